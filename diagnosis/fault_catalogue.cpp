@@ -1,0 +1,94 @@
+#include "diagnosis/fault_catalogue.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+
+#include "diagnosis/error.h"
+
+namespace fdi {
+namespace {
+
+constexpr std::array<FaultFacts, kFaultCount> kFaults{{
+    {"f1", "valve clogging", "F1", false},
+    {"f2", "plug or seat sedimentation", "", false},
+    {"f3", "plug or seat erosion", "F2", false},
+    {"f4", "increased friction of valve or bushing", "", true},
+    {"f5", "external leakage", "", false},
+    {"f6", "internal leakage", "F3", false},
+    {"f7", "medium evaporation or critical flow", "F4", false},
+    {"f8", "twisted piston rod", "", false},
+    {"f9", "housing or terminals leak air", "", false},
+    {"f10", "diaphragm perforation", "", false},
+    {"f11", "spring fault", "", false},
+    {"f12", "electro-pneumatic transducer fault", "", true},
+    {"f13", "rod displacement sensor fault", "", true},
+    {"f14", "positioner pressure sensor fault", "", false},
+    {"f15", "positioner feedback fault", "", false},
+    {"f16", "supply pressure drop", "", false},
+    {"f17", "unexpected pressure change across the valve", "", true},
+    {"f18", "bypass valve open", "", false},
+    {"f19", "flow sensor fault", "F5", true},
+}};
+
+constexpr std::array<int, 5> kPaperFaults{1, 3, 6, 7, 19};
+
+std::optional<int> NumberAfter(std::string_view text, std::string_view prefix) {
+  if (!text.starts_with(prefix)) {
+    return std::nullopt;
+  }
+  text.remove_prefix(prefix.size());
+  int number = 0;
+  const auto [end, error] =
+      std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{} || end != text.data() + text.size()) {
+    return std::nullopt;
+  }
+  return number;
+}
+
+}  // namespace
+
+const FaultFacts& FaultFactsOf(int fault) {
+  Require(fault >= 1 && fault <= kFaultCount, "fault must be in 1..19");
+  return kFaults[static_cast<std::size_t>(fault - 1)];
+}
+
+std::string FaultName(int fault) {
+  if (fault == 0) {
+    return "normal";
+  }
+  if (fault < 0 || fault > kFaultCount) {
+    return "unknown";
+  }
+  return std::string(FaultFactsOf(fault).name);
+}
+
+std::optional<int> ParseFault(std::string_view name) {
+  std::string lower(name);
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) {
+    return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  });
+  if (const auto paper = NumberAfter(lower, "paper")) {
+    if (*paper >= 1 && *paper <= 5) {
+      return kPaperFaults[static_cast<std::size_t>(*paper - 1)];
+    }
+    return std::nullopt;
+  }
+  const auto number = NumberAfter(lower, "f");
+  if (number && *number >= 1 && *number <= kFaultCount) {
+    return number;
+  }
+  return std::nullopt;
+}
+
+int RequireFault(std::string_view name) {
+  if (const auto fault = ParseFault(name)) {
+    return *fault;
+  }
+  throw ConfigError("unknown fault '" + std::string(name) +
+                    "': expected f1..f19 or paper1..paper5");
+}
+
+}  // namespace fdi

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "diagnosis/membership.h"
+#include "diagnosis/sample.h"
+#include "diagnosis/ts_model.h"
+
+namespace fdi {
+
+inline constexpr int kMaxFaults = 64;
+inline constexpr int kMaxObservers = 128;
+inline constexpr int kMaxChannels = 16;
+
+/// Fit of one channel model on validation data it was not fitted to, run as
+/// the engine runs it.
+struct ValidationFigures {
+  double mse{0.0};   ///< Mean squared residual [unit²].
+  double vaf{0.0};   ///< Variance accounted for [%]; blind to an offset.
+  double bias{0.0};  ///< Mean residual y − ŷ [unit].
+  std::int64_t samples{0};
+};
+
+/// A residual channel of the model set: which output it watches.
+struct ChannelSpec {
+  std::string name;  ///< "X", "F", ...
+  Signal output{Signal::kX};
+  double lower_threshold{0.0};  ///< The normal residual r = y − ŷ below this
+  double upper_threshold{0.0};  ///< or above this is abnormal [unit].
+};
+
+/// One channel of one observer.
+struct ChannelObserver {
+  TsModel model;
+  Trapezoid membership;          ///< Over r = y − ŷ [unit of the output].
+  double residual_sd{1.0};       ///< On validation data [unit], > 0.
+  double correlation_time{1.0};  ///< Of the residual [samples], ≥ 1.
+  ValidationFigures validation;
+};
+
+/// One observer: normal operation (fault 0) or one fault condition.
+struct Observer {
+  std::string name;      ///< "normal", "f19 0.50".
+  int fault{0};          ///< 0 = normal, else 1..19.
+  double strength{0.0};  ///< Of the condition it was trained on; signed.
+  std::vector<ChannelObserver> channels;  ///< One per ModelSet::channels.
+};
+
+/// Settings of detection and isolation; see docs/method.md.
+struct DecisionParameters {
+  double isolation_threshold{0.7};  ///< T, on decision factors [-].
+  int detection_samples{2};         ///< n_d
+  int isolation_samples{20};        ///< t_k
+  double isolation_fraction{0.9};   ///< Share of t_k samples with d ≥ T.
+  int clearing_samples{60};         ///< t_c
+  int settling_samples{30};
+  double evidence_window{120.0};    ///< Memory of evidence [samples].
+  double evidence_core{3.0};        ///< Behind the best fault by up to this: 1,
+  double evidence_support{9.0};     ///< by more than this: 0 [log-likelihood].
+  double interpolation_error{0.2};  ///< Error of a prediction between two
+                                    ///< observers, per distance to the nearer.
+};
+
+/// The stored knowledge about one kind of valve: what the trainer writes, the
+/// monitor loads, and both run. Observer 0 is the normal one.
+struct ModelSet {
+  std::string name;
+  int version{0};                 ///< Given when stored, 1, 2, ...
+  std::uint64_t content_hash{0};  ///< Of the stored bytes, given when stored.
+  std::int64_t created_ns{0};
+  std::string software;  ///< Version and revision of the trainer.
+  std::string preset;    ///< "paper", ...
+  double sample_period_s{1.0};
+  FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  SignalRange trained_cv{0.0, 100.0};  ///< Commands seen in training [%].
+  DecisionParameters decision;
+  std::vector<ChannelSpec> channels;
+  std::vector<Observer> observers;
+  std::vector<int> faults;  ///< Numbers, ascending; index = bit in FaultSet.
+  std::vector<std::vector<int>> groups;  ///< Faults it cannot tell apart.
+  std::vector<int> undetectable;         ///< Faults that look normal.
+  std::vector<std::string> training_runs;
+  double threshold_hours{0.0};  ///< Fault-free hours behind the thresholds.
+  double false_alarms_per_hour{1e-3};  ///< The rate they are set for.
+};
+
+/// A set of faults as bits: bit i stands for ModelSet::faults[i].
+using FaultSet = std::uint64_t;
+
+/// Index of `fault` in `models.faults`, or -1.
+int FaultIndex(const ModelSet& models, int fault);
+
+/// "f3|f6"; "unknown" for the empty set.
+std::string FaultSetName(const ModelSet& models, FaultSet faults);
+
+/// The signals that some channel of the set reads, its output included.
+SignalMask RequiredSignals(const ModelSet& models);
+
+/// @throws DataError naming the first thing that makes the set unusable.
+void Validate(const ModelSet& models);
+
+}  // namespace fdi

@@ -1,0 +1,74 @@
+#include "diagnosis/sample.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace fdi {
+namespace {
+
+struct SignalFacts {
+  std::string_view name;
+  std::string_view unit;
+  SignalRange range;
+};
+
+// Ranges: twice the usual transmitter span of a feedwater valve, so that a
+// saturated reading passes and a broken one does not.
+constexpr std::array<SignalFacts, kSignalCount> kFacts{{
+    {"CV", "%", {-10.0, 110.0}},
+    {"P1", "kPa", {-100.0, 8000.0}},
+    {"P2", "kPa", {-100.0, 8000.0}},
+    {"T1", "degC", {-50.0, 400.0}},
+    {"X", "%", {-10.0, 110.0}},
+    {"F", "", {-50.0, 1000.0}},
+    {"SP", "%", {-10.0, 110.0}},
+    {"CVI", "-", {-2.0, 2.0}},
+    {"Ps", "kPa", {-100.0, 2000.0}},
+    {"Pz", "kPa", {-100.0, 2000.0}},
+}};
+
+bool EqualIgnoringCase(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
+    return std::tolower(static_cast<unsigned char>(x)) ==
+           std::tolower(static_cast<unsigned char>(y));
+  });
+}
+
+}  // namespace
+
+std::string_view SignalName(Signal signal) {
+  return kFacts[Index(signal)].name;
+}
+
+std::string_view SignalUnit(Signal signal) {
+  return kFacts[Index(signal)].unit;
+}
+
+std::optional<Signal> ParseSignal(std::string_view name) {
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    if (EqualIgnoringCase(name, kFacts[i].name)) {
+      return static_cast<Signal>(i);
+    }
+  }
+  return std::nullopt;
+}
+
+SignalRange PlausibleRange(Signal signal) {
+  return kFacts[Index(signal)].range;
+}
+
+std::string_view FlowUnitName(FlowUnit unit) {
+  return unit == FlowUnit::kM3PerHour ? "m3/h" : "t/h";
+}
+
+std::optional<FlowUnit> ParseFlowUnit(std::string_view name) {
+  if (name == "m3/h") {
+    return FlowUnit::kM3PerHour;
+  }
+  if (name == "t/h") {
+    return FlowUnit::kTPerHour;
+  }
+  return std::nullopt;
+}
+
+}  // namespace fdi

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace fdi {
+
+/// The signals a valve may deliver, in the order of every array of signals.
+/// Units: positions and commands in % of closing, pressures in kPa (absolute
+/// process pressures), temperature in °C, flow as the transmitter reads it.
+enum class Signal : std::uint8_t {
+  kCv,   ///< Command to the positioner [%].
+  kP1,   ///< Pressure before the valve [kPa].
+  kP2,   ///< Pressure behind the valve [kPa].
+  kT1,   ///< Temperature before the valve [°C].
+  kX,    ///< Rod position [%].
+  kF,    ///< Flow [m³/h or t/h, see FlowUnit].
+  kSp,   ///< Set point of the loop [%].
+  kCvi,  ///< Positioner output [-1, 1].
+  kPs,   ///< Actuator chamber pressure [kPa].
+  kPz,   ///< Supply pressure [kPa].
+};
+inline constexpr std::size_t kSignalCount = 10;
+
+constexpr std::size_t Index(Signal signal) {
+  return static_cast<std::size_t>(signal);
+}
+
+/// A set of signals as bits 1 << Index(signal).
+using SignalMask = std::uint16_t;
+
+constexpr SignalMask MaskOf(Signal signal) {
+  return static_cast<SignalMask>(1U << Index(signal));
+}
+
+/// CV, P1, P2, T1, X and F: the basic measurements of the benchmark.
+inline constexpr SignalMask kBasicSignals = 0x3F;
+
+/// What a transmitter can read: values beyond it never reach an observer.
+struct SignalRange {
+  double minimum;
+  double maximum;
+};
+
+/// "CV", "P1", ...
+std::string_view SignalName(Signal signal);
+/// "%", "kPa", "degC"; for kF the unit of the flow, see FlowUnitName().
+std::string_view SignalUnit(Signal signal);
+/// The signal called `name`, in any case.
+std::optional<Signal> ParseSignal(std::string_view name);
+/// The physically possible readings of `signal`, for both flow units.
+SignalRange PlausibleRange(Signal signal);
+
+enum class SignalQuality : std::uint8_t { kGood, kUncertain, kBad };
+
+enum class ValveMode : std::uint8_t {
+  kAuto,
+  kManual,
+  kInhibited,
+  kOutOfService,
+  kCalibrating
+};
+
+enum class FlowUnit : std::uint8_t { kM3PerHour, kTPerHour };
+
+/// "m3/h" or "t/h".
+std::string_view FlowUnitName(FlowUnit unit);
+std::optional<FlowUnit> ParseFlowUnit(std::string_view name);
+
+/// One reading of all transmitters of one valve.
+struct Sample {
+  std::int64_t stamp_ns{0};    ///< UTC of sampling.
+  std::uint64_t source_id{0};  ///< Random, new at each start of a publisher.
+  std::uint64_t seq{0};        ///< Counts the samples of one source.
+  std::array<double, kSignalCount> values{};  ///< By Index(Signal).
+  SignalMask present{0};
+  std::array<SignalQuality, kSignalCount> quality{};
+  ValveMode mode{ValveMode::kAuto};
+  FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  std::uint32_t epoch{0};  ///< Replacements and recalibrations; 0 unknown.
+
+  double operator[](Signal signal) const { return values[Index(signal)]; }
+  bool Has(Signal signal) const { return (present & MaskOf(signal)) != 0; }
+  void Set(Signal signal, double value) {
+    values[Index(signal)] = value;
+    present = static_cast<SignalMask>(present | MaskOf(signal));
+  }
+};
+
+/// The truth beside a simulated or labelled sample; never seen by an engine.
+struct FaultTruth {
+  int fault{0};          ///< 1..19, 0 = none acting.
+  double strength{0.0};  ///< Signed; 0 while the fault does not act.
+};
+
+/// A sample and its truth, where it is known.
+struct LabelledSample {
+  Sample sample;
+  std::optional<FaultTruth> truth;
+};
+
+}  // namespace fdi

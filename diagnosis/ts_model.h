@@ -1,0 +1,81 @@
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/sample.h"
+
+namespace fdi {
+
+/// One antecedent set: a two-sided Gaussian with a core,
+///
+///     log μ(x) = −½ ((c₁ − x)/w₁)²  for x < c₁,
+///                0                  on [c₁, c₂],
+///                −½ ((x − c₂)/w₂)²  for x > c₂.
+///
+/// An infinite width is a shoulder. All in the unit of the regressor.
+struct FuzzySet {
+  double left_center{0.0};   ///< c₁
+  double right_center{0.0};  ///< c₂ ≥ c₁
+  double left_width{1.0};    ///< w₁ > 0
+  double right_width{1.0};   ///< w₂ > 0
+};
+
+/// x_j = signal(k − lag). Lag 0 is the present sample.
+struct Regressor {
+  Signal signal{Signal::kCv};
+  int lag{0};
+
+  bool operator==(const Regressor&) const = default;
+};
+
+/// R_i: if x_1 is A_i1 and ... then y_i = a_iᵀx + b_i.
+struct TsRule {
+  std::vector<FuzzySet> antecedents;  ///< One per regressor.
+  std::vector<double> slopes;         ///< a_i, one per regressor.
+  double intercept{0.0};              ///< b_i [unit of the output].
+  double data_share{0.0};  ///< Share of the training data, sums to 1.
+};
+
+/// A multiple-input single-output Takagi-Sugeno model,
+///
+///     ŷ = Σ β_i y_i / Σ β_i,   β_i = Π_j μ_Aij(x_j).
+///
+/// In a parallel model a regressor on the output itself (lag ≥ 1) reads the
+/// model's own past predictions, otherwise the measured past.
+struct TsModel {
+  Signal output{Signal::kX};
+  bool parallel{true};
+  std::vector<Regressor> regressors;
+  std::vector<double> regressor_min;  ///< Range of the training data, one
+  std::vector<double> regressor_max;  ///< per regressor.
+  double output_min{0.0};             ///< Predictions are kept within
+  double output_max{0.0};             ///< [output_min, output_max].
+  std::vector<TsRule> rules;
+};
+
+struct TsPrediction {
+  double value{0.0};
+  bool covered{true};  ///< False where every β_i < 1e-8: nearest rule.
+};
+
+/// ŷ for the regressor values `x` (as many as model.regressors). The exponents
+/// of a rule are summed first, one exp per rule; the largest is taken out, so
+/// that far from all rules the nearest one answers. Does not allocate.
+TsPrediction Evaluate(const TsModel& model, const double* x);
+
+/// The largest lag of the regressors.
+int LongestLag(const TsModel& model);
+
+/// The signals that the model reads from the transmitters.
+SignalMask RequiredSignals(const TsModel& model);
+
+/// @throws DataError naming `where` and the first thing that makes the model
+///   unusable: sizes that differ, a number that is not finite, no rule, a lag
+///   beyond kMaxLag, a lag of 0 on the output itself.
+void Validate(const TsModel& model, const char* where);
+
+inline constexpr int kMaxLag = 16;
+inline constexpr int kMaxRegressors = 16;
+inline constexpr int kMaxRules = 32;
+
+}  // namespace fdi

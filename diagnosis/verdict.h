@@ -1,0 +1,108 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "diagnosis/model_set.h"
+
+namespace fdi {
+
+/// What became of a received sample. Only kAccepted reaches the observers.
+enum class Intake : std::uint8_t {
+  kAccepted,
+  kRepeat,      ///< seq seen before from this source.
+  kLate,        ///< seq or stamp before the newest one of this source.
+  kSuperseded,  ///< A newer source speaks for this valve.
+  kBadQuality,  ///< A required signal has quality BAD.
+  kNotFinite,   ///< A required signal is NaN or infinite.
+  kRange,       ///< A required signal is beyond what a transmitter can read.
+  kUnit,        ///< Flow in another unit than the model set's.
+  kPeriod,      ///< Stamps are not the model set's sample period apart.
+};
+inline constexpr int kIntakeCount = 9;
+
+/// Beside the state: may the diagnosis be relied upon?
+enum class Quality : std::uint8_t {
+  kLive,
+  kStale,  ///< No sample for 3 periods; a label of the adapter's clock.
+  kBadInput,
+  kSettling,
+  kInhibited,
+  kUncovered,
+  kModelUnsuited,
+  kUnassigned,
+};
+
+enum class State : std::uint8_t { kNormal, kDetected, kIsolated };
+
+enum class TransitionKind : std::uint8_t {
+  kDetected,
+  kIsolated,
+  kReisolated,
+  kCleared,
+  kClosed,
+};
+
+enum class EndReason : std::uint8_t {
+  kNone,
+  kCleared,
+  kStreamEnded,
+  kStaleTimeout,
+  kModelChanged,
+  kSuperseded,
+  kUnknown,
+};
+
+/// A step in the life of an episode.
+struct Transition {
+  TransitionKind kind{TransitionKind::kDetected};
+  std::int64_t stamp_ns{0};
+  /// Key of the episode: stamp of the first abnormal sample of its detection.
+  std::int64_t detection_stamp_ns{0};
+  FaultSet faults{0};    ///< The isolated set, empty until isolated.
+  double factor{0.0};    ///< Largest factor of the set, or of any fault.
+  double strength{0.0};  ///< Estimated, of the fault with that factor.
+  EndReason reason{EndReason::kNone};  ///< Of kClosed.
+};
+
+/// Everything the engine says about one sample.
+struct Verdict {
+  std::int64_t stamp_ns{0};
+  std::uint64_t source_id{0};
+  std::uint64_t seq{0};
+  Intake intake{Intake::kAccepted};
+  bool initialised{false};  ///< Observers were re-initialised at this sample.
+  Quality quality{Quality::kSettling};
+  State state{State::kNormal};
+  bool detected{false};    ///< An episode is open.
+  double confidence{0.0};  ///< Share of the channels that could vote.
+  /// r = y − ŷ of the normal observer per channel; NaN where it abstains.
+  std::array<double, kMaxChannels> residuals{};
+  double normal_factor{0.0};                             ///< d_0
+  std::array<double, kMaxFaults> fault_factors{};        ///< d by fault index.
+  std::array<double, kMaxFaults> strengths{};            ///< By fault index.
+  std::array<double, kMaxObservers> observer_factors{};  ///< By observer.
+  FaultSet isolated{0};
+  std::array<Transition, 4> transitions{};
+  int transition_count{0};
+
+  std::span<const Transition> Transitions() const {
+    return {transitions.data(), static_cast<std::size_t>(transition_count)};
+  }
+};
+
+std::string_view IntakeName(Intake intake);            ///< "accepted", ...
+std::string_view QualityName(Quality quality);         ///< "LIVE", ...
+std::string_view StateName(State state);               ///< "NORMAL", ...
+std::string_view TransitionName(TransitionKind kind);  ///< "DETECTED", ...
+std::string_view EndReasonName(EndReason reason);      ///< "cleared", ...
+
+/// 64-bit FNV-1a over valve, source and detection stamp: recording the same
+/// episode twice meets the same id.
+std::uint64_t EpisodeId(std::string_view valve_id, std::uint64_t source_id,
+                        std::int64_t detection_stamp_ns);
+
+}  // namespace fdi
