@@ -59,8 +59,6 @@ struct DecisionParameters {
   double evidence_window{120.0};    ///< Memory of evidence [samples].
   double evidence_core{3.0};        ///< Behind the best fault by up to this: 1,
   double evidence_support{9.0};     ///< by more than this: 0 [log-likelihood].
-  double interpolation_error{0.2};  ///< Error of a prediction between two
-                                    ///< observers, per distance to the nearer.
 };
 
 /// The stored knowledge about one kind of valve: what the trainer writes, the
@@ -79,6 +77,9 @@ struct ModelSet {
   std::vector<ChannelSpec> channels;
   std::vector<Observer> observers;
   std::vector<int> faults;  ///< Numbers, ascending; index = bit in FaultSet.
+  /// κ, faults × channels, row by row: a prediction between two observers of
+  /// a fault errs by κ times what it differs from the nearer one [-].
+  std::vector<double> interpolation_errors;
   std::vector<std::vector<int>> groups;  ///< Faults it cannot tell apart.
   std::vector<int> undetectable;         ///< Faults that look normal.
   std::vector<std::string> training_runs;
