@@ -1,0 +1,267 @@
+#include "storage/database.h"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "diagnosis/error.h"
+#include "storage/data_directory.h"
+#include "storage/exclusive_lock.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::storage {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::string_view kFirst =
+    "CREATE TABLE t (id INTEGER PRIMARY KEY, v REAL, s TEXT, b BLOB) STRICT;"
+    "CREATE TABLE child (parent INTEGER NOT NULL REFERENCES t (id)) STRICT;";
+constexpr std::string_view kSecond =
+    "ALTER TABLE t ADD COLUMN extra INTEGER;"
+    "UPDATE t SET extra = id * 10;";
+
+Schema SchemaOf(int version, std::int32_t id = 0x1234) {
+  Schema schema{"test", id, Synchronous::kNormal, {kFirst, kSecond}};
+  schema.migrations.resize(static_cast<std::size_t>(version));
+  return schema;
+}
+
+class DatabaseTest : public ::testing::Test {
+ protected:
+  std::string MessageOf(const Schema& schema, Access access) {
+    try {
+      const Database database(file_, schema, access);
+    } catch (const DataError& error) {
+      return error.what();
+    }
+    return "no DataError";
+  }
+  void Insert(Database& database, int id) {
+    Transaction transaction(database);
+    database.Run("INSERT INTO t (id) VALUES (?)", id);
+    transaction.Commit();
+  }
+
+  TemporaryDirectory directory_;
+  std::filesystem::path file_{directory_.path() / "test.db"};
+};
+
+TEST_F(DatabaseTest, EveryTypeReadsBackAsItWasBound) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  const std::vector<std::byte> blob{std::byte{0}, std::byte{255}};
+  {
+    Transaction transaction(database);
+    database.Run("INSERT INTO t VALUES (?, ?, ?, ?)", ~std::uint64_t{0}, 5e-324,
+                 "text", std::span<const std::byte>(blob));
+    database.Run("INSERT INTO t VALUES (?, ?, ?, ?)", 2, std::nullopt,
+                 std::optional<std::string>(), std::span<const std::byte>());
+    transaction.Commit();
+  }
+
+  Statement rows = database.Prepare("SELECT * FROM t ORDER BY id");
+  ASSERT_TRUE(rows.Step());
+  EXPECT_EQ(rows.Uint64(0), ~std::uint64_t{0});
+  EXPECT_EQ(rows.Double(1), 5e-324);
+  EXPECT_EQ(rows.Text(2), "text");
+  EXPECT_EQ(rows.Blob(3), blob);
+  ASSERT_TRUE(rows.Step());
+  EXPECT_TRUE(rows.IsNull(1));
+  EXPECT_EQ(rows.OptionalText(2), std::nullopt);
+  EXPECT_FALSE(rows.IsNull(3));
+  EXPECT_FALSE(rows.Step());
+}
+
+TEST_F(DatabaseTest, TransactionRollsBackUnlessCommitted) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  {
+    Transaction transaction(database);
+    database.Run("INSERT INTO t (id) VALUES (1)");
+  }
+  EXPECT_EQ(database.QueryInt64("SELECT count(*) FROM t"), 0);
+}
+
+TEST_F(DatabaseTest, WritingOutsideATransactionIsALogicError) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  EXPECT_THROW(database.Run("DELETE FROM t"), std::logic_error);
+}
+
+TEST_F(DatabaseTest, ReaderCannotWriteAndNeedsTheFile) {
+  EXPECT_THAT(MessageOf(SchemaOf(1), Access::kReader),
+              HasSubstr("No such file"));
+  const Database writer(file_, SchemaOf(1), Access::kWriter);
+
+  Database reader(file_, SchemaOf(1), Access::kReader);
+  EXPECT_THROW(Transaction{reader}, std::logic_error);
+  EXPECT_THROW(reader.Checkpoint(), std::logic_error);
+}
+
+TEST_F(DatabaseTest, ForeignKeysHoldAndStrictTablesRefuseText) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  Transaction transaction(database);
+  EXPECT_THROW(database.Run("INSERT INTO child VALUES (7)"), SqliteError);
+  EXPECT_THROW(database.Run("INSERT INTO t (v) VALUES ('x')"), SqliteError);
+}
+
+TEST_F(DatabaseTest, MigrationKeepsRowsAndLeavesTheOldFileBeside) {
+  {
+    Database old(file_, SchemaOf(1), Access::kWriter);
+    Insert(old, 4);
+  }
+  EXPECT_THAT(MessageOf(SchemaOf(2), Access::kReader),
+              HasSubstr("fdi-store migrate"));
+
+  Database migrated(file_, SchemaOf(2), Access::kOccasionalWriter);
+  EXPECT_EQ(migrated.version(), 2);
+  EXPECT_EQ(migrated.QueryInt64("SELECT extra FROM t"), 40);
+  ASSERT_TRUE(migrated.migration_backup());
+  Database backup(*migrated.migration_backup(), SchemaOf(1), Access::kReader);
+  EXPECT_EQ(backup.QueryInt64("SELECT id FROM t"), 4);
+}
+
+TEST_F(DatabaseTest, FailedMigrationLeavesTheOldVersion) {
+  {
+    Database old(file_, SchemaOf(1), Access::kWriter);
+    Insert(old, 4);
+  }
+  Schema broken = SchemaOf(1);
+  broken.migrations.push_back("DELETE FROM t; SELECT nothing FROM nowhere;");
+
+  EXPECT_THROW(Database(file_, broken, Access::kWriter), SqliteError);
+  Database after(file_, SchemaOf(1), Access::kWriter);
+  EXPECT_EQ(after.QueryInt64("SELECT id FROM t"), 4);
+}
+
+TEST_F(DatabaseTest, NewerVersionIsRefusedNamingFileAndBothVersions) {
+  { const Database newer(file_, SchemaOf(2), Access::kWriter); }
+  for (const Access access :
+       {Access::kWriter, Access::kOccasionalWriter, Access::kReader}) {
+    const std::string message = MessageOf(SchemaOf(1), access);
+    EXPECT_THAT(message, HasSubstr(file_.string()));
+    EXPECT_THAT(message, HasSubstr("version 2 is newer"));
+    EXPECT_THAT(message, HasSubstr("up to 1"));
+  }
+}
+
+TEST_F(DatabaseTest, AnotherKindOfFileIsRefused) {
+  { const Database other(file_, SchemaOf(1, 0x77), Access::kWriter); }
+  EXPECT_THAT(MessageOf(SchemaOf(1), Access::kWriter),
+              HasSubstr("application_id 119"));
+}
+
+TEST_F(DatabaseTest, FileThatIsNoDatabaseIsRefusedAndLeftAlone) {
+  const std::string text(5000, 'x');
+  std::ofstream(file_) << text;
+
+  EXPECT_THAT(MessageOf(SchemaOf(1), Access::kWriter),
+              HasSubstr("file is not a database"));
+  EXPECT_EQ(std::filesystem::file_size(file_), text.size());
+}
+
+TEST_F(DatabaseTest, UnreachablePathsAreNamedWithTheReason) {
+  std::ofstream(file_) << "x";
+  const std::filesystem::path below = file_ / "sub" / "runs.db";
+  try {
+    const Database database(below, SchemaOf(1), Access::kWriter);
+    ADD_FAILURE();
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), HasSubstr(below.string()));
+    EXPECT_THAT(error.what(), HasSubstr("Not a directory"));
+  }
+  EXPECT_THROW(EnsureExists({file_ / "data"}), DataError);
+  file_ = directory_.path() / "missing" / "runs.db";
+  EXPECT_THAT(MessageOf(SchemaOf(1), Access::kWriter),
+              HasSubstr("missing: No such file"));
+}
+
+TEST_F(DatabaseTest, DataVersionTellsOfTheCommitsOfOthersOnly) {
+  Database writer(file_, SchemaOf(1), Access::kWriter);
+  Database reader(file_, SchemaOf(1), Access::kReader);
+  const std::int64_t before = reader.DataVersion();
+  EXPECT_EQ(reader.DataVersion(), before);
+
+  Insert(writer, 1);
+  EXPECT_NE(reader.DataVersion(), before);
+}
+
+TEST_F(DatabaseTest, CheckpointTruncatesTheLog) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  Insert(database, 1);
+  EXPECT_GT(database.WalBytes(), 0U);
+
+  EXPECT_TRUE(database.Checkpoint());
+  EXPECT_EQ(database.WalBytes(), 0U);
+  EXPECT_TRUE(database.Check().empty());
+}
+
+TEST_F(DatabaseTest, CheckFindsARowWithoutItsParent) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  database.Prepare("PRAGMA foreign_keys = OFF").Step();
+  {
+    Transaction transaction(database);
+    database.Run("INSERT INTO child VALUES (7)");
+    transaction.Commit();
+  }
+  EXPECT_THAT(database.Check(),
+              ::testing::ElementsAre(HasSubstr("table child has no parent")));
+}
+
+// Two processes that add to one row: without the gate and BEGIN IMMEDIATE an
+// update would be lost or refused.
+TEST_F(DatabaseTest, WritersOfTwoProcessesTakeTurns) {
+  constexpr int kRounds = 100;
+  {
+    Database database(file_, SchemaOf(1), Access::kWriter);
+    Insert(database, 1);
+    Transaction transaction(database);
+    database.Run("UPDATE t SET v = 0");
+    transaction.Commit();
+  }
+  const auto add = [&](Access access) {
+    Database database(file_, SchemaOf(1), access);
+    for (int i = 0; i < kRounds; ++i) {
+      Transaction transaction(database);
+      database.Run("UPDATE t SET v = v + 1");
+      transaction.Commit();
+    }
+  };
+  const pid_t child = fork();
+  if (child == 0) {
+    try {
+      add(Access::kOccasionalWriter);
+      _exit(0);
+    } catch (...) {
+      _exit(1);
+    }
+  }
+  add(Access::kWriter);
+  int status = -1;
+  waitpid(child, &status, 0);
+
+  EXPECT_EQ(status, 0);
+  Database reader(file_, SchemaOf(1), Access::kReader);
+  EXPECT_EQ(reader.QueryInt64("SELECT CAST(v AS INTEGER) FROM t"), 2 * kRounds);
+}
+
+TEST(ExclusiveLockTest, SecondHolderIsRefusedWithThePidOfTheFirst) {
+  const TemporaryDirectory directory;
+  const auto path = directory.path() / "history.db.lock";
+  {
+    const ExclusiveLock first(path, "monitoring");
+    try {
+      const ExclusiveLock second(path, "monitoring");
+      ADD_FAILURE();
+    } catch (const DataError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(std::to_string(getpid())));
+      EXPECT_THAT(error.what(), HasSubstr("monitoring"));
+      EXPECT_THAT(error.what(), HasSubstr(path.string()));
+    }
+  }
+  EXPECT_NO_THROW(ExclusiveLock(path, "monitoring"));
+}
+
+}  // namespace
+}  // namespace fdi::storage
