@@ -1,0 +1,155 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <stop_token>
+#include <string>
+
+#include "idl/participant.h"
+#include "idl/wire.h"
+
+namespace fdi::idl {
+
+/// Which QoS of the topic; both ends of a topic should agree.
+enum class Profile {
+  kLive,        ///< Of system.md: keeps the newest, never waits for a reader.
+  kLossless,    ///< KEEP_ALL: a slow reader slows the writer down.
+  kBestEffort,  ///< ValveSample only: no retransmission.
+};
+
+struct PublisherOptions {
+  Profile profile{Profile::kLive};
+  int valves{0};  ///< How many this publisher speaks for; 0: max_valves.
+};
+
+enum class WriteResult {
+  kSent,
+  kNotSent,        ///< Stopped or timed out while the reader was behind.
+  kTooManyValves,  ///< Beyond PublisherOptions::valves.
+};
+
+struct PublisherStatus {
+  std::uint64_t written{0};
+  std::uint64_t retries{0};       ///< Times a full history made Write() wait.
+  std::uint64_t refused{0};       ///< Writes answered with kTooManyValves.
+  std::uint64_t incompatible{0};  ///< Readers with a QoS that cannot be met.
+  int matched{0};                 ///< Readers now.
+};
+
+/// Writes one topic. Thread safe, except that the messages of one valve must
+/// come from one thread at a time to have an order.
+///
+/// Message is one of the five of wire.h; there are no others.
+template <typename Message>
+class Publisher {
+ public:
+  /// @throws TransportError if the library refuses the endpoint.
+  explicit Publisher(Participant& participant,
+                     const PublisherOptions& options = {});
+  ~Publisher();
+  Publisher(const Publisher&) = delete;
+  Publisher& operator=(const Publisher&) = delete;
+
+  /// Sends `message`. With kLossless it waits until there is room, a stop is
+  /// requested or `timeout` has passed; otherwise it does not wait.
+  /// @throws DataError naming what in `message` is too long or out of range.
+  WriteResult Write(
+      const Message& message, std::stop_token stop = {},
+      std::chrono::milliseconds timeout = std::chrono::milliseconds::max());
+
+  /// Ends the stream of the instance of `message` (for a valve: no samples will
+  /// follow). Only the key of `message` counts. Nothing if never written.
+  void Dispose(const Message& message);
+
+  /// @returns whether at least `count` readers are matched in time.
+  bool WaitForReaders(int count, std::chrono::milliseconds timeout) const;
+  /// @returns whether all matched readers have all that was written in time.
+  bool WaitForAcknowledged(std::chrono::milliseconds timeout);
+  PublisherStatus status() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What DDS says about a received message.
+struct Reception {
+  std::int64_t sent_ns{0};      ///< UTC at the writer.
+  std::int64_t received_ns{0};  ///< UTC here.
+  std::uint64_t writer_id{0};   ///< Differs between writers of one domain.
+};
+
+/// What became of the messages. Nothing is lost in silence.
+struct SubscriberStatus {
+  std::uint64_t received{0};     ///< Messages handed out.
+  std::uint64_t ended{0};        ///< Ended instances handed out.
+  std::uint64_t lost{0};         ///< Will never come: overwritten or dropped.
+  std::uint64_t undecodable{0};  ///< A value no publisher of ours sends.
+  /// Messages of valves beyond max_valves: lost, and how many valves (exact
+  /// up to 65536).
+  std::uint64_t rejected_instances{0};
+  std::uint64_t refused_valves{0};
+  /// Full: sent again by a reliable KEEP_ALL writer, so back-pressure rather
+  /// than loss; what a live writer overwrites meanwhile is counted as lost.
+  std::uint64_t rejected_samples{0};
+  std::uint64_t incompatible{0};  ///< Writers that offer less than is asked.
+  int matched{0};                 ///< Writers now.
+  int alive{0};                   ///< Of these, writers that show life.
+};
+
+template <typename Message>
+struct Handlers {
+  std::function<void(const Message&, const Reception&)> on_message;
+  /// The publisher ended this instance. Only the key of the message is set.
+  std::function<void(const Message&, const Reception&)> on_ended;
+};
+
+/// Reads one topic. The messages of one valve from one writer come in order;
+/// between valves there is no order. One thread takes; status() and
+/// Interrupt() are thread safe.
+template <typename Message>
+class Subscriber {
+ public:
+  /// @throws TransportError if the library refuses the endpoint.
+  explicit Subscriber(Participant& participant,
+                      Profile profile = Profile::kLive);
+  ~Subscriber();
+  Subscriber(const Subscriber&) = delete;
+  Subscriber& operator=(const Subscriber&) = delete;
+
+  /// Waits up to `timeout` for messages, then hands out what is there, at most
+  /// `limit`. What is not taken stays; once too much has stayed the writers
+  /// wait (lossless) or overwrite (live).
+  /// @returns how many messages and ends were handed out.
+  /// @throws what a handler throws; the rest of its batch (at most 256) is
+  ///   counted as lost.
+  int Take(const Handlers<Message>& handlers, std::chrono::milliseconds timeout,
+           int limit = std::numeric_limits<int>::max());
+
+  /// Makes a Take() that waits, or the next one, return at once.
+  void Interrupt();
+
+  /// @returns whether at least `count` writers are matched in time.
+  bool WaitForWriters(int count, std::chrono::milliseconds timeout) const;
+  SubscriberStatus status() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+extern template class Publisher<ValveSampleMessage>;
+extern template class Publisher<DecisionMessage>;
+extern template class Publisher<FaultEventMessage>;
+extern template class Publisher<ModelSetInfoMessage>;
+extern template class Publisher<MonitorStatusMessage>;
+extern template class Subscriber<ValveSampleMessage>;
+extern template class Subscriber<DecisionMessage>;
+extern template class Subscriber<FaultEventMessage>;
+extern template class Subscriber<ModelSetInfoMessage>;
+extern template class Subscriber<MonitorStatusMessage>;
+
+}  // namespace fdi::idl

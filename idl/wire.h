@@ -1,0 +1,123 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+#include "diagnosis/sample.h"
+#include "diagnosis/verdict.h"
+
+/// What goes over the wire, as plain structs: one per topic `fdi/v1/...`.
+/// Doubles arrive bit for bit as they were sent, NaN included.
+namespace fdi::idl {
+
+/// Lengths in bytes; a longer text is refused, never cut.
+inline constexpr std::size_t kMaxIdLength = 64;    ///< Valve, monitor, set.
+inline constexpr std::size_t kMaxNameLength = 32;  ///< Channel, counter.
+inline constexpr std::size_t kMaxTextLength = 255;
+inline constexpr std::size_t kMaxGroups = 64;
+inline constexpr std::size_t kMaxCounters = 64;
+
+/// Topic fdi/v1/ValveSample, key valve_id.
+struct ValveSampleMessage {
+  std::string valve_id;
+  Sample sample;
+};
+
+/// Topic fdi/v1/DecisionVector, key valve_id. Of the arrays in `verdict` only
+/// the first channel_count, fault_count and observer_count entries travel;
+/// transitions do not: they are FaultEvents.
+struct DecisionMessage {
+  std::string valve_id;
+  std::uint64_t model_hash{0};  ///< ModelSet::content_hash; 0 if unassigned.
+  int channel_count{0};
+  int fault_count{0};
+  int observer_count{0};
+  Verdict verdict;
+};
+
+/// One fault in the running of an episode.
+struct FaultCandidate {
+  int fault{0};          ///< 1..19
+  double factor{0.0};    ///< Decision factor at the transition [-].
+  double strength{0.0};  ///< Estimated; signed.
+  bool isolated{false};  ///< Member of the isolated set.
+};
+
+/// Topic fdi/v1/FaultEvent, key valve_id.
+struct FaultEventMessage {
+  std::string valve_id;
+  std::uint64_t source_id{0};
+  std::uint64_t seq{0};  ///< Of the sample at the transition, or the last one.
+  std::uint64_t episode_id{0};
+  Transition transition;
+  /// Largest factor first; see CandidatesOf(). Empty if nothing matches.
+  std::vector<FaultCandidate> candidates;
+  std::string model_set;
+  int model_version{0};
+  std::uint64_t model_hash{0};
+  bool persisted{false};  ///< Committed to the history before it was sent.
+};
+
+struct ObserverInfo {
+  std::string name;
+  int fault{0};  ///< 0 = normal.
+  double strength{0.0};
+};
+
+/// Topic fdi/v1/ModelSetInfo, key (model_set, model_hash): what the arrays of
+/// a DecisionVector with this hash mean.
+struct ModelSetInfoMessage {
+  std::string model_set;
+  std::uint64_t model_hash{0};
+  int version{0};
+  std::int64_t created_ns{0};
+  double sample_period_s{1.0};
+  FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  SignalMask required{0};
+  double isolation_threshold{0.0};  ///< T
+  double isolation_fraction{0.0};   ///< Share of the t_k samples with d ≥ T.
+  int detection_samples{0};         ///< n_d
+  int isolation_samples{0};         ///< t_k
+  int clearing_samples{0};          ///< t_c
+  int settling_samples{0};
+  std::vector<ChannelSpec> channels;
+  std::vector<int> faults;  ///< Bit i of a fault set stands for faults[i].
+  std::vector<ObserverInfo> observers;
+  std::vector<int> undetectable;
+  std::vector<std::vector<int>> groups;
+};
+
+enum class Health : std::uint8_t { kOk, kDegraded, kFailing };
+std::string_view HealthName(Health health);  ///< "OK", ...
+
+/// Topic fdi/v1/MonitorStatus, key monitor.
+struct MonitorStatusMessage {
+  std::string monitor;  ///< Unique name of the process, e.g. host:pid.
+  std::string software;
+  std::int64_t started_ns{0};
+  std::int64_t stamp_ns{0};
+  Health health{Health::kOk};
+  std::string text;  ///< Why it is not OK.
+  /// Totals since the start, by reason: ("received", 12), ("range", 3), ...
+  std::vector<std::pair<std::string, std::uint64_t>> counters;
+};
+
+/// @throws DataError unless `id` has 1..64 bytes and no NUL.
+void ValidateId(std::string_view id);
+
+/// The sizes of `models` beside the verdict. @throws as ValidateId().
+DecisionMessage MakeDecision(std::string valve_id, const ModelSet& models,
+                             const Verdict& verdict);
+
+/// The faults of `verdict` that are isolated, or whose factor is at least half
+/// the isolation threshold; largest factor first.
+std::vector<FaultCandidate> CandidatesOf(const ModelSet& models,
+                                         const Verdict& verdict);
+
+ModelSetInfoMessage Describe(const ModelSet& models);
+
+}  // namespace fdi::idl
