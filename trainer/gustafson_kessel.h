@@ -1,0 +1,63 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace fdi::trainer {
+
+/// Settings of FitGustafsonKessel(). The defaults suit unit-variance data.
+struct GustafsonKesselOptions {
+  int num_clusters{3};            ///< c ≥ 2.
+  double fuzziness{2.0};          ///< m > 1 [-]; larger is softer.
+  double tolerance{1e-3};         ///< Stop once max|ΔU| falls below it [-].
+  int min_iterations{10};         ///< Before the tolerance counts.
+  int max_iterations{200};        ///< ≥ 1.
+  double covariance_weight{0.0};  ///< γ in [0, 1]: share of F₀ in every Fᵢ.
+  double max_condition{1e12};     ///< β ≥ 1, bound on cond(Fᵢ) [-].
+  int num_starts{3};              ///< ≥ 1; the start with the lowest J wins.
+  unsigned seed{1};               ///< Of the random initial centers.
+};
+
+/// A fuzzy partition of N points in n dimensions into c clusters.
+struct FuzzyPartition {
+  Eigen::MatrixXd memberships;               ///< U, N×c; each row sums to 1.
+  Eigen::MatrixXd centers;                   ///< V, c×n; units of the data.
+  std::vector<Eigen::MatrixXd> covariances;  ///< F₁…F_c, each n×n, s.p.d.
+  double objective{0.0};                     ///< J(U, V).
+  int iterations{0};                         ///< Of the start that won.
+  bool converged{false};  ///< False if max_iterations came first.
+  bool separated{false};  ///< False if every start fell onto the trivial
+                          ///< partition: no μ exceeds 1/c by 0.1.
+};
+
+/// Clusters `points` with ellipsoids of equal volume by alternately minimizing
+///
+///     J(U,V) = Σᵢ Σₖ μₖᵢᵐ Dᵢₖ,  Dᵢₖ = (zₖ − vᵢ)ᵀ Aᵢ (zₖ − vᵢ),
+///     Aᵢ = det(Fᵢ)^(1/n) Fᵢ⁻¹,  Fᵢ = Σₖ μₖᵢᵐ (zₖ − vᵢ)(zₖ − vᵢ)ᵀ / Σₖ μₖᵢᵐ,
+///     μₖᵢ = 1 / Σⱼ (Dᵢₖ / Dⱼₖ)^(1/(m−1)),
+///
+/// after [Gustafson & Kessel, 1978]. In every iteration Fᵢ is replaced by
+/// (1 − γ) Fᵢ + γ det(F₀)^(1/n) I, F₀ the covariance of all points, and its
+/// eigenvalues below λmax/β are raised to λmax/β [Babuška et al., 2002], so
+/// that collinear data stay solvable.
+///
+/// A start draws its centers among the points, far ones more likely. The order
+/// of the rows does not matter: the points are sorted before the draw.
+/// Not converging is a result, not an error: read FuzzyPartition::converged.
+///
+/// @param points Z, N×n: one sample zₖ per row, every column scaled to
+///   comparable variance [-]. N > num_clusters.
+/// @throws std::invalid_argument if `points` has too few rows or a value that
+///   is not finite, or if an option is out of its range.
+///
+/// - [Gustafson & Kessel, 1978] "Fuzzy clustering with a fuzzy covariance
+///   matrix", Proc. IEEE Conf. Decision and Control, San Diego, pp. 761–766.
+/// - [Babuška et al., 2002] R. Babuška, P. J. van der Veen, U. Kaymak,
+///   "Improved covariance estimation for Gustafson-Kessel clustering",
+///   Proc. FUZZ-IEEE, Honolulu, pp. 1081–1085.
+FuzzyPartition FitGustafsonKessel(
+    const Eigen::Ref<const Eigen::MatrixXd>& points,
+    const GustafsonKesselOptions& options = {});
+
+}  // namespace fdi::trainer

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "diagnosis/ts_model.h"
+#include "trainer/consequent_estimation.h"
+#include "trainer/gustafson_kessel.h"
+
+namespace fdi::trainer {
+
+/// N rows of regressors and targets, in physical units.
+struct RegressionData {
+  Eigen::MatrixXd x;  ///< X, N×n.
+  Eigen::VectorXd y;  ///< N.
+};
+
+/// Settings of FitTakagiSugeno().
+struct TakagiSugenoOptions {
+  int num_rules{3};                   ///< c ≥ 1; 1 is one linear model.
+  GustafsonKesselOptions clustering;  ///< num_clusters is taken from num_rules.
+  ConsequentOptions consequents;
+};
+
+/// Fits y = Σ w_i(x) (a_iᵀ x + b_i): Gustafson-Kessel clusters of Z = [X, y]
+/// scaled to unit variance, antecedents by projection onto the regressors,
+/// consequents by weighted least squares.
+///
+/// The same data and options give the same bits; scaling a column of X or
+/// reordering the rows changes the result by rounding at most. A column of X
+/// that is constant is dropped: slope 0, sets that are 1 everywhere. Clusters
+/// that collapse yield fewer rules than asked for, at least one.
+///
+/// @return the rules in physical units, `data_share` summing to 1.
+/// @throws std::invalid_argument if X has no column or not as many rows as y,
+///   fewer rows than c (n + 1), a value that is not finite, or if an option
+///   is out of its range.
+std::vector<TsRule> FitTakagiSugeno(const RegressionData& data,
+                                    const TakagiSugenoOptions& options = {});
+
+/// Normalized degrees of fulfilment βₖᵢ / Σⱼ βₖⱼ; N×c, each row sums to 1.
+/// The exponents are summed first, so far from all rules the nearest wins.
+Eigen::MatrixXd DegreesOfFulfilment(const std::vector<TsRule>& rules,
+                                    const Eigen::Ref<const Eigen::MatrixXd>& x);
+
+/// ŷ of the rules for every row of X, without the limits of a TsModel.
+Eigen::VectorXd Predict(const std::vector<TsRule>& rules,
+                        const Eigen::Ref<const Eigen::MatrixXd>& x);
+
+/// Error of a set of rules on data they were not fitted to, ≥ 0; infinite or
+/// NaN if unusable.
+using ValidationError = std::function<double(const std::vector<TsRule>&)>;
+
+/// Settings of SelectRules().
+struct RuleSelectionOptions {
+  TakagiSugenoOptions fit;  ///< num_rules is not read.
+  int min_rules{2};         ///< ≥ 1.
+  int max_rules{8};         ///< ≥ min_rules, at most kMaxRules.
+  double tolerance{0.02};   ///< ≥ 0, relative validation error given away.
+};
+
+/// One number of rules that was tried.
+struct RuleCount {
+  int num_rules{0};
+  double validity{0.0};          ///< S(c) of the clusters.
+  double validation_error{0.0};  ///< NaN without a validation.
+};
+
+struct RuleSelection {
+  std::vector<TsRule> rules;  ///< The chosen ones.
+  std::vector<RuleCount> tried;
+};
+
+/// Chooses the number of rules: among those whose validation error is within
+/// `tolerance` of the lowest, the one with the smallest S(c) of Sugeno and
+/// Yasukawa; without a validation, the smallest S(c) alone.
+///
+/// @throws std::invalid_argument as FitTakagiSugeno() does, or if no number of
+///   rules gives a usable validation error.
+RuleSelection SelectRules(const RegressionData& data,
+                          const RuleSelectionOptions& options = {},
+                          const ValidationError& validation = {});
+
+}  // namespace fdi::trainer
