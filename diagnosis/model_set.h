@@ -56,9 +56,9 @@ struct DecisionParameters {
   double isolation_fraction{0.9};   ///< Share of t_k samples with d ≥ T.
   int clearing_samples{60};         ///< t_c
   int settling_samples{30};
-  double evidence_window{120.0};    ///< Memory of evidence [samples].
-  double evidence_core{3.0};        ///< Behind the best fault by up to this: 1,
-  double evidence_support{9.0};     ///< by more than this: 0 [log-likelihood].
+  double evidence_window{120.0};  ///< Memory of evidence [samples].
+  double evidence_core{3.0};      ///< Behind the best fault by up to this: 1,
+  double evidence_support{9.0};   ///< by more than this: 0 [log-likelihood].
 };
 
 /// The stored knowledge about one kind of valve: what the trainer writes, the

@@ -1,0 +1,118 @@
+#include "diagnosis/fault_bank.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace fdi {
+namespace {
+
+std::vector<int> ObserversOf(const ModelSet& models, int fault, bool negative) {
+  std::vector<int> found;
+  for (std::size_t i = 1; i < models.observers.size(); ++i) {
+    const Observer& observer = models.observers[i];
+    if (observer.fault == fault && (observer.strength < 0.0) == negative) {
+      found.push_back(static_cast<int>(i));
+    }
+  }
+  std::sort(found.begin(), found.end(), [&](int a, int b) {
+    return std::abs(models.observers[static_cast<std::size_t>(a)].strength) <
+           std::abs(models.observers[static_cast<std::size_t>(b)].strength);
+  });
+  return found;
+}
+
+double InstantFactor(const ObserverBank& bank, const Observer& observer,
+                     int index) {
+  double factor = 1.0;
+  for (std::size_t c = 0; c < observer.channels.size(); ++c) {
+    const int channel = static_cast<int>(c);
+    if (bank.active(channel)) {
+      factor = std::min(factor, observer.channels[c].membership(
+                                    bank.residual(index, channel)));
+    }
+  }
+  return bank.active_channels() > 0 ? factor : 0.0;
+}
+
+}  // namespace
+
+FaultBank::FaultBank(const ModelSet& models)
+    : models_(&models), normal_(models, {}, {}) {
+  const std::size_t channels = models.channels.size();
+  for (std::size_t i = 0; i < models.faults.size(); ++i) {
+    const auto first = models.interpolation_errors.begin() +
+                       static_cast<std::ptrdiff_t>(i * channels);
+    const std::vector<double> errors(
+        first, first + static_cast<std::ptrdiff_t>(channels));
+    for (const bool negative : {false, true}) {
+      const auto observers = ObserversOf(models, models.faults[i], negative);
+      if (!observers.empty()) {
+        families_.push_back({i, StrengthTracker(models, observers, errors)});
+      }
+    }
+  }
+}
+
+void FaultBank::Score(const ObserverBank& bank, Verdict& verdict) const {
+  std::fill_n(verdict.fault_factors.begin(), models_->faults.size(), 0.0);
+  for (std::size_t i = 0; i < models_->observers.size(); ++i) {
+    const Observer& observer = models_->observers[i];
+    const double factor = InstantFactor(bank, observer, static_cast<int>(i));
+    verdict.observer_factors[i] = factor;
+    if (i > 0) {
+      const auto index =
+          static_cast<std::size_t>(FaultIndex(*models_, observer.fault));
+      verdict.fault_factors[index] =
+          std::max(verdict.fault_factors[index], factor);
+    }
+  }
+  verdict.normal_factor = verdict.observer_factors[0];
+}
+
+void FaultBank::Restart() {
+  normal_.Restart();
+  for (Family& family : families_) {
+    family.tracker.Restart();
+  }
+}
+
+void FaultBank::Follow(const ObserverBank& bank) {
+  normal_.Step(bank);
+  for (Family& family : families_) {
+    family.tracker.Step(bank);
+  }
+}
+
+double FaultBank::EvidenceMembership(double behind) const {
+  const double core = models_->decision.evidence_core;
+  const double support = models_->decision.evidence_support;
+  return std::clamp((support - behind) / (support - core), 0.0, 1.0);
+}
+
+void FaultBank::Compete(Verdict& verdict) const {
+  double best = normal_.evidence();
+  for (const Family& family : families_) {
+    best = std::max(best, family.tracker.evidence());
+  }
+  verdict.normal_factor = std::min(
+      verdict.normal_factor, EvidenceMembership(best - normal_.evidence()));
+  std::array<double, kMaxFaults> instant = verdict.fault_factors;
+  std::fill_n(verdict.fault_factors.begin(), models_->faults.size(), 0.0);
+  std::array<double, kMaxFaults> leading{};
+  leading.fill(-std::numeric_limits<double>::infinity());
+  for (const Family& family : families_) {
+    const std::size_t i = family.fault_index;
+    const StrengthTracker& tracker = family.tracker;
+    const double factor =
+        std::min(std::max(instant[i], tracker.factor()),
+                 EvidenceMembership(best - tracker.evidence()));
+    verdict.fault_factors[i] = std::max(verdict.fault_factors[i], factor);
+    if (tracker.evidence() > leading[i]) {
+      leading[i] = tracker.evidence();
+      verdict.strengths[i] = tracker.strength();
+    }
+  }
+}
+
+}  // namespace fdi

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/strength_tracker.h"
+#include "diagnosis/verdict.h"
+
+namespace fdi {
+
+/// Decision factors of all faults of a model set, d_f for fault f:
+/// the largest factor of its observers, and once an episode is open also that
+/// of its strength tracker, capped by the evidence
+///
+///     d_f = min( max(γ_observers, γ_tracker), μ_L(L_best − L_f) ),
+///
+/// μ_L falling from 1 to 0 between the evidence core and support. Normal
+/// operation competes alike with d_0.
+class FaultBank {
+ public:
+  /// `models` must outlive the bank.
+  explicit FaultBank(const ModelSet& models);
+
+  /// Instant factors of all observers and faults from the residuals in `bank`.
+  void Score(const ObserverBank& bank, Verdict& verdict) const;
+
+  /// A detection: evidence and strengths begin anew.
+  void Restart();
+
+  /// Follows strengths and evidence with the residuals of one more sample of
+  /// an open episode.
+  void Follow(const ObserverBank& bank);
+
+  /// Lets the evidence so far act on the factors scored by Score().
+  void Compete(Verdict& verdict) const;
+
+ private:
+  struct Family {
+    std::size_t fault_index;
+    StrengthTracker tracker;
+  };
+
+  double EvidenceMembership(double behind) const;
+
+  const ModelSet* models_;
+  StrengthTracker normal_;
+  std::vector<Family> families_;  // one per fault and direction
+};
+
+}  // namespace fdi

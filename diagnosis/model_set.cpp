@@ -1,0 +1,133 @@
+#include "diagnosis/model_set.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+
+namespace fdi {
+namespace {
+
+void Check(bool condition, const ModelSet& models, const std::string& what) {
+  if (!condition) {
+    throw DataError("model set '" + models.name + "': " + what);
+  }
+}
+
+void ValidateDecision(const ModelSet& models) {
+  const DecisionParameters& p = models.decision;
+  Check(p.isolation_threshold > 0.0 && p.isolation_threshold < 1.0, models,
+        "isolation threshold T must be in (0, 1)");
+  Check(p.isolation_fraction > 0.0 && p.isolation_fraction <= 1.0, models,
+        "isolation fraction must be in (0, 1]");
+  Check(p.detection_samples >= 1 && p.detection_samples <= 1000, models,
+        "n_d must be in 1..1000");
+  Check(p.isolation_samples >= 1 && p.isolation_samples <= 10000, models,
+        "t_k must be in 1..10000");
+  Check(p.clearing_samples >= 1 && p.clearing_samples <= 100000, models,
+        "t_c must be in 1..100000");
+  Check(p.settling_samples >= 0 && p.settling_samples <= 100000, models,
+        "settling samples must be in 0..100000");
+  Check(p.evidence_window >= 2.0 && p.evidence_window <= 1e6, models,
+        "evidence window must be in 2..1e6 samples");
+  Check(p.evidence_core >= 0.0 && p.evidence_support > p.evidence_core, models,
+        "evidence support must be beyond its core");
+}
+
+void ValidateObserver(const ModelSet& models, const Observer& observer) {
+  const std::string where = "observer '" + observer.name + "': ";
+  Check(observer.channels.size() == models.channels.size(), models,
+        where + "not one model per channel");
+  Check(observer.fault >= 0 && observer.fault <= kFaultCount, models,
+        where + "fault beyond f1..f19");
+  Check(std::abs(observer.strength) <= 1.0, models,
+        where + "strength beyond [-1, 1]");
+  Check((observer.fault == 0) == (observer.strength == 0.0), models,
+        where + "strength 0 belongs to the normal observer alone");
+  for (std::size_t c = 0; c < observer.channels.size(); ++c) {
+    const ChannelObserver& channel = observer.channels[c];
+    Validate(channel.model, observer.name.c_str());
+    Check(channel.model.output == models.channels[c].output, models,
+          where + "output is not the channel's");
+    Check(std::isfinite(channel.residual_sd) && channel.residual_sd > 0.0,
+          models, where + "residual deviation must be positive");
+    Check(channel.correlation_time >= 1.0, models,
+          where + "correlation time must be at least 1 sample");
+    const Trapezoid& m = channel.membership;
+    Check(m.a <= m.b && m.b <= m.c && m.c <= m.d && std::isfinite(m.d - m.a),
+          models, where + "corners of the membership are not ascending");
+  }
+}
+
+}  // namespace
+
+int FaultIndex(const ModelSet& models, int fault) {
+  const auto it = std::find(models.faults.begin(), models.faults.end(), fault);
+  return it == models.faults.end()
+             ? -1
+             : static_cast<int>(it - models.faults.begin());
+}
+
+std::string FaultSetName(const ModelSet& models, FaultSet faults) {
+  std::string name;
+  for (std::size_t i = 0; i < models.faults.size(); ++i) {
+    if ((faults >> i & 1U) != 0) {
+      name += (name.empty() ? "" : "|") + FaultName(models.faults[i]);
+    }
+  }
+  return name.empty() ? "unknown" : name;
+}
+
+SignalMask RequiredSignals(const ModelSet& models) {
+  unsigned mask = 0;
+  for (const Observer& observer : models.observers) {
+    for (const ChannelObserver& channel : observer.channels) {
+      mask |= static_cast<unsigned>(RequiredSignals(channel.model)) |
+              MaskOf(channel.model.output);
+    }
+  }
+  return static_cast<SignalMask>(mask);
+}
+
+void Validate(const ModelSet& models) {
+  Check(!models.name.empty() && models.name.size() <= 64, models,
+        "the name must have 1 to 64 characters");
+  Check(models.sample_period_s > 0.0 && models.sample_period_s <= 3600.0,
+        models, "the sample period must be in (0, 3600] s");
+  Check(!models.channels.empty() && models.channels.size() <= kMaxChannels,
+        models, "there must be 1 to 16 channels");
+  Check(!models.observers.empty() && models.observers.size() <= kMaxObservers,
+        models, "there must be 1 to 128 observers");
+  Check(models.faults.size() <= kMaxFaults, models,
+        "there may be at most 64 faults");
+  Check(models.observers.front().fault == 0, models,
+        "the first observer must be the normal one");
+  Check(std::is_sorted(models.faults.begin(), models.faults.end()), models,
+        "faults must be ascending");
+  Check(models.interpolation_errors.size() ==
+            models.faults.size() * models.channels.size(),
+        models, "there must be one interpolation error per fault and channel");
+  ValidateDecision(models);
+  for (std::size_t i = 0; i < models.observers.size(); ++i) {
+    const Observer& observer = models.observers[i];
+    Check((i == 0) == (observer.fault == 0), models,
+          "there must be exactly one normal observer");
+    Check(i == 0 || FaultIndex(models, observer.fault) >= 0, models,
+          "observer '" + observer.name + "' has a fault that is not listed");
+    ValidateObserver(models, observer);
+  }
+  for (const std::vector<int>& group : models.groups) {
+    for (const int fault : group) {
+      Check(FaultIndex(models, fault) >= 0, models,
+            "a group names a fault that is not listed");
+    }
+  }
+  for (const ChannelSpec& channel : models.channels) {
+    Check(channel.lower_threshold < 0.0 && channel.upper_threshold > 0.0,
+          models,
+          "thresholds of channel " + channel.name + " must enclose zero");
+  }
+}
+
+}  // namespace fdi

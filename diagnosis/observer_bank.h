@@ -1,0 +1,68 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+#include "diagnosis/sample.h"
+
+namespace fdi {
+
+/// Runs all observers of a model set side by side on the samples of one valve,
+///
+///     r = y − ŷ   for every observer and channel,
+///
+/// each parallel observer on its own past predictions. A channel whose signals
+/// the valve lacks abstains.
+class ObserverBank {
+ public:
+  /// `models` must outlive the bank.
+  explicit ObserverBank(const ModelSet& models);
+
+  /// Fills all lags with `sample`: past inputs and outputs as if it had been
+  /// at rest there. Decides which channels take part from now on.
+  void Initialise(const Sample& sample);
+
+  /// Predicts the outputs of `sample` and takes it into the past. After
+  /// Initialise(); the signals of active channels must be present.
+  void Step(const Sample& sample);
+
+  bool active(int channel) const {
+    return active_[static_cast<std::size_t>(channel)] != 0;
+  }
+  int active_channels() const { return active_count_; }
+  double prediction(int observer, int channel) const {
+    return predictions_[Slot(observer, channel)];
+  }
+  double residual(int observer, int channel) const {
+    return residuals_[Slot(observer, channel)];
+  }
+  /// False where the model had to extrapolate far.
+  bool covered(int observer, int channel) const {
+    return covered_[Slot(observer, channel)] != 0;
+  }
+
+ private:
+  std::size_t Slot(int observer, int channel) const {
+    return static_cast<std::size_t>(observer * channel_count_ + channel);
+  }
+  std::size_t Row(int lag) const {
+    return static_cast<std::size_t>((head_ + depth_ - lag) % depth_);
+  }
+  double RegressorValue(const TsModel& model, const Regressor& regressor,
+                        std::size_t slot) const;
+
+  const ModelSet* models_;
+  int channel_count_;
+  int depth_;  // longest lag + 1
+  int head_{0};
+  int active_count_{0};
+  std::vector<char> active_;
+  std::vector<std::array<double, kSignalCount>> measured_;  // ring of depth_
+  std::vector<double> own_past_;  // ring of depth_ rows of all slots
+  std::vector<double> predictions_;
+  std::vector<double> residuals_;
+  std::vector<char> covered_;
+};
+
+}  // namespace fdi

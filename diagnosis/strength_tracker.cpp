@@ -1,0 +1,185 @@
+#include "diagnosis/strength_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fdi {
+namespace {
+
+// A fault may be this much weaker or stronger than those trained.
+constexpr double kReachBelow = 0.5;
+constexpr double kReachAbove = 1.5;
+// A fault rarely develops faster than to full strength in 10 minutes.
+constexpr double kRateDeviation = 1.0 / 600.0;
+
+double ChannelTime(const ChannelObserver& channel) {
+  return std::max(channel.correlation_time, 1.0);
+}
+
+}  // namespace
+
+StrengthTracker::StrengthTracker(const ModelSet& models,
+                                 std::vector<int> observers,
+                                 std::vector<double> interpolation_errors)
+    : models_(&models),
+      interpolation_errors_(std::move(interpolation_errors)),
+      memory_(1.0 - 1.0 / models.decision.evidence_window),
+      cell_cost_(kCells, 0.0) {
+  nodes_.push_back({0, 0.0});
+  for (const int index : observers) {
+    const double s = models.observers[static_cast<std::size_t>(index)].strength;
+    nodes_.push_back({index, std::abs(s)});
+    sign_ = s < 0.0 ? -1.0 : 1.0;
+  }
+  if (nodes_.size() > 1) {
+    lowest_ = kReachBelow * nodes_[1].strength;
+    highest_ = std::min(1.0, kReachAbove * nodes_.back().strength);
+  }
+}
+
+void StrengthTracker::Restart() {
+  age_ = 0;
+  strength_ = lowest_;
+  rate_ = 0.0;
+  evidence_ = 0.0;
+  factor_ = 0.0;
+  std::fill(cell_cost_.begin(), cell_cost_.end(), 0.0);
+}
+
+double StrengthTracker::Cell(int index) const {
+  return lowest_ + (highest_ - lowest_) * index / (kCells - 1);
+}
+
+StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
+                                                int channel,
+                                                double strength) const {
+  const auto observer = [&](const Node& node) -> const ChannelObserver& {
+    return models_->observers[static_cast<std::size_t>(node.observer)]
+        .channels[static_cast<std::size_t>(channel)];
+  };
+  if (nodes_.size() == 1) {
+    const double sd = observer(nodes_[0]).residual_sd;
+    return {bank.residual(0, channel), 0.0, sd * sd, 0};
+  }
+  std::size_t j = 1;
+  while (j + 1 < nodes_.size() && strength > nodes_[j].strength) {
+    ++j;
+  }
+  const Node& low = nodes_[j - 1];
+  const Node& high = nodes_[j];
+  const double slope = (bank.prediction(high.observer, channel) -
+                        bank.prediction(low.observer, channel)) /
+                       (high.strength - low.strength);
+  const double step = strength - low.strength;
+  const bool high_nearer =
+      j == 1 || strength - low.strength > high.strength - strength;
+  const Node& nearest = high_nearer ? high : low;
+  const double error =
+      interpolation_errors_[static_cast<std::size_t>(channel)] * slope *
+      (strength - nearest.strength);
+  const double sd = std::max(observer(low).residual_sd * (j == 1 ? 0.0 : 1.0),
+                             observer(high).residual_sd);
+  return {bank.residual(low.observer, channel) - slope * step, slope,
+          sd * sd + error * error, nearest.observer};
+}
+
+void StrengthTracker::Step(const ObserverBank& bank) {
+  if (nodes_.size() > 1 && age_ < kSearchSamples) {
+    Search(bank);
+  } else {
+    Follow(bank);
+  }
+  ++age_;
+  UpdateFactor(bank);
+}
+
+// Least cost over a grid of constant strengths: the filter is only locally
+// right, and a fault without effect at small strengths has no slope there.
+void StrengthTracker::Search(const ObserverBank& bank) {
+  const int channels = static_cast<int>(models_->channels.size());
+  for (int cell = 0; cell < kCells; ++cell) {
+    double cost = 0.0;
+    for (int c = 0; c < channels; ++c) {
+      if (!bank.active(c)) {
+        continue;
+      }
+      const Prediction p = At(bank, c, Cell(cell));
+      cost +=
+          (std::min(p.residual * p.residual / p.variance, kOutlier) +
+           std::log(p.variance)) /
+          ChannelTime(models_->observers[static_cast<std::size_t>(p.nearest)]
+                          .channels[static_cast<std::size_t>(c)]);
+    }
+    cell_cost_[static_cast<std::size_t>(cell)] += cost;
+  }
+  const auto best = std::min_element(cell_cost_.begin(), cell_cost_.end());
+  strength_ = Cell(static_cast<int>(best - cell_cost_.begin()));
+  evidence_ = -0.5 * *best;
+  const double width = (highest_ - lowest_) / (kCells - 1);
+  var_strength_ = width * width;
+  var_rate_ = kRateDeviation * kRateDeviation;
+  covariance_ = 0.0;
+  rate_ = 0.0;
+}
+
+void StrengthTracker::Follow(const ObserverBank& bank) {
+  evidence_ *= memory_;
+  // Prediction: s ← s + ṡ; the old information fades by λ.
+  strength_ += rate_;
+  var_strength_ = (var_strength_ + 2.0 * covariance_ + var_rate_) / memory_;
+  covariance_ = (covariance_ + var_rate_) / memory_;
+  var_rate_ = std::min(var_rate_ / memory_, kRateDeviation * kRateDeviation);
+  const int channels = static_cast<int>(models_->channels.size());
+  for (int c = 0; c < channels; ++c) {
+    if (!bank.active(c)) {
+      continue;
+    }
+    const double s = std::clamp(strength_, lowest_, highest_);
+    const Prediction p = At(bank, c, s);
+    const double spread =
+        p.variance + p.slope * p.slope * std::min(var_strength_, 1.0);
+    const double distance = p.residual * p.residual / spread;
+    const double bounded = std::min(distance, kOutlier);
+    evidence_ -=
+        0.5 * (bounded + std::log(spread)) /
+        ChannelTime(models_->observers[static_cast<std::size_t>(p.nearest)]
+                        .channels[static_cast<std::size_t>(c)]);
+    if (p.slope == 0.0 || nodes_.size() == 1) {
+      continue;
+    }
+    const double innovation =
+        p.residual *
+        (distance > kOutlier ? std::sqrt(kOutlier / distance) : 1.0);
+    const double gain_s = p.slope * var_strength_ / spread;
+    const double gain_r = p.slope * covariance_ / spread;
+    strength_ = s + gain_s * innovation;
+    rate_ += gain_r * innovation;
+    var_rate_ -= gain_r * p.slope * covariance_;
+    covariance_ -= gain_s * p.slope * covariance_;
+    var_strength_ -= gain_s * p.slope * var_strength_;
+  }
+  var_strength_ = std::clamp(var_strength_, 0.0, 1.0);
+  if (strength_ < lowest_ || strength_ > highest_) {
+    strength_ = std::clamp(strength_, lowest_, highest_);
+    rate_ = 0.0;
+  }
+}
+
+void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
+  factor_ = 1.0;
+  const int channels = static_cast<int>(models_->channels.size());
+  for (int c = 0; c < channels; ++c) {
+    if (!bank.active(c)) {
+      continue;
+    }
+    const Prediction p = At(bank, c, strength_);
+    const ChannelObserver& nearest =
+        models_->observers[static_cast<std::size_t>(p.nearest)]
+            .channels[static_cast<std::size_t>(c)];
+    const double shrunk =
+        p.residual * nearest.residual_sd / std::sqrt(p.variance);
+    factor_ = std::min(factor_, nearest.membership(shrunk));
+  }
+}
+
+}  // namespace fdi

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/observer_bank.h"
+
+namespace fdi {
+
+/// Follows how strong one fault would have to be, in one direction, to explain
+/// the samples since a detection, and how well it then explains them.
+///
+/// Between the observers of the fault, at strengths s_1 < s_2 < ..., and the
+/// normal one at s_0 = 0, predictions are interpolated,
+///
+///     ŷ(s) = ŷ_j + (ŷ_{j+1} − ŷ_j) (s − s_j) / (s_{j+1} − s_j),
+///
+/// and s is followed with its rate by a Kalman filter of fading memory over all
+/// active channels, so that a developing fault is met at every strength, not
+/// at the trained ones only. The innovations ν of variance S give the evidence
+///
+///     L ← λ L − ½ Σ_c (ν²/S + ln S) / τ_c,
+///
+/// τ_c the correlation time of the residual: log-likelihoods of faults differ
+/// long before single residuals do.
+class StrengthTracker {
+ public:
+  /// `observers`: indices of one fault and direction by rising |strength|;
+  /// empty for normal operation, which has nothing to follow.
+  StrengthTracker(const ModelSet& models, std::vector<int> observers,
+                  std::vector<double> interpolation_errors);
+
+  /// Begins anew at a detection.
+  void Restart();
+
+  /// Takes the residuals of one sample.
+  void Step(const ObserverBank& bank);
+
+  double strength() const { return sign_ * strength_; }
+  double evidence() const { return evidence_; }
+
+  /// Smallest membership over the active channels of the residual at the
+  /// followed strength.
+  double factor() const { return factor_; }
+
+ private:
+  struct Node {
+    int observer;
+    double strength;  // |s|
+  };
+  struct Prediction {
+    double residual;
+    double slope;     // dŷ/ds
+    double variance;  // of the residual, interpolation error included
+    int nearest;      // observer at the nearer node
+  };
+
+  Prediction At(const ObserverBank& bank, int channel, double strength) const;
+  void Search(const ObserverBank& bank);
+  void Follow(const ObserverBank& bank);
+  void UpdateFactor(const ObserverBank& bank);
+  double Cell(int index) const;
+
+  static constexpr int kCells = 33;         // strengths tried at the start
+  static constexpr int kSearchSamples = 8;  // for so many samples
+  static constexpr double kOutlier = 25.0;  // bound of ν²/S
+
+  const ModelSet* models_;
+  std::vector<Node> nodes_;                   // the normal observer first
+  std::vector<double> interpolation_errors_;  // κ per channel
+  double sign_{1.0};
+  double lowest_{0.0};
+  double highest_{0.0};
+  double memory_;  // λ
+
+  int age_{0};
+  double strength_{0.0};
+  double rate_{0.0};
+  double var_strength_{0.0};
+  double var_rate_{0.0};
+  double covariance_{0.0};
+  double evidence_{0.0};
+  double factor_{0.0};
+  std::vector<double> cell_cost_;
+};
+
+}  // namespace fdi

@@ -1,0 +1,70 @@
+#include "diagnosis/verdict.h"
+
+namespace fdi {
+namespace {
+
+template <typename Enum, std::size_t N>
+std::string_view NameOf(Enum value,
+                        const std::array<std::string_view, N>& names) {
+  const auto index = static_cast<std::size_t>(value);
+  return index < N ? names[index] : std::string_view("invalid");
+}
+
+constexpr std::uint64_t kFnvOffset = 14695981039346656037ULL;
+constexpr std::uint64_t kFnvPrime = 1099511628211ULL;
+
+std::uint64_t HashByte(std::uint64_t hash, unsigned char byte) {
+  return (hash ^ byte) * kFnvPrime;
+}
+
+std::uint64_t HashWord(std::uint64_t hash, std::uint64_t word) {
+  for (int i = 0; i < 8; ++i) {
+    hash = HashByte(hash, static_cast<unsigned char>(word >> (8 * i) & 0xFF));
+  }
+  return hash;
+}
+
+}  // namespace
+
+std::string_view IntakeName(Intake intake) {
+  return NameOf(intake,
+                std::array<std::string_view, kIntakeCount>{
+                    "accepted", "repeat", "late", "superseded", "bad_quality",
+                    "not_finite", "range", "unit", "period"});
+}
+
+std::string_view QualityName(Quality quality) {
+  return NameOf(quality,
+                std::array<std::string_view, 8>{
+                    "LIVE", "STALE", "BAD_INPUT", "SETTLING", "INHIBITED",
+                    "UNCOVERED", "MODEL_UNSUITED", "UNASSIGNED"});
+}
+
+std::string_view StateName(State state) {
+  return NameOf(
+      state, std::array<std::string_view, 3>{"NORMAL", "DETECTED", "ISOLATED"});
+}
+
+std::string_view TransitionName(TransitionKind kind) {
+  return NameOf(
+      kind, std::array<std::string_view, 5>{"DETECTED", "ISOLATED",
+                                            "REISOLATED", "CLEARED", "CLOSED"});
+}
+
+std::string_view EndReasonName(EndReason reason) {
+  return NameOf(reason, std::array<std::string_view, 7>{
+                            "", "cleared", "stream_ended", "stale_timeout",
+                            "model_changed", "superseded", "unknown"});
+}
+
+std::uint64_t EpisodeId(std::string_view valve_id, std::uint64_t source_id,
+                        std::int64_t detection_stamp_ns) {
+  std::uint64_t hash = kFnvOffset;
+  for (const char c : valve_id) {
+    hash = HashByte(hash, static_cast<unsigned char>(c));
+  }
+  hash = HashWord(hash, source_id);
+  return HashWord(hash, static_cast<std::uint64_t>(detection_stamp_ns));
+}
+
+}  // namespace fdi
