@@ -1,0 +1,113 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace fdi::simulator {
+
+/// What acts on the valve from outside at one instant, in SI units.
+struct ProcessInputs {
+  double command{0.0};  ///< CV as a fraction of closing, 0..1.
+  double inlet_pressure_pa{0.0};
+  double outlet_pressure_pa{0.0};
+  double temperature_c{0.0};
+};
+
+/// One instant of a recorded excitation, in the units of Sample.
+struct InputRow {
+  double cv_pct;
+  double p1_kpa;
+  double p2_kpa;
+  double t1_degc;
+};
+
+/// A first-order autoregressive disturbance: stationary standard deviation and
+/// correlation of neighbours, x(k+1) = a x(k) + sd sqrt(1 - a^2) e(k).
+struct Disturbance {
+  double sd{0.0};           ///< >= 0.
+  double correlation{0.0};  ///< a, in [0, 1).
+};
+
+/// Work about one operating point in open loop, with an optional slow sine on
+/// the command, so that faults that look alike at a fixed position separate.
+struct OperatingPointExcitation {
+  double cv_pct{71.67};
+  Disturbance cv_noise_pct{0.5, 0.95};
+  double p1_kpa{3555.0};
+  Disturbance p1_noise_kpa{22.0, 0.85};
+  double p2_kpa{2615.0};
+  Disturbance p2_noise_kpa{13.0, 0.6};
+  double t1_degc{100.7};
+  double amplitude_pct{0.0};  ///< Of the sine on the command.
+  double period_s{400.0};     ///< Of the sine on the command, > 0.
+};
+
+/// The benchmark's excitation: CV 50 + 25 sin(2 pi 0.01 t) %,
+/// P1 3500 + 175 sin(2 pi 0.1 t), P2 2600 + 26 sin(2 t) kPa, T1 43 degC.
+struct SineExcitation {
+  double phase_s{0.0};  ///< Time at the first sample.
+};
+
+/// The feedwater loop: boiler drum, superheater, level controller, steam demand
+/// and the bypass circuit of the valve; see level_loop.h.
+struct LevelLoopExcitation {
+  double level_set_point_pct{49.2};
+  double steam_demand_t_h{14.89};
+  Disturbance steam_noise_t_h{0.72, 0.984};
+  double level_noise_pct{1.05};   ///< White, of the level transmitter.
+  double proportional_gain{5.0};  ///< % of CV per % of level.
+  double integral_time_s{120.0};
+  double inlet_opening{1.0};   ///< V1, hand valve before, in (0, 1].
+  double outlet_opening{1.0};  ///< V2, hand valve behind, in (0, 1].
+  double bypass_opening{0.0};  ///< V3, hand valve beside, in [0, 1].
+};
+
+/// A recorded excitation, one row per sample.
+struct RecordedExcitation {
+  std::vector<InputRow> rows;
+};
+
+using ExcitationConfig = std::variant<OperatingPointExcitation, SineExcitation,
+                                      LevelLoopExcitation, RecordedExcitation>;
+
+/// "operating-point", "sine", "level-loop" or "csv".
+std::string_view ExcitationName(const ExcitationConfig& config);
+
+/// The default excitation called `name` (csv: without rows).
+/// @throws ConfigError naming the accepted names.
+ExcitationConfig DefaultExcitation(std::string_view name);
+
+/// @throws ConfigError naming field, value and range.
+void Validate(const ExcitationConfig& config);
+
+/// Flow that enters the boiler [m3/h] for the pressures before and behind the
+/// valve [Pa], at its present opening.
+using FlowOfPressures = std::function<double(double, double)>;
+
+/// Yields the process inputs of sample 0, 1, 2, ...
+class Excitation {
+ public:
+  virtual ~Excitation() = default;
+
+  /// True if the inputs do not depend on the valve. They are then known one
+  /// period ahead and the pressures run linearly between samples; a closed
+  /// loop's are held.
+  virtual bool is_open_loop() const { return true; }
+
+  /// Hand valve V3 beside the valve, 0..1.
+  virtual double bypass_opening() const { return 0.0; }
+
+  /// Inputs of the next sample. `flow` is only used by closed loops.
+  virtual ProcessInputs Next(const FlowOfPressures& flow) = 0;
+};
+
+/// @param seed Same seed, same inputs, bit for bit.
+std::unique_ptr<Excitation> MakeExcitation(const ExcitationConfig& config,
+                                           double period_s, std::uint64_t seed);
+
+}  // namespace fdi::simulator

@@ -1,0 +1,43 @@
+#pragma once
+
+namespace fdi::simulator {
+
+/// All that a fault can change in the valve: the seam between fault numbers and
+/// physics. The defaults are the healthy valve.
+struct FaultEffects {
+  double upper_stop_factor{1.0};   ///< Upper travel stop / stroke.
+  double plug_offset{0.0};         ///< Plug against rod, fraction of stroke.
+  double kv_factor{1.0};           ///< On Kv.
+  double opening_offset{0.0};      ///< Added to f(x).
+  double play_offset{0.0};         ///< Added to the play / stroke.
+  double play_slope{0.0};          ///< Play width * (1 + slope (1 - X)).
+  double external_loss{0.0};       ///< Share of the flow lost outside.
+  double temperature_rise_c{0.0};  ///< On T1, up to kMaxTemperatureC.
+  double air_leak{0.0};            ///< kg/(s sqrt(Pa)), out of the chamber.
+  double area_factor{1.0};         ///< On the diaphragm area in (14).
+  double spring_factor{1.0};       ///< On the spring force.
+  double transducer_factor{1.0};   ///< On the transducer's output.
+  double position_reading_factor{1.0};  ///< In X and in the feedback.
+  double chamber_reading_factor{1.0};   ///< Not in the basic measurements.
+  double feedback_play{0.0};        ///< Width / stroke, in the feedback only.
+  double supply_factor{1.0};        ///< On the supply's gauge pressure.
+  double inlet_factor{1.0};         ///< On P1.
+  double outlet_factor{1.0};        ///< On P2.
+  double bypass_opening{0.0};       ///< Of V3, 0..1.
+  double flow_reading_factor{1.0};  ///< On the flow reading.
+
+  friend bool operator==(const FaultEffects&, const FaultEffects&) = default;
+};
+
+/// The water is never hotter than this [degC].
+inline constexpr double kMaxTemperatureC = 300.0;
+
+/// Adds what `fault` (1..19) does at `strength` to `effects`. Several faults
+/// may be combined; strength 0 leaves `effects` as it is.
+///
+/// Sizes after the DAMADICS benchmark's definition of its faults.
+/// @throws std::invalid_argument if `fault` is not in 1..19 or `strength` is
+///   outside [0, 1] ([-1, 1] for the signed faults of the catalogue).
+void ApplyFault(int fault, double strength, FaultEffects& effects);
+
+}  // namespace fdi::simulator

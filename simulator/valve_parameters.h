@@ -1,0 +1,101 @@
+#pragma once
+
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/sample.h"
+
+namespace fdi::simulator {
+
+/// Spring-and-diaphragm actuator, equations (13)-(15). x = 0 is open,
+/// x = stroke is closed; pressure in the chamber closes.
+struct ActuatorParameters {
+  double moving_mass_kg{2.0};              ///< m.
+  double damping_n_s_m{1500.0};            ///< b.
+  double spring_rate_n_m{60892.0};         ///< K.
+  double spring_preload_m{0.009525};       ///< x0.
+  double diaphragm_area_m2{0.0290};        ///< A.
+  double stroke_m{0.0381};                 ///< Travel of the rod.
+  double chamber_volume_m3{0.0055};        ///< V0, at x = 0.
+  double air_temperature_k{293.0};         ///< T of (15).
+  double ambient_pressure_pa{101325.0};    ///< P0.
+  double supply_pressure_gauge_pa{600e3};  ///< Above ambient.
+  double plug_area_m2{1.9635e-3};          ///< A0, 50 mm plug.
+  double play_fraction{0.01};              ///< Backlash width / stroke.
+  double coulomb_friction_n{0.0};          ///< F_f of (13), 0 = none.
+};
+
+/// Positioner (17) with its filter, transducer and air relay (16).
+struct PositionerParameters {
+  double gain{100.0};  ///< Kp, on the error as a fraction of the stroke.
+  double integral_time_s{std::numeric_limits<double>::infinity()};  ///< TI.
+  double derivative_time_s{0.0};                                    ///< TD.
+  double filter_time_s{0.30};        ///< Each of the two lags on the command.
+  double sampling_period_s{0.0};     ///< 0 = continuous (17); benchmark: 0.035.
+  double filling_cv{1.05e-3};        ///< Cv of (16) while filling.
+  double venting_cv{1.05e-3};        ///< Cv of (16) while venting.
+  bool transducer_dead_zone{false};  ///< Electro-pneumatic table in series.
+};
+
+enum class FlowCharacteristic {
+  kExponential,  ///< f = exp(-n X), linear to 0 beyond X = 0.975.
+  kLinear        ///< f = 1 - X.
+};
+
+/// The trim, equation (12).
+struct TrimParameters {
+  double kv_m3_h{120.0};  ///< Fully open.
+  FlowCharacteristic characteristic{FlowCharacteristic::kExponential};
+  double exponent{5.0};          ///< n of the exponential characteristic.
+  double bypass_kv_m3_h{19.75};  ///< V3, fully open (fault f18).
+};
+
+/// A transmitter: reading = quantize(clamp(value + noise, low, high)).
+struct Transmitter {
+  double low;
+  double high;
+  double noise_sd;  ///< Same unit as the range, >= 0.
+};
+
+/// Transmitters in the units of Sample (%, kPa, degC, flow unit of the set).
+struct InstrumentParameters {
+  FlowUnit flow_unit{FlowUnit::kTPerHour};
+  Transmitter command{0.0, 100.0, 0.0};
+  Transmitter pressure{0.0, 4000.0, 5.64};
+  Transmitter temperature{0.0, 200.0, 0.282};
+  Transmitter position{0.0, 100.0, 0.141};
+  Transmitter flow{0.0, 40.0, 0.0564};
+  /// Noise of the command on its way to the positioner, drawn once a sample and
+  /// held, hence 17 times smaller than that of a fast white noise [%].
+  double positioner_noise_sd_pct{0.0083};
+  int resolution_bits{16};  ///< Of the span.
+};
+
+/// One valve. The named sets below are what users choose from.
+struct ValveParameters {
+  std::string name{"lublin-actuator-3"};
+  ActuatorParameters actuator;
+  PositionerParameters positioner;
+  TrimParameters trim;
+  InstrumentParameters instruments;
+};
+
+/// The shipped sets:
+/// - lublin-actuator-3: data sheet and benchmark values of actuator 3 of the
+///   Lublin sugar factory (feedwater of the 4th boiler), flow in t/h.
+/// - lublin-actuator-3-refit: five values of it (air relay Cv filling and
+///   venting, no dead zone, Kv, exponent) refitted to the plant record.
+/// - paper-operating-point: linear trim in m3/h that gives the flow, position
+///   and noise floor of [Mendonca et al., 2009], tables 3 and 4.
+std::vector<std::string> ParameterSetNames();
+
+/// @throws ConfigError naming the accepted names.
+ValveParameters ParameterSet(std::string_view name);
+
+/// @throws ConfigError naming the first field out of range, its value and the
+///   accepted range.
+void Validate(const ValveParameters& parameters);
+
+}  // namespace fdi::simulator
