@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "diagnosis/log.h"
+
+namespace CLI {
+class App;
+}
+
+namespace fdi::cli {
+
+/// The options that every program has, before or after the verb.
+struct GlobalOptions {
+  std::filesystem::path data_dir{"./fdi-data"};  ///< --data, env FDI_DATA
+  int domain{0};                                 ///< --domain 0..232
+  std::string interface { "127.0.0.1" };  ///< --interface ADDR[,ADDR]|all
+  std::string transport{"default"};       ///< --transport udp|shm|default
+  std::filesystem::path qos_file;         ///< --qos FILE.xml, or empty
+  std::filesystem::path config_file;      ///< --config FILE.toml, or empty
+  LogLevel log_level{LogLevel::kInfo};
+  bool json{false};
+  bool utc{false};  ///< Times for people in UTC instead of the local zone.
+};
+
+/// Thrown by --print-config once everything given is known.
+struct PrintConfigRequest {};
+
+/// Adds --help --version --data --domain --interface --transport --qos
+/// --config --print-config --json --utc --log-level to the root `app`;
+/// `options` must outlive it.
+void AddGlobalOptions(CLI::App& app, GlobalOptions& options);
+
+}  // namespace fdi::cli
