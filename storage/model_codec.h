@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+
+namespace fdi::storage {
+
+/// The canonical bytes of a model set: "FDIM", format version, length, fields
+/// in order of declaration (little endian, doubles as their bits), CRC-32. Not
+/// in them: version and content_hash, which are given when it is stored.
+std::vector<std::byte> EncodeModelSet(const ModelSet& models);
+
+/// The inverse, bit for bit. Checks the form alone; Validate() the meaning.
+/// @param where the bytes come from, for the message.
+/// @throws DataError naming `where` and the reason: CRC, another format
+///   version, a count beyond its limit, bytes missing or left over.
+ModelSet DecodeModelSet(std::span<const std::byte> bytes,
+                        std::string_view where);
+
+/// First 8 bytes of the SHA-256 of `bytes`, big endian: as 16 hex digits they
+/// are what sha256sum of an exported file begins with.
+std::uint64_t ContentHash(std::span<const std::byte> bytes);
+
+}  // namespace fdi::storage

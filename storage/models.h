@@ -1,0 +1,147 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+#include "storage/csv.h"
+#include "storage/database.h"
+
+namespace fdi::storage {
+
+/// Schema of models.db: tables model_set, observer, channel, training_run,
+/// valve, generation and the view model_summary; see docs/data.md.
+const Schema& ModelsSchema();
+
+/// `NAME`, which means its active version, or `NAME@VERSION`.
+struct ModelReference {
+  std::string name;
+  std::optional<int> version;
+
+  bool operator==(const ModelReference&) const = default;
+};
+
+/// @throws ConfigError naming the accepted forms.
+ModelReference ParseModelReference(std::string_view text);
+std::string ToString(const ModelReference& reference);
+
+/// A stored model set without its models.
+struct ModelSummary {
+  std::string name;
+  int version{0};
+  std::uint64_t content_hash{0};
+  std::int64_t created_ns{0};
+  bool active{false};
+  std::string preset;
+  std::string software;
+  double period_s{1.0};
+  FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  int observers{0};
+  int training_runs{0};
+  std::int64_t bytes{0};
+  double lowest_vaf{0.0};     ///< Over all channels of all observers [%].
+  double greatest_mse{0.0};   ///< [unit²]
+  double greatest_bias{0.0};  ///< |mean residual| [unit].
+};
+
+/// What is known about a valve, or about all whose id matches a glob.
+struct ValveEntry {
+  std::string pattern;  ///< Id, or glob with * ? [...].
+  std::string type;     ///< Free text, e.g. "globe DN100".
+  FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  Sense sense{Sense::kClosing};
+  SignalMask signals{kBasicSignals};
+  double period_s{1.0};
+  std::uint32_t epoch{0};  ///< Replacements and recalibrations.
+  std::optional<ModelReference> model_set;
+};
+
+/// Whether an observed version should answer from now on.
+enum class Activation {
+  kIfFirst,  ///< Only if no version of that name is active.
+  kAlways,
+};
+
+/// Model sets and valves. Any number of readers; for changes open it as an
+/// occasional writer. One thread at a time.
+class ModelStore {
+ public:
+  /// @throws DataError, SqliteError as Database.
+  explicit ModelStore(const std::filesystem::path& path,
+                      Access access = Access::kReader);
+
+  /// Stores the set as the next version of its name, in one transaction.
+  /// @returns it as Load() gives it: with version and content_hash.
+  ModelSet Save(const ModelSet& models,
+                Activation activation = Activation::kIfFirst);
+
+  /// "NAME" (the active version) or "NAME@VERSION".
+  /// @throws NotFoundError naming what is there.
+  /// @throws DataError if the stored bytes are damaged.
+  ModelSet Load(std::string_view reference);
+  ModelSet Load(const ModelReference& reference);
+
+  /// By name and version.
+  std::vector<ModelSummary> List();
+  ModelSummary Summary(const ModelReference& reference);
+  void Activate(const ModelReference& reference);
+
+  /// Writes the canonical bytes to a file that does not exist yet.
+  void ExportFile(const ModelReference& reference,
+                  const std::filesystem::path& path);
+  /// Stores a file as the next version of its name. @throws DataError
+  ModelSet ImportFile(const std::filesystem::path& path,
+                      Activation activation = Activation::kIfFirst);
+
+  /// Valve entries in the order in which they are tried.
+  std::vector<ValveEntry> Valves();
+  /// Adds an entry behind the others, or replaces the one of that pattern.
+  void PutValve(const ValveEntry& entry);
+  /// @throws NotFoundError if there is no entry of that pattern.
+  void RemoveValve(std::string_view pattern);
+  /// Assigns a model set, or none, to the entry of `pattern`; adds the entry
+  /// if it is not there. @throws NotFoundError if there is no such model set.
+  void AssignModelSet(std::string_view pattern,
+                      const std::optional<ModelReference>& reference);
+
+  /// The first entry whose pattern matches.
+  std::optional<ValveEntry> FindValve(std::string_view valve_id);
+
+  /// Which version diagnoses the valve: the set of the first matching entry
+  /// that names one (its active version unless it names one), else the active
+  /// set whose name is the valve's id, else none: the valve is UNASSIGNED.
+  std::optional<ModelReference> AssignedModelSet(std::string_view valve_id);
+
+  /// Counts changes of active sets, assignments and valve entries.
+  std::int64_t Generation();
+
+  Database& database() { return database_; }
+
+ private:
+  std::int64_t RequireId(const ModelReference& reference);
+  void BumpGeneration();
+
+  Database database_;
+};
+
+/// Tells cheaply whether assignments may have changed, for a service that
+/// polls: most calls cost one look into shared memory.
+class ChangeCounter {
+ public:
+  explicit ChangeCounter(const std::filesystem::path& path);
+
+  /// True if active sets or valve entries changed since the last call (or
+  /// since the construction).
+  bool Changed();
+
+ private:
+  ModelStore store_;
+  std::int64_t data_version_;
+  std::int64_t generation_;
+};
+
+}  // namespace fdi::storage

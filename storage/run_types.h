@@ -1,0 +1,99 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/sample.h"
+#include "diagnosis/verdict.h"
+#include "storage/sample_codec.h"
+
+namespace fdi::storage {
+
+/// Where a run came from; numbers are part of the file format.
+enum class RunOrigin : std::uint8_t { kSimulated, kImported, kRecorded };
+
+enum class RunState : std::uint8_t {
+  kRecording,    ///< A recorder is at it.
+  kComplete,     ///< Ended by its recorder, or imported.
+  kInterrupted,  ///< Its recorder died; all committed samples are there.
+};
+
+std::string_view RunOriginName(RunOrigin origin);  ///< "simulated", ...
+std::string_view RunStateName(RunState state);     ///< "recording", ...
+
+/// What is known when a run begins: one valve, one source, one sample period.
+struct NewRun {
+  std::string valve_id;
+  std::uint64_t source_id{0};
+  std::int64_t start_ns{0};  ///< UTC of t = 0; stretches count from here.
+  double period_s{1.0};
+  FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  RunOrigin origin{RunOrigin::kRecorded};
+  std::string scenario;  ///< Of a simulation: TOML; of an import: the file.
+  std::optional<std::uint64_t> seed;
+  std::string software;  ///< Version and revision of the program.
+};
+
+/// A truth given by a user for t in [from_s, to_s); it overrides a stored one.
+struct RunLabel {
+  double from_s{0.0};
+  double to_s{std::numeric_limits<double>::infinity()};
+  int fault{0};  ///< 0 = normal, else 1..19.
+  double strength{0.0};
+};
+
+/// A stored run without its samples.
+struct RunInfo {
+  std::string id;  ///< 12 hex digits.
+  NewRun run;
+  RunState state{RunState::kComplete};
+  std::int64_t created_ns{0};
+  std::int64_t samples{0};
+  std::int64_t first_stamp_ns{0};  ///< 0 if there is no sample.
+  std::int64_t last_stamp_ns{0};
+  SignalMask signals{0};  ///< Present in some sample.
+  bool has_truth{false};  ///< Stored beside every sample.
+  std::array<std::int64_t, kIntakeCount> intake{};  ///< Samples by verdict.
+  std::int64_t stored_bytes{0};
+  std::vector<RunLabel> labels;
+};
+
+/// Part of a run, written `ID` or `ID@from:to`; a unique beginning of an id
+/// stands for it. t in [from_s, to_s), seconds from the start of the run.
+struct RunSelector {
+  std::string id;
+  double from_s{-std::numeric_limits<double>::infinity()};
+  double to_s{std::numeric_limits<double>::infinity()};
+
+  bool IsStretch() const {
+    return from_s > -std::numeric_limits<double>::infinity() ||
+           to_s < std::numeric_limits<double>::infinity();
+  }
+};
+
+/// "1a2b", "1a2b@600:1200", "1a2b@600:", "1a2b@:600".
+/// @throws ConfigError naming the accepted forms.
+RunSelector ParseRunSelector(std::string_view text);
+
+/// Settings of RunStore::List().
+struct RunFilter {
+  std::string valve_glob{"*"};  ///< As in a shell: * ? [...].
+  std::optional<RunOrigin> origin;
+  std::int64_t since_ns{std::numeric_limits<std::int64_t>::min()};
+  std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
+};
+
+/// A run, or a stretch of it, with its samples in the order of arrival. Labels
+/// are in StoredSample::truth.
+struct StoredRun {
+  RunInfo info;
+  RunSelector selector;
+  std::vector<StoredSample> samples;
+};
+
+}  // namespace fdi::storage
