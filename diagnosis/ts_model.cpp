@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "diagnosis/error.h"
 
@@ -18,6 +19,8 @@ namespace {
 constexpr double kCoveredExponent = -18.420680743952367;
 // exp(t) is taken as 0 below this, far above the subnormal numbers.
 constexpr double kLowestExponent = -700.0;
+// Keeps the difference of two exponents a number however far x is.
+constexpr double kFarthestExponent = -1e300;
 
 // exp(t) for t ≤ 0: t = k ln 2 + r, |r| ≤ ln(2)/2, times the Taylor series of
 // exp(r) up to r¹³. Relative error below 3e-16. The library's exp differs in
@@ -80,6 +83,7 @@ RuleValue EvaluateRule(const TsRule& rule, const double* x) {
     value.exponent += LogMembership(sets[j], x[j]);
     value.output += slopes[j] * x[j];
   }
+  value.exponent = std::max(value.exponent, kFarthestExponent);
   return value;
 }
 
