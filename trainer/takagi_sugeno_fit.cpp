@@ -1,0 +1,199 @@
+#include "trainer/takagi_sugeno_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "diagnosis/error.h"
+#include "trainer/antecedent_projection.h"
+#include "trainer/cluster_validity.h"
+
+namespace fdi::trainer {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
+using Eigen::VectorXd;
+
+// A column that varies by less than this share of its size is constant.
+constexpr double kConstantTolerance = 1e-12;
+
+void CheckData(const RegressionData& data, int num_rules) {
+  Require(data.x.cols() >= 1, "X needs at least one column");
+  Require(data.x.rows() == data.y.size(), "X and y need equally many rows");
+  Require(num_rules >= 1 && num_rules <= kMaxRules,
+          "num_rules must be within 1 to " + std::to_string(kMaxRules));
+  Require(data.x.rows() >= num_rules * (data.x.cols() + 1),
+          "too few rows: " + std::to_string(data.x.rows()) + " for " +
+              std::to_string(num_rules) + " rules with " +
+              std::to_string(data.x.cols() + 1) + " parameters each");
+  Require(data.x.allFinite() && data.y.allFinite(),
+          "X and y must be finite numbers");
+}
+
+// The columns of X that vary.
+std::vector<Index> VaryingColumns(const MatrixXd& x) {
+  std::vector<Index> columns;
+  for (Index j = 0; j < x.cols(); ++j) {
+    const double range = x.col(j).maxCoeff() - x.col(j).minCoeff();
+    if (range > kConstantTolerance * x.col(j).cwiseAbs().maxCoeff()) {
+      columns.push_back(j);
+    }
+  }
+  return columns;
+}
+
+// Z = [X, y] with columns of mean 0 and variance 1.
+MatrixXd Standardized(const MatrixXd& x, const VectorXd& y) {
+  MatrixXd z(x.rows(), x.cols() + 1);
+  z << x, y;
+  z.rowwise() -= RowVectorXd(z.colwise().mean());
+  for (Index j = 0; j < z.cols(); ++j) {
+    const double deviation =
+        std::sqrt(z.col(j).squaredNorm() / static_cast<double>(z.rows()));
+    if (deviation > 0.0) {
+      z.col(j) /= deviation;
+    }
+  }
+  return z;
+}
+
+FuzzyPartition OneCluster(const MatrixXd& z) {
+  FuzzyPartition partition;
+  partition.memberships = MatrixXd::Ones(z.rows(), 1);
+  partition.centers = z.colwise().mean();
+  partition.converged = partition.separated = true;
+  return partition;
+}
+
+FuzzyPartition Cluster(const MatrixXd& z, const TakagiSugenoOptions& options) {
+  if (options.num_rules == 1 || z.cols() == 1) {
+    return OneCluster(z);
+  }
+  GustafsonKesselOptions clustering = options.clustering;
+  clustering.num_clusters = options.num_rules;
+  FuzzyPartition partition = FitGustafsonKessel(z, clustering);
+  return partition.separated ? partition : OneCluster(z);
+}
+
+// log μ of one set for a whole column; -0.5 z², z = 0 in the core.
+ArrayXd LogMembership(const FuzzySet& set, const ArrayXd& x) {
+  const ArrayXd z = ((set.left_center - x) / set.left_width)
+                        .max((x - set.right_center) / set.right_width)
+                        .max(0.0);
+  return -0.5 * z.square();
+}
+
+struct Fit {
+  std::vector<TsRule> rules;
+  double validity{0.0};
+};
+
+Fit FitOnce(const RegressionData& data, const TakagiSugenoOptions& options) {
+  CheckData(data, options.num_rules);
+  const std::vector<Index> columns = VaryingColumns(data.x);
+  const MatrixXd x = data.x(Eigen::all, columns);
+  const MatrixXd z = Standardized(x, data.y);
+  const FuzzyPartition partition = Cluster(z, options);
+
+  Fit fit;
+  fit.validity = SugenoYasukawa(z, partition, options.clustering.fuzziness);
+  for (auto& antecedents : ProjectAntecedents(data.x, partition.memberships)) {
+    TsRule rule;
+    rule.antecedents = std::move(antecedents);
+    rule.slopes.assign(static_cast<std::size_t>(data.x.cols()), 0.0);
+    fit.rules.push_back(std::move(rule));
+  }
+  const MatrixXd weights = DegreesOfFulfilment(fit.rules, data.x);
+  const Consequents consequents =
+      EstimateConsequents(data.x, data.y, weights, options.consequents);
+  for (std::size_t i = 0; i < fit.rules.size(); ++i) {
+    const auto row = static_cast<Index>(i);
+    TsRule& rule = fit.rules[i];
+    for (std::size_t j = 0; j < rule.slopes.size(); ++j) {
+      rule.slopes[j] = consequents.slopes(row, static_cast<Index>(j));
+    }
+    rule.intercept = consequents.intercepts(row);
+    rule.data_share = weights.col(row).mean();
+  }
+  return fit;
+}
+
+}  // namespace
+
+MatrixXd DegreesOfFulfilment(const std::vector<TsRule>& rules,
+                             const Eigen::Ref<const MatrixXd>& x) {
+  Require(!rules.empty(), "there must be at least one rule");
+  const auto c = static_cast<Index>(rules.size());
+  Eigen::ArrayXXd exponents = Eigen::ArrayXXd::Zero(x.rows(), c);
+  for (Index i = 0; i < c; ++i) {
+    const TsRule& rule = rules[static_cast<std::size_t>(i)];
+    Require(static_cast<Index>(rule.antecedents.size()) == x.cols(),
+            "rules need one set per column of X");
+    for (Index j = 0; j < x.cols(); ++j) {
+      exponents.col(i) += LogMembership(
+          rule.antecedents[static_cast<std::size_t>(j)], x.col(j).array());
+    }
+  }
+  const ArrayXd largest = exponents.rowwise().maxCoeff();
+  exponents = (exponents.colwise() - largest).exp();
+  const ArrayXd sum = exponents.rowwise().sum();
+  return exponents.colwise() / sum;
+}
+
+VectorXd Predict(const std::vector<TsRule>& rules,
+                 const Eigen::Ref<const MatrixXd>& x) {
+  const MatrixXd weights = DegreesOfFulfilment(rules, x);
+  VectorXd y = VectorXd::Zero(x.rows());
+  for (std::size_t i = 0; i < rules.size(); ++i) {
+    const Eigen::Map<const VectorXd> slopes(rules[i].slopes.data(), x.cols());
+    const VectorXd output = (x * slopes).array() + rules[i].intercept;
+    y += weights.col(static_cast<Index>(i)).cwiseProduct(output);
+  }
+  return y;
+}
+
+std::vector<TsRule> FitTakagiSugeno(const RegressionData& data,
+                                    const TakagiSugenoOptions& options) {
+  return FitOnce(data, options).rules;
+}
+
+RuleSelection SelectRules(const RegressionData& data,
+                          const RuleSelectionOptions& options,
+                          const ValidationError& validation) {
+  Require(options.min_rules >= 1 && options.max_rules >= options.min_rules,
+          "min_rules must be at least 1 and at most max_rules");
+  Require(options.tolerance >= 0.0, "tolerance must not be negative");
+  RuleSelection selection;
+  std::vector<std::vector<TsRule>> rules;
+  double least = std::numeric_limits<double>::infinity();
+  for (int c = options.min_rules; c <= options.max_rules; ++c) {
+    TakagiSugenoOptions fit_options = options.fit;
+    fit_options.num_rules = c;
+    Fit fit = FitOnce(data, fit_options);
+    const double error = validation ? validation(fit.rules)
+                                    : std::numeric_limits<double>::quiet_NaN();
+    least = error < least ? error : least;
+    selection.tried.push_back({c, fit.validity, error});
+    rules.push_back(std::move(fit.rules));
+  }
+  Require(!validation || std::isfinite(least),
+          "no number of rules gives a usable validation error");
+  std::size_t best = rules.size();
+  for (std::size_t i = 0; i < rules.size(); ++i) {
+    const RuleCount& count = selection.tried[i];
+    const bool eligible = !validation || count.validation_error <=
+                                             (1.0 + options.tolerance) * least;
+    if (eligible && (best == rules.size() ||
+                     count.validity < selection.tried[best].validity)) {
+      best = i;
+    }
+  }
+  selection.rules = std::move(rules[best]);
+  return selection;
+}
+
+}  // namespace fdi::trainer
