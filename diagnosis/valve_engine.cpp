@@ -326,7 +326,8 @@ Transition ValveEngine::Impl::Make(TransitionKind kind, std::int64_t stamp_ns,
         verdict_.isolated == 0 || (verdict_.isolated >> i & 1U) != 0;
     if (counts && verdict_.fault_factors[i] >= transition.factor) {
       transition.factor = verdict_.fault_factors[i];
-      transition.strength = verdict_.strengths[i];
+      transition.strength =
+          verdict_.isolated == 0 ? 0.0 : verdict_.strengths[i];
     }
   }
   return transition;

@@ -64,7 +64,8 @@ struct Transition {
   std::int64_t detection_stamp_ns{0};
   FaultSet faults{0};    ///< The isolated set, empty until isolated.
   double factor{0.0};    ///< Largest factor of the set, or of any fault.
-  double strength{0.0};  ///< Estimated, of the fault with that factor.
+  double strength{0.0};  ///< Estimated, of the fault with that factor; 0
+                         ///< until isolated.
   EndReason reason{EndReason::kNone};  ///< Of kClosed.
 };
 

@@ -5,9 +5,10 @@
 #include <limits>
 #include <numeric>
 #include <random>
+#include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 
 #include "diagnosis/error.h"
 
@@ -32,6 +33,7 @@ void CheckArguments(const Eigen::Ref<const MatrixXd>& points,
           "covariance_weight must be within 0 to 1");
   Require(options.max_condition >= 1.0, "max_condition must be at least 1");
   Require(options.num_starts >= 1, "num_starts must be at least 1");
+  Require(options.coarse_points >= 0, "coarse_points must not be negative");
   Require(points.cols() >= 1, "points need at least one column");
   Require(points.rows() > options.num_clusters,
           "points need more rows than clusters");
@@ -58,36 +60,67 @@ double LogDeterminant(const VectorXd& eigenvalues) {
   return eigenvalues.array().log().sum();
 }
 
-// One start of the alternating minimization over fixed points Z, N×n. All
-// buffers are allocated once; a step works on whole columns.
+// Rows 0, stride, 2 stride, ... of Z.
+MatrixXd Thinned(const MatrixXd& z, Index stride) {
+  return z(Eigen::seq(0, Eigen::last, stride), Eigen::all);
+}
+
+// A start: spheres around centers among the points, each drawn with a
+// probability proportional to the squared distance from the nearest before.
+FuzzyPartition DrawStart(const MatrixXd& z, int num_clusters, unsigned seed) {
+  std::mt19937_64 generator(seed);
+  FuzzyPartition start;
+  start.centers.resize(num_clusters, z.cols());
+  start.covariances.assign(static_cast<std::size_t>(num_clusters),
+                           MatrixXd::Identity(z.cols(), z.cols()));
+  ArrayXd nearest = ArrayXd::Ones(z.rows());
+  for (Index i = 0; i < start.centers.rows(); ++i) {
+    // 53 random bits; the library's distributions are not the same everywhere.
+    double left =
+        static_cast<double>(generator() >> 11U) * 0x1p-53 * nearest.sum();
+    Index k = 0;
+    while (k + 1 < z.rows() && left >= nearest(k)) {
+      left -= nearest(k);
+      ++k;
+    }
+    start.centers.row(i) = z.row(k);
+    const ArrayXd squared =
+        (z.rowwise() - z.row(k)).rowwise().squaredNorm().array();
+    nearest = i == 0 ? squared : nearest.min(squared).eval();
+  }
+  return start;
+}
+
+// The alternating minimization over fixed points Z, N×n. All buffers of size N
+// are allocated once; a step works on whole columns.
 class Iteration {
  public:
   Iteration(const MatrixXd& z, const GustafsonKesselOptions& options)
       : z_(z),
         options_(options),
-        u_(z.rows(), options.num_clusters),
+        u_(ArrayXXd::Zero(z.rows(), options.num_clusters)),
         distances_(z.rows(), options.num_clusters),
         centered_(z.rows(), z.cols()),
         weights_(z.rows()),
         scratch_(z.rows()),
-        nearest_(z.rows()),
-        centers_(options.num_clusters, z.cols()),
-        covariances_(static_cast<std::size_t>(options.num_clusters),
-                     MatrixXd(z.cols(), z.cols())) {
+        nearest_(z.rows()) {
     PrepareRegularization();
   }
 
-  FuzzyPartition Run(unsigned seed) {
-    DrawCenters(seed);
+  // Iterates from the centers and covariances of `start`.
+  FuzzyPartition Run(const FuzzyPartition& start) {
+    centers_ = start.centers;
+    covariances_ = start.covariances;
     for (Index i = 0; i < u_.cols(); ++i) {
       centered_ = z_.rowwise() - centers_.row(i);
-      distances_.col(i) = centered_.rowwise().squaredNorm();
+      UpdateDistances(i);
     }
     UpdateMemberships();
     FuzzyPartition result;
     while (result.iterations < options_.max_iterations && !result.converged) {
       for (Index i = 0; i < u_.cols(); ++i) {
         UpdateCluster(i);
+        UpdateDistances(i);
       }
       const double change = UpdateMemberships();
       ++result.iterations;
@@ -113,35 +146,13 @@ class Iteration {
     const auto count = static_cast<double>(z_.rows());
     const MatrixXd f0 = centered_.transpose() * centered_ / count;
     const auto n = static_cast<double>(z_.cols());
-    const double mean_variance = f0.trace() / n;
-    smallest_eigenvalue_ = std::max(1e-30 * mean_variance, kSmallest);
+    smallest_eigenvalue_ = std::max(1e-30 * f0.trace() / n, kSmallest);
     const VectorXd eigenvalues =
         Eigen::SelfAdjointEigenSolver<MatrixXd>(f0, Eigen::EigenvaluesOnly)
             .eigenvalues()
             .cwiseMax(smallest_eigenvalue_);
     spread_ =
         options_.covariance_weight * std::exp(LogDeterminant(eigenvalues) / n);
-  }
-
-  // Centers among the points, each drawn with a probability proportional to
-  // the squared distance from the nearest one drawn before.
-  void DrawCenters(unsigned seed) {
-    std::mt19937_64 generator(seed);
-    nearest_.setOnes();
-    for (Index i = 0; i < centers_.rows(); ++i) {
-      const double total = nearest_.sum();
-      // 53 random bits; std::uniform_real_distribution differs by library.
-      double left = static_cast<double>(generator() >> 11U) * 0x1p-53 * total;
-      Index k = 0;
-      while (k + 1 < z_.rows() && left >= nearest_(k)) {
-        left -= nearest_(k);
-        ++k;
-      }
-      centers_.row(i) = z_.row(k);
-      scratch_ =
-          (z_.rowwise() - centers_.row(i)).rowwise().squaredNorm().array();
-      nearest_ = i == 0 ? scratch_ : nearest_.min(scratch_);
-    }
   }
 
   // μ^m of cluster i into weights_.
@@ -153,7 +164,7 @@ class Iteration {
     }
   }
 
-  // vᵢ, Fᵢ and the distances of all points from it.
+  // vᵢ and Fᵢ; leaves Z − vᵢ in centered_.
   void UpdateCluster(Index i) {
     const Index n = z_.cols();
     UpdateWeights(i);
@@ -169,42 +180,40 @@ class Iteration {
         f(a, b) = f(b, a) = scratch_.matrix().dot(centered_.col(b)) / total;
       }
     }
-    UpdateDistances(i, NormInducingFactor(f));
-  }
-
-  // Regularizes F in place and returns upper triangular R, RᵀR = A =
-  // det(F)^(1/n) F⁻¹.
-  MatrixXd NormInducingFactor(MatrixXd& f) const {
     f *= 1.0 - options_.covariance_weight;
     f.diagonal().array() += spread_;
+  }
+
+  // Raises the small eigenvalues of F and returns upper triangular R with
+  // RᵀR = A = det(F)^(1/n) F⁻¹.
+  MatrixXd NormInducingFactor(MatrixXd& f) const {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(f);
-    const double floor = solver.eigenvalues().maxCoeff();
-    const VectorXd eigenvalues = solver.eigenvalues().cwiseMax(
-        std::max(floor / options_.max_condition, smallest_eigenvalue_));
+    const double floor =
+        std::max(solver.eigenvalues().maxCoeff() / options_.max_condition,
+                 smallest_eigenvalue_);
+    const VectorXd eigenvalues = solver.eigenvalues().cwiseMax(floor);
     const MatrixXd& q = solver.eigenvectors();
     f = q * eigenvalues.asDiagonal() * q.transpose();
     const double scale =
         std::exp(LogDeterminant(eigenvalues) / static_cast<double>(f.rows()));
     const VectorXd root = (scale / eigenvalues.array()).sqrt();
-    return (root.asDiagonal() * q.transpose())
-        .householderQr()
+    const MatrixXd square_root = root.asDiagonal() * q.transpose();
+    return square_root.householderQr()
         .matrixQR()
         .triangularView<Eigen::Upper>();
   }
 
-  // Dᵢₖ = ‖R (zₖ − vᵢ)‖², column by column.
-  void UpdateDistances(Index i, const MatrixXd& r) {
-    const Index n = z_.cols();
-    for (Index a = 0; a < n; ++a) {
+  // Dᵢₖ = ‖R (zₖ − vᵢ)‖², from centered_.
+  void UpdateDistances(Index i) {
+    const MatrixXd r =
+        NormInducingFactor(covariances_[static_cast<std::size_t>(i)]);
+    distances_.col(i).setZero();
+    for (Index a = 0; a < r.cols(); ++a) {
       scratch_ = r(a, a) * centered_.col(a).array();
-      for (Index b = a + 1; b < n; ++b) {
+      for (Index b = a + 1; b < r.cols(); ++b) {
         scratch_ += r(a, b) * centered_.col(b).array();
       }
-      if (a == 0) {
-        distances_.col(i) = scratch_.square();
-      } else {
-        distances_.col(i) += scratch_.square();
-      }
+      distances_.col(i) += scratch_.square();
     }
   }
 
@@ -214,17 +223,15 @@ class Iteration {
     distances_ = distances_.max(kSmallest);
     nearest_ = distances_.rowwise().minCoeff();
     weights_.setZero();
-    // Until the sum is known, the ratios stand in for the new memberships.
-    double change = 0.0;
     for (Index i = 0; i < u_.cols(); ++i) {
       weights_ += Ratio(i);
     }
     weights_ = weights_.inverse();
+    double change = 0.0;
     for (Index i = 0; i < u_.cols(); ++i) {
-      Ratio(i);
-      scratch_ *= weights_;
-      change = std::max(change, (scratch_ - u_.col(i)).abs().maxCoeff());
-      u_.col(i) = scratch_;
+      change =
+          std::max(change, (Ratio(i) * weights_ - u_.col(i)).abs().maxCoeff());
+      u_.col(i) = scratch_ * weights_;
     }
     return change;
   }
@@ -269,6 +276,20 @@ bool Better(const FuzzyPartition& a, const FuzzyPartition& b) {
   return a.objective < b.objective;
 }
 
+FuzzyPartition BestStart(const MatrixXd& z,
+                         const GustafsonKesselOptions& options) {
+  Iteration iteration(z, options);
+  FuzzyPartition best;
+  for (int start = 0; start < options.num_starts; ++start) {
+    FuzzyPartition next = iteration.Run(DrawStart(
+        z, options.num_clusters, options.seed + static_cast<unsigned>(start)));
+    if (start == 0 || Better(next, best)) {
+      best = std::move(next);
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 FuzzyPartition FitGustafsonKessel(const Eigen::Ref<const MatrixXd>& points,
@@ -277,14 +298,15 @@ FuzzyPartition FitGustafsonKessel(const Eigen::Ref<const MatrixXd>& points,
   const std::vector<Index> order = LexicographicOrder(points);
   const MatrixXd sorted = points(order, Eigen::all);
 
-  Iteration iteration(sorted, options);
-  FuzzyPartition best = iteration.Run(options.seed);
-  for (int start = 1; start < options.num_starts; ++start) {
-    FuzzyPartition next =
-        iteration.Run(options.seed + static_cast<unsigned>(start));
-    if (Better(next, best)) {
-      best = std::move(next);
-    }
+  const Index stride =
+      options.coarse_points > 0
+          ? std::max(Index{1},
+                     sorted.rows() / std::max(options.coarse_points,
+                                              options.num_clusters + 1))
+          : Index{1};
+  FuzzyPartition best = BestStart(Thinned(sorted, stride), options);
+  if (stride > 1) {
+    best = Iteration(sorted, options).Run(best);
   }
 
   MatrixXd unsorted(best.memberships.rows(), best.memberships.cols());

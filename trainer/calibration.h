@@ -1,0 +1,31 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+
+namespace fdi::trainer {
+
+/// MSE, VAF = 100 (1 − var(r)/var(y)) and bias of residuals r against the
+/// outputs y they belong to. @throws std::invalid_argument if sizes differ.
+ValidationFigures Figures(std::span<const double> residuals,
+                          std::span<const double> outputs);
+
+/// The membership of an observer's residual from residuals under its own
+/// condition: core from the 5 % to the 95 % quantile, stretched to hold zero;
+/// support beyond the extremes by half a standard deviation.
+Trapezoid FitMembership(std::span<const double> residuals);
+
+/// τ = 1 + 2 Σ ρ_j up to the first autocorrelation below 0.05 [samples].
+double CorrelationTime(std::span<const double> residuals);
+
+/// Thresholds of the normal residual per channel for `rate` false alarms per
+/// hour over all channels, both sides and the n_d consecutive samples that a
+/// detection takes together (peaks over threshold, see tail_fit.h).
+///
+/// @param residuals one series per channel.
+void FitThresholds(const std::vector<std::vector<double>>& residuals,
+                   double rate_per_hour, ModelSet& models);
+
+}  // namespace fdi::trainer

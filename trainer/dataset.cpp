@@ -1,0 +1,208 @@
+#include "trainer/dataset.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <string>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+
+namespace fdi::trainer {
+namespace {
+
+constexpr double kStep = 0.02;          // change of strength in one sample
+constexpr double kStrengthGrid = 0.05;  // conditions are this far apart
+constexpr std::array<double, 7> kBands{0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0};
+
+// Fault and strength in grid steps, -1000 for samples of no condition.
+struct Key {
+  int fault{0};
+  int steps{0};
+  bool usable{false};
+
+  bool operator==(const Key&) const = default;
+};
+
+FaultTruth TruthOf(const LabelledSample& sample) {
+  FaultTruth truth = sample.truth.value_or(FaultTruth{});
+  if (truth.strength == 0.0) {
+    truth.fault = 0;
+  }
+  return truth;
+}
+
+double FullStrength(const TrainingRun& run) {
+  double full = 0.0;
+  for (const LabelledSample& sample : run.samples) {
+    full = std::max(full, std::abs(TruthOf(sample).strength));
+  }
+  return full;
+}
+
+int RoundedSteps(double strength) {
+  const int steps = static_cast<int>(std::lround(strength / kStrengthGrid));
+  return steps != 0 ? steps : (strength > 0.0 ? 1 : -1);
+}
+
+Key ConstantKey(const FaultTruth& truth) {
+  if (truth.fault == 0) {
+    return {0, 0, true};
+  }
+  return {truth.fault, RoundedSteps(truth.strength), true};
+}
+
+Key DevelopingKey(const FaultTruth& truth, double full) {
+  const double share = std::abs(truth.strength) / full;
+  if (share < 0.5 * kBands[0]) {
+    return {};
+  }
+  const auto nearest =
+      std::min_element(kBands.begin(), kBands.end(), [&](double a, double b) {
+        return std::abs(a - share) < std::abs(b - share);
+      });
+  return {truth.fault,
+          RoundedSteps(std::copysign(*nearest * full, truth.strength)), true};
+}
+
+// Condition of every sample; not usable right after a start or a step.
+std::vector<Key> KeysOf(const TrainingRun& run, const DatasetOptions& options) {
+  const std::size_t count = run.samples.size();
+  const double full = FullStrength(run);
+  std::vector<Key> keys(count);
+  int dropped = options.dropped_after_step;
+  for (std::size_t k = 0; k < count; ++k) {
+    const FaultTruth now = TruthOf(run.samples[k]);
+    const double before =
+        k > 0 ? TruthOf(run.samples[k - 1]).strength : now.strength;
+    const double after =
+        k + 1 < count ? TruthOf(run.samples[k + 1]).strength : now.strength;
+    if (std::abs(now.strength - before) >= kStep) {
+      dropped = options.dropped_after_step;
+    }
+    const bool developing =
+        (now.strength != before && std::abs(now.strength - before) < kStep) ||
+        (now.strength != after && std::abs(now.strength - after) < kStep);
+    const Key key = now.fault != 0 && developing ? DevelopingKey(now, full)
+                                                 : ConstantKey(now);
+    keys[k] = dropped > 0 ? Key{} : key;
+    dropped = std::max(0, dropped - 1);
+  }
+  return keys;
+}
+
+struct Pool {
+  double strength_sum{0.0};
+  std::int64_t strength_count{0};
+  Condition condition;
+};
+
+using Pools = std::map<std::pair<int, int>, Pool>;
+
+void AddStretch(const TrainingRun& run, std::size_t begin, std::size_t end,
+                const Key& key, const DatasetOptions& options, Pools& pools) {
+  if (static_cast<int>(end - begin) < options.shortest_stretch) {
+    return;
+  }
+  Pool& pool = pools[{key.fault, key.steps}];
+  pool.condition.fault = key.fault;
+  const auto validated = static_cast<std::size_t>(
+      options.validation_share * static_cast<double>(end - begin));
+  Stretch training{run.id, {}};
+  Stretch validation{run.id, {}};
+  for (std::size_t k = begin; k < end; ++k) {
+    Stretch& target = k < end - validated ? training : validation;
+    target.samples.push_back(run.samples[k].sample);
+    pool.strength_sum += TruthOf(run.samples[k]).strength;
+    ++pool.strength_count;
+  }
+  pool.condition.training.push_back(std::move(training));
+  pool.condition.validation.push_back(std::move(validation));
+}
+
+void CutRun(const TrainingRun& run, const DatasetOptions& options,
+            Pools& pools) {
+  const std::vector<Key> keys = KeysOf(run, options);
+  const auto period_ns = std::llround(run.period_s * 1e9);
+  std::size_t begin = 0;
+  for (std::size_t k = 1; k <= keys.size(); ++k) {
+    const bool continues = k < keys.size() && keys[k] == keys[begin] &&
+                           std::abs(run.samples[k].sample.stamp_ns -
+                                    run.samples[k - 1].sample.stamp_ns -
+                                    period_ns) <= period_ns / 2;
+    if (!continues) {
+      if (keys[begin].usable) {
+        AddStretch(run, begin, k, keys[begin], options, pools);
+      }
+      begin = k;
+    }
+  }
+}
+
+void CheckRuns(const std::vector<TrainingRun>& runs,
+               const DatasetOptions& options) {
+  Require(!runs.empty(), "no run was given");
+  const TrainingRun& first = runs.front();
+  for (const TrainingRun& run : runs) {
+    if (run.samples.empty()) {
+      throw DataError("run " + run.id + " has no sample");
+    }
+    if (!run.samples.front().truth && !options.assume_normal) {
+      throw DataError("run " + run.id +
+                      " carries no truth: label it, or say --assume-normal");
+    }
+    if (run.period_s != first.period_s) {
+      throw DataError("run " + run.id + " has a sample period of " +
+                      std::to_string(run.period_s) + " s, run " + first.id +
+                      " of " + std::to_string(first.period_s) + " s");
+    }
+    if (run.flow_unit != first.flow_unit) {
+      throw DataError("run " + run.id + " has its flow in " +
+                      std::string(FlowUnitName(run.flow_unit)) + ", run " +
+                      first.id + " in " +
+                      std::string(FlowUnitName(first.flow_unit)));
+    }
+    if (run.samples.front().sample.present !=
+        first.samples.front().sample.present) {
+      throw DataError("run " + run.id + " has other signals than run " +
+                      first.id);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Condition> BuildConditions(const std::vector<TrainingRun>& runs,
+                                       const DatasetOptions& options) {
+  CheckRuns(runs, options);
+  Pools pools;
+  for (const TrainingRun& run : runs) {
+    CutRun(run, options, pools);
+  }
+  std::vector<Condition> conditions;
+  for (auto& [key, pool] : pools) {
+    pool.condition.strength =
+        pool.condition.fault == 0
+            ? 0.0
+            : pool.strength_sum / static_cast<double>(pool.strength_count);
+    conditions.push_back(std::move(pool.condition));
+  }
+  if (conditions.empty() || conditions.front().fault != 0) {
+    throw DataError("no run has at least " +
+                    std::to_string(options.shortest_stretch) +
+                    " samples of normal operation in a row");
+  }
+  return conditions;
+}
+
+std::int64_t CountSamples(const std::vector<Stretch>& stretches) {
+  std::int64_t count = 0;
+  for (const Stretch& stretch : stretches) {
+    count += static_cast<std::int64_t>(stretch.samples.size());
+  }
+  return count;
+}
+
+}  // namespace fdi::trainer

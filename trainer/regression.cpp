@@ -1,0 +1,114 @@
+#include "trainer/regression.h"
+
+#include <algorithm>
+#include <array>
+
+#include "diagnosis/error.h"
+
+namespace fdi::trainer {
+namespace {
+
+int LongestLagOf(const std::vector<Regressor>& regressors) {
+  int longest = 0;
+  for (const Regressor& regressor : regressors) {
+    longest = std::max(longest, regressor.lag);
+  }
+  return longest;
+}
+
+bool RunsOnItself(const TsModel& model) {
+  return model.parallel &&
+         std::any_of(
+             model.regressors.begin(), model.regressors.end(),
+             [&](const Regressor& r) { return r.signal == model.output; });
+}
+
+}  // namespace
+
+RegressionData BuildRegression(std::span<const Stretch> stretches,
+                               const std::vector<Regressor>& regressors,
+                               Signal output) {
+  Require(!regressors.empty(), "a model needs at least one regressor");
+  const int lag = LongestLagOf(regressors);
+  Eigen::Index rows = 0;
+  for (const Stretch& stretch : stretches) {
+    rows += std::max<Eigen::Index>(
+        0, static_cast<Eigen::Index>(stretch.samples.size()) - lag);
+  }
+  RegressionData data;
+  data.x.resize(rows, static_cast<Eigen::Index>(regressors.size()));
+  data.y.resize(rows);
+  Eigen::Index row = 0;
+  for (const Stretch& stretch : stretches) {
+    const int count = static_cast<int>(stretch.samples.size());
+    for (int k = lag; k < count; ++k, ++row) {
+      for (std::size_t j = 0; j < regressors.size(); ++j) {
+        const auto at = static_cast<std::size_t>(k - regressors[j].lag);
+        data.x(row, static_cast<Eigen::Index>(j)) =
+            stretch.samples[at][regressors[j].signal];
+      }
+      data.y(row) = stretch.samples[static_cast<std::size_t>(k)][output];
+    }
+  }
+  return data;
+}
+
+std::vector<double> RunResiduals(const TsModel& model, const Stretch& stretch,
+                                 int settling) {
+  const int left_out = RunsOnItself(model) ? settling : LongestLag(model);
+  std::vector<double> predictions(stretch.samples.size());
+  std::vector<double> residuals;
+  std::array<double, kMaxRegressors> x{};
+  for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
+    for (std::size_t j = 0; j < model.regressors.size(); ++j) {
+      const Regressor& regressor = model.regressors[j];
+      const auto lag = static_cast<std::size_t>(regressor.lag);
+      const bool own = model.parallel && regressor.signal == model.output;
+      if (k < lag) {
+        x[j] = stretch.samples.front()[regressor.signal];
+      } else {
+        x[j] = own ? predictions[k - lag]
+                   : stretch.samples[k - lag][regressor.signal];
+      }
+    }
+    predictions[k] = std::clamp(Evaluate(model, x.data()).value,
+                                model.output_min, model.output_max);
+    if (static_cast<int>(k) >= left_out) {
+      residuals.push_back(stretch.samples[k][model.output] - predictions[k]);
+    }
+  }
+  return residuals;
+}
+
+std::vector<double> RunResiduals(const TsModel& model,
+                                 std::span<const Stretch> stretches,
+                                 int settling) {
+  std::vector<double> all;
+  for (const Stretch& stretch : stretches) {
+    const std::vector<double> one = RunResiduals(model, stretch, settling);
+    all.insert(all.end(), one.begin(), one.end());
+  }
+  return all;
+}
+
+TsModel MakeModel(std::vector<TsRule> rules, const RegressionData& data,
+                  const std::vector<Regressor>& regressors, Signal output,
+                  bool parallel) {
+  TsModel model;
+  model.output = output;
+  model.parallel = parallel;
+  model.regressors = regressors;
+  for (Eigen::Index j = 0; j < data.x.cols(); ++j) {
+    model.regressor_min.push_back(data.x.col(j).minCoeff());
+    model.regressor_max.push_back(data.x.col(j).maxCoeff());
+  }
+  const double low = data.y.minCoeff();
+  const double high = data.y.maxCoeff();
+  const double margin = 0.5 * (high - low) + 1e-9;
+  model.output_min = low - margin;
+  model.output_max = high + margin;
+  model.rules = std::move(rules);
+  return model;
+}
+
+}  // namespace fdi::trainer

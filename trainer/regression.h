@@ -1,0 +1,39 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "diagnosis/ts_model.h"
+#include "trainer/dataset.h"
+#include "trainer/takagi_sugeno_fit.h"
+
+namespace fdi::trainer {
+
+/// Rows of regressors and targets from measured values, lags included; a row
+/// never reaches across the border of a stretch.
+///
+/// @return X, N×n and y with N the samples of all stretches less the longest
+///   lag of each.
+RegressionData BuildRegression(std::span<const Stretch> stretches,
+                               const std::vector<Regressor>& regressors,
+                               Signal output);
+
+/// Residuals y − ŷ of one stretch, run as the engine runs the model: past of
+/// the first sample at rest, parallel models on their own predictions, limits
+/// kept. Left out are the first `settling` residuals of a model that runs on
+/// its own predictions, of others those that lack a lag.
+std::vector<double> RunResiduals(const TsModel& model, const Stretch& stretch,
+                                 int settling);
+
+/// RunResiduals() of all stretches, one after another.
+std::vector<double> RunResiduals(const TsModel& model,
+                                 std::span<const Stretch> stretches,
+                                 int settling);
+
+/// A model around `rules` with the ranges of `data` and an output that may
+/// leave the trained range by half of it.
+TsModel MakeModel(std::vector<TsRule> rules, const RegressionData& data,
+                  const std::vector<Regressor>& regressors, Signal output,
+                  bool parallel);
+
+}  // namespace fdi::trainer

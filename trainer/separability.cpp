@@ -1,0 +1,197 @@
+#include "trainer/separability.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "diagnosis/fault_bank.h"
+#include "diagnosis/observer_bank.h"
+
+namespace fdi::trainer {
+namespace {
+
+constexpr double kDefaultInterpolationError = 0.3;
+constexpr double kLowestInterpolationError = 0.02;
+constexpr double kHighestInterpolationError = 1.0;
+constexpr double kDetectableShare = 0.05;
+constexpr double kGroupShare = 0.5;
+constexpr int kEvidenceSamples = 60;  // before a factor counts
+
+// Observers of one fault and direction by rising |strength|, normal first.
+std::vector<int> Chain(const ModelSet& models, int fault, bool negative) {
+  std::vector<int> chain{0};
+  for (std::size_t i = 1; i < models.observers.size(); ++i) {
+    const Observer& observer = models.observers[i];
+    if (observer.fault == fault && (observer.strength < 0.0) == negative) {
+      chain.push_back(static_cast<int>(i));
+    }
+  }
+  std::sort(chain.begin(), chain.end(), [&](int a, int b) {
+    return std::abs(models.observers[static_cast<std::size_t>(a)].strength) <
+           std::abs(models.observers[static_cast<std::size_t>(b)].strength);
+  });
+  return chain;
+}
+
+struct InterpolationSums {
+  double error{0.0};
+  double move{0.0};
+};
+
+// Squares of: neighbours' interpolation less the observer between them, and
+// how far the interpolation moved from the nearer neighbour.
+std::vector<InterpolationSums> CompareWithNeighbours(
+    const std::vector<Condition>& conditions, const ModelSet& models, int low,
+    int middle, int high) {
+  const auto strength = [&](int i) {
+    return models.observers[static_cast<std::size_t>(i)].strength;
+  };
+  const double w =
+      (strength(middle) - strength(low)) / (strength(high) - strength(low));
+  std::vector<InterpolationSums> sums(models.channels.size());
+  const Condition& condition = conditions[static_cast<std::size_t>(middle)];
+  for (const Stretch& stretch : condition.validation) {
+    ObserverBank bank(models);
+    bank.Initialise(stretch.samples.front());
+    for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
+      bank.Step(stretch.samples[k]);
+      if (static_cast<int>(k) < models.decision.settling_samples) {
+        continue;
+      }
+      for (std::size_t c = 0; c < sums.size(); ++c) {
+        const int channel = static_cast<int>(c);
+        if (!bank.active(channel)) {
+          continue;
+        }
+        const double from = bank.prediction(low, channel);
+        const double to = bank.prediction(high, channel);
+        const double between = from + w * (to - from);
+        const double nearer = w < 0.5 ? from : to;
+        const double error = between - bank.prediction(middle, channel);
+        sums[c].error += error * error;
+        sums[c].move += (between - nearer) * (between - nearer);
+      }
+    }
+  }
+  return sums;
+}
+
+// Share of samples beyond a threshold, and per fault index with d ≥ T.
+struct Shares {
+  double samples{0.0};
+  double abnormal{0.0};
+  std::vector<double> accepted;
+};
+
+void ScoreStretch(const Stretch& stretch, const ModelSet& models,
+                  Shares& shares) {
+  ObserverBank bank(models);
+  FaultBank faults(models);
+  Verdict verdict;
+  bank.Initialise(stretch.samples.front());
+  faults.Restart();
+  const int start = models.decision.settling_samples;
+  for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
+    bank.Step(stretch.samples[k]);
+    if (static_cast<int>(k) < start) {
+      continue;
+    }
+    faults.Score(bank, verdict);
+    faults.Follow(bank);
+    faults.Compete(verdict);
+    if (static_cast<int>(k) < start + kEvidenceSamples) {
+      continue;
+    }
+    shares.samples += 1.0;
+    for (std::size_t c = 0; c < models.channels.size(); ++c) {
+      const double r = bank.residual(0, static_cast<int>(c));
+      if (bank.active(static_cast<int>(c)) &&
+          (r < models.channels[c].lower_threshold ||
+           r > models.channels[c].upper_threshold)) {
+        shares.abnormal += 1.0;
+        break;
+      }
+    }
+    for (std::size_t i = 0; i < models.faults.size(); ++i) {
+      shares.accepted[i] +=
+          verdict.fault_factors[i] >= models.decision.isolation_threshold;
+    }
+  }
+}
+
+}  // namespace
+
+void FitInterpolationErrors(const std::vector<Condition>& conditions,
+                            ModelSet& models) {
+  const std::size_t channels = models.channels.size();
+  models.interpolation_errors.assign(models.faults.size() * channels,
+                                     kDefaultInterpolationError);
+  for (std::size_t f = 0; f < models.faults.size(); ++f) {
+    std::vector<double> largest(channels, 0.0);
+    bool compared = false;
+    for (const bool negative : {false, true}) {
+      const std::vector<int> chain = Chain(models, models.faults[f], negative);
+      for (std::size_t n = 1; n + 1 < chain.size(); ++n) {
+        const auto sums = CompareWithNeighbours(
+            conditions, models, chain[n - 1], chain[n], chain[n + 1]);
+        for (std::size_t c = 0; c < channels; ++c) {
+          if (sums[c].move > 0.0) {
+            largest[c] =
+                std::max(largest[c], std::sqrt(sums[c].error / sums[c].move));
+          }
+        }
+        compared = true;
+      }
+    }
+    for (std::size_t c = 0; c < channels && compared; ++c) {
+      models.interpolation_errors[f * channels + c] = std::clamp(
+          largest[c], kLowestInterpolationError, kHighestInterpolationError);
+    }
+  }
+}
+
+void FindGroups(const std::vector<Condition>& conditions, ModelSet& models) {
+  models.groups.clear();
+  models.undetectable.clear();
+  std::map<int, Shares> by_fault;
+  for (const Condition& condition : conditions) {
+    if (condition.fault == 0) {
+      continue;
+    }
+    Shares& shares = by_fault[condition.fault];
+    shares.accepted.resize(models.faults.size(), 0.0);
+    for (const Stretch& stretch : condition.validation) {
+      ScoreStretch(stretch, models, shares);
+    }
+  }
+  std::vector<std::size_t> root(models.faults.size());
+  std::iota(root.begin(), root.end(), std::size_t{0});
+  for (const auto& [fault, shares] : by_fault) {
+    if (shares.abnormal < kDetectableShare * shares.samples) {
+      models.undetectable.push_back(fault);
+      continue;
+    }
+    const auto i = static_cast<std::size_t>(FaultIndex(models, fault));
+    for (std::size_t l = 0; l < root.size(); ++l) {
+      if (l != i && shares.accepted[l] > kGroupShare * shares.samples) {
+        const std::size_t merged = std::min(root[i], root[l]);
+        const std::size_t gone = std::max(root[i], root[l]);
+        std::replace(root.begin(), root.end(), gone, merged);
+      }
+    }
+  }
+  for (std::size_t first = 0; first < root.size(); ++first) {
+    std::vector<int> group;
+    for (std::size_t i = 0; i < root.size(); ++i) {
+      if (root[i] == first) {
+        group.push_back(models.faults[i]);
+      }
+    }
+    if (group.size() > 1) {
+      models.groups.push_back(group);
+    }
+  }
+}
+
+}  // namespace fdi::trainer

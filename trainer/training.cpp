@@ -1,0 +1,249 @@
+#include "trainer/training.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <mutex>
+#include <numeric>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "trainer/calibration.h"
+#include "trainer/parallel_for.h"
+#include "trainer/regression.h"
+#include "trainer/separability.h"
+
+namespace fdi::trainer {
+namespace {
+
+constexpr int kFolds = 4;
+constexpr std::size_t kFewResiduals = 20;
+
+// Shares of the work, for the progress bar.
+constexpr double kStructureShare = 0.3;
+constexpr double kObserverShare = 0.5;
+
+class Reporter {
+ public:
+  explicit Reporter(const Progress& progress) : progress_(progress) {}
+
+  void Tell(double share, std::string_view stage) {
+    const std::scoped_lock lock(mutex_);
+    if (progress_) {
+      progress_(share, stage);
+    }
+  }
+
+ private:
+  const Progress& progress_;
+  std::mutex mutex_;
+};
+
+std::string ObserverName(const Condition& condition) {
+  if (condition.fault == 0) {
+    return "normal";
+  }
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), " %.2f", condition.strength);
+  return FaultName(condition.fault) + text.data();
+}
+
+std::vector<double> Outputs(std::span<const Stretch> stretches, Signal output) {
+  std::vector<double> outputs;
+  for (const Stretch& stretch : stretches) {
+    for (const Sample& sample : stretch.samples) {
+      outputs.push_back(sample[output]);
+    }
+  }
+  return outputs;
+}
+
+// Residuals of the validation stretches, of all stretches where those are too
+// short to tell anything.
+ChannelObserver Calibrate(TsModel model, const Condition& condition,
+                          int settling) {
+  ChannelObserver channel;
+  std::vector<double> residuals;
+  std::vector<double> outputs;
+  const auto add = [&](std::span<const Stretch> stretches) {
+    for (const Stretch& stretch : stretches) {
+      const std::vector<double> r = RunResiduals(model, stretch, settling);
+      const std::vector<double> y = Outputs({&stretch, 1}, model.output);
+      residuals.insert(residuals.end(), r.begin(), r.end());
+      outputs.insert(outputs.end(),
+                     y.end() - static_cast<std::ptrdiff_t>(r.size()), y.end());
+    }
+  };
+  add(condition.validation);
+  if (residuals.size() < kFewResiduals) {
+    add(condition.training);
+  }
+  channel.validation = Figures(residuals, outputs);
+  channel.membership = FitMembership(residuals);
+  channel.residual_sd = std::max(std::sqrt(channel.validation.mse), 1e-6);
+  channel.correlation_time = CorrelationTime(residuals);
+  channel.model = std::move(model);
+  return channel;
+}
+
+// Block f of kFolds of every stretch, and all the others.
+struct Fold {
+  Condition rest;
+  std::vector<Stretch> block;
+};
+
+Fold MakeFold(const Condition& normal, int fold) {
+  Fold result;
+  for (std::size_t i = 0; i < normal.training.size(); ++i) {
+    std::vector<Sample> whole = normal.training[i].samples;
+    const auto& tail = normal.validation[i].samples;
+    whole.insert(whole.end(), tail.begin(), tail.end());
+    const auto cut = [&](int f) {
+      return whole.begin() +
+             static_cast<std::ptrdiff_t>(whole.size() *
+                                         static_cast<std::size_t>(f) / kFolds);
+    };
+    const std::string& id = normal.training[i].run_id;
+    result.block.push_back({id, {cut(fold), cut(fold + 1)}});
+    result.rest.training.push_back({id, {whole.begin(), cut(fold)}});
+    result.rest.training.push_back({id, {cut(fold + 1), whole.end()}});
+  }
+  std::erase_if(result.rest.training,
+                [](const Stretch& s) { return s.samples.empty(); });
+  result.rest.validation = result.block;
+  return result;
+}
+
+// Residuals of normal operation that no model was fitted to: every block is
+// predicted by a model of the other blocks.
+std::vector<std::vector<double>> CrossValidate(const Condition& normal,
+                                               const ModelSet& models,
+                                               const TrainingOptions& options) {
+  const std::size_t channels = models.channels.size();
+  std::vector<std::vector<double>> parts(channels * kFolds);
+  ParallelFor(static_cast<int>(parts.size()), options.threads, [&](int i) {
+    const auto c = static_cast<std::size_t>(i / kFolds);
+    const Fold fold = MakeFold(normal, i % kFolds);
+    const TsModel& chosen = models.observers.front().channels[c].model;
+    FitOptions fixed = options.fit;
+    fixed.rules.min_rules = static_cast<int>(chosen.rules.size());
+    fixed.rules.max_rules = fixed.rules.min_rules;
+    const TsModel model =
+        FitChannel(options.channels[c], chosen.regressors, fold.rest, fixed);
+    parts[static_cast<std::size_t>(i)] =
+        RunResiduals(model, fold.block, options.fit.settling);
+  });
+  std::vector<std::vector<double>> joined(channels);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    auto& series = joined[i / kFolds];
+    series.insert(series.end(), parts[i].begin(), parts[i].end());
+  }
+  return joined;
+}
+
+SignalRange TrainedCommands(const std::vector<Condition>& conditions) {
+  SignalRange range{1e9, -1e9};
+  for (const Condition& condition : conditions) {
+    for (const Stretch& stretch : condition.training) {
+      for (const Sample& sample : stretch.samples) {
+        range.minimum = std::min(range.minimum, sample[Signal::kCv]);
+        range.maximum = std::max(range.maximum, sample[Signal::kCv]);
+      }
+    }
+  }
+  const double margin = std::max(5.0, 0.1 * (range.maximum - range.minimum));
+  return {range.minimum - margin, range.maximum + margin};
+}
+
+ModelSet Describe(const std::vector<TrainingRun>& runs,
+                  const std::vector<Condition>& conditions,
+                  const TrainingOptions& options) {
+  ModelSet models;
+  models.name = options.name;
+  models.created_ns = options.created_ns;
+  models.software = options.software;
+  models.preset = options.preset;
+  models.sample_period_s = runs.front().period_s;
+  models.flow_unit = runs.front().flow_unit;
+  models.trained_cv = TrainedCommands(conditions);
+  models.decision = options.decision;
+  for (const ChannelPlan& plan : options.channels) {
+    models.channels.push_back({plan.name, plan.output, -1.0, 1.0});
+  }
+  for (const Condition& condition : conditions) {
+    models.observers.push_back(
+        {ObserverName(condition), condition.fault, condition.strength,
+         std::vector<ChannelObserver>(options.channels.size())});
+    if (condition.fault != 0 &&
+        (models.faults.empty() || models.faults.back() != condition.fault)) {
+      models.faults.push_back(condition.fault);
+    }
+  }
+  for (const TrainingRun& run : runs) {
+    models.training_runs.push_back(run.id);
+  }
+  return models;
+}
+
+// The normal observer's membership and deviation rest on all its data.
+void CalibrateNormal(const std::vector<std::vector<double>>& residuals,
+                     Observer& normal) {
+  for (std::size_t c = 0; c < residuals.size(); ++c) {
+    ChannelObserver& channel = normal.channels[c];
+    double square = 0.0;
+    for (const double r : residuals[c]) {
+      square += r * r;
+    }
+    channel.membership = FitMembership(residuals[c]);
+    channel.residual_sd = std::max(
+        std::sqrt(square / static_cast<double>(residuals[c].size())), 1e-6);
+    channel.correlation_time = CorrelationTime(residuals[c]);
+  }
+}
+
+}  // namespace
+
+ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
+                       const TrainingOptions& options,
+                       const Progress& progress) {
+  Require(!options.channels.empty(), "a model set needs a channel");
+  Reporter reporter(progress);
+  const std::vector<Condition> conditions =
+      BuildConditions(runs, options.dataset);
+  ModelSet models = Describe(runs, conditions, options);
+  const int channels = static_cast<int>(options.channels.size());
+  std::vector<std::vector<Regressor>> regressors(options.channels.size());
+  reporter.Tell(0.0, "choosing regressors");
+  ParallelFor(channels, options.threads, [&](int c) {
+    const auto i = static_cast<std::size_t>(c);
+    regressors[i] =
+        ChooseRegressors(options.channels[i], conditions.front(), options.fit);
+  });
+  const int fits = static_cast<int>(conditions.size()) * channels;
+  std::atomic<int> done{0};
+  ParallelFor(fits, options.threads, [&](int i) {
+    const auto o = static_cast<std::size_t>(i / channels);
+    const auto c = static_cast<std::size_t>(i % channels);
+    models.observers[o].channels[c] =
+        Calibrate(FitChannel(options.channels[c], regressors[c], conditions[o],
+                             options.fit),
+                  conditions[o], options.fit.settling);
+    reporter.Tell(kStructureShare + kObserverShare * ++done / fits,
+                  "fitting " + models.observers[o].name);
+  });
+  reporter.Tell(kStructureShare + kObserverShare, "setting thresholds");
+  const auto normal_residuals =
+      CrossValidate(conditions.front(), models, options);
+  CalibrateNormal(normal_residuals, models.observers.front());
+  FitThresholds(normal_residuals, options.false_alarms_per_hour, models);
+  reporter.Tell(0.9, "comparing faults");
+  FitInterpolationErrors(conditions, models);
+  FindGroups(conditions, models);
+  Validate(models);
+  reporter.Tell(1.0, "done");
+  return models;
+}
+
+}  // namespace fdi::trainer

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+#include "trainer/channel_training.h"
+#include "trainer/dataset.h"
+
+namespace fdi::trainer {
+
+/// Told how far the training is: share in [0, 1] and what is being done. Called
+/// from one thread at a time.
+using Progress = std::function<void(double share, std::string_view stage)>;
+
+/// Everything that decides what comes out of a training.
+struct TrainingOptions {
+  std::string name;    ///< Of the model set.
+  std::string preset;  ///< That these options came from.
+  std::vector<ChannelPlan> channels;
+  DecisionParameters decision;
+  DatasetOptions dataset;
+  FitOptions fit;
+  double false_alarms_per_hour{1e-3};  ///< Over all channels together.
+  int threads{0};                      ///< 0: all of the machine.
+  std::string software;                ///< Stored with the set.
+  std::int64_t created_ns{0};          ///< Stored with the set.
+};
+
+/// The options of a named preset. `paper`: two channels, X and F, each from the
+/// inputs and its own past.
+/// @throws ConfigError naming the presets if there is none of that name.
+TrainingOptions PresetOptions(std::string_view preset);
+
+/// Builds a model set: regressors per channel on normal operation, then one
+/// observer per condition, memberships, thresholds, interpolation errors and
+/// groups. The same runs and options give the same set, whatever the threads.
+///
+/// @throws DataError naming run, condition or channel if the runs do not
+///   suffice (see BuildConditions, FitChannel).
+ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
+                       const TrainingOptions& options,
+                       const Progress& progress = {});
+
+}  // namespace fdi::trainer
