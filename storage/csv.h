@@ -33,14 +33,15 @@ struct ColumnMap {
   std::string time_column{"t_s"};
   double time_scale{1.0};  ///< To seconds.
   std::vector<ColumnMapping> columns;
-  std::optional<FlowUnit> flow_unit;  ///< Of a mapped flow; required for one.
+  std::optional<FlowUnit> flow_unit;  ///< Needed if the flow is mapped.
 };
 
 /// Settings of the CSV readers.
 struct CsvOptions {
   std::string source{"input"};  ///< Name of the file, for messages.
   ColumnMap map;
-  /// Columns that must be there. CV and one of X, F are always needed.
+  /// Columns that must be there; with a map, those of the map instead. Time,
+  /// CV and one of X, F are always needed.
   SignalMask required{kBasicSignals};
   bool split_gaps{false};    ///< A gap starts another run, not an error.
   double period_s{0.0};      ///< 0: as the file has it.
@@ -86,6 +87,7 @@ struct CsvRow {
 /// non-zero strength marks a fault. Further columns are ignored.
 class CsvReader {
  public:
+  /// @throws ConfigError if a map has a flow without its unit.
   explicit CsvReader(CsvOptions options);
 
   /// Takes the next line, without its end. @returns nothing for the header and
@@ -152,7 +154,8 @@ CsvTable ReadCsvFile(const std::filesystem::path& path,
 
 /// Writes the columns of the contract for the signals that occur; fault and
 /// fault_strength if truth is known. Numbers read back as the same bits.
-/// t_s counts from `start_ns`. A signal that one sample lacks is `nan`.
+/// t_s counts from `start_ns`. A signal that one sample lacks, or
+/// a flow in another unit than the run's, is `nan`.
 void WriteCsv(std::ostream& output, std::span<const LabelledSample> samples,
               FlowUnit flow_unit, std::int64_t start_ns);
 
