@@ -1,0 +1,268 @@
+#include "monitor/episode_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace fdi::monitor {
+namespace {
+
+constexpr double kResumeWindowS = 60.0;
+constexpr double kGapPeriods = 3.0;
+
+std::int64_t Ns(double seconds) {
+  return std::llround(seconds * 1e9);
+}
+
+bool OutOfOrder(Intake intake) {
+  return intake == Intake::kRepeat || intake == Intake::kLate ||
+         intake == Intake::kSuperseded;
+}
+
+// The isolated members of `candidates` as a set of `models`.
+FaultSet IsolatedSet(const std::vector<Candidate>& candidates,
+                     const ModelSet& models) {
+  FaultSet set = 0;
+  for (const Candidate& candidate : candidates) {
+    const int index = FaultIndex(models, candidate.fault);
+    if (candidate.isolated && index >= 0) {
+      set |= FaultSet{1} << index;
+    }
+  }
+  return set;
+}
+
+}  // namespace
+
+std::vector<Candidate> CandidatesOf(const ModelSet& models,
+                                    const Verdict& verdict, FaultSet isolated) {
+  std::vector<Candidate> candidates;
+  const double half = 0.5 * models.decision.isolation_threshold;
+  for (std::size_t i = 0; i < models.faults.size(); ++i) {
+    const bool member = (isolated >> i & 1U) != 0;
+    if (member || verdict.fault_factors[i] >= half) {
+      candidates.push_back({models.faults[i], verdict.fault_factors[i],
+                            verdict.strengths[i], member});
+    }
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) {
+                     return a.factor > b.factor;
+                   });
+  return candidates;
+}
+
+EpisodeTracker::EpisodeTracker(std::string valve_id,
+                               const TraceOptions& options)
+    : valve_id_(std::move(valve_id)),
+      options_(options),
+      trace_(options.before_points, Ns(options.before_s)) {}
+
+void EpisodeTracker::Recover(const OpenEpisode& episode) {
+  recovered_ = episode;
+}
+
+void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
+                          const std::shared_ptr<const ModelSet>& models,
+                          EpisodeOutlet& outlet) {
+  if (OutOfOrder(verdict.intake)) {
+    return;
+  }
+  NoteGap(sample, verdict, *models, outlet);
+  TryRecovery(sample, *models, outlet);
+  const int channels = static_cast<int>(models->channels.size());
+  const int faults = static_cast<int>(models->faults.size());
+  if (open_ && open_->tracing &&
+      !trace_.Continues(sample, verdict, channels, faults)) {
+    WriteTrace(false, outlet);
+  }
+  trace_.Push(sample, verdict, channels, faults);
+  source_id_ = sample.source_id;
+  seq_ = sample.seq;
+  for (const Transition& transition : verdict.Transitions()) {
+    Take(transition, verdict, models, outlet);
+  }
+  if (open_ && open_->tracing) {
+    const bool complete = sample.stamp_ns > open_->trace_until_ns;
+    if (complete || verdict.transition_count > 0 ||
+        trace_.size() >= static_cast<std::size_t>(options_.points_per_write)) {
+      WriteTrace(complete, outlet);
+    }
+  }
+}
+
+// A stretch without accepted samples is a gap.
+void EpisodeTracker::NoteGap(const Sample& sample, const Verdict& verdict,
+                             const ModelSet& models, EpisodeOutlet& outlet) {
+  if (seen_ && sample.source_id != source_id_) {
+    accepted_stamp_ns_ = 0;
+  }
+  if (verdict.intake != Intake::kAccepted) {
+    rejected_since_ = true;
+    return;
+  }
+  const std::int64_t since = accepted_stamp_ns_;
+  if (since != 0 &&
+      sample.stamp_ns - since > Ns(kGapPeriods * models.sample_period_s)) {
+    outlet.Gap({valve_id_, since, sample.stamp_ns,
+                rejected_since_ ? "bad_input" : "stream"});
+  }
+  accepted_stamp_ns_ = sample.stamp_ns;
+  rejected_since_ = false;
+}
+
+void EpisodeTracker::TryRecovery(const Sample& sample, const ModelSet& models,
+                                 EpisodeOutlet& outlet) {
+  if (!std::exchange(seen_, true)) {
+    first_stamp_ns_ = sample.stamp_ns;
+    if (recovered_ && sample.stamp_ns > recovered_->last_stamp_ns) {
+      outlet.Gap({valve_id_, recovered_->last_stamp_ns, sample.stamp_ns,
+                  "monitor_down"});
+    }
+  }
+  if (!recovered_) {
+    return;
+  }
+  const double window =
+      std::max(kResumeWindowS,
+               2.0 * models.decision.settling_samples * models.sample_period_s);
+  if (recovered_->model_hash != models.content_hash) {
+    CloseRecovered(EndReason::kModelChanged, sample.stamp_ns, outlet);
+  } else if (recovered_->source_id != sample.source_id ||
+             sample.stamp_ns - first_stamp_ns_ > Ns(window)) {
+    CloseRecovered(EndReason::kUnknown, sample.stamp_ns, outlet);
+  }
+}
+
+void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
+                                    EpisodeOutlet& outlet) {
+  const OpenEpisode episode = std::move(*recovered_);
+  recovered_.reset();
+  EpisodeEvent event;
+  event.valve_id = valve_id_;
+  event.source_id = episode.source_id;
+  event.episode_id = episode.episode_id;
+  event.transition.kind = TransitionKind::kClosed;
+  event.transition.stamp_ns = stamp_ns;
+  event.transition.detection_stamp_ns = episode.detection_stamp_ns;
+  event.transition.reason = reason;
+  event.candidates = episode.candidates;
+  event.model_set = episode.model_set;
+  event.model_version = episode.model_version;
+  event.model_hash = episode.model_hash;
+  outlet.Event(std::move(event));
+}
+
+void EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
+                           EpisodeOutlet& outlet) {
+  open_.emplace();
+  open_->source_id = verdict.source_id;
+  open_->trace_until_ns = transition.stamp_ns + Ns(options_.after_detection_s);
+  if (recovered_) {
+    open_->episode_id = recovered_->episode_id;
+    open_->detection_stamp_ns = recovered_->detection_stamp_ns;
+    open_->isolated = recovered_->isolated;
+    open_->candidates = recovered_->candidates;
+    open_->resumed = true;
+    outlet.Resumed(*recovered_, verdict.stamp_ns);
+    recovered_.reset();
+    return;
+  }
+  open_->detection_stamp_ns = transition.detection_stamp_ns;
+  open_->episode_id =
+      EpisodeId(valve_id_, verdict.source_id, transition.detection_stamp_ns);
+}
+
+void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
+                          const std::shared_ptr<const ModelSet>& models,
+                          EpisodeOutlet& outlet) {
+  Transition recorded = transition;
+  if (transition.kind == TransitionKind::kDetected) {
+    Begin(transition, verdict, outlet);
+    if (open_->resumed) {
+      return;
+    }
+  }
+  if (!open_) {
+    return;
+  }
+  if (transition.kind == TransitionKind::kIsolated) {
+    const FaultSet before = IsolatedSet(open_->candidates, *models);
+    open_->trace_until_ns =
+        transition.stamp_ns + Ns(options_.after_isolation_s);
+    if (open_->resumed && open_->isolated && before == transition.faults) {
+      return;
+    }
+    recorded.kind = open_->isolated ? TransitionKind::kReisolated
+                                    : TransitionKind::kIsolated;
+    open_->isolated = true;
+  }
+  if (transition.reason != EndReason::kSuperseded) {
+    open_->candidates = CandidatesOf(*models, verdict, transition.faults);
+  }
+  Emit(recorded, models, outlet);
+}
+
+void EpisodeTracker::Emit(Transition transition,
+                          const std::shared_ptr<const ModelSet>& models,
+                          EpisodeOutlet& outlet) {
+  const bool closed = transition.kind == TransitionKind::kClosed;
+  const bool superseded = transition.reason == EndReason::kSuperseded;
+  transition.detection_stamp_ns = open_->detection_stamp_ns;
+  EpisodeEvent event;
+  event.valve_id = valve_id_;
+  event.source_id = open_->source_id;
+  event.seq = seq_;
+  event.episode_id = open_->episode_id;
+  event.transition = transition;
+  event.candidates = open_->candidates;
+  event.models = models;
+  event.model_set = models->name;
+  event.model_version = models->version;
+  event.model_hash = models->content_hash;
+  outlet.Event(std::move(event));
+  if (closed && open_->tracing && !superseded) {
+    WriteTrace(true, outlet);
+  } else if (closed && open_->tracing) {
+    // What is in the trace by now came from the next source.
+    outlet.Evidence({open_->episode_id,
+                     Trace(options_.before_points, Ns(options_.before_s)),
+                     true});
+  }
+  if (closed) {
+    open_.reset();
+  }
+}
+
+void EpisodeTracker::End(const Transition& closed,
+                         const std::shared_ptr<const ModelSet>& models,
+                         EpisodeOutlet& outlet) {
+  if (open_) {
+    Emit(closed, models, outlet);
+  }
+}
+
+void EpisodeTracker::GiveUpRecovery(std::int64_t now_ns,
+                                    EpisodeOutlet& outlet) {
+  if (!recovered_ || seen_) {
+    return;
+  }
+  const std::int64_t last = recovered_->last_stamp_ns;
+  if (now_ns > last) {
+    outlet.Gap({valve_id_, last, now_ns, "monitor_down"});
+  }
+  CloseRecovered(EndReason::kUnknown, last, outlet);
+}
+
+void EpisodeTracker::Flush(EpisodeOutlet& outlet) {
+  if (open_ && open_->tracing && trace_.size() > 0) {
+    WriteTrace(false, outlet);
+  }
+}
+
+void EpisodeTracker::WriteTrace(bool complete, EpisodeOutlet& outlet) {
+  outlet.Evidence({open_->episode_id, trace_.Take(), complete});
+  open_->tracing = !complete;
+}
+
+}  // namespace fdi::monitor

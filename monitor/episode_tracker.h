@@ -1,0 +1,110 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+#include "diagnosis/verdict.h"
+#include "monitor/records.h"
+#include "monitor/trace.h"
+
+namespace fdi::monitor {
+
+/// Settings of the evidence kept beside an episode, in the time of samples.
+struct TraceOptions {
+  double before_s{1800.0};           ///< Kept before a detection.
+  std::size_t before_points{1800};   ///< At most; bounds the memory of a valve.
+  double after_isolation_s{600.0};   ///< Kept on after the first isolation.
+  double after_detection_s{3600.0};  ///< And if it is never isolated.
+  int points_per_write{10};          ///< Written as it goes.
+};
+
+/// Where a tracker's results go.
+class EpisodeOutlet {
+ public:
+  virtual ~EpisodeOutlet() = default;
+  virtual void Event(EpisodeEvent event) = 0;
+  virtual void Evidence(EpisodeTrace trace) = 0;
+  virtual void Gap(DataGap gap) = 0;
+  /// An episode of an earlier session goes on.
+  virtual void Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) = 0;
+};
+
+/// Turns what the engine of one valve says into the episodes of that valve:
+/// ids, events, evidence, gaps.
+///
+/// An episode that an earlier session left open is resumed, under its old id,
+/// if the same source goes on and is detected abnormal again within the first
+/// minute (or twice the settling time, if that is longer); else it is closed
+/// with `unknown`.
+class EpisodeTracker {
+ public:
+  EpisodeTracker(std::string valve_id, const TraceOptions& options);
+
+  /// Before the first Step().
+  void Recover(const OpenEpisode& episode);
+
+  /// Takes a sample and what the engine with `models` said about it.
+  void Step(const Sample& sample, const Verdict& verdict,
+            const std::shared_ptr<const ModelSet>& models,
+            EpisodeOutlet& outlet);
+
+  /// The engine was made to end its episode. @param models it ran with.
+  void End(const Transition& closed,
+           const std::shared_ptr<const ModelSet>& models,
+           EpisodeOutlet& outlet);
+
+  /// No sample came: closes what was to be resumed. @param now_ns UTC.
+  void GiveUpRecovery(std::int64_t now_ns, EpisodeOutlet& outlet);
+
+  /// Hands over evidence that is not written yet; for an orderly stop.
+  void Flush(EpisodeOutlet& outlet);
+
+  bool recovering() const { return recovered_.has_value(); }
+  std::size_t trace_bytes() const { return trace_.bytes(); }
+
+ private:
+  struct Open {
+    std::uint64_t episode_id{0};
+    std::uint64_t source_id{0};
+    std::int64_t detection_stamp_ns{0};  // of the record, not of the engine
+    std::int64_t trace_until_ns{0};
+    bool isolated{false};
+    bool resumed{false};
+    bool tracing{true};
+    std::vector<Candidate> candidates;
+  };
+
+  void NoteGap(const Sample& sample, const Verdict& verdict,
+               const ModelSet& models, EpisodeOutlet& outlet);
+  void TryRecovery(const Sample& sample, const ModelSet& models,
+                   EpisodeOutlet& outlet);
+  void CloseRecovered(EndReason reason, std::int64_t stamp_ns,
+                      EpisodeOutlet& outlet);
+  void Take(const Transition& transition, const Verdict& verdict,
+            const std::shared_ptr<const ModelSet>& models,
+            EpisodeOutlet& outlet);
+  void Begin(const Transition& transition, const Verdict& verdict,
+             EpisodeOutlet& outlet);
+  void Emit(Transition transition,
+            const std::shared_ptr<const ModelSet>& models,
+            EpisodeOutlet& outlet);
+  void WriteTrace(bool complete, EpisodeOutlet& outlet);
+
+  std::string valve_id_;
+  TraceOptions options_;
+  Trace trace_;
+  std::optional<Open> open_;
+  std::optional<OpenEpisode> recovered_;
+  bool seen_{false};
+  bool rejected_since_{false};
+  std::int64_t first_stamp_ns_{0};
+  std::int64_t accepted_stamp_ns_{0};  // 0: none of this source yet
+  std::uint64_t source_id_{0};
+  std::uint64_t seq_{0};
+};
+
+}  // namespace fdi::monitor

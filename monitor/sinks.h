@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "diagnosis/model_set.h"
+#include "diagnosis/verdict.h"
+#include "monitor/records.h"
+
+/// What the monitor needs from outside; the program wires it to DDS and SQLite.
+/// Each sink is called by one thread only, named beside it.
+namespace fdi::monitor {
+
+/// Says which model set a valve is diagnosed with. Diagnosis thread.
+class ModelResolver {
+ public:
+  virtual ~ModelResolver() = default;
+  /// Null if none is assigned.
+  /// @throws std::exception if it cannot be had: the valve goes without.
+  virtual std::shared_ptr<const ModelSet> ModelsFor(
+      std::string_view valve_id) const = 0;
+};
+
+/// Takes decision vectors to the bus. Diagnosis thread.
+class DecisionSink {
+ public:
+  virtual ~DecisionSink() = default;
+  /// @param models null for a valve without a model set.
+  /// @returns false if it was not sent.
+  virtual bool Publish(const std::string& valve_id, const ModelSet* models,
+                       const Verdict& verdict) = 0;
+};
+
+/// Takes fault events to the bus. Outbox thread.
+class EventSink {
+ public:
+  virtual ~EventSink() = default;
+  /// @returns false if it was not sent.
+  virtual bool Publish(const EpisodeEvent& event, bool persisted) = 0;
+};
+
+/// Keeps episodes. History thread. Every call may fail with a std::exception,
+/// can be repeated then, and doing it twice is a no-op.
+class HistorySink {
+ public:
+  virtual ~HistorySink() = default;
+  /// On the disk on return.
+  virtual void Record(const EpisodeEvent& event) = 0;
+  /// An episode left open by an earlier session goes on.
+  virtual void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) = 0;
+  /// Buffers. Evidence of an episode that is not there is dropped.
+  virtual void AddTrace(const EpisodeTrace& trace) = 0;
+  virtual void AddGap(const DataGap& gap) = 0;
+  /// The event is on the bus. Buffers.
+  virtual void MarkSent(const EpisodeEvent& event) = 0;
+  /// Stores what is buffered, and a sign of life; called each second.
+  virtual void Commit() = 0;
+};
+
+/// Keeps samples as runs. Recorder thread.
+class SampleSink {
+ public:
+  virtual ~SampleSink() = default;
+  /// Buffers.
+  virtual void Append(const ReceivedSample& sample) = 0;
+  /// Stores what is buffered. @throws std::exception; then it still is.
+  virtual void Commit() = 0;
+  /// Forgets what is buffered. @returns how many samples that were.
+  virtual std::uint64_t DropPending() = 0;
+  /// Ends all runs and stores what is buffered.
+  virtual void Close() = 0;
+};
+
+}  // namespace fdi::monitor

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+#include "diagnosis/sample.h"
+#include "diagnosis/verdict.h"
+
+namespace fdi::monitor {
+
+/// One instant of a valve as evidence: what was read and what was decided.
+struct TracePoint {
+  Sample sample;  ///< As received, bit for bit.
+  Intake intake{Intake::kAccepted};
+  bool initialised{false};
+  Quality quality{Quality::kLive};
+  State state{State::kNormal};
+  FaultSet isolated{0};
+  std::vector<double> residuals;  ///< As float; NaN where it abstains.
+  double normal_factor{0.0};      ///< d_0, in steps of 1/32768.
+  std::vector<double> factors;    ///< d by fault index, likewise.
+};
+
+/// Past instants of one valve, packed: 100 bytes each for six signals, two
+/// channels and five faults, so 180 kB for half an hour at 1 Hz. Holds at most
+/// `capacity` of them, none older than `span_ns` before the newest; memory
+/// grows with what is in it.
+class Trace {
+ public:
+  Trace(std::size_t capacity, std::int64_t span_ns)
+      : capacity_(capacity), span_ns_(span_ns) {}
+
+  /// Appends an instant. Where Continues() is false the trace begins anew.
+  void Push(const Sample& sample, const Verdict& verdict, int channels,
+            int faults);
+
+  /// Whether source, signals, model sizes and isolated set are as before.
+  bool Continues(const Sample& sample, const Verdict& verdict, int channels,
+                 int faults) const;
+
+  /// The instants, oldest first.
+  std::vector<TracePoint> Unpack() const;
+
+  /// Hands over what is in it and is empty afterwards.
+  Trace Take();
+
+  std::size_t size() const { return size_; }
+  std::size_t bytes() const;
+
+ private:
+  struct Head {
+    std::int64_t stamp_ns;
+    std::uint64_t seq;
+    std::uint32_t signal_quality;  // two bits each
+    SignalMask present;
+    Intake intake;
+    Quality quality;
+    State state;
+    ValveMode mode;
+    bool initialised;
+  };
+  // What all instants of a trace share.
+  struct Layout {
+    std::uint64_t source_id{0};
+    std::uint32_t epoch{0};
+    FlowUnit flow_unit{FlowUnit::kM3PerHour};
+    SignalMask signals{0};
+    FaultSet isolated{0};
+    std::size_t signal_count{0};
+    std::size_t channels{0};
+    std::size_t faults{0};
+  };
+
+  void Begin(const Sample& sample, const Verdict& verdict, int channels,
+             int faults);
+  void MakeRoom(std::int64_t stamp_ns);
+  void Grow();
+  TracePoint PointAt(std::size_t row) const;
+  std::size_t Row(std::size_t i) const { return (first_ + i) % heads_.size(); }
+
+  std::size_t capacity_;
+  std::int64_t span_ns_;
+  Layout layout_;
+  std::size_t first_{0};
+  std::size_t size_{0};
+  std::vector<Head> heads_;
+  std::vector<double> values_;
+  std::vector<float> residuals_;
+  std::vector<std::uint16_t> factors_;  // d_0, then faults
+};
+
+}  // namespace fdi::monitor
