@@ -15,7 +15,7 @@
 namespace fdi::idl {
 
 /// Lengths in bytes; a longer text is refused, never cut.
-inline constexpr std::size_t kMaxIdLength = 64;    ///< Valve, monitor, set.
+inline constexpr std::size_t kMaxIdLength = 64;  ///< Valve, set, observer, ...
 inline constexpr std::size_t kMaxNameLength = 32;  ///< Channel, counter.
 inline constexpr std::size_t kMaxTextLength = 255;
 inline constexpr std::size_t kMaxGroups = 64;

@@ -1,0 +1,103 @@
+#include "idl/library_log.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fastdds/dds/log/Log.hpp>
+
+namespace fdi::idl {
+namespace {
+
+using eprosima::fastdds::dds::Log;
+using Clock = std::chrono::steady_clock;
+constexpr auto kQuietTime = std::chrono::seconds(10);
+
+// The library has one log for the process; so have we.
+struct Registry {
+  std::mutex mutex;
+  bool installed{false};
+  std::vector<const LogSink*> sinks;
+};
+
+Registry& TheRegistry() {
+  static Registry registry;
+  return registry;
+}
+
+LogLevel LevelOf(const Log::Entry& entry) {
+  switch (entry.kind) {
+    case Log::Kind::Error:
+      return LogLevel::kError;
+    case Log::Kind::Warning:
+      return LogLevel::kWarning;
+    default:
+      return LogLevel::kDebug;
+  }
+}
+
+// Called by the one log thread of the library.
+class Throttle : public eprosima::fastdds::dds::LogConsumer {
+ public:
+  void Consume(const Log::Entry& entry) override {
+    const auto place = std::make_pair(
+        std::string(entry.context.filename ? entry.context.filename : ""),
+        entry.context.line);
+    Place& seen = places_[place];
+    const Clock::time_point now = Clock::now();
+    if (seen.count > 0 && now - seen.last < kQuietTime) {
+      ++seen.suppressed;
+      return;
+    }
+    std::string text = entry.message;
+    std::ranges::replace(text, '\n', ' ');
+    std::ranges::replace(text, '"', '\'');
+    std::string line =
+        "dds_library category=" + std::string(entry.context.category) +
+        " text=\"" + text + "\"";
+    if (seen.suppressed > 0) {
+      line += " suppressed=" + std::to_string(seen.suppressed);
+    }
+    seen = {now, seen.count + 1, 0};
+    Registry& registry = TheRegistry();
+    const std::lock_guard lock(registry.mutex);
+    if (!registry.sinks.empty() && *registry.sinks.back()) {
+      (*registry.sinks.back())(LevelOf(entry), line);
+    }
+  }
+
+ private:
+  struct Place {
+    Clock::time_point last{};
+    std::uint64_t count{0};
+    std::uint64_t suppressed{0};
+  };
+  std::map<std::pair<std::string, int>, Place> places_;
+};
+
+}  // namespace
+
+LibraryLog::LibraryLog(LogSink sink) : sink_(std::move(sink)) {
+  Registry& registry = TheRegistry();
+  const std::lock_guard lock(registry.mutex);
+  if (!registry.installed) {
+    Log::ClearConsumers();
+    Log::RegisterConsumer(std::make_unique<Throttle>());
+    registry.installed = true;
+  }
+  registry.sinks.push_back(&sink_);
+}
+
+LibraryLog::~LibraryLog() {
+  Registry& registry = TheRegistry();
+  const std::lock_guard lock(registry.mutex);
+  std::erase(registry.sinks, &sink_);
+}
+
+}  // namespace fdi::idl

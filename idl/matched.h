@@ -1,0 +1,37 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+
+namespace fdi::idl {
+
+/// How many remote endpoints are matched; set by a callback, waited for by
+/// others.
+class Matched {
+ public:
+  void Set(int count) {
+    {
+      const std::lock_guard lock(mutex_);
+      count_ = count;
+    }
+    changed_.notify_all();
+  }
+
+  int count() const {
+    const std::lock_guard lock(mutex_);
+    return count_;
+  }
+
+  bool WaitFor(int count, std::chrono::milliseconds timeout) const {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, timeout, [&] { return count_ >= count; });
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  int count_{0};
+};
+
+}  // namespace fdi::idl

@@ -1,0 +1,282 @@
+#include "idl/participant.h"
+
+#include <algorithm>
+#include <set>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include <arpa/inet.h>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#include <ifaddrs.h>
+#include <netinet/in.h>
+
+#include "diagnosis/error.h"
+#include "idl/participant_impl.h"
+
+namespace fdi::idl {
+namespace {
+
+namespace dds = eprosima::fastdds::dds;
+using eprosima::fastdds::rtps::SharedMemTransportDescriptor;
+using eprosima::fastdds::rtps::UDPv4TransportDescriptor;
+
+constexpr int kMaxDomain = 232;
+constexpr int kMaxValvesLimit = 100000;
+constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
+constexpr std::uint32_t kSegmentBytes = 64U << 20U;
+constexpr std::uint32_t kPortQueueCapacity = 8192;
+constexpr std::size_t kRemembered = 64;  // Remote endpoints per topic.
+
+std::vector<std::string> Addresses(const std::string& interfaces) {
+  std::vector<std::string> addresses;
+  std::istringstream stream(interfaces);
+  for (std::string address; std::getline(stream, address, ',');) {
+    addresses.push_back(address);
+  }
+  return addresses;
+}
+
+std::set<std::string> LocalAddresses() {
+  std::set<std::string> addresses;
+  ifaddrs* list = nullptr;
+  if (getifaddrs(&list) != 0) {
+    return addresses;
+  }
+  for (const ifaddrs* each = list; each != nullptr; each = each->ifa_next) {
+    if (each->ifa_addr != nullptr && each->ifa_addr->sa_family == AF_INET) {
+      sockaddr_in address{};
+      std::copy_n(reinterpret_cast<const char*>(each->ifa_addr), sizeof address,
+                  reinterpret_cast<char*>(&address));
+      std::array<char, INET_ADDRSTRLEN> text{};
+      if (inet_ntop(AF_INET, &address.sin_addr, text.data(), text.size()) !=
+          nullptr) {
+        addresses.insert(text.data());
+      }
+    }
+  }
+  freeifaddrs(list);
+  return addresses;
+}
+
+void ValidateInterfaces(const std::string& interfaces) {
+  if (interfaces == "all") {
+    return;
+  }
+  const std::set<std::string> local = LocalAddresses();
+  const std::vector<std::string> addresses = Addresses(interfaces);
+  for (const std::string& address : addresses) {
+    if (!local.contains(address)) {
+      std::string known;
+      for (const std::string& each : local) {
+        known += " " + each;
+      }
+      throw ConfigError("--interface: '" + address +
+                        "' is no IPv4 address of this machine, accepted are "
+                        "all or, comma separated," +
+                        known);
+    }
+  }
+  if (addresses.empty()) {
+    throw ConfigError("--interface is empty, accepted are addresses or all");
+  }
+}
+
+// One participant in a process sees another as a process would.
+void SetUpLibraryOnce() {
+  static const bool done = [] {
+    constexpr const char* kSettings =
+        "<dds xmlns=\"http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles\">"
+        "<library_settings><intraprocess_delivery>OFF</intraprocess_delivery>"
+        "</library_settings></dds>";
+    dds::DomainParticipantFactory::get_instance()->load_XML_profiles_string(
+        kSettings, std::char_traits<char>::length(kSettings));
+    return true;
+  }();
+  static_cast<void>(done);
+}
+
+void SetTransports(const DdsOptions& options, dds::DomainParticipantQos& qos) {
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports.clear();
+  if (options.transport != "shm") {
+    auto udp = std::make_shared<UDPv4TransportDescriptor>();
+    udp->receiveBufferSize = kReceiveBufferBytes;
+    if (options.interfaces != "all") {
+      udp->interfaceWhiteList = Addresses(options.interfaces);
+    }
+    qos.transport().user_transports.push_back(udp);
+  }
+  if (options.transport != "udp") {
+    auto shm = std::make_shared<SharedMemTransportDescriptor>();
+    shm->segment_size(kSegmentBytes);
+    shm->port_queue_capacity(kPortQueueCapacity);
+    qos.transport().user_transports.push_back(shm);
+  }
+}
+
+dds::DomainParticipantQos MakeQos(const DdsOptions& options,
+                                  const ProfileFile& profiles,
+                                  const std::string& name) {
+  dds::DomainParticipantQos qos;
+  const std::set<std::string>* stated = profiles.ParticipantPolicies();
+  if (stated != nullptr) {
+    Check(dds::DomainParticipantFactory::get_instance()
+              ->get_participant_qos_from_profile(kParticipantProfile, qos),
+          "get_participant_qos_from_profile");
+  }
+  const auto states = [&](const char* element) {
+    return stated != nullptr && stated->contains(element);
+  };
+  qos.name(name);
+  if (!states("userTransports") && !states("useBuiltinTransports")) {
+    SetTransports(options, qos);
+  }
+  if (!states("builtin")) {
+    auto& discovery = qos.wire_protocol().builtin.discovery_config;
+    discovery.leaseDuration = {5, 0};
+    discovery.leaseDuration_announcementperiod = {1, 0};
+  }
+  return qos;
+}
+
+}  // namespace
+
+TransportError::TransportError(const std::string& operation, int code)
+    : std::runtime_error("DDS " + operation + " failed with code " +
+                         std::to_string(code)),
+      code_(code) {}
+
+void Check(const ReturnCode& code, const std::string& operation) {
+  if (code != ReturnCode::RETCODE_OK) {
+    throw TransportError(operation, static_cast<int>(code()));
+  }
+}
+
+void Validate(const DdsOptions& options) {
+  if (options.domain < 0 || options.domain > kMaxDomain) {
+    throw ConfigError("--domain is " + std::to_string(options.domain) +
+                      ", accepted are 0 to " + std::to_string(kMaxDomain));
+  }
+  if (options.transport != "udp" && options.transport != "shm" &&
+      options.transport != "default") {
+    throw ConfigError("--transport is '" + options.transport +
+                      "', accepted are udp, shm and default");
+  }
+  if (options.max_valves < 1 || options.max_valves > kMaxValvesLimit) {
+    throw ConfigError("--max-valves is " + std::to_string(options.max_valves) +
+                      ", accepted are 1 to " + std::to_string(kMaxValvesLimit));
+  }
+  ValidateInterfaces(options.interfaces);
+}
+
+Participant::Impl::Impl(const DdsOptions& options, LogSink log,
+                        const std::string& name)
+    : options_(options),
+      log_(std::move(log)),
+      library_log_(log_),
+      profiles_(options.qos_file.empty() ? ProfileFile()
+                                         : ProfileFile(options.qos_file)) {
+  SetUpLibraryOnce();
+  const dds::DomainParticipantQos qos = MakeQos(options_, profiles_, name);
+  handle_ = NotNull(
+      dds::DomainParticipantFactory::get_instance()->create_participant(
+          static_cast<std::uint32_t>(options_.domain), qos, this,
+          dds::StatusMask::none()),
+      "create_participant on domain " + std::to_string(options_.domain));
+}
+
+Participant::Impl::~Impl() {
+  handle_->set_listener(nullptr);
+  for (const auto& [name, topic] : topics_) {
+    handle_->delete_topic(topic);
+  }
+  dds::DomainParticipantFactory::get_instance()->delete_participant(handle_);
+}
+
+dds::Topic* Participant::Impl::TopicOf(const std::string& topic,
+                                       const dds::TypeSupport& type) {
+  const std::lock_guard lock(mutex_);
+  dds::Topic*& found = topics_[topic];
+  if (found == nullptr) {
+    Check(type.register_type(handle_), "register_type of " + topic);
+    found = NotNull(handle_->create_topic(topic, type.get_type_name(),
+                                          dds::TOPIC_QOS_DEFAULT),
+                    "create_topic " + topic);
+  }
+  return found;
+}
+
+void Participant::Impl::Log(LogLevel level, const std::string& line) const {
+  if (log_) {
+    log_(level, line);
+  }
+}
+
+void Participant::Impl::ReportIncompatible(const std::string& topic,
+                                           bool remote_is_writer,
+                                           dds::QosPolicyId_t id,
+                                           const PolicyTexts& ours) {
+  const auto own = ours.find(id);
+  std::string theirs = "unknown";
+  {
+    const std::lock_guard lock(mutex_);
+    for (const PolicyTexts& remote : remotes_[{topic, remote_is_writer}]) {
+      const auto text = remote.find(id);
+      if (own != ours.end() && text != remote.end() &&
+          text->second != own->second) {
+        theirs = text->second;
+        break;
+      }
+    }
+  }
+  const std::string own_text = own == ours.end() ? "unknown" : own->second;
+  Log(LogLevel::kWarning,
+      "qos_incompatible topic=" + topic + " policy=" + PolicyName(id) +
+          (remote_is_writer
+               ? " requested_here=" + own_text + " offered_there=" + theirs
+               : " offered_here=" + own_text + " requested_there=" + theirs));
+}
+
+void Participant::Impl::Remember(const RemoteKey& key, PolicyTexts texts) {
+  const std::lock_guard lock(mutex_);
+  std::deque<PolicyTexts>& known = remotes_[key];
+  known.push_front(std::move(texts));
+  if (known.size() > kRemembered) {
+    known.pop_back();
+  }
+}
+
+void Participant::Impl::on_publisher_discovery(
+    dds::DomainParticipant* /*participant*/,
+    eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) {
+  using Info = eprosima::fastrtps::rtps::WriterDiscoveryInfo;
+  if (info.status == Info::DISCOVERED_WRITER) {
+    Remember({info.info.topicName().c_str(), true}, Describe(info.info.m_qos));
+  }
+}
+
+void Participant::Impl::on_subscriber_discovery(
+    dds::DomainParticipant* /*participant*/,
+    eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
+  using Info = eprosima::fastrtps::rtps::ReaderDiscoveryInfo;
+  if (info.status == Info::DISCOVERED_READER) {
+    Remember({info.info.topicName().c_str(), false}, Describe(info.info.m_qos));
+  }
+}
+
+Participant::Participant(const DdsOptions& options, LogSink log,
+                         const std::string& name) {
+  Validate(options);
+  impl_ = std::make_unique<Impl>(options, std::move(log), name);
+}
+
+Participant::~Participant() = default;
+
+const DdsOptions& Participant::options() const {
+  return impl_->options();
+}
+
+}  // namespace fdi::idl

@@ -1,0 +1,86 @@
+#include "idl/wire.h"
+
+#include <algorithm>
+
+#include "diagnosis/error.h"
+
+namespace fdi::idl {
+
+std::string_view HealthName(Health health) {
+  switch (health) {
+    case Health::kOk:
+      return "OK";
+    case Health::kDegraded:
+      return "DEGRADED";
+    case Health::kFailing:
+      return "FAILING";
+  }
+  return "?";
+}
+
+void ValidateId(std::string_view id) {
+  if (id.empty() || id.size() > kMaxIdLength) {
+    throw DataError("id '" + std::string(id) + "' has " +
+                    std::to_string(id.size()) + " bytes, accepted are 1 to " +
+                    std::to_string(kMaxIdLength));
+  }
+  if (id.find('\0') != std::string_view::npos) {
+    throw DataError("id '" + std::string(id) + "' contains a NUL byte");
+  }
+}
+
+DecisionMessage MakeDecision(std::string valve_id, const ModelSet& models,
+                             const Verdict& verdict) {
+  DecisionMessage message;
+  message.valve_id = std::move(valve_id);
+  message.model_hash = models.content_hash;
+  message.channel_count = static_cast<int>(models.channels.size());
+  message.fault_count = static_cast<int>(models.faults.size());
+  message.observer_count = static_cast<int>(models.observers.size());
+  message.verdict = verdict;
+  return message;
+}
+
+std::vector<FaultCandidate> CandidatesOf(const ModelSet& models,
+                                         const Verdict& verdict) {
+  std::vector<FaultCandidate> candidates;
+  for (std::size_t i = 0; i < models.faults.size(); ++i) {
+    const bool isolated = ((verdict.isolated >> i) & 1U) != 0;
+    const double factor = verdict.fault_factors[i];
+    if (isolated || factor >= 0.5 * models.decision.isolation_threshold) {
+      candidates.push_back(
+          {models.faults[i], factor, verdict.strengths[i], isolated});
+    }
+  }
+  std::ranges::stable_sort(candidates, std::ranges::greater{},
+                           &FaultCandidate::factor);
+  return candidates;
+}
+
+ModelSetInfoMessage Describe(const ModelSet& models) {
+  ModelSetInfoMessage info;
+  info.model_set = models.name;
+  info.model_hash = models.content_hash;
+  info.version = models.version;
+  info.created_ns = models.created_ns;
+  info.sample_period_s = models.sample_period_s;
+  info.flow_unit = models.flow_unit;
+  info.required = RequiredSignals(models);
+  info.isolation_threshold = models.decision.isolation_threshold;
+  info.isolation_fraction = models.decision.isolation_fraction;
+  info.detection_samples = models.decision.detection_samples;
+  info.isolation_samples = models.decision.isolation_samples;
+  info.clearing_samples = models.decision.clearing_samples;
+  info.settling_samples = models.decision.settling_samples;
+  info.channels = models.channels;
+  info.faults = models.faults;
+  for (const Observer& observer : models.observers) {
+    info.observers.push_back(
+        {observer.name, observer.fault, observer.strength});
+  }
+  info.undetectable = models.undetectable;
+  info.groups = models.groups;
+  return info;
+}
+
+}  // namespace fdi::idl
