@@ -76,6 +76,11 @@ bool TomlReader::Has(std::string_view key) const {
   return node_->table->contains(key);
 }
 
+bool TomlReader::IsTable(std::string_view key) const {
+  const toml::node* node = node_->table->get(key);
+  return node != nullptr && node->is_table();
+}
+
 std::optional<double> TomlReader::Number(std::string_view key) {
   document_->known[node_->table].emplace(key);
   const toml::node* node = node_->table->get(key);

@@ -45,6 +45,7 @@ class TomlReader {
   /// All keys of this table, in the order of the alphabet; marks none.
   std::vector<std::string> Keys() const;
   bool Has(std::string_view key) const;
+  bool IsTable(std::string_view key) const;
 
   /// @throws ConfigError at `key`: "file:line: key: message".
   [[noreturn]] void Refuse(std::string_view key,

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "simulator/valve_simulation.h"
+#include "storage/cli/toml_reader.h"
+
+namespace fdi::simulator {
+
+/// One simulated valve, as a TOML table describes it.
+struct Scenario {
+  std::string valve_id{"VALVE-0001"};
+  ValveSimulationConfig config;  ///< start_ns 0: when the run starts.
+  std::string excitation_file;   ///< Of a csv excitation, as it was given.
+};
+
+/// Lays what `table` says over `scenario`; what it does not say stays. Keys:
+///
+///     valve = "LC51_03"
+///     parameters = "lublin-actuator-3"   # or a name of ParameterSetNames(),
+///                                        # "FILE.toml", or a table
+///     excitation = "level-loop"          # or operating-point, sine,
+///                                        # "csv:FILE", or a table
+///     faults = ["f19:abrupt@50:strength=0.75"]
+///     seed = 7
+///     duration_s = 2000
+///     period_s = 1
+///     start = "2026-11-20T00:00:00Z"
+///     cold_start = false
+///     noise = true
+///     resolution = true
+///     tolerance_scale = 1
+///
+///     [excitation]                       # the fields of excitation.h
+///     name = "operating-point"           # absent: the present one
+///     amplitude_pct = 5
+///     cv_noise_pct.sd = 0.3
+///
+///     [parameters]                       # the fields of valve_parameters.h
+///     base = "lublin-actuator-3"         # absent: the present ones
+///     name = "mine"
+///     trim.kv_m3_h = 72.7
+///
+/// A parameter file has the keys of [parameters]. Choosing a csv excitation
+/// sets period and, unless the table has duration_s, duration to the file's.
+///
+/// @param folder Where relative file names start.
+/// @throws ConfigError naming file, line, key, value and what is accepted. The
+///   caller's Finish() of the whole document refuses unknown keys.
+/// @throws DataError if a csv excitation cannot be read.
+void ApplyScenario(cli::TomlReader& table, const std::filesystem::path& folder,
+                   Scenario& scenario);
+
+/// Lays a whole file over `scenario`. @throws as ApplyScenario(), and
+/// ConfigError on an unknown key.
+void ApplyScenarioFile(const std::filesystem::path& path, Scenario& scenario);
+
+/// Lays one `key=value` over `scenario`, e.g. "excitation.amplitude_pct=5" or
+/// "excitation=level-loop" (text needs no quotes). @throws as above.
+void ApplySetting(std::string_view setting, Scenario& scenario);
+
+/// The canonical text: TOML from which ApplyScenario() restores `scenario`. Of
+/// excitation and parameters it has what differs from the defaults of that name
+/// (which the software version pins). Numbers read back as the same bits.
+std::string ScenarioText(const Scenario& scenario);
+
+}  // namespace fdi::simulator
