@@ -20,6 +20,10 @@ using Eigen::VectorXd;
 
 // A column that varies by less than this share of its size is constant.
 constexpr double kConstantTolerance = 1e-12;
+// Factor on all widths in one step, and the relative improvement of the
+// training error that makes another step worth its sharper edges.
+constexpr double kNarrowing = 0.7;
+constexpr double kWorthNarrowing = 0.02;
 
 void CheckData(const RegressionData& data, int num_rules) {
   Require(data.x.cols() >= 1, "X needs at least one column");
@@ -87,6 +91,66 @@ ArrayXd LogMembership(const FuzzySet& set, const ArrayXd& x) {
   return -0.5 * z.square();
 }
 
+// Consequents and data shares of rules with given antecedents.
+void EstimateRules(const RegressionData& data, const ConsequentOptions& options,
+                   std::vector<TsRule>& rules) {
+  const MatrixXd weights = DegreesOfFulfilment(rules, data.x);
+  const Consequents consequents =
+      EstimateConsequents(data.x, data.y, weights, options);
+  for (std::size_t i = 0; i < rules.size(); ++i) {
+    const auto row = static_cast<Index>(i);
+    const VectorXd slopes = consequents.slopes.row(row);
+    rules[i].slopes.assign(slopes.begin(), slopes.end());
+    rules[i].intercept = consequents.intercepts(row);
+    rules[i].data_share = weights.col(row).mean();
+  }
+}
+
+// Mean squared error on the data, predictions kept within the range of y.
+double TrainingError(const RegressionData& data,
+                     const std::vector<TsRule>& rules) {
+  const VectorXd predicted = Predict(rules, data.x)
+                                 .cwiseMax(data.y.minCoeff())
+                                 .cwiseMin(data.y.maxCoeff());
+  return (data.y - predicted).squaredNorm() /
+         static_cast<double>(data.y.size());
+}
+
+void ScaleWidths(double factor, std::vector<TsRule>& rules) {
+  for (TsRule& rule : rules) {
+    for (FuzzySet& set : rule.antecedents) {
+      set.left_width *= factor;
+      set.right_width *= factor;
+    }
+  }
+}
+
+// Rules with projected sets, all narrowed by one factor as long as that pays.
+std::vector<TsRule> ProjectedRules(const RegressionData& data,
+                                   const FuzzyPartition& partition,
+                                   const TakagiSugenoOptions& options) {
+  std::vector<TsRule> rules;
+  for (auto& sets : ProjectAntecedents(data.x, partition.memberships)) {
+    rules.emplace_back().antecedents = std::move(sets);
+  }
+  EstimateRules(data, options.consequents, rules);
+  double error = TrainingError(data, rules);
+  double factor = kNarrowing;
+  while (rules.size() > 1 && factor >= options.min_width_factor) {
+    std::vector<TsRule> narrower = rules;
+    ScaleWidths(kNarrowing, narrower);
+    EstimateRules(data, options.consequents, narrower);
+    const double narrower_error = TrainingError(data, narrower);
+    if (!(narrower_error < (1.0 - kWorthNarrowing) * error)) {
+      break;
+    }
+    rules = std::move(narrower);
+    error = narrower_error;
+    factor *= kNarrowing;
+  }
+  return rules;
+}
+
 struct Fit {
   std::vector<TsRule> rules;
   double validity{0.0};
@@ -101,24 +165,7 @@ Fit FitOnce(const RegressionData& data, const TakagiSugenoOptions& options) {
 
   Fit fit;
   fit.validity = SugenoYasukawa(z, partition, options.clustering.fuzziness);
-  for (auto& antecedents : ProjectAntecedents(data.x, partition.memberships)) {
-    TsRule rule;
-    rule.antecedents = std::move(antecedents);
-    rule.slopes.assign(static_cast<std::size_t>(data.x.cols()), 0.0);
-    fit.rules.push_back(std::move(rule));
-  }
-  const MatrixXd weights = DegreesOfFulfilment(fit.rules, data.x);
-  const Consequents consequents =
-      EstimateConsequents(data.x, data.y, weights, options.consequents);
-  for (std::size_t i = 0; i < fit.rules.size(); ++i) {
-    const auto row = static_cast<Index>(i);
-    TsRule& rule = fit.rules[i];
-    for (std::size_t j = 0; j < rule.slopes.size(); ++j) {
-      rule.slopes[j] = consequents.slopes(row, static_cast<Index>(j));
-    }
-    rule.intercept = consequents.intercepts(row);
-    rule.data_share = weights.col(row).mean();
-  }
+  fit.rules = ProjectedRules(data, partition, options);
   return fit;
 }
 

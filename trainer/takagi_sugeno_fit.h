@@ -22,11 +22,17 @@ struct TakagiSugenoOptions {
   int num_rules{3};                   ///< c ≥ 1; 1 is one linear model.
   GustafsonKesselOptions clustering;  ///< num_clusters is taken from num_rules.
   ConsequentOptions consequents;
+  /// Lower bound on the common factor on the projected widths; 1: leave them.
+  double min_width_factor{0.3};
 };
 
 /// Fits y = Σ w_i(x) (a_iᵀ x + b_i): Gustafson-Kessel clusters of Z = [X, y]
 /// scaled to unit variance, antecedents by projection onto the regressors,
 /// consequents by weighted least squares.
+///
+/// Memberships of fuzzy clusters fall off slowly, and so do the projected sets:
+/// neighbouring rules blur each other. All widths are therefore narrowed in
+/// steps by one common factor while that lowers the training error by 2 %.
 ///
 /// The same data and options give the same bits; scaling a column of X or
 /// reordering the rows changes the result by rounding at most. A column of X
