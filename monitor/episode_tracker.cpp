@@ -143,7 +143,7 @@ void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
   event.source_id = episode.source_id;
   event.episode_id = episode.episode_id;
   event.transition.kind = TransitionKind::kClosed;
-  event.transition.stamp_ns = stamp_ns;
+  event.transition.stamp_ns = std::max(stamp_ns, episode.last_stamp_ns);
   event.transition.detection_stamp_ns = episode.detection_stamp_ns;
   event.transition.reason = reason;
   event.candidates = episode.candidates;
@@ -244,14 +244,16 @@ void EpisodeTracker::End(const Transition& closed,
 
 void EpisodeTracker::GiveUpRecovery(std::int64_t now_ns,
                                     EpisodeOutlet& outlet) {
-  if (!recovered_ || seen_) {
-    return;
+  if (recovered_ && !seen_ && now_ns > recovered_->last_stamp_ns) {
+    outlet.Gap({valve_id_, recovered_->last_stamp_ns, now_ns, "monitor_down"});
   }
-  const std::int64_t last = recovered_->last_stamp_ns;
-  if (now_ns > last) {
-    outlet.Gap({valve_id_, last, now_ns, "monitor_down"});
+  AbandonRecovery(EndReason::kUnknown, outlet);
+}
+
+void EpisodeTracker::AbandonRecovery(EndReason reason, EpisodeOutlet& outlet) {
+  if (recovered_) {
+    CloseRecovered(reason, seen_ ? accepted_stamp_ns_ : 0, outlet);
   }
-  CloseRecovered(EndReason::kUnknown, last, outlet);
 }
 
 void EpisodeTracker::Flush(EpisodeOutlet& outlet) {

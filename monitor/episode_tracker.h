@@ -57,8 +57,12 @@ class EpisodeTracker {
            const std::shared_ptr<const ModelSet>& models,
            EpisodeOutlet& outlet);
 
-  /// No sample came: closes what was to be resumed. @param now_ns UTC.
+  /// The samples stay away: closes what was to be resumed, with `unknown`.
+  /// @param now_ns UTC, the end of the gap if none came at all.
   void GiveUpRecovery(std::int64_t now_ns, EpisodeOutlet& outlet);
+
+  /// Closes what was to be resumed.
+  void AbandonRecovery(EndReason reason, EpisodeOutlet& outlet);
 
   /// Hands over evidence that is not written yet; for an orderly stop.
   void Flush(EpisodeOutlet& outlet);

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "monitor/bounded_queue.h"
+#include "monitor/counters.h"
+#include "monitor/episode_writer.h"
+#include "monitor/sample_recorder.h"
+#include "monitor/sinks.h"
+#include "monitor/throttled_log.h"
+#include "monitor/valve_registry.h"
+
+namespace fdi::monitor {
+
+/// Settings of Pipeline.
+struct PipelineOptions {
+  int max_valves{2000};
+  std::string valve_glob{"*"};
+  std::size_t queue_samples{8192};  ///< Between intake and diagnosis.
+  RegistryOptions registry;
+  EpisodeWriterOptions history;  ///< utc_now_ns is needed.
+  SampleRecorderOptions recorder;
+};
+
+/// Where the results go; all outlive the pipeline.
+struct PipelineSinks {
+  DecisionSink& decisions;
+  EventSink& events;
+  HistorySink& history;
+  SampleSink* samples{nullptr};  ///< Null: samples are not recorded.
+};
+
+/// From samples to decisions, events and records, on threads of its own:
+///
+///     intake (the caller) -> queue -> diagnosis -> decision vectors
+///                                       |-> history thread -> outbox thread
+///                                       \-> recorder thread
+///
+/// The queue never drops: full, Offer() waits, and the reader stops taking.
+class Pipeline {
+ public:
+  Pipeline(PipelineOptions options, PipelineSinks sinks,
+           std::shared_ptr<const ModelResolver> resolver, Counters& counters,
+           ThrottledLog& log);
+  ~Pipeline();
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+
+  /// Begins to diagnose. @param open episodes that the last session left open.
+  void Start(const std::vector<OpenEpisode>& open);
+
+  /// A sample that was received. One intake thread. Waits while the queue is
+  /// full. @param writer who sent it. @returns false once stopped.
+  bool Offer(std::string_view valve_id, const Sample& sample,
+             std::uint64_t writer);
+  /// The publisher ended the stream of the valve. As Offer().
+  bool OfferEnd(std::string_view valve_id, std::uint64_t writer);
+
+  /// Asks `resolver` for the models of all valves from now on. Between two
+  /// samples: none is lost or diagnosed twice. Thread safe.
+  void Reassign(std::shared_ptr<const ModelResolver> resolver);
+
+  /// Diagnoses, stores and publishes what is in, then ends the threads.
+  /// Episodes stay open: the next session goes on with them.
+  void Stop();
+
+  /// A thread died of an exception; Stop() and then Rethrow().
+  bool failed() const { return failed_; }
+  void Rethrow() const;
+
+  ValveCensus census() const { return registry_.census(); }
+  std::vector<std::string> valve_names() const { return registry_.names(); }
+  bool history_degraded() const { return writer_.degraded(); }
+  bool recording_degraded() const { return recorder_ && recorder_->degraded(); }
+  std::size_t waiting() const { return queue_.size(); }
+
+ private:
+  using TimePoint = ValveMonitor::TimePoint;
+  struct Item {
+    ValveDirectory::Entry valve;
+    std::uint64_t writer;
+    TimePoint received;
+    bool ended;
+    Sample sample;
+  };
+
+  std::optional<ValveDirectory::Entry> Admit(std::string_view valve_id);
+  void Run();
+  void Diagnose();
+  void Handle(const Item& item);
+  void Publish(const Item& item, const ValveOutcome& outcome);
+  void CountRejection(const Item& item, Intake intake);
+  void AdoptPendingResolver();
+
+  PipelineOptions options_;
+  DecisionSink& decisions_;
+  Counters& counters_;
+  ThrottledLog& log_;
+  EpisodeWriter writer_;
+  std::unique_ptr<SampleRecorder> recorder_;
+  ValveDirectory directory_;
+  ValveRegistry registry_;
+  BoundedQueue<Item> queue_;
+  TimePoint last_tend_;
+
+  std::mutex resolver_mutex_;
+  std::shared_ptr<const ModelResolver> next_resolver_;
+
+  std::atomic<bool> failed_{false};
+  std::exception_ptr error_;  // set before failed_
+  std::thread thread_;
+};
+
+}  // namespace fdi::monitor

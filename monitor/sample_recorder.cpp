@@ -1,0 +1,109 @@
+#include "monitor/sample_recorder.h"
+
+#include <exception>
+#include <string>
+#include <utility>
+
+namespace fdi::monitor {
+namespace {
+
+constexpr std::chrono::milliseconds kTick{100};
+
+}  // namespace
+
+SampleRecorder::SampleRecorder(SampleSink& sink, Counters& counters,
+                               ThrottledLog& log,
+                               const SampleRecorderOptions& options)
+    : sink_(sink),
+      counters_(counters),
+      log_(log),
+      options_(options),
+      last_commit_(std::chrono::steady_clock::now()),
+      queue_(options.queue_samples),
+      thread_([this] { Run(); }) {}
+
+SampleRecorder::~SampleRecorder() {
+  Stop();
+}
+
+void SampleRecorder::Record(ReceivedSample sample) {
+  const bool taken = options_.lossless ? queue_.Push(std::move(sample))
+                                       : queue_.TryPush(std::move(sample));
+  if (!taken) {
+    counters_.Add(Counter::kRecordDropped);
+    log_.Report(LogId::kRecordDropped, "record_dropped",
+                [] { return std::string("reason=queue_full"); });
+  }
+}
+
+void SampleRecorder::Stop() {
+  queue_.Close();
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+void SampleRecorder::Run() {
+  std::vector<ReceivedSample> batch;
+  while (queue_.PopAll(batch, kTick)) {
+    for (const ReceivedSample& sample : batch) {
+      Take(sample);
+    }
+    if (std::chrono::steady_clock::now() - last_commit_ >=
+        options_.commit_period) {
+      Commit();
+    }
+  }
+  Close();
+}
+
+void SampleRecorder::Take(const ReceivedSample& sample) {
+  try {
+    sink_.Append(sample);
+    pending_ += sample.ended ? 0 : 1;
+  } catch (const std::exception& error) {
+    counters_.Add(Counter::kRecordDropped);
+    Fail(error.what());
+  }
+  if (!degraded_ && pending_ >= options_.commit_samples) {
+    Commit();
+  }
+  if (pending_ >= options_.max_pending) {
+    counters_.Add(Counter::kRecordDropped, sink_.DropPending());
+    pending_ = 0;
+  }
+}
+
+void SampleRecorder::Commit() {
+  last_commit_ = std::chrono::steady_clock::now();
+  try {
+    sink_.Commit();
+    counters_.Add(Counter::kRecorded, std::exchange(pending_, 0));
+    if (degraded_.exchange(false)) {
+      log_.Line(LogLevel::kInfo, "recording_recovered");
+    }
+  } catch (const std::exception& error) {
+    Fail(error.what());
+  }
+}
+
+void SampleRecorder::Close() {
+  try {
+    sink_.Close();
+    counters_.Add(Counter::kRecorded, std::exchange(pending_, 0));
+  } catch (const std::exception& error) {
+    Fail(error.what());
+    counters_.Add(Counter::kRecordDropped, std::exchange(pending_, 0));
+  }
+}
+
+void SampleRecorder::Fail(const char* reason) {
+  degraded_ = true;
+  counters_.Add(Counter::kRecordFailures);
+  const std::string text = reason;
+  log_.Report(
+      LogId::kRecordFailed, "record_failed",
+      [&text] { return "reason=\"" + text + "\""; }, LogLevel::kError);
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <thread>
+#include <vector>
+
+#include "monitor/bounded_queue.h"
+#include "monitor/counters.h"
+#include "monitor/sinks.h"
+#include "monitor/throttled_log.h"
+
+namespace fdi::monitor {
+
+/// Settings of SampleRecorder.
+struct SampleRecorderOptions {
+  bool lossless{false};  ///< Full: Record() waits instead of dropping.
+  std::size_t queue_samples{16'384};
+  std::chrono::milliseconds commit_period{1000};
+  std::uint64_t commit_samples{20'000};  ///< Commit earlier with so many.
+  std::uint64_t max_pending{200'000};    ///< Kept while commits fail.
+};
+
+/// Stores samples as runs by a thread of its own. What is not stored is
+/// counted; while commits fail samples are kept up to a limit and then dropped,
+/// so that diagnosis goes on.
+class SampleRecorder {
+ public:
+  SampleRecorder(SampleSink& sink, Counters& counters, ThrottledLog& log,
+                 const SampleRecorderOptions& options);
+  ~SampleRecorder();
+  SampleRecorder(const SampleRecorder&) = delete;
+  SampleRecorder& operator=(const SampleRecorder&) = delete;
+
+  void Record(ReceivedSample sample);
+
+  /// Stores what is there, ends the runs and the thread.
+  void Stop();
+
+  bool degraded() const { return degraded_; }
+
+ private:
+  void Run();
+  void Take(const ReceivedSample& sample);
+  void Commit();
+  void Close();
+  void Fail(const char* reason);
+
+  SampleSink& sink_;
+  Counters& counters_;
+  ThrottledLog& log_;
+  SampleRecorderOptions options_;
+  std::atomic<bool> degraded_{false};
+  std::uint64_t pending_{0};
+  std::chrono::steady_clock::time_point last_commit_;
+  BoundedQueue<ReceivedSample> queue_;
+  std::thread thread_;
+};
+
+}  // namespace fdi::monitor

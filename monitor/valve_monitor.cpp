@@ -1,0 +1,114 @@
+#include "monitor/valve_monitor.h"
+
+#include <limits>
+#include <utility>
+
+namespace fdi::monitor {
+namespace {
+
+constexpr double kStalePeriods = 3.0;
+
+}  // namespace
+
+ValveMonitor::ValveMonitor(const std::string& id,
+                           std::shared_ptr<const ModelSet> models,
+                           const TraceOptions& options)
+    : id_(id), models_(std::move(models)), tracker_(id, options) {
+  if (models_) {
+    engine_.emplace(models_);
+  }
+  unassigned_.quality = Quality::kUnassigned;
+  unassigned_.residuals.fill(std::numeric_limits<double>::quiet_NaN());
+}
+
+ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
+                                TimePoint received, EpisodeOutlet& outlet) {
+  received_ = received;
+  seen_ = true;
+  stale_ = false;
+  ended_ = false;
+  const bool swapped = std::exchange(swapped_, false);
+  if (!engine_) {
+    writer_ = writer;
+    unassigned_.stamp_ns = sample.stamp_ns;
+    unassigned_.source_id = sample.source_id;
+    unassigned_.seq = sample.seq;
+    return {unassigned_, nullptr, swapped};
+  }
+  const Verdict& verdict = engine_->Step(sample);
+  if (verdict.intake != Intake::kSuperseded) {
+    writer_ = writer;
+  }
+  tracker_.Step(sample, verdict, models_, outlet);
+  return {verdict, models_.get(), swapped};
+}
+
+bool ValveMonitor::EndStream(std::uint64_t writer, EpisodeOutlet& outlet) {
+  if (ended_ || (seen_ && writer != writer_)) {
+    return false;
+  }
+  Close(EndReason::kStreamEnded, outlet);
+  tracker_.AbandonRecovery(EndReason::kStreamEnded, outlet);
+  ended_ = true;
+  stale_ = false;
+  return true;
+}
+
+bool ValveMonitor::Adopt(std::shared_ptr<const ModelSet> models,
+                         EpisodeOutlet& outlet) {
+  if (models == models_ || (models && models_ && models->content_hash != 0 &&
+                            models->content_hash == models_->content_hash)) {
+    return false;
+  }
+  if (models && engine_) {
+    const std::optional<Transition> closed = engine_->Adopt(models);
+    if (closed) {
+      tracker_.End(*closed, models_, outlet);
+    }
+  } else if (models) {
+    engine_.emplace(models);
+  } else {
+    Close(EndReason::kModelChanged, outlet);
+    engine_.reset();
+  }
+  models_ = std::move(models);
+  swapped_ = true;
+  return true;
+}
+
+bool ValveMonitor::CheckStale(TimePoint now) {
+  const double period_s = models_ ? models_->sample_period_s : 1.0;
+  const std::chrono::duration<double> limit(kStalePeriods * period_s);
+  if (!seen_ || ended_ || stale_ || now - received_ <= limit) {
+    return false;
+  }
+  stale_ = true;
+  return true;
+}
+
+void ValveMonitor::CheckTimeout(TimePoint now,
+                                std::chrono::milliseconds timeout,
+                                EpisodeOutlet& outlet) {
+  if (stale_ && now - received_ > timeout) {
+    Close(EndReason::kStaleTimeout, outlet);
+    tracker_.AbandonRecovery(EndReason::kStaleTimeout, outlet);
+  }
+}
+
+void ValveMonitor::GiveUpRecovery(std::int64_t now_ns, EpisodeOutlet& outlet) {
+  if (!seen_ || stale_ || !engine_) {
+    tracker_.GiveUpRecovery(now_ns, outlet);
+  }
+}
+
+void ValveMonitor::Close(EndReason reason, EpisodeOutlet& outlet) {
+  if (!engine_) {
+    return;
+  }
+  const std::optional<Transition> closed = engine_->EndEpisode(reason);
+  if (closed) {
+    tracker_.End(*closed, models_, outlet);
+  }
+}
+
+}  // namespace fdi::monitor

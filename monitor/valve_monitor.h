@@ -1,0 +1,86 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "diagnosis/valve_engine.h"
+#include "monitor/episode_tracker.h"
+
+namespace fdi::monitor {
+
+/// What became of one sample.
+struct ValveOutcome {
+  const Verdict& verdict;  ///< Stands until the next call.
+  const ModelSet* models;  ///< Null while the valve is UNASSIGNED.
+  bool model_swapped;      ///< Another model set answers from here on.
+};
+
+/// One valve of the plant: its engine, its episodes, its clock. A valve
+/// without a model set is listed, and its quality is UNASSIGNED.
+///
+/// One thread at a time.
+class ValveMonitor {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  /// @param models null: none assigned.
+  /// @throws DataError if `models` is not usable.
+  ValveMonitor(const std::string& id, std::shared_ptr<const ModelSet> models,
+               const TraceOptions& options);
+
+  /// Before the first Step().
+  void Recover(const OpenEpisode& episode) { tracker_.Recover(episode); }
+
+  /// @param writer who sent it; see EndStream().
+  ValveOutcome Step(const Sample& sample, std::uint64_t writer,
+                    TimePoint received, EpisodeOutlet& outlet);
+
+  /// The publisher ended the stream. Nothing if another one speaks by now.
+  /// @returns whether the stream ended.
+  bool EndStream(std::uint64_t writer, EpisodeOutlet& outlet);
+
+  /// Continues with another model set, or none, from the next sample on.
+  /// @returns whether it is another one. @throws DataError as the constructor;
+  ///   then the valve goes on as before.
+  bool Adopt(std::shared_ptr<const ModelSet> models, EpisodeOutlet& outlet);
+
+  /// Labels the valve STALE if it was silent for three periods.
+  /// @returns whether it became so by this call.
+  bool CheckStale(TimePoint now);
+
+  /// Closes an open episode after a long silence.
+  void CheckTimeout(TimePoint now, std::chrono::milliseconds timeout,
+                    EpisodeOutlet& outlet);
+
+  /// Closes what was to be resumed if the valve is silent.
+  void GiveUpRecovery(std::int64_t now_ns, EpisodeOutlet& outlet);
+
+  void Flush(EpisodeOutlet& outlet) { tracker_.Flush(outlet); }
+
+  const std::string& id() const { return id_; }
+  const ModelSet* models() const { return models_.get(); }
+  bool stale() const { return stale_; }
+  bool ended() const { return ended_; }
+  bool episode_open() const { return engine_ && engine_->episode_open(); }
+  std::size_t trace_bytes() const { return tracker_.trace_bytes(); }
+
+ private:
+  void Close(EndReason reason, EpisodeOutlet& outlet);
+
+  std::string id_;
+  std::shared_ptr<const ModelSet> models_;
+  std::optional<ValveEngine> engine_;
+  EpisodeTracker tracker_;
+  Verdict unassigned_;
+  bool swapped_{false};
+  bool seen_{false};
+  bool stale_{false};
+  bool ended_{false};
+  std::uint64_t writer_{0};
+  TimePoint received_;
+};
+
+}  // namespace fdi::monitor

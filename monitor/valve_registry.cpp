@@ -1,0 +1,179 @@
+#include "monitor/valve_registry.h"
+
+#include <exception>
+#include <utility>
+
+namespace fdi::monitor {
+
+ValveRegistry::ValveRegistry(const RegistryOptions& options,
+                             std::shared_ptr<const ModelResolver> resolver,
+                             EpisodeOutlet& outlet, Counters& counters,
+                             ThrottledLog& log)
+    : options_(options),
+      resolver_(std::move(resolver)),
+      outlet_(outlet),
+      counters_(counters),
+      log_(log) {}
+
+void ValveRegistry::Recover(const std::vector<OpenEpisode>& episodes,
+                            TimePoint now) {
+  for (const OpenEpisode& episode : episodes) {
+    const auto [known, fresh] = recovered_.emplace(episode.valve_id, episode);
+    if (fresh) {
+      continue;
+    }
+    // A valve has one open episode; the older one of two cannot go on.
+    OpenEpisode older = episode;
+    if (older.detection_stamp_ns > known->second.detection_stamp_ns) {
+      std::swap(older, known->second);
+    }
+    EpisodeTracker tracker(older.valve_id, options_.trace);
+    tracker.Recover(older);
+    tracker.AbandonRecovery(EndReason::kUnknown, outlet_);
+  }
+  recovering_ = !recovered_.empty();
+  recovery_deadline_ = now + options_.recovery_window;
+}
+
+// @returns false if the model set of the valve cannot be had.
+bool ValveRegistry::Resolve(const std::string& valve_id,
+                            std::shared_ptr<const ModelSet>& models) {
+  try {
+    models = resolver_->ModelsFor(valve_id);
+    if (models) {
+      Validate(*models);
+    }
+  } catch (const std::exception& error) {
+    models = nullptr;
+    counters_.Add(Counter::kModelFailures);
+    const std::string reason = error.what();
+    log_.Report(
+        LogId::kModelFailure, "model_set_unusable",
+        [&] { return "valve=" + valve_id + " reason=\"" + reason + "\""; },
+        LogLevel::kError);
+    return false;
+  }
+  if (!models) {
+    log_.Report(LogId::kUnassigned, "valve_unassigned",
+                [&valve_id] { return "valve=" + valve_id; });
+  }
+  return true;
+}
+
+ValveMonitor& ValveRegistry::At(const ValveDirectory::Entry& valve) {
+  if (valve.index >= valves_.size()) {
+    valves_.resize(valve.index + 1);
+  }
+  std::unique_ptr<ValveMonitor>& place = valves_[valve.index];
+  if (!place) {
+    const std::string& id = *valve.name;
+    std::shared_ptr<const ModelSet> models;
+    Resolve(id, models);
+    log_.Line(LogLevel::kDebug,
+              "valve_seen valve=" + id + " model_set=" +
+                  (models ? models->name + "@" + std::to_string(models->version)
+                          : "none"));
+    place =
+        std::make_unique<ValveMonitor>(id, std::move(models), options_.trace);
+    if (const auto open = recovered_.find(id); open != recovered_.end()) {
+      place->Recover(open->second);
+      recovered_.erase(open);
+    }
+    const std::lock_guard lock(mutex_);
+    names_.push_back(id);
+  }
+  return *place;
+}
+
+ValveOutcome ValveRegistry::Step(const ValveDirectory::Entry& valve,
+                                 const Sample& sample, std::uint64_t writer,
+                                 TimePoint received) {
+  return At(valve).Step(sample, writer, received, outlet_);
+}
+
+bool ValveRegistry::EndStream(const ValveDirectory::Entry& valve,
+                              std::uint64_t writer) {
+  return At(valve).EndStream(writer, outlet_);
+}
+
+void ValveRegistry::Reassign(std::shared_ptr<const ModelResolver> resolver) {
+  resolver_ = std::move(resolver);
+  std::uint64_t swapped = 0;
+  for (const std::unique_ptr<ValveMonitor>& valve : valves_) {
+    std::shared_ptr<const ModelSet> models;
+    // A valve whose new set cannot be had goes on with the one it has.
+    if (valve && Resolve(valve->id(), models) &&
+        valve->Adopt(std::move(models), outlet_)) {
+      ++swapped;
+    }
+  }
+  counters_.Add(Counter::kModelSwaps, swapped);
+  log_.Line(LogLevel::kInfo,
+            "models_reassigned valves_swapped=" + std::to_string(swapped));
+}
+
+void ValveRegistry::Tend(TimePoint now, std::int64_t now_ns) {
+  for (const std::unique_ptr<ValveMonitor>& valve : valves_) {
+    if (!valve) {
+      continue;
+    }
+    if (valve->CheckStale(now)) {
+      counters_.Add(Counter::kStaleEvents);
+      log_.Report(LogId::kStale, "valve_stale",
+                  [&valve] { return "valve=" + valve->id(); });
+    }
+    valve->CheckTimeout(now, options_.stale_timeout, outlet_);
+  }
+  if (recovering_ && now >= recovery_deadline_) {
+    recovering_ = false;
+    for (const std::unique_ptr<ValveMonitor>& valve : valves_) {
+      if (valve) {
+        valve->GiveUpRecovery(now_ns, outlet_);
+      }
+    }
+    for (const auto& [id, episode] : recovered_) {
+      EpisodeTracker tracker(id, options_.trace);
+      tracker.Recover(episode);
+      tracker.GiveUpRecovery(now_ns, outlet_);
+    }
+    recovered_.clear();
+  }
+  TakeCensus();
+}
+
+void ValveRegistry::TakeCensus() {
+  ValveCensus census;
+  for (const std::unique_ptr<ValveMonitor>& valve : valves_) {
+    if (!valve) {
+      continue;
+    }
+    ++census.valves;
+    census.unassigned += valve->models() == nullptr ? 1 : 0;
+    census.stale += valve->stale() ? 1 : 0;
+    census.ended += valve->ended() ? 1 : 0;
+    census.open_episodes += valve->episode_open() ? 1 : 0;
+    census.trace_bytes += valve->trace_bytes();
+  }
+  const std::lock_guard lock(mutex_);
+  census_ = census;
+}
+
+void ValveRegistry::Flush() {
+  for (const std::unique_ptr<ValveMonitor>& valve : valves_) {
+    if (valve) {
+      valve->Flush(outlet_);
+    }
+  }
+}
+
+ValveCensus ValveRegistry::census() const {
+  const std::lock_guard lock(mutex_);
+  return census_;
+}
+
+std::vector<std::string> ValveRegistry::names() const {
+  const std::lock_guard lock(mutex_);
+  return names_;
+}
+
+}  // namespace fdi::monitor
