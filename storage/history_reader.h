@@ -14,8 +14,7 @@ namespace fdi::storage {
 /// Reads history.db beside a running monitor. One thread at a time.
 class HistoryReader {
  public:
-  /// @throws DataError, SqliteError as Database; NotFoundError if there is no
-  ///   such file.
+  /// @throws DataError, SqliteError as Database.
   explicit HistoryReader(const std::filesystem::path& path);
 
   /// By detection.

@@ -85,6 +85,7 @@ CREATE TABLE event_outbox (
 
 CREATE TABLE episode_trace (
   episode_id TEXT NOT NULL REFERENCES episode ON DELETE CASCADE,
+  chunk INTEGER NOT NULL,      -- 0, 1, ... in order of arrival.
   first_ns INTEGER NOT NULL,
   last_ns INTEGER NOT NULL,
   instants INTEGER NOT NULL,
@@ -93,7 +94,7 @@ CREATE TABLE episode_trace (
   samples BLOB NOT NULL,
   vector_crc INTEGER NOT NULL,
   vectors BLOB NOT NULL,
-  PRIMARY KEY (episode_id, first_ns)
+  PRIMARY KEY (episode_id, chunk)
 ) STRICT, WITHOUT ROWID;
 
 CREATE TABLE data_gap (
@@ -119,7 +120,7 @@ SELECT
     || printf('.%03dZ', cleared_ns / 1000000 % 1000) AS cleared_utc,
   CASE
     WHEN isolated_ns IS NOT NULL THEN (
-      SELECT group_concat(fault, '|') FROM (
+      SELECT coalesce(group_concat(fault, '|'), 'unknown') FROM (
         SELECT fault FROM episode_fault f
         WHERE f.episode_id = e.episode_id AND held = 1
         ORDER BY fault_bit))

@@ -19,9 +19,9 @@ struct TraceChunk {
 
 inline constexpr int kTraceChunkInstants = 300;
 
-/// Packs instants without loss. `vectors`: "instants, channels, faults" as
-/// three uint32, then the zlib stream of the columns quality, state, isolated,
-/// d_0, residuals, factors, each as planes of bytes, least significant first.
+/// Packs instants without loss. `vectors`: instants, channels, faults and size
+/// as uint32, then the zlib stream of the columns quality, state, isolated,
+/// d_0, residuals by channel, factors by fault (see column_codec.h).
 /// @throws std::invalid_argument if there are none or their sizes differ.
 TraceChunk EncodeTrace(std::span<const TraceInstant> instants);
 

@@ -1,0 +1,172 @@
+#include "storage/history_reader.h"
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "storage/history_rows.h"
+#include "storage/history_schema.h"
+#include "storage/history_trace.h"
+
+namespace fdi::storage {
+namespace {
+
+/// Parameters 1..5: valve glob, since, until, fault ('' for any), state.
+constexpr const char* kMatches =
+    "e.valve_id GLOB ?1 AND e.detected_ns >= ?2 AND e.detected_ns < ?3 AND "
+    "(?4 = '' OR (?4 = 'unknown' AND v.fault = 'unknown') OR EXISTS (SELECT 1 "
+    "FROM episode_fault f WHERE f.episode_id = e.episode_id AND f.fault = ?4 "
+    "AND f.held = 1)) AND CASE ?5 "
+    "WHEN 1 THEN e.ended_ns IS NULL "
+    "WHEN 2 THEN e.ended_ns IS NULL AND e.isolated_ns IS NULL "
+    "WHEN 3 THEN e.ended_ns IS NULL AND e.isolated_ns IS NOT NULL "
+    "WHEN 4 THEN e.ended_ns IS NOT NULL "
+    "WHEN 5 THEN e.acked_by IS NULL ELSE 1 END";
+static_assert(static_cast<int>(EpisodeState::kOpen) == 1 &&
+              static_cast<int>(EpisodeState::kUnacked) == 5);
+
+constexpr const char* kFrom =
+    " FROM fault_history v JOIN episode e USING (episode_id) ";
+
+std::string FaultOf(const EpisodeFilter& filter) {
+  if (filter.fault.empty() || filter.fault == "unknown") {
+    return filter.fault;
+  }
+  return FaultName(RequireFault(filter.fault));
+}
+
+void BindFilter(Statement& statement, const EpisodeFilter& filter) {
+  const std::int64_t limit = filter.limit > 0 ? filter.limit : -1;
+  statement.Bind(filter.valve_glob, filter.since_ns, filter.until_ns,
+                 FaultOf(filter), filter.state, limit);
+}
+
+void BindStatistics(Statement& statement, const EpisodeFilter& filter) {
+  statement.Bind(filter.valve_glob, filter.since_ns, filter.until_ns,
+                 FaultOf(filter), filter.state);
+}
+
+TraceChunk ReadChunk(const Statement& row) {
+  TraceChunk chunk;
+  chunk.samples.codec = static_cast<ChunkCodec>(row.Int(0));
+  chunk.samples.crc = static_cast<std::uint32_t>(row.Int64(1));
+  chunk.samples.count = static_cast<std::uint32_t>(row.Int64(2));
+  chunk.samples.bytes = row.Blob(3);
+  chunk.vector_crc = static_cast<std::uint32_t>(row.Int64(4));
+  chunk.vectors = row.Blob(5);
+  return chunk;
+}
+
+}  // namespace
+
+HistoryReader::HistoryReader(const std::filesystem::path& path)
+    : database_(path, HistorySchema(), Access::kReader) {}
+
+std::vector<Episode> HistoryReader::List(const EpisodeFilter& filter) {
+  // The newest `limit`, then oldest first.
+  Statement row = database_.Prepare(
+      std::string("SELECT ") + kEpisodeColumns + kFrom +
+      "WHERE e.episode_id IN (SELECT e.episode_id" + kFrom + "WHERE " +
+      kMatches +
+      " ORDER BY e.detected_ns DESC, e.valve_id DESC LIMIT ?6) "
+      "ORDER BY e.detected_ns, e.valve_id");
+  BindFilter(row, filter);
+  std::vector<Episode> episodes;
+  while (row.Step()) {
+    episodes.push_back(ReadEpisode(row));
+  }
+  return episodes;
+}
+
+Episode HistoryReader::Show(std::string_view id) {
+  const Snapshot snapshot(database_);
+  const std::uint64_t episode_id = ResolveEpisode(database_, id);
+  Statement row = database_.Prepare(std::string("SELECT ") + kEpisodeColumns +
+                                    kFrom + "WHERE e.episode_id = ?");
+  row.Bind(EpisodeIdText(episode_id)).Step();
+  return ReadEpisode(row);
+}
+
+std::vector<EpisodeEvent> HistoryReader::Events(std::uint64_t episode_id) {
+  Statement row = database_.Prepare(
+      "SELECT event_id, kind, stamp_ns, recorded_ns, faults, fault_bits, "
+      "coalesce(factor, 0.0), coalesce(strength, 0.0), reason, value, who, "
+      "comment FROM episode_event WHERE episode_id = ? ORDER BY event_id");
+  row.Bind(EpisodeIdText(episode_id));
+  std::vector<EpisodeEvent> events;
+  while (row.Step()) {
+    events.push_back({row.Int64(0), episode_id, row.Text(1), row.Int64(2),
+                      row.Int64(3), row.Text(4), row.Uint64(5), row.Double(6),
+                      row.Double(7), row.Text(8), row.Text(9), row.Text(10),
+                      row.Text(11)});
+  }
+  return events;
+}
+
+std::vector<TraceInstant> HistoryReader::Trace(std::uint64_t episode_id) {
+  const std::string id = EpisodeIdText(episode_id);
+  Statement row = database_.Prepare(
+      "SELECT sample_codec, sample_crc, instants, samples, vector_crc, "
+      "vectors, chunk FROM episode_trace WHERE episode_id = ? ORDER BY chunk");
+  row.Bind(id);
+  std::vector<TraceInstant> trace;
+  while (row.Step()) {
+    const std::string where = database_.path().string() + ": trace of " + id +
+                              ", chunk " + row.Text(6);
+    auto part = DecodeTrace(ReadChunk(row), where);
+    trace.insert(trace.end(), std::make_move_iterator(part.begin()),
+                 std::make_move_iterator(part.end()));
+  }
+  return trace;
+}
+
+std::vector<EpisodeStatistics> HistoryReader::Statistics(
+    const EpisodeFilter& filter) {
+  Statement row = database_.Prepare(
+      std::string(
+          "SELECT e.valve_id, coalesce(v.fault, '') AS answer, count(*), "
+          "sum(e.ended_ns IS NULL), sum(e.acked_by IS NULL), "
+          "sum(e.label IS NOT NULL AND (e.label = 'true' OR e.label = "
+          "v.fault)), sum(e.label IS NOT NULL AND e.label <> 'true' AND "
+          "e.label IS NOT v.fault), "
+          "avg((e.isolated_ns - e.detected_ns) * 1e-9), "
+          "avg((e.ended_ns - e.detected_ns) * 1e-9), max(e.peak_factor), "
+          "max(e.detected_ns)") +
+      kFrom + "WHERE " + kMatches +
+      " GROUP BY e.valve_id, answer ORDER BY e.valve_id, answer");
+  BindStatistics(row, filter);
+  std::vector<EpisodeStatistics> statistics;
+  while (row.Step()) {
+    statistics.push_back({row.Text(0), row.Text(1), row.Int64(2), row.Int64(3),
+                          row.Int64(4), row.Int64(5), row.Int64(6),
+                          row.OptionalDouble(7), row.OptionalDouble(8),
+                          row.Double(9), row.Int64(10)});
+  }
+  return statistics;
+}
+
+std::vector<DataGap> HistoryReader::Gaps(const EpisodeFilter& filter) {
+  Statement row = database_.Prepare(
+      "SELECT valve_id, from_ns, to_ns, reason FROM data_gap "
+      "WHERE (valve_id IS NULL OR valve_id GLOB ?) AND to_ns >= ? AND "
+      "from_ns < ? ORDER BY from_ns, valve_id");
+  row.Bind(filter.valve_glob, filter.since_ns, filter.until_ns);
+  std::vector<DataGap> gaps;
+  while (row.Step()) {
+    gaps.push_back({row.Text(0), row.Int64(1), row.Int64(2), row.Text(3)});
+  }
+  return gaps;
+}
+
+std::vector<MonitorSession> HistoryReader::Sessions() {
+  Statement row = database_.Prepare(
+      "SELECT session_id, start_ns, alive_ns, stop_ns, coalesce(clean, 0), "
+      "software, config FROM monitor_session ORDER BY session_id");
+  std::vector<MonitorSession> sessions;
+  while (row.Step()) {
+    sessions.push_back({row.Int64(0), row.Int64(1), row.Int64(2),
+                        row.OptionalInt64(3), row.Bool(4), row.Text(5),
+                        row.Text(6)});
+  }
+  return sessions;
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,176 @@
+#include "storage/history_reader.h"
+
+#include <gmock/gmock.h>
+
+#include "diagnosis/error.h"
+#include "tests/storage/history_fixture.h"
+
+namespace fdi::storage {
+namespace {
+
+using Kind = TransitionKind;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+class HistoryReaderTest : public HistoryFixture {
+ protected:
+  // LV-1: f7, closed. LV-2: f1|f19, closed. PV-1: never isolated, closed.
+  // PV-2: open, detected.
+  HistoryReaderTest() : writer_(path_) {
+    RecordEpisode(writer_, 0b010, "LV-1");
+    RecordEpisode(writer_, 0b101, "LV-2");
+    const auto none = EndReason::kNone;
+    writer_.Record(Event(Kind::kDetected, 0, 0, 0.3, none, "PV-1"));
+    writer_.Record(
+        Event(Kind::kClosed, 60, 0, 0.3, EndReason::kStaleTimeout, "PV-1"));
+    NewEvent later = Event(Kind::kDetected, 500, 0, 0.3, none, "PV-2");
+    later.transition.detection_stamp_ns += 500 * kSecond;
+    writer_.Record(later);
+  }
+
+  std::vector<std::string> Valves(const EpisodeFilter& filter) {
+    std::vector<std::string> valves;
+    for (const Episode& episode : HistoryReader(path_).List(filter)) {
+      valves.push_back(episode.valve_id);
+    }
+    return valves;
+  }
+
+  HistoryWriter writer_;
+};
+
+TEST_F(HistoryReaderTest, FiltersNarrowTheList) {
+  EpisodeFilter valve;
+  valve.valve_glob = "LV-*";
+  EpisodeFilter fault;
+  fault.fault = "F19";
+  EpisodeFilter unknown;
+  unknown.fault = "unknown";
+  EpisodeFilter since;
+  since.since_ns = kDetected + 1;
+  EpisodeFilter until;
+  until.until_ns = kDetected + 1;
+  EpisodeFilter newest;
+  newest.limit = 2;
+
+  EXPECT_THAT(Valves({}), ElementsAre("LV-1", "LV-2", "PV-1", "PV-2"));
+  EXPECT_THAT(Valves(valve), ElementsAre("LV-1", "LV-2"));
+  EXPECT_THAT(Valves(fault), ElementsAre("LV-2"));
+  EXPECT_THAT(Valves(unknown), ElementsAre("PV-1"));
+  EXPECT_THAT(Valves(since), ElementsAre("PV-2"));
+  EXPECT_THAT(Valves(until), ElementsAre("LV-1", "LV-2", "PV-1"));
+  EXPECT_THAT(Valves(newest), ElementsAre("PV-1", "PV-2"));
+}
+
+TEST_F(HistoryReaderTest, StatesNarrowTheList) {
+  const auto valves = [this](EpisodeState state) {
+    EpisodeFilter filter;
+    filter.state = state;
+    return Valves(filter);
+  };
+  HistoryEditor(path_).Acknowledge(EpisodeIdText(Id("LV-2")), "anna", "", 1);
+
+  EXPECT_THAT(valves(EpisodeState::kOpen), ElementsAre("PV-2"));
+  EXPECT_THAT(valves(EpisodeState::kDetected), ElementsAre("PV-2"));
+  EXPECT_THAT(valves(EpisodeState::kIsolated), IsEmpty());
+  EXPECT_THAT(valves(EpisodeState::kClosed),
+              ElementsAre("LV-1", "LV-2", "PV-1"));
+  EXPECT_THAT(valves(EpisodeState::kUnacked),
+              ElementsAre("LV-1", "PV-1", "PV-2"));
+}
+
+TEST_F(HistoryReaderTest, EpisodeIsFoundByAUniqueBeginningOfItsId) {
+  HistoryReader reader(path_);
+  const std::string id = EpisodeIdText(Id("LV-2"));
+
+  EXPECT_EQ(reader.Show(id).fault, "f1|f19");
+  EXPECT_EQ(reader.Show(id.substr(0, 8)).valve_id, "LV-2");
+  EXPECT_EQ(reader.Show("last").valve_id, "PV-2");
+  EXPECT_THROW(reader.Show(""), NotFoundError);
+  EXPECT_THROW(reader.Show("*"), NotFoundError);
+  EXPECT_THROW(reader.Show("0123456789abcdef"), NotFoundError);
+}
+
+TEST_F(HistoryReaderTest, AcknowledgementAndLabelAreInTheViewAndInTheEvents) {
+  const std::string id = EpisodeIdText(Id("LV-1"));
+  HistoryEditor editor(path_);
+  editor.Acknowledge(id, "anna", "valve opened", kDetected + 1);
+  editor.Label(id, "F7", "jan", "seat worn", kDetected + 2);
+
+  EXPECT_EQ(Sql("SELECT acked_by || ' ' || label FROM fault_history "
+                "WHERE valve_id = 'LV-1'"),
+            "anna f7");
+  const auto events = HistoryReader(path_).Events(Id("LV-1"));
+  ASSERT_EQ(events.size(), 6U);
+  EXPECT_EQ(events[4].kind, "ACK");
+  EXPECT_EQ(events[4].comment, "valve opened");
+  EXPECT_EQ(events[5].kind, "LABEL");
+  EXPECT_EQ(events[5].value, "f7");
+  EXPECT_EQ(events[5].who, "jan");
+  EXPECT_THAT(writer_.UnsentEvents().size(), 11U);  // None of these two.
+}
+
+TEST_F(HistoryReaderTest, UnknownLabelChangesNothing) {
+  const std::string id = EpisodeIdText(Id("LV-1"));
+
+  EXPECT_THROW(HistoryEditor(path_).Label(id, "maybe", "jan", "", 1),
+               ConfigError);
+  EXPECT_THROW(HistoryEditor(path_).Label("ffff", "true", "jan", "", 1),
+               NotFoundError);
+  EXPECT_EQ(Sql("SELECT count(*) FROM episode WHERE label IS NOT NULL"), "0");
+}
+
+TEST_F(HistoryReaderTest, StatisticsCountByValveAndAnswer) {
+  HistoryEditor editor(path_);
+  editor.Label(EpisodeIdText(Id("LV-1")), "f7", "a", "", 1);
+  editor.Label(EpisodeIdText(Id("LV-2")), "false", "a", "", 1);
+
+  const auto statistics = HistoryReader(path_).Statistics();
+
+  ASSERT_EQ(statistics.size(), 4U);
+  EXPECT_EQ(statistics[0].fault, "f7");
+  EXPECT_EQ(statistics[0].labelled_true, 1);
+  EXPECT_EQ(statistics[0].labelled_false, 0);
+  EXPECT_NEAR(statistics[0].mean_isolation_s.value_or(0.0), 20.0, 1e-6);
+  EXPECT_NEAR(statistics[0].mean_duration_s.value_or(0.0), 91.0, 1e-6);
+  EXPECT_EQ(statistics[1].fault, "f1|f19");
+  EXPECT_EQ(statistics[1].labelled_false, 1);
+  EXPECT_EQ(statistics[2].fault, "unknown");
+  EXPECT_EQ(statistics[2].mean_isolation_s, std::nullopt);
+  EXPECT_EQ(statistics[3].fault, "");
+  EXPECT_EQ(statistics[3].open, 1);
+}
+
+TEST_F(HistoryReaderTest, GapsOfAllValvesShowForEachValve) {
+  writer_.AddGap({"", kDetected, kDetected + 10, "monitor_down"});
+  writer_.AddGap({"PV-1", kDetected + 20, kDetected + 30, "stale"});
+  writer_.Commit(kDetected);
+  EpisodeFilter filter;
+  filter.valve_glob = "LV-1";
+  EpisodeFilter later;
+  later.since_ns = kDetected + 15;
+
+  ASSERT_EQ(HistoryReader(path_).Gaps(filter).size(), 1U);
+  EXPECT_EQ(HistoryReader(path_).Gaps(filter)[0].reason, "monitor_down");
+  ASSERT_EQ(HistoryReader(path_).Gaps(later).size(), 1U);
+  EXPECT_EQ(HistoryReader(path_).Gaps(later)[0].valve_id, "PV-1");
+}
+
+TEST_F(HistoryReaderTest, SessionsTellHowTheyEnded) {
+  writer_.BeginSession(kDetected, "0.1.0+abc", "domain = 0");
+  writer_.EndSession(kDetected + 5, true);
+
+  const auto sessions = HistoryReader(path_).Sessions();
+
+  ASSERT_EQ(sessions.size(), 1U);
+  EXPECT_TRUE(sessions[0].clean);
+  EXPECT_EQ(sessions[0].stop_ns, kDetected + 5);
+  EXPECT_EQ(sessions[0].config, "domain = 0");
+}
+
+TEST_F(HistoryReaderTest, ReadingAHistoryThatIsNotThereIsADataError) {
+  EXPECT_THROW(HistoryReader(directory_.path() / "none.db"), DataError);
+}
+
+}  // namespace
+}  // namespace fdi::storage

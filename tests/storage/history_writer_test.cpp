@@ -1,0 +1,330 @@
+#include "storage/history_writer.h"
+
+#include <gmock/gmock.h>
+
+#include "diagnosis/error.h"
+#include "tests/storage/history_fixture.h"
+
+namespace fdi::storage {
+namespace {
+
+using Kind = TransitionKind;
+using testing::ElementsAre;
+
+constexpr const char* kView =
+    "SELECT concat_ws FROM (SELECT detected_utc || ' ' || isolated_utc || ' ' "
+    "|| cleared_utc || ' ' || fault || ' ' || peak_factor || ' ' || model_set "
+    "|| ' ' || end_reason AS concat_ws FROM fault_history)";
+
+using HistoryWriterTest = HistoryFixture;
+
+TEST_F(HistoryWriterTest, ViewTellsTheLifeOfAnEpisode) {
+  HistoryWriter writer(path_);
+  RecordEpisode(writer, 0b101);
+
+  EXPECT_EQ(Sql(kView),
+            "2026-11-20T14:56:11.000Z 2026-11-20T14:56:31.000Z "
+            "2026-11-20T14:57:41.000Z f1|f19 0.8 demo@3 cleared");
+  EXPECT_EQ(Sql("SELECT episode_id FROM fault_history"), EpisodeIdText(Id()));
+  EXPECT_EQ(Sql("SELECT label IS NULL AND acked_by IS NULL FROM "
+                "fault_history"),
+            "1");
+}
+
+TEST_F(HistoryWriterTest, ViewHasTheColumnsOfTheContractInOrder) {
+  HistoryWriter writer(path_);
+  Database database(path_, HistorySchema(), Access::kReader);
+  const Statement row = database.Prepare("SELECT * FROM fault_history");
+
+  std::vector<std::string> columns;
+  for (int c = 0; c < row.ColumnCount(); ++c) {
+    columns.push_back(row.ColumnName(c));
+  }
+
+  EXPECT_THAT(columns,
+              ElementsAre("episode_id", "valve_id", "detected_utc",
+                          "isolated_utc", "cleared_utc", "fault", "peak_factor",
+                          "model_set", "end_reason", "label", "acked_by"));
+}
+
+TEST_F(HistoryWriterTest, FaultIsNullUntilIsolatedAndUnknownIfItNeverWas) {
+  HistoryWriter writer(path_);
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+  EXPECT_EQ(Sql("SELECT fault FROM fault_history"), "NULL");
+  EXPECT_EQ(Sql("SELECT isolated_utc FROM fault_history"), "NULL");
+
+  writer.Record(Event(Kind::kClosed, 50, 0, 0.3, EndReason::kStreamEnded));
+
+  EXPECT_EQ(Sql("SELECT fault FROM fault_history"), "unknown");
+  EXPECT_EQ(Sql("SELECT end_reason FROM fault_history"), "stream_ended");
+  EXPECT_EQ(Sql("SELECT cleared_utc FROM fault_history"), "NULL");
+}
+
+TEST_F(HistoryWriterTest, ReisolationReplacesTheAnswerAndKeepsTheFirstTime) {
+  HistoryWriter writer(path_);
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+  writer.Record(Event(Kind::kIsolated, 20, 0b001, 0.9));
+  writer.Record(Event(Kind::kReisolated, 60, 0b110, 0.75));
+
+  EXPECT_EQ(Sql("SELECT fault FROM fault_history"), "f7|f19");
+  EXPECT_EQ(Sql("SELECT isolated_utc FROM fault_history"),
+            "2026-11-20T14:56:31.000Z");
+  EXPECT_EQ(Sql("SELECT peak_factor FROM fault_history"), "0.75");
+  EXPECT_EQ(Sql("SELECT count(*) FROM episode_fault"), "3");
+}
+
+TEST_F(HistoryWriterTest, RecordingTwiceIsANoOp) {
+  HistoryWriter writer(path_);
+  RecordEpisode(writer, 0b010);
+  const std::string before = Sql(kView);
+
+  EXPECT_EQ(writer.Record(Event(Kind::kDetected, 0, 0, 0.9)), std::nullopt);
+  EXPECT_EQ(writer.Record(Event(Kind::kIsolated, 20, 0b100, 0.9)),
+            std::nullopt);
+  RecordEpisode(writer, 0b100);
+
+  EXPECT_EQ(Sql(kView), before);
+  EXPECT_EQ(Sql("SELECT count(*) FROM episode"), "1");
+  EXPECT_EQ(Sql("SELECT count(*) FROM episode_event"), "4");
+  EXPECT_EQ(Sql("SELECT group_concat(fault) FROM episode_fault"), "f7");
+}
+
+TEST_F(HistoryWriterTest, EventsCannotBeChangedOrTakenOut) {
+  {
+    HistoryWriter writer(path_);
+    RecordEpisode(writer, 0b010);
+  }
+  Database database(path_, HistorySchema(), Access::kOccasionalWriter);
+  const Transaction transaction(database);
+
+  EXPECT_THROW(database.Run("UPDATE episode_event SET factor = 1"),
+               SqliteError);
+  EXPECT_THROW(database.Run("DELETE FROM episode_event"), SqliteError);
+  EXPECT_NO_THROW(database.Run("DELETE FROM episode"));
+  EXPECT_EQ(database.QueryInt64("SELECT count(*) FROM episode_event"), 0);
+}
+
+TEST_F(HistoryWriterTest, TransitionIsOnTheDiskWhenTheWriterDies) {
+  {
+    HistoryWriter writer(path_);
+    writer.BeginSession(kDetected, "0.1.0+abc", "domain = 0");
+    writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+    writer.AppendTrace(Id(), Instants(1800, -1800));
+    writer.Record(Event(Kind::kIsolated, 20, 0b010, 0.8));
+    writer.AppendTrace(Id(), Instants(5, 0));  // Never committed.
+  }
+  HistoryWriter writer(path_);
+
+  EXPECT_TRUE(writer.database().Check().empty());
+  const auto open = writer.OpenEpisodes();
+  ASSERT_EQ(open.size(), 1U);
+  EXPECT_EQ(open[0].id, Id());
+  EXPECT_EQ(open[0].fault, "f7");
+  EXPECT_EQ(open[0].detected_ns, kDetected);
+  EXPECT_EQ(open[0].trace_end_ns, kDetected - kSecond);
+}
+
+TEST_F(HistoryWriterTest, SessionThatDidNotEndIsFoundAtItsLastSignOfLife) {
+  {
+    HistoryWriter writer(path_);
+    EXPECT_EQ(writer.BeginSession(kDetected, "v", "").died_ns, std::nullopt);
+    writer.Commit(kDetected + 11 * kSecond);
+    writer.Commit(kDetected + 12 * kSecond);  // Too soon for another sign.
+  }
+  HistoryWriter writer(path_);
+
+  const SessionStart start =
+      writer.BeginSession(kDetected + 100 * kSecond, "v", "");
+  writer.EndSession(kDetected + 200 * kSecond, true);
+
+  EXPECT_EQ(start.died_ns, kDetected + 11 * kSecond);
+  EXPECT_EQ(start.session_id, 2);
+  EXPECT_EQ(Sql("SELECT group_concat(clean) FROM monitor_session"), "0,1");
+}
+
+TEST_F(HistoryWriterTest, EpisodeOfADeadMonitorCanBeClosedOnce) {
+  { HistoryWriter(path_).Record(Event(Kind::kDetected, 0, 0, 0.3)); }
+  HistoryWriter writer(path_);
+
+  const auto event = writer.Close(Id(), kDetected + 60 * kSecond,
+                                  EndReason::kUnknown, kDetected);
+  const auto again = writer.Close(Id(), kDetected + 61 * kSecond,
+                                  EndReason::kUnknown, kDetected);
+
+  EXPECT_TRUE(event.has_value());
+  EXPECT_EQ(again, std::nullopt);
+  EXPECT_EQ(Sql("SELECT fault || end_reason FROM fault_history"),
+            "unknownunknown");
+  EXPECT_TRUE(writer.OpenEpisodes().empty());
+  EXPECT_THROW(writer.Close(42, 0, EndReason::kUnknown, 0), NotFoundError);
+}
+
+TEST_F(HistoryWriterTest, ResumedEpisodeGoesOnUnderItsOldId) {
+  { HistoryWriter(path_).Record(Event(Kind::kDetected, 0, 0, 0.3)); }
+  HistoryWriter writer(path_);
+  writer.Resume(Id(), kDetected + 60 * kSecond, kDetected);
+  NewEvent isolated = Event(Kind::kIsolated, 80, 0b100, 0.9);
+  isolated.source_id = 99;  // The publisher was restarted too.
+  isolated.transition.detection_stamp_ns = kDetected + 60 * kSecond;
+  isolated.resumed_episode = Id();
+
+  EXPECT_TRUE(writer.Record(isolated).has_value());
+
+  EXPECT_EQ(Sql("SELECT count(*) FROM episode"), "1");
+  EXPECT_EQ(Sql("SELECT fault FROM fault_history"), "f19");
+  EXPECT_EQ(
+      Sql("SELECT group_concat(kind) FROM (SELECT kind FROM episode_event "
+          "ORDER BY event_id)"),
+      "DETECTED,RESUMED,ISOLATED");
+}
+
+TEST_F(HistoryWriterTest, EventsNotMarkedAsSentAreFoundAtTheNextStart) {
+  {
+    HistoryWriter writer(path_);
+    const auto detected = writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+    writer.Record(Event(Kind::kIsolated, 20, 0b101, 0.8));
+    ASSERT_TRUE(detected.has_value());
+    writer.MarkSent(*detected);
+    writer.Commit(kDetected);
+  }
+  HistoryWriter writer(path_);
+
+  const auto unsent = writer.UnsentEvents();
+
+  ASSERT_EQ(unsent.size(), 1U);
+  EXPECT_EQ(unsent[0].episode_id, Id());
+  EXPECT_EQ(unsent[0].valve_id, "LV-1");
+  EXPECT_EQ(unsent[0].source_id, kSource);
+  EXPECT_EQ(unsent[0].transition.kind, Kind::kIsolated);
+  EXPECT_EQ(unsent[0].transition.stamp_ns, kDetected + 20 * kSecond);
+  EXPECT_EQ(unsent[0].transition.detection_stamp_ns, kDetected);
+  EXPECT_EQ(unsent[0].transition.faults, 0b101U);
+  EXPECT_EQ(unsent[0].transition.factor, 0.8);
+  EXPECT_EQ(unsent[0].transition.reason, EndReason::kNone);
+  EXPECT_THAT(unsent[0].faults, ElementsAre(1, 19));
+  EXPECT_EQ(unsent[0].model_set, "demo@3");
+  EXPECT_EQ(unsent[0].model_hash, models_.content_hash);
+}
+
+TEST_F(HistoryWriterTest, IsolationWithoutItsDetectionStillMakesTheEpisode) {
+  HistoryWriter writer(path_);
+
+  EXPECT_TRUE(writer.Record(Event(Kind::kIsolated, 20, 0b010, 0.8)));
+
+  EXPECT_EQ(Sql("SELECT detected_utc || ' ' || fault FROM fault_history"),
+            "2026-11-20T14:56:11.000Z f7");
+}
+
+TEST_F(HistoryWriterTest, SameGapTwiceIsOneGap) {
+  HistoryWriter writer(path_);
+  const DataGap all{"", kDetected, kDetected + kSecond, "monitor_down"};
+  const DataGap one{"LV-1", kDetected, kDetected + kSecond, "monitor_down"};
+  writer.AddGap(all);
+  writer.AddGap(all);
+  writer.AddGap(one);
+  writer.Commit(kDetected);
+  writer.AddGap(all);
+  EXPECT_TRUE(writer.HasPending());
+  writer.Commit(kDetected);
+
+  EXPECT_FALSE(writer.HasPending());
+  EXPECT_EQ(Sql("SELECT count(*) FROM data_gap"), "2");
+}
+
+TEST_F(HistoryWriterTest, TraceReadsBackBitForBitAcrossChunks) {
+  const auto before = Instants(1800, -1800);
+  {
+    HistoryWriter writer(path_);
+    writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+    ASSERT_TRUE(writer.AppendTrace(Id(), before));
+    for (int k = 0; k < 310; ++k) {  // As it goes: one instant per commit.
+      ASSERT_TRUE(writer.AppendTrace(Id(), std::vector{Instant(k)}));
+      writer.Commit(kDetected);
+    }
+    writer.EndTrace(Id());
+    writer.EndSession(kDetected, true);
+  }
+
+  const auto trace = HistoryReader(path_).Trace(Id());
+
+  ASSERT_EQ(trace.size(), 2110U);
+  for (int i = 0; i < 2110; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const TraceInstant expected = i < 1800 ? before[at] : Instant(i - 1800);
+    ASSERT_EQ(trace[at].received.sample.stamp_ns,
+              expected.received.sample.stamp_ns);
+    ASSERT_EQ(trace[at].received.sample.values,
+              expected.received.sample.values);
+    ASSERT_EQ(trace[at].residuals, expected.residuals);
+    ASSERT_EQ(trace[at].fault_factors, expected.fault_factors);
+    ASSERT_EQ(trace[at].normal_factor, expected.normal_factor);
+    ASSERT_EQ(trace[at].state, expected.state);
+  }
+  EXPECT_EQ(Sql("SELECT count(*) FROM episode_trace"), "8");  // 6 + 1 + 1
+}
+
+TEST_F(HistoryWriterTest, TraceOfAnotherModelSetIsNotTaken) {
+  HistoryWriter writer(path_);
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+  TraceInstant other = Instant(0);
+  other.fault_factors.push_back(0.5);
+
+  EXPECT_FALSE(writer.AppendTrace(Id(), std::vector{other}));
+  EXPECT_THROW(writer.AppendTrace(7, {}), NotFoundError);
+}
+
+TEST_F(HistoryWriterTest, PeakFactorIsTheLargestOfTheIsolatedSetInTheTrace) {
+  HistoryWriter writer(path_);
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+  writer.Record(Event(Kind::kIsolated, 20, 0b010, 0.8));
+  TraceInstant high = Instant(30);
+  high.isolated = 0b010;
+  high.fault_factors = {0.99, 0.93, 0.1};  // f1 is higher, but not isolated.
+  TraceInstant early = Instant(10);  // Before isolation: another question.
+  early.fault_factors = {0.0, 0.97, 0.0};
+
+  writer.AppendTrace(Id(), std::vector{early, high});
+  writer.Commit(kDetected);
+
+  EXPECT_EQ(Sql("SELECT peak_factor FROM fault_history"), "0.93");
+}
+
+TEST_F(HistoryWriterTest, FailedCommitKeepsWhatIsPending) {
+  HistoryWriter writer(path_);
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+  writer.AppendTrace(Id(), Instants(700, 0));
+  // 700 instants need three chunks; a full disk is a limit on pages.
+  const auto pages =
+      writer.database().QueryInt64("PRAGMA page_count").value_or(0);
+  writer.database().QueryInt64("PRAGMA max_page_count = " +
+                               std::to_string(pages));
+  EXPECT_THROW(writer.Commit(kDetected), SqliteError);
+  EXPECT_TRUE(writer.HasPending());
+  writer.database().QueryInt64("PRAGMA max_page_count = 1000000");
+
+  writer.Commit(kDetected);
+
+  EXPECT_EQ(HistoryReader(path_).Trace(Id()).size(), 700U);
+}
+
+TEST_F(HistoryWriterTest, DamagedTraceIsRefusedByName) {
+  {
+    HistoryWriter writer(path_);
+    writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+    writer.AppendTrace(Id(), Instants(10, 0));
+    writer.Commit(kDetected);
+  }
+  {
+    Database database(path_, HistorySchema(), Access::kOccasionalWriter);
+    Transaction transaction(database);
+    database.Run(
+        "UPDATE episode_trace SET vectors = CAST(substr(vectors, 1, 20) || "
+        "x'00' AS BLOB)");
+    transaction.Commit();
+  }
+
+  EXPECT_THROW(HistoryReader(path_).Trace(Id()), DataError);
+}
+
+}  // namespace
+}  // namespace fdi::storage
