@@ -66,7 +66,7 @@ double UsualStep(const std::vector<std::string>& lines, CsvOptions options) {
     return 0.0;
   }
   const auto middle =
-      steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+      steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
   std::nth_element(steps.begin(), middle, steps.end());
   return *middle;
 }

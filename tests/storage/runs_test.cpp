@@ -1,0 +1,425 @@
+#include "storage/runs.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "diagnosis/error.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::storage {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kStart = 1'700'000'000 * kSecond;
+
+NewRun RunOf(const std::string& valve) {
+  NewRun run;
+  run.valve_id = valve;
+  run.source_id = 0xFEDCBA9876543210;
+  run.start_ns = kStart;
+  run.software = "test";
+  return run;
+}
+
+StoredSample SampleAt(std::int64_t k, int valve = 0) {
+  StoredSample stored;
+  stored.sample.stamp_ns = kStart + k * kSecond;
+  stored.sample.source_id = 0xFEDCBA9876543210;
+  stored.sample.seq = static_cast<std::uint64_t>(k);
+  stored.sample.Set(Signal::kCv, 50.0 + valve);
+  stored.sample.Set(Signal::kX, std::sin(0.1 * static_cast<double>(k)));
+  return stored;
+}
+
+CsvTable TableOf(const std::string& text, bool split_gaps = false) {
+  CsvOptions options;
+  options.required = 0;
+  options.start_ns = kStart;
+  options.split_gaps = split_gaps;
+  std::istringstream input(text);
+  return ReadCsv(input, options);
+}
+
+template <typename Error, typename Call>
+std::string MessageOf(Call&& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "not thrown";
+}
+
+class RunsTest : public ::testing::Test {
+ protected:
+  /// What a run holds, as its samples' positions.
+  std::vector<std::int64_t> Positions(const std::string& selector) {
+    RunStore store(file_);
+    std::vector<std::int64_t> positions;
+    for (const StoredSample& s : store.Load(selector).samples) {
+      positions.push_back((s.sample.stamp_ns - kStart) / kSecond);
+    }
+    return positions;
+  }
+  std::int64_t Query(const std::string& sql) {
+    Database database(file_, RunsSchema(), Access::kReader);
+    return database.QueryInt64(sql).value_or(-1);
+  }
+
+  TemporaryDirectory directory_;
+  std::filesystem::path file_{directory_.path() / "runs.db"};
+};
+
+TEST_F(RunsTest, RecordedSamplesReadBackInOrderThroughTailAndChunks) {
+  constexpr int kSamples = 137;
+  RunRecorder recorder(file_, {50});
+  const auto a = recorder.Begin(RunOf("V1"));
+  const auto b = recorder.Begin(RunOf("V2"));
+  for (int k = 0; k < kSamples; ++k) {
+    recorder.Append(a, SampleAt(k));
+    recorder.Append(b, SampleAt(k, 1));
+    recorder.Commit();
+
+    // At every moment all that was committed is there, chunk or tail.
+    ASSERT_EQ(Positions(recorder.Id(a)).size(),
+              static_cast<std::size_t>(k + 1));
+  }
+  EXPECT_GT(Query("SELECT count(*) FROM tail"), 0);
+  recorder.Close();
+
+  EXPECT_EQ(Query("SELECT count(*) FROM tail"), 0);
+  EXPECT_EQ(Query("SELECT max(count) FROM chunk"), 50);
+  EXPECT_EQ(Query("SELECT sum(count) FROM chunk"), 2 * kSamples);
+  RunStore store(file_);
+  const StoredRun run = store.Load(recorder.Id(b));
+  ASSERT_THAT(run.samples, SizeIs(kSamples));
+  for (int k = 0; k < kSamples; ++k) {
+    const Sample& s = run.samples[static_cast<std::size_t>(k)].sample;
+    EXPECT_EQ(s.seq, static_cast<std::uint64_t>(k));
+    EXPECT_EQ(s[Signal::kCv], 51.0);
+    EXPECT_EQ(s[Signal::kX], SampleAt(k).sample[Signal::kX]);
+  }
+  EXPECT_EQ(run.info.state, RunState::kComplete);
+}
+
+TEST_F(RunsTest, CountersTellWhatBecameOfTheSamples) {
+  RunRecorder recorder(file_);
+  const auto key = recorder.Begin(RunOf("V1"));
+  for (int i = 0; i < kIntakeCount; ++i) {
+    for (int n = 0; n <= i; ++n) {
+      StoredSample sample = SampleAt(10 * i + n);
+      sample.intake = static_cast<Intake>(i);
+      sample.initialised = i == 0;
+      recorder.Append(key, sample);
+    }
+  }
+  recorder.Close();
+
+  RunStore store(file_);
+  const RunInfo info = store.Info(recorder.Id(key));
+  for (int i = 0; i < kIntakeCount; ++i) {
+    EXPECT_EQ(info.intake[static_cast<std::size_t>(i)], i + 1);
+  }
+  EXPECT_EQ(info.samples, 45);
+  EXPECT_EQ(Query("SELECT rejected FROM run_summary"), 44);
+  EXPECT_EQ(info.signals, MaskOf(Signal::kCv) | MaskOf(Signal::kX));
+  EXPECT_EQ(info.run.source_id, 0xFEDCBA9876543210);
+  EXPECT_FALSE(info.has_truth);
+  const StoredRun run = store.Load(info.id);
+  EXPECT_TRUE(run.samples[0].initialised);
+  EXPECT_EQ(run.samples[1].intake, Intake::kRepeat);
+}
+
+TEST_F(RunsTest, WhatWasCommittedSurvivesARecorderThatDied) {
+  std::string id;
+  {
+    RunRecorder recorder(file_, {50});
+    const auto key = recorder.Begin(RunOf("V1"));
+    id = recorder.Id(key);
+    for (int k = 0; k < 70; ++k) {
+      recorder.Append(key, SampleAt(k));
+      recorder.Commit();
+    }
+    recorder.Append(key, SampleAt(70));  // never committed
+    EXPECT_EQ(recorder.pending(), 1);
+  }
+  EXPECT_THAT(Positions(id), SizeIs(70));
+  EXPECT_EQ(RunStore(file_).Info(id).state, RunState::kInterrupted);
+  EXPECT_GT(Query("SELECT count(*) FROM tail"), 0);
+
+  RunRecorder next(file_);
+  EXPECT_THAT(Positions(id), SizeIs(70));
+  EXPECT_EQ(Query("SELECT count(*) FROM tail"), 0);
+  EXPECT_EQ(Query("SELECT count(*) FROM run WHERE state = 'interrupted'"), 1);
+}
+
+TEST_F(RunsTest, KillingTheRecorderLosesNothingCommitted) {
+  int pipe_ends[2];
+  ASSERT_EQ(pipe(pipe_ends), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    RunRecorder recorder(file_, {50});
+    const auto key = recorder.Begin(RunOf("V1"));
+    for (int k = 0; k < 130; ++k) {
+      recorder.Append(key, SampleAt(k));
+      recorder.Commit();
+    }
+    recorder.Append(key, SampleAt(130));
+    if (write(pipe_ends[1], "x", 1) == 1) {
+      pause();
+    }
+    _exit(1);
+  }
+  char ready = 0;
+  ASSERT_EQ(read(pipe_ends[0], &ready, 1), 1);
+  EXPECT_EQ(RunStore(file_).List().at(0).state, RunState::kRecording);
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  close(pipe_ends[0]);
+  close(pipe_ends[1]);
+
+  const RunInfo info = RunStore(file_).List().at(0);
+  EXPECT_EQ(info.state, RunState::kInterrupted);
+  EXPECT_EQ(info.samples, 130);
+  EXPECT_THAT(Positions(info.id), SizeIs(130));
+}
+
+TEST_F(RunsTest, ALivingRecorderIsLeftAloneByTheNext) {
+  RunRecorder first(file_);
+  const auto key = first.Begin(RunOf("V1"));
+  first.Append(key, SampleAt(0));
+  first.Commit();
+  RunRecorder second(file_);
+
+  EXPECT_EQ(RunStore(file_).Info(first.Id(key)).state, RunState::kRecording);
+  RunStore store(file_, Access::kOccasionalWriter);
+  EXPECT_THAT(MessageOf<DataError>([&] { store.Delete(first.Id(key)); }),
+              HasSubstr("is being recorded"));
+  first.Append(key, SampleAt(1));
+  first.Close();
+  EXPECT_THAT(Positions(first.Id(key)), ElementsAre(0, 1));
+}
+
+TEST_F(RunsTest, PendingSamplesSurviveACommitThatFails) {
+  RunRecorder recorder(file_);
+  const auto key = recorder.Begin(RunOf("V1"));
+  recorder.Append(key, SampleAt(0));
+  recorder.database().Prepare("PRAGMA query_only = ON").Step();
+  EXPECT_THROW(recorder.Commit(), SqliteError);
+  EXPECT_EQ(recorder.pending(), 1);
+
+  recorder.database().Prepare("PRAGMA query_only = OFF").Step();
+  recorder.Append(key, SampleAt(1));
+  recorder.Close();
+  EXPECT_EQ(recorder.recorded(), 2);
+  EXPECT_THAT(Positions(recorder.Id(key)), ElementsAre(0, 1));
+}
+
+TEST_F(RunsTest, AStretchIsHalfOpenAndInSecondsFromTheStart) {
+  RunRecorder recorder(file_, {4});
+  const auto key = recorder.Begin(RunOf("V1"));
+  for (int k = 0; k < 10; ++k) {
+    recorder.Append(key, SampleAt(k));
+  }
+  recorder.Close();
+  const std::string id = recorder.Id(key);
+
+  EXPECT_THAT(Positions(id + "@2:5"), ElementsAre(2, 3, 4));
+  EXPECT_THAT(Positions(id + "@7.5:"), ElementsAre(8, 9));
+  EXPECT_THAT(Positions(id + "@:1"), ElementsAre(0));
+  EXPECT_THAT(Positions(id + "@-1e300:1e300"), SizeIs(10));
+  EXPECT_THROW(Positions(id + "@10:20"), NotFoundError);
+}
+
+TEST_F(RunsTest, SelectorsThatSayNothingAreUsageErrors) {
+  for (const std::string text :
+       {"", "@1:2", "xyz", "abc@", "abc@1", "abc@2:1", "abc@1:1", "abc@x:1",
+        "abc@nan:1", "0123456789abc"}) {
+    EXPECT_THAT(MessageOf<ConfigError>([&] { ParseRunSelector(text); }),
+                HasSubstr("accepted are ID"))
+        << text;
+  }
+  EXPECT_EQ(ParseRunSelector("ABC@1:2").id, "abc");
+}
+
+TEST_F(RunsTest, AUniqueBeginningOfAnIdSelectsTheRun) {
+  RunStore store(file_, Access::kOccasionalWriter);
+  const CsvTable table = TableOf("t_s,CV_pct,X_pct\n0,1,2\n1,1,2\n");
+  // 17 runs: two at least begin alike.
+  std::vector<std::string> ids;
+  for (int i = 0; i < 17; ++i) {
+    ids.push_back(store.Import(table, RunOf("V")).at(0));
+  }
+  std::sort(ids.begin(), ids.end());
+  std::size_t twin = 1;
+  while (ids[twin][0] != ids[twin - 1][0]) {
+    ++twin;
+  }
+
+  EXPECT_EQ(store.Info(ids[3].substr(0, 11)).id, ids[3]);
+  EXPECT_THAT(
+      MessageOf<NotFoundError>([&] { store.Info(ids[twin].substr(0, 1)); }),
+      AllOf(HasSubstr("ambiguous"), HasSubstr(ids[twin - 1])));
+  store.Delete(ids[3]);
+  EXPECT_THAT(MessageOf<NotFoundError>([&] { store.Info(ids[3]); }),
+              HasSubstr("no run " + ids[3]));
+  EXPECT_EQ(Query("SELECT count(*) FROM chunk"), 16);
+}
+
+TEST_F(RunsTest, ImportKeepsTruthAndSplitTablesBecomeRunsOfTheirOwn) {
+  RunStore store(file_, Access::kOccasionalWriter);
+  const std::string text =
+      "t_s,CV_pct,X_pct,fault,fault_strength\n"
+      "0,1,2,f19,0\n1,1,2,f19,0.5\n5,1,2,f19,0.5\n6,1,2,f19,0.75\n";
+  const auto ids = store.Import(TableOf(text, true), RunOf("V"));
+
+  ASSERT_THAT(ids, SizeIs(2));
+  const StoredRun second = store.Load(ids[1]);
+  EXPECT_EQ(second.info.run.origin, RunOrigin::kImported);
+  EXPECT_EQ(second.info.run.start_ns, kStart + 5 * kSecond);
+  EXPECT_TRUE(second.info.has_truth);
+  ASSERT_THAT(second.samples, SizeIs(2));
+  EXPECT_EQ(second.samples[1].truth->fault, 19);
+  EXPECT_EQ(second.samples[1].truth->strength, 0.75);
+  EXPECT_EQ(second.samples[0].sample.source_id, RunOf("V").source_id);
+}
+
+TEST_F(RunsTest, AnImportThatFailsStoresNothing) {
+  RunStore store(file_, Access::kOccasionalWriter);
+  CsvTable table = TableOf("t_s,CV_pct,X_pct\n0,1,2\n1,1,2\n5,1,2\n", true);
+  table.runs[1].period_s = -1.0;  // refused by the schema, after run 1
+
+  EXPECT_THROW(store.Import(table, RunOf("V")), SqliteError);
+  EXPECT_THAT(store.List(), IsEmpty());
+}
+
+TEST_F(RunsTest, LabelsOverrideTheTruthOfTheirStretch) {
+  RunStore store(file_, Access::kOccasionalWriter);
+  const std::string id = store.Import(
+      TableOf("t_s,CV_pct,X_pct\n0,1,2\n1,1,2\n2,1,2\n3,1,2\n"), RunOf("V"))[0];
+  EXPECT_FALSE(store.Load(id).samples[0].truth);
+
+  store.Label(id, 0, 0.0);
+  store.Label(id + "@1:3", 18, -0.5);
+  const StoredRun run = store.Load(id);
+  EXPECT_EQ(run.samples[0].truth->fault, 0);
+  EXPECT_EQ(run.samples[1].truth->fault, 18);
+  EXPECT_EQ(run.samples[2].truth->strength, -0.5);
+  EXPECT_EQ(run.samples[3].truth->fault, 0);
+  Database database(file_, RunsSchema(), Access::kReader);
+  Statement labels = database.Prepare("SELECT labels FROM run_summary");
+  ASSERT_TRUE(labels.Step());
+  EXPECT_EQ(labels.Text(0), "normal, f18 -0.5 @1.0:3.0");
+
+  EXPECT_THROW(store.Label(id, 20, 0.5), ConfigError);
+  EXPECT_THROW(store.Label(id, 1, -1.5), ConfigError);
+  EXPECT_THROW(store.Label(id, 1, 0.0), ConfigError);
+  EXPECT_THROW(store.Label(id, 0, 0.5), ConfigError);
+  EXPECT_THROW(store.Label(id + "@4:9", 1, 0.5), NotFoundError);
+  EXPECT_EQ(store.RemoveLabels(id), 2);
+  EXPECT_FALSE(store.Load(id).samples[0].truth);
+}
+
+TEST_F(RunsTest, ListSelectsByValveOriginAndTime) {
+  {
+    RunStore store(file_, Access::kOccasionalWriter);
+    store.Import(TableOf("t_s,CV_pct,X_pct\n0,1,2\n1,1,2\n"), RunOf("FV-1"));
+    RunRecorder recorder(file_);
+    NewRun late = RunOf("FV-2");
+    late.start_ns += 100 * kSecond;
+    late.seed = ~std::uint64_t{0};
+    recorder.Append(recorder.Begin(late), SampleAt(100));
+    recorder.Close();
+  }
+  RunStore store(file_);
+  RunFilter filter;
+  EXPECT_THAT(store.List(), SizeIs(2));
+  filter.valve_glob = "*-2";
+  EXPECT_EQ(store.List(filter).at(0).run.seed, ~std::uint64_t{0});
+  filter = {};
+  filter.origin = RunOrigin::kImported;
+  EXPECT_EQ(store.List(filter).at(0).run.valve_id, "FV-1");
+  filter = {};
+  filter.since_ns = kStart + kSecond;
+  EXPECT_EQ(store.List(filter).at(0).run.valve_id, "FV-2");
+  filter.until_ns = kStart + 99 * kSecond;
+  EXPECT_THAT(store.List(filter), IsEmpty());
+}
+
+TEST_F(RunsTest, SummaryViewAnswersWithReadableTimes) {
+  RunStore store(file_, Access::kOccasionalWriter);
+  store.Import(TableOf("t_s,CV_pct,X_pct\n0,1,2\n0.5,1,2\n"), RunOf("V"));
+  Database database(file_, RunsSchema(), Access::kReader);
+  Statement row = database.Prepare(
+      "SELECT valve_id, start_utc, end_utc, duration_s, samples, rejected,"
+      " period_s, flow_unit, origin, state, has_truth, stored_bytes"
+      " FROM run_summary");
+  ASSERT_TRUE(row.Step());
+  EXPECT_EQ(row.Text(1), "2023-11-14T22:13:20.000Z");  // date -ud @1700000000
+  EXPECT_EQ(row.Text(2), "2023-11-14T22:13:20.500Z");
+  EXPECT_EQ(row.Double(3), 1.0);
+  EXPECT_EQ(row.Int(4), 2);
+  EXPECT_EQ(row.Text(7), "m3/h");
+  EXPECT_EQ(row.Text(8), "imported");
+  EXPECT_EQ(row.Text(9), "complete");
+  EXPECT_FALSE(row.Bool(10));
+  EXPECT_GT(row.Int(11), 0);
+}
+
+TEST_F(RunsTest, DamagedChunksAreReportedWithTheirPlace) {
+  RunStore store(file_, Access::kOccasionalWriter);
+  const std::string id =
+      store.Import(TableOf("t_s,CV_pct,X_pct\n0,1,2\n1,1,2\n"), RunOf("V"))[0];
+  {
+    Transaction transaction(store.database());
+    store.database().Run("UPDATE chunk SET bytes = zeroblob(length(bytes))");
+    transaction.Commit();
+  }
+  EXPECT_THAT(
+      MessageOf<DataError>([&] { store.Load(id); }),
+      AllOf(HasSubstr(file_.string()), HasSubstr(id), HasSubstr("CRC-32")));
+}
+
+TEST_F(RunsTest, PlantRecordImportsWellWithinASecondAndReadsBackExactly) {
+  const char* reference = std::getenv("FDI_REFERENCE_DATA");
+  if (reference == nullptr) {
+    GTEST_SKIP() << "set FDI_REFERENCE_DATA to the folder of reference data";
+  }
+  const auto csv = std::filesystem::path(reference) / "plant" /
+                   "lublin_actuator3_2001-10-11_first40min.csv";
+  const auto before = std::chrono::steady_clock::now();
+  const CsvTable table = ReadCsvFile(csv);
+  RunStore store(file_, Access::kOccasionalWriter);
+  const std::string id = store.Import(table, RunOf("V"))[0];
+  const std::chrono::duration<double> taken =
+      std::chrono::steady_clock::now() - before;
+
+  const StoredRun run = store.Load(id);
+  std::printf("import of %zu rows: %.1f ms, %.2f bytes/sample\n",
+              run.samples.size(), taken.count() * 1e3,
+              static_cast<double>(run.info.stored_bytes) /
+                  static_cast<double>(run.samples.size()));
+  ASSERT_EQ(run.samples.size(), table.runs.at(0).samples.size());
+  for (std::size_t k = 0; k < run.samples.size(); ++k) {
+    ASSERT_EQ(run.samples[k].sample.values,
+              table.runs[0].samples[k].sample.values);
+  }
+  EXPECT_LT(taken.count(), 0.5);
+  EXPECT_THAT(table.header.ignored_columns, SizeIs(4));
+}
+
+}  // namespace
+}  // namespace fdi::storage
