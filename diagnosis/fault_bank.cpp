@@ -38,17 +38,12 @@ double InstantFactor(const ObserverBank& bank, const Observer& observer,
 }  // namespace
 
 FaultBank::FaultBank(const ModelSet& models)
-    : models_(&models), normal_(models, {}, {}) {
-  const std::size_t channels = models.channels.size();
+    : models_(&models), normal_(models, {}) {
   for (std::size_t i = 0; i < models.faults.size(); ++i) {
-    const auto first = models.interpolation_errors.begin() +
-                       static_cast<std::ptrdiff_t>(i * channels);
-    const std::vector<double> errors(
-        first, first + static_cast<std::ptrdiff_t>(channels));
     for (const bool negative : {false, true}) {
       const auto observers = ObserversOf(models, models.faults[i], negative);
       if (!observers.empty()) {
-        families_.push_back({i, StrengthTracker(models, observers, errors)});
+        families_.push_back({i, StrengthTracker(models, observers)});
       }
     }
   }

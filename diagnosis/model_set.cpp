@@ -54,6 +54,8 @@ void ValidateObserver(const ModelSet& models, const Observer& observer) {
           models, where + "residual deviation must be positive");
     Check(channel.correlation_time >= 1.0, models,
           where + "correlation time must be at least 1 sample");
+    Check(channel.interpolation_error >= 0.0, models,
+          where + "interpolation error must not be negative");
     const Trapezoid& m = channel.membership;
     Check(m.a <= m.b && m.b <= m.c && m.c <= m.d && std::isfinite(m.d - m.a),
           models, where + "corners of the membership are not ascending");
@@ -105,9 +107,6 @@ void Validate(const ModelSet& models) {
         "the first observer must be the normal one");
   Check(std::is_sorted(models.faults.begin(), models.faults.end()), models,
         "faults must be ascending");
-  Check(models.interpolation_errors.size() ==
-            models.faults.size() * models.channels.size(),
-        models, "there must be one interpolation error per fault and channel");
   ValidateDecision(models);
   for (std::size_t i = 0; i < models.observers.size(); ++i) {
     const Observer& observer = models.observers[i];

@@ -37,6 +37,9 @@ struct ChannelObserver {
   Trapezoid membership;          ///< Over r = y − ŷ [unit of the output].
   double residual_sd{1.0};       ///< On validation data [unit], > 0.
   double correlation_time{1.0};  ///< Of the residual [samples], ≥ 1.
+  /// κ: interpolating this observer from its neighbours in strength errs by κ
+  /// times what the interpolation differs from the nearer one [-].
+  double interpolation_error{0.3};
   ValidationFigures validation;
 };
 
@@ -77,9 +80,6 @@ struct ModelSet {
   std::vector<ChannelSpec> channels;
   std::vector<Observer> observers;
   std::vector<int> faults;  ///< Numbers, ascending; index = bit in FaultSet.
-  /// κ, faults × channels, row by row: a prediction between two observers of
-  /// a fault errs by κ times what it differs from the nearer one [-].
-  std::vector<double> interpolation_errors;
   std::vector<std::vector<int>> groups;  ///< Faults it cannot tell apart.
   std::vector<int> undetectable;         ///< Faults that look normal.
   std::vector<std::string> training_runs;

@@ -6,11 +6,16 @@
 namespace fdi {
 namespace {
 
-// A fault may be this much weaker or stronger than those trained.
+// A fault may be this much weaker or stronger than those trained, and this
+// much if there is but one observer to tell what strength does.
 constexpr double kReachBelow = 0.5;
 constexpr double kReachAbove = 1.5;
+constexpr double kLoneReachBelow = 0.75;
+constexpr double kLoneReachAbove = 1.25;
+// Interpolation that errs by more than this is none.
+constexpr double kWorstInterpolation = 0.5;
 // A fault rarely develops faster than to full strength in 10 minutes.
-constexpr double kRateDeviation = 1.0 / 600.0;
+constexpr double kRateDeviation = 1.0 / 1500.0;
 
 double ChannelTime(const ChannelObserver& channel) {
   return std::max(channel.correlation_time, 1.0);
@@ -19,10 +24,8 @@ double ChannelTime(const ChannelObserver& channel) {
 }  // namespace
 
 StrengthTracker::StrengthTracker(const ModelSet& models,
-                                 std::vector<int> observers,
-                                 std::vector<double> interpolation_errors)
+                                 const std::vector<int>& observers)
     : models_(&models),
-      interpolation_errors_(std::move(interpolation_errors)),
       memory_(1.0 - 1.0 / models.decision.evidence_window),
       cell_cost_(kCells, 0.0) {
   nodes_.push_back({0, 0.0});
@@ -30,11 +33,41 @@ StrengthTracker::StrengthTracker(const ModelSet& models,
     const double s = models.observers[static_cast<std::size_t>(index)].strength;
     nodes_.push_back({index, std::abs(s)});
     sign_ = s < 0.0 ? -1.0 : 1.0;
+    segments_.push_back(MakeSegment(nodes_[nodes_.size() - 2], nodes_.back()));
   }
-  if (nodes_.size() > 1) {
-    lowest_ = kReachBelow * nodes_[1].strength;
-    highest_ = std::min(1.0, kReachAbove * nodes_.back().strength);
+  SetReach();
+}
+
+const ChannelObserver& StrengthTracker::Channel(int observer,
+                                                int channel) const {
+  return models_->observers[static_cast<std::size_t>(observer)]
+      .channels[static_cast<std::size_t>(channel)];
+}
+
+StrengthTracker::Segment StrengthTracker::MakeSegment(const Node& low,
+                                                      const Node& high) const {
+  Segment segment{true, {}};
+  for (int c = 0; c < static_cast<int>(models_->channels.size()); ++c) {
+    double error = Channel(high.observer, c).interpolation_error;
+    if (low.observer != 0) {
+      error = std::min(error, Channel(low.observer, c).interpolation_error);
+    }
+    segment.errors.push_back(error);
+    segment.open = segment.open && error <= kWorstInterpolation;
   }
+  return segment;
+}
+
+void StrengthTracker::SetReach() {
+  if (segments_.empty()) {
+    return;
+  }
+  const bool lone = segments_.size() == 1;
+  const double below = lone ? kLoneReachBelow : kReachBelow;
+  const double above = lone ? kLoneReachAbove : kReachAbove;
+  lowest_ = nodes_[1].strength * (segments_.front().open ? below : 1.0);
+  highest_ = std::min(
+      1.0, nodes_.back().strength * (segments_.back().open ? above : 1.0));
 }
 
 void StrengthTracker::Restart() {
@@ -53,38 +86,40 @@ double StrengthTracker::Cell(int index) const {
 StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
                                                 int channel,
                                                 double strength) const {
-  const auto observer = [&](const Node& node) -> const ChannelObserver& {
-    return models_->observers[static_cast<std::size_t>(node.observer)]
-        .channels[static_cast<std::size_t>(channel)];
-  };
-  if (nodes_.size() == 1) {
-    const double sd = observer(nodes_[0]).residual_sd;
+  if (segments_.empty()) {
+    const double sd = Channel(0, channel).residual_sd;
     return {bank.residual(0, channel), 0.0, sd * sd, 0};
   }
-  std::size_t j = 1;
-  while (j + 1 < nodes_.size() && strength > nodes_[j].strength) {
+  std::size_t j = 0;
+  while (j + 1 < segments_.size() && strength >= nodes_[j + 1].strength) {
     ++j;
   }
-  const Node& low = nodes_[j - 1];
-  const Node& high = nodes_[j];
+  const Node& low = nodes_[j];
+  const Node& high = nodes_[j + 1];
+  const bool high_nearer =
+      j == 0 || strength - low.strength > high.strength - strength;
+  const Node& nearest = high_nearer ? high : low;
+  if (!segments_[j].open) {
+    const double sd = Channel(nearest.observer, channel).residual_sd;
+    return {bank.residual(nearest.observer, channel), 0.0, sd * sd,
+            nearest.observer};
+  }
   const double slope = (bank.prediction(high.observer, channel) -
                         bank.prediction(low.observer, channel)) /
                        (high.strength - low.strength);
-  const double step = strength - low.strength;
-  const bool high_nearer =
-      j == 1 || strength - low.strength > high.strength - strength;
-  const Node& nearest = high_nearer ? high : low;
-  const double error =
-      interpolation_errors_[static_cast<std::size_t>(channel)] * slope *
-      (strength - nearest.strength);
-  const double sd = std::max(observer(low).residual_sd * (j == 1 ? 0.0 : 1.0),
-                             observer(high).residual_sd);
-  return {bank.residual(low.observer, channel) - slope * step, slope,
-          sd * sd + error * error, nearest.observer};
+  const double error = segments_[j].errors[static_cast<std::size_t>(channel)] *
+                       slope * (strength - nearest.strength);
+  double sd = Channel(high.observer, channel).residual_sd;
+  if (low.observer != 0) {
+    sd = std::max(sd, Channel(low.observer, channel).residual_sd);
+  }
+  return {
+      bank.residual(low.observer, channel) - slope * (strength - low.strength),
+      slope, sd * sd + error * error, nearest.observer};
 }
 
 void StrengthTracker::Step(const ObserverBank& bank) {
-  if (nodes_.size() > 1 && age_ < kSearchSamples) {
+  if (!segments_.empty() && age_ < kSearchSamples) {
     Search(bank);
   } else {
     Follow(bank);
@@ -141,10 +176,8 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
     const double distance = p.residual * p.residual / spread;
     const double bounded = std::min(distance, kOutlier);
     evidence_ -=
-        0.5 * (bounded + std::log(spread)) /
-        ChannelTime(models_->observers[static_cast<std::size_t>(p.nearest)]
-                        .channels[static_cast<std::size_t>(c)]);
-    if (p.slope == 0.0 || nodes_.size() == 1) {
+        0.5 * (bounded + std::log(spread)) / ChannelTime(Channel(p.nearest, c));
+    if (p.slope == 0.0 || segments_.empty()) {
       continue;
     }
     const double innovation =
@@ -173,9 +206,7 @@ void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
       continue;
     }
     const Prediction p = At(bank, c, strength_);
-    const ChannelObserver& nearest =
-        models_->observers[static_cast<std::size_t>(p.nearest)]
-            .channels[static_cast<std::size_t>(c)];
+    const ChannelObserver& nearest = Channel(p.nearest, c);
     const double shrunk =
         p.residual * nearest.residual_sd / std::sqrt(p.variance);
     factor_ = std::min(factor_, nearest.membership(shrunk));

@@ -14,9 +14,11 @@ namespace fdi {
 ///
 ///     ŷ(s) = ŷ_j + (ŷ_{j+1} − ŷ_j) (s − s_j) / (s_{j+1} − s_j),
 ///
-/// and s is followed with its rate by a Kalman filter of fading memory over all
-/// active channels, so that a developing fault is met at every strength, not
-/// at the trained ones only. The innovations ν of variance S give the evidence
+/// unless the trainer found that interpolation fails there; then the nearer
+/// observer answers. s is followed with its rate by a Kalman filter of fading
+/// memory over all active channels, so that a developing fault is met at every
+/// strength, not at the trained ones only. The innovations ν of variance S give
+/// the evidence
 ///
 ///     L ← λ L − ½ Σ_c (ν²/S + ln S) / τ_c,
 ///
@@ -26,8 +28,7 @@ class StrengthTracker {
  public:
   /// `observers`: indices of one fault and direction by rising |strength|;
   /// empty for normal operation, which has nothing to follow.
-  StrengthTracker(const ModelSet& models, std::vector<int> observers,
-                  std::vector<double> interpolation_errors);
+  StrengthTracker(const ModelSet& models, const std::vector<int>& observers);
 
   /// Begins anew at a detection.
   void Restart();
@@ -47,6 +48,10 @@ class StrengthTracker {
     int observer;
     double strength;  // |s|
   };
+  struct Segment {               // between node j and j + 1
+    bool open;                   // interpolation holds
+    std::vector<double> errors;  // κ per channel
+  };
   struct Prediction {
     double residual;
     double slope;     // dŷ/ds
@@ -54,6 +59,9 @@ class StrengthTracker {
     int nearest;      // observer at the nearer node
   };
 
+  const ChannelObserver& Channel(int observer, int channel) const;
+  Segment MakeSegment(const Node& low, const Node& high) const;
+  void SetReach();
   Prediction At(const ObserverBank& bank, int channel, double strength) const;
   void Search(const ObserverBank& bank);
   void Follow(const ObserverBank& bank);
@@ -65,8 +73,8 @@ class StrengthTracker {
   static constexpr double kOutlier = 25.0;  // bound of ν²/S
 
   const ModelSet* models_;
-  std::vector<Node> nodes_;                   // the normal observer first
-  std::vector<double> interpolation_errors_;  // κ per channel
+  std::vector<Node> nodes_;  // the normal observer first
+  std::vector<Segment> segments_;
   double sign_{1.0};
   double lowest_{0.0};
   double highest_{0.0};

@@ -10,7 +10,7 @@ namespace fdi::trainer {
 namespace {
 
 constexpr double kCoreQuantile = 0.05;
-constexpr double kSupportMargin = 0.5;  // standard deviations
+constexpr double kSupportMargin = 1.0;  // standard deviations
 
 double Mean(std::span<const double> values) {
   double sum = 0.0;

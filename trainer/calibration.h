@@ -14,7 +14,7 @@ ValidationFigures Figures(std::span<const double> residuals,
 
 /// The membership of an observer's residual from residuals under its own
 /// condition: core from the 5 % to the 95 % quantile, stretched to hold zero;
-/// support beyond the extremes by half a standard deviation.
+/// support beyond the extremes by one standard deviation.
 Trapezoid FitMembership(std::span<const double> residuals);
 
 /// τ = 1 + 2 Σ ρ_j up to the first autocorrelation below 0.05 [samples].

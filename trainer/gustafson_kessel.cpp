@@ -65,19 +65,23 @@ MatrixXd Thinned(const MatrixXd& z, Index stride) {
   return z(Eigen::seq(0, Eigen::last, stride), Eigen::all);
 }
 
-// A start: spheres around centers among the points, each drawn with a
-// probability proportional to the squared distance from the nearest before.
-FuzzyPartition DrawStart(const MatrixXd& z, int num_clusters, unsigned seed) {
-  std::mt19937_64 generator(seed);
+// A number in [0, 1) of 53 random bits: the library's distributions are not
+// the same everywhere.
+double Uniform(std::mt19937_64& generator) {
+  return static_cast<double>(generator() >> 11U) * 0x1p-53;
+}
+
+// Spheres around centers among the points, each drawn with a probability
+// proportional to the squared distance from the nearest before.
+FuzzyPartition DrawCenters(const MatrixXd& z, Index num_clusters,
+                           std::mt19937_64& generator) {
   FuzzyPartition start;
   start.centers.resize(num_clusters, z.cols());
   start.covariances.assign(static_cast<std::size_t>(num_clusters),
                            MatrixXd::Identity(z.cols(), z.cols()));
   ArrayXd nearest = ArrayXd::Ones(z.rows());
-  for (Index i = 0; i < start.centers.rows(); ++i) {
-    // 53 random bits; the library's distributions are not the same everywhere.
-    double left =
-        static_cast<double>(generator() >> 11U) * 0x1p-53 * nearest.sum();
+  for (Index i = 0; i < num_clusters; ++i) {
+    double left = Uniform(generator) * nearest.sum();
     Index k = 0;
     while (k + 1 < z.rows() && left >= nearest(k)) {
       left -= nearest(k);
@@ -88,6 +92,17 @@ FuzzyPartition DrawStart(const MatrixXd& z, int num_clusters, unsigned seed) {
         (z.rowwise() - z.row(k)).rowwise().squaredNorm().array();
     nearest = i == 0 ? squared : nearest.min(squared).eval();
   }
+  return start;
+}
+
+// Memberships at random, each row summing to 1.
+FuzzyPartition DrawMemberships(Index rows, Index num_clusters,
+                               std::mt19937_64& generator) {
+  FuzzyPartition start;
+  start.memberships = MatrixXd::NullaryExpr(
+      rows, num_clusters, [&generator] { return Uniform(generator); });
+  const ArrayXd sum = start.memberships.rowwise().sum().array().max(kSmallest);
+  start.memberships.array().colwise() /= sum;
   return start;
 }
 
@@ -103,19 +118,27 @@ class Iteration {
         centered_(z.rows(), z.cols()),
         weights_(z.rows()),
         scratch_(z.rows()),
-        nearest_(z.rows()) {
+        nearest_(z.rows()),
+        centers_(options.num_clusters, z.cols()),
+        covariances_(static_cast<std::size_t>(options.num_clusters),
+                     MatrixXd::Identity(z.cols(), z.cols())) {
     PrepareRegularization();
   }
 
-  // Iterates from the centers and covariances of `start`.
+  // Iterates from the memberships of `start` if they are of these points, else
+  // from its centers and covariances.
   FuzzyPartition Run(const FuzzyPartition& start) {
-    centers_ = start.centers;
-    covariances_ = start.covariances;
-    for (Index i = 0; i < u_.cols(); ++i) {
-      centered_ = z_.rowwise() - centers_.row(i);
-      UpdateDistances(i);
+    if (start.memberships.rows() == z_.rows()) {
+      u_ = start.memberships.array();
+    } else {
+      centers_ = start.centers;
+      covariances_ = start.covariances;
+      for (Index i = 0; i < u_.cols(); ++i) {
+        centered_ = z_.rowwise() - centers_.row(i);
+        UpdateDistances(i);
+      }
+      UpdateMemberships();
     }
-    UpdateMemberships();
     FuzzyPartition result;
     while (result.iterations < options_.max_iterations && !result.converged) {
       for (Index i = 0; i < u_.cols(); ++i) {
@@ -281,8 +304,11 @@ FuzzyPartition BestStart(const MatrixXd& z,
   Iteration iteration(z, options);
   FuzzyPartition best;
   for (int start = 0; start < options.num_starts; ++start) {
-    FuzzyPartition next = iteration.Run(DrawStart(
-        z, options.num_clusters, options.seed + static_cast<unsigned>(start)));
+    std::mt19937_64 generator(options.seed + static_cast<unsigned>(start));
+    const Index c = options.num_clusters;
+    FuzzyPartition next =
+        iteration.Run(start % 2 == 1 ? DrawCenters(z, c, generator)
+                                     : DrawMemberships(z.rows(), c, generator));
     if (start == 0 || Better(next, best)) {
       best = std::move(next);
     }

@@ -11,9 +11,9 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr double kDefaultInterpolationError = 0.3;
 constexpr double kLowestInterpolationError = 0.02;
 constexpr double kHighestInterpolationError = 1.0;
+constexpr double kErrorFloor = 0.3;  // residual deviations
 constexpr double kDetectableShare = 0.05;
 constexpr double kGroupShare = 0.5;
 constexpr int kEvidenceSamples = 60;  // before a factor counts
@@ -37,6 +37,7 @@ std::vector<int> Chain(const ModelSet& models, int fault, bool negative) {
 struct InterpolationSums {
   double error{0.0};
   double move{0.0};
+  double samples{0.0};
 };
 
 // Squares of: neighbours' interpolation less the observer between them, and
@@ -69,12 +70,32 @@ std::vector<InterpolationSums> CompareWithNeighbours(
         const double between = from + w * (to - from);
         const double nearer = w < 0.5 ? from : to;
         const double error = between - bank.prediction(middle, channel);
+        sums[c].samples += 1.0;
         sums[c].error += error * error;
         sums[c].move += (between - nearer) * (between - nearer);
       }
     }
   }
   return sums;
+}
+
+void SetInterpolationErrors(const std::vector<InterpolationSums>& sums,
+                            Observer& observer) {
+  for (std::size_t c = 0; c < sums.size(); ++c) {
+    ChannelObserver& channel = observer.channels[c];
+    const double floor = kErrorFloor * channel.residual_sd;
+    const double excess =
+        std::max(0.0, sums[c].error - floor * floor * sums[c].samples);
+    channel.interpolation_error =
+        std::clamp(sums[c].move > 0.0 ? std::sqrt(excess / sums[c].move) : 0.0,
+                   kLowestInterpolationError, kHighestInterpolationError);
+  }
+}
+
+void TakeOverErrors(const Observer& from, Observer& to) {
+  for (std::size_t c = 0; c < to.channels.size(); ++c) {
+    to.channels[c].interpolation_error = from.channels[c].interpolation_error;
+  }
 }
 
 // Share of samples beyond a threshold, and per fault index with d ≥ T.
@@ -124,29 +145,20 @@ void ScoreStretch(const Stretch& stretch, const ModelSet& models,
 
 void FitInterpolationErrors(const std::vector<Condition>& conditions,
                             ModelSet& models) {
-  const std::size_t channels = models.channels.size();
-  models.interpolation_errors.assign(models.faults.size() * channels,
-                                     kDefaultInterpolationError);
-  for (std::size_t f = 0; f < models.faults.size(); ++f) {
-    std::vector<double> largest(channels, 0.0);
-    bool compared = false;
+  for (const int fault : models.faults) {
     for (const bool negative : {false, true}) {
-      const std::vector<int> chain = Chain(models, models.faults[f], negative);
+      const std::vector<int> chain = Chain(models, fault, negative);
       for (std::size_t n = 1; n + 1 < chain.size(); ++n) {
         const auto sums = CompareWithNeighbours(
             conditions, models, chain[n - 1], chain[n], chain[n + 1]);
-        for (std::size_t c = 0; c < channels; ++c) {
-          if (sums[c].move > 0.0) {
-            largest[c] =
-                std::max(largest[c], std::sqrt(sums[c].error / sums[c].move));
-          }
-        }
-        compared = true;
+        SetInterpolationErrors(
+            sums, models.observers[static_cast<std::size_t>(chain[n])]);
       }
-    }
-    for (std::size_t c = 0; c < channels && compared; ++c) {
-      models.interpolation_errors[f * channels + c] = std::clamp(
-          largest[c], kLowestInterpolationError, kHighestInterpolationError);
+      if (chain.size() > 2) {
+        TakeOverErrors(
+            models.observers[static_cast<std::size_t>(chain[chain.size() - 2])],
+            models.observers[static_cast<std::size_t>(chain.back())]);
+      }
     }
   }
 }

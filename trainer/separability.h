@@ -7,11 +7,12 @@
 
 namespace fdi::trainer {
 
-/// κ per fault and channel (ModelSet::interpolation_errors): for every observer
-/// between two of its fault, the root mean square error of interpolating it
-/// from its neighbours, per what the interpolation moves from the nearer one;
-/// the largest of the fault, within [0.02, 1]. 0.3 where a fault has a single
-/// observer.
+/// Sets ChannelObserver::interpolation_error of every observer between two of
+/// its fault (normal operation counts as strength 0): the root mean square
+/// error of interpolating it from its neighbours, less 0.3 deviations of its
+/// residual, per what the interpolation moves from the nearer one; within
+/// [0.02, 1]. The strongest observer takes over that of its neighbour; one
+/// without any neighbour of its fault keeps 0.3.
 ///
 /// @param conditions parallel to models.observers.
 void FitInterpolationErrors(const std::vector<Condition>& conditions,

@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kTailQuantile = 0.95;
 constexpr double kShrinkage = 50.0;
-constexpr double kLowestShape = -0.25;
+constexpr double kUpperBound = 1.645;  // 95 % of a normal distribution
+constexpr double kLowestShape = -0.1;
 constexpr double kHighestShape = 0.3;
 
 double Quantile(std::vector<double> values, double q) {
@@ -56,7 +57,8 @@ void FitPareto(const std::vector<double>& maxima, TailThreshold& tail) {
   const double raw = difference > 0.0 ? 2.0 - b0 / difference : 0.0;
   tail.shape =
       std::clamp(raw * n / (n + kShrinkage), kLowestShape, kHighestShape);
-  tail.scale = b0 * (1.0 - tail.shape);  // keeps the mean excess σ/(1 − ξ)
+  // σ keeps the mean excess σ/(1 − ξ), at its 95 % upper bound.
+  tail.scale = b0 * (1.0 - tail.shape) * (1.0 + kUpperBound / std::sqrt(n));
 }
 
 }  // namespace
@@ -83,7 +85,7 @@ TailThreshold FitTail(std::span<const double> series, double rate,
                            ? std::log(ratio)
                            : (std::pow(ratio, tail.shape) - 1.0) / tail.shape;
   tail.level = tail.base + tail.scale * std::max(0.0, reach);
-  tail.rate_upper = rate * (1.0 + 1.645 / std::sqrt(n));
+  tail.rate_upper = rate * (1.0 + kUpperBound / std::sqrt(n));
   return tail;
 }
 

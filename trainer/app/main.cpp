@@ -1,0 +1,12 @@
+#include "storage/cli/program.h"
+#include "trainer/app/verbs.h"
+
+int main(int argc, char** argv) {
+  fdi::cli::Program program(
+      "fdi-trainer",
+      "Builds model sets from stored or simulated runs and scores them");
+  fdi::trainer::AddTrainVerb(program);
+  fdi::trainer::AddEvaluateVerb(program);
+  fdi::trainer::AddShowVerb(program);
+  return program.Run(argc, argv);
+}

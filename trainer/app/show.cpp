@@ -1,0 +1,186 @@
+#include <iostream>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+
+#include "storage/cli/program.h"
+#include "storage/cli/text_table.h"
+#include "storage/cli/time_text.h"
+#include "storage/data_directory.h"
+#include "storage/models.h"
+#include "trainer/app/model_report.h"
+#include "trainer/app/rule_text.h"
+#include "trainer/app/verbs.h"
+
+namespace fdi::trainer {
+namespace {
+
+struct ShowOptions {
+  std::string model_set;
+  bool rules{false};
+};
+
+std::string Text(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+std::string DecisionText(const DecisionParameters& d) {
+  return "T " + Text(d.isolation_threshold) + " in " +
+         Text(100.0 * d.isolation_fraction) + " % of t_k " +
+         std::to_string(d.isolation_samples) + ", n_d " +
+         std::to_string(d.detection_samples) + ", t_c " +
+         std::to_string(d.clearing_samples) + ", settling " +
+         std::to_string(d.settling_samples) + " samples; evidence over " +
+         Text(d.evidence_window) + " samples, core " + Text(d.evidence_core) +
+         ", support " + Text(d.evidence_support);
+}
+
+std::string TrainingRunsText(const ModelSet& models) {
+  std::string text = std::to_string(models.training_runs.size()) + ":";
+  for (const std::string& run : models.training_runs) {
+    text += ' ' + run;
+  }
+  return text;
+}
+
+void PrintSummary(std::ostream& out, const ModelSet& models, bool active,
+                  bool utc) {
+  cli::TextTable table({{"model set"}, {models.name + "@" +
+                                        std::to_string(models.version) +
+                                        (active ? " (active)" : "")}});
+  const auto add = [&table](const char* key, const std::string& value) {
+    table.AddRow({key, value});
+  };
+  add("content hash", HashText(models.content_hash));
+  add("created", cli::FormatTime(models.created_ns, utc));
+  add("software", models.software);
+  add("preset", models.preset);
+  add("sample period", Text(models.sample_period_s) + " s");
+  add("flow unit", std::string(FlowUnitName(models.flow_unit)));
+  add("commands", Text(models.trained_cv.minimum) + ".." +
+                      Text(models.trained_cv.maximum) + " %");
+  add("faults", FaultsText(models.faults));
+  add("thresholds", "for " + Text(models.false_alarms_per_hour) +
+                        " false alarms per hour, from " +
+                        Text(models.threshold_hours) + " h without fault");
+  add("decision", DecisionText(models.decision));
+  add("training runs", TrainingRunsText(models));
+  table.Print(out);
+  out << '\n';
+}
+
+void PrintRules(std::ostream& out, const ModelSet& models) {
+  out << "\nRules. (k-1) of the output itself is the model's own prediction.\n";
+  for (const Observer& observer : models.observers) {
+    for (std::size_t c = 0; c < observer.channels.size(); ++c) {
+      out << '\n'
+          << observer.name << ", " << models.channels[c].name << ":\n"
+          << RulesText(observer.channels[c].model, models.flow_unit);
+    }
+  }
+}
+
+cli::Json DecisionJson(const DecisionParameters& d) {
+  return {{"isolation_threshold", d.isolation_threshold},
+          {"detection_samples", d.detection_samples},
+          {"isolation_samples", d.isolation_samples},
+          {"isolation_fraction", d.isolation_fraction},
+          {"clearing_samples", d.clearing_samples},
+          {"settling_samples", d.settling_samples},
+          {"evidence_window", d.evidence_window},
+          {"evidence_core", d.evidence_core},
+          {"evidence_support", d.evidence_support}};
+}
+
+cli::Json RuleJson(const TsRule& rule) {
+  cli::Json sets = cli::Json::array();
+  for (const FuzzySet& set : rule.antecedents) {
+    sets.push_back({{"left_center", set.left_center},
+                    {"right_center", set.right_center},
+                    {"left_width", set.left_width},
+                    {"right_width", set.right_width}});
+  }
+  return {{"antecedents", std::move(sets)},
+          {"slopes", rule.slopes},
+          {"intercept", rule.intercept},
+          {"data_share", rule.data_share}};
+}
+
+void AddRules(const ModelSet& models, cli::Json& json) {
+  for (std::size_t o = 0; o < models.observers.size(); ++o) {
+    for (std::size_t c = 0; c < models.channels.size(); ++c) {
+      const TsModel& model = models.observers[o].channels[c].model;
+      cli::Json& channel = json["observers"][o]["channels"][c];
+      channel["regressor_min"] = model.regressor_min;
+      channel["regressor_max"] = model.regressor_max;
+      channel["rule_list"] = cli::Json::array();
+      for (const TsRule& rule : model.rules) {
+        channel["rule_list"].push_back(RuleJson(rule));
+      }
+    }
+  }
+}
+
+cli::Json SetJson(const ModelSet& models, bool active, bool rules) {
+  cli::Json json = ModelsJson(models);
+  json["active"] = active;
+  json["created_utc"] = cli::FormatTime(models.created_ns, true);
+  json["software"] = models.software;
+  json["preset"] = models.preset;
+  json["sample_period_s"] = models.sample_period_s;
+  json["flow_unit"] = FlowUnitName(models.flow_unit);
+  json["trained_cv"] = {models.trained_cv.minimum, models.trained_cv.maximum};
+  json["threshold_hours"] = models.threshold_hours;
+  json["false_alarms_per_hour"] = models.false_alarms_per_hour;
+  json["decision"] = DecisionJson(models.decision);
+  json["training_runs"] = models.training_runs;
+  json["channels"] = cli::Json::array();
+  for (const ChannelSpec& channel : models.channels) {
+    json["channels"].push_back(
+        {{"name", channel.name},
+         {"output", SignalName(channel.output)},
+         {"unit", UnitOf(channel.output, models.flow_unit)},
+         {"lower_threshold", channel.lower_threshold},
+         {"upper_threshold", channel.upper_threshold}});
+  }
+  if (rules) {
+    AddRules(models, json);
+  }
+  return json;
+}
+
+int Show(const ShowOptions& options, const cli::Context& context) {
+  const storage::DataDirectory directory{context.options.data_dir};
+  storage::ModelStore store(directory.models());
+  const ModelSet models = store.Load(options.model_set);
+  const bool active = store.Summary({models.name, models.version}).active;
+  if (context.options.json) {
+    cli::PrintJson(std::cout, SetJson(models, active, options.rules));
+    return cli::kExitOk;
+  }
+  PrintSummary(std::cout, models, active, context.options.utc);
+  PrintModels(std::cout, models);
+  if (options.rules) {
+    PrintRules(std::cout, models);
+  }
+  return cli::kExitOk;
+}
+
+}  // namespace
+
+void AddShowVerb(cli::Program& program) {
+  auto options = std::make_shared<ShowOptions>();
+  CLI::App& verb = program.AddVerb("show", "Show a model set, and its rules",
+                                   [options](const cli::Context& context) {
+                                     return Show(*options, context);
+                                   });
+  verb.add_option("model-set", options->model_set,
+                  "NAME (its active version) or NAME@VERSION")
+      ->required()
+      ->type_name("NAME[@VERSION]");
+  verb.add_flag("--rules", options->rules, "Print the rules in words");
+}
+
+}  // namespace fdi::trainer

@@ -1,0 +1,14 @@
+#pragma once
+
+namespace fdi::cli {
+class Program;
+}
+
+namespace fdi::trainer {
+
+/// One verb of fdi-trainer each; see docs and `--help`.
+void AddTrainVerb(cli::Program& program);
+void AddEvaluateVerb(cli::Program& program);
+void AddShowVerb(cli::Program& program);
+
+}  // namespace fdi::trainer
