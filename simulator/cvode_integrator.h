@@ -57,6 +57,7 @@ class CvodeIntegrator {
   double time() const;
   /// The state at time(); may be changed before Restart().
   std::span<double> state();
+  std::span<const double> state() const;
   std::int64_t step_count() const;
   std::int64_t derivative_count() const;
   std::int64_t restart_count() const;

@@ -59,7 +59,9 @@ struct LevelLoopExcitation {
   double level_set_point_pct{49.2};
   double steam_demand_t_h{14.89};
   Disturbance steam_noise_t_h{0.72, 0.984};
-  double level_noise_pct{1.05};   ///< White, of the level transmitter.
+  double level_noise_pct{1.05};            ///< White, of the level transmitter.
+  Disturbance pump_noise_kpa{35.0, 0.85};  ///< On P1.
+  double initial_cv_pct{59.9};
   double proportional_gain{5.0};  ///< % of CV per % of level.
   double integral_time_s{120.0};
   double inlet_opening{1.0};   ///< V1, hand valve before, in (0, 1].
@@ -85,8 +87,8 @@ ExcitationConfig DefaultExcitation(std::string_view name);
 /// @throws ConfigError naming field, value and range.
 void Validate(const ExcitationConfig& config);
 
-/// Flow that enters the boiler [m3/h] for the pressures before and behind the
-/// valve [Pa], at its present opening.
+/// Flow through the valve and its bypass [m3/h] for the pressures before and
+/// behind the valve [Pa], at its present opening.
 using FlowOfPressures = std::function<double(double, double)>;
 
 /// Yields the process inputs of sample 0, 1, 2, ...
@@ -98,6 +100,9 @@ class Excitation {
   /// period ahead and the pressures run linearly between samples; a closed
   /// loop's are held.
   virtual bool is_open_loop() const { return true; }
+
+  /// Inputs under which a closed loop starts; its first Next() follows.
+  virtual ProcessInputs Rest() const { return {}; }
 
   /// Hand valve V3 beside the valve, 0..1.
   virtual double bypass_opening() const { return 0.0; }

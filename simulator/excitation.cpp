@@ -1,0 +1,180 @@
+#include "simulator/excitation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "diagnosis/error.h"
+#include "simulator/level_loop.h"
+#include "simulator/random.h"
+#include "simulator/require_range.h"
+
+namespace fdi::simulator {
+namespace {
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+
+ProcessInputs FromRow(const InputRow& row) {
+  return {std::clamp(row.cv_pct, 0.0, 100.0) / 100.0, row.p1_kpa * 1e3,
+          row.p2_kpa * 1e3, row.t1_degc};
+}
+
+class OperatingPoint final : public Excitation {
+ public:
+  OperatingPoint(const OperatingPointExcitation& config, double period_s,
+                 std::uint64_t seed)
+      : config_(config),
+        period_s_(period_s),
+        cv_(config.cv_noise_pct, NormalSource(seed, 11)),
+        p1_(config.p1_noise_kpa, NormalSource(seed, 12)),
+        p2_(config.p2_noise_kpa, NormalSource(seed, 13)) {}
+
+  ProcessInputs Next(const FlowOfPressures&) override {
+    const double t = static_cast<double>(sample_++) * period_s_;
+    const double wave =
+        config_.amplitude_pct * std::sin(kTwoPi * t / config_.period_s);
+    return FromRow({config_.cv_pct + wave + cv_.Next(),
+                    config_.p1_kpa + p1_.Next(), config_.p2_kpa + p2_.Next(),
+                    config_.t1_degc});
+  }
+
+ private:
+  OperatingPointExcitation config_;
+  double period_s_;
+  DisturbanceProcess cv_;
+  DisturbanceProcess p1_;
+  DisturbanceProcess p2_;
+  std::uint64_t sample_{0};
+};
+
+class Sine final : public Excitation {
+ public:
+  Sine(const SineExcitation& config, double period_s)
+      : phase_s_(config.phase_s), period_s_(period_s) {}
+
+  ProcessInputs Next(const FlowOfPressures&) override {
+    const double t = phase_s_ + static_cast<double>(sample_++) * period_s_;
+    return FromRow({50.0 + 25.0 * std::sin(kTwoPi * 0.01 * t),
+                    3500.0 + 175.0 * std::sin(kTwoPi * 0.1 * t),
+                    2600.0 + 26.0 * std::sin(2.0 * t), 43.0});
+  }
+
+ private:
+  double phase_s_;
+  double period_s_;
+  std::uint64_t sample_{0};
+};
+
+class Recorded final : public Excitation {
+ public:
+  explicit Recorded(RecordedExcitation config) : config_(std::move(config)) {}
+
+  // Beyond the last row it is held: the pressures of the last period need one
+  // more.
+  ProcessInputs Next(const FlowOfPressures&) override {
+    const std::size_t last = config_.rows.size() - 1;
+    return FromRow(config_.rows[std::min(row_++, last)]);
+  }
+
+ private:
+  RecordedExcitation config_;
+  std::size_t row_{0};
+};
+
+void RequireDisturbance(const std::string& field,
+                        const Disturbance& disturbance) {
+  RequireRange(field + ".sd", disturbance.sd, 0.0, 1e4);
+  RequireRange(field + ".correlation", disturbance.correlation, 0.0, 0.9999);
+}
+
+void ValidateOne(const OperatingPointExcitation& e) {
+  RequireRange("operating-point.cv_pct", e.cv_pct, 0.0, 100.0);
+  RequireRange("operating-point.p1_kpa", e.p1_kpa, 0.0, 2e4);
+  RequireRange("operating-point.p2_kpa", e.p2_kpa, 0.0, 2e4);
+  RequireRange("operating-point.t1_degc", e.t1_degc, 0.0, 300.0);
+  RequireRange("operating-point.amplitude_pct", e.amplitude_pct, 0.0, 50.0);
+  RequirePositive("operating-point.period_s", e.period_s);
+  RequireDisturbance("operating-point.cv_noise_pct", e.cv_noise_pct);
+  RequireDisturbance("operating-point.p1_noise_kpa", e.p1_noise_kpa);
+  RequireDisturbance("operating-point.p2_noise_kpa", e.p2_noise_kpa);
+}
+
+void ValidateOne(const SineExcitation& e) {
+  RequireRange("sine.phase_s", e.phase_s, 0.0, 1e9);
+}
+
+void ValidateOne(const LevelLoopExcitation& e) {
+  RequireRange("level-loop.level_set_point_pct", e.level_set_point_pct, 10.0,
+               90.0);
+  RequireRange("level-loop.steam_demand_t_h", e.steam_demand_t_h, 1.0, 30.0);
+  RequireDisturbance("level-loop.steam_noise_t_h", e.steam_noise_t_h);
+  RequireDisturbance("level-loop.pump_noise_kpa", e.pump_noise_kpa);
+  RequireRange("level-loop.level_noise_pct", e.level_noise_pct, 0.0, 10.0);
+  RequireRange("level-loop.initial_cv_pct", e.initial_cv_pct, 0.0, 100.0);
+  RequireRange("level-loop.proportional_gain", e.proportional_gain, 0.0, 100.0);
+  RequireRange("level-loop.integral_time_s", e.integral_time_s, 1.0, 1e6);
+  RequireRange("level-loop.inlet_opening", e.inlet_opening, 0.05, 1.0);
+  RequireRange("level-loop.outlet_opening", e.outlet_opening, 0.05, 1.0);
+  RequireRange("level-loop.bypass_opening", e.bypass_opening, 0.0, 1.0);
+}
+
+void ValidateOne(const RecordedExcitation& e) {
+  if (e.rows.empty()) {
+    throw ConfigError("csv excitation: it has no rows, expected at least 1");
+  }
+  for (std::size_t i = 0; i < e.rows.size(); ++i) {
+    const std::string row = "csv row " + std::to_string(i + 1) + ' ';
+    RequireRange(row + "CV [%]", e.rows[i].cv_pct, -10.0, 110.0);
+    RequireRange(row + "P1 [kPa]", e.rows[i].p1_kpa, 0.0, 2e4);
+    RequireRange(row + "P2 [kPa]", e.rows[i].p2_kpa, 0.0, 2e4);
+    RequireRange(row + "T1 [degC]", e.rows[i].t1_degc, 0.0, 300.0);
+  }
+}
+
+constexpr std::string_view kNames[] = {"operating-point", "sine", "level-loop",
+                                       "csv"};
+
+}  // namespace
+
+std::string_view ExcitationName(const ExcitationConfig& config) {
+  return kNames[config.index()];
+}
+
+ExcitationConfig DefaultExcitation(std::string_view name) {
+  for (const ExcitationConfig& config :
+       {ExcitationConfig(OperatingPointExcitation{}),
+        ExcitationConfig(SineExcitation{}),
+        ExcitationConfig(LevelLoopExcitation{}),
+        ExcitationConfig(RecordedExcitation{})}) {
+    if (ExcitationName(config) == name) {
+      return config;
+    }
+  }
+  throw ConfigError("unknown excitation '" + std::string(name) +
+                    "': expected operating-point, sine, level-loop or csv");
+}
+
+void Validate(const ExcitationConfig& config) {
+  std::visit([](const auto& e) { ValidateOne(e); }, config);
+}
+
+std::unique_ptr<Excitation> MakeExcitation(const ExcitationConfig& config,
+                                           double period_s,
+                                           std::uint64_t seed) {
+  Validate(config);
+  RequirePositive("period_s", period_s);
+  if (const auto* e = std::get_if<OperatingPointExcitation>(&config)) {
+    return std::make_unique<OperatingPoint>(*e, period_s, seed);
+  }
+  if (const auto* e = std::get_if<SineExcitation>(&config)) {
+    return std::make_unique<Sine>(*e, period_s);
+  }
+  if (const auto* e = std::get_if<LevelLoopExcitation>(&config)) {
+    return std::make_unique<LevelLoop>(*e, period_s, seed);
+  }
+  return std::make_unique<Recorded>(std::get<RecordedExcitation>(config));
+}
+
+}  // namespace fdi::simulator

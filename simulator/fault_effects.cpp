@@ -1,0 +1,75 @@
+#include "simulator/fault_effects.h"
+
+#include <cmath>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+
+namespace fdi::simulator {
+namespace {
+
+using Effect = void (*)(double s, FaultEffects& e);
+
+void ExtendLeak(double s, FaultEffects& e) {
+  e.air_leak += 0.1 * s * 2e-6;
+}
+
+constexpr Effect kEffects[kFaultCount] = {
+    /* f1 */ [](double s, FaultEffects& e) { e.upper_stop_factor *= 1.0 - s; },
+    /* f2 */
+    [](double s, FaultEffects& e) {
+      e.upper_stop_factor *= 1.0 - 0.2 * s;
+      e.plug_offset += 0.2 * s;
+      e.kv_factor *= 1.0 - 0.2 * s;
+    },
+    /* f3 */
+    [](double s, FaultEffects& e) {
+      e.upper_stop_factor *= 1.0 + 0.1 * s;
+      e.plug_offset -= 0.1 * s;
+      e.kv_factor *= 1.0 + 0.1 * s;
+    },
+    /* f4 */ [](double s, FaultEffects& e) { e.play_offset += s; },
+    /* f5 */ [](double s, FaultEffects& e) { e.external_loss += 0.05 * s; },
+    /* f6 */ [](double s, FaultEffects& e) { e.opening_offset += 0.10 * s; },
+    /* f7 */
+    [](double s, FaultEffects& e) {
+      e.temperature_rise_c += 200.0 + 100.0 * s;
+    },
+    /* f8 */ [](double s, FaultEffects& e) { e.play_slope += 0.5 * s; },
+    /* f9 */ ExtendLeak,
+    /* f10 */
+    [](double s, FaultEffects& e) {
+      ExtendLeak(s, e);
+      e.area_factor *= 1.0 - s;
+    },
+    /* f11 */ [](double s, FaultEffects& e) { e.spring_factor *= 1.0 - s; },
+    /* f12 */ [](double s, FaultEffects& e) { e.transducer_factor *= 1.0 - s; },
+    /* f13 */
+    [](double s, FaultEffects& e) {
+      e.position_reading_factor *= 1.0 + 1.25 * s;
+    },
+    /* f14 */
+    [](double s, FaultEffects& e) { e.chamber_reading_factor *= 1.0 - s; },
+    /* f15 */ [](double s, FaultEffects& e) { e.feedback_play += s; },
+    /* f16 */ [](double s, FaultEffects& e) { e.supply_factor *= 1.0 - s; },
+    /* f17 */
+    [](double s, FaultEffects& e) {
+      (s > 0.0 ? e.outlet_factor : e.inlet_factor) *= 1.0 - std::abs(s);
+    },
+    /* f18 */ [](double s, FaultEffects& e) { e.bypass_opening += s; },
+    /* f19 */
+    [](double s, FaultEffects& e) { e.flow_reading_factor *= 1.0 - s; },
+};
+
+}  // namespace
+
+void ApplyFault(int fault, double strength, FaultEffects& effects) {
+  const bool is_signed = FaultFactsOf(fault).is_signed;
+  Require(strength >= (is_signed ? -1.0 : 0.0) && strength <= 1.0,
+          "fault strength must be in [0, 1], or [-1, 1] for a signed fault");
+  if (strength != 0.0) {
+    kEffects[fault - 1](strength, effects);
+  }
+}
+
+}  // namespace fdi::simulator

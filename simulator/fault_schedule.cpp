@@ -1,0 +1,179 @@
+#include "simulator/fault_schedule.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "simulator/require_range.h"
+
+namespace fdi::simulator {
+namespace {
+
+[[noreturn]] void Refuse(std::string_view text, const std::string& reason) {
+  throw ConfigError("fault '" + std::string(text) + "': " + reason +
+                    "; expected " + std::string(kFaultForms));
+}
+
+double ReadNumber(std::string_view text, std::string_view part,
+                  const char* name) {
+  double value = 0.0;
+  const auto [end, error] =
+      std::from_chars(part.data(), part.data() + part.size(), value);
+  if (error != std::errc{} || end != part.data() + part.size() ||
+      !std::isfinite(value)) {
+    Refuse(text,
+           std::string(name) + " '" + std::string(part) + "' is not a number");
+  }
+  return value;
+}
+
+// Cuts `rest` at the next `separator`; the part before it.
+std::string_view CutAt(std::string_view& rest, char separator) {
+  const std::size_t at = rest.find(separator);
+  const std::string_view part = rest.substr(0, at);
+  rest =
+      at == std::string_view::npos ? std::string_view{} : rest.substr(at + 1);
+  return part;
+}
+
+void ReadTimes(std::string_view text, std::string_view profile,
+               FaultSchedule& schedule) {
+  std::string_view times = profile;
+  const std::string_view kind = CutAt(times, '@');
+  if (kind != "abrupt" && kind != "incipient") {
+    Refuse(text, "profile '" + std::string(kind) +
+                     "' is neither abrupt nor incipient");
+  }
+  if (times.empty()) {
+    Refuse(text, "the start time after '@' is missing");
+  }
+  const bool has_duration = times.find('+') != std::string_view::npos;
+  if (has_duration != (kind == "incipient")) {
+    Refuse(text, kind == "abrupt" ? "an abrupt fault takes no duration"
+                                  : "the duration after '+' is missing");
+  }
+  schedule.start_s = ReadNumber(text, CutAt(times, '+'), "start");
+  if (has_duration) {
+    schedule.development_s = ReadNumber(text, times, "duration");
+    if (!(schedule.development_s > 0.0)) {
+      Refuse(text, "the duration must be above 0");
+    }
+  }
+}
+
+void ReadOption(std::string_view text, std::string_view option,
+                FaultSchedule& schedule) {
+  std::string_view value = option;
+  const std::string_view key = CutAt(value, '=');
+  if (key == "strength") {
+    schedule.final_strength = ReadNumber(text, value, "strength");
+  } else if (key == "from" && schedule.development_s > 0.0) {
+    schedule.initial_strength = ReadNumber(text, value, "from");
+  } else if (key == "until") {
+    schedule.end_s = ReadNumber(text, value, "until");
+  } else if (key == "from") {
+    Refuse(text, "'from' belongs to incipient faults");
+  } else {
+    Refuse(text, "unknown option '" + std::string(key) + "'");
+  }
+}
+
+// The shortest text that reads back as `value`.
+std::string Shortest(double value) {
+  std::array<char, 32> buffer{};
+  const auto [end, error] =
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+  return {buffer.data(), end};
+}
+
+}  // namespace
+
+FaultSchedule ParseFaultSchedule(std::string_view text) {
+  FaultSchedule schedule;
+  std::string_view rest = text;
+  schedule.fault = RequireFault(CutAt(rest, ':'));
+  if (rest.empty()) {
+    Refuse(text, "the profile is missing");
+  }
+  ReadTimes(text, CutAt(rest, ':'), schedule);
+  while (!rest.empty()) {
+    ReadOption(text, CutAt(rest, ':'), schedule);
+  }
+  if (schedule.development_s == 0.0) {
+    schedule.initial_strength = schedule.final_strength;
+  }
+  try {
+    Validate(schedule);
+  } catch (const ConfigError& error) {
+    Refuse(text, error.what());
+  }
+  return schedule;
+}
+
+std::string ToText(const FaultSchedule& schedule) {
+  std::string text = FaultName(schedule.fault);
+  if (schedule.development_s > 0.0) {
+    text += ":incipient@" + Shortest(schedule.start_s) + '+' +
+            Shortest(schedule.development_s) +
+            ":from=" + Shortest(schedule.initial_strength);
+  } else {
+    text += ":abrupt@" + Shortest(schedule.start_s);
+  }
+  text += ":strength=" + Shortest(schedule.final_strength);
+  if (std::isfinite(schedule.end_s)) {
+    text += ":until=" + Shortest(schedule.end_s);
+  }
+  return text;
+}
+
+void Validate(const FaultSchedule& schedule) {
+  constexpr double kForever = 1e10;
+  RequireRange("fault number", schedule.fault, 1, kFaultCount);
+  const double least = FaultFactsOf(schedule.fault).is_signed ? -1.0 : 0.0;
+  const std::string name = FaultName(schedule.fault);
+  RequireRange("start of " + name + " [s]", schedule.start_s, 0.0, kForever);
+  RequireRange("development of " + name + " [s]", schedule.development_s, 0.0,
+               kForever);
+  RequireRange("strength of " + name, schedule.final_strength, least, 1.0);
+  RequireRange("initial strength of " + name, schedule.initial_strength, least,
+               1.0);
+  if (!(schedule.end_s > schedule.start_s)) {
+    throw ConfigError("end of " + name + " is not after its start");
+  }
+}
+
+double StrengthAt(const FaultSchedule& schedule, double time_s) {
+  if (time_s < schedule.start_s || time_s >= schedule.end_s) {
+    return 0.0;
+  }
+  const double elapsed = time_s - schedule.start_s;
+  if (elapsed >= schedule.development_s) {
+    return schedule.final_strength;
+  }
+  return schedule.initial_strength +
+         (schedule.final_strength - schedule.initial_strength) * elapsed /
+             schedule.development_s;
+}
+
+FaultTruth TruthAt(const std::vector<FaultSchedule>& schedules, double time_s) {
+  for (const FaultSchedule& schedule : schedules) {
+    const double strength = StrengthAt(schedule, time_s);
+    if (strength != 0.0) {
+      return {schedule.fault, strength};
+    }
+  }
+  return {};
+}
+
+FaultEffects EffectsAt(const std::vector<FaultSchedule>& schedules,
+                       double time_s) {
+  FaultEffects effects;
+  for (const FaultSchedule& schedule : schedules) {
+    ApplyFault(schedule.fault, StrengthAt(schedule, time_s), effects);
+  }
+  return effects;
+}
+
+}  // namespace fdi::simulator

@@ -1,0 +1,146 @@
+#include "simulator/level_loop.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "simulator/water.h"
+
+namespace fdi::simulator {
+namespace {
+
+constexpr double kKgPerSPerTPerH = 1.0 / 3.6;
+constexpr double kFeedTemperatureC = 100.7;
+constexpr double kDrumPressurePa = 2398.6e3;
+constexpr double kBlowDownKgS = 2.45 * kKgPerSPerTPerH;
+constexpr double kFiringW = 10.25e6;
+constexpr double kFeedEnthalpy = 424e3;      // J/kg.
+constexpr double kWaterEnthalpy = 951e3;     // Saturated at 2.4 MPa.
+constexpr double kSteamEnthalpy = 2802e3;    // Saturated at 2.4 MPa.
+constexpr double kSteamHeat = 2490.0;        // cp of the steam, J/(kg K).
+constexpr double kLevelMassKg = 27.4;        // Per % of level.
+constexpr double kDrumEnergy = 735.0;        // J/Pa.
+constexpr double kSuperheaterHeat = 1.04e6;  // J/K.
+constexpr double kSteamTemperatureC = 398.8;
+constexpr double kSuperheaterShare = 0.178;  // Of the firing.
+constexpr double kFiringGain = 12.0;         // W/Pa.
+constexpr double kFiringIntegralS = 300.0;
+constexpr double kHandValveKv = 250.0;  // V1 and V2, open [m3/h].
+
+// Tsat of water near 2.4 MPa: 221.8 degC there, 0.020 K per kPa.
+double SaturationTemperature(double pressure_pa) {
+  return 221.8 + 0.020e-3 * (pressure_pa - 2.4e6);
+}
+
+double FeedDensity() {
+  return WaterDensity(kFeedTemperatureC);
+}
+
+double TonsPerHour(double flow_m3_h) {
+  return flow_m3_h * FeedDensity() / 1000.0;
+}
+
+// Pressure that a throttled hand valve takes beyond the open one [Pa].
+double HandValveLoss(double flow_m3_h, double opening) {
+  const double open = flow_m3_h / kHandValveKv;
+  return 1e5 * FeedDensity() / 1000.0 * open * open *
+         (1.0 / (opening * opening) - 1.0);
+}
+
+}  // namespace
+
+LevelLoop::LevelLoop(const LevelLoopExcitation& config, double period_s,
+                     std::uint64_t seed)
+    : config_(config),
+      period_s_(period_s),
+      steam_(config.steam_noise_t_h, NormalSource(seed, 21)),
+      pump_(config.pump_noise_kpa, NormalSource(seed, 22)),
+      level_noise_(seed, 23),
+      boiler_{config.level_set_point_pct,
+              kDrumPressurePa,
+              config.steam_demand_t_h * kKgPerSPerTPerH,
+              kSteamTemperatureC,
+              config.steam_demand_t_h * kKgPerSPerTPerH + kBlowDownKgS,
+              kFiringW},
+      integral_pct_(config.initial_cv_pct) {}
+
+ProcessInputs LevelLoop::Rest() const {
+  const double flow = boiler_.feed_flow_kg_s * 3600.0 / FeedDensity();
+  return {config_.initial_cv_pct / 100.0, InletPressure(flow),
+          OutletPressure(flow), kFeedTemperatureC};
+}
+
+double LevelLoop::InletPressure(double flow_m3_h) const {
+  return 3557e3 - 3e3 * (TonsPerHour(flow_m3_h) - 17.3) -
+         HandValveLoss(flow_m3_h, config_.inlet_opening) + pump_offset_pa_;
+}
+
+double LevelLoop::OutletPressure(double flow_m3_h) const {
+  const double flow = TonsPerHour(flow_m3_h);
+  return boiler_.drum_pressure_pa + 178e3 + 0.13e3 * flow * flow +
+         HandValveLoss(flow_m3_h, config_.outlet_opening);
+}
+
+// Euler in steps of at most 0.1 s: the fastest pole lies at a minute.
+void LevelLoop::AdvanceBoiler() {
+  const int steps = static_cast<int>(std::ceil(period_s_ / 0.1));
+  const double h = period_s_ / steps;
+  BoilerState& b = boiler_;
+  for (int i = 0; i < steps; ++i) {
+    const double error = kDrumPressurePa - b.drum_pressure_pa;
+    firing_integral_w_ += kFiringGain * error / kFiringIntegralS * h;
+    b.firing_w = std::clamp(kFiringW + kFiringGain * error + firing_integral_w_,
+                            0.0, 2.0 * kFiringW);
+    const double level_rate =
+        (b.feed_flow_kg_s - b.steam_flow_kg_s - kBlowDownKgS) / kLevelMassKg;
+    const double pressure_rate =
+        (b.firing_w - b.feed_flow_kg_s * (kWaterEnthalpy - kFeedEnthalpy) -
+         b.steam_flow_kg_s * (kSteamEnthalpy - kWaterEnthalpy)) /
+        kDrumEnergy;
+    const double superheat =
+        b.steam_temperature_c - SaturationTemperature(b.drum_pressure_pa);
+    const double temperature_rate =
+        (kSuperheaterShare * b.firing_w -
+         b.steam_flow_kg_s * kSteamHeat * superheat) /
+        kSuperheaterHeat;
+    b.level_pct = std::clamp(b.level_pct + h * level_rate, 0.0, 100.0);
+    b.drum_pressure_pa += h * pressure_rate;
+    b.steam_temperature_c += h * temperature_rate;
+  }
+}
+
+// CV [%] by PI with the integral held at the ends of CV; more CV, less water.
+double LevelLoop::LevelController(double level_pct) {
+  const double error = level_pct - config_.level_set_point_pct;
+  integral_pct_ +=
+      config_.proportional_gain / config_.integral_time_s * error * period_s_;
+  integral_pct_ = std::clamp(integral_pct_, 0.0, 100.0);
+  return std::clamp(integral_pct_ + config_.proportional_gain * error, 0.0,
+                    100.0);
+}
+
+ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {
+  if (started_) {
+    AdvanceBoiler();
+  }
+  started_ = true;
+  boiler_.steam_flow_kg_s =
+      std::max(0.0, config_.steam_demand_t_h + steam_.Next()) * kKgPerSPerTPerH;
+  pump_offset_pa_ = 1e3 * pump_.Next();
+  const double reading =
+      boiler_.level_pct + config_.level_noise_pct * level_noise_();
+  const double cv_pct = LevelController(reading);
+  // The more flows, the less pressure is left to drive it: bisection.
+  double low = 0.0;
+  double high = 1000.0;
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (low + high);
+    const bool more =
+        flow(InletPressure(middle), OutletPressure(middle)) > middle;
+    (more ? low : high) = middle;
+  }
+  boiler_.feed_flow_kg_s = low * FeedDensity() / 3600.0;
+  return {cv_pct / 100.0, InletPressure(low), OutletPressure(low),
+          kFeedTemperatureC};
+}
+
+}  // namespace fdi::simulator

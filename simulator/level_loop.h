@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+
+#include "simulator/excitation.h"
+#include "simulator/random.h"
+
+namespace fdi::simulator {
+
+/// The boiler as the valve sees it.
+struct BoilerState {
+  double level_pct;  ///< Of the drum.
+  double drum_pressure_pa;
+  double steam_flow_kg_s;
+  double steam_temperature_c;  ///< Behind the superheater.
+  double feed_flow_kg_s;
+  double firing_w;
+};
+
+/// Feedwater loop about the Lublin boiler's working point: the valve feeds a
+/// drum whose level a PI controller holds through CV; steam demand disturbs.
+///
+///   27.4 dL/dt   = Wf - Ws - Wb                         (kg/s, L in %)
+///   735  dP/dt   = Q - Wf (hl - hf) - Ws (hg - hl)      (J/Pa)
+///   1.04e6 dT/dt = 0.178 Q - Ws cp (T - Tsat)           (J/K)
+///   Q by PI on P about 10.25 MW; Wb is the blow-down
+///   P1 = 3557 kPa - 3 (F - 17.3) - loss of V1 + pump noise   (F in t/h)
+///   P2 = P + 178 kPa + 0.13 F^2 + loss of V2
+///
+/// F and the two pressures solve each other at every sample. Values fitted to
+/// means, deviations and correlations of the plant record; enthalpies of
+/// saturated water and steam at 2.4 MPa, feed at 100.7 degC.
+class LevelLoop final : public Excitation {
+ public:
+  LevelLoop(const LevelLoopExcitation& config, double period_s,
+            std::uint64_t seed);
+
+  bool is_open_loop() const override { return false; }
+  ProcessInputs Rest() const override;
+  double bypass_opening() const override { return config_.bypass_opening; }
+  ProcessInputs Next(const FlowOfPressures& flow) override;
+
+  const BoilerState& boiler() const { return boiler_; }
+
+ private:
+  void AdvanceBoiler();
+  double LevelController(double level_pct);
+  double InletPressure(double flow_m3_h) const;
+  double OutletPressure(double flow_m3_h) const;
+
+  LevelLoopExcitation config_;
+  double period_s_;
+  DisturbanceProcess steam_;
+  DisturbanceProcess pump_;
+  NormalSource level_noise_;
+  BoilerState boiler_;
+  double pump_offset_pa_{0.0};
+  double firing_integral_w_{0.0};
+  double integral_pct_;
+  bool started_{false};
+};
+
+}  // namespace fdi::simulator

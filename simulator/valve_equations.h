@@ -1,0 +1,61 @@
+#pragma once
+
+#include "simulator/valve_parameters.h"
+
+/// The algebraic equations of the valve, one function each. SI units; X is the
+/// fraction of closing (0 open, 1 closed), pressures are absolute.
+namespace fdi::simulator {
+
+/// f(X) of (12) in [0, 1]; 1 is open.
+double Opening(const TrimParameters& trim, double closing);
+
+/// Recovery coefficient Km(X) of the benchmark's table, 1 (open)..0.4.
+double RecoveryCoefficient(double closing);
+/// Km of the bypass path, 0.45 (open)..1.
+double BypassRecoveryCoefficient(double closing);
+/// Critical pressure ratio rc(P1) of the benchmark's table.
+double CriticalPressureRatio(double inlet_pressure_pa);
+
+/// Pressures of the medium at the trim.
+struct MediumState {
+  double inlet_pressure_pa;   ///< P1m = max(P1, Pv).
+  double outlet_pressure_pa;  ///< P2.
+  double vapour_pressure_pa;  ///< Pv at T1.
+  double density_kg_m3;       ///< rho at T1.
+};
+MediumState MediumAt(double inlet_pressure_pa, double outlet_pressure_pa,
+                     double temperature_c);
+
+/// Pressure drop that drives the flow: P1m - P2, at most
+/// max(0, Km (P1m - rc Pv)) (choking).
+double EffectivePressureDrop(const MediumState& medium, double recovery);
+
+/// (12) F = 100 Kv f sqrt(dP / rho) [m3/h], Kv in m3/h, dP in MPa; negative
+/// for reversed flow. The root is regularised below 1 kPa.
+double Flow(double kv_m3_h, double opening, double pressure_drop_pa,
+            double density_kg_m3);
+
+/// Force of the flow on the plug, towards opening: (P1m - P2) A0 / Km, with the
+/// unlimited drop. The paper prints Km (Pus - Pds) A0; this is the benchmark's.
+double FlowForce(double pressure_drop_pa, double plug_area_m2, double recovery);
+
+/// (15) Absolute pressure in the chamber Pc = (P0 V0 + R T m) / (V0 + A x),
+/// with R T m = charge P0 V0.
+double ChamberPressure(const ActuatorParameters& actuator, double charge,
+                       double position_m);
+
+/// (16) Air flow [kg/s] between two pressures per unit of |if| and Cv:
+/// 4.13e-6 sqrt((Pa1 - Pa2) Pa2) while Pa2 >= Pa1/2, else 2.065e-6 Pa1 (the
+/// printed 2.06e-6 would leave a jump); backwards if Pa1 < Pa2.
+double AirFlow(double from_pa, double to_pa);
+
+/// Static table of the electro-pneumatic transducer, dead zone about 0.
+double TransducerOutput(double signal);
+
+/// The lever between rod and positioner: X = 0.5 + sin(60 deg (a - 0.5)), a the
+/// angle as a fraction of its travel. LeverAngle() is its inverse and is held
+/// at the ends of the travel.
+double LeverPosition(double angle);
+double LeverAngle(double closing);
+
+}  // namespace fdi::simulator
