@@ -4,13 +4,13 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <random>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
 #include "diagnosis/error.h"
+#include "trainer/cluster_starts.h"
 
 namespace fdi::trainer {
 namespace {
@@ -63,47 +63,6 @@ double LogDeterminant(const VectorXd& eigenvalues) {
 // Rows 0, stride, 2 stride, ... of Z.
 MatrixXd Thinned(const MatrixXd& z, Index stride) {
   return z(Eigen::seq(0, Eigen::last, stride), Eigen::all);
-}
-
-// A number in [0, 1) of 53 random bits: the library's distributions are not
-// the same everywhere.
-double Uniform(std::mt19937_64& generator) {
-  return static_cast<double>(generator() >> 11U) * 0x1p-53;
-}
-
-// Spheres around centers among the points, each drawn with a probability
-// proportional to the squared distance from the nearest before.
-FuzzyPartition DrawCenters(const MatrixXd& z, Index num_clusters,
-                           std::mt19937_64& generator) {
-  FuzzyPartition start;
-  start.centers.resize(num_clusters, z.cols());
-  start.covariances.assign(static_cast<std::size_t>(num_clusters),
-                           MatrixXd::Identity(z.cols(), z.cols()));
-  ArrayXd nearest = ArrayXd::Ones(z.rows());
-  for (Index i = 0; i < num_clusters; ++i) {
-    double left = Uniform(generator) * nearest.sum();
-    Index k = 0;
-    while (k + 1 < z.rows() && left >= nearest(k)) {
-      left -= nearest(k);
-      ++k;
-    }
-    start.centers.row(i) = z.row(k);
-    const ArrayXd squared =
-        (z.rowwise() - z.row(k)).rowwise().squaredNorm().array();
-    nearest = i == 0 ? squared : nearest.min(squared).eval();
-  }
-  return start;
-}
-
-// Memberships at random, each row summing to 1.
-FuzzyPartition DrawMemberships(Index rows, Index num_clusters,
-                               std::mt19937_64& generator) {
-  FuzzyPartition start;
-  start.memberships = MatrixXd::NullaryExpr(
-      rows, num_clusters, [&generator] { return Uniform(generator); });
-  const ArrayXd sum = start.memberships.rowwise().sum().array().max(kSmallest);
-  start.memberships.array().colwise() /= sum;
-  return start;
 }
 
 // The alternating minimization over fixed points Z, N×n. All buffers of size N
@@ -304,11 +263,11 @@ FuzzyPartition BestStart(const MatrixXd& z,
   Iteration iteration(z, options);
   FuzzyPartition best;
   for (int start = 0; start < options.num_starts; ++start) {
-    std::mt19937_64 generator(options.seed + static_cast<unsigned>(start));
+    const unsigned seed = options.seed + static_cast<unsigned>(start);
     const Index c = options.num_clusters;
     FuzzyPartition next =
-        iteration.Run(start % 2 == 1 ? DrawCenters(z, c, generator)
-                                     : DrawMemberships(z.rows(), c, generator));
+        iteration.Run(start % 2 == 1 ? DrawCenters(z, c, seed)
+                                     : DrawMemberships(z.rows(), c, seed));
     if (start == 0 || Better(next, best)) {
       best = std::move(next);
     }

@@ -16,8 +16,8 @@ struct GustafsonKesselOptions {
   double covariance_weight{0.0};  ///< γ in [0, 1]: share of F₀ in every Fᵢ.
   double max_condition{1e12};     ///< β ≥ 1, bound on cond(Fᵢ) [-].
   int num_starts{3};              ///< ≥ 1; the start with the lowest J wins.
-  int coarse_points{500};         ///< See below; 0: always all points.
-  unsigned seed{1};               ///< Of the random initial centers.
+  int coarse_points{500};         ///< For choosing a start; 0: all points.
+  unsigned seed{1};               ///< Of the random starts.
 };
 
 /// A fuzzy partition of N points in n dimensions into c clusters.
@@ -43,10 +43,10 @@ struct FuzzyPartition {
 /// eigenvalues below λmax/β are raised to λmax/β [Babuška et al., 2002], so
 /// that collinear data stay solvable.
 ///
-/// A start draws its centers among the points, far ones more likely. Starts
-/// compete on about `coarse_points` of the points, evenly taken from the sorted
-/// ones, and the best is iterated further on all of them: a tenth of the time.
-/// The order of the rows does not matter, since the points are sorted first.
+/// Starts are random partitions and, every second one, spheres about points
+/// far from each other. They compete on about `coarse_points` of the points,
+/// evenly taken from the sorted ones; the best is iterated further on all. The
+/// order of the rows does not matter, since the points are sorted first.
 /// Not converging is a result, not an error: read FuzzyPartition::converged.
 ///
 /// @param points Z, N×n: one sample zₖ per row, every column scaled to
