@@ -60,7 +60,7 @@ struct ValveEntry {
   std::optional<ModelReference> model_set;
 };
 
-/// Whether an observed version should answer from now on.
+/// Whether a version that is stored becomes the active one of its name.
 enum class Activation {
   kIfFirst,  ///< Only if no version of that name is active.
   kAlways,
@@ -88,6 +88,7 @@ class ModelStore {
   /// By name and version.
   std::vector<ModelSummary> List();
   ModelSummary Summary(const ModelReference& reference);
+  /// The version answers from now on; without one, the newest.
   void Activate(const ModelReference& reference);
 
   /// Writes the canonical bytes to a file that does not exist yet.
