@@ -107,8 +107,8 @@ struct Handlers {
   std::function<void(const Message&, const Reception&)> on_ended;
 };
 
-/// Reads one topic. The messages of one valve from one writer come in order;
-/// between valves there is no order. One thread takes; status() and
+/// Reads one topic. The messages of one writer come in the order of writing,
+/// those of different writers as they arrive. One thread takes; status() and
 /// Interrupt() are thread safe.
 template <typename Message>
 class Subscriber {
@@ -120,12 +120,11 @@ class Subscriber {
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;
 
-  /// Waits up to `timeout` for messages, then hands out what is there, at most
-  /// `limit`. What is not taken stays; once too much has stayed the writers
-  /// wait (lossless) or overwrite (live).
+  /// Hands out what has arrived, at most `limit`; if nothing has, waits up to
+  /// `timeout` first. What is not taken waits here, up to 16 MB; from then on
+  /// the writers wait (lossless) or overwrite (live).
   /// @returns how many messages and ends were handed out.
-  /// @throws what a handler throws; the rest of its batch (at most 256) is
-  ///   counted as lost.
+  /// @throws what a handler throws; the next message comes with the next call.
   int Take(const Handlers<Message>& handlers, std::chrono::milliseconds timeout,
            int limit = std::numeric_limits<int>::max());
 

@@ -5,15 +5,12 @@
 #include <set>
 #include <unordered_map>
 
-#include <fastdds/dds/core/LoanableSequence.hpp>
-#include <fastdds/dds/core/condition/GuardCondition.hpp>
-#include <fastdds/dds/core/condition/StatusCondition.hpp>
-#include <fastdds/dds/core/condition/WaitSet.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
+#include "idl/bounded_queue.h"
 #include "idl/checked_type.h"
 #include "idl/codec.h"
 #include "idl/endpoint.h"
@@ -27,8 +24,13 @@ namespace {
 namespace dds = eprosima::fastdds::dds;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kBatch = 256;
 constexpr std::size_t kRefusedLimit = 65536;
+
+// Messages that wait for Take(), so many as fit into 16 MB. They wait here and
+// not in the library, which searches its history at every release.
+constexpr std::size_t QueueCapacity(std::size_t item_bytes) {
+  return std::clamp<std::size_t>((16U << 20U) / item_bytes, 1024, 65536);
+}
 
 struct HandleHash {
   std::size_t operator()(const dds::InstanceHandle_t& handle) const {
@@ -55,13 +57,6 @@ Reception ReceptionOf(const dds::SampleInfo& info) {
           WriterId(info.publication_handle)};
 }
 
-eprosima::fastrtps::Duration_t ToDuration(Clock::duration time) {
-  const auto count = std::max<std::int64_t>(
-      0, std::chrono::duration_cast<std::chrono::nanoseconds>(time).count());
-  return {static_cast<std::int32_t>(count / 1000000000),
-          static_cast<std::uint32_t>(count % 1000000000)};
-}
-
 }  // namespace
 
 template <typename Message>
@@ -74,15 +69,15 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
       : participant_(participant.impl()),
         max_keys_(
             4 * static_cast<std::size_t>(participant.options().max_valves) +
-            1024),
-        values_(kBatch),
-        infos_(kBatch) {
+            1024) {
     dds::Topic* topic =
         participant_.TopicOf(Traits::kTopic, dds::TypeSupport(new Type()));
     type_ = participant_->find_type(topic->get_type_name());
-    subscriber_ =
-        NotNull(participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT),
-                "create_subscriber");
+    // The reader is enabled once reader_ is set: callbacks use it.
+    dds::SubscriberQos subscriber_qos;
+    subscriber_qos.entity_factory().autoenable_created_entities = false;
+    subscriber_ = NotNull(participant_->create_subscriber(subscriber_qos),
+                          "create_subscriber");
     try {
       const dds::DataReaderQos qos =
           MakeQos(profile, participant.options().max_valves);
@@ -96,15 +91,10 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
       participant_->delete_subscriber(subscriber_);
       throw;
     }
-    reader_->get_statuscondition().set_enabled_statuses(
-        dds::StatusMask::data_available());
-    waits_.attach_condition(reader_->get_statuscondition());
-    waits_.attach_condition(interrupt_);
+    Check(reader_->enable(), "enable a reader");
   }
 
   ~Impl() override {
-    waits_.detach_condition(reader_->get_statuscondition());
-    waits_.detach_condition(interrupt_);
     reader_->set_listener(nullptr);
     subscriber_->delete_datareader(reader_);
     participant_->delete_subscriber(subscriber_);
@@ -116,30 +106,16 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
   int Take(const Handlers<Message>& handlers, std::chrono::milliseconds timeout,
            int limit) {
     const auto longest = std::chrono::hours(24);
-    const Clock::time_point deadline =
-        Clock::now() + std::min<std::chrono::milliseconds>(timeout, longest);
-    int handed = TakeRound(handlers, limit);
-    while (handed == 0) {
-      dds::ConditionSeq triggered;
-      const ReturnCode code =
-          waits_.wait(triggered, ToDuration(deadline - Clock::now()));
-      if (code == ReturnCode::RETCODE_TIMEOUT) {
-        break;
-      }
-      Check(code, "wait on a WaitSet");
-      if (interrupt_.get_trigger_value()) {
-        interrupt_.set_trigger_value(false);
-        return TakeRound(handlers, limit);
-      }
-      handed = TakeRound(handlers, limit);
-      if (handed == 0 && Clock::now() >= deadline) {
-        break;
-      }
+    int handed = HandOut(handlers, limit);
+    if (handed == 0) {
+      queue_.Wait(Clock::now() +
+                  std::min<std::chrono::milliseconds>(timeout, longest));
+      handed = HandOut(handlers, limit);
     }
     return handed;
   }
 
-  void Interrupt() { interrupt_.set_trigger_value(true); }
+  void Interrupt() { queue_.Interrupt(); }
 
   bool WaitForWriters(int count, std::chrono::milliseconds timeout) const {
     return matched_.WaitFor(count, timeout);
@@ -167,8 +143,15 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
   }
 
  private:
+  struct Item {
+    Message message;
+    Reception reception;
+    bool ended{false};
+  };
+
   static dds::StatusMask Mask() {
-    return dds::StatusMask::subscription_matched()
+    return dds::StatusMask::data_available()
+           << dds::StatusMask::subscription_matched()
            << dds::StatusMask::requested_incompatible_qos()
            << dds::StatusMask::sample_lost()
            << dds::StatusMask::sample_rejected()
@@ -188,88 +171,80 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
     return qos;
   }
 
-  // Takes from instance after instance, beginning behind the one where the last
-  // round ended, so that no valve starves another; once around at most.
-  int TakeRound(const Handlers<Message>& handlers, int limit) {
+  int HandOut(const Handlers<Message>& handlers, int limit) {
     int handed = 0;
     while (handed < limit) {
-      values_.length(0);
-      infos_.length(0);
-      const ReturnCode code = reader_->take_next_instance(
-          values_, infos_, std::min(kBatch, limit - handed), position_);
-      if (code == ReturnCode::RETCODE_OK) {
-        position_ = infos_[infos_.length() - 1].instance_handle;
-        handed += HandOut(handlers);
-      } else if (code != ReturnCode::RETCODE_NO_DATA) {
-        Check(code, std::string("take from ") + Traits::kTopic);
-      } else if (position_.isDefined()) {
-        position_ = dds::InstanceHandle_t();
-        if (handed > 0) {
-          break;
-        }
-      } else {
+      auto [item, opened] = queue_.Pop();
+      if (opened) {
+        Drain();
+      }
+      if (!item) {
         break;
       }
+      ++handed;
+      if (item->ended) {
+        ended_.fetch_add(1, std::memory_order_relaxed);
+      } else {
+        received_.fetch_add(1, std::memory_order_relaxed);
+      }
+      const auto& handler =
+          item->ended ? handlers.on_ended : handlers.on_message;
+      if (handler) {
+        handler(item->message, item->reception);
+      }
     }
     return handed;
   }
 
-  int HandOut(const Handlers<Message>& handlers) {
-    int handed = 0;
-    const int count = infos_.length();
-    int i = 0;
-    try {
-      for (; i < count; ++i) {
-        if (infos_[i].valid_data) {
-          handed += HandOutMessage(handlers, values_[i], infos_[i]);
-        } else {
-          handed += HandOutEnd(handlers, infos_[i]);
+  // Moves from the library to queue_ while its gate is open. Called by the
+  // thread that receives, which holds locks of the library and so must not
+  // wait, and by the thread that opens the gate: who comes second leaves the
+  // work to the first.
+  void Drain() noexcept {
+    pending_.store(true);
+    while (pending_.load()) {
+      const std::unique_lock lock(drain_mutex_, std::try_to_lock);
+      if (!lock.owns_lock()) {
+        return;
+      }
+      pending_.store(false);
+      dds::SampleInfo info;
+      while (queue_.open() && reader_->take_next_sample(&wire_, &info) ==
+                                  ReturnCode::RETCODE_OK) {
+        try {
+          Accept(info);
+        } catch (const std::exception&) {  // Out of memory.
+          lost_.fetch_add(1, std::memory_order_relaxed);
         }
       }
-    } catch (...) {
-      lost_.fetch_add(static_cast<std::uint64_t>(count - i - 1),
-                      std::memory_order_relaxed);
-      throw;
     }
-    return handed;
   }
 
-  int HandOutMessage(const Handlers<Message>& handlers,
-                     const typename Traits::Wire& wire,
-                     const dds::SampleInfo& info) {
-    if (!Traits::Decode(wire, message_)) {
+  void Accept(const dds::SampleInfo& info) {
+    Item item;
+    item.reception = ReceptionOf(info);
+    item.ended = !info.valid_data;
+    if (item.ended) {
+      // An end carries a hash of the key: keys_ knows what it stands for.
+      const auto found = keys_.find(info.instance_handle);
+      if (found == keys_.end()) {
+        return;
+      }
+      Traits::SetKey(found->second, item.message);
+      keys_.erase(found);
+    } else if (!Traits::Decode(wire_, item.message)) {
       undecodable_.fetch_add(1, std::memory_order_relaxed);
-      return 0;
-    }
-    if (!keys_.contains(info.instance_handle)) {
+      return;
+    } else if (!keys_.contains(info.instance_handle)) {
       if (keys_.size() >= max_keys_) {
         keys_.clear();  // Ids that come and go for ever must not fill memory.
       }
-      keys_.emplace(info.instance_handle, Traits::KeyOf(message_));
+      keys_.emplace(info.instance_handle, Traits::KeyOf(item.message));
     }
-    received_.fetch_add(1, std::memory_order_relaxed);
-    if (handlers.on_message) {
-      handlers.on_message(message_, ReceptionOf(info));
-    }
-    return 1;
+    queue_.Push(std::move(item));
   }
 
-  // An end carries a hash of the key only: keys_ knows what it stands for.
-  int HandOutEnd(const Handlers<Message>& handlers,
-                 const dds::SampleInfo& info) {
-    const auto found = keys_.find(info.instance_handle);
-    if (found == keys_.end()) {
-      return 0;
-    }
-    Message message;
-    Traits::SetKey(found->second, message);
-    keys_.erase(found);
-    ended_.fetch_add(1, std::memory_order_relaxed);
-    if (handlers.on_ended) {
-      handlers.on_ended(message, ReceptionOf(info));
-    }
-    return 1;
-  }
+  void on_data_available(dds::DataReader* /*reader*/) override { Drain(); }
 
   void on_subscription_matched(
       dds::DataReader* /*reader*/,
@@ -317,8 +292,6 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
   dds::TypeSupport type_;
   dds::Subscriber* subscriber_{nullptr};
   dds::DataReader* reader_{nullptr};
-  dds::GuardCondition interrupt_;
-  dds::WaitSet waits_;
   PolicyTexts policies_;
   bool has_lease_{false};
   Matched matched_;
@@ -332,13 +305,12 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
   std::atomic<std::uint64_t> incompatible_{0};
   mutable std::mutex refused_mutex_;
   std::set<dds::InstanceHandle_t> refused_valves_;
-  // Of the thread that takes.
-  dds::LoanableSequence<typename Traits::Wire> values_;
-  dds::SampleInfoSeq infos_;
-  dds::InstanceHandle_t position_;
+  BoundedQueue<Item> queue_{QueueCapacity(sizeof(Item))};
+  std::atomic<bool> pending_{false};
+  std::mutex drain_mutex_;  // Guards wire_ and keys_.
+  typename Traits::Wire wire_;
   std::unordered_map<dds::InstanceHandle_t, typename Traits::Key, HandleHash>
       keys_;
-  Message message_;
 };
 
 template <typename Message>
