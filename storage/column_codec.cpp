@@ -3,58 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
-#include <limits>
 #include <optional>
+
+#include "storage/value_predictor.h"
 
 namespace fdi::storage {
 namespace {
 
 constexpr std::uint8_t kConstant = 0;  // else order + 1
-constexpr std::uint8_t kBits = 0;      // else a predictor:
-constexpr std::uint8_t kGrid = 1;      // a + q·n
-constexpr std::uint8_t kDecimal = 16;  // + d: n / 10^d
-constexpr int kMaxDecimals = 9;
-constexpr double kMaxExact = 9007199254740992.0;  // 2⁵³
-
-constexpr std::array<double, kMaxDecimals + 1> kPowers{1e0, 1e1, 1e2, 1e3, 1e4,
-                                                       1e5, 1e6, 1e7, 1e8, 1e9};
-
-// Differences of the file format wrap around.
-std::int64_t Subtract(std::int64_t a, std::int64_t b) {
-  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) -
-                                   static_cast<std::uint64_t>(b));
-}
-
-std::int64_t Add(std::int64_t a, std::int64_t b) {
-  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) +
-                                   static_cast<std::uint64_t>(b));
-}
-
-std::uint64_t Zigzag(std::int64_t value) {
-  return (static_cast<std::uint64_t>(value) << 1U) ^
-         static_cast<std::uint64_t>(value >> 63);
-}
-
-std::int64_t Unzigzag(std::uint64_t value) {
-  return static_cast<std::int64_t>((value >> 1U) ^ (~(value & 1U) + 1U));
-}
-
-/// Integers in the order of the doubles; −0 is one below +0.
-std::int64_t Ordered(double value) {
-  const auto bits = std::bit_cast<std::int64_t>(value);
-  return bits < 0
-             ? Subtract(std::numeric_limits<std::int64_t>::min(), Add(bits, 1))
-             : bits;
-}
-
-double Unordered(std::int64_t ordered) {
-  return std::bit_cast<double>(
-      ordered < 0
-          ? Subtract(
-                Subtract(std::numeric_limits<std::int64_t>::min(), ordered), 1)
-          : ordered);
-}
+constexpr std::uint8_t kBits = 0;      // else ValuePredictor::kind
 
 /// Residuals of one order; the first `order` values (for order 0 the median)
 /// stand apart as seeds.
@@ -81,16 +38,17 @@ Residuals ResidualsOf(std::span<const std::int64_t> x, int order) {
     std::nth_element(sorted.begin(), middle, sorted.end());
     result.seeds = {*middle};
     for (const std::int64_t value : x) {
-      result.Push(Subtract(value, *middle));
+      result.Push(WrapSubtract(value, *middle));
     }
     return result;
   }
   const auto seeds = static_cast<std::size_t>(order);
   result.seeds.assign(x.begin(), x.begin() + order);
   for (std::size_t i = seeds; i < x.size(); ++i) {
-    const std::int64_t first = Subtract(x[i], x[i - 1]);
-    result.Push(order == 1 ? first
-                           : Subtract(first, Subtract(x[i - 1], x[i - 2])));
+    const std::int64_t first = WrapSubtract(x[i], x[i - 1]);
+    result.Push(order == 1
+                    ? first
+                    : WrapSubtract(first, WrapSubtract(x[i - 1], x[i - 2])));
   }
   return result;
 }
@@ -108,159 +66,14 @@ Residuals BestResiduals(std::span<const std::int64_t> x) {
   return best;
 }
 
-/// p(n) of WriteDoubles().
-struct Predictor {
-  std::uint8_t kind{kGrid};
-  double origin{0.0};
-  double step{1.0};
-
-  double operator()(std::int64_t n) const {
-    const auto x = static_cast<double>(n);
-    return kind == kGrid ? origin + step * x
-                         : x / kPowers[std::size_t{kind} - kDecimal];
+ValuePredictor ReadPredictor(ByteReader& reader, std::uint8_t kind) {
+  if (!ValuePredictor::IsKind(kind)) {
+    reader.Refuse("no column of doubles is of kind " + std::to_string(kind));
   }
-  /// The nearest n, 0 where there is none that is exact.
-  std::int64_t Nearest(double value) const {
-    const double x = kind == kGrid
-                         ? (value - origin) / step
-                         : value * kPowers[std::size_t{kind} - kDecimal];
-    return std::abs(x) < kMaxExact ? std::llround(x) : 0;  // NaN: 0
-  }
-};
-
-/// Shares of misfits up to 1/16 pass: a few bad readings spoil no column.
-bool Fits(const Predictor& predictor, std::span<const double> values,
-          std::int64_t tolerance) {
-  std::size_t misfits = 0;
-  for (const double value : values) {
-    const std::int64_t off =
-        Subtract(Ordered(value), Ordered(predictor(predictor.Nearest(value))));
-    if (off > tolerance || off < -tolerance) {
-      if (++misfits * 16 > values.size()) {
-        return false;
-      }
-    }
-  }
-  return true;
-}
-
-std::uint64_t CorrectionBits(const Predictor& predictor,
-                             std::span<const double> values) {
-  std::uint64_t bits = 0;
-  for (const double value : values) {
-    bits += static_cast<std::uint64_t>(std::bit_width(Zigzag(Subtract(
-        Ordered(value), Ordered(predictor(predictor.Nearest(value)))))));
-  }
-  return bits;
-}
-
-/// Greatest common divisor of two lengths known up to `tolerance`.
-double CommonStep(double a, double b, double tolerance) {
-  while (b > tolerance) {
-    double rest = std::fmod(a, b);
-    if (b - rest < tolerance) {
-      rest = 0.0;
-    }
-    a = b;
-    b = rest;
-  }
-  return a;
-}
-
-/// The step of the grid that the sorted values lie on, 0 if none shows.
-double GridStep(const std::vector<double>& sorted) {
-  const double largest =
-      std::max(std::abs(sorted.front()), std::abs(sorted.back()));
-  const double tolerance = largest * 1e-12;
-  std::vector<double> gaps;
-  for (std::size_t i = 1; i < sorted.size(); ++i) {
-    if (sorted[i] - sorted[i - 1] > tolerance) {
-      gaps.push_back(sorted[i] - sorted[i - 1]);
-    }
-  }
-  if (gaps.empty()) {
-    return 0.0;
-  }
-  std::sort(gaps.begin(), gaps.end());
-  double step = gaps.front();
-  for (std::size_t i = 1; i < std::min<std::size_t>(gaps.size(), 16); ++i) {
-    step = CommonStep(gaps[i], step, tolerance);
-  }
-  return step > 16.0 * tolerance ? step : 0.0;
-}
-
-/// A grid through `origin`, its step such that `far` is met best.
-std::optional<Predictor> BestGrid(std::span<const double> values, double origin,
-                                  double far, double step) {
-  const double count = std::round((far - origin) / step);
-  if (count == 0.0 || !(std::abs(count) < kMaxExact)) {
-    return std::nullopt;
-  }
-  double q = (far - origin) / count;
-  q = std::nextafter(std::nextafter(q, 0.0), 0.0);
-  std::optional<Predictor> best;
-  std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
-  for (int i = 0; i < 5; ++i) {
-    const Predictor candidate{kGrid, origin, q};
-    if (Fits(candidate, values, 64)) {
-      const std::uint64_t bits = CorrectionBits(candidate, values);
-      if (bits < least) {
-        least = bits;
-        best = candidate;
-      }
-    }
-    q = std::nextafter(q, std::numeric_limits<double>::infinity());
-  }
-  return best;
-}
-
-std::optional<Predictor> FindGrid(std::span<const double> values) {
-  std::vector<double> sorted;
-  sorted.reserve(values.size());
-  for (const double value : values) {
-    if (std::isfinite(value) && std::abs(value) < 1e150) {
-      sorted.push_back(value);
-    }
-  }
-  if (sorted.size() < 8 || sorted.size() * 16 < values.size() * 15) {
-    return std::nullopt;
-  }
-  std::sort(sorted.begin(), sorted.end());
-  const double step = GridStep(sorted);
-  if (step == 0.0) {
-    return std::nullopt;
-  }
-  const double low = sorted.front();
-  const double high = sorted.back();
-  const double far = std::abs(low) > std::abs(high) ? low : high;
-  const auto from_zero = BestGrid(values, 0.0, far, step);
-  const auto from_low = BestGrid(values, low, high, step);
-  if (from_zero && from_low) {
-    return CorrectionBits(*from_zero, values) <=
-                   CorrectionBits(*from_low, values)
-               ? from_zero
-               : from_low;
-  }
-  return from_zero ? from_zero : from_low;
-}
-
-std::optional<Predictor> FindPredictor(std::span<const double> values) {
-  for (int d = 0; d <= kMaxDecimals; ++d) {
-    const Predictor decimal{static_cast<std::uint8_t>(kDecimal + d), 0.0, 1.0};
-    if (Fits(decimal, values, 0)) {
-      return decimal;
-    }
-  }
-  return FindGrid(values);
-}
-
-Predictor ReadPredictor(ByteReader& reader, std::uint8_t kind) {
-  Predictor predictor{kind, 0.0, 1.0};
-  if (kind == kGrid) {
+  ValuePredictor predictor{kind, 0.0, 1.0};
+  if (kind == ValuePredictor::kGrid) {
     predictor.origin = reader.GetDouble();
     predictor.step = reader.GetDouble();
-  } else if (kind < kDecimal || kind > kDecimal + kMaxDecimals) {
-    reader.Refuse("no column of doubles is of kind " + std::to_string(kind));
   }
   return predictor;
 }
@@ -321,15 +134,16 @@ std::vector<std::int64_t> ReadIntegers(ByteReader& reader, std::size_t count) {
     if (order == 1) {
       expected = values[i - 1];
     } else if (order == 2) {
-      expected = Add(values[i - 1], Subtract(values[i - 1], values[i - 2]));
+      expected =
+          WrapAdd(values[i - 1], WrapSubtract(values[i - 1], values[i - 2]));
     }
-    values[i] = Add(expected, Unzigzag(codes[i - order]));
+    values[i] = WrapAdd(expected, Unzigzag(codes[i - order]));
   }
   return values;
 }
 
 void WriteDoubles(ByteWriter& writer, std::span<const double> values) {
-  const std::optional<Predictor> predictor = FindPredictor(values);
+  const std::optional<ValuePredictor> predictor = FindPredictor(values);
   std::vector<std::int64_t> numbers(values.size());
   if (!predictor) {
     std::transform(values.begin(), values.end(), numbers.begin(), Ordered);
@@ -340,11 +154,10 @@ void WriteDoubles(ByteWriter& writer, std::span<const double> values) {
   std::vector<std::int64_t> corrections(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
     numbers[i] = predictor->Nearest(values[i]);
-    corrections[i] =
-        Subtract(Ordered(values[i]), Ordered((*predictor)(numbers[i])));
+    corrections[i] = predictor->Correction(values[i]);
   }
   writer.Put(predictor->kind);
-  if (predictor->kind == kGrid) {
+  if (predictor->kind == ValuePredictor::kGrid) {
     writer.Put(predictor->origin);
     writer.Put(predictor->step);
   }
@@ -360,11 +173,12 @@ std::vector<double> ReadDoubles(ByteReader& reader, std::size_t count) {
     std::transform(ordered.begin(), ordered.end(), values.begin(), Unordered);
     return values;
   }
-  const Predictor predictor = ReadPredictor(reader, kind);
+  const ValuePredictor predictor = ReadPredictor(reader, kind);
   const auto numbers = ReadIntegers(reader, count);
   const auto corrections = ReadIntegers(reader, count);
   for (std::size_t i = 0; i < count; ++i) {
-    values[i] = Unordered(Add(Ordered(predictor(numbers[i])), corrections[i]));
+    values[i] =
+        Unordered(WrapAdd(Ordered(predictor(numbers[i])), corrections[i]));
   }
   return values;
 }

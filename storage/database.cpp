@@ -1,7 +1,6 @@
 #include "storage/database.h"
 
 #include <cerrno>
-#include <chrono>
 #include <cstring>
 #include <utility>
 
@@ -15,8 +14,6 @@
 
 namespace fdi::storage {
 namespace {
-
-constexpr std::chrono::milliseconds kPatience{5000};
 
 [[noreturn]] void Refuse(const std::filesystem::path& path,
                          const std::string& reason) {
@@ -51,7 +48,7 @@ std::unique_ptr<SQLite::Database> Connect(const std::filesystem::path& path,
                         : SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
   try {
     return std::make_unique<SQLite::Database>(
-        path.string(), flags, static_cast<int>(kPatience.count()));
+        path.string(), flags, static_cast<int>(kWritePatience.count()));
   } catch (const SQLite::Exception& error) {
     Refuse(path, error.what());
   }
@@ -72,7 +69,7 @@ std::filesystem::path FreeBackupName(const std::filesystem::path& path,
 class GateHolder {
  public:
   GateHolder(WriteGate& gate, const std::filesystem::path& path) : gate_(gate) {
-    if (!gate_.Enter(kPatience)) {
+    if (!gate_.Enter(kWritePatience)) {
       throw SqliteError(SQLITE_BUSY,
                         path.string() + ": another process keeps writing");
     }
@@ -283,47 +280,6 @@ std::vector<std::string> Database::Check() {
                        " has no parent in " + keys.Text(2));
   }
   return findings;
-}
-
-Transaction::Transaction(Database& database) : database_(database) {
-  if (database.gate_ == nullptr) {
-    throw std::logic_error(database.path().string() + " is open read only");
-  }
-  if (!database.gate_->Enter(kPatience)) {
-    throw SqliteError(SQLITE_BUSY, database.path().string() +
-                                       ": another process keeps writing");
-  }
-  try {
-    database.Execute("BEGIN IMMEDIATE");
-  } catch (...) {
-    database.gate_->Leave();
-    throw;
-  }
-}
-
-Transaction::~Transaction() {
-  if (open_) {
-    database_.connection_->tryExec("ROLLBACK");
-    database_.gate_->Leave();
-  }
-}
-
-void Transaction::Commit() {
-  database_.Execute("COMMIT");
-  open_ = false;
-  database_.gate_->Leave();
-}
-
-Snapshot::Snapshot(Database& database) : database_(database) {
-  database.Prepare("BEGIN").Run();
-}
-
-Snapshot::~Snapshot() {
-  try {
-    database_.Prepare("COMMIT").Run();
-  } catch (const std::exception&) {
-    // A read transaction that cannot end ends with its connection.
-  }
 }
 
 }  // namespace fdi::storage

@@ -5,6 +5,9 @@
 
 namespace fdi::storage {
 
+/// How long a connection waits for others that write.
+inline constexpr std::chrono::milliseconds kWritePatience{5000};
+
 /// Lets one connection at a time write or checkpoint a database, across
 /// processes: a lock on `<database>.gate`. (Not on the database itself: to
 /// close a second descriptor of it would drop the locks of SQLite.)
