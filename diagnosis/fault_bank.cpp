@@ -22,14 +22,23 @@ std::vector<int> ObserversOf(const ModelSet& models, int fault, bool negative) {
   return found;
 }
 
+// μ of a residual, less what the extrapolation may have put there.
+double Membership(const ChannelObserver& channel, double residual,
+                  double extrapolation) {
+  const double uncertain =
+      kExtrapolationError * extrapolation / channel.residual_sd;
+  return channel.membership(residual / std::sqrt(1.0 + uncertain * uncertain));
+}
+
 double InstantFactor(const ObserverBank& bank, const Observer& observer,
                      int index) {
   double factor = 1.0;
   for (std::size_t c = 0; c < observer.channels.size(); ++c) {
     const int channel = static_cast<int>(c);
     if (bank.active(channel)) {
-      factor = std::min(factor, observer.channels[c].membership(
-                                    bank.residual(index, channel)));
+      factor = std::min(factor, Membership(observer.channels[c],
+                                           bank.residual(index, channel),
+                                           bank.extrapolation(index, channel)));
     }
   }
   return bank.active_channels() > 0 ? factor : 0.0;

@@ -14,6 +14,10 @@ inline constexpr int kMaxFaults = 64;
 inline constexpr int kMaxObservers = 128;
 inline constexpr int kMaxChannels = 16;
 
+/// A prediction is uncertain by this share of what it extrapolates
+/// (ObserverBank::extrapolation).
+inline constexpr double kExtrapolationError = 0.5;
+
 /// Fit of one channel model on validation data it was not fitted to, run as
 /// the engine runs it.
 struct ValidationFigures {
@@ -39,7 +43,7 @@ struct ChannelObserver {
   double correlation_time{1.0};  ///< Of the residual [samples], ≥ 1.
   /// κ: interpolating this observer from its neighbours in strength errs by κ
   /// times what the interpolation differs from the nearer one [-].
-  double interpolation_error{0.3};
+  double interpolation_error{0.5};
   ValidationFigures validation;
 };
 

@@ -1,6 +1,7 @@
 #include "diagnosis/observer_bank.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace fdi {
 namespace {
@@ -24,6 +25,24 @@ SignalMask ChannelSignals(const ModelSet& models, std::size_t c) {
   return static_cast<SignalMask>(mask);
 }
 
+double Kept(const TsModel& model, const double* x) {
+  return std::clamp(Evaluate(model, x).value, model.output_min,
+                    model.output_max);
+}
+
+// |ŷ(x) − ŷ(x within the trained range)|
+double Extrapolation(const TsModel& model, std::array<double, kMaxRegressors> x,
+                     double prediction) {
+  bool beyond = false;
+  for (std::size_t j = 0; j < model.regressors.size(); ++j) {
+    const double inside =
+        std::clamp(x[j], model.regressor_min[j], model.regressor_max[j]);
+    beyond = beyond || inside != x[j];
+    x[j] = inside;
+  }
+  return beyond ? std::abs(prediction - Kept(model, x.data())) : 0.0;
+}
+
 }  // namespace
 
 ObserverBank::ObserverBank(const ModelSet& models)
@@ -36,7 +55,7 @@ ObserverBank::ObserverBank(const ModelSet& models)
   own_past_.resize(static_cast<std::size_t>(depth_) * slots);
   predictions_.resize(slots);
   residuals_.resize(slots);
-  covered_.resize(slots, 1);
+  extrapolations_.resize(slots);
 }
 
 void ObserverBank::Initialise(const Sample& sample) {
@@ -80,11 +99,9 @@ void ObserverBank::Step(const Sample& sample) {
       for (std::size_t j = 0; j < model.regressors.size(); ++j) {
         x[j] = RegressorValue(model, model.regressors[j], slot);
       }
-      const TsPrediction result = Evaluate(model, x.data());
-      const double kept =
-          std::clamp(result.value, model.output_min, model.output_max);
+      const double kept = Kept(model, x.data());
       predictions_[slot] = kept;
-      covered_[slot] = result.covered ? 1 : 0;
+      extrapolations_[slot] = Extrapolation(model, x, kept);
       residuals_[slot] = sample[model.output] - kept;
       own_past_[Row(0) * predictions_.size() + slot] = kept;
     }

@@ -37,9 +37,10 @@ class ObserverBank {
   double residual(int observer, int channel) const {
     return residuals_[Slot(observer, channel)];
   }
-  /// False where the model had to extrapolate far.
-  bool covered(int observer, int channel) const {
-    return covered_[Slot(observer, channel)] != 0;
+  /// What the prediction owes to regressors beyond their trained range,
+  /// |ŷ(x) − ŷ(x kept within the range)|; 0 where the model is at home.
+  double extrapolation(int observer, int channel) const {
+    return extrapolations_[Slot(observer, channel)];
   }
 
  private:
@@ -62,7 +63,7 @@ class ObserverBank {
   std::vector<double> own_past_;  // ring of depth_ rows of all slots
   std::vector<double> predictions_;
   std::vector<double> residuals_;
-  std::vector<char> covered_;
+  std::vector<double> extrapolations_;
 };
 
 }  // namespace fdi

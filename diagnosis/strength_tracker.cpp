@@ -87,8 +87,7 @@ StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
                                                 int channel,
                                                 double strength) const {
   if (segments_.empty()) {
-    const double sd = Channel(0, channel).residual_sd;
-    return {bank.residual(0, channel), 0.0, sd * sd, 0};
+    return {bank.residual(0, channel), 0.0, Variance(bank, 0, channel), 0};
   }
   std::size_t j = 0;
   while (j + 1 < segments_.size() && strength >= nodes_[j + 1].strength) {
@@ -100,22 +99,35 @@ StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
       j == 0 || strength - low.strength > high.strength - strength;
   const Node& nearest = high_nearer ? high : low;
   if (!segments_[j].open) {
-    const double sd = Channel(nearest.observer, channel).residual_sd;
-    return {bank.residual(nearest.observer, channel), 0.0, sd * sd,
-            nearest.observer};
+    return {bank.residual(nearest.observer, channel), 0.0,
+            Variance(bank, nearest.observer, channel), nearest.observer};
   }
   const double slope = (bank.prediction(high.observer, channel) -
                         bank.prediction(low.observer, channel)) /
                        (high.strength - low.strength);
   const double error = segments_[j].errors[static_cast<std::size_t>(channel)] *
                        slope * (strength - nearest.strength);
-  double sd = Channel(high.observer, channel).residual_sd;
-  if (low.observer != 0) {
-    sd = std::max(sd, Channel(low.observer, channel).residual_sd);
-  }
+  const double high_share = std::clamp(
+      (strength - low.strength) / (high.strength - low.strength), 0.0, 1.0);
+  const double low_share = 1.0 - high_share;
+  const double variance =
+      high_share * high_share * Variance(bank, high.observer, channel) +
+      low_share * low_share * Variance(bank, low.observer, channel) +
+      2.0 * high_share * low_share *
+          Channel(high.observer, channel).residual_sd *
+          Channel(low.observer, channel).residual_sd;
   return {
       bank.residual(low.observer, channel) - slope * (strength - low.strength),
-      slope, sd * sd + error * error, nearest.observer};
+      slope, variance + error * error, nearest.observer};
+}
+
+// Of a residual under its own condition, and of what is extrapolated.
+double StrengthTracker::Variance(const ObserverBank& bank, int observer,
+                                 int channel) const {
+  const double sd = Channel(observer, channel).residual_sd;
+  const double extrapolated =
+      kExtrapolationError * bank.extrapolation(observer, channel);
+  return sd * sd + extrapolated * extrapolated;
 }
 
 void StrengthTracker::Step(const ObserverBank& bank) {

@@ -63,6 +63,7 @@ class StrengthTracker {
   Segment MakeSegment(const Node& low, const Node& high) const;
   void SetReach();
   Prediction At(const ObserverBank& bank, int channel, double strength) const;
+  double Variance(const ObserverBank& bank, int observer, int channel) const;
   void Search(const ObserverBank& bank);
   void Follow(const ObserverBank& bank);
   void UpdateFactor(const ObserverBank& bank);

@@ -212,7 +212,11 @@ bool ValveEngine::Impl::Abnormal() const {
   for (std::size_t c = 0; c < models().channels.size(); ++c) {
     const ChannelSpec& channel = models().channels[c];
     const double r = verdict_.residuals[c];
-    if (r < channel.lower_threshold || r > channel.upper_threshold) {
+    const double uncertain =
+        kExtrapolationError *
+        diagnosis_->bank.extrapolation(0, static_cast<int>(c));
+    if (r < channel.lower_threshold - uncertain ||
+        r > channel.upper_threshold + uncertain) {
       return true;
     }
   }

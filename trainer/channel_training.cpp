@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
@@ -11,6 +12,9 @@
 
 namespace fdi::trainer {
 namespace {
+
+constexpr double kReuseTolerance = 1.02;
+constexpr double kPoolTolerance = 1.1;
 
 double MeanSquare(const std::vector<double>& values) {
   if (values.empty()) {
@@ -36,6 +40,56 @@ std::string Describe(const Condition& condition) {
   }
   return FaultName(condition.fault) + " at strength " +
          std::to_string(condition.strength);
+}
+
+// Every n-th row, so that at most `most` remain.
+RegressionData Thinned(const RegressionData& data, int most) {
+  const Eigen::Index stride =
+      (data.y.size() + most - 1) / std::max<Eigen::Index>(1, most);
+  if (stride <= 1) {
+    return data;
+  }
+  const Eigen::Index rows = (data.y.size() + stride - 1) / stride;
+  RegressionData thinned;
+  thinned.x.resize(rows, data.x.cols());
+  thinned.y.resize(rows);
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    thinned.x.row(row) = data.x.row(row * stride);
+    thinned.y(row) = data.y(row * stride);
+  }
+  return thinned;
+}
+
+RegressionData Joined(const RegressionData& a, const RegressionData& b) {
+  RegressionData joined;
+  joined.x.resize(a.x.rows() + b.x.rows(), a.x.cols());
+  joined.x << a.x, b.x;
+  joined.y.resize(a.y.size() + b.y.size());
+  joined.y << a.y, b.y;
+  return joined;
+}
+
+TsModel FitRows(const ChannelPlan& plan,
+                const std::vector<Regressor>& regressors,
+                const RegressionData& data, const Condition& condition,
+                const FitOptions& options,
+                std::optional<double> past_output = {}) {
+  const auto needed = static_cast<Eigen::Index>(options.rules.min_rules) *
+                      static_cast<Eigen::Index>(regressors.size() + 1);
+  if (data.y.size() < needed) {
+    throw DataError(Describe(condition) + ", channel " + plan.name + ": " +
+                    std::to_string(data.y.size()) + " samples for at least " +
+                    std::to_string(needed) + " parameters");
+  }
+  const auto validation_error = [&](const std::vector<TsRule>& rules) {
+    const TsModel model =
+        MakeModel(rules, data, regressors, plan.output, plan.parallel);
+    return MeanSquare(RunResiduals(model, condition.validation,
+                                   options.settling, past_output));
+  };
+  RuleSelection selection = SelectRules(data, options.rules, validation_error);
+  return MakeModel(std::move(selection.rules), data, regressors, plan.output,
+                   plan.parallel);
 }
 
 }  // namespace
@@ -86,22 +140,38 @@ TsModel FitChannel(const ChannelPlan& plan,
                    const Condition& condition, const FitOptions& options) {
   const RegressionData data =
       BuildRegression(condition.training, regressors, plan.output);
-  const auto needed = static_cast<Eigen::Index>(options.rules.min_rules) *
-                      static_cast<Eigen::Index>(regressors.size() + 1);
-  if (data.y.size() < needed) {
-    throw DataError(Describe(condition) + ", channel " + plan.name + ": " +
-                    std::to_string(data.y.size()) + " samples for at least " +
-                    std::to_string(needed) + " parameters");
-  }
-  const auto validation_error = [&](const std::vector<TsRule>& rules) {
-    const TsModel model =
-        MakeModel(rules, data, regressors, plan.output, plan.parallel);
-    return MeanSquare(
-        RunResiduals(model, condition.validation, options.settling));
+  return FitRows(plan, regressors, Thinned(data, options.max_rows), condition,
+                 options);
+}
+
+TsModel FitFaultChannel(const ChannelPlan& plan, const TsModel& normal_model,
+                        const Condition& normal, const Condition& condition,
+                        const FitOptions& options) {
+  const std::vector<Regressor>& regressors = normal_model.regressors;
+  const RegressionData normal_rows =
+      BuildRegression(normal.training, regressors, plan.output);
+  const RegressionData fault_rows =
+      Thinned(BuildRegression(condition.training, regressors, plan.output),
+              options.max_rows);
+  const double past_output = normal_rows.y.mean();
+  const auto error = [&](const TsModel& model) {
+    return MeanSquare(RunResiduals(model, condition.validation,
+                                   options.settling, past_output));
   };
-  RuleSelection selection = SelectRules(data, options.rules, validation_error);
-  return MakeModel(std::move(selection.rules), data, regressors, plan.output,
-                   plan.parallel);
+  TsModel own =
+      FitRows(plan, regressors, fault_rows, condition, options, past_output);
+  const double own_error = error(own);
+  if (error(normal_model) <= kReuseTolerance * own_error) {
+    return normal_model;
+  }
+  if (RunsOnItself(normal_model)) {
+    return own;
+  }
+  const RegressionData as_many =
+      Thinned(normal_rows, static_cast<int>(fault_rows.y.size()));
+  TsModel pooled = FitRows(plan, regressors, Joined(fault_rows, as_many),
+                           condition, options, past_output);
+  return error(pooled) <= kPoolTolerance * own_error ? pooled : own;
 }
 
 }  // namespace fdi::trainer

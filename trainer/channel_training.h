@@ -25,6 +25,7 @@ struct FitOptions {
   StructureSearchOptions structure;
   int search_rules{2};  ///< Rules of the models that the search compares.
   int settling{30};     ///< Samples left out of every parallel run.
+  int max_rows{6000};   ///< Rows of a fit, evenly taken where there are more.
 };
 
 /// Regressors of a channel, chosen bottom-up by the mean squared residual of
@@ -42,5 +43,17 @@ std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
 TsModel FitChannel(const ChannelPlan& plan,
                    const std::vector<Regressor>& regressors,
                    const Condition& condition, const FitOptions& options);
+
+/// The simplest model that explains a fault condition. A fault leaves many
+/// relations of the valve alone, and what is learnt from more data reaches
+/// further: the normal model itself is taken if its validation error is within
+/// 2 % of that of a model of the condition's own data; else a model of the
+/// condition's and as many normal samples if within 10 %; else the own one.
+/// Parallel models are run from a normal past, as when a fault comes: one that
+/// does not find to the fault from there is of no use. Nor are they fitted to
+/// both data: on its own past such a model may stay normal in a fault.
+TsModel FitFaultChannel(const ChannelPlan& plan, const TsModel& normal_model,
+                        const Condition& normal, const Condition& condition,
+                        const FitOptions& options);
 
 }  // namespace fdi::trainer

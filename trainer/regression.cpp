@@ -16,14 +16,14 @@ int LongestLagOf(const std::vector<Regressor>& regressors) {
   return longest;
 }
 
+}  // namespace
+
 bool RunsOnItself(const TsModel& model) {
   return model.parallel &&
          std::any_of(
              model.regressors.begin(), model.regressors.end(),
              [&](const Regressor& r) { return r.signal == model.output; });
 }
-
-}  // namespace
 
 RegressionData BuildRegression(std::span<const Stretch> stretches,
                                const std::vector<Regressor>& regressors,
@@ -54,7 +54,8 @@ RegressionData BuildRegression(std::span<const Stretch> stretches,
 }
 
 std::vector<double> RunResiduals(const TsModel& model, const Stretch& stretch,
-                                 int settling) {
+                                 int settling,
+                                 std::optional<double> past_output) {
   const int left_out = RunsOnItself(model) ? settling : LongestLag(model);
   std::vector<double> predictions(stretch.samples.size());
   std::vector<double> residuals;
@@ -65,7 +66,8 @@ std::vector<double> RunResiduals(const TsModel& model, const Stretch& stretch,
       const auto lag = static_cast<std::size_t>(regressor.lag);
       const bool own = model.parallel && regressor.signal == model.output;
       if (k < lag) {
-        x[j] = stretch.samples.front()[regressor.signal];
+        const double measured = stretch.samples.front()[regressor.signal];
+        x[j] = own ? past_output.value_or(measured) : measured;
       } else {
         x[j] = own ? predictions[k - lag]
                    : stretch.samples[k - lag][regressor.signal];
@@ -82,10 +84,12 @@ std::vector<double> RunResiduals(const TsModel& model, const Stretch& stretch,
 
 std::vector<double> RunResiduals(const TsModel& model,
                                  std::span<const Stretch> stretches,
-                                 int settling) {
+                                 int settling,
+                                 std::optional<double> past_output) {
   std::vector<double> all;
   for (const Stretch& stretch : stretches) {
-    const std::vector<double> one = RunResiduals(model, stretch, settling);
+    const std::vector<double> one =
+        RunResiduals(model, stretch, settling, past_output);
     all.insert(all.end(), one.begin(), one.end());
   }
   return all;

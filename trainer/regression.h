@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,13 +23,22 @@ RegressionData BuildRegression(std::span<const Stretch> stretches,
 /// the first sample at rest, parallel models on their own predictions, limits
 /// kept. Left out are the first `settling` residuals of a model that runs on
 /// its own predictions, of others those that lack a lag.
+///
+/// @param past_output What a parallel model believes of its own past at the
+///   start, such as normal operation before a fault came; by default the first
+///   measured output.
 std::vector<double> RunResiduals(const TsModel& model, const Stretch& stretch,
-                                 int settling);
+                                 int settling,
+                                 std::optional<double> past_output = {});
 
 /// RunResiduals() of all stretches, one after another.
 std::vector<double> RunResiduals(const TsModel& model,
                                  std::span<const Stretch> stretches,
-                                 int settling);
+                                 int settling,
+                                 std::optional<double> past_output = {});
+
+/// True if the model is parallel and has its own output among its regressors.
+bool RunsOnItself(const TsModel& model);
 
 /// A model around `rules` with the ranges of `data` and an output that may
 /// leave the trained range by half of it.

@@ -12,7 +12,7 @@ namespace fdi::trainer {
 /// error of interpolating it from its neighbours, less 0.3 deviations of its
 /// residual, per what the interpolation moves from the nearer one; within
 /// [0.02, 1]. The strongest observer takes over that of its neighbour; one
-/// without any neighbour of its fault keeps 0.3.
+/// without any neighbour of its fault keeps 0.5.
 ///
 /// @param conditions parallel to models.observers.
 void FitInterpolationErrors(const std::vector<Condition>& conditions,

@@ -221,15 +221,23 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
     regressors[i] =
         ChooseRegressors(options.channels[i], conditions.front(), options.fit);
   });
-  const int fits = static_cast<int>(conditions.size()) * channels;
+  Observer& normal = models.observers.front();
+  ParallelFor(channels, options.threads, [&](int c) {
+    const auto i = static_cast<std::size_t>(c);
+    normal.channels[i] =
+        Calibrate(FitChannel(options.channels[i], regressors[i],
+                             conditions.front(), options.fit),
+                  conditions.front(), options.fit.settling);
+  });
+  const int fits = static_cast<int>(conditions.size() - 1) * channels;
   std::atomic<int> done{0};
   ParallelFor(fits, options.threads, [&](int i) {
-    const auto o = static_cast<std::size_t>(i / channels);
+    const auto o = static_cast<std::size_t>(1 + i / channels);
     const auto c = static_cast<std::size_t>(i % channels);
-    models.observers[o].channels[c] =
-        Calibrate(FitChannel(options.channels[c], regressors[c], conditions[o],
-                             options.fit),
-                  conditions[o], options.fit.settling);
+    models.observers[o].channels[c] = Calibrate(
+        FitFaultChannel(options.channels[c], normal.channels[c].model,
+                        conditions.front(), conditions[o], options.fit),
+        conditions[o], options.fit.settling);
     reporter.Tell(kStructureShare + kObserverShare * ++done / fits,
                   "fitting " + models.observers[o].name);
   });

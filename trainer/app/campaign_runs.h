@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "storage/data_directory.h"
+#include "trainer/app/campaign.h"
+#include "trainer/dataset.h"
+
+namespace fdi::trainer {
+
+/// The user asked to stop.
+class Interrupted : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct CollectOptions {
+  std::string software;      ///< Stored with new runs.
+  std::int64_t start_ns{0};  ///< Of runs whose scenario does not say it.
+  int threads{0};            ///< 0: all of the machine.
+};
+
+struct CollectedRuns {
+  std::vector<TrainingRun> runs;  ///< In the order of the campaign.
+  int simulated{0};               ///< New in runs.db.
+  int imported{0};                ///< New in runs.db.
+  int reused{0};  ///< Simulated or imported before, by the same software.
+};
+
+/// Told how far the work is: share in [0, 1], what is done. It may throw to
+/// stop it. Called from one thread at a time.
+using CollectProgress = std::function<void(double, const std::string&)>;
+
+/// Brings together the runs of a campaign: loads those that runs.db has,
+/// imports files and simulates the others on all cores. Every new run is stored
+/// in one transaction when it is complete.
+///
+/// @throws NotFoundError, DataError, ConfigError naming run or file; nothing
+///   is simulated before all files and recorded runs were found.
+CollectedRuns CollectRuns(const Campaign& campaign,
+                          const storage::DataDirectory& directory,
+                          const CollectOptions& options,
+                          const CollectProgress& progress = {});
+
+}  // namespace fdi::trainer
