@@ -260,14 +260,14 @@ double ControlValve::FlowM3PerHour(const ProcessInputs& inputs,
   const MediumState medium =
       MediumAt(effective.inlet_pressure_pa, effective.outlet_pressure_pa,
                effective.temperature_c);
-  const double rod = dynamics.Rod(impl_->x()[kActuatorState]);
-  const double opening =
-      Opening(trim, rod + effects.plug_offset) + effects.opening_offset;
+  const double plug =
+      dynamics.Rod(impl_->x()[kActuatorState]) + effects.plug_offset;
+  const double opening = Opening(trim, plug) + effects.opening_offset;
   const double bypass =
       std::clamp(bypass_opening + effects.bypass_opening, 0.0, 1.0);
   const double through_trim =
       Flow(trim.kv_m3_h * effects.kv_factor, opening,
-           EffectivePressureDrop(medium, RecoveryCoefficient(rod)),
+           EffectivePressureDrop(medium, RecoveryCoefficient(plug)),
            medium.density_kg_m3);
   const double through_bypass = Flow(
       trim.bypass_kv_m3_h, bypass,

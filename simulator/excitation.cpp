@@ -111,7 +111,7 @@ void ValidateOne(const LevelLoopExcitation& e) {
   RequireRange("level-loop.steam_demand_t_h", e.steam_demand_t_h, 1.0, 30.0);
   RequireDisturbance("level-loop.steam_noise_t_h", e.steam_noise_t_h);
   RequireDisturbance("level-loop.pump_noise_kpa", e.pump_noise_kpa);
-  RequireRange("level-loop.level_noise_pct", e.level_noise_pct, 0.0, 10.0);
+  RequireDisturbance("level-loop.level_noise_pct", e.level_noise_pct);
   RequireRange("level-loop.initial_cv_pct", e.initial_cv_pct, 0.0, 100.0);
   RequireRange("level-loop.proportional_gain", e.proportional_gain, 0.0, 100.0);
   RequireRange("level-loop.integral_time_s", e.integral_time_s, 1.0, 1e6);

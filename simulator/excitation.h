@@ -59,8 +59,8 @@ struct LevelLoopExcitation {
   double level_set_point_pct{49.2};
   double steam_demand_t_h{14.89};
   Disturbance steam_noise_t_h{0.72, 0.984};
-  double level_noise_pct{1.05};            ///< White, of the level transmitter.
-  Disturbance pump_noise_kpa{35.0, 0.85};  ///< On P1.
+  Disturbance level_noise_pct{1.05, 0.35};  ///< Of the level transmitter.
+  Disturbance pump_noise_kpa{35.0, 0.85};   ///< On P1.
   double initial_cv_pct{59.9};
   double proportional_gain{5.0};  ///< % of CV per % of level.
   double integral_time_s{120.0};
@@ -97,8 +97,8 @@ class Excitation {
   virtual ~Excitation() = default;
 
   /// True if the inputs do not depend on the valve. They are then known one
-  /// period ahead and the pressures run linearly between samples; a closed
-  /// loop's are held.
+  /// period ahead, and the pressures run linearly from sample to sample. A
+  /// closed loop's pressures, found at a sample, are reached one period later.
   virtual bool is_open_loop() const { return true; }
 
   /// Inputs under which a closed loop starts; its first Next() follows.

@@ -22,7 +22,7 @@ constexpr double kDrumEnergy = 735.0;        // J/Pa.
 constexpr double kSuperheaterHeat = 1.04e6;  // J/K.
 constexpr double kSteamTemperatureC = 398.8;
 constexpr double kSuperheaterShare = 0.178;  // Of the firing.
-constexpr double kFiringGain = 12.0;         // W/Pa.
+constexpr double kFiringGain = 60.0;         // W/Pa.
 constexpr double kFiringIntegralS = 300.0;
 constexpr double kHandValveKv = 250.0;  // V1 and V2, open [m3/h].
 
@@ -54,7 +54,7 @@ LevelLoop::LevelLoop(const LevelLoopExcitation& config, double period_s,
       period_s_(period_s),
       steam_(config.steam_noise_t_h, NormalSource(seed, 21)),
       pump_(config.pump_noise_kpa, NormalSource(seed, 22)),
-      level_noise_(seed, 23),
+      level_noise_(config.level_noise_pct, NormalSource(seed, 23)),
       boiler_{config.level_set_point_pct,
               kDrumPressurePa,
               config.steam_demand_t_h * kKgPerSPerTPerH,
@@ -126,8 +126,7 @@ ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {
   boiler_.steam_flow_kg_s =
       std::max(0.0, config_.steam_demand_t_h + steam_.Next()) * kKgPerSPerTPerH;
   pump_offset_pa_ = 1e3 * pump_.Next();
-  const double reading =
-      boiler_.level_pct + config_.level_noise_pct * level_noise_();
+  const double reading = boiler_.level_pct + level_noise_.Next();
   const double cv_pct = LevelController(reading);
   // The more flows, the less pressure is left to drive it: bisection.
   double low = 0.0;

@@ -52,7 +52,7 @@ class LevelLoop final : public Excitation {
   double period_s_;
   DisturbanceProcess steam_;
   DisturbanceProcess pump_;
-  NormalSource level_noise_;
+  DisturbanceProcess level_noise_;
   BoilerState boiler_;
   double pump_offset_pa_{0.0};
   double firing_integral_w_{0.0};

@@ -103,7 +103,7 @@ double ValveDynamics::OpeningForce(double t, double z) const {
                         (z * a.stroke_m + a.spring_preload_m);
   return spring +
          FlowForce(inlet - outlet, a.plug_area_m2,
-                   RecoveryCoefficient(Rod(z))) -
+                   RecoveryCoefficient(Rod(z) + effects_.plug_offset)) -
          a.moving_mass_kg * kGravity;
 }
 

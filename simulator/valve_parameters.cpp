@@ -20,10 +20,11 @@ ValveParameters LublinActuator3() {
 ValveParameters LublinActuator3Refit() {
   ValveParameters valve;
   valve.name = "lublin-actuator-3-refit";
-  valve.positioner.filling_cv = 2.0e-3;
-  valve.positioner.venting_cv = 1.24e-3;
-  valve.trim.kv_m3_h = 72.7;
-  valve.trim.exponent = 4.13;
+  valve.positioner.filling_cv = 2.5e-3;
+  valve.positioner.venting_cv = 1.45e-3;
+  valve.positioner.filter_time_s = 0.25;
+  valve.trim.kv_m3_h = 70.0;
+  valve.trim.exponent = 4.07;
   return valve;
 }
 

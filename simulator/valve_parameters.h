@@ -85,8 +85,9 @@ struct ValveParameters {
 /// The shipped sets:
 /// - lublin-actuator-3: data sheet and benchmark values of actuator 3 of the
 ///   Lublin sugar factory (feedwater of the 4th boiler), flow in t/h.
-/// - lublin-actuator-3-refit: five values of it (air relay Cv filling and
-///   venting, no dead zone, Kv, exponent) refitted to the plant record.
+/// - lublin-actuator-3-refit: the same refitted to 40 minutes of the plant's
+///   record: Cv of (16) filling and venting (without the dead zone's table),
+///   filter time, Kv and exponent; all else as above.
 /// - paper-operating-point: linear trim in m3/h that gives the flow, position
 ///   and noise floor of [Mendonca et al., 2009], tables 3 and 4.
 std::vector<std::string> ParameterSetNames();

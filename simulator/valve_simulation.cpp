@@ -62,7 +62,8 @@ class ValveSimulation::Impl {
   NormalSource noise_;
   NormalSource positioner_noise_;
   ControlValve valve_;
-  ProcessInputs inputs_;
+  ProcessInputs inputs_;   // Of the last sample.
+  ProcessInputs reached_;  // Pressures up to which the valve is integrated.
 
  private:
   double TimeOf(std::uint64_t k) const {
@@ -96,16 +97,19 @@ void ValveSimulation::Impl::Start() {
     valve_.Settle(inputs_);
   }
   valve_.SetEffects(EffectsAt(config_.faults, 0.0));
+  reached_ = inputs_;
   if (!open_loop) {
     inputs_ = NextInputs();
   }
 }
 
-// One Advance() per stretch of constant faults; the pressures of every stretch
-// lie on the line to `target`.
+// One Advance() per stretch of constant faults, with the command of the last
+// sample and pressures on the line from those reached to those of `target`.
 void ValveSimulation::Impl::AdvanceAcrossFaults(double from_s, double to_s,
                                                 const ProcessInputs& target) {
   ProcessInputs here = inputs_;
+  here.inlet_pressure_pa = reached_.inlet_pressure_pa;
+  here.outlet_pressure_pa = reached_.outlet_pressure_pa;
   double at_s = from_s;
   while (at_s < to_s) {
     double until_s = to_s;
@@ -127,6 +131,7 @@ void ValveSimulation::Impl::AdvanceAcrossFaults(double from_s, double to_s,
     here = there;
     at_s = until_s;
   }
+  reached_ = target;
 }
 
 void ValveSimulation::Impl::AdvanceTo(std::uint64_t k) {
@@ -135,14 +140,10 @@ void ValveSimulation::Impl::AdvanceTo(std::uint64_t k) {
         0.01 * config_.parameters.instruments.positioner_noise_sd_pct *
         positioner_noise_());
   }
-  if (excitation_->is_open_loop()) {
-    const ProcessInputs target = NextInputs();
-    AdvanceAcrossFaults(TimeOf(k - 1), TimeOf(k), target);
-    inputs_ = target;
-  } else {
-    AdvanceAcrossFaults(TimeOf(k - 1), TimeOf(k), inputs_);
-    inputs_ = NextInputs();
-  }
+  const bool open_loop = excitation_->is_open_loop();
+  const ProcessInputs target = open_loop ? NextInputs() : inputs_;
+  AdvanceAcrossFaults(TimeOf(k - 1), TimeOf(k), target);
+  inputs_ = open_loop ? target : NextInputs();
 }
 
 double ValveSimulation::Impl::Read(const Transmitter& transmitter,

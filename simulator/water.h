@@ -10,7 +10,7 @@ namespace fdi::simulator {
 double WaterDensity(double temperature_c);
 
 /// Vapour pressure of water Pv = 10^(-2141/(T + 273.15) + 10.7167) [Pa], the
-/// benchmark's fit; 1 % at 100..300 degC.
+/// benchmark's formula: exact at 200 degC, 6 % low at 100, 11 % high at 300.
 double VapourPressure(double temperature_c);
 
 }  // namespace fdi::simulator

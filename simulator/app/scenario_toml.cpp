@@ -80,31 +80,12 @@ void AtKey(const TomlReader& table, std::string_view key, Read&& read) {
   }
 }
 
-ValveParameters NamedParameters(const std::string& name, const path& folder);
-
 void ReadParameterTable(TomlReader& table, const path& folder,
                         ValveParameters& parameters) {
   if (const auto base = table.Text("base")) {
-    AtKey(table, "base", [&] { parameters = NamedParameters(*base, folder); });
+    AtKey(table, "base", [&] { parameters = FindParameters(*base, folder); });
   }
   VisitFields(parameters, FieldReader(table));
-}
-
-ValveParameters NamedParameters(const std::string& name, const path& folder) {
-  if (path(name).extension() != ".toml") {
-    try {
-      return ParameterSet(name);
-    } catch (const ConfigError& error) {
-      throw ConfigError(std::string(error.what()) + ", or a file FILE.toml");
-    }
-  }
-  TomlReader file(Resolve(folder, name));
-  ValveParameters parameters;
-  parameters.name = path(name).stem().string();
-  ReadParameterTable(file, Resolve(folder, name).parent_path(), parameters);
-  file.Finish();
-  Validate(parameters);
-  return parameters;
 }
 
 void ReadParameters(TomlReader& table, const path& folder,
@@ -114,7 +95,7 @@ void ReadParameters(TomlReader& table, const path& folder,
     TomlReader inner = *table.Table(kKey);
     ReadParameterTable(inner, folder, parameters);
   } else if (const auto name = table.Text(kKey)) {
-    AtKey(table, kKey, [&] { parameters = NamedParameters(*name, folder); });
+    AtKey(table, kKey, [&] { parameters = FindParameters(*name, folder); });
   }
   AtKey(table, kKey, [&] { Validate(parameters); });
 }
@@ -140,20 +121,6 @@ void LoadExcitation(const path& folder, const std::string& file,
   scenario.config.duration_s =
       static_cast<double>(recorded.rows.size()) * run.period_s;
   scenario.config.excitation = std::move(recorded);
-}
-
-void ChooseExcitation(const std::string& name, const path& folder,
-                      Scenario& scenario) {
-  constexpr std::string_view kCsv = "csv:";
-  if (name.starts_with(kCsv)) {
-    LoadExcitation(folder, name.substr(kCsv.size()), scenario);
-    return;
-  }
-  if (name == "csv") {
-    throw ConfigError("csv needs a file: csv:FILE");
-  }
-  scenario.config.excitation = DefaultExcitation(name);
-  scenario.excitation_file.clear();
 }
 
 void ReadExcitation(TomlReader& table, const path& folder, Scenario& scenario) {
@@ -201,16 +168,50 @@ void ReadNumbers(TomlReader& table, ValveSimulationConfig& config) {
   }
 }
 
-// The value as TOML: as it is if it may be one, else as text.
-std::string TomlValue(std::string_view value) {
-  constexpr std::string_view kStarts = "+-.0123456789[{\"'";
-  const bool is_toml =
-      (!value.empty() && kStarts.find(value.front()) != kStarts.npos) ||
-      value == "true" || value == "false" || value == "inf" || value == "nan";
-  return is_toml ? std::string(value) : QuoteToml(value);
+// As TOML if it is that, else as text.
+TomlReader ReaderOf(const std::string& setting, std::string_view key,
+                    std::string_view value) {
+  const std::string source = "setting '" + setting + "'";
+  const std::string head = std::string(key) + " = ";
+  try {
+    return TomlReader(head + std::string(value), source);
+  } catch (const ConfigError&) {
+    return TomlReader(head + QuoteToml(value), source);
+  }
 }
 
 }  // namespace
+
+ValveParameters FindParameters(const std::string& name, const path& folder) {
+  if (path(name).extension() != ".toml") {
+    try {
+      return ParameterSet(name);
+    } catch (const ConfigError& error) {
+      throw ConfigError(std::string(error.what()) + ", or a file FILE.toml");
+    }
+  }
+  TomlReader file(Resolve(folder, name));
+  ValveParameters parameters;
+  parameters.name = path(name).stem().string();
+  ReadParameterTable(file, Resolve(folder, name).parent_path(), parameters);
+  file.Finish();
+  Validate(parameters);
+  return parameters;
+}
+
+void ChooseExcitation(const std::string& name, const path& folder,
+                      Scenario& scenario) {
+  constexpr std::string_view kCsv = "csv:";
+  if (name.starts_with(kCsv)) {
+    LoadExcitation(folder, name.substr(kCsv.size()), scenario);
+    return;
+  }
+  if (name == "csv") {
+    throw ConfigError("csv needs a file: csv:FILE");
+  }
+  scenario.config.excitation = DefaultExcitation(name);
+  scenario.excitation_file.clear();
+}
 
 void ApplyScenario(TomlReader& table, const path& folder, Scenario& scenario) {
   ValveSimulationConfig& config = scenario.config;
@@ -240,9 +241,8 @@ void ApplySetting(std::string_view setting, Scenario& scenario) {
     throw ConfigError("setting '" + std::string(setting) +
                       "': expected KEY=VALUE");
   }
-  const std::string text = std::string(setting.substr(0, at)) + " = " +
-                           TomlValue(setting.substr(at + 1));
-  TomlReader reader(text, "'" + std::string(setting) + "'");
+  TomlReader reader = ReaderOf(std::string(setting), setting.substr(0, at),
+                               setting.substr(at + 1));
   ApplyScenario(reader, {}, scenario);
   reader.Finish();
 }

@@ -57,6 +57,16 @@ void ApplyScenario(cli::TomlReader& table, const std::filesystem::path& folder,
 /// ConfigError on an unknown key.
 void ApplyScenarioFile(const std::filesystem::path& path, Scenario& scenario);
 
+/// The named set, or what "FILE.toml" makes of it; `folder` as above.
+/// @throws ConfigError naming the accepted names.
+ValveParameters FindParameters(const std::string& name,
+                               const std::filesystem::path& folder = {});
+
+/// Takes the excitation called `name`: operating-point, sine, level-loop or
+/// csv:FILE. @throws ConfigError naming these; DataError.
+void ChooseExcitation(const std::string& name,
+                      const std::filesystem::path& folder, Scenario& scenario);
+
 /// Lays one `key=value` over `scenario`, e.g. "excitation.amplitude_pct=5" or
 /// "excitation=level-loop" (text needs no quotes). @throws as above.
 void ApplySetting(std::string_view setting, Scenario& scenario);
