@@ -19,19 +19,6 @@ bool OutOfOrder(Intake intake) {
          intake == Intake::kSuperseded;
 }
 
-// The isolated members of `candidates` as a set of `models`.
-FaultSet IsolatedSet(const std::vector<Candidate>& candidates,
-                     const ModelSet& models) {
-  FaultSet set = 0;
-  for (const Candidate& candidate : candidates) {
-    const int index = FaultIndex(models, candidate.fault);
-    if (candidate.isolated && index >= 0) {
-      set |= FaultSet{1} << index;
-    }
-  }
-  return set;
-}
-
 }  // namespace
 
 std::vector<Candidate> CandidatesOf(const ModelSet& models,
@@ -145,7 +132,12 @@ void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
   event.transition.kind = TransitionKind::kClosed;
   event.transition.stamp_ns = std::max(stamp_ns, episode.last_stamp_ns);
   event.transition.detection_stamp_ns = episode.detection_stamp_ns;
+  event.transition.faults = episode.faults;
   event.transition.reason = reason;
+  if (!episode.candidates.empty()) {
+    event.transition.factor = episode.candidates.front().factor;
+    event.transition.strength = episode.candidates.front().strength;
+  }
   event.candidates = episode.candidates;
   event.model_set = episode.model_set;
   event.model_version = episode.model_version;
@@ -162,6 +154,7 @@ void EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
     open_->episode_id = recovered_->episode_id;
     open_->detection_stamp_ns = recovered_->detection_stamp_ns;
     open_->isolated = recovered_->isolated;
+    open_->faults = recovered_->faults;
     open_->candidates = recovered_->candidates;
     open_->resumed = true;
     outlet.Resumed(*recovered_, verdict.stamp_ns);
@@ -187,16 +180,17 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
     return;
   }
   if (transition.kind == TransitionKind::kIsolated) {
-    const FaultSet before = IsolatedSet(open_->candidates, *models);
     open_->trace_until_ns =
         transition.stamp_ns + Ns(options_.after_isolation_s);
-    if (open_->resumed && open_->isolated && before == transition.faults) {
+    if (open_->resumed && open_->isolated &&
+        open_->faults == transition.faults) {
       return;
     }
     recorded.kind = open_->isolated ? TransitionKind::kReisolated
                                     : TransitionKind::kIsolated;
     open_->isolated = true;
   }
+  open_->faults = transition.faults;
   if (transition.reason != EndReason::kSuperseded) {
     open_->candidates = CandidatesOf(*models, verdict, transition.faults);
   }

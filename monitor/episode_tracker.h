@@ -79,6 +79,7 @@ class EpisodeTracker {
     bool isolated{false};
     bool resumed{false};
     bool tracing{true};
+    FaultSet faults{0};  // isolated last
     std::vector<Candidate> candidates;
   };
 

@@ -61,7 +61,8 @@ struct OpenEpisode {
   std::uint64_t episode_id{0};
   std::int64_t detection_stamp_ns{0};
   std::int64_t last_stamp_ns{0};      ///< Last instant known of the valve.
-  std::vector<Candidate> candidates;  ///< The set isolated last, if any.
+  FaultSet faults{0};                 ///< The set isolated last, if any.
+  std::vector<Candidate> candidates;  ///< Its members.
   bool isolated{false};
   std::string model_set;
   int model_version{0};

@@ -78,7 +78,7 @@ void SampleRecorder::Commit() {
   last_commit_ = std::chrono::steady_clock::now();
   try {
     sink_.Commit();
-    counters_.Add(Counter::kRecorded, std::exchange(pending_, 0));
+    CountRecorded();
     if (degraded_.exchange(false)) {
       log_.Line(LogLevel::kInfo, "recording_recovered");
     }
@@ -90,11 +90,18 @@ void SampleRecorder::Commit() {
 void SampleRecorder::Close() {
   try {
     sink_.Close();
-    counters_.Add(Counter::kRecorded, std::exchange(pending_, 0));
+    CountRecorded();
   } catch (const std::exception& error) {
     Fail(error.what());
     counters_.Add(Counter::kRecordDropped, std::exchange(pending_, 0));
   }
+}
+
+void SampleRecorder::CountRecorded() {
+  const std::uint64_t recorded = sink_.recorded();
+  counters_.Add(Counter::kRecorded,
+                recorded - std::exchange(recorded_, recorded));
+  pending_ = 0;
 }
 
 void SampleRecorder::Fail(const char* reason) {

@@ -45,6 +45,7 @@ class SampleRecorder {
   void Take(const ReceivedSample& sample);
   void Commit();
   void Close();
+  void CountRecorded();
   void Fail(const char* reason);
 
   SampleSink& sink_;
@@ -53,6 +54,7 @@ class SampleRecorder {
   SampleRecorderOptions options_;
   std::atomic<bool> degraded_{false};
   std::uint64_t pending_{0};
+  std::uint64_t recorded_{0};  // counted so far
   std::chrono::steady_clock::time_point last_commit_;
   BoundedQueue<ReceivedSample> queue_;
   std::thread thread_;

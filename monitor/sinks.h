@@ -71,6 +71,8 @@ class SampleSink {
   virtual std::uint64_t DropPending() = 0;
   /// Ends all runs and stores what is buffered.
   virtual void Close() = 0;
+  /// How many samples are stored by now.
+  virtual std::uint64_t recorded() const = 0;
 };
 
 }  // namespace fdi::monitor

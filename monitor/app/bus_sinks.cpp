@@ -1,0 +1,109 @@
+#include "monitor/app/bus_sinks.h"
+
+#include <exception>
+#include <utility>
+
+#include "diagnosis/fault_catalogue.h"
+#include "storage/cli/logging.h"
+#include "storage/models.h"
+
+namespace fdi::monitor {
+namespace {
+
+idl::FaultEventMessage MessageOf(const EpisodeEvent& event, bool persisted) {
+  idl::FaultEventMessage message;
+  message.valve_id = event.valve_id;
+  message.source_id = event.source_id;
+  message.seq = event.seq;
+  message.episode_id = event.episode_id;
+  message.transition = event.transition;
+  for (const Candidate& candidate : event.candidates) {
+    message.candidates.push_back({candidate.fault, candidate.factor,
+                                  candidate.strength, candidate.isolated});
+  }
+  message.model_set = event.model_set;
+  message.model_version = event.model_version;
+  message.model_hash = event.model_hash;
+  message.persisted = persisted;
+  return message;
+}
+
+idl::FaultEventMessage MessageOf(const storage::UnsentEvent& event) {
+  idl::FaultEventMessage message;
+  message.valve_id = event.valve_id;
+  message.source_id = event.source_id;
+  message.episode_id = event.episode_id;
+  message.transition = event.transition;
+  for (const int fault : event.faults) {
+    if (fault != 0) {
+      message.candidates.push_back(
+          {fault, event.transition.factor, event.transition.strength, true});
+    }
+  }
+  const storage::ModelReference reference =
+      storage::ParseModelReference(event.model_set);
+  message.model_set = reference.name;
+  message.model_version = reference.version.value_or(0);
+  message.model_hash = event.model_hash;
+  message.persisted = true;
+  return message;
+}
+
+std::string IsolatedNames(const idl::FaultEventMessage& message) {
+  std::string names;
+  for (const idl::FaultCandidate& candidate : message.candidates) {
+    if (candidate.isolated) {
+      names += (names.empty() ? "" : "|") + FaultName(candidate.fault);
+    }
+  }
+  return names.empty() ? "unknown" : names;
+}
+
+}  // namespace
+
+BusDecisionSink::BusDecisionSink(idl::Participant& participant,
+                                 idl::Profile profile, std::stop_token stop)
+    : publisher_(participant, {profile, 0}), stop_(std::move(stop)) {}
+
+bool BusDecisionSink::Publish(const std::string& valve_id,
+                              const ModelSet* models, const Verdict& verdict) {
+  message_.valve_id = valve_id;
+  message_.model_hash = models != nullptr ? models->content_hash : 0;
+  message_.channel_count =
+      models != nullptr ? static_cast<int>(models->channels.size()) : 0;
+  message_.fault_count =
+      models != nullptr ? static_cast<int>(models->faults.size()) : 0;
+  message_.observer_count =
+      models != nullptr ? static_cast<int>(models->observers.size()) : 0;
+  message_.verdict = verdict;
+  return publisher_.Write(message_, stop_) == idl::WriteResult::kSent;
+}
+
+BusEventSink::BusEventSink(idl::Participant& participant, LogSink log)
+    : publisher_(participant), log_(std::move(log)) {}
+
+bool BusEventSink::Publish(const EpisodeEvent& event, bool persisted) {
+  return Send(MessageOf(event, persisted));
+}
+
+bool BusEventSink::Resend(const storage::UnsentEvent& event) {
+  return Send(MessageOf(event));
+}
+
+bool BusEventSink::Send(const idl::FaultEventMessage& message) {
+  if (log_) {
+    const Transition& transition = message.transition;
+    log_(LogLevel::kInfo,
+         cli::EventLine(
+             "fault_event",
+             {{"valve", message.valve_id},
+              {"transition", std::string(TransitionName(transition.kind))},
+              {"faults", IsolatedNames(message)},
+              {"reason", std::string(EndReasonName(transition.reason))},
+              {"episode", storage::EpisodeIdText(message.episode_id)},
+              {"persisted", message.persisted ? "true" : "false"}}));
+  }
+  return publisher_.Write(message) == idl::WriteResult::kSent;
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,12 @@
+#include "idl/participant.h"
+#include "monitor/app/verbs.h"
+#include "storage/cli/program.h"
+
+int main(int argc, char** argv) {
+  fdi::cli::Program program("fdi-monitor",
+                            "Recognises which fault a control valve has");
+  program.MapError<fdi::idl::TransportError>(fdi::cli::kExitTransport);
+  fdi::monitor::AddRunVerb(program);
+  fdi::monitor::AddWatchVerb(program);
+  return program.Run(argc, argv);
+}

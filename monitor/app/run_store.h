@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "monitor/sinks.h"
+#include "storage/runs.h"
+
+namespace fdi::monitor {
+
+/// runs.db as the monitor's recorder: a run for each source of a valve, whose
+/// sample period is what its first two samples are apart.
+class RunStore : public SampleSink {
+ public:
+  /// @throws DataError, storage::SqliteError
+  RunStore(const std::filesystem::path& path, std::string software);
+
+  void Append(const ReceivedSample& sample) override;
+  void Commit() override;
+  std::uint64_t DropPending() override;
+  void Close() override;
+  std::uint64_t recorded() const override;
+
+ private:
+  using Key = storage::RunRecorder::Key;
+  struct Stream {
+    std::uint64_t source_id{0};
+    std::optional<Key> run;
+    storage::StoredSample first;  // waits for the second while there is no run
+  };
+  using Streams = std::vector<Stream>;  // of one valve, the newest at the end
+
+  void AppendTo(const std::string& valve_id, Stream& stream,
+                const storage::StoredSample& sample);
+  void Begin(const std::string& valve_id, Stream& stream, double period_s);
+  void End(const std::string& valve_id, Stream& stream);
+
+  std::string software_;
+  storage::RunRecorder recorder_;
+  std::unordered_map<std::string, Streams> valves_;
+};
+
+}  // namespace fdi::monitor

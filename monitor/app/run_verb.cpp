@@ -1,0 +1,78 @@
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "monitor/app/service.h"
+#include "monitor/app/verbs.h"
+#include "storage/cli/program.h"
+#include "storage/cli/stop_signals.h"
+
+namespace fdi::monitor {
+namespace {
+
+struct RunArguments {
+  std::string model_set;
+  std::string record;
+  ServiceOptions service;
+};
+
+int Run(const RunArguments& arguments, const cli::Context& context) {
+  ServiceOptions options = arguments.service;
+  if (!arguments.model_set.empty()) {
+    options.model_set = storage::ParseModelReference(arguments.model_set);
+  }
+  options.recording = arguments.record.empty()         ? Recording::kOff
+                      : arguments.record == "lossless" ? Recording::kLossless
+                                                       : Recording::kOn;
+  cli::StopSignals signals;
+  Service service(options, context);
+  return service.Run(signals);
+}
+
+}  // namespace
+
+void AddRunVerb(cli::Program& program) {
+  auto arguments = std::make_shared<RunArguments>();
+  CLI::App& run = program.AddVerb(
+      "run", "Diagnose the valves on the bus until SIGINT or SIGTERM",
+      [arguments](const cli::Context& context) {
+        return Run(*arguments, context);
+      });
+  run.add_option("--model-set", arguments->model_set,
+                 "NAME[@VERSION] for valves that none is assigned to; without "
+                 "it the only active one, if no valve is assigned any");
+  run.add_option("--record", arguments->record,
+                 "Store the samples as runs; =lossless waits for the disk "
+                 "instead of counting what it could not take")
+      ->expected(0, 1)
+      ->default_str("on")
+      ->check(CLI::IsMember({"on", "lossless"}));
+  ServiceOptions& service = arguments->service;
+  run.add_option("--valves", service.valves, "Serve only ids that match GLOB")
+      ->capture_default_str();
+  run.add_option("--max-valves", service.max_valves,
+                 "Serve at most N valves, count the others")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  run.add_flag("--lossless-decisions", service.lossless_decisions,
+               "A slow subscriber holds the monitor up instead of missing "
+               "decision vectors");
+  run.add_flag("--best-effort", service.best_effort,
+               "Take samples without retransmission");
+  run.add_option("--stale-timeout", service.stale_timeout_s,
+                 "Close an episode after so much silence of its valve [s]")
+      ->check(CLI::Range(1.0, 1e7))
+      ->capture_default_str();
+  run.add_option("--trace-before", service.trace_before_s,
+                 "Evidence kept from before a detection [s], at most 1800 "
+                 "samples")
+      ->check(CLI::Range(0.0, 1800.0))
+      ->capture_default_str();
+  run.add_option("--status-period", service.status_period_s,
+                 "Time between status lines in the log [s]")
+      ->check(CLI::Range(1.0, 86400.0))
+      ->capture_default_str();
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,275 @@
+#include "monitor/app/service.h"
+
+#include <condition_variable>
+#include <cstdio>
+#include <mutex>
+#include <utility>
+
+#include "monitor/app/status.h"
+#include "storage/cli/time_text.h"
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kTakeTimeout{100};
+constexpr milliseconds kTickPeriod{1000};
+constexpr milliseconds kDrainLimit{1000};
+constexpr milliseconds kSubscriberPatience{1500};  // at shutdown
+constexpr milliseconds kAcknowledgeLimit{300};
+
+std::chrono::milliseconds Milliseconds(double seconds) {
+  return milliseconds(static_cast<std::int64_t>(seconds * 1e3));
+}
+
+storage::DataDirectory Prepared(const std::filesystem::path& path) {
+  storage::DataDirectory data{path};
+  storage::EnsureExists(data);
+  PrepareModels(data.models());
+  return data;
+}
+
+idl::DdsOptions DdsOptionsOf(const ServiceOptions& options,
+                             const cli::GlobalOptions& global) {
+  idl::DdsOptions dds;
+  dds.domain = global.domain;
+  dds.interfaces = global.interface;
+  dds.transport = global.transport;
+  dds.qos_file = global.qos_file.string();
+  dds.max_valves = options.max_valves;
+  return dds;
+}
+
+PipelineOptions PipelineOptionsOf(const ServiceOptions& options) {
+  PipelineOptions pipeline;
+  pipeline.max_valves = options.max_valves;
+  pipeline.valve_glob = options.valves;
+  pipeline.registry.stale_timeout = Milliseconds(options.stale_timeout_s);
+  pipeline.registry.trace.before_s = options.trace_before_s;
+  pipeline.history.utc_now_ns = cli::NowNs;
+  pipeline.recorder.lossless = options.recording == Recording::kLossless;
+  return pipeline;
+}
+
+std::filesystem::path LockOf(const storage::DataDirectory& data) {
+  std::filesystem::path path = data.history();
+  return path += ".lock";
+}
+
+}  // namespace
+
+Service::Service(const ServiceOptions& options, const cli::Context& context)
+    : options_(options),
+      context_(context),
+      data_(Prepared(context.options.data_dir)),
+      lock_(LockOf(data_), "recording faults"),
+      participant_(DdsOptionsOf(options, context.options), context.log,
+                   "fdi-monitor"),
+      models_topic_(participant_),
+      changes_(data_.models()),
+      assignment_(std::make_shared<const ModelAssignment>(
+          data_.models(), options.model_set,
+          [this](const ModelSet& models) { AnnounceModels(models); })),
+      history_(data_.history(), context.software, context.command_line,
+               cli::NowNs, context.log),
+      runs_(options.recording == Recording::kOff
+                ? nullptr
+                : std::make_unique<RunStore>(data_.runs(), context.software)),
+      decisions_(participant_,
+                 options.lossless_decisions ? idl::Profile::kLossless
+                                            : idl::Profile::kLive,
+                 publication_stop_.get_token()),
+      events_(participant_, context.log),
+      status_topic_(participant_),
+      samples_(participant_, options.best_effort ? idl::Profile::kBestEffort
+                                                 : idl::Profile::kLive),
+      log_(context.log),
+      pipeline_(PipelineOptionsOf(options),
+                {decisions_, events_, history_, runs_.get()}, assignment_,
+                counters_, log_),
+      started_ns_(cli::NowNs()),
+      last_status_line_(std::chrono::steady_clock::now()) {
+  ResendEvents();
+  pipeline_.Start(history_.OpenEpisodes());
+  intake_ = std::jthread([this](const std::stop_token& stop) { Intake(stop); });
+}
+
+Service::~Service() = default;
+
+void Service::AnnounceModels(const ModelSet& models) {
+  models_topic_.Write(idl::Describe(models));
+  context_.log(LogLevel::kInfo, "models_loaded model_set=" + models.name + "@" +
+                                    std::to_string(models.version));
+}
+
+// What an earlier session committed but perhaps did not send.
+void Service::ResendEvents() {
+  for (const storage::UnsentEvent& event : history_.UnsentEvents()) {
+    if (events_.Resend(event)) {
+      history_.MarkResent(event);
+      counters_.Add(Counter::kEventsResent);
+    }
+  }
+}
+
+void Service::Intake(const std::stop_token& stop) {
+  try {
+    const idl::Handlers<idl::ValveSampleMessage> handlers{
+        [this](const idl::ValveSampleMessage& message,
+               const idl::Reception& reception) {
+          pipeline_.Offer(message.valve_id, message.sample,
+                          reception.writer_id);
+        },
+        [this](const idl::ValveSampleMessage& message,
+               const idl::Reception& reception) {
+          pipeline_.OfferEnd(message.valve_id, reception.writer_id);
+        }};
+    const std::stop_callback wake(stop, [this] { samples_.Interrupt(); });
+    while (!stop.stop_requested() && !pipeline_.failed()) {
+      samples_.Take(handlers, kTakeTimeout);
+    }
+    const auto deadline = std::chrono::steady_clock::now() + kDrainLimit;
+    while (std::chrono::steady_clock::now() < deadline &&
+           samples_.Take(handlers, milliseconds(0), 4096) > 0) {
+    }
+  } catch (...) {
+    intake_error_ = std::current_exception();
+    intake_failed_ = true;
+  }
+}
+
+int Service::Run(cli::StopSignals& signals) {
+  // Not through the log: scripts wait for this line at every log level.
+  const std::string ready =
+      "monitor_ready model_set=" + assignment_->DefaultName() +
+      " valves=" + options_.valves +
+      " max_valves=" + std::to_string(options_.max_valves) +
+      " domain=" + std::to_string(context_.options.domain) + "\n";
+  std::fputs(ready.c_str(), stderr);
+  auto next_tick = std::chrono::steady_clock::now();
+  while (!pipeline_.failed() && !intake_failed_) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now >= next_tick) {
+      Tick();
+      next_tick = now + kTickPeriod;
+    }
+    const cli::StopSignals::Event event =
+        signals.WaitFor(std::chrono::duration_cast<milliseconds>(
+                            next_tick - std::chrono::steady_clock::now()) +
+                        milliseconds(1));
+    if (event == cli::StopSignals::Event::kStop) {
+      break;
+    }
+    if (event == cli::StopSignals::Event::kReload) {
+      Reload("signal");
+    }
+  }
+  Shutdown();
+  pipeline_.Rethrow();
+  if (intake_error_) {
+    std::rethrow_exception(intake_error_);
+  }
+  const bool incomplete =
+      pipeline_.history_degraded() || pipeline_.recording_degraded();
+  return incomplete ? cli::kExitData : cli::kExitOk;
+}
+
+void Service::Tick() {
+  try {
+    if (changes_.Changed()) {
+      Reload("models_changed");
+    }
+  } catch (const std::exception& error) {
+    const std::string reason = error.what();
+    log_.Report(LogId::kModelFailure, "models_unreadable",
+                [&reason] { return "reason=\"" + reason + "\""; });
+  }
+  const idl::SubscriberStatus dds = samples_.status();
+  const std::uint64_t loss =
+      dds.lost + dds.undecodable + dds.rejected_instances;
+  if (loss != reported_loss_) {
+    reported_loss_ = loss;
+    log_.Report(LogId::kTransport, "transport_loss", [&dds] {
+      return "lost=" + std::to_string(dds.lost) +
+             " undecodable=" + std::to_string(dds.undecodable) +
+             " rejected_instances=" + std::to_string(dds.rejected_instances) +
+             " refused_valves=" + std::to_string(dds.refused_valves);
+    });
+  }
+  PublishStatus();
+  if (std::chrono::steady_clock::now() - last_status_line_ >=
+      Milliseconds(options_.status_period_s)) {
+    last_status_line_ = std::chrono::steady_clock::now();
+    WriteStatusLine();
+  }
+}
+
+void Service::Reload(const char* cause) {
+  context_.log(LogLevel::kInfo, std::string("models_reload cause=") + cause);
+  try {
+    auto next = std::make_shared<const ModelAssignment>(
+        data_.models(), options_.model_set,
+        [this](const ModelSet& models) { AnnounceModels(models); });
+    // Loads here what the diagnosis would otherwise wait for.
+    for (const std::string& valve : pipeline_.valve_names()) {
+      next->ModelsFor(valve);
+    }
+    assignment_ = next;
+    pipeline_.Reassign(std::move(next));
+  } catch (const std::exception& error) {
+    counters_.Add(Counter::kModelFailures);
+    const std::string reason = error.what();
+    log_.Report(
+        LogId::kModelFailure, "reload_failed",
+        [&reason] { return "reason=\"" + reason + "\""; }, LogLevel::kError);
+  }
+}
+
+void Service::PublishStatus() {
+  idl::MonitorStatusMessage status =
+      StatusOf({counters_, pipeline_.census(), samples_.status(),
+                decisions_.status(), pipeline_.waiting(),
+                pipeline_.history_degraded(), pipeline_.recording_degraded()});
+  status.monitor = MonitorName();
+  status.software = context_.software;
+  status.started_ns = started_ns_;
+  status.stamp_ns = cli::NowNs();
+  status_topic_.Write(status);
+}
+
+void Service::WriteStatusLine() {
+  context_.log(
+      LogLevel::kInfo,
+      StatusLine(StatusOf({counters_, pipeline_.census(), samples_.status(),
+                           decisions_.status(), pipeline_.waiting(),
+                           pipeline_.history_degraded(),
+                           pipeline_.recording_degraded()})));
+}
+
+void Service::Shutdown() {
+  context_.log(LogLevel::kInfo, "monitor_stopping");
+  // A subscriber that does not read must not keep the service from ending.
+  std::mutex mutex;
+  std::condition_variable_any woken;
+  const std::jthread watchdog([&](const std::stop_token& done) {
+    std::unique_lock lock(mutex);
+    if (!woken.wait_for(lock, done, kSubscriberPatience,
+                        [&done] { return done.stop_requested(); })) {
+      publication_stop_.request_stop();
+    }
+  });
+  intake_.request_stop();
+  if (intake_.joinable()) {
+    intake_.join();
+  }
+  pipeline_.Stop();
+  history_.EndSession();
+  PublishStatus();
+  decisions_.WaitForAcknowledged(kAcknowledgeLimit);
+  events_.WaitForAcknowledged(kAcknowledgeLimit);
+  WriteStatusLine();
+  context_.log(LogLevel::kInfo, "monitor_stopped");
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include "idl/endpoint.h"
+#include "monitor/app/bus_sinks.h"
+#include "monitor/app/history_store.h"
+#include "monitor/app/model_assignment.h"
+#include "monitor/app/run_store.h"
+#include "monitor/pipeline.h"
+#include "storage/cli/program.h"
+#include "storage/cli/stop_signals.h"
+#include "storage/data_directory.h"
+#include "storage/exclusive_lock.h"
+
+namespace fdi::monitor {
+
+enum class Recording : std::uint8_t { kOff, kOn, kLossless };
+
+/// Settings of `fdi-monitor run`.
+struct ServiceOptions {
+  std::optional<storage::ModelReference> model_set;
+  Recording recording{Recording::kOff};
+  std::string valves{"*"};
+  int max_valves{2000};
+  bool lossless_decisions{false};
+  bool best_effort{false};  ///< ValveSample without retransmission.
+  double stale_timeout_s{3600.0};
+  double trace_before_s{1800.0};
+  double status_period_s{60.0};  ///< Of the status line in the log.
+};
+
+/// The monitor as a service: DDS on one side, the databases on the other, the
+/// pipeline between them. Lives for one run.
+class Service {
+ public:
+  /// Opens all; afterwards samples are taken.
+  /// @throws ConfigError, DataError, NotFoundError, idl::TransportError,
+  ///   storage::SqliteError
+  Service(const ServiceOptions& options, const cli::Context& context);
+  ~Service();
+  Service(const Service&) = delete;
+  Service& operator=(const Service&) = delete;
+
+  /// Serves until a signal asks to stop, then drains and closes.
+  /// @returns the exit code.
+  int Run(cli::StopSignals& signals);
+
+ private:
+  void ResendEvents();
+  void Intake(const std::stop_token& stop);
+  void AnnounceModels(const ModelSet& models);
+  void Reload(const char* cause);
+  void Tick();
+  void PublishStatus();
+  void WriteStatusLine();
+  void Shutdown();
+
+  ServiceOptions options_;
+  const cli::Context& context_;
+  storage::DataDirectory data_;
+  storage::ExclusiveLock lock_;
+  idl::Participant participant_;
+  idl::Publisher<idl::ModelSetInfoMessage> models_topic_;
+  storage::ChangeCounter changes_;
+  std::shared_ptr<const ModelAssignment> assignment_;
+  HistoryStore history_;
+  std::unique_ptr<RunStore> runs_;
+  std::stop_source publication_stop_;  // ends waits for slow subscribers
+  BusDecisionSink decisions_;
+  BusEventSink events_;
+  idl::Publisher<idl::MonitorStatusMessage> status_topic_;
+  idl::Subscriber<idl::ValveSampleMessage> samples_;
+  Counters counters_;
+  ThrottledLog log_;
+  Pipeline pipeline_;
+  std::int64_t started_ns_;
+  std::uint64_t reported_loss_{0};
+  std::chrono::steady_clock::time_point last_status_line_;
+  std::exception_ptr intake_error_;
+  std::atomic<bool> intake_failed_{false};
+  std::jthread intake_;
+};
+
+}  // namespace fdi::monitor
