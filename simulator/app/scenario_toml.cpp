@@ -182,6 +182,12 @@ TomlReader ReaderOf(const std::string& setting, std::string_view key,
 
 }  // namespace
 
+ValveSimulationConfig DefaultConfig() {
+  ValveSimulationConfig config;
+  config.parameters = ParameterSet("lublin-actuator-3");
+  return config;
+}
+
 ValveParameters FindParameters(const std::string& name, const path& folder) {
   if (path(name).extension() != ".toml") {
     try {

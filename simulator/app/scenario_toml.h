@@ -9,11 +9,14 @@
 
 namespace fdi::simulator {
 
+/// The defaults of ValveSimulationConfig for lublin-actuator-3.
+ValveSimulationConfig DefaultConfig();
+
 /// One simulated valve, as a TOML table describes it.
 struct Scenario {
   std::string valve_id{"VALVE-0001"};
-  ValveSimulationConfig config;  ///< start_ns 0: when the run starts.
-  std::string excitation_file;   ///< Of a csv excitation, as it was given.
+  ValveSimulationConfig config{DefaultConfig()};  ///< start_ns 0: not given.
+  std::string excitation_file;  ///< Of a csv excitation, as it was given.
 };
 
 /// Lays what `table` says over `scenario`; what it does not say stays. Keys:

@@ -1,0 +1,247 @@
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <limits>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "diagnosis/error.h"
+#include "simulator/app/feed.h"
+#include "simulator/app/scenario_toml.h"
+#include "simulator/app/verbs.h"
+
+namespace fdi::simulator {
+namespace {
+
+struct RunOptions {
+  std::string valve;
+  std::filesystem::path scenario;
+  std::string parameters;
+  std::string excitation;
+  std::vector<std::string> faults;
+  std::vector<std::string> settings;
+  std::optional<double> duration_s;
+  std::optional<std::uint64_t> seed;
+  bool cold_start{false};
+  int valves{1};
+  bool record{false};
+  bool no_publish{false};
+  std::filesystem::path export_file;
+  DeliveryOptions delivery;
+};
+
+// The scenario file, then the options, then --set.
+Scenario BaseScenario(const RunOptions& options) {
+  Scenario scenario;
+  ValveSimulationConfig& config = scenario.config;
+  if (!options.scenario.empty()) {
+    ApplyScenarioFile(options.scenario, scenario);
+  }
+  if (!options.valve.empty()) {
+    scenario.valve_id = options.valve;
+  }
+  if (!options.parameters.empty()) {
+    config.parameters = FindParameters(options.parameters);
+  }
+  if (!options.excitation.empty()) {
+    ChooseExcitation(options.excitation, {}, scenario);
+  }
+  if (!options.faults.empty()) {
+    config.faults.clear();
+    for (const std::string& text : options.faults) {
+      config.faults.push_back(ParseFaultSchedule(text));
+    }
+  }
+  config.duration_s = options.duration_s.value_or(config.duration_s);
+  config.seed = options.seed.value_or(config.seed);
+  config.cold_start = config.cold_start || options.cold_start;
+  for (const std::string& setting : options.settings) {
+    ApplySetting(setting, scenario);
+  }
+  if (config.start_ns == 0 || !options.delivery.start.empty()) {
+    config.start_ns = StartOf(options.delivery);
+  }
+  return scenario;
+}
+
+// "VALVE-0001", ... or "ID-1", ...
+std::string ValveIdOf(const std::string& base, int index) {
+  if (base != Scenario{}.valve_id) {
+    return base + '-' + std::to_string(index + 1);
+  }
+  char text[32];
+  std::snprintf(text, sizeof text, "VALVE-%04d", index + 1);
+  return text;
+}
+
+// One scenario per valve, each with its own seed and source.
+std::vector<Scenario> Scenarios(const RunOptions& options) {
+  const Scenario base = BaseScenario(options);
+  std::vector<Scenario> scenarios(static_cast<std::size_t>(options.valves),
+                                  base);
+  for (int i = 0; i < options.valves; ++i) {
+    Scenario& scenario = scenarios[static_cast<std::size_t>(i)];
+    if (options.valves > 1) {
+      scenario.valve_id = ValveIdOf(base.valve_id, i);
+    }
+    scenario.config.seed += static_cast<std::uint64_t>(i);
+    scenario.config.source_id = NewSourceId();
+    RequireValveId(scenario.valve_id);
+  }
+  return scenarios;
+}
+
+// Steps all valves in turn, so that their samples leave by time.
+class SimulationFeed final : public Feed {
+ public:
+  SimulationFeed(const std::vector<Scenario>& scenarios,
+                 cli::StopSignals& signals)
+      : signals_(signals) {
+    simulations_.reserve(scenarios.size());
+    for (const Scenario& scenario : scenarios) {
+      simulations_.emplace_back(scenario.config);
+    }
+  }
+
+  std::optional<FedSample> Next() override {
+    if (simulations_[valve_].finished() || signals_.stop_requested()) {
+      return std::nullopt;
+    }
+    FedSample fed{valve_, simulations_[valve_].Step()};
+    valve_ = (valve_ + 1) % simulations_.size();
+    return fed;
+  }
+
+ private:
+  cli::StopSignals& signals_;
+  std::vector<ValveSimulation> simulations_;
+  std::size_t valve_{0};
+};
+
+storage::NewRun NewRunOf(const Scenario& scenario,
+                         const std::string& software) {
+  const ValveSimulationConfig& config = scenario.config;
+  storage::NewRun run;
+  run.valve_id = scenario.valve_id;
+  run.source_id = config.source_id;
+  run.start_ns = config.start_ns;
+  run.period_s = config.period_s;
+  run.flow_unit = config.parameters.instruments.flow_unit;
+  run.origin = storage::RunOrigin::kSimulated;
+  run.scenario = ScenarioText(scenario);
+  run.seed = config.seed;
+  run.software = software;
+  return run;
+}
+
+int Run(const RunOptions& options, const cli::Context& context) {
+  const Speed speed = options.no_publish
+                          ? ParseSpeed("max")
+                          : ParseSpeed(options.delivery.speed.value_or("1"));
+  const std::vector<Scenario> scenarios = Scenarios(options);
+  if (!options.export_file.empty() && scenarios.size() > 1) {
+    throw ConfigError("--export takes one valve, not " +
+                      std::to_string(scenarios.size()));
+  }
+  cli::StopSignals signals;
+  SimulationFeed feed(scenarios, signals);
+
+  FeedSummary summary;
+  std::vector<std::string> valve_ids;
+  for (const Scenario& scenario : scenarios) {
+    valve_ids.push_back(scenario.valve_id);
+    SourceSummary& source = summary.sources.emplace_back();
+    source.valve_id = scenario.valve_id;
+    source.source_id = scenario.config.source_id;
+    source.seed = scenario.config.seed;
+  }
+  std::optional<CsvSink> csv;
+  if (!options.export_file.empty()) {
+    csv.emplace(options.export_file);
+  }
+  std::optional<RunSink> runs;
+  if (options.record) {
+    runs.emplace(storage::DataDirectory{context.options.data_dir});
+  }
+  std::optional<SamplePublisher> publisher;
+  if (!options.no_publish) {
+    publisher.emplace(PublisherOptionsOf(options.delivery, speed), valve_ids,
+                      context, signals);
+    publisher->AwaitReader();
+  }
+  if (runs) {
+    for (std::size_t i = 0; i < scenarios.size(); ++i) {
+      summary.sources[i].run_id =
+          runs->Begin(NewRunOf(scenarios[i], context.software));
+    }
+  }
+  Deliver(feed,
+          {publisher ? &*publisher : nullptr, runs ? &*runs : nullptr,
+           csv ? &*csv : nullptr},
+          Pacer(speed, signals), signals, summary);
+  PrintSummary(summary, context.options);
+  return cli::kExitOk;
+}
+
+void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
+  verb.add_option("--valve", options.valve, "Valve id (default: VALVE-0001)")
+      ->type_name("ID");
+  verb.add_option("--scenario", options.scenario,
+                  "Scenario file; the options below override it")
+      ->type_name("FILE.toml");
+  verb.add_option("--duration", options.duration_s,
+                  "Simulated seconds (default: 2000, or the excitation's)")
+      ->type_name("S");
+  verb.add_option("--fault", options.faults,
+                  std::string(kFaultForms) + "; may be repeated")
+      ->type_name("SPEC")
+      ->default_str("")
+      ->allow_extra_args(false);
+  verb.add_option("--parameters", options.parameters,
+                  "lublin-actuator-3 (default), lublin-actuator-3-refit, "
+                  "paper-operating-point or FILE.toml")
+      ->type_name("NAME");
+  verb.add_option("--excitation", options.excitation,
+                  "operating-point (default), sine, level-loop or csv:FILE")
+      ->type_name("NAME");
+  verb.add_option("--set", options.settings,
+                  "A scenario key, e.g. excitation.amplitude_pct=5, "
+                  "noise=false, parameters.trim.kv_m3_h=72; may be repeated")
+      ->type_name("KEY=VALUE")
+      ->default_str("")
+      ->allow_extra_args(false);
+  verb.add_flag("--cold-start", options.cold_start,
+                "From X = 0 and vented, not in equilibrium");
+  constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
+  verb.add_option("--seed", options.seed, "Seed (default: 1)")
+      ->check(CLI::Range(std::int64_t{0}, kLargest))
+      ->type_name("N");
+  verb.add_option("--valves", options.valves,
+                  "So many valves, ID-1, ID-2, ..., with seeds N, N+1, ...")
+      ->check(CLI::Range(1, 100'000))
+      ->type_name("N");
+}
+
+}  // namespace
+
+void AddRunVerb(cli::Program& program) {
+  auto options = std::make_shared<RunOptions>();
+  CLI::App& verb =
+      program.AddVerb("run", "Simulate valves and publish their samples",
+                      [options](const cli::Context& context) {
+                        return Run(*options, context);
+                      });
+  AddScenarioOptions(verb, *options);
+  AddDeliveryOptions(verb, options->delivery);
+  verb.add_flag("--record", options->record,
+                "Store the runs, with their truth, in runs.db");
+  verb.add_flag("--no-publish", options->no_publish,
+                "Simulate only, as fast as possible");
+  verb.add_option("--export", options->export_file, "Write the run as CSV")
+      ->type_name("FILE.csv");
+}
+
+}  // namespace fdi::simulator

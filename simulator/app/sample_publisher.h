@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "diagnosis/log.h"
+#include "diagnosis/sample.h"
+#include "idl/endpoint.h"
+#include "idl/participant.h"
+#include "storage/cli/program.h"
+#include "storage/cli/stop_signals.h"
+
+namespace fdi::simulator {
+
+/// Nobody listens. Exit code 4.
+class NoReaderError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Settings of SamplePublisher.
+struct SamplePublisherOptions {
+  bool lossless{false};          ///< The reader paces the writer.
+  std::optional<double> wait_s;  ///< For a reader; see AwaitReader().
+  bool keep_alive{false};        ///< Do not end the streams.
+};
+
+/// Publishes the samples of some valves and ends their streams. One thread.
+class SamplePublisher {
+ public:
+  /// @throws ConfigError, TransportError as idl::Participant.
+  SamplePublisher(const SamplePublisherOptions& options,
+                  std::vector<std::string> valve_ids,
+                  const cli::Context& context, cli::StopSignals& signals);
+
+  /// Waits until a reader is there. Lossless, or with wait_s given, there must
+  /// be one in time (30 s by default); otherwise one that is up already gets
+  /// the first sample and nobody is waited for beyond 2 s.
+  /// @throws NoReaderError naming domain and interface.
+  void AwaitReader();
+
+  /// Lossless: waits until there is room; with no reader left, for another.
+  /// @returns false if a stop was requested before the sample left.
+  /// @throws NoReaderError, TransportError
+  bool Publish(std::size_t valve, const Sample& sample);
+
+  /// Waits until the readers have it all, ends the streams (unless keep_alive),
+  /// waits again. After a stop it waits a moment only.
+  /// @returns whether the readers have it all.
+  bool Finish();
+
+  /// How many there are now.
+  int readers() const { return writer_.status().matched; }
+
+ private:
+  bool AwaitAcknowledged();
+
+  SamplePublisherOptions options_;
+  std::vector<std::string> valve_ids_;
+  LogSink log_;
+  cli::StopSignals& signals_;
+  idl::Participant participant_;
+  idl::Publisher<idl::ValveSampleMessage> writer_;
+  idl::ValveSampleMessage message_;
+};
+
+/// The DDS settings of the command line, for `valves` valves.
+/// @throws ConfigError
+idl::DdsOptions DdsOptionsOf(const cli::GlobalOptions& options,
+                             std::size_t valves);
+
+}  // namespace fdi::simulator
