@@ -41,10 +41,16 @@ bool IsName(std::string_view name) {
 std::string RegressorText(const TsModel& model) {
   std::string text;
   for (const Regressor& regressor : model.regressors) {
-    text +=
-        (text.empty() ? "" : " ") + std::string(SignalName(regressor.signal));
-    text += regressor.lag == 0 ? "(k)"
-                               : "(k-" + std::to_string(regressor.lag) + ")";
+    if (!text.empty()) {
+      text += ' ';
+    }
+    text += SignalName(regressor.signal);
+    text += "(k";
+    if (regressor.lag > 0) {
+      text += '-';
+      text += std::to_string(regressor.lag);
+    }
+    text += ')';
   }
   return text;
 }
