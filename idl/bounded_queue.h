@@ -11,7 +11,8 @@
 namespace fdi::idl {
 
 /// First in, first out, between threads. Its gate closes when it is full and
-/// opens again at half: who fills it asks for the gate before each item.
+/// opens again when an eighth is free: who fills it asks for the gate before
+/// each item.
 template <typename Item>
 class BoundedQueue {
  public:
@@ -49,7 +50,7 @@ class BoundedQueue {
       popped.item = std::move(items_.front());
       items_.pop_front();
     }
-    if (!open_ && items_.size() <= capacity_ / 2) {
+    if (!open_ && items_.size() <= capacity_ - capacity_ / 8) {
       open_ = true;
       popped.opened = true;
     }

@@ -84,9 +84,11 @@ struct Reception {
 
 /// What became of the messages. Nothing is lost in silence.
 struct SubscriberStatus {
-  std::uint64_t received{0};     ///< Messages handed out.
-  std::uint64_t ended{0};        ///< Ended instances handed out.
-  std::uint64_t lost{0};         ///< Will never come: overwritten or dropped.
+  std::uint64_t received{0};  ///< Messages handed out.
+  std::uint64_t ended{0};     ///< Ended instances handed out.
+  /// Written since this subscriber exists, and will never come: overwritten by
+  /// a live writer, or dropped on the way.
+  std::uint64_t lost{0};
   std::uint64_t undecodable{0};  ///< A value no publisher of ours sends.
   /// Messages of valves beyond max_valves: lost, and how many valves (exact
   /// up to 65536).

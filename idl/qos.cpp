@@ -15,8 +15,8 @@ constexpr int kSamplesInFlight = 4096;
 // Samples of all valves that wait in the library once the queue of the
 // Subscriber is full; beyond it writers are made to wait. The limit is per
 // valve, and the library counts what is missing on the way towards it: 16 per
-// valve halved the rate of 2000 valves, from 256 on nothing is refused.
-constexpr int kReaderBacklog = 524288;
+// valve halved the rate of 2000 valves.
+constexpr int kReaderBacklog = 131072;
 constexpr int kModelSets = 256;
 constexpr int kMonitors = 64;
 
@@ -53,7 +53,10 @@ EndpointQos Common(const std::string& name) {
   reader.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
   reader.durability().kind = dds::VOLATILE_DURABILITY_QOS;
   reader.data_sharing().off();
-  reader.endpoint().history_memory_policy = rtps::DYNAMIC_RESERVE_MEMORY_MODE;
+  // The dynamic modes refuse the end of an instance, which has no payload, and
+  // with it all that the writer sends later.
+  reader.endpoint().history_memory_policy =
+      rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   return qos;
 }
 
@@ -77,7 +80,7 @@ void WriterKeepsAll(EndpointQos& qos, int instances) {
 
 void ReaderKeepsAll(EndpointQos& qos, int instances) {
   const int per_instance =
-      std::clamp(kReaderBacklog / instances, 16, kSamplesInFlight);
+      std::clamp(kReaderBacklog / instances, 64, kSamplesInFlight);
   qos.reader.history().kind = dds::KEEP_ALL_HISTORY_QOS;
   SetLimits(qos.reader.resource_limits(), instances, per_instance, 256);
 }

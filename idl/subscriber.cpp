@@ -14,6 +14,7 @@
 #include "idl/checked_type.h"
 #include "idl/codec.h"
 #include "idl/endpoint.h"
+#include "idl/gap_counter.h"
 #include "idl/matched.h"
 #include "idl/participant_impl.h"
 #include "idl/qos.h"
@@ -50,6 +51,12 @@ std::uint64_t WriterId(const dds::InstanceHandle_t& writer) {
     hash = (hash ^ writer.value[i]) * 1099511628211U;
   }
   return hash;
+}
+
+std::int64_t NowNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
 }
 
 Reception ReceptionOf(const dds::SampleInfo& info) {
@@ -125,13 +132,17 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
     SubscriberStatus status;
     status.received = received_.load(std::memory_order_relaxed);
     status.ended = ended_.load(std::memory_order_relaxed);
-    status.lost = lost_.load(std::memory_order_relaxed);
     status.undecodable = undecodable_.load(std::memory_order_relaxed);
-    if (const auto* type = dynamic_cast<const Type*>(type_.get())) {
-      status.undecodable += type->refused();
-    }
+    const auto* type = dynamic_cast<const Type*>(type_.get());
+    const std::uint64_t refused_bytes = type == nullptr ? 0 : type->refused();
+    status.undecodable += refused_bytes;
     status.rejected_instances =
         rejected_instances_.load(std::memory_order_relaxed);
+    // Messages refused for a reason of their own are missing, too.
+    const std::uint64_t missing = missing_.load(std::memory_order_relaxed);
+    const std::uint64_t explained = status.rejected_instances + refused_bytes;
+    status.lost = std::max(missing - std::min(missing, explained),
+                           lost_.load(std::memory_order_relaxed));
     status.rejected_samples = rejected_samples_.load(std::memory_order_relaxed);
     status.incompatible = incompatible_.load(std::memory_order_relaxed);
     status.matched = matched_.count();
@@ -224,6 +235,11 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
     Item item;
     item.reception = ReceptionOf(info);
     item.ended = !info.valid_data;
+    missing_.fetch_add(
+        gaps_.Missing(item.reception.writer_id,
+                      info.sample_identity.sequence_number().to64long(),
+                      item.reception.sent_ns),
+        std::memory_order_relaxed);
     if (item.ended) {
       // An end carries a hash of the key: keys_ knows what it stands for.
       const auto found = keys_.find(info.instance_handle);
@@ -298,7 +314,8 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
   std::atomic<int> alive_{0};
   std::atomic<std::uint64_t> received_{0};
   std::atomic<std::uint64_t> ended_{0};
-  std::atomic<std::uint64_t> lost_{0};
+  std::atomic<std::uint64_t> lost_{0};     // As the library counts,
+  std::atomic<std::uint64_t> missing_{0};  // as gaps_ does.
   std::atomic<std::uint64_t> undecodable_{0};
   std::atomic<std::uint64_t> rejected_instances_{0};
   std::atomic<std::uint64_t> rejected_samples_{0};
@@ -307,7 +324,8 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
   std::set<dds::InstanceHandle_t> refused_valves_;
   BoundedQueue<Item> queue_{QueueCapacity(sizeof(Item))};
   std::atomic<bool> pending_{false};
-  std::mutex drain_mutex_;  // Guards wire_ and keys_.
+  std::mutex drain_mutex_;  // Guards what follows.
+  GapCounter gaps_{NowNs()};
   typename Traits::Wire wire_;
   std::unordered_map<dds::InstanceHandle_t, typename Traits::Key, HandleHash>
       keys_;

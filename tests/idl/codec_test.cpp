@@ -1,0 +1,294 @@
+#include "idl/codec.h"
+
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <fastdds/rtps/common/SerializedPayload.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "diagnosis/error.h"
+#include "idl/checked_type.h"
+
+namespace fdi::idl {
+namespace {
+
+using eprosima::fastrtps::rtps::SerializedPayload_t;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Bits of values that a decimal or a float would not survive.
+const double kThird = 1.0 / 3.0;
+const double kSignallingBits = std::bit_cast<double>(0x7FF8'0000'DEAD'BEEFU);
+
+std::uint64_t Bits(double value) {
+  return std::bit_cast<std::uint64_t>(value);
+}
+
+// Through the generated serializer, as on the wire.
+template <typename Message>
+Message RoundTrip(const Message& message) {
+  typename Codec<Message>::Wire out;
+  Codec<Message>::Encode(message, out);
+  CheckedType<typename Codec<Message>::Type> type;
+  SerializedPayload_t payload(type.getSerializedSizeProvider(&out)());
+  EXPECT_TRUE(type.serialize(&out, &payload));
+  typename Codec<Message>::Wire in;
+  EXPECT_TRUE(type.deserialize(&payload, &in));
+  Message result;
+  EXPECT_TRUE(Codec<Message>::Decode(in, result));
+  return result;
+}
+
+ValveSampleMessage SomeSample() {
+  ValveSampleMessage message;
+  message.valve_id = std::string(64, 'v');
+  Sample& sample = message.sample;
+  sample.stamp_ns = -1;
+  sample.source_id = 0xFFFF'FFFF'FFFF'FFFFU;
+  sample.seq = 1U << 31U;
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    sample.values[i] = kThird * static_cast<double>(i + 1);
+    sample.quality[i] = static_cast<SignalQuality>(i % 3);
+  }
+  sample.values[Index(Signal::kX)] = kSignallingBits;
+  sample.values[Index(Signal::kF)] = -0.0;
+  sample.values[Index(Signal::kSp)] = -kInfinity;
+  sample.present = 0x2A5;
+  sample.mode = ValveMode::kCalibrating;
+  sample.flow_unit = FlowUnit::kTPerHour;
+  sample.epoch = 7;
+  return message;
+}
+
+TEST(CodecTest, SamplesArriveBitForBit) {
+  const ValveSampleMessage sent = SomeSample();
+
+  const ValveSampleMessage got = RoundTrip(sent);
+
+  EXPECT_EQ(got.valve_id, sent.valve_id);
+  EXPECT_EQ(got.sample.stamp_ns, sent.sample.stamp_ns);
+  EXPECT_EQ(got.sample.source_id, sent.sample.source_id);
+  EXPECT_EQ(got.sample.seq, sent.sample.seq);
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    EXPECT_EQ(Bits(got.sample.values[i]), Bits(sent.sample.values[i])) << i;
+  }
+  EXPECT_EQ(got.sample.quality, sent.sample.quality);
+  EXPECT_EQ(got.sample.present, sent.sample.present);
+  EXPECT_EQ(got.sample.mode, sent.sample.mode);
+  EXPECT_EQ(got.sample.flow_unit, sent.sample.flow_unit);
+  EXPECT_EQ(got.sample.epoch, sent.sample.epoch);
+}
+
+DecisionMessage FullDecision() {
+  DecisionMessage message;
+  message.valve_id = "V";
+  message.model_hash = 42;
+  message.channel_count = kMaxChannels;
+  message.fault_count = kMaxFaults;
+  message.observer_count = kMaxObservers;
+  Verdict& verdict = message.verdict;
+  verdict.stamp_ns = 5;
+  verdict.source_id = 6;
+  verdict.seq = 7;
+  verdict.intake = Intake::kPeriod;
+  verdict.initialised = true;
+  verdict.quality = Quality::kModelUnsuited;
+  verdict.state = State::kIsolated;
+  verdict.detected = true;
+  verdict.confidence = kThird;
+  verdict.normal_factor = std::nextafter(1.0, 0.0);
+  verdict.isolated = 1ULL << 63U;
+  verdict.residuals.fill(kSignallingBits);
+  verdict.fault_factors.fill(kThird);
+  verdict.strengths.fill(-kThird);
+  verdict.observer_factors.fill(0.1);
+  return message;
+}
+
+TEST(CodecTest, DecisionsOfTheLargestModelSetArriveBitForBit) {
+  const DecisionMessage sent = FullDecision();
+
+  const DecisionMessage got = RoundTrip(sent);
+
+  EXPECT_EQ(got.observer_count, kMaxObservers);
+  EXPECT_EQ(got.fault_count, kMaxFaults);
+  EXPECT_EQ(got.channel_count, kMaxChannels);
+  EXPECT_EQ(got.model_hash, 42U);
+  EXPECT_EQ(got.verdict.intake, Intake::kPeriod);
+  EXPECT_TRUE(got.verdict.initialised);
+  EXPECT_EQ(got.verdict.quality, Quality::kModelUnsuited);
+  EXPECT_EQ(got.verdict.state, State::kIsolated);
+  EXPECT_TRUE(got.verdict.detected);
+  EXPECT_EQ(got.verdict.isolated, sent.verdict.isolated);
+  EXPECT_EQ(Bits(got.verdict.normal_factor), Bits(sent.verdict.normal_factor));
+  EXPECT_EQ(Bits(got.verdict.residuals.back()), Bits(kSignallingBits));
+  EXPECT_EQ(got.verdict.fault_factors, sent.verdict.fault_factors);
+  EXPECT_EQ(got.verdict.strengths, sent.verdict.strengths);
+  EXPECT_EQ(got.verdict.observer_factors, sent.verdict.observer_factors);
+}
+
+// 2 channels, 5 faults, 11 observers: the paper's model set.
+TEST(CodecTest, SmallModelSetsMakeSmallMessages) {
+  DecisionMessage message = FullDecision();
+  message.channel_count = 2;
+  message.fault_count = 5;
+  message.observer_count = 11;
+  v1::DecisionVector wire;
+  Codec<DecisionMessage>::Encode(message, wire);
+
+  EXPECT_LT(v1::DecisionVector::getCdrSerializedSize(wire), 320U);
+  EXPECT_EQ(RoundTrip(message).verdict.observer_factors[11], 0.0);
+}
+
+TEST(CodecTest, FaultEventsArriveWhole) {
+  FaultEventMessage sent;
+  sent.valve_id = "V";
+  sent.source_id = 1;
+  sent.seq = 2;
+  sent.episode_id = 3;
+  sent.transition = {TransitionKind::kClosed, 4, 5, 0b11, kThird, -0.5,
+                     EndReason::kUnknown};
+  sent.candidates = {{19, 0.9, -0.5, true}, {3, 0.4, 0.1, false}};
+  sent.model_set = "set";
+  sent.model_version = 6;
+  sent.model_hash = 7;
+  sent.persisted = true;
+
+  const FaultEventMessage got = RoundTrip(sent);
+
+  EXPECT_EQ(got.episode_id, 3U);
+  EXPECT_EQ(got.seq, 2U);
+  EXPECT_EQ(got.transition.kind, TransitionKind::kClosed);
+  EXPECT_EQ(got.transition.stamp_ns, 4);
+  EXPECT_EQ(got.transition.detection_stamp_ns, 5);
+  EXPECT_EQ(got.transition.faults, 0b11U);
+  EXPECT_EQ(got.transition.factor, kThird);
+  EXPECT_EQ(got.transition.strength, -0.5);
+  EXPECT_EQ(got.transition.reason, EndReason::kUnknown);
+  ASSERT_EQ(got.candidates.size(), 2U);
+  EXPECT_EQ(got.candidates[1].fault, 3);
+  EXPECT_TRUE(got.candidates[0].isolated);
+  EXPECT_EQ(got.model_version, 6);
+  EXPECT_TRUE(got.persisted);
+}
+
+TEST(CodecTest, ModelSetsArriveWhole) {
+  ModelSet models;
+  models.name = "set";
+  models.content_hash = 9;
+  models.version = 2;
+  models.sample_period_s = 0.1;
+  models.channels = {{"X", Signal::kX, -0.5, 0.4}};
+  models.faults = {1, 19};
+  models.observers.resize(2);
+  models.observers[1].name = "f19 0.50";
+  models.observers[1].fault = 19;
+  models.observers[1].strength = -0.5;
+  models.observers[0].channels.resize(1);
+  models.undetectable = {5};
+  models.groups = {{1, 19}, {3}};
+  models.decision.clearing_samples = 61;
+
+  const ModelSetInfoMessage got = RoundTrip(Describe(models));
+
+  EXPECT_EQ(got.model_set, "set");
+  EXPECT_EQ(got.model_hash, 9U);
+  EXPECT_EQ(got.sample_period_s, 0.1);
+  EXPECT_EQ(got.clearing_samples, 61);
+  ASSERT_EQ(got.channels.size(), 1U);
+  EXPECT_EQ(got.channels[0].output, Signal::kX);
+  EXPECT_EQ(got.channels[0].lower_threshold, -0.5);
+  EXPECT_EQ(got.faults, models.faults);
+  ASSERT_EQ(got.observers.size(), 2U);
+  EXPECT_EQ(got.observers[1].name, "f19 0.50");
+  EXPECT_EQ(got.observers[1].strength, -0.5);
+  EXPECT_EQ(got.undetectable, models.undetectable);
+  EXPECT_EQ(got.groups, models.groups);
+}
+
+TEST(CodecTest, MonitorStatusArrivesWhole) {
+  MonitorStatusMessage sent;
+  sent.monitor = "host:1";
+  sent.software = "0.1.0";
+  sent.stamp_ns = 4;
+  sent.health = Health::kDegraded;
+  sent.text = std::string(255, 't');
+  sent.counters = {{"received", 1ULL << 40U}, {"range", 3}};
+
+  const MonitorStatusMessage got = RoundTrip(sent);
+
+  EXPECT_EQ(got.monitor, "host:1");
+  EXPECT_EQ(got.health, Health::kDegraded);
+  EXPECT_EQ(got.text, sent.text);
+  EXPECT_EQ(got.counters, sent.counters);
+}
+
+TEST(CodecTest, ATooLongIdIsRefusedNotCut) {
+  ValveSampleMessage message = SomeSample();
+  message.valve_id += 'v';
+  v1::ValveSample wire;
+
+  EXPECT_THAT([&] { Codec<ValveSampleMessage>::Encode(message, wire); },
+              ThrowsMessage<DataError>(HasSubstr("65 bytes")));
+}
+
+TEST(CodecTest, TooLongTextsAndListsAreRefused) {
+  MonitorStatusMessage status;
+  status.monitor = "m";
+  status.text = std::string(256, 't');
+  v1::MonitorStatus wire;
+  EXPECT_THROW(Codec<MonitorStatusMessage>::Encode(status, wire), DataError);
+  status.text.clear();
+  status.counters.resize(kMaxCounters + 1);
+  EXPECT_THROW(Codec<MonitorStatusMessage>::Encode(status, wire), DataError);
+  status.counters = {{std::string(33, 'c'), 1}};
+  EXPECT_THROW(Codec<MonitorStatusMessage>::Encode(status, wire), DataError);
+}
+
+TEST(CodecTest, EnumeratorsNobodyDefinedAreNotDecoded) {
+  v1::ValveSample wire;
+  Codec<ValveSampleMessage>::Encode(SomeSample(), wire);
+  ValveSampleMessage message;
+  ASSERT_TRUE(Codec<ValveSampleMessage>::Decode(wire, message));
+
+  v1::ValveSample wrong = wire;
+  wrong.quality()[9] = static_cast<v1::SignalQuality>(3);
+  EXPECT_FALSE(Codec<ValveSampleMessage>::Decode(wrong, message));
+  wrong = wire;
+  wrong.mode(static_cast<v1::ValveMode>(5));
+  EXPECT_FALSE(Codec<ValveSampleMessage>::Decode(wrong, message));
+  wrong = wire;
+  wrong.flow_unit(static_cast<v1::FlowUnit>(2));
+  EXPECT_FALSE(Codec<ValveSampleMessage>::Decode(wrong, message));
+  wrong = wire;
+  wrong.present(1U << kSignalCount);
+  EXPECT_FALSE(Codec<ValveSampleMessage>::Decode(wrong, message));
+}
+
+TEST(CodecTest, ArraysBeyondTheirBoundAreNotDecoded) {
+  v1::DecisionVector wire;
+  Codec<DecisionMessage>::Encode(FullDecision(), wire);
+  DecisionMessage message;
+  ASSERT_TRUE(Codec<DecisionMessage>::Decode(wire, message));
+
+  wire.residuals().push_back(0.0);
+  EXPECT_FALSE(Codec<DecisionMessage>::Decode(wire, message));
+}
+
+TEST(CodecTest, BytesThatAreNoMessageAreCountedNotThrown) {
+  CheckedType<v1::DecisionVectorPubSubType> type;
+  v1::DecisionVector wire;
+  SerializedPayload_t payload(32);
+  payload.length = 32;
+  std::fill_n(payload.data, 32, eprosima::fastrtps::rtps::octet{0xFF});
+
+  EXPECT_FALSE(type.deserialize(&payload, &wire));
+  EXPECT_EQ(type.refused(), 1U);
+}
+
+}  // namespace
+}  // namespace fdi::idl

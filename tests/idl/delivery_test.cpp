@@ -1,0 +1,412 @@
+#include <fstream>
+#include <map>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/idl/dds_fixture.h"
+
+namespace fdi::idl {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using std::chrono::steady_clock;
+
+class DeliveryTest : public ::testing::Test {
+ protected:
+  const TestDomain domain_;
+  LogCapture log_;
+};
+
+// Checks that each valve's samples come as 0, 1, 2, ...
+struct OrderCheck {
+  std::map<std::string, std::uint64_t> next;
+  std::uint64_t count{0};
+  std::uint64_t out_of_order{0};
+
+  Handlers<ValveSampleMessage> AsHandlers() {
+    return {[this](const ValveSampleMessage& message, const Reception&) {
+              std::uint64_t& expected = next[message.valve_id];
+              out_of_order += message.sample.seq != expected ? 1 : 0;
+              expected = message.sample.seq + 1;
+              ++count;
+            },
+            nullptr};
+  }
+};
+
+// The library's own limit is ten keys.
+TEST_F(DeliveryTest, EveryOf2500ValvesIsServed) {
+  constexpr int kValves = 2500;
+  DdsOptions options = domain_.Options();
+  options.max_valves = kValves;
+  Participant here(options, log_.Sink());
+  Participant there(options, log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  std::jthread writer([&] {
+    for (std::uint64_t k = 0; k < 4; ++k) {
+      for (int i = 0; i < kValves; ++i) {
+        publisher.Write(SampleOf(ValveName(i), k));
+      }
+    }
+  });
+  OrderCheck check;
+  TakeUntil(subscriber, check.AsHandlers(),
+            [&] { return check.count == 4U * kValves; });
+
+  EXPECT_EQ(check.count, 4U * kValves);
+  EXPECT_EQ(check.next.size(), static_cast<std::size_t>(kValves));
+  EXPECT_EQ(check.out_of_order, 0U);
+  EXPECT_EQ(subscriber.status().rejected_instances, 0U);
+}
+
+TEST_F(DeliveryTest, ValvesBeyondTheLimitAreCountedAndNotServed) {
+  DdsOptions options = domain_.Options();
+  options.max_valves = 5;
+  Participant here(options, log_.Sink());
+  options.max_valves = 8;
+  Participant there(options, log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  for (std::uint64_t k = 0; k < 10; ++k) {
+    for (int i = 0; i < 8; ++i) {
+      ASSERT_EQ(publisher.Write(SampleOf(ValveName(i), k)), WriteResult::kSent);
+    }
+  }
+  OrderCheck check;
+  TakeUntil(subscriber, check.AsHandlers(), [&] {
+    return check.count == 50U && subscriber.status().rejected_instances >= 30U;
+  });
+
+  EXPECT_EQ(check.next.size(), 5U);
+  EXPECT_EQ(check.count, 50U);
+  EXPECT_EQ(subscriber.status().refused_valves, 3U);
+  EXPECT_EQ(subscriber.status().rejected_instances, 30U);
+}
+
+TEST_F(DeliveryTest, APublisherRefusesValvesBeyondItsNumber) {
+  Participant participant(domain_.Options(), log_.Sink());
+  Publisher<ValveSampleMessage> publisher(participant, {Profile::kLossless, 2});
+
+  EXPECT_EQ(publisher.Write(SampleOf("a", 0)), WriteResult::kSent);
+  EXPECT_EQ(publisher.Write(SampleOf("b", 0)), WriteResult::kSent);
+  EXPECT_EQ(publisher.Write(SampleOf("c", 0)), WriteResult::kTooManyValves);
+  EXPECT_EQ(publisher.Write(SampleOf("a", 1)), WriteResult::kSent);
+  EXPECT_EQ(publisher.status().refused, 1U);
+  EXPECT_EQ(publisher.status().written, 3U);
+}
+
+// The consumer takes nothing until the writer has had to wait; then all comes.
+TEST_F(DeliveryTest, ASlowReaderPacesALosslessWriter) {
+  constexpr std::uint64_t kSamples = 120000;
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here, Profile::kLossless);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless, 1});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  std::uint64_t sent = 0;
+  while (publisher.Write(SampleOf("v", sent), {}, milliseconds(300)) ==
+         WriteResult::kSent) {
+    ++sent;
+    ASSERT_LT(sent, kSamples) << "nothing held the writer up";
+  }
+  EXPECT_GT(sent, 10000U);
+  std::jthread writer([&, sent] {
+    for (std::uint64_t k = sent; k < kSamples; ++k) {
+      publisher.Write(SampleOf("v", k));
+    }
+  });
+  OrderCheck check;
+  TakeUntil(subscriber, check.AsHandlers(),
+            [&] { return check.count == kSamples; });
+
+  EXPECT_EQ(check.count, kSamples);
+  EXPECT_EQ(check.out_of_order, 0U);
+  EXPECT_EQ(subscriber.status().lost, 0U);
+  EXPECT_EQ(subscriber.status().received, kSamples);
+}
+
+TEST_F(DeliveryTest, AStopEndsAWriteThatWaits) {
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here, Profile::kLossless);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless, 1});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  WriteResult last = WriteResult::kSent;
+  std::jthread writer([&](const std::stop_token& stop) {
+    for (std::uint64_t k = 0; last == WriteResult::kSent; ++k) {
+      last = publisher.Write(SampleOf("v", k), stop);
+    }
+  });
+  while (publisher.status().retries == 0) {
+    std::this_thread::yield();
+  }
+  writer.request_stop();
+  writer.join();
+
+  EXPECT_EQ(last, WriteResult::kNotSent);
+}
+
+TEST_F(DeliveryTest, WhatALiveWriterOverwritesIsCountedAsLost) {
+  constexpr std::uint64_t kSamples = 200000;
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLive, 1});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  bool newest = false;
+  std::uint64_t got = 0;
+  const Handlers<ValveSampleMessage> handlers{
+      [&](const ValveSampleMessage& message, const Reception&) {
+        ++got;
+        newest = message.sample.seq == kSamples - 1;
+      },
+      nullptr};
+  publisher.Write(SampleOf("v", 0));
+  ASSERT_TRUE(TakeUntil(subscriber, handlers, [&] { return got == 1; }));
+
+  for (std::uint64_t k = 1; k < kSamples; ++k) {
+    ASSERT_EQ(publisher.Write(SampleOf("v", k)), WriteResult::kSent);
+  }
+  TakeUntil(subscriber, handlers, [&] { return newest; });
+
+  EXPECT_TRUE(newest);
+  EXPECT_EQ(got + subscriber.status().lost, kSamples);
+}
+
+DecisionMessage DecisionOf(const std::string& valve, std::uint64_t seq) {
+  DecisionMessage message;
+  message.valve_id = valve;
+  message.fault_count = 5;
+  message.verdict.seq = seq;
+  return message;
+}
+
+TEST_F(DeliveryTest, ALateJoinerHasTheLastDecisionOfEveryValve) {
+  constexpr int kValves = 300;
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Publisher<DecisionMessage> publisher(there);
+  for (std::uint64_t k = 0; k < 5; ++k) {
+    for (int i = 0; i < kValves; ++i) {
+      ASSERT_EQ(publisher.Write(DecisionOf(ValveName(i), k)),
+                WriteResult::kSent);
+    }
+  }
+
+  Subscriber<DecisionMessage> late(here);
+  std::map<std::string, std::uint64_t> seen;
+  std::size_t count = 0;
+  const Handlers<DecisionMessage> handlers{
+      [&](const DecisionMessage& message, const Reception&) {
+        seen[message.valve_id] = message.verdict.seq;
+        ++count;
+      },
+      nullptr};
+  TakeUntil(late, handlers, [&] { return seen.size() == kValves; });
+
+  ASSERT_EQ(seen.size(), static_cast<std::size_t>(kValves));
+  EXPECT_EQ(count, static_cast<std::size_t>(kValves));
+  for (const auto& [valve, seq] : seen) {
+    EXPECT_EQ(seq, 4U) << valve;
+  }
+}
+
+TEST_F(DeliveryTest, ADecisionSubscriberThatSleepsNeverHoldsTheWriterUp) {
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Subscriber<DecisionMessage> sleeper(here);
+  Publisher<DecisionMessage> publisher(there);
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  const auto start = steady_clock::now();
+  for (std::uint64_t k = 0; k < 2000; ++k) {
+    for (int i = 0; i < 20; ++i) {
+      ASSERT_EQ(publisher.Write(DecisionOf(ValveName(i), k)),
+                WriteResult::kSent);
+    }
+  }
+
+  EXPECT_EQ(publisher.status().retries, 0U);
+  EXPECT_LT(steady_clock::now() - start, seconds(20));
+}
+
+TEST_F(DeliveryTest, LosslessDecisionsAllArrive) {
+  constexpr std::uint64_t kSamples = 1000;
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Subscriber<DecisionMessage> subscriber(here, Profile::kLossless);
+  Publisher<DecisionMessage> publisher(there, {Profile::kLossless});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  std::jthread writer([&] {
+    for (std::uint64_t k = 0; k < kSamples; ++k) {
+      for (int i = 0; i < 20; ++i) {
+        publisher.Write(DecisionOf(ValveName(i), k));
+      }
+    }
+  });
+  std::map<std::string, std::uint64_t> next;
+  std::uint64_t count = 0;
+  std::uint64_t out_of_order = 0;
+  const Handlers<DecisionMessage> handlers{
+      [&](const DecisionMessage& message, const Reception&) {
+        std::uint64_t& expected = next[message.valve_id];
+        out_of_order += message.verdict.seq != expected ? 1 : 0;
+        expected = message.verdict.seq + 1;
+        ++count;
+      },
+      nullptr};
+  TakeUntil(subscriber, handlers, [&] { return count == 20 * kSamples; });
+
+  EXPECT_EQ(count, 20 * kSamples);
+  EXPECT_EQ(out_of_order, 0U);
+}
+
+TEST_F(DeliveryTest, AnEndedStreamIsSeenBehindItsLastSample) {
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  publisher.Write(SampleOf("goes", 0));
+  publisher.Write(SampleOf("stays", 0));
+  publisher.Write(SampleOf("goes", 1));
+  publisher.Dispose(SampleOf("goes", 0));
+  publisher.Write(SampleOf("stays", 1));
+  std::vector<std::string> events;
+  const Handlers<ValveSampleMessage> handlers{
+      [&](const ValveSampleMessage& message, const Reception&) {
+        events.push_back(message.valve_id + std::to_string(message.sample.seq));
+      },
+      [&](const ValveSampleMessage& message, const Reception&) {
+        events.push_back(message.valve_id + " ended");
+      }};
+  TakeUntil(subscriber, handlers, [&] { return events.size() >= 5; });
+
+  EXPECT_THAT(events, ::testing::ElementsAre("goes0", "stays0", "goes1",
+                                             "goes ended", "stays1"));
+  EXPECT_EQ(subscriber.status().ended, 1U);
+}
+
+TEST_F(DeliveryTest, AnEndedValveMayComeBack) {
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  publisher.Write(SampleOf("v", 0));
+  publisher.Dispose(SampleOf("v", 0));
+  publisher.Write(SampleOf("v", 1));
+  publisher.Dispose(SampleOf("v", 0));
+  int messages = 0;
+  int ends = 0;
+  const Handlers<ValveSampleMessage> handlers{
+      [&](const ValveSampleMessage&, const Reception&) { ++messages; },
+      [&](const ValveSampleMessage&, const Reception&) { ++ends; }};
+  TakeUntil(subscriber, handlers, [&] { return messages + ends == 4; });
+
+  EXPECT_EQ(messages, 2);
+  EXPECT_EQ(ends, 2);
+}
+
+TEST_F(DeliveryTest, ATakeHandsOutNoMoreThanItsLimit) {
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+  for (std::uint64_t k = 0; k < 10; ++k) {
+    publisher.Write(SampleOf("v", k));
+  }
+  ASSERT_TRUE(publisher.WaitForAcknowledged(kPatience));
+
+  OrderCheck check;
+  EXPECT_EQ(subscriber.Take(check.AsHandlers(), kPatience, 3), 3);
+  EXPECT_EQ(check.count, 3U);
+  EXPECT_EQ(subscriber.Take(check.AsHandlers(), kPatience), 7);
+}
+
+TEST_F(DeliveryTest, AnInterruptWakesATakeThatWaits) {
+  Participant participant(domain_.Options(), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(participant);
+  const auto start = steady_clock::now();
+
+  std::jthread waker([&] { subscriber.Interrupt(); });
+
+  EXPECT_EQ(subscriber.Take({}, kPatience), 0);
+  EXPECT_LT(steady_clock::now() - start, kPatience / 2);
+}
+
+TEST_F(DeliveryTest, DomainsDoNotMeet) {
+  const TestDomain other;
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(other.Options(), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  Publisher<ValveSampleMessage> publisher(there);
+
+  EXPECT_FALSE(publisher.WaitForReaders(1, seconds(2)));
+  EXPECT_EQ(subscriber.status().matched, 0);
+}
+
+TEST_F(DeliveryTest, SharedMemoryDeliversToo) {
+  DdsOptions options = domain_.Options();
+  options.transport = "shm";
+  Participant here(options, log_.Sink());
+  Participant there(options, log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  publisher.Write(SampleOf("v", 0));
+  OrderCheck check;
+  EXPECT_TRUE(TakeUntil(subscriber, check.AsHandlers(),
+                        [&] { return check.count == 1; }));
+}
+
+long ResidentKilobytes() {
+  std::ifstream file("/proc/self/status");
+  for (std::string word; file >> word;) {
+    if (word == "VmRSS:") {
+      long kilobytes = 0;
+      file >> kilobytes;
+      return kilobytes;
+    }
+  }
+  return -1;
+}
+
+// With the library's own memory policy the writer of decisions alone would take
+// some 230 MB at creation.
+TEST_F(DeliveryTest, NoMemoryIsTakenForValvesThatAreNotThere) {
+  DdsOptions options = domain_.Options();
+  options.max_valves = 100000;
+  Participant participant(options, log_.Sink());
+  const long before = ResidentKilobytes();
+
+  Publisher<ValveSampleMessage> samples_out(participant);
+  Publisher<ValveSampleMessage> all_out(participant, {Profile::kLossless});
+  Subscriber<ValveSampleMessage> samples_in(participant);
+  Publisher<DecisionMessage> decisions_out(participant);
+  Subscriber<DecisionMessage> decisions_in(participant, Profile::kLossless);
+  Publisher<FaultEventMessage> events_out(participant);
+  Subscriber<FaultEventMessage> events_in(participant);
+
+  ASSERT_GT(before, 0);
+  EXPECT_LT(ResidentKilobytes() - before, 10000);
+}
+
+}  // namespace
+}  // namespace fdi::idl

@@ -1,0 +1,125 @@
+#include <cstdio>
+#include <fstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/idl/dds_fixture.h"
+
+namespace fdi::idl {
+namespace {
+
+using ::testing::HasSubstr;
+
+class QosTest : public ::testing::Test {
+ protected:
+  ~QosTest() override { std::remove(path_.c_str()); }
+
+  // Options with a file that makes the named writer best effort.
+  DdsOptions WithBestEffortWriter() {
+    std::ofstream(path_)
+        << "<?xml version=\"1.0\"?>\n<profiles xmlns=\"http://"
+           "www.eprosima.com/XMLSchemas/fastRTPS_Profiles\">"
+           "<data_writer profile_name=\"fdi_valve_sample_writer\"><qos>"
+           "<reliability><kind>BEST_EFFORT</kind></reliability></qos>"
+           "</data_writer></profiles>";
+    DdsOptions options = domain_.Options();
+    options.qos_file = path_;
+    return options;
+  }
+
+  const std::string path_ =
+      ::testing::TempDir() + "fdi_qos_" + std::to_string(getpid()) + ".xml";
+  const TestDomain domain_;
+  LogCapture log_here_;
+  LogCapture log_there_;
+};
+
+TEST_F(QosTest, IncompatibleQosIsLoggedWithBothSides) {
+  Participant here(domain_.Options(), log_here_.Sink());
+  Participant there(WithBestEffortWriter(), log_there_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  Publisher<ValveSampleMessage> publisher(there);
+
+  EXPECT_TRUE(log_here_.WaitFor(
+      "qos_incompatible topic=fdi/v1/ValveSample policy=RELIABILITY "
+      "requested_here=RELIABLE offered_there=BEST_EFFORT"))
+      << log_here_.text();
+  EXPECT_TRUE(log_there_.WaitFor(
+      "qos_incompatible topic=fdi/v1/ValveSample policy=RELIABILITY "
+      "offered_here=BEST_EFFORT requested_there=RELIABLE"))
+      << log_there_.text();
+  EXPECT_EQ(subscriber.status().incompatible, 1U);
+  EXPECT_EQ(publisher.status().incompatible, 1U);
+  EXPECT_EQ(subscriber.status().matched, 0);
+}
+
+// The library's default would be ten valves again.
+TEST_F(QosTest, AFileAboutReliabilityLeavesTheLimitsAlone) {
+  Participant here(domain_.Options(), log_here_.Sink());
+  Participant there(WithBestEffortWriter(), log_there_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here, Profile::kBestEffort);
+  Publisher<ValveSampleMessage> publisher(there);
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  int count = 0;
+  const Handlers<ValveSampleMessage> handlers{
+      [&](const ValveSampleMessage&, const Reception&) { ++count; }, nullptr};
+  for (int i = 0; i < 50; ++i) {
+    ASSERT_EQ(publisher.Write(SampleOf(ValveName(i), 0)), WriteResult::kSent);
+  }
+  TakeUntil(subscriber, handlers, [&] { return count == 50; });
+
+  EXPECT_EQ(count, 50);
+}
+
+TEST_F(QosTest, TwoParticipantsMayUseTheSameFile) {
+  const DdsOptions options = WithBestEffortWriter();
+  Participant here(options);
+  EXPECT_NO_THROW(Participant there(options));
+}
+
+TEST_F(QosTest, BestEffortIsAProfileOfBothEnds) {
+  Participant here(domain_.Options(), log_here_.Sink());
+  Participant there(domain_.Options(), log_there_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here, Profile::kBestEffort);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kBestEffort});
+
+  EXPECT_TRUE(publisher.WaitForReaders(1, kPatience));
+}
+
+// A process that hangs stays matched; what it owes is a status now and then.
+TEST_F(QosTest, AMonitorThatFallsSilentIsNoticed) {
+  Participant here(domain_.Options(), log_here_.Sink());
+  Participant there(domain_.Options(), log_there_.Sink());
+  Subscriber<MonitorStatusMessage> subscriber(here);
+  Publisher<MonitorStatusMessage> publisher(there);
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  MonitorStatusMessage status;
+  status.monitor = "m";
+  publisher.Write(status);
+  ASSERT_TRUE(TakeUntil<MonitorStatusMessage>(
+      subscriber, {}, [&] { return subscriber.status().alive == 1; }));
+
+  EXPECT_TRUE(TakeUntil<MonitorStatusMessage>(
+      subscriber, {}, [&] { return subscriber.status().alive == 0; }));
+  EXPECT_EQ(subscriber.status().matched, 1);
+}
+
+TEST_F(QosTest, APublisherThatEndsIsUnmatched) {
+  Participant here(domain_.Options(), log_here_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here);
+  {
+    Participant there(domain_.Options(), log_there_.Sink());
+    Publisher<ValveSampleMessage> publisher(there);
+    ASSERT_TRUE(subscriber.WaitForWriters(1, kPatience));
+  }
+
+  EXPECT_TRUE(TakeUntil<ValveSampleMessage>(
+      subscriber, {}, [&] { return subscriber.status().matched == 0; }));
+}
+
+}  // namespace
+}  // namespace fdi::idl
