@@ -259,11 +259,25 @@ void Database::BackupTo(const std::filesystem::path& target) {
   if (std::filesystem::exists(target)) {
     Refuse(path_, "backup " + target.string() + " exists already");
   }
-  SqliteCall("VACUUM INTO", [&] {
-    SQLite::Statement statement(*connection_, "VACUUM INTO ?");
-    statement.bind(1, target.string());
-    statement.exec();
-  });
+  // A copy is a write to SQLite: lift the lock of a reader for it.
+  const bool reader = access_ == Access::kReader;
+  try {
+    if (reader) {
+      Execute("PRAGMA query_only = OFF");
+    }
+    SqliteCall("VACUUM INTO", [&] {
+      SQLite::Statement statement(*connection_, "VACUUM INTO ?");
+      statement.bind(1, target.string());
+      statement.exec();
+    });
+    if (reader) {
+      Execute("PRAGMA query_only = ON");
+    }
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(target, ignored);
+    throw;
+  }
 }
 
 std::vector<std::string> Database::Check() {

@@ -1,0 +1,181 @@
+#include <charconv>
+#include <cmath>
+#include <iostream>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+
+#include "storage/app/common.h"
+#include "storage/app/episode_plot.h"
+#include "storage/app/history_options.h"
+#include "storage/app/verbs.h"
+#include "storage/history.h"
+
+namespace fdi::storage {
+namespace {
+
+using cli::Context;
+
+// Quoted if it must be (RFC 4180).
+std::string Cell(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) {
+    return text;
+  }
+  std::string cell = "\"";
+  for (const char c : text) {
+    cell += c == '"' ? "\"\"" : std::string(1, c);
+  }
+  return cell + '"';
+}
+
+// Reads back as the same bits.
+std::string Cell(double value) {
+  if (std::isnan(value)) {
+    return "nan";
+  }
+  char text[64];
+  const auto end = std::to_chars(text, text + sizeof text, value);
+  return {text, end.ptr};
+}
+
+void WriteEpisodes(const std::vector<Episode>& episodes, std::ostream& out) {
+  out << "episode_id,valve_id,detected_utc,isolated_utc,cleared_utc,fault,"
+         "peak_factor,model_set,end_reason,label,acked_by\n";
+  for (const Episode& e : episodes) {
+    out << e.episode_id << ',' << Cell(e.valve_id) << ',' << e.detected_utc
+        << ',' << e.isolated_utc.value_or("") << ','
+        << e.cleared_utc.value_or("") << ',' << e.fault.value_or("") << ','
+        << Cell(e.peak_factor) << ',' << Cell(e.model_set) << ','
+        << e.end_reason.value_or("") << ',' << e.label.value_or("") << ','
+        << Cell(e.acked_by.value_or("")) << '\n';
+  }
+}
+
+// Heading of a signal, as in the CSV contract.
+std::string Heading(Signal signal, FlowUnit flow_unit) {
+  const std::string name(SignalName(signal));
+  if (signal == Signal::kF) {
+    return name + (flow_unit == FlowUnit::kM3PerHour ? "_m3_h" : "_t_h");
+  }
+  const std::string unit(SignalUnit(signal));
+  return name + (unit == "%" ? "_pct" : unit.empty() ? "" : "_" + unit);
+}
+
+void WriteTrace(const Episode& episode, const std::vector<TraceInstant>& trace,
+                std::ostream& out) {
+  SignalMask present = 0;
+  for (const TraceInstant& instant : trace) {
+    present =
+        static_cast<SignalMask>(present | instant.received.sample.present);
+  }
+  out << "t_s,stamp_ns,seq,intake,quality,state";
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    if ((present >> i & 1U) != 0) {
+      out << ',' << Heading(static_cast<Signal>(i), episode.flow_unit);
+    }
+  }
+  for (const std::string& channel : episode.channels) {
+    out << ",r_" << channel;
+  }
+  out << ",d_0";
+  for (const std::string& fault : episode.faults) {
+    out << ",d_" << fault;
+  }
+  out << '\n';
+  for (const TraceInstant& instant : trace) {
+    const Sample& sample = instant.received.sample;
+    out << Cell(static_cast<double>(sample.stamp_ns - episode.detected_ns) /
+                1e9)
+        << ',' << sample.stamp_ns << ',' << sample.seq << ','
+        << IntakeName(instant.received.intake) << ','
+        << QualityName(instant.quality) << ',' << StateName(instant.state);
+    for (std::size_t i = 0; i < kSignalCount; ++i) {
+      if ((present >> i & 1U) != 0) {
+        out << ','
+            << (sample.Has(static_cast<Signal>(i)) ? Cell(sample.values[i])
+                                                   : "nan");
+      }
+    }
+    for (const double residual : instant.residuals) {
+      out << ',' << Cell(residual);
+    }
+    out << ',' << Cell(instant.normal_factor);
+    for (const double factor : instant.fault_factors) {
+      out << ',' << Cell(factor);
+    }
+    out << '\n';
+  }
+}
+
+struct ExportOptions {
+  std::string id;
+  std::string output{"-"};
+  HistoryOptions filter;
+};
+
+int Export(const ExportOptions& options, const Context& context) {
+  HistoryReader reader(DataOf(context).history());
+  if (options.id.empty()) {
+    const auto episodes = reader.List(options.filter.Filter(context));
+    WriteOutput(options.output,
+                [&](std::ostream& out) { WriteEpisodes(episodes, out); });
+  } else {
+    const Episode episode = reader.Show(options.id);
+    const auto trace = reader.Trace(episode.id);
+    WriteOutput(options.output,
+                [&](std::ostream& out) { WriteTrace(episode, trace, out); });
+  }
+  return cli::kExitOk;
+}
+
+struct PlotArguments {
+  std::string id;
+  std::string output;
+  PlotOptions options;
+};
+
+int Plot(const PlotArguments& arguments, const Context& context) {
+  HistoryReader reader(DataOf(context).history());
+  const Episode episode = reader.Show(arguments.id);
+  const std::filesystem::path path =
+      arguments.output.empty() ? episode.episode_id + ".png" : arguments.output;
+  PlotEpisode(episode, reader.Trace(episode.id), path, arguments.options);
+  if (context.options.json) {
+    cli::PrintJson(std::cout, {{"episode_id", episode.episode_id},
+                               {"file", path.string()}});
+  } else {
+    std::cout << "drawn to " << path.string() << '\n';
+  }
+  return cli::kExitOk;
+}
+
+}  // namespace
+
+void AddEvidenceVerbs(cli::Program& program) {
+  CLI::App& group = *program.root().get_subcommand("history");
+  auto options = std::make_shared<ExportOptions>();
+  CLI::App& exporting = program.AddVerb(
+      group, "export",
+      "Write as CSV the list of episodes, or the trace of one of them",
+      [options](const Context& c) { return Export(*options, c); });
+  exporting.add_option("episode", options->id,
+                       "ID, a unique beginning of it, or last");
+  exporting.add_option("--output", options->output, "File, or - for stdout");
+  options->filter.AddTo(exporting);
+
+  auto arguments = std::make_shared<PlotArguments>();
+  CLI::App& plot = program.AddVerb(
+      group, "plot", "Draw the evidence of an episode with gnuplot",
+      [arguments](const Context& c) { return Plot(*arguments, c); });
+  plot.add_option("episode", arguments->id,
+                  "ID, a unique beginning of it, or last")
+      ->required();
+  plot.add_option("--output", arguments->output,
+                  "FILE.png or FILE.svg (ID.png)");
+  plot.add_option("--from", arguments->options.from_s,
+                  "From so many s after detection on");
+  plot.add_option("--to", arguments->options.to_s,
+                  "Up to so many s after detection");
+}
+
+}  // namespace fdi::storage

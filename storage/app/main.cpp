@@ -1,0 +1,15 @@
+#include "storage/app/verbs.h"
+#include "storage/cli/program.h"
+
+int main(int argc, char** argv) {
+  fdi::cli::Program program(
+      "fdi-store",
+      "Runs, model sets, valves and the fault history of the data directory");
+  fdi::storage::AddRunsVerbs(program);
+  fdi::storage::AddModelsVerbs(program);
+  fdi::storage::AddValvesVerbs(program);
+  fdi::storage::AddHistoryVerbs(program);
+  fdi::storage::AddEvidenceVerbs(program);
+  fdi::storage::AddMaintenanceVerbs(program);
+  return program.Run(argc, argv);
+}

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "storage/cli/program.h"
+
+namespace fdi::storage {
+
+// Each adds the verbs of one group of fdi-store.
+void AddRunsVerbs(cli::Program& program);     ///< runs list|show|import|...
+void AddModelsVerbs(cli::Program& program);   ///< models list|show|...
+void AddValvesVerbs(cli::Program& program);   ///< valves list|show|add|...
+void AddHistoryVerbs(cli::Program& program);  ///< history list|show|ack|...
+/// history export|plot; after AddHistoryVerbs().
+void AddEvidenceVerbs(cli::Program& program);
+void AddMaintenanceVerbs(cli::Program& program);  ///< doctor, backup, migrate
+
+}  // namespace fdi::storage
