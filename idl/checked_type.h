@@ -3,13 +3,16 @@
 #include <atomic>
 #include <cstdint>
 #include <exception>
+#include <mutex>
 
 #include <fastdds/dds/topic/TypeSupport.hpp>
 
 namespace fdi::idl {
 
 /// A generated type that survives foreign bytes: what cannot be deserialized,
-/// for whatever reason, is refused and counted.
+/// for whatever reason, is refused and counted. And one that the endpoints of a
+/// participant can share: generated types compute keys in a buffer of their
+/// own, from which two threads got each other's keys.
 template <typename Generated>
 class CheckedType : public Generated {
  public:
@@ -26,11 +29,18 @@ class CheckedType : public Generated {
     return false;
   }
 
+  bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle,
+              bool force_md5) override {
+    const std::lock_guard lock(key_mutex_);
+    return Generated::getKey(data, handle, force_md5);
+  }
+
   std::uint64_t refused() const {
     return refused_.load(std::memory_order_relaxed);
   }
 
  private:
+  std::mutex key_mutex_;
   std::atomic<std::uint64_t> refused_{0};
 };
 

@@ -1,8 +1,10 @@
 #include "idl/codec.h"
 
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <thread>
 
 #include <fastdds/rtps/common/SerializedPayload.h>
 #include <gmock/gmock.h>
@@ -288,6 +290,28 @@ TEST(CodecTest, BytesThatAreNoMessageAreCountedNotThrown) {
 
   EXPECT_FALSE(type.deserialize(&payload, &wire));
   EXPECT_EQ(type.refused(), 1U);
+}
+
+TEST(CodecTest, ThreadsThatShareATypeGetTheirOwnKeys) {
+  CheckedType<v1::ValveSamplePubSubType> type;
+  std::atomic<int> wrong{0};
+  const auto compute = [&](const std::string& valve) {
+    v1::ValveSample sample;
+    sample.valve_id() = valve;
+    eprosima::fastrtps::rtps::InstanceHandle_t first;
+    v1::ValveSamplePubSubType().getKey(&sample, &first, false);
+    for (int i = 0; i < 20000; ++i) {
+      eprosima::fastrtps::rtps::InstanceHandle_t handle;
+      type.getKey(&sample, &handle, false);
+      wrong += handle == first ? 0 : 1;
+    }
+  };
+  {
+    const std::jthread one(compute, "one");
+    const std::jthread two(compute, "two");
+  }
+
+  EXPECT_EQ(wrong, 0);
 }
 
 }  // namespace
