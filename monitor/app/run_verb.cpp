@@ -13,7 +13,7 @@ namespace {
 
 struct RunArguments {
   std::string model_set;
-  std::string record;
+  std::string record{"off"};
   ServiceOptions service;
 };
 
@@ -42,12 +42,11 @@ void AddRunVerb(cli::Program& program) {
   run.add_option("--model-set", arguments->model_set,
                  "NAME[@VERSION] for valves that none is assigned to; without "
                  "it the only active one, if no valve is assigned any");
-  run.add_option("--record", arguments->record,
-                 "Store the samples as runs; =lossless waits for the disk "
-                 "instead of counting what it could not take")
-      ->expected(0, 1)
-      ->default_str("on")
-      ->check(CLI::IsMember({"on", "lossless"}));
+  run.add_flag("--record{on}", arguments->record,
+               "Store the samples as runs; =lossless waits for the disk "
+               "instead of counting what it could not take")
+      ->default_str("off")
+      ->check(CLI::IsMember({"off", "on", "lossless"}));
   ServiceOptions& service = arguments->service;
   run.add_option("--valves", service.valves, "Serve only ids that match GLOB")
       ->capture_default_str();

@@ -1,0 +1,184 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "monitor/sinks.h"
+
+/// Sinks that remember, wait or fail as a test wants. Thread safe.
+namespace fdi::monitor {
+
+/// Waits for a condition that other threads bring about; 20 s at most.
+class Notice {
+ public:
+  template <typename Change>
+  void Apply(Change&& change) {
+    const std::lock_guard lock(mutex_);
+    change();
+    changed_.notify_all();
+  }
+  template <typename Condition>
+  bool Await(Condition&& condition) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, std::chrono::seconds(20), condition);
+  }
+  template <typename Read>
+  auto Look(Read&& read) {
+    const std::lock_guard lock(mutex_);
+    return read();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+};
+
+class FixedResolver : public ModelResolver {
+ public:
+  explicit FixedResolver(std::shared_ptr<const ModelSet> models)
+      : models_(std::move(models)) {}
+  std::shared_ptr<const ModelSet> ModelsFor(
+      std::string_view valve_id) const override {
+    if (valve_id.starts_with("broken")) {
+      throw std::runtime_error("CRC");
+    }
+    return valve_id.starts_with("bare") ? nullptr : models_;
+  }
+
+ private:
+  std::shared_ptr<const ModelSet> models_;
+};
+
+class FakeBus : public DecisionSink, public EventSink {
+ public:
+  struct Decision {
+    std::string valve_id;
+    std::uint64_t seq;
+    std::uint64_t model_hash;
+    Quality quality;
+  };
+
+  bool Publish(const std::string& valve_id, const ModelSet* models,
+               const Verdict& verdict) override {
+    notice.Await([this] { return !held; });
+    notice.Apply([&] {
+      decisions.push_back({valve_id, verdict.seq,
+                           models != nullptr ? models->content_hash : 0,
+                           verdict.quality});
+    });
+    return true;
+  }
+  bool Publish(const EpisodeEvent& event, bool persisted) override {
+    notice.Apply([&] {
+      events.emplace_back(event.transition.kind, persisted);
+      event_times.push_back(std::chrono::steady_clock::now());
+    });
+    return true;
+  }
+
+  Notice notice;
+  bool held{false};
+  std::vector<Decision> decisions;
+  std::vector<std::pair<TransitionKind, bool>> events;
+  std::vector<std::chrono::steady_clock::time_point> event_times;
+};
+
+class FakeHistory : public HistorySink {
+ public:
+  void Record(const EpisodeEvent& event) override {
+    notice.Await([this] { return !stuck; });
+    notice.Apply([&] {
+      ++attempts;
+      FailIfBroken();
+      ++recorded[{event.episode_id, event.transition.kind}];
+    });
+  }
+  void Resume(std::uint64_t /*id*/, std::int64_t /*stamp*/) override {
+    notice.Apply([&] { FailIfBroken(); });
+  }
+  void AddTrace(const EpisodeTrace& trace) override {
+    notice.Apply([&] {
+      FailIfBroken();
+      trace_points += trace.trace.size();
+    });
+  }
+  void AddGap(const DataGap& gap) override {
+    notice.Apply([&] {
+      FailIfBroken();
+      gaps.push_back(gap);
+    });
+  }
+  void MarkSent(const EpisodeEvent& /*event*/) override {
+    notice.Apply([&] {
+      FailIfBroken();
+      ++sent;
+    });
+  }
+  void Commit() override {
+    notice.Apply([&] { FailIfBroken(); });
+  }
+
+  Notice notice;
+  bool broken{false};
+  bool stuck{false};
+  int attempts{0};
+  std::map<std::pair<std::uint64_t, TransitionKind>, int> recorded;
+  std::vector<DataGap> gaps;
+  std::size_t trace_points{0};
+  int sent{0};
+
+ private:
+  void FailIfBroken() const {
+    if (broken) {
+      throw std::runtime_error("disk is full");
+    }
+  }
+};
+
+class FakeRuns : public SampleSink {
+ public:
+  void Append(const ReceivedSample& sample) override {
+    notice.Await([this] { return !held; });
+    notice.Apply([&] {
+      if (sample.ended) {
+        ++ends;
+      } else {
+        pending.push_back(sample);
+      }
+    });
+  }
+  void Commit() override {
+    notice.Apply([&] {
+      if (broken) {
+        throw std::runtime_error("disk is full");
+      }
+      stored.insert(stored.end(), pending.begin(), pending.end());
+      pending.clear();
+    });
+  }
+  std::uint64_t DropPending() override {
+    std::uint64_t dropped = 0;
+    notice.Apply([&] {
+      dropped = pending.size();
+      pending.clear();
+    });
+    return dropped;
+  }
+  void Close() override { Commit(); }
+  std::uint64_t recorded() const override { return stored.size(); }
+
+  Notice notice;
+  bool held{false};
+  bool broken{false};
+  int ends{0};
+  std::vector<ReceivedSample> pending;
+  std::vector<ReceivedSample> stored;
+};
+
+}  // namespace fdi::monitor

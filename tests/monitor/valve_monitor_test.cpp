@@ -1,0 +1,309 @@
+#include "monitor/valve_monitor.h"
+
+#include <algorithm>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/monitor/linear_models.h"
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::seconds;
+using testing::ElementsAre;
+
+class Notebook : public EpisodeOutlet {
+ public:
+  void Event(EpisodeEvent event) override {
+    events.push_back(std::move(event));
+  }
+  void Evidence(EpisodeTrace trace) override {
+    complete = complete || trace.complete;
+    for (TracePoint& point : trace.trace.Unpack()) {
+      evidence.emplace_back(trace.episode_id, std::move(point));
+    }
+  }
+  void Gap(DataGap gap) override { gaps.push_back(std::move(gap)); }
+  void Resumed(const OpenEpisode& episode, std::int64_t /*stamp*/) override {
+    resumed.push_back(episode.episode_id);
+  }
+
+  std::vector<TransitionKind> Kinds() const {
+    std::vector<TransitionKind> kinds;
+    for (const EpisodeEvent& event : events) {
+      kinds.push_back(event.transition.kind);
+    }
+    return kinds;
+  }
+
+  std::vector<EpisodeEvent> events;
+  std::vector<std::pair<std::uint64_t, TracePoint>> evidence;
+  std::vector<DataGap> gaps;
+  std::vector<std::uint64_t> resumed;
+  bool complete{false};
+};
+
+class ValveMonitorTest : public testing::Test {
+ protected:
+  static constexpr std::uint64_t kWriter = 77;
+
+  ValveOutcome Feed(const Sample& sample, std::uint64_t writer = kWriter) {
+    return valve_.Step(sample, writer, now_, notebook_);
+  }
+  // Samples [from, to) with X off by `offset`.
+  void Feed(std::uint64_t from, std::uint64_t to, double offset = 0.0,
+            std::uint64_t source = 1) {
+    for (std::uint64_t k = from; k < to; ++k) {
+      Feed(PlantSample(k, offset, source));
+    }
+  }
+  OpenEpisode LeftOpen() const {
+    OpenEpisode episode;
+    episode.valve_id = "V1";
+    episode.source_id = 1;
+    episode.detection_stamp_ns = PlantSample(100).stamp_ns;
+    episode.episode_id = EpisodeId("V1", 1, episode.detection_stamp_ns);
+    episode.last_stamp_ns = PlantSample(120).stamp_ns;
+    episode.isolated = true;
+    episode.faults = 0b10;
+    episode.candidates = {{7, 1.0, 1.0, true}};
+    episode.model_hash = 0x1234;
+    return episode;
+  }
+
+  ValveMonitor::TimePoint now_{};
+  Notebook notebook_;
+  ValveMonitor valve_{"V1", SharedLinearModels(), {}};
+};
+
+TEST_F(ValveMonitorTest, AFaultIsDetectedIsolatedAndClearedAsOneEpisode) {
+  Feed(0, 100);
+  Feed(100, 150, kF7Offset);
+  Feed(150, 200);
+
+  EXPECT_THAT(notebook_.Kinds(),
+              ElementsAre(TransitionKind::kDetected, TransitionKind::kIsolated,
+                          TransitionKind::kCleared, TransitionKind::kClosed));
+  const std::uint64_t id = EpisodeId("V1", 1, PlantSample(100).stamp_ns);
+  for (const EpisodeEvent& event : notebook_.events) {
+    EXPECT_EQ(event.episode_id, id);
+  }
+  ASSERT_FALSE(notebook_.events[1].candidates.empty());
+  EXPECT_EQ(notebook_.events[1].candidates.front().fault, 7);
+  EXPECT_TRUE(notebook_.events[1].candidates.front().isolated);
+  EXPECT_EQ(notebook_.events[3].transition.reason, EndReason::kCleared);
+}
+
+TEST_F(ValveMonitorTest, EvidenceRunsFromBeforeDetectionToTheEndWithoutHoles) {
+  Feed(0, 100);
+  Feed(100, 150, kF7Offset);
+  Feed(150, 200);
+
+  ASSERT_TRUE(notebook_.complete);
+  const std::uint64_t last =
+      notebook_.evidence.back().second.sample.seq;  // the clearing sample
+  ASSERT_EQ(notebook_.evidence.size(), last + 1);
+  for (std::size_t k = 0; k < notebook_.evidence.size(); ++k) {
+    EXPECT_EQ(notebook_.evidence[k].second.sample.seq, k);
+  }
+  EXPECT_EQ(PlantSample(last).stamp_ns,
+            notebook_.events.back().transition.stamp_ns);
+}
+
+TEST_F(ValveMonitorTest, EvidenceEndsTenMinutesAfterIsolation) {
+  Feed(0, 100);
+  Feed(100, 1500, kF7Offset);
+
+  ASSERT_TRUE(notebook_.complete);
+  const std::int64_t isolated = notebook_.events.at(1).transition.stamp_ns;
+  EXPECT_NEAR(static_cast<double>(
+                  notebook_.evidence.back().second.sample.stamp_ns - isolated),
+              600e9, 1.1e9);
+}
+
+TEST_F(ValveMonitorTest, ASupersededEpisodeBelongsToItsOwnSource) {
+  Feed(0, 100);
+  Feed(100, 120, kF7Offset);
+  Feed(0, 5, 0.0, 2);
+
+  const EpisodeEvent& closed = notebook_.events.back();
+  EXPECT_EQ(closed.transition.kind, TransitionKind::kClosed);
+  EXPECT_EQ(closed.transition.reason, EndReason::kSuperseded);
+  EXPECT_EQ(closed.source_id, 1U);
+  EXPECT_EQ(closed.episode_id, EpisodeId("V1", 1, PlantSample(100).stamp_ns));
+  for (const auto& [episode, point] : notebook_.evidence) {
+    EXPECT_EQ(point.sample.source_id, 1U);
+  }
+}
+
+TEST_F(ValveMonitorTest, TheEndOfTheStreamClosesTheEpisode) {
+  Feed(0, 100);
+  Feed(100, 120, kF7Offset);
+
+  EXPECT_TRUE(valve_.EndStream(kWriter, notebook_));
+
+  EXPECT_EQ(notebook_.events.back().transition.reason, EndReason::kStreamEnded);
+  EXPECT_FALSE(valve_.episode_open());
+}
+
+TEST_F(ValveMonitorTest, AnEarlierPublisherCannotEndTheStreamOfItsSuccessor) {
+  Feed(0, 50);
+  for (std::uint64_t k = 0; k < 5; ++k) {
+    Feed(PlantSample(k, 0.0, 2), kWriter + 1);
+  }
+
+  EXPECT_FALSE(valve_.EndStream(kWriter, notebook_));
+  EXPECT_TRUE(valve_.EndStream(kWriter + 1, notebook_));
+}
+
+TEST_F(ValveMonitorTest, ThreeSilentPeriodsMakeAValveStaleUntilItSpeaks) {
+  Feed(0, 10);
+
+  EXPECT_FALSE(valve_.CheckStale(now_ + seconds(3)));
+  EXPECT_TRUE(valve_.CheckStale(now_ + std::chrono::milliseconds(3001)));
+  EXPECT_FALSE(valve_.CheckStale(now_ + seconds(5)));
+  EXPECT_TRUE(valve_.stale());
+  Feed(10, 11);
+  EXPECT_FALSE(valve_.stale());
+}
+
+TEST_F(ValveMonitorTest, ALongSilenceClosesTheEpisode) {
+  Feed(0, 100);
+  Feed(100, 120, kF7Offset);
+  ASSERT_TRUE(valve_.CheckStale(now_ + seconds(10)));
+
+  valve_.CheckTimeout(now_ + seconds(59), seconds(60), notebook_);
+  EXPECT_TRUE(valve_.episode_open());
+  valve_.CheckTimeout(now_ + seconds(61), seconds(60), notebook_);
+
+  EXPECT_EQ(notebook_.events.back().transition.reason,
+            EndReason::kStaleTimeout);
+}
+
+TEST_F(ValveMonitorTest, AnotherModelSetClosesTheEpisodeAndSettles) {
+  Feed(0, 100);
+  Feed(100, 120, kF7Offset);
+
+  ASSERT_TRUE(valve_.Adopt(SharedLinearModels(0x99), notebook_));
+  const ValveOutcome first = Feed(PlantSample(120, kF7Offset));
+
+  EXPECT_EQ(notebook_.events.back().transition.reason,
+            EndReason::kModelChanged);
+  EXPECT_EQ(notebook_.events.back().model_hash, 0x1234U);
+  EXPECT_TRUE(first.model_swapped);
+  EXPECT_EQ(first.models->content_hash, 0x99U);
+  EXPECT_EQ(first.verdict.quality, Quality::kSettling);
+  EXPECT_FALSE(Feed(PlantSample(121)).model_swapped);
+  EXPECT_EQ(Feed(PlantSample(121)).verdict.intake, Intake::kRepeat);
+}
+
+TEST_F(ValveMonitorTest, TheSameModelSetAgainChangesNothing) {
+  Feed(0, 100);
+  Feed(100, 120, kF7Offset);
+
+  EXPECT_FALSE(valve_.Adopt(SharedLinearModels(), notebook_));
+  EXPECT_TRUE(valve_.episode_open());
+}
+
+TEST_F(ValveMonitorTest, WithoutAModelSetAValveIsListedAndNotDiagnosed) {
+  ValveMonitor bare("V2", nullptr, {});
+  const ValveOutcome outcome =
+      bare.Step(PlantSample(5, kF7Offset), 1, now_, notebook_);
+
+  EXPECT_EQ(outcome.models, nullptr);
+  EXPECT_EQ(outcome.verdict.quality, Quality::kUnassigned);
+  EXPECT_EQ(outcome.verdict.seq, 5U);
+  ASSERT_TRUE(bare.Adopt(SharedLinearModels(), notebook_));
+  EXPECT_NE(bare.Step(PlantSample(6), 1, now_, notebook_).models, nullptr);
+}
+
+TEST_F(ValveMonitorTest, AnOpenEpisodeGoesOnUnderItsIdAfterARestart) {
+  valve_.Recover(LeftOpen());
+  Feed(150, 200, kF7Offset);  // f7 acts from the first sample on.
+  Feed(200, 250);
+
+  // Observers without lags see the fault at once after settling.
+  EXPECT_THAT(notebook_.resumed, ElementsAre(LeftOpen().episode_id));
+  EXPECT_THAT(notebook_.Kinds(),
+              ElementsAre(TransitionKind::kCleared, TransitionKind::kClosed));
+  EXPECT_EQ(notebook_.events[0].episode_id, LeftOpen().episode_id);
+  EXPECT_EQ(notebook_.events[0].transition.detection_stamp_ns,
+            LeftOpen().detection_stamp_ns);
+  ASSERT_EQ(notebook_.gaps.size(), 1U);
+  EXPECT_EQ(notebook_.gaps[0].reason, "monitor_down");
+  EXPECT_EQ(notebook_.gaps[0].from_ns, PlantSample(120).stamp_ns);
+  EXPECT_EQ(notebook_.gaps[0].to_ns, PlantSample(150).stamp_ns);
+}
+
+TEST_F(ValveMonitorTest, AResumedEpisodeWithAnotherFaultIsReisolated) {
+  valve_.Recover(LeftOpen());
+  Feed(150, 200, kF1Offset);
+
+  EXPECT_THAT(notebook_.Kinds(), ElementsAre(TransitionKind::kReisolated));
+  EXPECT_EQ(notebook_.events[0].candidates.front().fault, 1);
+}
+
+TEST_F(ValveMonitorTest, ANormalMinuteAfterARestartClosesTheEpisodeUnknown) {
+  valve_.Recover(LeftOpen());
+  Feed(150, 210);
+  EXPECT_TRUE(notebook_.events.empty());
+  Feed(210, 212);
+
+  ASSERT_EQ(notebook_.events.size(), 1U);
+  EXPECT_EQ(notebook_.events[0].transition.reason, EndReason::kUnknown);
+  EXPECT_EQ(notebook_.events[0].episode_id, LeftOpen().episode_id);
+  Feed(212, 230, kF7Offset);
+  EXPECT_EQ(notebook_.events[1].transition.kind, TransitionKind::kDetected);
+  EXPECT_NE(notebook_.events[1].episode_id, LeftOpen().episode_id);
+}
+
+TEST_F(ValveMonitorTest, AnotherSourceDoesNotResumeTheEpisode) {
+  valve_.Recover(LeftOpen());
+  Feed(0, 30, kF7Offset, 5);
+
+  EXPECT_TRUE(notebook_.resumed.empty());
+  EXPECT_EQ(notebook_.events[0].transition.reason, EndReason::kUnknown);
+}
+
+TEST_F(ValveMonitorTest, AnotherModelSetDoesNotResumeTheEpisode) {
+  OpenEpisode episode = LeftOpen();
+  episode.model_hash = 0x77;
+  valve_.Recover(episode);
+  Feed(150, 180, kF7Offset);
+
+  EXPECT_TRUE(notebook_.resumed.empty());
+  EXPECT_EQ(notebook_.events[0].transition.reason, EndReason::kModelChanged);
+}
+
+TEST_F(ValveMonitorTest, ASilentValveGivesItsOpenEpisodeUp) {
+  valve_.Recover(LeftOpen());
+  const std::int64_t now_ns = PlantSample(500).stamp_ns;
+
+  valve_.GiveUpRecovery(now_ns, notebook_);
+  valve_.GiveUpRecovery(now_ns, notebook_);
+
+  ASSERT_EQ(notebook_.events.size(), 1U);
+  EXPECT_EQ(notebook_.events[0].transition.reason, EndReason::kUnknown);
+  ASSERT_EQ(notebook_.gaps.size(), 1U);
+  EXPECT_EQ(notebook_.gaps[0].to_ns, now_ns);
+}
+
+TEST_F(ValveMonitorTest, MissingAndUnusableSamplesAreGaps) {
+  Feed(0, 50);
+  Feed(60, 80);
+  for (std::uint64_t k = 80; k < 90; ++k) {
+    Feed(BadSample(k));
+  }
+  Feed(90, 95);
+  Feed(97, 99);  // Two samples missing are none.
+
+  ASSERT_EQ(notebook_.gaps.size(), 2U);
+  EXPECT_EQ(notebook_.gaps[0].reason, "stream");
+  EXPECT_EQ(notebook_.gaps[0].from_ns, PlantSample(49).stamp_ns);
+  EXPECT_EQ(notebook_.gaps[0].to_ns, PlantSample(60).stamp_ns);
+  EXPECT_EQ(notebook_.gaps[1].reason, "bad_input");
+}
+
+}  // namespace
+}  // namespace fdi::monitor
