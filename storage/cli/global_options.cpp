@@ -59,6 +59,9 @@ void AddGlobalOptions(CLI::App& app, GlobalOptions& options) {
   app.add_flag("--json", options.json, "One JSON object on stdout");
   app.add_flag("--utc", options.utc, "Times in UTC, not in the local zone");
   AddLogLevel(app, options);
+  for (CLI::Option* option : app.get_options()) {
+    option->take_last();  // So that a script's options can be overridden.
+  }
   app.config_formatter(std::make_shared<TomlConfig>());
   app.allow_config_extras(CLI::config_extras_mode::error);
   app.set_config("--config", "", "TOML file: option = value, [verb] tables")

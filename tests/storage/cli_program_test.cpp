@@ -78,6 +78,14 @@ TEST(ProgramTest, GlobalOptionsAreAcceptedBeforeAndAfterTheVerb) {
   EXPECT_TRUE(after.options.json);
 }
 
+TEST(ProgramTest, LaterOfTwoGlobalOptionsCounts) {
+  const Outcome outcome =
+      RunProgram({"--domain", "7", "greet", "--domain", "8"});
+
+  EXPECT_EQ(outcome.code, kExitOk) << outcome.err;
+  EXPECT_EQ(outcome.options.domain, 8);
+}
+
 TEST(ProgramTest, LoopbackAndLocalDataAreTheDefaults) {
   unsetenv("FDI_DATA");
   const Outcome outcome = RunProgram({"greet"});

@@ -1,0 +1,391 @@
+// Runs the built program: exit codes, messages, JSON keys, nothing stored.
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+
+#include "storage/runs.h"
+#include "tests/storage/history_fixture.h"
+
+namespace fdi::storage {
+namespace {
+
+using nlohmann::json;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+struct Outcome {
+  int code{-1};
+  std::string out;
+  std::string err;
+};
+
+class FdiStoreTest : public HistoryFixture {
+ protected:
+  static std::string Slurp(const std::filesystem::path& path) {
+    std::ostringstream text;
+    text << std::ifstream(path, std::ios::binary).rdbuf();
+    return text.str();
+  }
+
+  // In the fresh folder, which is the data directory too.
+  Outcome Store(const std::string& arguments,
+                const std::string& environment = "TZ=UTC") {
+    const std::string command =
+        "cd " + directory_.path().string() + " && " + environment + " " +
+        FDI_STORE_PROGRAM + " --data . " + arguments + " >out.txt 2>err.txt";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1,
+            Slurp(directory_.path() / "out.txt"),
+            Slurp(directory_.path() / "err.txt")};
+  }
+  json StoreJson(const std::string& arguments) {
+    const Outcome outcome = Store(arguments + " --json");
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return outcome.code == 0 ? json::parse(outcome.out) : json();
+  }
+
+  void Write(const std::string& name, const std::string& text) {
+    std::ofstream(directory_.path() / name) << text;
+  }
+  bool RunsAreStored() const {
+    return std::filesystem::exists(directory_.path() / "runs.db");
+  }
+  static std::vector<std::string> KeysOf(const json& object) {
+    std::vector<std::string> keys;
+    for (const auto& [key, value] : object.items()) {
+      keys.push_back(key);
+    }
+    return keys;
+  }
+  static std::string Rows(int count, int first = 0) {
+    std::string rows;
+    for (int t = first; t < first + count; ++t) {
+      rows += std::to_string(t) + ",40.5,3500,2600,130,41,22.25\n";
+    }
+    return rows;
+  }
+
+  const std::string header_ = "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h\n";
+};
+
+TEST_F(FdiStoreTest, ImportedRunIsListedAndExportedAsItWas) {
+  Write("a.csv", header_ + Rows(5));
+
+  const json imported = StoreJson("runs import a.csv --valve LV-1");
+
+  EXPECT_EQ(imported["samples"], 5);
+  EXPECT_EQ(imported["flow_unit"], "t/h");
+  EXPECT_EQ(imported["period_s"], 1.0);
+  const std::string id = imported["run_id"];
+  EXPECT_EQ(id.size(), 12U);
+  const json listed = StoreJson("runs list");
+  ASSERT_EQ(listed["runs"].size(), 1U);
+  EXPECT_EQ(listed["runs"][0]["run_id"], id);
+  EXPECT_EQ(Store("runs export " + id).out, header_ + Rows(5));
+  EXPECT_EQ(Store("runs export " + id + "@1:3").out, header_ + Rows(2, 1));
+}
+
+TEST_F(FdiStoreTest, CsvWithoutAColumnIsRefusedAndNothingIsStored) {
+  Write("a.csv", "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,F_t_h\n0,1,2,3,4,5\n");
+
+  const Outcome outcome = Store("runs import a.csv --valve LV-1");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("a.csv"), HasSubstr("X_pct")));
+  EXPECT_FALSE(RunsAreStored());
+}
+
+TEST_F(FdiStoreTest, TextInANumberIsRefusedWithItsLine) {
+  Write("a.csv", header_ + Rows(3) + "3,40.5,3500,x12,130,41,22\n");
+
+  const Outcome outcome = Store("runs import a.csv --valve LV-1");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("a.csv:5"), HasSubstr("P2_kPa")));
+  EXPECT_FALSE(RunsAreStored());
+}
+
+TEST_F(FdiStoreTest, JumpInTimeIsRefusedUnlessGapsMaySplitTheRun) {
+  Write("a.csv", header_ + Rows(5) + Rows(4, 10));
+
+  const Outcome outcome = Store("runs import a.csv --valve LV-1");
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("a.csv:7"));
+  EXPECT_FALSE(RunsAreStored());
+
+  const json split = StoreJson("runs import a.csv --valve LV-1 --split-gaps");
+  ASSERT_EQ(split["runs"].size(), 2U);
+  EXPECT_EQ(split["runs"][0]["samples"], 5);
+  EXPECT_EQ(split["runs"][1]["samples"], 4);
+  EXPECT_EQ(split["samples"], 9);
+}
+
+TEST_F(FdiStoreTest, EmptyFileIsRefused) {
+  Write("empty.csv", "");
+  Write("header.csv", header_);
+
+  for (const char* file : {"empty.csv", "header.csv"}) {
+    const Outcome outcome =
+        Store("runs import " + std::string(file) + " --valve LV-1");
+    EXPECT_EQ(outcome.code, 3);
+    EXPECT_THAT(outcome.err, HasSubstr(file));
+  }
+  EXPECT_FALSE(RunsAreStored());
+}
+
+TEST_F(FdiStoreTest, MapGivesForeignColumnsTheirSignalUnitAndSense) {
+  Write("foreign.csv",
+        "ms,MV,PI1,PI2,TI,ZI,FI\n0,59.5,35,26,403.15,0.59,6\n"
+        "1000,59.5,35,26,403.15,0.59,6\n");
+  Write("tags.toml",
+        "[time]\ncolumn = \"ms\"\nunit = \"ms\"\n"
+        "[signal.CV]\ncolumn = \"MV\"\nsense = \"opening\"\n"
+        "[signal.P1]\ncolumn = \"PI1\"\nunit = \"bar\"\n"
+        "[signal.P2]\ncolumn = \"PI2\"\nunit = \"bar\"\n"
+        "[signal.T1]\ncolumn = \"TI\"\nunit = \"K\"\n"
+        "[signal.X]\ncolumn = \"ZI\"\nunit = \"1\"\nsense = \"opening\"\n"
+        "[signal.F]\ncolumn = \"FI\"\nunit = \"kg/s\"\nscale = 2\n");
+
+  const json run =
+      StoreJson("runs import foreign.csv --valve V --map tags.toml");
+
+  const std::string id = run["run_id"];
+  EXPECT_EQ(run["flow_unit"], "t/h");
+  std::istringstream lines(Store("runs export " + id).out);
+  std::string header;
+  std::string row;
+  std::getline(lines, header);
+  std::getline(lines, row);
+  std::replace(row.begin(), row.end(), ',', ' ');
+  std::istringstream cells(row);
+  std::vector<double> values((std::istream_iterator<double>(cells)), {});
+  using testing::DoubleNear;
+  EXPECT_THAT(values,
+              ElementsAre(0.0, DoubleNear(40.5, 1e-9), DoubleNear(3500, 1e-9),
+                          DoubleNear(2600, 1e-9), DoubleNear(130, 1e-9),
+                          DoubleNear(41, 1e-9), DoubleNear(43.2, 1e-9)));
+}
+
+TEST_F(FdiStoreTest, UnknownKeyOrUnitInAMapIsAConfigurationError) {
+  Write("a.csv", header_ + Rows(5));
+  Write("key.toml", "[signal.CV]\ncolumn = \"CV_pct\"\nscal = 2.0\n");
+  Write("unit.toml", "[signal.P1]\ncolumn = \"P1_kPa\"\nunit = \"psi\"\n");
+
+  const Outcome key = Store("runs import a.csv --valve V --map key.toml");
+  const Outcome unit = Store("runs import a.csv --valve V --map unit.toml");
+
+  EXPECT_EQ(key.code, 2);
+  EXPECT_THAT(key.err, HasSubstr("key.toml:3: unknown key 'scal'"));
+  EXPECT_EQ(unit.code, 2);
+  EXPECT_THAT(unit.err, AllOf(HasSubstr("psi"), HasSubstr("kPa Pa bar MPa")));
+  EXPECT_FALSE(RunsAreStored());
+}
+
+TEST_F(FdiStoreTest, UsageErrorsExitWithTwo) {
+  EXPECT_EQ(Store("runs list --no-such-option").code, 2);
+  EXPECT_EQ(Store("runs").code, 2);
+  EXPECT_EQ(Store("history lsit").code, 2);
+  EXPECT_EQ(Store("runs import a.csv").code, 2);  // --valve is missing.
+  EXPECT_EQ(Store("runs list --since yesterday").code, 2);
+  Write("bad.toml", "domian = 3\n");
+  const Outcome outcome = Store("runs list --config bad.toml");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("unknown key 'domian'"));
+}
+
+TEST_F(FdiStoreTest, WhatIsNotThereExitsWithFive) {
+  Write("a.csv", header_ + Rows(5));
+  Store("runs import a.csv --valve LV-1");
+  Store("valves add LV-1");
+  { HistoryWriter writer(path_); }
+
+  EXPECT_EQ(Store("runs show 0123456789ab").code, 5);
+  EXPECT_EQ(Store("runs import no.csv --valve LV-1").code, 5);
+  EXPECT_EQ(Store("models show nothing").code, 5);
+  EXPECT_EQ(Store("models activate nothing@1").code, 5);
+  EXPECT_EQ(Store("valves show PV-9").code, 5);
+  EXPECT_EQ(Store("valves assign LV-1 nothing").code, 5);
+  EXPECT_EQ(Store("history show 0123456789abcdef").code, 5);
+  EXPECT_EQ(Store("history ack last").code, 5);
+}
+
+TEST_F(FdiStoreTest, DataDirectoryThatIsAFileExitsWithThree) {
+  Write("a.csv", header_ + Rows(5));
+  Write("file", "");
+
+  const Outcome outcome = Store("runs import a.csv --valve V --data ./file");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("file"));
+}
+
+TEST_F(FdiStoreTest, DatabaseOfANewerVersionIsRefusedWithBothVersions) {
+  Schema newer = RunsSchema();
+  const auto version = newer.migrations.size();
+  newer.migrations.push_back("CREATE TABLE later (x INTEGER) STRICT;");
+  { Database(directory_.path() / "runs.db", newer, Access::kWriter); }
+
+  const Outcome outcome = Store("runs list");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("version " + std::to_string(version + 1)),
+                    HasSubstr("up to " + std::to_string(version))));
+}
+
+TEST_F(FdiStoreTest, LabelsAreShownAndRemoved) {
+  Write("a.csv", header_ + Rows(5));
+  const std::string id =
+      StoreJson("runs import a.csv --valve V --assume-normal")["run_id"];
+  EXPECT_EQ(Store("runs label " + id + "@2:4 F7 --strength 0.5").code, 0);
+
+  const json labels = StoreJson("runs show " + id)["labels"];
+  ASSERT_EQ(labels.size(), 2U);
+  EXPECT_EQ(labels[0]["fault"], "normal");
+  EXPECT_EQ(labels[1]["fault"], "f7");
+  EXPECT_EQ(labels[1]["from_s"], 2.0);
+
+  EXPECT_EQ(Store("runs label " + id + " --remove").code, 0);
+  EXPECT_THAT(StoreJson("runs show " + id)["labels"], IsEmpty());
+  EXPECT_EQ(Store("runs delete " + id).code, 0);
+  EXPECT_THAT(StoreJson("runs list")["runs"], IsEmpty());
+}
+
+TEST_F(FdiStoreTest, ValvesAreDescribedAndTheirEpochCounts) {
+  EXPECT_EQ(Store("valves add 'LV-*' --flow-unit t/h --sense opening").code, 0);
+  EXPECT_EQ(Store("valves event 'LV-*'").code, 0);
+
+  const json valve = StoreJson("valves show LV-7");
+
+  EXPECT_EQ(valve["valve"], "LV-*");
+  EXPECT_EQ(valve["flow_unit"], "t/h");
+  EXPECT_EQ(valve["sense"], "opening");
+  EXPECT_EQ(valve["epoch"], 1);
+  EXPECT_TRUE(valve["diagnosed_with"].is_null());
+}
+
+class FdiStoreHistoryTest : public FdiStoreTest {
+ protected:
+  FdiStoreHistoryTest() {
+    HistoryWriter writer(path_);
+    writer.Record(Event(TransitionKind::kDetected, 0, 0, 0.3));
+    writer.AppendTrace(Id(), Instants(100, -20));
+    writer.Record(Event(TransitionKind::kIsolated, 20, 0b010, 0.8));
+    writer.EndSession(kDetected, true);
+  }
+};
+
+TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
+  const json listed = StoreJson("history list");
+
+  ASSERT_EQ(listed["episodes"].size(), 1U);
+  const json& episode = listed["episodes"][0];
+  EXPECT_THAT(KeysOf(episode),
+              testing::UnorderedElementsAre(
+                  "episode_id", "valve_id", "detected_utc", "isolated_utc",
+                  "cleared_utc", "fault", "peak_factor", "model_set",
+                  "end_reason", "label", "acked_by"));
+  EXPECT_EQ(episode["fault"], "f7");
+  EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
+  EXPECT_TRUE(episode["cleared_utc"].is_null());
+}
+
+TEST_F(FdiStoreHistoryTest, FiltersReachTheQuery) {
+  const auto count = [this](const std::string& arguments) {
+    return StoreJson("history list " + arguments)["episodes"].size();
+  };
+
+  EXPECT_EQ(count("--fault f7"), 1U);
+  EXPECT_EQ(count("--fault paper5"), 0U);
+  EXPECT_EQ(count("--valve 'PV*'"), 0U);
+  EXPECT_EQ(count("--since 2026-11-20T14:56:12Z"), 0U);
+  EXPECT_EQ(count("--until 2026-11-20T14:56:12Z"), 1U);
+  EXPECT_EQ(count("--state isolated"), 1U);
+  EXPECT_EQ(Store("history list --state odd").code, 2);
+  EXPECT_EQ(Store("history list --fault f20").code, 2);
+}
+
+TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
+  EXPECT_EQ(Store("history ack last --by anna --comment 'seat worn'").code, 0);
+  EXPECT_EQ(Store("history label last f1 --by jan").code, 0);
+
+  const json shown = StoreJson("history show last");
+  EXPECT_EQ(shown["acked_by"], "anna");
+  EXPECT_EQ(shown["label"], "f1");
+  EXPECT_EQ(shown["events"].back()["kind"], "LABEL");
+  EXPECT_EQ(shown["trace_instants"], 100);
+  const json statistics = StoreJson("history stats")["statistics"];
+  EXPECT_EQ(statistics[0]["labelled_false"], 1);
+  EXPECT_EQ(Store("history label last perhaps").code, 2);
+}
+
+TEST_F(FdiStoreHistoryTest, TraceIsExportedWithAColumnPerChannelAndFault) {
+  const Outcome outcome = Store("history export last");
+
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out,
+              testing::StartsWith("t_s,stamp_ns,seq,intake,quality,state,"
+                                  "CV_pct,X_pct,F_m3_h,r_X,r_F,d_0,d_f1,d_f7,"
+                                  "d_f19\n-20,"));
+  EXPECT_EQ(std::count(outcome.out.begin(), outcome.out.end(), '\n'), 101);
+}
+
+TEST_F(FdiStoreHistoryTest, PlotIsAPictureOrAClearError) {
+  const Outcome missing =
+      Store("history plot last --output a.png", "PATH=/nowhere");
+  EXPECT_EQ(missing.code, 1);
+  EXPECT_THAT(missing.err, HasSubstr("gnuplot cannot run"));
+  EXPECT_EQ(Store("history plot last --output a.bmp").code, 2);
+  if (std::system("gnuplot --version >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "gnuplot is not installed";
+  }
+
+  EXPECT_EQ(Store("history plot last --output a.png").code, 0);
+
+  EXPECT_EQ(Slurp(directory_.path() / "a.png").substr(1, 3), "PNG");
+}
+
+TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
+  const json report = StoreJson("doctor");
+
+  EXPECT_EQ(report["sound"], true);
+  ASSERT_EQ(report["databases"].size(), 3U);
+  EXPECT_EQ(report["databases"][0]["present"], false);
+  EXPECT_EQ(report["databases"][2]["version"], 1);
+  EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
+  EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
+}
+
+TEST_F(FdiStoreHistoryTest, DoctorExitsWithThreeOnADamagedFile) {
+  const auto size = std::filesystem::file_size(path_);
+  std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(4096 * 2);
+  for (std::uintmax_t at = 4096 * 2; at < size; ++at) {
+    file.put('\x5A');
+  }
+  file.close();
+
+  const Outcome outcome = Store("doctor --json");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(json::parse(outcome.out)["sound"], false);
+}
+
+TEST_F(FdiStoreHistoryTest, BackupIsACompleteCopyAndNeverOverwrites) {
+  EXPECT_EQ(Store("backup copy").code, 0);
+
+  EXPECT_EQ(HistoryReader(directory_.path() / "copy/history.db").List().size(),
+            1U);
+  EXPECT_EQ(Store("backup copy").code, 3);
+}
+
+}  // namespace
+}  // namespace fdi::storage
