@@ -4,12 +4,18 @@
 #include <cmath>
 
 namespace fdi {
+namespace {
+
+int CountOf(double fraction, int samples) {
+  return static_cast<int>(std::ceil(fraction * samples - 1e-9));
+}
+
+}  // namespace
 
 IsolationWindow::IsolationWindow(const DecisionParameters& parameters)
     : length_(parameters.isolation_samples),
-      needed_(static_cast<int>(std::ceil(parameters.isolation_fraction *
-                                             parameters.isolation_samples -
-                                         1e-9))),
+      needed_(CountOf(parameters.isolation_fraction, length_)),
+      joining_(CountOf(parameters.join_fraction, length_)),
       ring_(static_cast<std::size_t>(length_), 0),
       counts_(kMaxFaults, 0) {}
 
@@ -34,16 +40,17 @@ void IsolationWindow::Push(FaultSet above_threshold) {
 }
 
 FaultSet IsolationWindow::Supported() const {
-  FaultSet supported = 0;
+  FaultSet supporting = 0;
+  FaultSet joining = 0;
   if (filled_ < length_) {
-    return supported;
+    return 0;
   }
   for (int i = 0; i < kMaxFaults; ++i) {
-    if (counts_[static_cast<std::size_t>(i)] >= needed_) {
-      supported |= FaultSet{1} << i;
-    }
+    const int count = counts_[static_cast<std::size_t>(i)];
+    supporting |= count >= needed_ ? FaultSet{1} << i : 0;
+    joining |= count >= joining_ ? FaultSet{1} << i : 0;
   }
-  return supported;
+  return supporting != 0 ? joining : 0;
 }
 
 }  // namespace fdi

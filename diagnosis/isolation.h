@@ -6,9 +6,11 @@
 
 namespace fdi {
 
-/// Counts over the last samples of an open episode which faults kept a factor
-/// of at least T, and holds the isolated set: the faults that did so in at
-/// least the isolation fraction of the last t_k samples.
+/// Counts over the last t_k samples of an open episode which faults had a
+/// factor of at least T. Faults that had it in at least the isolation fraction
+/// of them support a set; those that had it in at least the join fraction join
+/// it, so that noise on the factor of one fault does not leave its neighbour
+/// alone.
 class IsolationWindow {
  public:
   explicit IsolationWindow(const DecisionParameters& parameters);
@@ -22,6 +24,7 @@ class IsolationWindow {
  private:
   int length_;
   int needed_;
+  int joining_;
   int filled_{0};
   int next_{0};
   std::vector<FaultSet> ring_;

@@ -21,6 +21,8 @@ void ValidateDecision(const ModelSet& models) {
         "isolation threshold T must be in (0, 1)");
   Check(p.isolation_fraction > 0.0 && p.isolation_fraction <= 1.0, models,
         "isolation fraction must be in (0, 1]");
+  Check(p.join_fraction > 0.0 && p.join_fraction <= p.isolation_fraction,
+        models, "join fraction must be in (0, isolation fraction]");
   Check(p.detection_samples >= 1 && p.detection_samples <= 1000, models,
         "n_d must be in 1..1000");
   Check(p.isolation_samples >= 1 && p.isolation_samples <= 10000, models,

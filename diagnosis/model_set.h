@@ -61,7 +61,9 @@ struct DecisionParameters {
   int detection_samples{2};         ///< n_d
   int isolation_samples{20};        ///< t_k
   double isolation_fraction{0.9};   ///< Share of t_k samples with d ≥ T.
-  int clearing_samples{60};         ///< t_c
+  double join_fraction{0.75};  ///< Faults with d ≥ T in this share of the t_k
+                               ///< samples join a set that others support.
+  int clearing_samples{60};    ///< t_c
   int settling_samples{30};
   double evidence_window{120.0};  ///< Memory of evidence [samples].
   double evidence_core{3.0};      ///< Behind the best fault by up to this: 1,

@@ -84,7 +84,9 @@ TailThreshold FitTail(std::span<const double> series, double rate,
   const double reach = std::abs(tail.shape) < 1e-6
                            ? std::log(ratio)
                            : (std::pow(ratio, tail.shape) - 1.0) / tail.shape;
-  tail.level = tail.base + tail.scale * std::max(0.0, reach);
+  // No data of some hours support a level that they themselves exceed.
+  tail.level = tail.base + std::max(tail.scale * std::max(0.0, reach),
+                                    maxima.back() + tail.scale);
   tail.rate_upper = rate * (1.0 + kUpperBound / std::sqrt(n));
   return tail;
 }

@@ -24,8 +24,8 @@ struct TailThreshold {
 /// shrunk towards 0, the exponential tail, with n/(n + 50) for n clusters and
 /// kept within [-0.1, 0.3] (-0.1 is what a Gaussian shows between its 95 %
 /// quantile and 1e-7); σ is taken at its 95 % upper bound, mean excess times
-/// 1 + 1.645/√n. Exceedances less than `separation` samples apart
-/// are one cluster.
+/// 1 + 1.645/√n. The level is at least σ beyond the largest value. Exceedances
+/// less than `separation` samples apart are one cluster.
 ///
 /// @param series in its order of time; at least 100 values.
 /// @param rate in (0, 0.01] [1/sample].

@@ -138,14 +138,14 @@ class Collector {
 
   void FindSimulated(std::size_t i, const SimulatedRun& run) {
     const std::string scenario = simulator::ScenarioText(run.scenario);
-    const auto found = std::find_if(
-        known_.begin(), known_.end(), [&](const RunInfo& info) {
+    const auto found =
+        std::find_if(known_.begin(), known_.end(), [&](const RunInfo& info) {
           return info.run.origin == RunOrigin::kSimulated &&
                  info.run.scenario == scenario &&
                  info.run.seed == run.scenario.config.seed &&
                  info.run.software == options_.software &&
-                 info.state == storage::RunState::kComplete &&
-                 info.has_truth && info.labels.empty();
+                 info.state == storage::RunState::kComplete && info.has_truth &&
+                 info.labels.empty();
         });
     if (found != known_.end()) {
       ids_[i] = found->id;

@@ -138,8 +138,8 @@ void PrintSummary(std::ostream& out, const std::vector<EvaluatedRun>& runs) {
                 std::to_string(s.fault_free_episodes) + " in " +
                     FormatNumber(s.fault_free_hours, 2) + " h"});
   if (const auto unlabelled = CountUnlabelled(runs); unlabelled > 0) {
-    table.AddRow({"runs without truth, not counted",
-                  std::to_string(unlabelled)});
+    table.AddRow(
+        {"runs without truth, not counted", std::to_string(unlabelled)});
   }
   out << '\n';
   table.Print(out);
@@ -156,9 +156,9 @@ void PrintConfusion(std::ostream& out, const ConfusionMatrix& matrix) {
   for (std::size_t r = 0; r < matrix.rows.size(); ++r) {
     std::vector<std::string> row{FaultName(matrix.rows[r])};
     for (const double count : matrix.counts[r]) {
-      row.push_back(count == 0.0               ? "."
+      row.push_back(count == 0.0                 ? "."
                     : count == std::round(count) ? FormatNumber(count, 0)
-                                               : FormatNumber(count, 2));
+                                                 : FormatNumber(count, 2));
     }
     table.AddRow(std::move(row));
   }

@@ -20,8 +20,8 @@ struct EvaluatedRun {
 /// Rows: what was true; columns: what the run ended with. A set of n faults
 /// counts 1/n in each of their columns, so that a row sums to its runs.
 struct ConfusionMatrix {
-  std::vector<int> rows;            ///< Faults, 0 = normal.
-  std::vector<int> columns;         ///< Faults that were indicated.
+  std::vector<int> rows;                    ///< Faults, 0 = normal.
+  std::vector<int> columns;                 ///< Faults that were indicated.
   std::vector<std::vector<double>> counts;  ///< rows × (columns, then
                                             ///< unknown fault, then no alarm).
 };

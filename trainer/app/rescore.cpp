@@ -135,10 +135,10 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
     }
     start_ns = all.empty() ? stored.sample.stamp_ns : start_ns;
     settled = settled || verdict.quality == Quality::kLive;
-    all.push_back({static_cast<double>(stored.sample.stamp_ns - start_ns) *
-                       kSecondsPerNs,
-                   TruthOf(stored), settled, verdict.detected,
-                   FaultsIn(*models, verdict.isolated)});
+    all.push_back(
+        {static_cast<double>(stored.sample.stamp_ns - start_ns) * kSecondsPerNs,
+         TruthOf(stored), settled, verdict.detected,
+         FaultsIn(*models, verdict.isolated)});
     BackdateDetections(verdict, start_ns, all);
   }
   return all;

@@ -28,10 +28,9 @@ std::string InSteps(double value, double span) {
 // Where the membership is at least one half, within [minimum, maximum].
 SignalRange HalfRange(const FuzzySet& set, double minimum, double maximum) {
   const double reach = std::sqrt(2.0 * std::log(2.0));
-  return {std::clamp(set.left_center - reach * set.left_width, minimum,
-                     maximum),
-          std::clamp(set.right_center + reach * set.right_width, minimum,
-                     maximum)};
+  return {
+      std::clamp(set.left_center - reach * set.left_width, minimum, maximum),
+      std::clamp(set.right_center + reach * set.right_width, minimum, maximum)};
 }
 
 std::string AntecedentText(const TsModel& model, const TsRule& rule,
@@ -63,8 +62,8 @@ std::string ConsequentText(const TsModel& model, const TsRule& rule,
     }
     text += text.back() == '=' ? (slope < 0.0 ? " -" : " ")
                                : (slope < 0.0 ? " - " : " + ");
-    text += Digits(std::abs(slope), 4) + ' ' +
-            RegressorText(model.regressors[j]);
+    text +=
+        Digits(std::abs(slope), 4) + ' ' + RegressorText(model.regressors[j]);
   }
   const double intercept = rule.intercept;
   text += text.back() == '=' ? (intercept < 0.0 ? " -" : " ")

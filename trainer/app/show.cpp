@@ -47,9 +47,9 @@ std::string TrainingRunsText(const ModelSet& models) {
 
 void PrintSummary(std::ostream& out, const ModelSet& models, bool active,
                   bool utc) {
-  cli::TextTable table({{"model set"}, {models.name + "@" +
-                                        std::to_string(models.version) +
-                                        (active ? " (active)" : "")}});
+  cli::TextTable table({{"model set"},
+                        {models.name + "@" + std::to_string(models.version) +
+                         (active ? " (active)" : "")}});
   const auto add = [&table](const char* key, const std::string& value) {
     table.AddRow({key, value});
   };

@@ -74,26 +74,26 @@ CollectedRuns Collect(const Campaign& campaign, const cli::Context& context,
                       const cli::StopSignals& signals) {
   const storage::DataDirectory directory{context.options.data_dir};
   std::optional<cli::Progress> progress;
-  CollectedRuns collected = CollectRuns(
-      campaign, directory,
-      {context.software, cli::NowNs(), campaign.training.threads},
-      [&](double share, const std::string& what) {
-        RequireGoOn(signals);
-        if (!progress) {
-          progress.emplace("simulate");
-        }
-        progress->Update(share, what);
-      });
+  CollectedRuns collected =
+      CollectRuns(campaign, directory,
+                  {context.software, cli::NowNs(), campaign.training.threads},
+                  [&](double share, const std::string& what) {
+                    RequireGoOn(signals);
+                    if (!progress) {
+                      progress.emplace("simulate");
+                    }
+                    progress->Update(share, what);
+                  });
   if (progress) {
     progress->Finish();
   }
-  context.log(LogLevel::kInfo,
-              cli::EventLine(
-                  "runs_collected",
-                  {{"runs", std::to_string(collected.runs.size())},
-                   {"simulated", std::to_string(collected.simulated)},
-                   {"imported", std::to_string(collected.imported)},
-                   {"reused", std::to_string(collected.reused)}}));
+  context.log(
+      LogLevel::kInfo,
+      cli::EventLine("runs_collected",
+                     {{"runs", std::to_string(collected.runs.size())},
+                      {"simulated", std::to_string(collected.simulated)},
+                      {"imported", std::to_string(collected.imported)},
+                      {"reused", std::to_string(collected.reused)}}));
   return collected;
 }
 

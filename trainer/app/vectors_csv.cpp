@@ -58,7 +58,8 @@ void VectorsCsv::Add(const std::string& run, const Verdict& verdict) {
     AddNumber(verdict.fault_factors[f]);
   }
   out_ << ','
-       << (verdict.isolated == 0 ? "" : FaultSetName(models_, verdict.isolated));
+       << (verdict.isolated == 0 ? ""
+                                 : FaultSetName(models_, verdict.isolated));
   for (std::size_t o = 0; o < models_.observers.size(); ++o) {
     AddNumber(verdict.observer_factors[o]);
   }
