@@ -10,6 +10,7 @@
 #include "diagnosis/error.h"
 #include "storage/data_directory.h"
 #include "storage/exclusive_lock.h"
+#include "storage/write_gate.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::storage {
@@ -207,6 +208,53 @@ TEST_F(DatabaseTest, CheckFindsARowWithoutItsParent) {
   }
   EXPECT_THAT(database.Check(),
               ::testing::ElementsAre(HasSubstr("table child has no parent")));
+}
+
+// Others than ours, e.g. the shell of SQLite, do not know the gate.
+TEST_F(DatabaseTest, ATransactionHoldsTheWriteLockFromItsBeginning) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  Database other(file_, SchemaOf(1), Access::kWriter);
+  other.Prepare("PRAGMA busy_timeout = 0").Step();
+  const Transaction transaction(database);
+
+  other.Prepare("SAVEPOINT past_the_gate").Run();
+  try {
+    other.Run("INSERT INTO t (id) VALUES (1)");
+    ADD_FAILURE();
+  } catch (const SqliteError& error) {
+    EXPECT_TRUE(error.IsBusy());
+  }
+}
+
+TEST_F(DatabaseTest, TheGateLetsOneConnectionIn) {
+  WriteGate first(file_);
+  WriteGate second(file_);
+  EXPECT_TRUE(first.Enter(std::chrono::milliseconds(0)));
+  EXPECT_FALSE(second.Enter(std::chrono::milliseconds(0)));
+
+  first.Leave();
+  EXPECT_TRUE(second.Enter(std::chrono::milliseconds(0)));
+}
+
+TEST_F(DatabaseTest, TransactionsPassTheGate) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  WriteGate gate(file_);
+  {
+    const Transaction transaction(database);
+    EXPECT_FALSE(gate.Enter(std::chrono::milliseconds(0)));
+  }
+  EXPECT_TRUE(gate.Enter(std::chrono::milliseconds(0)));
+}
+
+TEST_F(DatabaseTest, AReaderCanCopyTheFile) {
+  Database writer(file_, SchemaOf(1), Access::kWriter);
+  Insert(writer, 5);
+  Database reader(file_, SchemaOf(1), Access::kReader);
+  reader.BackupTo(directory_.path() / "copy.db");
+
+  Database copy(directory_.path() / "copy.db", SchemaOf(1), Access::kReader);
+  EXPECT_EQ(copy.QueryInt64("SELECT id FROM t"), 5);
+  EXPECT_THROW(reader.BackupTo(directory_.path() / "copy.db"), DataError);
 }
 
 // Two processes that add to one row: without the gate and BEGIN IMMEDIATE an
