@@ -65,7 +65,7 @@ struct DecisionParameters {
                                ///< samples join a set that others support.
   int clearing_samples{60};    ///< t_c
   int settling_samples{30};
-  double evidence_window{120.0};  ///< Memory of evidence [samples].
+  double evidence_window{200.0};  ///< Memory of evidence [samples].
   double evidence_core{3.0};      ///< Behind the best fault by up to this: 1,
   double evidence_support{9.0};   ///< by more than this: 0 [log-likelihood].
 };

@@ -105,11 +105,11 @@ void Fields(A& a, T& observer) {
 template <typename A, Of<DecisionParameters> T>
 void Fields(A& a, T& decision) {
   auto& [isolation_threshold, detection_samples, isolation_samples,
-         isolation_fraction, clearing_samples, settling_samples,
+         isolation_fraction, join_fraction, clearing_samples, settling_samples,
          evidence_window, evidence_core, evidence_support] = decision;
   a(isolation_threshold, detection_samples, isolation_samples,
-    isolation_fraction, clearing_samples, settling_samples, evidence_window,
-    evidence_core, evidence_support);
+    isolation_fraction, join_fraction, clearing_samples, settling_samples,
+    evidence_window, evidence_core, evidence_support);
 }
 
 template <typename A, Of<ModelSet> T>
@@ -261,7 +261,15 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
   return models;
 }
 
-std::uint64_t ContentHash(std::span<const std::byte> bytes) {
+std::uint64_t ContentHash(const ModelSet& models) {
+  ModelSet content = models;
+  content.created_ns = 0;
+  content.software.clear();
+  content.training_runs.clear();
+  return Sha256Start(EncodeModelSet(content));
+}
+
+std::uint64_t Sha256Start(std::span<const std::byte> bytes) {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), nullptr,
                  EVP_sha256(), nullptr) != 1) {
