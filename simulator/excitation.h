@@ -71,7 +71,7 @@ struct LevelLoopExcitation {
 
 /// A recorded excitation, one row per sample.
 struct RecordedExcitation {
-  std::vector<InputRow> rows;
+  std::vector<InputRow> rows{};
 };
 
 using ExcitationConfig = std::variant<OperatingPointExcitation, SineExcitation,

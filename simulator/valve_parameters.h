@@ -76,10 +76,10 @@ struct InstrumentParameters {
 /// One valve. The named sets below are what users choose from.
 struct ValveParameters {
   std::string name{"lublin-actuator-3"};
-  ActuatorParameters actuator;
-  PositionerParameters positioner;
-  TrimParameters trim;
-  InstrumentParameters instruments;
+  ActuatorParameters actuator{};
+  PositionerParameters positioner{};
+  TrimParameters trim{};
+  InstrumentParameters instruments{};
 };
 
 /// The shipped sets:

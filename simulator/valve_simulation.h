@@ -13,9 +13,9 @@ namespace fdi::simulator {
 
 /// One run of one valve.
 struct ValveSimulationConfig {
-  ValveParameters parameters;
+  ValveParameters parameters{};
   ExcitationConfig excitation{OperatingPointExcitation{}};
-  std::vector<FaultSchedule> faults;
+  std::vector<FaultSchedule> faults{};
   std::uint64_t seed{1};        ///< Same seed, same run, bit for bit.
   double duration_s{2000.0};    ///< Samples at 0, period, ... < duration; > 0.
   double period_s{1.0};         ///< > 0.
