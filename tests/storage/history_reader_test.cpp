@@ -1,5 +1,7 @@
 #include "storage/history_reader.h"
 
+#include <algorithm>
+
 #include <gmock/gmock.h>
 
 #include "diagnosis/error.h"
@@ -50,6 +52,8 @@ TEST_F(HistoryReaderTest, FiltersNarrowTheList) {
   since.since_ns = kDetected + 1;
   EpisodeFilter until;
   until.until_ns = kDetected + 1;
+  EpisodeFilter before;
+  before.until_ns = kDetected;
   EpisodeFilter newest;
   newest.limit = 2;
 
@@ -59,6 +63,7 @@ TEST_F(HistoryReaderTest, FiltersNarrowTheList) {
   EXPECT_THAT(Valves(unknown), ElementsAre("PV-1"));
   EXPECT_THAT(Valves(since), ElementsAre("PV-2"));
   EXPECT_THAT(Valves(until), ElementsAre("LV-1", "LV-2", "PV-1"));
+  EXPECT_THAT(Valves(before), IsEmpty());
   EXPECT_THAT(Valves(newest), ElementsAre("PV-1", "PV-2"));
 }
 
@@ -89,6 +94,21 @@ TEST_F(HistoryReaderTest, EpisodeIsFoundByAUniqueBeginningOfItsId) {
   EXPECT_THROW(reader.Show(""), NotFoundError);
   EXPECT_THROW(reader.Show("*"), NotFoundError);
   EXPECT_THROW(reader.Show("0123456789abcdef"), NotFoundError);
+}
+
+TEST_F(HistoryReaderTest, BeginningThatSeveralIdsShareIsRefused) {
+  std::string digits;
+  for (int valve = 0; valve < 17; ++valve) {  // Two must share a first digit.
+    const std::string id = "TV-" + std::to_string(valve);
+    writer_.Record(Event(Kind::kDetected, 0, 0, 0.3, EndReason::kNone, id));
+    digits += EpisodeIdText(Id(id)).front();
+  }
+  std::sort(digits.begin(), digits.end());
+  const auto shared = std::adjacent_find(digits.begin(), digits.end());
+  ASSERT_NE(shared, digits.end());
+
+  EXPECT_THROW(HistoryReader(path_).Show(std::string(1, *shared)),
+               NotFoundError);
 }
 
 TEST_F(HistoryReaderTest, AcknowledgementAndLabelAreInTheViewAndInTheEvents) {
