@@ -66,17 +66,15 @@ void PrintSummaryJson(const FeedSummary& summary) {
   cli::PrintJson(std::cout, json);
 }
 
-}  // namespace
-
-void Deliver(Feed& feed, const FeedSinks& sinks, Pacer pacer,
-             cli::StopSignals& signals, FeedSummary& summary) {
-  const auto start = std::chrono::steady_clock::now();
+// Until the feed ends or a stop is requested.
+void DeliverAll(Feed& feed, const FeedSinks& sinks, Pacer& pacer,
+                FeedSummary& summary) {
   while (const auto next = feed.Next()) {
     const Sample& sample = next->labelled.sample;
     if (!pacer.WaitUntilDue(sample.stamp_ns) ||
         (sinks.publisher != nullptr &&
          !sinks.publisher->Publish(next->valve, sample))) {
-      break;
+      return;
     }
     if (sinks.runs != nullptr) {
       sinks.runs->Append(next->valve, next->labelled);
@@ -86,6 +84,22 @@ void Deliver(Feed& feed, const FeedSinks& sinks, Pacer pacer,
     }
     ++summary.samples;
     Count(sample, summary.sources[next->valve]);
+  }
+}
+
+}  // namespace
+
+void Deliver(Feed& feed, const FeedSinks& sinks, Pacer pacer,
+             cli::StopSignals& signals, FeedSummary& summary) {
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    DeliverAll(feed, sinks, pacer, summary);
+  } catch (...) {
+    // The readers still get what came before, and the end of the streams.
+    if (sinks.publisher != nullptr) {
+      sinks.publisher->Finish();
+    }
+    throw;
   }
   summary.interrupted = signals.stop_requested();
   if (sinks.publisher != nullptr) {

@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
                        "Control valve with faults: simulates or replays it, "
                        "publishes and records its samples");
   simulator::AddRunVerb(program);
+  simulator::AddReplayVerb(program);
   simulator::AddFaultsVerb(program);
   program.MapError<idl::TransportError>(cli::kExitTransport);
   program.MapError<simulator::NoReaderError>(cli::kExitTransport);

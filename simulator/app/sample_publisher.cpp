@@ -125,7 +125,8 @@ bool SamplePublisher::AwaitAcknowledged() {
 
 bool SamplePublisher::Finish() {
   bool complete = AwaitAcknowledged();
-  if (!options_.keep_alive) {
+  const bool giving_up = !complete && signals_.stop_requested();
+  if (!options_.keep_alive && !giving_up) {
     for (const std::string& valve_id : valve_ids_) {
       message_.valve_id = valve_id;
       writer_.Dispose(message_);

@@ -49,7 +49,8 @@ class SamplePublisher {
   bool Publish(std::size_t valve, const Sample& sample);
 
   /// Waits until the readers have it all, ends the streams (unless keep_alive),
-  /// waits again. After a stop it waits a moment only.
+  /// waits again. After a stop it waits a moment only, and leaves streams open
+  /// whose readers are behind.
   /// @returns whether the readers have it all.
   bool Finish();
 

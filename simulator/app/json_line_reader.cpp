@@ -1,0 +1,130 @@
+#include "simulator/app/json_line_reader.h"
+
+#include <cmath>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "diagnosis/error.h"
+#include "storage/csv_columns.h"
+
+namespace fdi::simulator {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kStepTolerance = 0.01;  // As in a CSV.
+constexpr double kMaxSeconds = 3.2e9;    // Nanoseconds must fit.
+
+const storage::SignalColumn* FindColumn(std::string_view key) {
+  for (const storage::SignalColumn& column : storage::kSignalColumns) {
+    if (storage::SameName(column.name, key)) {
+      return &column;
+    }
+  }
+  return nullptr;
+}
+
+bool IsTruth(std::string_view key) {
+  return storage::SameName(key, storage::kFaultColumn) ||
+         storage::SameName(key, storage::kFaultNumberColumn) ||
+         storage::SameName(key, storage::kStrengthColumn);
+}
+
+bool IsBlank(std::string_view line) {
+  return line.find_first_not_of(" \t\r") == std::string_view::npos;
+}
+
+}  // namespace
+
+void JsonLineReader::Refuse(const std::string& reason) const {
+  throw DataError(options_.source + ':' + std::to_string(line_) + ": " +
+                  reason);
+}
+
+std::optional<JsonRow> JsonLineReader::TakeLine(std::string_view line) {
+  ++line_;
+  if (IsBlank(line)) {
+    return std::nullopt;
+  }
+  const Json object = Json::parse(line, nullptr, false);
+  if (!object.is_object()) {
+    Refuse("not a JSON object");
+  }
+  JsonRow row;
+  for (const auto& [key, value] : object.items()) {
+    const storage::SignalColumn* column = FindColumn(key);
+    const bool is_time = storage::SameName(key, storage::kTimeColumn);
+    if (column == nullptr && !is_time) {
+      if (rows_ == 0 && !IsTruth(key)) {
+        ignored_keys_.push_back(key);
+      }
+      continue;
+    }
+    if (value.is_null()) {
+      continue;
+    }
+    if (!value.is_number() || !std::isfinite(value.get<double>())) {
+      Refuse("key \"" + key + "\": " + value.dump().substr(0, 60) +
+             " is not a finite number");
+    }
+    if (is_time) {
+      row.t_s = value.get<double>();
+    } else {
+      if (row.sample.Has(column->signal)) {
+        Refuse("key \"" + key + "\": the signal is there twice");
+      }
+      if (column->signal == Signal::kF &&
+          flow_unit_.value_or(column->flow_unit) != column->flow_unit) {
+        Refuse("key \"" + key + "\": the flow was in " +
+               std::string(FlowUnitName(*flow_unit_)) + " before");
+      }
+      if (column->signal == Signal::kF) {
+        flow_unit_ = column->flow_unit;
+      }
+      row.sample.Set(column->signal, value.get<double>());
+    }
+  }
+  if (!row.sample.Has(Signal::kCv)) {
+    Refuse("missing key CV_pct");
+  }
+  if (!row.sample.Has(Signal::kX) && !row.sample.Has(Signal::kF)) {
+    Refuse("missing key: one of X_pct, F_m3_h, F_t_h");
+  }
+  CheckTime(row.t_s);
+  row.sample.flow_unit = flow_unit_.value_or(FlowUnit::kM3PerHour);
+  row.sample.stamp_ns = std::llround(row.t_s.value_or(0.0) * 1e9);
+  row.sample.seq = rows_++;
+  return row;
+}
+
+void JsonLineReader::CheckTime(std::optional<double> t_s) {
+  if (t_s && std::abs(*t_s) > kMaxSeconds) {
+    Refuse("t_s is beyond 100 years");
+  }
+  if (rows_ == 0) {
+    last_t_s_ = t_s;
+    return;
+  }
+  if (t_s.has_value() != last_t_s_.has_value()) {
+    Refuse("t_s must be in all lines or in none");
+  }
+  if (!t_s) {
+    return;
+  }
+  const double step = *t_s - *std::exchange(last_t_s_, t_s);
+  if (!(step > 0.0)) {
+    Refuse("time goes back or stands still at t_s = " + std::to_string(*t_s));
+  }
+  if (period_s_ == 0.0) {
+    period_s_ = step;
+  }
+  const bool on_time = std::abs(step - period_s_) <= kStepTolerance * period_s_;
+  if (!on_time && !(options_.split_gaps && step > period_s_)) {
+    Refuse("time jumps by " + std::to_string(step) +
+           " s, the sample period is " + std::to_string(period_s_) + " s" +
+           (step > period_s_ ? " (--split-gaps accepts gaps)" : ""));
+  }
+}
+
+}  // namespace fdi::simulator

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/sample.h"
+
+namespace fdi::simulator {
+
+/// Settings of JsonLineReader.
+struct JsonLineOptions {
+  std::string source{"stdin"};  ///< For messages.
+  bool split_gaps{false};       ///< A gap in time is no error.
+};
+
+struct JsonRow {
+  Sample sample;              ///< stamp_ns from t_s; seq counts from 0.
+  std::optional<double> t_s;  ///< Not given: to be stamped by the clock.
+};
+
+/// Reads samples as JSON lines, one object a line, with the names of the CSV
+/// contract as keys:
+///
+///     {"t_s": 0, "CV_pct": 70.1, "X_pct": 71.0, "F_t_h": 12.5}
+///
+/// A signal that is null or missing is not present in that sample; CV and one
+/// of X, F must be. t_s is in all lines or in none. Further keys are ignored.
+class JsonLineReader {
+ public:
+  explicit JsonLineReader(JsonLineOptions options)
+      : options_(std::move(options)) {}
+
+  /// @returns nothing for a blank line.
+  /// @throws DataError naming source, line, key and reason.
+  std::optional<JsonRow> TakeLine(std::string_view line);
+
+  /// Keys of the first object that mean nothing here.
+  const std::vector<std::string>& ignored_keys() const { return ignored_keys_; }
+
+ private:
+  void CheckTime(std::optional<double> t_s);
+  [[noreturn]] void Refuse(const std::string& reason) const;
+
+  JsonLineOptions options_;
+  std::vector<std::string> ignored_keys_;
+  std::optional<FlowUnit> flow_unit_;
+  std::optional<double> last_t_s_;
+  double period_s_{0.0};  // 0: not known yet
+  std::int64_t line_{0};
+  std::uint64_t rows_{0};
+};
+
+}  // namespace fdi::simulator

@@ -1,0 +1,150 @@
+#include <memory>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <unistd.h>
+
+#include "diagnosis/error.h"
+#include "simulator/app/feed.h"
+#include "simulator/app/replay_feed.h"
+#include "simulator/app/verbs.h"
+#include "storage/data_directory.h"
+#include "storage/runs.h"
+
+namespace fdi::simulator {
+namespace {
+
+struct ReplayOptions {
+  std::string csv;
+  std::string run;
+  std::string valve;
+  bool keep_stamps{false};
+  StreamOptions stream;
+  DeliveryOptions delivery;
+};
+
+// What is replayed, and for which valve.
+struct Recording {
+  std::string valve_id;
+  std::vector<LabelledSample> samples;
+};
+
+Recording LoadRun(const ReplayOptions& options, const cli::Context& context) {
+  const storage::DataDirectory data{context.options.data_dir};
+  if (!std::filesystem::exists(data.runs())) {
+    throw NotFoundError("no run " + options.run + ": there is no " +
+                        data.runs().string());
+  }
+  storage::RunStore store(data.runs());
+  storage::StoredRun run = store.Load(options.run);
+  Recording recording{std::move(run.info.run.valve_id), {}};
+  recording.samples.reserve(run.samples.size());
+  for (const storage::StoredSample& stored : run.samples) {
+    recording.samples.push_back({stored.sample, stored.truth});
+  }
+  return recording;
+}
+
+Recording LoadCsv(const ReplayOptions& options, const cli::Context& context) {
+  storage::CsvOptions csv;
+  csv.required = MaskOf(Signal::kCv);
+  csv.split_gaps = options.stream.split_gaps;
+  storage::CsvTable table = storage::ReadCsvFile(options.csv, csv);
+  LogIgnored(context.log, options.csv, table.header.ignored_columns);
+  Recording recording;
+  for (storage::CsvRun& run : table.runs) {
+    recording.samples.insert(recording.samples.end(), run.samples.begin(),
+                             run.samples.end());
+  }
+  return recording;
+}
+
+void Check(const ReplayOptions& options) {
+  if (options.csv.empty() == options.run.empty()) {
+    throw ConfigError("replay takes one of --csv FILE|- and --run ID");
+  }
+  if (options.run.empty() && options.valve.empty()) {
+    throw ConfigError("--valve ID is missing: whose samples are these?");
+  }
+  if (options.keep_stamps && !options.delivery.start.empty()) {
+    throw ConfigError("--keep-stamps and --start exclude each other");
+  }
+}
+
+int Replay(const ReplayOptions& options, const cli::Context& context) {
+  Check(options);
+  const bool from_stdin = options.csv == "-";
+  // Lines of a gateway are passed on as they come, unless a speed is given.
+  const Speed speed =
+      ParseSpeed(options.delivery.speed.value_or(from_stdin ? "max" : "1"));
+  const bool lossless = speed.IsMax() && options.delivery.speed;
+  Restamping restamping;
+  restamping.keep = options.keep_stamps;
+  restamping.start = [&options] { return StartOf(options.delivery); };
+  restamping.source_id = NewSourceId();
+  if (!options.delivery.start.empty()) {
+    StartOf(options.delivery);  // Refused before anything is published.
+  }
+
+  cli::StopSignals signals;
+  FeedSummary summary;
+  SourceSummary& source = summary.sources.emplace_back();
+  source.source_id = restamping.source_id;
+  source.valve_id = options.valve;
+  std::unique_ptr<Feed> feed;
+  if (from_stdin) {
+    feed =
+        std::make_unique<StreamFeed>(LineInput(STDIN_FILENO, signals),
+                                     options.stream, restamping, context.log);
+  } else {
+    Recording recording = options.run.empty() ? LoadCsv(options, context)
+                                              : LoadRun(options, context);
+    if (options.valve.empty()) {
+      source.valve_id = recording.valve_id;
+    }
+    feed =
+        std::make_unique<StoredFeed>(std::move(recording.samples), restamping);
+  }
+  RequireValveId(source.valve_id);
+  SamplePublisherOptions publishing =
+      PublisherOptionsOf(options.delivery, speed);
+  publishing.lossless = lossless;
+  SamplePublisher publisher(publishing, {source.valve_id}, context, signals);
+  publisher.AwaitReader();
+  Deliver(*feed, {&publisher, nullptr, nullptr}, Pacer(speed, signals), signals,
+          summary);
+  PrintSummary(summary, context.options);
+  return cli::kExitOk;
+}
+
+}  // namespace
+
+void AddReplayVerb(cli::Program& program) {
+  auto options = std::make_shared<ReplayOptions>();
+  CLI::App& verb = program.AddVerb(
+      "replay", "Publish a stored run, a CSV file or what comes on stdin",
+      [options](const cli::Context& context) {
+        return Replay(*options, context);
+      });
+  verb.add_option("--csv", options->csv,
+                  "CSV file; - reads CSV or JSON lines from stdin and passes "
+                  "each on at once, unless --speed is given")
+      ->type_name("FILE|-");
+  verb.add_option("--run", options->run, "A stored run, or a stretch of it")
+      ->type_name("ID[@from:to]");
+  verb.add_option("--valve", options->valve,
+                  "Valve id (a run: by default its own)")
+      ->type_name("ID");
+  AddDeliveryOptions(verb, options->delivery);
+  verb.add_flag("--keep-stamps", options->keep_stamps,
+                "Keep the stamps; t_s of a CSV or of JSON is then Unix time");
+  verb.add_flag("--split-gaps", options->stream.split_gaps,
+                "Accept gaps in time of a CSV or of JSON; they are kept");
+  verb.add_option("--period", options->stream.period_s,
+                  "Sample period of JSON lines without t_s, which are stamped "
+                  "on arrival")
+      ->check(CLI::Range(1e-3, 3600.0))
+      ->type_name("S");
+}
+
+}  // namespace fdi::simulator
