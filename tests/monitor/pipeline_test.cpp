@@ -132,7 +132,7 @@ TEST_F(PipelineTest, AFullQueueMakesTheIntakeWaitAndDropsNothing) {
   std::thread intake([&] {
     for (std::uint64_t k = 0; k < 500; ++k) {
       pipeline_->Offer("V1", PlantSample(k), 1);
-      ++offered;
+      bus_.notice.Apply([&] { ++offered; });
     }
   });
 
