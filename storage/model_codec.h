@@ -22,8 +22,13 @@ std::vector<std::byte> EncodeModelSet(const ModelSet& models);
 ModelSet DecodeModelSet(std::span<const std::byte> bytes,
                         std::string_view where);
 
-/// First 8 bytes of the SHA-256 of `bytes`, big endian: as 16 hex digits they
-/// are what sha256sum of an exported file begins with.
-std::uint64_t ContentHash(std::span<const std::byte> bytes);
+/// What a model set is known by: the same training on the same data gives the
+/// same hash, anywhere and any time. Sha256Start() of the canonical bytes
+/// without what tells where the set came from: created_ns, software,
+/// training_runs.
+std::uint64_t ContentHash(const ModelSet& models);
+
+/// First 8 bytes of the SHA-256 of `bytes`, big endian.
+std::uint64_t Sha256Start(std::span<const std::byte> bytes);
 
 }  // namespace fdi::storage

@@ -168,7 +168,7 @@ ModelSet ModelStore::Save(const ModelSet& models, Activation activation) {
                            .count();
   }
   const std::vector<std::byte> bytes = EncodeModelSet(saved);
-  saved.content_hash = ContentHash(bytes);
+  saved.content_hash = ContentHash(saved);
   Transaction transaction(database_);
   saved.version =
       static_cast<int>(*database_.QueryInt64(
@@ -212,7 +212,7 @@ ModelSet ModelStore::Load(const ModelReference& reference) {
   const std::vector<std::byte> bytes = row.Blob(3);
   ModelSet models = DecodeModelSet(bytes, where);
   models.version = row.Int(1);
-  models.content_hash = ContentHash(bytes);
+  models.content_hash = ContentHash(models);
   if (HexOf(models.content_hash) != row.Text(2) || models.name != row.Text(0)) {
     throw DataError(where + " is damaged: its content hash differs");
   }

@@ -151,10 +151,23 @@ TEST(ModelCodecTest, RefusalsNameThePlaceAndTheReason) {
   EXPECT_THAT(Refusal(WithValidChecksum(huge)), HasSubstr("beyond its limit"));
 }
 
-TEST(ModelCodecTest, ContentHashIsTheBeginningOfSha256) {
+TEST(ModelCodecTest, HashBeginsLikeSha256) {
   // FIPS 180-4 example: SHA-256("abc") = ba7816bf8f01cfea...
   const std::string text = "abc";
-  EXPECT_EQ(ContentHash(std::as_bytes(std::span(text))), 0xBA7816BF8F01CFEAULL);
+  EXPECT_EQ(Sha256Start(std::as_bytes(std::span(text))), 0xBA7816BF8F01CFEAULL);
+}
+
+TEST(ModelCodecTest, ContentHashDependsOnContentNotOnItsOrigin) {
+  const ModelSet models = RandomModelSet("pump");
+  ModelSet elsewhere = models;
+  elsewhere.created_ns += 1;
+  elsewhere.software += "+1";
+  elsewhere.training_runs.push_back("0123456789ab");
+  ModelSet other = models;
+  other.decision.isolation_samples += 1;
+
+  EXPECT_EQ(ContentHash(elsewhere), ContentHash(models));
+  EXPECT_NE(ContentHash(other), ContentHash(models));
 }
 
 }  // namespace

@@ -55,7 +55,7 @@ TEST_F(ModelsTest, SavedSetsGetVersionsAndReadBackBitForBit) {
   EXPECT_EQ(first.version, 1);
   EXPECT_EQ(second.version, 2);
   EXPECT_NE(first.content_hash, second.content_hash);
-  EXPECT_EQ(first.content_hash, ContentHash(EncodeModelSet(first)));
+  EXPECT_EQ(first.content_hash, ContentHash(first));
   const ModelSet back = store_.Load("pump@2");
   EXPECT_EQ(back.version, 2);
   EXPECT_EQ(back.content_hash, second.content_hash);
@@ -247,6 +247,8 @@ TEST_F(ModelsTest, ChangeCounterTellsOfActivationsAndAssignmentsOnly) {
   EXPECT_FALSE(counter.Changed());
   store_.Activate({"pump", 2});
   EXPECT_TRUE(counter.Changed());
+  EXPECT_FALSE(counter.Changed());
+  store_.Save(RandomModelSet("pump"));
   EXPECT_FALSE(counter.Changed());
   store_.AssignModelSet("FV-1", ModelReference{"pump", {}});
   EXPECT_TRUE(counter.Changed());
