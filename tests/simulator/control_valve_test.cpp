@@ -254,6 +254,35 @@ TEST(ControlValveTest, WidePlayInTheFeedbackMakesTheValveCycle) {
   EXPECT_LT(low, 0.2);
 }
 
+// The feedback lags by half the width, on the other side after each turn.
+TEST(ControlValveTest, PlayInTheFeedbackShiftsTheRodByHalfItsWidth) {
+  ControlValve valve(Exact(), 1.0);
+  valve.Settle(InputsAt(0.5));
+  FaultEffects loose;
+  loose.feedback_play = 0.2;
+  valve.SetEffects(loose);
+  Hold(valve, 0.7, 120);
+  EXPECT_NEAR(valve.state().rod, LeverPosition(0.8), 2e-3);
+  Hold(valve, 0.65, 120);
+  EXPECT_NEAR(valve.state().rod, LeverPosition(0.55), 2e-3);
+}
+
+// Without its limit the integral would grow to 20 in these 300 s and hold the
+// rod at the stop for as long again.
+TEST(ControlValveTest, IntegralDoesNotWindUpAtAStop) {
+  ValveParameters parameters = Exact();
+  parameters.positioner.integral_time_s = 5.0;
+  ControlValve valve(parameters, 1.0);
+  valve.Settle(InputsAt(0.5));
+  FaultEffects clogged;
+  clogged.upper_stop_factor = 0.6;
+  valve.SetEffects(clogged);
+  Hold(valve, 0.9, 300);
+  EXPECT_DOUBLE_EQ(valve.state().rod, 0.6);
+  Hold(valve, 0.4, 30);
+  EXPECT_NEAR(valve.state().rod, LeverPosition(0.4), 5e-3);
+}
+
 TEST(ControlValveTest, BypassAddsItsOwnFlow) {
   ControlValve valve(Exact(), 1.0);
   const ProcessInputs inputs = InputsAt(0.7);
