@@ -39,8 +39,8 @@ struct PublisherStatus {
   int matched{0};                 ///< Readers now.
 };
 
-/// Writes one topic. Thread safe, except that the messages of one valve must
-/// come from one thread at a time to have an order.
+/// Writes one topic. Thread safe. What is on the way when it is destroyed is
+/// lost: call WaitForAcknowledged() first.
 ///
 /// Message is one of the five of wire.h; there are no others.
 template <typename Message>

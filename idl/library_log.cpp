@@ -26,8 +26,9 @@ struct Registry {
   std::vector<const LogSink*> sinks;
 };
 
+// Never destroyed: the log thread of the library outlives our statics.
 Registry& TheRegistry() {
-  static Registry registry;
+  static Registry& registry = *new Registry;
   return registry;
 }
 

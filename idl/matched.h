@@ -4,6 +4,8 @@
 #include <condition_variable>
 #include <mutex>
 
+#include "idl/deadline.h"
+
 namespace fdi::idl {
 
 /// How many remote endpoints are matched; set by a callback, waited for by
@@ -25,7 +27,8 @@ class Matched {
 
   bool WaitFor(int count, std::chrono::milliseconds timeout) const {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, timeout, [&] { return count_ >= count; });
+    return changed_.wait_until(lock, DeadlineIn(timeout),
+                               [&] { return count_ >= count; });
   }
 
  private:

@@ -198,7 +198,7 @@ Participant::Impl::~Impl() {
 
 dds::Topic* Participant::Impl::TopicOf(const std::string& topic,
                                        const dds::TypeSupport& type) {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(topics_mutex_);
   dds::Topic*& found = topics_[topic];
   if (found == nullptr) {
     Check(type.register_type(handle_), "register_type of " + topic);
@@ -222,7 +222,7 @@ void Participant::Impl::ReportIncompatible(const std::string& topic,
   const auto own = ours.find(id);
   std::string theirs = "unknown";
   {
-    const std::lock_guard lock(mutex_);
+    const std::lock_guard lock(remotes_mutex_);
     for (const PolicyTexts& remote : remotes_[{topic, remote_is_writer}]) {
       const auto text = remote.find(id);
       if (own != ours.end() && text != remote.end() &&
@@ -241,7 +241,7 @@ void Participant::Impl::ReportIncompatible(const std::string& topic,
 }
 
 void Participant::Impl::Remember(const RemoteKey& key, PolicyTexts texts) {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(remotes_mutex_);
   std::deque<PolicyTexts>& known = remotes_[key];
   known.push_front(std::move(texts));
   if (known.size() > kRemembered) {

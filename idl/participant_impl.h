@@ -74,8 +74,9 @@ class Participant::Impl
   LogSink log_;
   LibraryLog library_log_;
   ProfileFile profiles_;
-  std::mutex mutex_;  // Guards remotes_ and topics_.
+  std::mutex remotes_mutex_;
   std::map<RemoteKey, std::deque<PolicyTexts>> remotes_;  // Newest first.
+  std::mutex topics_mutex_;  // Apart, for it is held in calls of the library.
   std::map<std::string, eprosima::fastdds::dds::Topic*> topics_;
   eprosima::fastdds::dds::DomainParticipant* handle_{nullptr};
 };

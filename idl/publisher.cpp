@@ -10,6 +10,7 @@
 
 #include "idl/checked_type.h"
 #include "idl/codec.h"
+#include "idl/deadline.h"
 #include "idl/endpoint.h"
 #include "idl/matched.h"
 #include "idl/participant_impl.h"
@@ -31,16 +32,11 @@ bool IsFull(const ReturnCode& code) {
          code == ReturnCode::RETCODE_OUT_OF_RESOURCES;
 }
 
-// now + timeout, without overflow.
-Clock::time_point Deadline(std::chrono::milliseconds timeout) {
-  const auto longest = std::chrono::hours(24 * 365);
-  return Clock::now() + std::min<std::chrono::milliseconds>(timeout, longest);
-}
-
-eprosima::fastrtps::Duration_t ToDuration(std::chrono::milliseconds time) {
-  const auto count = std::max<std::int64_t>(0, time.count());
-  return {static_cast<std::int32_t>(count / 1000),
-          static_cast<std::uint32_t>(count % 1000) * 1000000U};
+eprosima::fastrtps::Duration_t Until(Clock::time_point deadline) {
+  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+      std::max(deadline - Clock::now(), Clock::duration::zero()));
+  return {static_cast<std::int32_t>(left.count() / 1000),
+          static_cast<std::uint32_t>(left.count() % 1000) * 1000000U};
 }
 
 }  // namespace
@@ -94,7 +90,7 @@ class Publisher<Message>::Impl : private dds::DataWriterListener {
       return WriteResult::kTooManyValves;
     }
     const auto send = [&] { return writer_->write(&wire_, *instance); };
-    if (!Retry(send, "write", stop, Deadline(timeout))) {
+    if (!Retry(send, "write", stop, DeadlineIn(timeout))) {
       return WriteResult::kNotSent;
     }
     written_.fetch_add(1, std::memory_order_relaxed);
@@ -120,7 +116,7 @@ class Publisher<Message>::Impl : private dds::DataWriterListener {
   }
 
   bool WaitForAcknowledged(std::chrono::milliseconds timeout) {
-    return writer_->wait_for_acknowledgments(ToDuration(timeout)) ==
+    return writer_->wait_for_acknowledgments(Until(DeadlineIn(timeout))) ==
            ReturnCode::RETCODE_OK;
   }
 

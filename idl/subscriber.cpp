@@ -13,6 +13,7 @@
 #include "idl/bounded_queue.h"
 #include "idl/checked_type.h"
 #include "idl/codec.h"
+#include "idl/deadline.h"
 #include "idl/endpoint.h"
 #include "idl/gap_counter.h"
 #include "idl/matched.h"
@@ -23,7 +24,6 @@ namespace fdi::idl {
 namespace {
 
 namespace dds = eprosima::fastdds::dds;
-using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kRefusedLimit = 65536;
 
@@ -112,11 +112,9 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
 
   int Take(const Handlers<Message>& handlers, std::chrono::milliseconds timeout,
            int limit) {
-    const auto longest = std::chrono::hours(24);
     int handed = HandOut(handlers, limit);
     if (handed == 0) {
-      queue_.Wait(Clock::now() +
-                  std::min<std::chrono::milliseconds>(timeout, longest));
+      queue_.Wait(DeadlineIn(timeout));
       handed = HandOut(handlers, limit);
     }
     return handed;
