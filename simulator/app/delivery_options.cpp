@@ -16,8 +16,9 @@ void AddDeliveryOptions(CLI::App& verb, DeliveryOptions& options) {
                   "UTC of the first sample (default: now)")
       ->type_name("UTC");
   verb.add_option("--wait-reader", options.wait_reader_s,
-                  "Seconds to wait for a reader (default: 30 at --speed max; "
-                  "otherwise 2, and none is needed)")
+                  "Seconds to wait for a reader, without which nothing is "
+                  "published (default: 30 at --speed max; otherwise 2, and "
+                  "none is needed)")
       ->check(CLI::Range(0.0, 1e6))
       ->type_name("S");
   verb.add_flag("--keep-alive", options.keep_alive,
@@ -26,7 +27,12 @@ void AddDeliveryOptions(CLI::App& verb, DeliveryOptions& options) {
 
 SamplePublisherOptions PublisherOptionsOf(const DeliveryOptions& options,
                                           Speed speed) {
-  return {speed.IsMax(), options.wait_reader_s, options.keep_alive};
+  SamplePublisherOptions publishing;
+  publishing.lossless = speed.IsMax();
+  publishing.needs_reader = speed.IsMax() || options.wait_reader_s > 0.0;
+  publishing.wait_s = options.wait_reader_s;
+  publishing.keep_alive = options.keep_alive;
+  return publishing;
 }
 
 std::int64_t StartOf(const DeliveryOptions& options) {

@@ -52,9 +52,9 @@ struct FeedSummary {
 
 /// Where the samples of a feed go; what is null is left out.
 struct FeedSinks {
-  SamplePublisher* publisher{nullptr};
-  RunSink* runs{nullptr};
-  CsvSink* csv{nullptr};
+  std::unique_ptr<SamplePublisher> publisher;
+  std::unique_ptr<RunSink> runs;
+  std::unique_ptr<CsvSink> csv;
 };
 
 /// Takes all samples of `feed` at their time to the sinks and closes these.

@@ -25,6 +25,10 @@ const storage::SignalColumn* FindColumn(std::string_view key) {
   return nullptr;
 }
 
+bool IsTime(std::string_view key) {
+  return storage::SameName(key, storage::kTimeColumn);
+}
+
 bool IsTruth(std::string_view key) {
   return storage::SameName(key, storage::kFaultColumn) ||
          storage::SameName(key, storage::kFaultNumberColumn) ||
@@ -53,36 +57,15 @@ std::optional<JsonRow> JsonLineReader::TakeLine(std::string_view line) {
   }
   JsonRow row;
   for (const auto& [key, value] : object.items()) {
-    const storage::SignalColumn* column = FindColumn(key);
-    const bool is_time = storage::SameName(key, storage::kTimeColumn);
-    if (column == nullptr && !is_time) {
+    if (FindColumn(key) == nullptr && !IsTime(key)) {
       if (rows_ == 0 && !IsTruth(key)) {
         ignored_keys_.push_back(key);
       }
-      continue;
-    }
-    if (value.is_null()) {
-      continue;
-    }
-    if (!value.is_number() || !std::isfinite(value.get<double>())) {
+    } else if (value.is_number() && std::isfinite(value.get<double>())) {
+      Set(key, value.get<double>(), row);
+    } else if (!value.is_null()) {
       Refuse("key \"" + key + "\": " + value.dump().substr(0, 60) +
              " is not a finite number");
-    }
-    if (is_time) {
-      row.t_s = value.get<double>();
-    } else {
-      if (row.sample.Has(column->signal)) {
-        Refuse("key \"" + key + "\": the signal is there twice");
-      }
-      if (column->signal == Signal::kF &&
-          flow_unit_.value_or(column->flow_unit) != column->flow_unit) {
-        Refuse("key \"" + key + "\": the flow was in " +
-               std::string(FlowUnitName(*flow_unit_)) + " before");
-      }
-      if (column->signal == Signal::kF) {
-        flow_unit_ = column->flow_unit;
-      }
-      row.sample.Set(column->signal, value.get<double>());
     }
   }
   if (!row.sample.Has(Signal::kCv)) {
@@ -96,6 +79,25 @@ std::optional<JsonRow> JsonLineReader::TakeLine(std::string_view line) {
   row.sample.stamp_ns = std::llround(row.t_s.value_or(0.0) * 1e9);
   row.sample.seq = rows_++;
   return row;
+}
+
+void JsonLineReader::Set(const std::string& key, double value, JsonRow& row) {
+  if (IsTime(key)) {
+    row.t_s = value;
+    return;
+  }
+  const storage::SignalColumn& column = *FindColumn(key);
+  if (row.sample.Has(column.signal)) {
+    Refuse("key \"" + key + "\": the signal is there twice");
+  }
+  if (column.signal == Signal::kF) {
+    if (flow_unit_.value_or(column.flow_unit) != column.flow_unit) {
+      Refuse("key \"" + key + "\": the flow was in " +
+             std::string(FlowUnitName(*flow_unit_)) + " before");
+    }
+    flow_unit_ = column.flow_unit;
+  }
+  row.sample.Set(column.signal, value);
 }
 
 void JsonLineReader::CheckTime(std::optional<double> t_s) {

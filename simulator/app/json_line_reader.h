@@ -41,6 +41,7 @@ class JsonLineReader {
   const std::vector<std::string>& ignored_keys() const { return ignored_keys_; }
 
  private:
+  void Set(const std::string& key, double value, JsonRow& row);
   void CheckTime(std::optional<double> t_s);
   [[noreturn]] void Refuse(const std::string& reason) const;
 

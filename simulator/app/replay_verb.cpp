@@ -1,5 +1,8 @@
+#include <filesystem>
 #include <memory>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <unistd.h>
@@ -13,6 +16,8 @@
 
 namespace fdi::simulator {
 namespace {
+
+constexpr const char* kStdinName = "-";
 
 struct ReplayOptions {
   std::string csv;
@@ -69,50 +74,57 @@ void Check(const ReplayOptions& options) {
   if (options.keep_stamps && !options.delivery.start.empty()) {
     throw ConfigError("--keep-stamps and --start exclude each other");
   }
+  StartOf(options.delivery);  // A bad one is refused before all else.
+}
+
+// The feed; sets `valve_id` if the options leave it open.
+std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options,
+                               const Restamping& restamping,
+                               const cli::Context& context,
+                               cli::StopSignals& signals,
+                               std::string& valve_id) {
+  if (options.csv == kStdinName) {
+    return std::make_unique<StreamFeed>(LineInput(STDIN_FILENO, signals),
+                                        options.stream, restamping,
+                                        context.log);
+  }
+  Recording recording = options.run.empty() ? LoadCsv(options, context)
+                                            : LoadRun(options, context);
+  if (valve_id.empty()) {
+    valve_id = recording.valve_id;
+  }
+  return std::make_unique<StoredFeed>(std::move(recording.samples), restamping);
 }
 
 int Replay(const ReplayOptions& options, const cli::Context& context) {
   Check(options);
-  const bool from_stdin = options.csv == "-";
-  // Lines of a gateway are passed on as they come, unless a speed is given.
+  const bool at_once = options.csv == kStdinName && !options.delivery.speed;
   const Speed speed =
-      ParseSpeed(options.delivery.speed.value_or(from_stdin ? "max" : "1"));
-  const bool lossless = speed.IsMax() && options.delivery.speed;
+      ParseSpeed(options.delivery.speed.value_or(at_once ? "max" : "1"));
+  SamplePublisherOptions publishing =
+      PublisherOptionsOf(options.delivery, speed);
+  if (at_once) {
+    // A gateway goes on without a reader; one that is there paces it.
+    publishing.needs_reader = options.delivery.wait_reader_s > 0.0;
+  }
   Restamping restamping;
   restamping.keep = options.keep_stamps;
   restamping.start = [&options] { return StartOf(options.delivery); };
   restamping.source_id = NewSourceId();
-  if (!options.delivery.start.empty()) {
-    StartOf(options.delivery);  // Refused before anything is published.
-  }
 
   cli::StopSignals signals;
   FeedSummary summary;
   SourceSummary& source = summary.sources.emplace_back();
   source.source_id = restamping.source_id;
   source.valve_id = options.valve;
-  std::unique_ptr<Feed> feed;
-  if (from_stdin) {
-    feed =
-        std::make_unique<StreamFeed>(LineInput(STDIN_FILENO, signals),
-                                     options.stream, restamping, context.log);
-  } else {
-    Recording recording = options.run.empty() ? LoadCsv(options, context)
-                                              : LoadRun(options, context);
-    if (options.valve.empty()) {
-      source.valve_id = recording.valve_id;
-    }
-    feed =
-        std::make_unique<StoredFeed>(std::move(recording.samples), restamping);
-  }
+  const auto feed =
+      OpenFeed(options, restamping, context, signals, source.valve_id);
   RequireValveId(source.valve_id);
-  SamplePublisherOptions publishing =
-      PublisherOptionsOf(options.delivery, speed);
-  publishing.lossless = lossless;
-  SamplePublisher publisher(publishing, {source.valve_id}, context, signals);
-  publisher.AwaitReader();
-  Deliver(*feed, {&publisher, nullptr, nullptr}, Pacer(speed, signals), signals,
-          summary);
+  FeedSinks sinks;
+  sinks.publisher = std::make_unique<SamplePublisher>(
+      publishing, std::vector{source.valve_id}, context, signals);
+  sinks.publisher->AwaitReader();
+  Deliver(*feed, sinks, Pacer(speed, signals), signals, summary);
   PrintSummary(summary, context.options);
   return cli::kExitOk;
 }

@@ -79,6 +79,10 @@ std::string ValveIdOf(const std::string& base, int index) {
 
 // One scenario per valve, each with its own seed and source.
 std::vector<Scenario> Scenarios(const RunOptions& options) {
+  if (!options.export_file.empty() && options.valves > 1) {
+    throw ConfigError("--export takes one valve, not " +
+                      std::to_string(options.valves));
+  }
   const Scenario base = BaseScenario(options);
   std::vector<Scenario> scenarios(static_cast<std::size_t>(options.valves),
                                   base);
@@ -137,51 +141,53 @@ storage::NewRun NewRunOf(const Scenario& scenario,
   return run;
 }
 
-int Run(const RunOptions& options, const cli::Context& context) {
-  const Speed speed = options.no_publish
-                          ? ParseSpeed("max")
-                          : ParseSpeed(options.delivery.speed.value_or("1"));
-  const std::vector<Scenario> scenarios = Scenarios(options);
-  if (!options.export_file.empty() && scenarios.size() > 1) {
-    throw ConfigError("--export takes one valve, not " +
-                      std::to_string(scenarios.size()));
-  }
-  cli::StopSignals signals;
-  SimulationFeed feed(scenarios, signals);
-
+FeedSummary SummaryOf(const std::vector<Scenario>& scenarios) {
   FeedSummary summary;
-  std::vector<std::string> valve_ids;
   for (const Scenario& scenario : scenarios) {
-    valve_ids.push_back(scenario.valve_id);
     SourceSummary& source = summary.sources.emplace_back();
     source.valve_id = scenario.valve_id;
     source.source_id = scenario.config.source_id;
     source.seed = scenario.config.seed;
   }
-  std::optional<CsvSink> csv;
+  return summary;
+}
+
+std::vector<std::string> ValveIds(const std::vector<Scenario>& scenarios) {
+  std::vector<std::string> ids;
+  for (const Scenario& scenario : scenarios) {
+    ids.push_back(scenario.valve_id);
+  }
+  return ids;
+}
+
+int Run(const RunOptions& options, const cli::Context& context) {
+  const Speed speed = options.no_publish
+                          ? ParseSpeed("max")
+                          : ParseSpeed(options.delivery.speed.value_or("1"));
+  const std::vector<Scenario> scenarios = Scenarios(options);
+  cli::StopSignals signals;
+  SimulationFeed feed(scenarios, signals);
+  FeedSummary summary = SummaryOf(scenarios);
+
+  FeedSinks sinks;
   if (!options.export_file.empty()) {
-    csv.emplace(options.export_file);
+    sinks.csv = std::make_unique<CsvSink>(options.export_file);
   }
-  std::optional<RunSink> runs;
   if (options.record) {
-    runs.emplace(storage::DataDirectory{context.options.data_dir});
+    sinks.runs = std::make_unique<RunSink>(
+        storage::DataDirectory{context.options.data_dir});
   }
-  std::optional<SamplePublisher> publisher;
   if (!options.no_publish) {
-    publisher.emplace(PublisherOptionsOf(options.delivery, speed), valve_ids,
-                      context, signals);
-    publisher->AwaitReader();
+    sinks.publisher = std::make_unique<SamplePublisher>(
+        PublisherOptionsOf(options.delivery, speed), ValveIds(scenarios),
+        context, signals);
+    sinks.publisher->AwaitReader();
   }
-  if (runs) {
-    for (std::size_t i = 0; i < scenarios.size(); ++i) {
-      summary.sources[i].run_id =
-          runs->Begin(NewRunOf(scenarios[i], context.software));
-    }
+  for (std::size_t i = 0; sinks.runs && i < scenarios.size(); ++i) {
+    summary.sources[i].run_id =
+        sinks.runs->Begin(NewRunOf(scenarios[i], context.software));
   }
-  Deliver(feed,
-          {publisher ? &*publisher : nullptr, runs ? &*runs : nullptr,
-           csv ? &*csv : nullptr},
-          Pacer(speed, signals), signals, summary);
+  Deliver(feed, sinks, Pacer(speed, signals), signals, summary);
   PrintSummary(summary, context.options);
   return cli::kExitOk;
 }

@@ -12,10 +12,11 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-constexpr double kLosslessWaitS = 30.0;
-constexpr double kLiveWaitS = 2.0;
+constexpr double kNeededWaitS = 30.0;
+constexpr double kCourtesyWaitS = 2.0;
 // How often a wait looks up for signals and for readers that left.
 constexpr milliseconds kLook(100);
+constexpr int kStalled = 50;  // looks until a stall is worth a line
 constexpr milliseconds kStopGrace(700);
 constexpr milliseconds kLiveAcknowledge(2000);
 
@@ -58,9 +59,9 @@ SamplePublisher::SamplePublisher(const SamplePublisherOptions& options,
       writer_(participant_, WriterOptions(options, valve_ids_.size())) {}
 
 void SamplePublisher::AwaitReader() {
-  const bool required = options_.lossless || options_.wait_s;
+  const bool needed = options_.needs_reader;
   const double wait_s =
-      options_.wait_s.value_or(required ? kLosslessWaitS : kLiveWaitS);
+      options_.wait_s.value_or(needed ? kNeededWaitS : kCourtesyWaitS);
   const auto deadline =
       steady_clock::now() + std::chrono::duration_cast<milliseconds>(
                                 std::chrono::duration<double>(wait_s));
@@ -74,7 +75,7 @@ void SamplePublisher::AwaitReader() {
     const idl::DdsOptions& dds = participant_.options();
     const std::string where = "domain " + std::to_string(dds.domain) +
                               ", interface " + dds.interfaces;
-    if (required) {
+    if (needed) {
       throw NoReaderError("nobody reads the samples (" + where +
                           "): no reader within " + Seconds(wait_s) +
                           "; start fdi-monitor, or wait longer with "
@@ -90,8 +91,9 @@ void SamplePublisher::AwaitReader() {
 bool SamplePublisher::Publish(std::size_t valve, const Sample& sample) {
   message_.valve_id = valve_ids_[valve];
   message_.sample = sample;
+  int looks = 0;
   while (!signals_.stop_requested()) {
-    if (options_.lossless && writer_.status().matched == 0) {
+    if (options_.needs_reader && readers() == 0) {
       log_(LogLevel::kWarning,
            cli::EventLine("reader_left", {{"effect", "waiting for another"}}));
       AwaitReader();
@@ -100,6 +102,11 @@ bool SamplePublisher::Publish(std::size_t valve, const Sample& sample) {
     if (writer_.Write(message_, {}, kLook) == idl::WriteResult::kSent ||
         !options_.lossless) {
       return true;
+    }
+    if (++looks == kStalled) {
+      log_(LogLevel::kWarning,
+           cli::EventLine("reader_behind",
+                          {{"effect", "waiting until it takes samples"}}));
     }
   }
   return false;

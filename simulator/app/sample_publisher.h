@@ -25,6 +25,7 @@ class NoReaderError : public std::runtime_error {
 /// Settings of SamplePublisher.
 struct SamplePublisherOptions {
   bool lossless{false};          ///< The reader paces the writer.
+  bool needs_reader{false};      ///< Without one, nothing leaves.
   std::optional<double> wait_s;  ///< For a reader; see AwaitReader().
   bool keep_alive{false};        ///< Do not end the streams.
 };
@@ -37,13 +38,13 @@ class SamplePublisher {
                   std::vector<std::string> valve_ids,
                   const cli::Context& context, cli::StopSignals& signals);
 
-  /// Waits until a reader is there. Lossless, or with wait_s given, there must
-  /// be one in time (30 s by default); otherwise one that is up already gets
-  /// the first sample and nobody is waited for beyond 2 s.
-  /// @throws NoReaderError naming domain and interface.
+  /// Waits until a reader is there: for wait_s or 30 s if one is needed, else
+  /// for wait_s or 2 s, so that one which is up gets the first sample.
+  /// @throws NoReaderError naming domain and interface if one is needed.
   void AwaitReader();
 
-  /// Lossless: waits until there is room; with no reader left, for another.
+  /// Lossless: waits until there is room. Where a reader is needed and none is
+  /// left: waits for another.
   /// @returns false if a stop was requested before the sample left.
   /// @throws NoReaderError, TransportError
   bool Publish(std::size_t valve, const Sample& sample);

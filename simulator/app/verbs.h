@@ -24,6 +24,7 @@ struct DeliveryOptions {
 
 void AddDeliveryOptions(CLI::App& verb, DeliveryOptions& options);
 
+/// At max, the reader paces the writer and there must be one.
 SamplePublisherOptions PublisherOptionsOf(const DeliveryOptions& options,
                                           Speed speed);
 

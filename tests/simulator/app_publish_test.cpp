@@ -238,6 +238,43 @@ TEST_F(AppPublishTest, EachJsonLineIsPublishedAtOnce) {
   EXPECT_EQ(got[1].stamp_ns - got[0].stamp_ns, 1'000'000'000);
 }
 
+TEST_F(AppPublishTest, JsonLinesWithoutTimeAreStampedOnTheGridOfThePeriod) {
+  Reader reader(domain_);
+  Process process(With({"replay", "--csv", "-", "--valve", "J", "--period",
+                        "0.25", "--start", "2026-03-01T00:00:00Z"}));
+
+  process.Send(
+      "{\"CV_pct\": 1, \"X_pct\": 1}\n{\"CV_pct\": 2, \"X_pct\": 2}\n");
+  process.CloseInput();
+  ASSERT_TRUE(reader.TakeUntilEnded());
+
+  EXPECT_EQ(process.Wait().code, 0);
+  const auto& got = reader.Samples("J");
+  ASSERT_EQ(got.size(), 2U);
+  EXPECT_EQ(got[0].stamp_ns, 1'772'323'200'000'000'000);
+  EXPECT_EQ((got[1].stamp_ns - got[0].stamp_ns) % 250'000'000, 0);
+  EXPECT_GT(got[1].stamp_ns, got[0].stamp_ns);
+}
+
+TEST_F(AppPublishTest, AFilePipedThroughStdinLosesNothing) {
+  Reader reader(domain_);
+  Process process(With({"replay", "--csv", "-", "--valve", "P"}));
+  std::string lines = "t_s,CV_pct,X_pct,colour\n";
+  for (int i = 0; i < 3000; ++i) {
+    lines += std::to_string(i) + ",50,50,red\n";
+  }
+
+  process.Send(lines);
+  process.CloseInput();
+  ASSERT_TRUE(reader.TakeUntilEnded(1, 10));
+
+  const Ended ended = process.Wait();
+  EXPECT_EQ(ended.code, 0);
+  EXPECT_THAT(ended.err, HasSubstr("names=colour"));
+  EXPECT_EQ(reader.Samples("P").size(), 3000U);
+  EXPECT_EQ(reader.status().lost, 0U);
+}
+
 TEST_F(AppPublishTest, ABadLineOnStdinEndsTheStreamBehindTheGoodOnes) {
   Reader reader(domain_);
   Process process(
@@ -300,8 +337,15 @@ TEST_F(AppPublishTest, SigtermEndsALiveRunAndItsStream) {
 
 TEST_F(AppPublishTest, SigtermEndsAWriterWhoseReaderTakesNothing) {
   Reader reader(domain_);
+  const std::string file = (folder_.path() / "long.csv").string();
+  std::ofstream csv(file);
+  csv << "t_s,CV_pct,X_pct\n";
+  for (int i = 0; i < 200'000; ++i) {
+    csv << i << ",50,50\n";
+  }
+  csv.close();
   Process process(
-      With({"run", "--valve", "S", "--duration", "1e6", "--speed", "max"}));
+      With({"replay", "--csv", file, "--valve", "S", "--speed", "max"}));
   ASSERT_TRUE(
       reader.TakeUntil([&] { return !reader.Samples("S").empty(); }, 1));
   ASSERT_TRUE(reader.AwaitFull());
