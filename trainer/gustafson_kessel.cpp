@@ -22,6 +22,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kSmallest = std::numeric_limits<double>::min();
+// Factor on the tolerance while starts compete on a subset of the points.
+constexpr double kCoarseTolerance = 10.0;
 
 void CheckArguments(const Eigen::Ref<const MatrixXd>& points,
                     const GustafsonKesselOptions& options) {
@@ -289,7 +291,9 @@ FuzzyPartition FitGustafsonKessel(const Eigen::Ref<const MatrixXd>& points,
                      sorted.rows() / std::max(options.coarse_points,
                                               options.num_clusters + 1))
           : Index{1};
-  FuzzyPartition best = BestStart(Thinned(sorted, stride), options);
+  GustafsonKesselOptions coarse = options;
+  coarse.tolerance *= stride > 1 ? kCoarseTolerance : 1.0;
+  FuzzyPartition best = BestStart(Thinned(sorted, stride), coarse);
   if (stride > 1) {
     best = Iteration(sorted, options).Run(best);
   }

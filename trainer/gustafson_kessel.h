@@ -45,8 +45,9 @@ struct FuzzyPartition {
 ///
 /// Starts are random partitions and, every second one, spheres about points
 /// far from each other. They compete on about `coarse_points` of the points,
-/// evenly taken from the sorted ones; the best is iterated further on all. The
-/// order of the rows does not matter, since the points are sorted first.
+/// evenly taken from the sorted ones, at ten times the tolerance; the best is
+/// iterated further on all. The order of the rows does not matter, since the
+/// points are sorted first.
 /// Not converging is a result, not an error: read FuzzyPartition::converged.
 ///
 /// @param points Z, N×n: one sample zₖ per row, every column scaled to

@@ -212,6 +212,16 @@ TEST(TakagiSugenoFitTest, ConstantDataGiveOneConstantRule) {
   EXPECT_NEAR(Predict(rules, data.x)(0), 12.5, 1e-12);
 }
 
+// One step from random memberships this soft leaves them all near 1/c.
+TEST(TakagiSugenoFitTest, ATrivialPartitionGivesOneRule) {
+  TakagiSugenoOptions options = Rules(3);
+  options.clustering.fuzziness = 20.0;
+  options.clustering.num_starts = 1;
+  options.clustering.max_iterations = 1;
+
+  EXPECT_EQ(FitTakagiSugeno(Sampled(300, Hills), options).size(), 1U);
+}
+
 TEST(TakagiSugenoFitTest, RefusesUnusableData) {
   RegressionData data = Sampled(20, Ramp);
   EXPECT_THROW(FitTakagiSugeno(data, Rules(7)), std::invalid_argument);
