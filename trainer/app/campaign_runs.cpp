@@ -92,7 +92,9 @@ class Collector {
       if (run == nullptr) {
         continue;
       }
-      storage::CsvTable table = storage::ReadCsvFile(run->file);
+      storage::CsvOptions csv;
+      csv.start_ns = options_.start_ns;
+      storage::CsvTable table = storage::ReadCsvFile(run->file, csv);
       if (!FindImported(i, *run, table.runs.front())) {
         missing.emplace_back(i, std::move(table));
       }

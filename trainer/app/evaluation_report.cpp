@@ -17,7 +17,8 @@ using cli::FormatNumber;
 std::string SetText(const std::vector<int>& set) {
   std::string text;
   for (const int fault : set) {
-    text += (text.empty() ? "" : "|") + FaultName(fault);
+    text += text.empty() ? "" : "|";
+    text += FaultName(fault);
   }
   return text;
 }

@@ -16,7 +16,8 @@ using cli::FormatNumber;
 std::string RegressorsText(const TsModel& model) {
   std::string text;
   for (const Regressor& regressor : model.regressors) {
-    text += (text.empty() ? "" : ", ") + RegressorText(regressor);
+    text += text.empty() ? "" : ", ";
+    text += RegressorText(regressor);
   }
   return text;
 }
@@ -93,7 +94,8 @@ std::string HashText(std::uint64_t hash) {
 std::string FaultsText(const std::vector<int>& faults) {
   std::string text;
   for (const int fault : faults) {
-    text += (text.empty() ? "" : ", ") + FaultName(fault);
+    text += text.empty() ? "" : ", ";
+    text += FaultName(fault);
   }
   return text.empty() ? "none" : text;
 }
@@ -103,9 +105,11 @@ std::string GroupsText(const ModelSet& models) {
   for (const std::vector<int>& group : models.groups) {
     std::string names;
     for (const int fault : group) {
-      names += (names.empty() ? "" : "|") + FaultName(fault);
+      names += names.empty() ? "" : "|";
+      names += FaultName(fault);
     }
-    text += (text.empty() ? "" : ", ") + names;
+    text += text.empty() ? "" : ", ";
+    text += names;
   }
   return text.empty() ? "none" : text;
 }

@@ -29,7 +29,8 @@ std::string Text(double value) {
 std::string DecisionText(const DecisionParameters& d) {
   return "T " + Text(d.isolation_threshold) + " in " +
          Text(100.0 * d.isolation_fraction) + " % of t_k " +
-         std::to_string(d.isolation_samples) + ", n_d " +
+         std::to_string(d.isolation_samples) + " (joins in " +
+         Text(100.0 * d.join_fraction) + " %), n_d " +
          std::to_string(d.detection_samples) + ", t_c " +
          std::to_string(d.clearing_samples) + ", settling " +
          std::to_string(d.settling_samples) + " samples; evidence over " +
@@ -87,6 +88,7 @@ cli::Json DecisionJson(const DecisionParameters& d) {
           {"detection_samples", d.detection_samples},
           {"isolation_samples", d.isolation_samples},
           {"isolation_fraction", d.isolation_fraction},
+          {"join_fraction", d.join_fraction},
           {"clearing_samples", d.clearing_samples},
           {"settling_samples", d.settling_samples},
           {"evidence_window", d.evidence_window},
