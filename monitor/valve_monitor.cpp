@@ -23,13 +23,16 @@ ValveMonitor::ValveMonitor(const std::string& id,
 
 ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
                                 TimePoint received, EpisodeOutlet& outlet) {
+  const bool first = !std::exchange(seen_, true);
   received_ = received;
-  seen_ = true;
   stale_ = false;
   ended_ = false;
   const bool swapped = std::exchange(swapped_, false);
   if (!engine_) {
     writer_ = writer;
+    if (!first && sample.stamp_ns > unassigned_.stamp_ns) {
+      unassigned_interval_ns_ = sample.stamp_ns - unassigned_.stamp_ns;
+    }
     unassigned_.stamp_ns = sample.stamp_ns;
     unassigned_.source_id = sample.source_id;
     unassigned_.seq = sample.seq;
@@ -77,7 +80,9 @@ bool ValveMonitor::Adopt(std::shared_ptr<const ModelSet> models,
 }
 
 bool ValveMonitor::CheckStale(TimePoint now) {
-  const double period_s = models_ ? models_->sample_period_s : 1.0;
+  const double period_s =
+      models_ ? models_->sample_period_s
+              : static_cast<double>(unassigned_interval_ns_) / 1e9;
   const std::chrono::duration<double> limit(kStalePeriods * period_s);
   if (!seen_ || ended_ || stale_ || now - received_ <= limit) {
     return false;

@@ -75,6 +75,7 @@ class ValveMonitor {
   std::optional<ValveEngine> engine_;
   EpisodeTracker tracker_;
   Verdict unassigned_;
+  std::int64_t unassigned_interval_ns_{1'000'000'000};
   bool swapped_{false};
   bool seen_{false};
   bool stale_{false};

@@ -63,7 +63,9 @@ HistoryStore::HistoryStore(const std::filesystem::path& path,
   const storage::SessionStart start =
       writer_.BeginSession(now_ns, software, config);
   if (start.died_ns) {
-    log_(LogLevel::kWarning, "session_died last monitor was not ended");
+    log_(LogLevel::kWarning,
+         "session_died outage_s=" +
+             std::to_string((now_ns - *start.died_ns) / 1'000'000'000));
     writer_.AddGap({"", *start.died_ns, now_ns, "monitor_down"});
     writer_.Commit(now_ns);
   }

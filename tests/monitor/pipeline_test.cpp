@@ -197,9 +197,9 @@ TEST_F(PipelineTest, AStuckHistoryHoldsAnEventUpForItsPatienceOnly) {
 
   EXPECT_GE(bus_.event_times[0] - start, milliseconds(50));
   EXPECT_FALSE(bus_.events[0].second);
-  EXPECT_EQ(counters_[Counter::kEventsUnpersisted], 2U);
   history_.notice.Apply([&] { history_.stuck = false; });
   pipeline_->Stop();
+  EXPECT_EQ(counters_[Counter::kEventsUnpersisted], 2U);
   for (const auto& [key, count] : history_.recorded) {
     EXPECT_EQ(count, 1);
   }

@@ -89,9 +89,9 @@ TEST_F(ValveMonitorTest, AFaultIsDetectedIsolatedAndClearedAsOneEpisode) {
   for (const EpisodeEvent& event : notebook_.events) {
     EXPECT_EQ(event.episode_id, id);
   }
-  ASSERT_FALSE(notebook_.events[1].candidates.empty());
-  EXPECT_EQ(notebook_.events[1].candidates.front().fault, 7);
-  EXPECT_TRUE(notebook_.events[1].candidates.front().isolated);
+  ASSERT_FALSE(notebook_.events.at(1).candidates.empty());
+  EXPECT_EQ(notebook_.events.at(1).candidates.front().fault, 7);
+  EXPECT_TRUE(notebook_.events.at(1).candidates.front().isolated);
   EXPECT_EQ(notebook_.events[3].transition.reason, EndReason::kCleared);
 }
 
@@ -152,6 +152,7 @@ TEST_F(ValveMonitorTest, AnEarlierPublisherCannotEndTheStreamOfItsSuccessor) {
   for (std::uint64_t k = 0; k < 5; ++k) {
     Feed(PlantSample(k, 0.0, 2), kWriter + 1);
   }
+  Feed(PlantSample(50, 0.0, 1));  // Superseded.
 
   EXPECT_FALSE(valve_.EndStream(kWriter, notebook_));
   EXPECT_TRUE(valve_.EndStream(kWriter + 1, notebook_));
@@ -227,8 +228,8 @@ TEST_F(ValveMonitorTest, AnOpenEpisodeGoesOnUnderItsIdAfterARestart) {
   EXPECT_THAT(notebook_.resumed, ElementsAre(LeftOpen().episode_id));
   EXPECT_THAT(notebook_.Kinds(),
               ElementsAre(TransitionKind::kCleared, TransitionKind::kClosed));
-  EXPECT_EQ(notebook_.events[0].episode_id, LeftOpen().episode_id);
-  EXPECT_EQ(notebook_.events[0].transition.detection_stamp_ns,
+  EXPECT_EQ(notebook_.events.at(0).episode_id, LeftOpen().episode_id);
+  EXPECT_EQ(notebook_.events.at(0).transition.detection_stamp_ns,
             LeftOpen().detection_stamp_ns);
   ASSERT_EQ(notebook_.gaps.size(), 1U);
   EXPECT_EQ(notebook_.gaps[0].reason, "monitor_down");
@@ -241,7 +242,7 @@ TEST_F(ValveMonitorTest, AResumedEpisodeWithAnotherFaultIsReisolated) {
   Feed(150, 200, kF1Offset);
 
   EXPECT_THAT(notebook_.Kinds(), ElementsAre(TransitionKind::kReisolated));
-  EXPECT_EQ(notebook_.events[0].candidates.front().fault, 1);
+  EXPECT_EQ(notebook_.events.at(0).candidates.front().fault, 1);
 }
 
 TEST_F(ValveMonitorTest, ANormalMinuteAfterARestartClosesTheEpisodeUnknown) {
@@ -251,11 +252,11 @@ TEST_F(ValveMonitorTest, ANormalMinuteAfterARestartClosesTheEpisodeUnknown) {
   Feed(210, 212);
 
   ASSERT_EQ(notebook_.events.size(), 1U);
-  EXPECT_EQ(notebook_.events[0].transition.reason, EndReason::kUnknown);
-  EXPECT_EQ(notebook_.events[0].episode_id, LeftOpen().episode_id);
+  EXPECT_EQ(notebook_.events.at(0).transition.reason, EndReason::kUnknown);
+  EXPECT_EQ(notebook_.events.at(0).episode_id, LeftOpen().episode_id);
   Feed(212, 230, kF7Offset);
-  EXPECT_EQ(notebook_.events[1].transition.kind, TransitionKind::kDetected);
-  EXPECT_NE(notebook_.events[1].episode_id, LeftOpen().episode_id);
+  EXPECT_EQ(notebook_.events.at(1).transition.kind, TransitionKind::kDetected);
+  EXPECT_NE(notebook_.events.at(1).episode_id, LeftOpen().episode_id);
 }
 
 TEST_F(ValveMonitorTest, AnotherSourceDoesNotResumeTheEpisode) {
@@ -263,7 +264,7 @@ TEST_F(ValveMonitorTest, AnotherSourceDoesNotResumeTheEpisode) {
   Feed(0, 30, kF7Offset, 5);
 
   EXPECT_TRUE(notebook_.resumed.empty());
-  EXPECT_EQ(notebook_.events[0].transition.reason, EndReason::kUnknown);
+  EXPECT_EQ(notebook_.events.at(0).transition.reason, EndReason::kUnknown);
 }
 
 TEST_F(ValveMonitorTest, AnotherModelSetDoesNotResumeTheEpisode) {
@@ -273,7 +274,7 @@ TEST_F(ValveMonitorTest, AnotherModelSetDoesNotResumeTheEpisode) {
   Feed(150, 180, kF7Offset);
 
   EXPECT_TRUE(notebook_.resumed.empty());
-  EXPECT_EQ(notebook_.events[0].transition.reason, EndReason::kModelChanged);
+  EXPECT_EQ(notebook_.events.at(0).transition.reason, EndReason::kModelChanged);
 }
 
 TEST_F(ValveMonitorTest, ASilentValveGivesItsOpenEpisodeUp) {
@@ -284,7 +285,7 @@ TEST_F(ValveMonitorTest, ASilentValveGivesItsOpenEpisodeUp) {
   valve_.GiveUpRecovery(now_ns, notebook_);
 
   ASSERT_EQ(notebook_.events.size(), 1U);
-  EXPECT_EQ(notebook_.events[0].transition.reason, EndReason::kUnknown);
+  EXPECT_EQ(notebook_.events.at(0).transition.reason, EndReason::kUnknown);
   ASSERT_EQ(notebook_.gaps.size(), 1U);
   EXPECT_EQ(notebook_.gaps[0].to_ns, now_ns);
 }
