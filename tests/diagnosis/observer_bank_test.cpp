@@ -1,0 +1,104 @@
+#include "diagnosis/observer_bank.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/verdict.h"
+#include "tests/diagnosis/linear_plant.h"
+
+namespace fdi {
+namespace {
+
+using testing::LinearModel;
+
+// X̂(k) = 0.5 X̂(k−1) + 0.5 CV(k−1), parallel or on the measured past.
+ModelSet FirstOrder(bool parallel) {
+  ModelSet models = testing::LinearPlant();
+  ChannelObserver channel = LinearModel(Signal::kX, 1.0, 0.0);
+  channel.model.parallel = parallel;
+  channel.model.regressors = {{Signal::kX, 1}, {Signal::kCv, 1}};
+  channel.model.regressor_min = {0.0, 0.0};
+  channel.model.regressor_max = {100.0, 100.0};
+  channel.model.rules[0].antecedents = {{50, 50, 1e6, 1e6}, {50, 50, 1e6, 1e6}};
+  channel.model.rules[0].slopes = {0.5, 0.5};
+  models.channels.resize(1);
+  models.observers = {{"normal", 0, 0.0, {channel}}};
+  models.faults.clear();
+  return models;
+}
+
+Sample Reading(double cv, double x) {
+  Sample sample;
+  sample.Set(Signal::kCv, cv);
+  sample.Set(Signal::kX, x);
+  return sample;
+}
+
+TEST(ObserverBankTest, ParallelObserverForgetsTheMeasuredPast) {
+  const ModelSet models = FirstOrder(true);
+  ObserverBank bank(models);
+  bank.Initialise(Reading(60.0, 80.0));
+  // From 80 towards 60 by halves, whatever is measured.
+  for (int k = 1; k <= 10; ++k) {
+    bank.Step(Reading(60.0, 5.0));
+    EXPECT_NEAR(bank.prediction(0, 0), 60.0 + 20.0 * std::pow(0.5, k), 1e-12);
+    EXPECT_NEAR(bank.residual(0, 0), 5.0 - bank.prediction(0, 0), 1e-12);
+  }
+}
+
+TEST(ObserverBankTest, SeriesParallelObserverReadsTheMeasuredPast) {
+  const ModelSet models = FirstOrder(false);
+  ObserverBank bank(models);
+  bank.Initialise(Reading(60.0, 80.0));
+  bank.Step(Reading(60.0, 20.0));
+  EXPECT_NEAR(bank.prediction(0, 0), 70.0, 1e-12);
+  bank.Step(Reading(60.0, 20.0));
+  EXPECT_NEAR(bank.prediction(0, 0), 40.0, 1e-12);
+}
+
+TEST(ObserverBankTest, PredictionStaysWithinTheOutputLimits) {
+  ModelSet models = FirstOrder(true);
+  models.observers[0].channels[0].model.output_max = 50.0;
+  ObserverBank bank(models);
+  bank.Initialise(Reading(60.0, 80.0));
+  bank.Step(Reading(60.0, 80.0));
+  EXPECT_EQ(bank.prediction(0, 0), 50.0);
+}
+
+TEST(ObserverBankTest, ExtrapolationIsWhatTheRangeWouldHaveKept) {
+  ModelSet models = testing::LinearPlant();
+  models.observers[0].channels[1].model.regressor_max = {60.0};
+  ObserverBank bank(models);
+  Sample sample = testing::PlantSample(0);
+  sample.Set(Signal::kCv, 75.0);
+  bank.Initialise(sample);
+  bank.Step(sample);
+  EXPECT_NEAR(bank.extrapolation(0, 1), 15.0, 1e-12);
+  EXPECT_EQ(bank.extrapolation(1, 1), 0.0);
+}
+
+TEST(FaultCatalogueTest, NamesAreReadInAnyCaseAndPaperNamesMapToTheFive) {
+  EXPECT_EQ(ParseFault("F19"), 19);
+  EXPECT_EQ(ParseFault("f1"), 1);
+  EXPECT_EQ(ParseFault("paper2"), 3);
+  EXPECT_EQ(ParseFault("PAPER5"), 19);
+  EXPECT_FALSE(ParseFault("f20").has_value());
+  EXPECT_FALSE(ParseFault("paper6").has_value());
+  EXPECT_FALSE(ParseFault("f1x").has_value());
+  for (int fault = 1; fault <= kFaultCount; ++fault) {
+    EXPECT_EQ(ParseFault(FaultName(fault)), fault);
+  }
+}
+
+TEST(EpisodeIdTest, DependsOnValveSourceAndStamp) {
+  const auto id = EpisodeId("FV-1", 1, 2);
+  EXPECT_EQ(id, EpisodeId("FV-1", 1, 2));
+  EXPECT_NE(id, EpisodeId("FV-2", 1, 2));
+  EXPECT_NE(id, EpisodeId("FV-1", 2, 2));
+  EXPECT_NE(id, EpisodeId("FV-1", 1, 3));
+}
+
+}  // namespace
+}  // namespace fdi

@@ -1,0 +1,117 @@
+#include "trainer/calibration.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/trainer/gaussian.h"
+#include "trainer/tail_fit.h"
+
+namespace fdi::trainer {
+namespace {
+
+TEST(FiguresTest, VafIsBlindToAnOffsetThatBiasAndMseShow) {
+  const std::vector<double> outputs{1.0, 2.0, 3.0, 4.0};
+  const std::vector<double> residuals{2.0, 2.0, 2.0, 2.0};
+  const ValidationFigures figures = Figures(residuals, outputs);
+  EXPECT_DOUBLE_EQ(figures.vaf, 100.0);
+  EXPECT_DOUBLE_EQ(figures.bias, 2.0);
+  EXPECT_DOUBLE_EQ(figures.mse, 4.0);
+  EXPECT_EQ(figures.samples, 4);
+}
+
+TEST(FiguresTest, PredictingTheMeanAccountsForNothing) {
+  const std::vector<double> outputs{1.0, 2.0, 3.0};
+  const std::vector<double> residuals{-1.0, 0.0, 1.0};
+  EXPECT_DOUBLE_EQ(Figures(residuals, outputs).vaf, 0.0);
+}
+
+TEST(MembershipTest, AcceptsItsOwnResidualsAndHoldsZeroInTheCore) {
+  std::vector<double> residuals = GaussianSeries(2000, 1);
+  for (double& r : residuals) {
+    r += 3.0;
+  }
+  const Trapezoid membership = FitMembership(residuals);
+  EXPECT_EQ(membership(0.0), 1.0);
+  double accepted = 0.0;
+  for (const double r : residuals) {
+    accepted += membership(r) >= 0.7 ? 1.0 : 0.0;
+  }
+  EXPECT_GT(accepted / 2000.0, 0.98);
+  EXPECT_EQ(membership(3.0 + 6.0), 0.0);
+  EXPECT_EQ(membership(-3.0), 0.0);
+}
+
+TEST(CorrelationTimeTest, MatchesAnAutoregressiveSeries) {
+  // x(k+1) = a x(k) + e: τ = (1 + a)/(1 − a).
+  const std::vector<double> noise = GaussianSeries(100000, 2);
+  for (const double a : {0.0, 0.5, 0.8}) {
+    std::vector<double> series(noise.size(), 0.0);
+    for (std::size_t k = 1; k < series.size(); ++k) {
+      series[k] = a * series[k - 1] + noise[k];
+    }
+    const double expected = (1.0 + a) / (1.0 - a);
+    EXPECT_NEAR(CorrelationTime(series), expected, 0.12 * expected) << a;
+  }
+}
+
+TEST(TailFitTest, ReachesTheGaussianQuantileWithoutBeingBelowIt) {
+  // P(z > 4.75) = 1e-6; 50 000 values reach about 4.1.
+  const std::vector<double> series = GaussianSeries(50000, 3);
+  const TailThreshold tail = FitTail(series, 1e-6, 1);
+  EXPECT_GT(tail.level, 4.6);
+  EXPECT_LT(tail.level, 5.8);
+}
+
+TEST(TailFitTest, ReachesTheExponentialQuantile) {
+  std::vector<double> series = GaussianSeries(50000, 4);
+  for (double& value : series) {
+    value = -std::log(0.5 * std::erfc(value / std::sqrt(2.0)));
+  }
+  // P(z > 13.8) = 1e-6; the scale is at its upper bound.
+  const double level = FitTail(series, 1e-6, 1).level;
+  EXPECT_GT(level, 13.5);
+  EXPECT_LT(level, 17.0);
+}
+
+TEST(TailFitTest, LevelIsBeyondEverythingSeen) {
+  std::vector<double> series = GaussianSeries(1000, 5);
+  series[500] = 40.0;
+  EXPECT_GT(FitTail(series, 1e-3, 1).level, 40.0);
+}
+
+TEST(TailFitTest, NeighbouringExceedancesAreOneCluster) {
+  std::vector<double> series(1000, 0.0);
+  for (std::size_t k = 0; k < 1000; k += 100) {
+    series[k] = 1.0 + 0.001 * static_cast<double>(k);
+    series[k + 1] = series[k];
+    series[k + 2] = series[k];
+    series[k + 3] = series[k];
+    series[k + 4] = series[k];
+  }
+  EXPECT_EQ(FitTail(series, 1e-4, 5).clusters, 10);
+}
+
+TEST(TailFitTest, TooFewValuesAreRefused) {
+  EXPECT_THROW(FitTail(GaussianSeries(99, 6), 1e-3, 1), std::invalid_argument);
+}
+
+TEST(ThresholdsTest, ConsecutiveSamplesAllowALowerThreshold) {
+  ModelSet models;
+  models.channels = {{"X", Signal::kX, -1.0, 1.0}};
+  const std::vector<std::vector<double>> residuals{GaussianSeries(30000, 7)};
+  models.decision.detection_samples = 1;
+  FitThresholds(residuals, 1e-3, models);
+  const double single = models.channels[0].upper_threshold;
+  models.decision.detection_samples = 2;
+  FitThresholds(residuals, 1e-3, models);
+  // One in 1000 h over two sides: 1.4e-7 a sample is 5.1 alone, 3.4 in pairs.
+  EXPECT_NEAR(single, 5.4, 0.7);
+  EXPECT_NEAR(models.channels[0].upper_threshold, 3.7, 0.5);
+  EXPECT_NEAR(models.channels[0].lower_threshold, -3.7, 0.5);
+  EXPECT_NEAR(models.threshold_hours, 30000.0 / 3600.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace fdi::trainer

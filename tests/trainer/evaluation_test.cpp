@@ -1,0 +1,143 @@
+#include "trainer/evaluation.h"
+
+#include <gtest/gtest.h>
+
+namespace fdi::trainer {
+namespace {
+
+// 1000 s, settled at 30 s, f6 growing from 700 s on.
+std::vector<Indication> Quiet() {
+  std::vector<Indication> all(1000);
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    all[k].time_s = static_cast<double>(k);
+    all[k].settled = k >= 30;
+    if (k >= 700) {
+      all[k].truth = {6, 0.001 * static_cast<double>(k - 699)};
+    }
+  }
+  return all;
+}
+
+void Detect(std::vector<Indication>& all, std::size_t from, std::size_t to) {
+  for (std::size_t k = from; k < to; ++k) {
+    all[k].detected = true;
+  }
+}
+
+void Isolate(std::vector<Indication>& all, std::size_t from, std::size_t to,
+             const std::vector<int>& set) {
+  for (std::size_t k = from; k < to; ++k) {
+    all[k].isolated = set;
+  }
+}
+
+TEST(IndicesTest, NothingIndicatedMeansMinusOne) {
+  const RunIndices r = ComputeIndices(Quiet());
+  EXPECT_EQ(r.fault, 6);
+  EXPECT_NEAR(r.strength, 0.3, 1e-12);
+  EXPECT_FALSE(r.detected);
+  for (const double index : {r.t_dt_first, r.t_dt, r.t_it_first, r.t_it,
+                             r.t_exact, r.fs_d, r.fs_i}) {
+    EXPECT_EQ(index, -1.0);
+  }
+  EXPECT_EQ(r.r_fd, 0.0);
+  EXPECT_EQ(r.r_td, 0.0);
+  EXPECT_EQ(r.d_acc, 0.0);
+}
+
+TEST(IndicesTest, PermanentDetectionIsTheLastRisingEdge) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 710, 720);
+  Detect(all, 800, 1000);
+  Isolate(all, 805, 1000, {3, 6});
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_TRUE(r.detected);
+  EXPECT_EQ(r.t_dt_first, 10.0);
+  EXPECT_EQ(r.t_dt, 100.0);
+  EXPECT_EQ(r.t_it, 105.0);
+  EXPECT_NEAR(r.fs_d, 0.101, 1e-12);
+  EXPECT_NEAR(r.fs_i, 0.106, 1e-12);
+  EXPECT_NEAR(r.r_td, 210.0 / 300.0, 1e-12);
+  EXPECT_NEAR(r.r_ti, 195.0 / 300.0, 1e-12);
+  EXPECT_NEAR(r.r_mi, 195.0 / 900.0, 1e-12);  // t_on = 100
+  EXPECT_EQ(r.d_acc, 0.5);
+  EXPECT_EQ(r.t_exact, -1.0);
+  EXPECT_EQ(r.episodes, 2);
+}
+
+TEST(IndicesTest, OnlyTheTenMinutesBeforeTheFaultCountAsFalse) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 40, 100);   // before t_on = 100
+  Detect(all, 400, 460);  // false
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_NEAR(r.r_fd, 60.0 / 600.0, 1e-12);
+  EXPECT_FALSE(r.detected);
+}
+
+TEST(IndicesTest, AlarmThatStandsBeforeTheFaultIsNoDetection) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 600, 1000);
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_FALSE(r.detected);
+  EXPECT_EQ(r.t_dt, -1.0);
+}
+
+TEST(IndicesTest, HorizonEndsTheZone) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 700, 900);
+  EXPECT_FALSE(ComputeIndices(all).detected);
+  EXPECT_TRUE(ComputeIndices(all, 850.0).detected);
+  EXPECT_NEAR(ComputeIndices(all, 850.0).r_td, 1.0, 1e-12);
+}
+
+TEST(IndicesTest, WrongSetsAreCountedAndTheLastOneDecides) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 700, 1000);
+  Isolate(all, 720, 760, {3});
+  Isolate(all, 760, 1000, {6});
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_EQ(r.wrong_isolations, 1);
+  EXPECT_EQ(r.t_exact, 60.0);
+  EXPECT_EQ(r.d_acc, 1.0);
+  EXPECT_EQ(r.final_set, std::vector<int>{6});
+}
+
+TEST(IndicesTest, RunWithoutFaultHasRatesButNoTimes) {
+  std::vector<Indication> all = Quiet();
+  for (Indication& indication : all) {
+    indication.truth = {};
+  }
+  Detect(all, 500, 510);
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_EQ(r.fault, 0);
+  EXPECT_GT(r.r_fd, 0.0);
+  EXPECT_EQ(r.t_dt, -1.0);
+  EXPECT_EQ(r.d_acc, -1.0);
+  EXPECT_EQ(r.episodes, 1);
+}
+
+TEST(SummaryTest, AccuracyIsTheMeanOverDetectedRuns) {
+  RunIndices right;
+  right.fault = 6;
+  right.detected = true;
+  right.d_acc = 1.0;
+  RunIndices pair = right;
+  pair.d_acc = 0.5;
+  RunIndices missed;
+  missed.fault = 3;
+  missed.d_acc = 0.0;
+  RunIndices healthy;
+  healthy.episodes = 2;
+  const EvaluationSummary summary =
+      Summarise({right, pair, missed, healthy}, {1.0, 1.0, 1.0, 7200.0});
+  EXPECT_EQ(summary.faulty_runs, 3);
+  EXPECT_EQ(summary.detected, 2);
+  EXPECT_EQ(summary.contained, 2);
+  EXPECT_EQ(summary.exact, 1);
+  EXPECT_DOUBLE_EQ(summary.mean_d_acc, 0.75);
+  EXPECT_EQ(summary.fault_free_episodes, 2);
+  EXPECT_DOUBLE_EQ(summary.fault_free_hours, 2.0);
+}
+
+}  // namespace
+}  // namespace fdi::trainer
