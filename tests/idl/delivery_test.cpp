@@ -388,8 +388,7 @@ long ResidentKilobytes() {
   return -1;
 }
 
-// With the library's own memory policy the writer of decisions alone would take
-// some 230 MB at creation.
+// Histories that are allocated ahead, for throughput, would take gigabytes.
 TEST_F(DeliveryTest, NoMemoryIsTakenForValvesThatAreNotThere) {
   DdsOptions options = domain_.Options();
   options.max_valves = 100000;
