@@ -109,9 +109,10 @@ struct Handlers {
   std::function<void(const Message&, const Reception&)> on_ended;
 };
 
-/// Reads one topic. The messages of one writer come in the order of writing,
-/// those of different writers as they arrive. One thread takes; status() and
-/// Interrupt() are thread safe.
+/// Reads one topic. The messages of one valve from one writer come in the order
+/// of writing; those of different valves as they arrive, or valve by valve
+/// where many have waited. One thread takes; status() and Interrupt() are
+/// thread safe.
 template <typename Message>
 class Subscriber {
  public:

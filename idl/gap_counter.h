@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <unordered_map>
@@ -15,31 +16,43 @@ class GapCounter {
  public:
   explicit GapCounter(std::int64_t joined_ns) : joined_ns_(joined_ns) {}
 
-  /// @returns how many messages are missing right before this one, which came
-  ///   in the order of its writer and was sent at `sent_ns` UTC.
-  std::uint64_t Missing(std::uint64_t writer_id, std::uint64_t number,
-                        std::int64_t sent_ns) {
+  /// A message, in any order, once each.
+  void Count(std::uint64_t writer_id, std::uint64_t number,
+             std::int64_t sent_ns) {
+    if (sent_ns < joined_ns_) {
+      return;
+    }
     if (writers_.size() >= kMaxWriters && !writers_.contains(writer_id)) {
       writers_.clear();
     }
-    Last& last = writers_[writer_id];
-    const bool counts = last.number > 0 && last.sent_ns >= joined_ns_;
-    const std::uint64_t missing =
-        counts && number > last.number + 1 ? number - last.number - 1 : 0;
-    last = {number, sent_ns};
-    return missing;
+    Writer& writer = writers_[writer_id];
+    const std::uint64_t before = writer.Missing();
+    writer.lowest = std::min(writer.lowest, number);
+    writer.highest = std::max(writer.highest, number);
+    ++writer.count;
+    missing_ += writer.Missing() - before;
   }
+
+  /// How many lie between those counted, of all writers. Exact once all that
+  /// has been received has been counted.
+  std::uint64_t missing() const { return missing_; }
 
  private:
   static constexpr std::size_t kMaxWriters = 4096;
 
-  struct Last {
-    std::uint64_t number{0};
-    std::int64_t sent_ns{0};
+  struct Writer {
+    std::uint64_t lowest{UINT64_MAX};
+    std::uint64_t highest{0};
+    std::uint64_t count{0};
+
+    std::uint64_t Missing() const {
+      return count == 0 ? 0 : highest - lowest + 1 - count;
+    }
   };
 
   std::int64_t joined_ns_;
-  std::unordered_map<std::uint64_t, Last> writers_;
+  std::uint64_t missing_{0};
+  std::unordered_map<std::uint64_t, Writer> writers_;
 };
 
 }  // namespace fdi::idl

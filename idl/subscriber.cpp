@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <atomic>
-#include <cstring>
 #include <mutex>
 #include <set>
 #include <unordered_map>
@@ -19,6 +18,7 @@
 #include "idl/matched.h"
 #include "idl/participant_impl.h"
 #include "idl/qos.h"
+#include "idl/reception.h"
 
 namespace fdi::idl {
 namespace {
@@ -31,37 +31,6 @@ constexpr std::size_t kRefusedLimit = 65536;
 // not in the library, which searches its history at every release.
 constexpr std::size_t QueueCapacity(std::size_t item_bytes) {
   return std::clamp<std::size_t>((16U << 20U) / item_bytes, 1024, 65536);
-}
-
-struct HandleHash {
-  std::size_t operator()(const dds::InstanceHandle_t& handle) const {
-    std::size_t hash = 0;  // The handle is an MD5 sum: any part will do.
-    std::memcpy(
-        &hash,
-        static_cast<const eprosima::fastrtps::rtps::octet*>(handle.value),
-        sizeof hash);
-    return hash;
-  }
-};
-
-// 64-bit FNV-1a over the 16 bytes of the writer's GUID.
-std::uint64_t WriterId(const dds::InstanceHandle_t& writer) {
-  std::uint64_t hash = 14695981039346656037U;
-  for (std::size_t i = 0; i < 16; ++i) {
-    hash = (hash ^ writer.value[i]) * 1099511628211U;
-  }
-  return hash;
-}
-
-std::int64_t NowNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
-Reception ReceptionOf(const dds::SampleInfo& info) {
-  return {info.source_timestamp.to_ns(), info.reception_timestamp.to_ns(),
-          WriterId(info.publication_handle)};
 }
 
 }  // namespace
@@ -217,14 +186,21 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
         return;
       }
       pending_.store(false);
-      dds::SampleInfo info;
-      while (queue_.open() && reader_->take_next_sample(&wire_, &info) ==
-                                  ReturnCode::RETCODE_OK) {
-        try {
-          Accept(info);
-        } catch (const std::exception&) {  // Out of memory.
-          lost_.fetch_add(1, std::memory_order_relaxed);
-        }
+      DrainLocked();
+    }
+  }
+
+  void DrainLocked() noexcept {
+    dds::SampleInfo info;
+    while (queue_.open()) {
+      if (reader_->take_next_sample(&wire_, &info) != ReturnCode::RETCODE_OK) {
+        missing_.store(gaps_.missing(), std::memory_order_relaxed);
+        return;
+      }
+      try {
+        Accept(info);
+      } catch (const std::exception&) {  // Out of memory.
+        lost_.fetch_add(1, std::memory_order_relaxed);
       }
     }
   }
@@ -233,11 +209,9 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
     Item item;
     item.reception = ReceptionOf(info);
     item.ended = !info.valid_data;
-    missing_.fetch_add(
-        gaps_.Missing(item.reception.writer_id,
-                      info.sample_identity.sequence_number().to64long(),
-                      item.reception.sent_ns),
-        std::memory_order_relaxed);
+    gaps_.Count(item.reception.writer_id,
+                info.sample_identity.sequence_number().to64long(),
+                item.reception.sent_ns);
     if (item.ended) {
       // An end carries a hash of the key: keys_ knows what it stands for.
       const auto found = keys_.find(info.instance_handle);

@@ -134,6 +134,30 @@ TEST_F(DeliveryTest, ASlowReaderPacesALosslessWriter) {
   EXPECT_EQ(subscriber.status().received, kSamples);
 }
 
+// Behind the queue of the subscriber the library keeps samples valve by valve.
+TEST_F(DeliveryTest, ABacklogOfManyValvesIsNoLoss) {
+  constexpr int kValves = 100;
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Subscriber<ValveSampleMessage> subscriber(here, Profile::kLossless);
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless, kValves});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  std::uint64_t sent = 0;
+  while (publisher.Write(SampleOf(ValveName(static_cast<int>(sent % kValves)),
+                                  sent / kValves),
+                         {}, milliseconds(300)) == WriteResult::kSent) {
+    ++sent;
+  }
+  OrderCheck check;
+  TakeUntil(subscriber, check.AsHandlers(),
+            [&] { return check.count == sent; });
+
+  EXPECT_EQ(check.count, sent);
+  EXPECT_EQ(check.out_of_order, 0U);
+  EXPECT_EQ(subscriber.status().lost, 0U);
+}
+
 TEST_F(DeliveryTest, AStopEndsAWriteThatWaits) {
   Participant here(domain_.Options(), log_.Sink());
   Participant there(domain_.Options(), log_.Sink());
