@@ -8,7 +8,7 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr double kWholeRange = 0.98;  // of the data: says nothing
+constexpr double kWholeRange = 0.9;  // of the data: says nothing
 
 std::string Digits(double value, int digits) {
   std::array<char, 40> text{};
