@@ -104,6 +104,7 @@ void Deliver(Feed& feed, const FeedSinks& sinks, Pacer pacer,
   summary.interrupted = signals.stop_requested();
   if (sinks.publisher != nullptr) {
     summary.published = true;
+    summary.lossless = sinks.publisher->lossless();
     summary.readers = sinks.publisher->readers();
     summary.acknowledged = sinks.publisher->Finish() && summary.readers > 0;
   }
@@ -144,6 +145,12 @@ void PrintSummary(const FeedSummary& summary,
             << cli::FormatNumber(summary.elapsed_s, 1) << " s"
             << (summary.interrupted ? ", stopped by a signal" : "")
             << Outcome(summary) << '\n';
+}
+
+int ExitCodeOf(const FeedSummary& summary) {
+  const bool failed = summary.lossless && summary.readers > 0 &&
+                      !summary.acknowledged && !summary.interrupted;
+  return failed ? cli::kExitTransport : cli::kExitOk;
 }
 
 std::uint64_t NewSourceId() {

@@ -46,6 +46,7 @@ struct FeedSummary {
   bool published{false};
   int readers{0};            ///< At the end.
   bool acknowledged{false};  ///< They have all of it.
+  bool lossless{false};      ///< They ought to.
   bool interrupted{false};   ///< By a signal.
   double elapsed_s{0.0};
 };
@@ -65,6 +66,10 @@ void Deliver(Feed& feed, const FeedSinks& sinks, Pacer pacer,
 /// To stdout, as a table or, with --json, an object.
 void PrintSummary(const FeedSummary& summary,
                   const cli::GlobalOptions& options);
+
+/// kExitTransport if readers lack samples of a lossless delivery that was not
+/// interrupted.
+int ExitCodeOf(const FeedSummary& summary);
 
 /// A random number that no other publisher has.
 std::uint64_t NewSourceId();

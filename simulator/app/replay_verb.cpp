@@ -126,7 +126,7 @@ int Replay(const ReplayOptions& options, const cli::Context& context) {
   sinks.publisher->AwaitReader();
   Deliver(*feed, sinks, Pacer(speed, signals), signals, summary);
   PrintSummary(summary, context.options);
-  return cli::kExitOk;
+  return ExitCodeOf(summary);
 }
 
 }  // namespace

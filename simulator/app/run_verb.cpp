@@ -189,7 +189,7 @@ int Run(const RunOptions& options, const cli::Context& context) {
   }
   Deliver(feed, sinks, Pacer(speed, signals), signals, summary);
   PrintSummary(summary, context.options);
-  return cli::kExitOk;
+  return ExitCodeOf(summary);
 }
 
 void AddScenarioOptions(CLI::App& verb, RunOptions& options) {

@@ -19,6 +19,7 @@ constexpr milliseconds kLook(100);
 constexpr int kStalled = 50;  // looks until a stall is worth a line
 constexpr milliseconds kStopGrace(700);
 constexpr milliseconds kLiveAcknowledge(2000);
+constexpr milliseconds kLosslessAcknowledge(60'000);
 
 idl::PublisherOptions WriterOptions(const SamplePublisherOptions& options,
                                     std::size_t valves) {
@@ -113,10 +114,8 @@ bool SamplePublisher::Publish(std::size_t valve, const Sample& sample) {
 }
 
 bool SamplePublisher::AwaitAcknowledged() {
-  auto deadline = steady_clock::time_point::max();
-  if (!options_.lossless) {
-    deadline = steady_clock::now() + kLiveAcknowledge;
-  }
+  auto deadline = steady_clock::now() +
+                  (options_.lossless ? kLosslessAcknowledge : kLiveAcknowledge);
   bool stopping = false;
   while (!writer_.WaitForAcknowledged(kLook)) {
     if (signals_.stop_requested() && !stopping) {

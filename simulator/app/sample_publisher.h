@@ -50,11 +50,12 @@ class SamplePublisher {
   bool Publish(std::size_t valve, const Sample& sample);
 
   /// Waits until the readers have it all, ends the streams (unless keep_alive),
-  /// waits again. After a stop it waits a moment only, and leaves streams open
-  /// whose readers are behind.
+  /// waits again; for 60 s lossless, else for 2 s. After a stop it waits a
+  /// moment only, and leaves streams open whose readers are behind.
   /// @returns whether the readers have it all.
   bool Finish();
 
+  bool lossless() const { return options_.lossless; }
   /// How many there are now.
   int readers() const { return writer_.status().matched; }
 

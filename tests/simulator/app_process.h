@@ -8,6 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -76,9 +77,18 @@ class Process {
   }
   void Signal(int signal) { kill(id_, signal); }
 
+  /// Kills it if it does not end within a minute.
   Ended Wait() {
+    using std::chrono::steady_clock;
+    const auto deadline = steady_clock::now() + std::chrono::minutes(1);
     int status = 0;
-    waitpid(std::exchange(id_, -1), &status, 0);
+    while (waitpid(id_, &status, WNOHANG) == 0) {
+      if (steady_clock::now() > deadline) {
+        kill(id_, SIGKILL);
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    id_ = -1;
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
             Contents("out"), Contents("err")};
   }

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -99,6 +100,18 @@ class AppPublishTest : public testing::Test {
     return file;
   }
 
+  // More samples than all buffers of a reader hold.
+  static constexpr std::size_t kManySamples = 120'000;
+  std::string MakeLongCsv() const {
+    const std::string file = (folder_.path() / "long.csv").string();
+    std::ofstream csv(file);
+    csv << "t_s,CV_pct,X_pct\n";
+    for (std::size_t i = 0; i < kManySamples; ++i) {
+      csv << i << ",50,50\n";
+    }
+    return file;
+  }
+
   idl::TestDomain domain_;
   storage::TemporaryDirectory folder_;
 };
@@ -135,33 +148,45 @@ TEST_F(AppPublishTest, AReplayedCsvArrivesInOrderBitForBit) {
 }
 
 TEST_F(AppPublishTest, AtMaxSpeedASlowReaderLosesNothing) {
-  constexpr std::size_t kValves = 10;
-  constexpr std::size_t kSamples = 2000;
   Reader reader(domain_);
+  Process process(With(
+      {"replay", "--csv", MakeLongCsv(), "--valve", "S", "--speed", "max"}));
 
-  Process process(With({"run", "--valves", "10", "--duration", "2000",
-                        "--speed", "max", "--set", "noise=false"}));
-  // Slower than the writer: at most 100 messages, then other work.
-  ASSERT_TRUE(reader.TakeUntil(
-      [&] {
-        std::this_thread::sleep_for(milliseconds(5));
-        return reader.ended().size() == kValves;
-      },
-      100));
+  ASSERT_TRUE(reader.AwaitFull());
+  ASSERT_TRUE(reader.TakeUntilEnded(1, 1000));
   const Ended ended = process.Wait();
 
   ASSERT_EQ(ended.code, 0) << ended.err;
-  for (std::size_t v = 1; v <= kValves; ++v) {
-    char name[16];
-    std::snprintf(name, sizeof name, "VALVE-%04zu", v);
-    const auto& got = reader.Samples(name);
-    ASSERT_EQ(got.size(), kSamples) << name;
-    for (std::size_t i = 0; i < kSamples; ++i) {
-      ASSERT_EQ(got[i].seq, i) << name;
-    }
+  const auto& got = reader.Samples("S");
+  ASSERT_EQ(got.size(), kManySamples);
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    ASSERT_EQ(got[i].seq, i);
   }
   EXPECT_EQ(reader.status().lost, 0U);
-  EXPECT_EQ(nlohmann::json::parse(ended.out)["published"], kValves * kSamples);
+  EXPECT_EQ(nlohmann::json::parse(ended.out)["published"], kManySamples);
+}
+
+TEST_F(AppPublishTest, ManyValvesArriveWholeEachFromItsOwnSource) {
+  Reader reader(domain_);
+
+  Process process(
+      With({"run", "--valves", "20", "--duration", "200", "--speed", "max"}));
+  ASSERT_TRUE(reader.TakeUntilEnded(20));
+  const Ended ended = process.Wait();
+
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  std::set<std::uint64_t> sources;
+  for (int v = 1; v <= 20; ++v) {
+    char name[16];
+    std::snprintf(name, sizeof name, "VALVE-%04d", v);
+    const auto& got = reader.Samples(name);
+    ASSERT_EQ(got.size(), 200U) << name;
+    for (std::size_t i = 0; i < got.size(); ++i) {
+      ASSERT_EQ(got[i].seq, i) << name;
+    }
+    sources.insert(got[0].source_id);
+  }
+  EXPECT_EQ(sources.size(), 20U);
 }
 
 TEST_F(AppPublishTest, AStoredRunIsReplayedFromNowOrWithItsStamps) {
@@ -337,15 +362,8 @@ TEST_F(AppPublishTest, SigtermEndsALiveRunAndItsStream) {
 
 TEST_F(AppPublishTest, SigtermEndsAWriterWhoseReaderTakesNothing) {
   Reader reader(domain_);
-  const std::string file = (folder_.path() / "long.csv").string();
-  std::ofstream csv(file);
-  csv << "t_s,CV_pct,X_pct\n";
-  for (int i = 0; i < 200'000; ++i) {
-    csv << i << ",50,50\n";
-  }
-  csv.close();
-  Process process(
-      With({"replay", "--csv", file, "--valve", "S", "--speed", "max"}));
+  Process process(With(
+      {"replay", "--csv", MakeLongCsv(), "--valve", "S", "--speed", "max"}));
   ASSERT_TRUE(
       reader.TakeUntil([&] { return !reader.Samples("S").empty(); }, 1));
   ASSERT_TRUE(reader.AwaitFull());
