@@ -1,13 +1,16 @@
 #include "monitor/episode_writer.h"
 
 #include <exception>
+#include <optional>
 #include <string>
 #include <utility>
 
 namespace fdi::monitor {
 namespace {
 
-constexpr int kTracesPerCommit = 64;
+// Few and large transactions: the newest chunk of a trace is packed anew in
+// each of them.
+constexpr std::size_t kPointsPerCommit = 5'000;
 
 template <typename... Ts>
 struct Overload : Ts... {
@@ -91,6 +94,7 @@ void EpisodeWriter::Stop() {
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
+    stop_by_ = std::chrono::steady_clock::now() + options_.stop_limit;
     changed_.notify_one();
   }
   if (thread_.joinable()) {
@@ -112,7 +116,7 @@ void EpisodeWriter::Stop() {
 
 void EpisodeWriter::Run() {
   const auto has_work = [this] {
-    return stopping_ || !records_.empty() || !traces_.empty();
+    return stopping_ || !records_.empty() || trace_points_ >= kPointsPerCommit;
   };
   while (true) {
     {
@@ -133,47 +137,74 @@ void EpisodeWriter::Run() {
   }
 }
 
-// Stores what waits. @returns false once the history fails.
+// Stores what waits, the evidence in its turn. @returns false once the history
+// fails.
 bool EpisodeWriter::Serve() {
   if (degraded_ && !Commit()) {
     FailWaitingEvents();
     return false;
   }
-  int traces = 0;
   while (true) {
-    std::unique_lock lock(mutex_);
-    if (!records_.empty()) {
-      // Only this thread takes from the front.
-      const Record& record = records_.front();
-      lock.unlock();
-      if (!WriteRecord(record)) {
-        FailWaitingEvents();
-        return false;
+    if (!WriteRecords()) {
+      FailWaitingEvents();
+      return false;
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      const bool due = std::chrono::steady_clock::now() - last_commit_ >=
+                       options_.commit_period;
+      if (!due && trace_points_ < kPointsPerCommit &&
+          !(stopping_ && !traces_.empty())) {
+        return true;
       }
-      lock.lock();
-      records_.pop_front();
-      continue;
     }
-    if (traces_.empty() || traces >= kTracesPerCommit) {
-      break;
-    }
-    const EpisodeTrace trace = std::move(traces_.front());
-    traces_.pop_front();
-    trace_points_ -= trace.trace.size();
-    ++traces;
-    lock.unlock();
-    if (!Attempt([&] { history_.AddTrace(trace); })) {
-      counters_.Add(Counter::kTraceDropped, trace.trace.size());
+    if (!WriteTraces()) {
       return false;
     }
   }
-  const auto now = std::chrono::steady_clock::now();
-  if (traces >= kTracesPerCommit ||
-      now - last_commit_ >= options_.commit_period) {
-    last_commit_ = now;
-    return Commit();
+}
+
+bool EpisodeWriter::WriteRecords() {
+  while (true) {
+    const Record* next = nullptr;
+    {
+      const std::lock_guard lock(mutex_);
+      if (records_.empty()) {
+        return true;
+      }
+      next = &records_.front();  // Only this thread takes from the front.
+    }
+    if (!WriteRecord(*next)) {
+      return false;
+    }
+    const std::lock_guard lock(mutex_);
+    records_.pop_front();
   }
-  return true;
+}
+
+// Buffers evidence and commits it at once, so that no event waits for it.
+bool EpisodeWriter::WriteTraces() {
+  last_commit_ = std::chrono::steady_clock::now();
+  std::size_t points = 0;
+  while (points < kPointsPerCommit) {
+    std::optional<EpisodeTrace> trace;
+    bool late = false;
+    {
+      const std::lock_guard lock(mutex_);
+      if (traces_.empty()) {
+        break;
+      }
+      trace = std::move(traces_.front());
+      traces_.pop_front();
+      trace_points_ -= trace->trace.size();
+      late = stopping_ && std::chrono::steady_clock::now() > stop_by_;
+    }
+    points += trace->trace.size();
+    if (late || !Attempt([&] { history_.AddTrace(*trace); })) {
+      counters_.Add(Counter::kTraceDropped, trace->trace.size());
+    }
+  }
+  return Commit();
 }
 
 bool EpisodeWriter::WriteRecord(const Record& record) {

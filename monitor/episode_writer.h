@@ -24,6 +24,7 @@ struct EpisodeWriterOptions {
   std::chrono::milliseconds patience{200};  ///< Of the bus for the disk.
   std::chrono::milliseconds commit_period{1000};
   std::chrono::milliseconds retry_period{1000};
+  std::chrono::milliseconds stop_limit{1000};  ///< Of evidence at the end.
   std::size_t max_records{100'000};         ///< Events, gaps and marks waiting.
   std::size_t max_trace_points{2'000'000};  ///< Evidence waiting.
   std::function<std::int64_t()> utc_now_ns;  ///< Needed.
@@ -70,6 +71,8 @@ class EpisodeWriter : public EpisodeOutlet {
   bool Enqueue(Record record);
   void Run();
   bool Serve();
+  bool WriteRecords();
+  bool WriteTraces();
   bool WriteRecord(const Record& record);
   bool Attempt(const std::function<void()>& call);
   bool Commit();
@@ -90,6 +93,7 @@ class EpisodeWriter : public EpisodeOutlet {
   std::deque<EpisodeTrace> traces_;
   std::size_t trace_points_{0};
   bool stopping_{false};
+  std::chrono::steady_clock::time_point stop_by_;
   EventOutbox outbox_;
   std::thread thread_;
 };

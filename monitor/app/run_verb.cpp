@@ -17,14 +17,30 @@ struct RunArguments {
   ServiceOptions service;
 };
 
+// A flag that may have a value; TOML knows it as true and false, too.
+std::string ParseRecord(const std::string& word) {
+  if (word == "true" || word == "on") {
+    return "on";
+  }
+  if (word == "false" || word == "off") {
+    return "off";
+  }
+  if (word != "lossless") {
+    throw CLI::ValidationError("--record",
+                               word + " is none of on, lossless, off");
+  }
+  return word;
+}
+
 int Run(const RunArguments& arguments, const cli::Context& context) {
   ServiceOptions options = arguments.service;
   if (!arguments.model_set.empty()) {
     options.model_set = storage::ParseModelReference(arguments.model_set);
   }
-  options.recording = arguments.record.empty()         ? Recording::kOff
-                      : arguments.record == "lossless" ? Recording::kLossless
-                                                       : Recording::kOn;
+  if (arguments.record != "off") {
+    options.recording =
+        arguments.record == "lossless" ? Recording::kLossless : Recording::kOn;
+  }
   cli::StopSignals signals;
   Service service(options, context);
   return service.Run(signals);
@@ -46,7 +62,8 @@ void AddRunVerb(cli::Program& program) {
                "Store the samples as runs; =lossless waits for the disk "
                "instead of counting what it could not take")
       ->default_str("off")
-      ->check(CLI::IsMember({"off", "on", "lossless"}));
+      ->transform(ParseRecord)
+      ->type_name("[=on|lossless|off]");
   ServiceOptions& service = arguments->service;
   run.add_option("--valves", service.valves, "Serve only ids that match GLOB")
       ->capture_default_str();

@@ -16,7 +16,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kTakeTimeout{100};
 constexpr milliseconds kTickPeriod{1000};
 constexpr milliseconds kDrainLimit{1000};
-constexpr milliseconds kSubscriberPatience{1500};  // at shutdown
+constexpr milliseconds kSubscriberPatience{1000};  // at shutdown
 constexpr milliseconds kAcknowledgeLimit{300};
 
 std::chrono::milliseconds Milliseconds(double seconds) {
@@ -129,8 +129,8 @@ void Service::Intake(const std::stop_token& stop) {
     while (!stop.stop_requested() && !pipeline_.failed()) {
       samples_.Take(handlers, kTakeTimeout);
     }
-    const auto deadline = std::chrono::steady_clock::now() + kDrainLimit;
-    while (std::chrono::steady_clock::now() < deadline &&
+    // What is there already; publishers that go on do not keep us.
+    while (std::chrono::steady_clock::now() < drain_until_.load() &&
            samples_.Take(handlers, milliseconds(0), 4096) > 0) {
     }
   } catch (...) {
@@ -259,6 +259,7 @@ void Service::Shutdown() {
       publication_stop_.request_stop();
     }
   });
+  drain_until_ = std::chrono::steady_clock::now() + kDrainLimit;
   intake_.request_stop();
   if (intake_.joinable()) {
     intake_.join();
@@ -266,7 +267,9 @@ void Service::Shutdown() {
   pipeline_.Stop();
   history_.EndSession();
   PublishStatus();
-  decisions_.WaitForAcknowledged(kAcknowledgeLimit);
+  if (!publication_stop_.stop_requested()) {
+    decisions_.WaitForAcknowledged(kAcknowledgeLimit);
+  }
   events_.WaitForAcknowledged(kAcknowledgeLimit);
   WriteStatusLine();
   context_.log(LogLevel::kInfo, "monitor_stopped");

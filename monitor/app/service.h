@@ -86,6 +86,8 @@ class Service {
   std::int64_t started_ns_;
   std::uint64_t reported_loss_{0};
   std::chrono::steady_clock::time_point last_status_line_;
+  std::atomic<std::chrono::steady_clock::time_point> drain_until_{
+      std::chrono::steady_clock::time_point{}};
   std::exception_ptr intake_error_;
   std::atomic<bool> intake_failed_{false};
   std::jthread intake_;
