@@ -53,7 +53,7 @@ simulate() {  # VALVE DURATION SEED [FAULT]
   fdi-simulator run --valve "$1" --duration "$2" --seed "$3" "${fault[@]}" \
     --parameters paper-operating-point --excitation operating-point \
     --set excitation.amplitude_pct=12 --set excitation.period_s=60 \
-    --start "$start" --speed max --domain "$domain" --log-level warn
+    --start "$start" --speed max --domain "$domain" --log-level warning
 }
 
 say "Ten fault scenarios with seeds that training did not see"
