@@ -62,6 +62,10 @@ function(fdi_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} GTest::gtest
                         GTest::gmock GTest::gtest_main)
   fdi_settings(${name})
+  if(NOT TARGET ${ARG_LABEL}_tests)
+    add_custom_target(${ARG_LABEL}_tests)  # unit_tests, system_tests
+  endif()
+  add_dependencies(${ARG_LABEL}_tests ${name})
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS ${ARG_LABEL} TIMEOUT 120)
 endfunction()
