@@ -1,6 +1,7 @@
 #include "diagnosis/valve_engine.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -49,6 +50,12 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
 
 }  // namespace
 
+// Consecutive residuals beyond one threshold.
+struct AbnormalRun {
+  int length{0};
+  std::int64_t since_ns{0};
+};
+
 // What depends on the model set; replaced as a whole by Adopt().
 struct Diagnosis {
   explicit Diagnosis(std::shared_ptr<const ModelSet> set)
@@ -89,14 +96,15 @@ class ValveEngine::Impl {
   void ReadResiduals();
   Quality Judge(const Sample& sample);
   void Decide();
-  void Detect();
+  void Detect(std::int64_t stamp_ns);
   void Isolate();
   FaultSet WithGroups(FaultSet set) const;
   void Emit(TransitionKind kind, std::int64_t stamp_ns,
             EndReason reason = EndReason::kNone);
   Transition Make(TransitionKind kind, std::int64_t stamp_ns,
                   EndReason reason) const;
-  bool Abnormal() const;
+  bool CountAbnormal();
+  std::optional<std::int64_t> DetectionStamp() const;
 
   std::unique_ptr<Diagnosis> diagnosis_;
   SourceOrder order_;
@@ -104,8 +112,7 @@ class ValveEngine::Impl {
   bool needs_initialisation_{true};
   int settling_{0};
   SignalMask present_{0};
-  int abnormal_run_{0};
-  std::int64_t abnormal_since_ns_{0};
+  std::array<AbnormalRun, 2 * kMaxChannels> runs_{};  // low, high a channel
   std::int64_t detection_stamp_ns_{0};
   FaultSet contender_{0};  // another set than the isolated one
   int contender_run_{0};
@@ -172,7 +179,7 @@ void ValveEngine::Impl::Initialise(const Sample& sample) {
   diagnosis_->bank.Initialise(sample);
   present_ = sample.present;
   needs_initialisation_ = false;
-  abnormal_run_ = 0;
+  runs_.fill({});
   settling_ = std::max(models().decision.settling_samples, kMaxLag);
   verdict_.initialised = true;
 }
@@ -208,30 +215,42 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
   return Quality::kLive;
 }
 
-bool ValveEngine::Impl::Abnormal() const {
+// Counts runs per channel and side, as the thresholds were fitted: noise that
+// passes one threshold now and another one next is no detection.
+bool ValveEngine::Impl::CountAbnormal() {
+  bool abnormal = false;
+  const auto count = [&](AbnormalRun& run, bool beyond) {
+    run.since_ns = beyond && run.length == 0 ? verdict_.stamp_ns : run.since_ns;
+    run.length = beyond ? run.length + 1 : 0;
+    abnormal = abnormal || beyond;
+  };
   for (std::size_t c = 0; c < models().channels.size(); ++c) {
     const ChannelSpec& channel = models().channels[c];
     const double r = verdict_.residuals[c];
     const double uncertain =
         kExtrapolationError *
         diagnosis_->bank.extrapolation(0, static_cast<int>(c));
-    if (r < channel.lower_threshold - uncertain ||
-        r > channel.upper_threshold + uncertain) {
-      return true;
+    count(runs_[2 * c], r < channel.lower_threshold - uncertain);
+    count(runs_[2 * c + 1], r > channel.upper_threshold + uncertain);
+  }
+  return abnormal;
+}
+
+// Start of the earliest run that is long enough for a detection.
+std::optional<std::int64_t> ValveEngine::Impl::DetectionStamp() const {
+  std::optional<std::int64_t> stamp;
+  for (const AbnormalRun& run : runs_) {
+    if (run.length >= models().decision.detection_samples) {
+      stamp = std::min(stamp.value_or(run.since_ns), run.since_ns);
     }
   }
-  return false;
+  return stamp;
 }
 
 void ValveEngine::Impl::Decide() {
-  const bool abnormal = Abnormal();
-  if (abnormal && abnormal_run_++ == 0) {
-    abnormal_since_ns_ = verdict_.stamp_ns;
-  } else if (!abnormal) {
-    abnormal_run_ = 0;
-  }
-  const bool begins =
-      !episode_open() && abnormal_run_ >= models().decision.detection_samples;
+  const bool abnormal = CountAbnormal();
+  const std::optional<std::int64_t> stamp = DetectionStamp();
+  const bool begins = !episode_open() && stamp.has_value();
   if (!episode_open() && !begins) {
     return;
   }
@@ -244,7 +263,7 @@ void ValveEngine::Impl::Decide() {
   diagnosis_->faults.Follow(diagnosis_->bank);
   diagnosis_->faults.Compete(verdict_);
   if (begins) {
-    Detect();
+    Detect(*stamp);
   }
   Isolate();
   diagnosis_->clearing.Push(
@@ -258,10 +277,10 @@ void ValveEngine::Impl::Decide() {
   }
 }
 
-void ValveEngine::Impl::Detect() {
+void ValveEngine::Impl::Detect(std::int64_t stamp_ns) {
   verdict_.state = State::kDetected;
   verdict_.isolated = 0;
-  detection_stamp_ns_ = abnormal_since_ns_;
+  detection_stamp_ns_ = stamp_ns;
   contender_ = 0;
   contender_run_ = 0;
   Emit(TransitionKind::kDetected, detection_stamp_ns_);

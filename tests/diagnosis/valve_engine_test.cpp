@@ -80,6 +80,20 @@ TEST(ValveEngineTest, OneAbnormalSampleIsNoDetection) {
   EXPECT_TRUE(StepRange(engine, 51, 80).transitions.empty());
 }
 
+TEST(ValveEngineTest, OneChannelAfterTheOtherIsNoDetection) {
+  ValveEngine engine(SharedPlant());
+  StepRange(engine, 0, 50);
+  const Seen x = StepRange(
+      engine, 50, 51, [](Sample& s) { s.values[Index(Signal::kX)] -= 3.0; });
+  const Seen f = StepRange(
+      engine, 51, 52, [](Sample& s) { s.values[Index(Signal::kF)] += 3.0; });
+  const Seen below = StepRange(
+      engine, 52, 53, [](Sample& s) { s.values[Index(Signal::kF)] -= 3.0; });
+  EXPECT_TRUE(x.transitions.empty());
+  EXPECT_TRUE(f.transitions.empty());
+  EXPECT_TRUE(below.transitions.empty());
+}
+
 TEST(ValveEngineTest, FaultIsIsolatedByTheSampleThatCompletesTk) {
   ValveEngine engine(SharedPlant());
   StepRange(engine, 0, 50);
