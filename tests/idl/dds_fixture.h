@@ -17,12 +17,14 @@ namespace fdi::idl {
 
 inline constexpr std::chrono::seconds kPatience{30};
 
-/// A domain id in 150..199 that no other test process has, as long as it lives.
+/// A domain id in 60..99 that no other test process has, as long as it lives.
+/// From 102 on the ports of a domain (7400 + 250 id) are ephemeral ones, which
+/// any socket may hold.
 class TestDomain {
  public:
   TestDomain() {
-    for (int i = 0; i < 50; ++i) {
-      id_ = 150 + (getpid() + i) % 50;
+    for (int i = 0; i < 40; ++i) {
+      id_ = 60 + (getpid() + i) % 40;
       const std::string path =
           "/tmp/fdi-test-domain-" + std::to_string(id_) + ".lock";
       file_ = open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);

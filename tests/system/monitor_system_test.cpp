@@ -125,7 +125,7 @@ class MonitorSystemTest : public testing::Test {
     return storage::HistoryReader(directory_.path() / "history.db");
   }
 
-  const int domain_{20 + static_cast<int>(getpid() % 80)};
+  const int domain_{20 + static_cast<int>(getpid() % 40)};
   storage::TemporaryDirectory directory_;
   std::optional<idl::Participant> participant_;
   std::optional<idl::Publisher<idl::ValveSampleMessage>> samples_;
