@@ -23,8 +23,6 @@ class SourceOrder {
   Placement Place(const Sample& sample);
 
   void SetPeriod(double sample_period_s);
-  /// No sample is known any more; sources and their seq are.
-  void ForgetTime() { has_stamp_ = false; }
 
  private:
   bool Superseded(std::uint64_t source_id) const;

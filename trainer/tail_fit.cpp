@@ -87,7 +87,6 @@ TailThreshold FitTail(std::span<const double> series, double rate,
   // No data of some hours support a level that they themselves exceed.
   tail.level = tail.base + std::max(tail.scale * std::max(0.0, reach),
                                     maxima.back() + tail.scale);
-  tail.rate_upper = rate * (1.0 + kUpperBound / std::sqrt(n));
   return tail;
 }
 

@@ -6,13 +6,11 @@ namespace fdi::trainer {
 
 /// A threshold from the upper tail of a series, and what it rests on.
 struct TailThreshold {
-  double level{0.0};       ///< Exceeded at the stated rate [unit of data].
-  double base{0.0};        ///< u, where the tail begins.
-  double scale{0.0};       ///< σ of the generalized Pareto distribution.
-  double shape{0.0};       ///< ξ; negative: bounded tail.
-  int clusters{0};         ///< Independent exceedances of u.
-  double rate_upper{0.0};  ///< 95 % upper bound of the rate at `level`, from
-                           ///< the uncertainty of the rate at u [1/sample].
+  double level{0.0};  ///< Exceeded at the stated rate [unit of data].
+  double base{0.0};   ///< u, where the tail begins.
+  double scale{0.0};  ///< σ of the generalized Pareto distribution.
+  double shape{0.0};  ///< ξ; negative: bounded tail.
+  int clusters{0};    ///< Independent exceedances of u.
 };
 
 /// The level that a stationary series exceeds `rate` times per sample, by
