@@ -24,7 +24,7 @@ constexpr std::array<FaultFacts, kFaultCount> kFaults{{
     {"f11", "spring fault", "", false},
     {"f12", "electro-pneumatic transducer fault", "", true},
     {"f13", "rod displacement sensor fault", "", true},
-    {"f14", "positioner pressure sensor fault", "", false},
+    {"f14", "positioner pressure sensor fault", "", true},
     {"f15", "positioner feedback fault", "", false},
     {"f16", "supply pressure drop", "", false},
     {"f17", "unexpected pressure change across the valve", "", true},
