@@ -7,6 +7,10 @@
 namespace fdi {
 namespace {
 
+// What is refuted stays refuted for a while, but not for longer the more often
+// it was: evidence falls behind the best by this many supports at most.
+constexpr double kMemoryOfContradiction = 4.0;
+
 std::vector<int> ObserversOf(const ModelSet& models, int fault, bool negative) {
   std::vector<int> found;
   for (std::size_t i = 1; i < models.observers.size(); ++i) {
@@ -33,15 +37,17 @@ double Membership(const ChannelObserver& channel, double residual,
 double InstantFactor(const ObserverBank& bank, const Observer& observer,
                      int index) {
   double factor = 1.0;
+  bool voted = false;
   for (std::size_t c = 0; c < observer.channels.size(); ++c) {
     const int channel = static_cast<int>(c);
-    if (bank.active(channel)) {
+    if (bank.active(channel) && !std::isnan(bank.residual(index, channel))) {
+      voted = true;
       factor = std::min(factor, Membership(observer.channels[c],
                                            bank.residual(index, channel),
                                            bank.extrapolation(index, channel)));
     }
   }
-  return bank.active_channels() > 0 ? factor : 0.0;
+  return voted ? factor : 0.0;
 }
 
 }  // namespace
@@ -83,8 +89,16 @@ void FaultBank::Restart() {
 
 void FaultBank::Follow(const ObserverBank& bank) {
   normal_.Step(bank);
+  double best = normal_.evidence();
   for (Family& family : families_) {
     family.tracker.Step(bank);
+    best = std::max(best, family.tracker.evidence());
+  }
+  const double least =
+      best - kMemoryOfContradiction * models_->decision.evidence_support;
+  normal_.RaiseEvidence(least);
+  for (Family& family : families_) {
+    family.tracker.RaiseEvidence(least);
   }
 }
 

@@ -37,6 +37,22 @@ void ValidateDecision(const ModelSet& models) {
         "evidence support must be beyond its core");
 }
 
+void ValidateChannel(const ModelSet& models, const ChannelSpec& channel) {
+  const std::string where = "channel " + channel.name + ": ";
+  Check(channel.lower_threshold < 0.0 && channel.upper_threshold > 0.0, models,
+        where + "thresholds must enclose zero");
+  Check(channel.windows.size() <= kMaxWindows, models,
+        where + "at most 4 windows are accepted");
+  for (const WindowLimits& window : channel.windows) {
+    Check(window.length >= 2 && window.length <= 100000, models,
+          where + "windows must be 2 to 100000 samples long");
+    Check(window.lower_mean < 0.0 && window.upper_mean > 0.0, models,
+          where + "limits of a window must enclose zero");
+    Check(std::isfinite(window.upper_log_rms), models,
+          where + "limits of a window must be finite");
+  }
+}
+
 void ValidateObserver(const ModelSet& models, const Observer& observer) {
   const std::string where = "observer '" + observer.name + "': ";
   Check(observer.channels.size() == models.channels.size(), models,
@@ -125,9 +141,7 @@ void Validate(const ModelSet& models) {
     }
   }
   for (const ChannelSpec& channel : models.channels) {
-    Check(channel.lower_threshold < 0.0 && channel.upper_threshold > 0.0,
-          models,
-          "thresholds of channel " + channel.name + " must enclose zero");
+    ValidateChannel(models, channel);
   }
 }
 

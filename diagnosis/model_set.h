@@ -13,6 +13,7 @@ namespace fdi {
 inline constexpr int kMaxFaults = 64;
 inline constexpr int kMaxObservers = 128;
 inline constexpr int kMaxChannels = 16;
+inline constexpr int kMaxWindows = 4;  // per channel
 
 /// A prediction is uncertain by this share of what it extrapolates
 /// (ObserverBank::extrapolation).
@@ -27,12 +28,23 @@ struct ValidationFigures {
   std::int64_t samples{0};
 };
 
+/// Limits on the normal residual over an exponential window: its mean and the
+/// logarithm of its deviation about that mean (ResidualWindows).
+struct WindowLimits {
+  int length{30};             ///< N [samples].
+  double lower_mean{0.0};     ///< < 0 [unit].
+  double upper_mean{0.0};     ///< > 0 [unit].
+  double upper_log_rms{0.0};  ///< Of the deviation in units of the output.
+};
+
 /// A residual channel of the model set: which output it watches.
 struct ChannelSpec {
   std::string name;  ///< "X", "F", ...
   Signal output{Signal::kX};
   double lower_threshold{0.0};  ///< The normal residual r = y − ŷ below this
   double upper_threshold{0.0};  ///< or above this is abnormal [unit].
+  std::vector<WindowLimits>
+      windows{};  ///< Slow and small faults; may be empty.
 };
 
 /// One channel of one observer.

@@ -25,22 +25,24 @@ SignalMask ChannelSignals(const ModelSet& models, std::size_t c) {
   return static_cast<SignalMask>(mask);
 }
 
-double Kept(const TsModel& model, const double* x) {
-  return std::clamp(Evaluate(model, x).value, model.output_min,
-                    model.output_max);
-}
-
-// |ŷ(x) − ŷ(x within the trained range)|
-double Extrapolation(const TsModel& model, std::array<double, kMaxRegressors> x,
-                     double prediction) {
+// True if some regressor of the model is beyond its trained range; `inside`
+// holds the values kept within.
+bool Beyond(const TsModel& model, const std::array<double, kMaxRegressors>& x,
+            std::array<double, kMaxRegressors>& inside) {
   bool beyond = false;
   for (std::size_t j = 0; j < model.regressors.size(); ++j) {
-    const double inside =
+    inside[j] =
         std::clamp(x[j], model.regressor_min[j], model.regressor_max[j]);
-    beyond = beyond || inside != x[j];
-    x[j] = inside;
+    beyond = beyond || inside[j] != x[j];
   }
-  return beyond ? std::abs(prediction - Kept(model, x.data())) : 0.0;
+  return beyond;
+}
+
+bool ReadsOwnPast(const TsModel& model) {
+  return model.parallel &&
+         std::any_of(
+             model.regressors.begin(), model.regressors.end(),
+             [&](const Regressor& r) { return r.signal == model.output; });
 }
 
 }  // namespace
@@ -50,12 +52,36 @@ ObserverBank::ObserverBank(const ModelSet& models)
       channel_count_(static_cast<int>(models.channels.size())),
       depth_(Depth(models)),
       active_(models.channels.size(), 0),
+      readings_(models.channels.size(), 0.0),
+      saturated_(models.channels.size(), 0),
       measured_(static_cast<std::size_t>(depth_)) {
   const std::size_t slots = models.observers.size() * models.channels.size();
   own_past_.resize(static_cast<std::size_t>(depth_) * slots);
   predictions_.resize(slots);
   residuals_.resize(slots);
   extrapolations_.resize(slots);
+  MakeGroups();
+}
+
+const TsModel& ObserverBank::Model(std::size_t slot) const {
+  const std::size_t channels = models_->channels.size();
+  return models_->observers[slot / channels].channels[slot % channels].model;
+}
+
+void ObserverBank::MakeGroups() {
+  for (std::size_t slot = 0; slot < predictions_.size(); ++slot) {
+    const std::size_t channel = slot % models_->channels.size();
+    const auto fits = [&](const Group& group) {
+      return group.channel == channel && !ReadsOwnPast(Model(slot)) &&
+             SharesAntecedents(Model(group.slots.front()), Model(slot));
+    };
+    const auto group = std::find_if(groups_.begin(), groups_.end(), fits);
+    if (group != groups_.end()) {
+      group->slots.push_back(slot);
+    } else {
+      groups_.push_back({channel, {slot}});
+    }
+  }
 }
 
 void ObserverBank::Initialise(const Sample& sample) {
@@ -88,23 +114,42 @@ double ObserverBank::RegressorValue(const TsModel& model,
 void ObserverBank::Step(const Sample& sample) {
   head_ = (head_ + 1) % depth_;
   measured_[Row(0)] = sample.values;
-  std::array<double, kMaxRegressors> x{};
-  std::size_t slot = 0;
-  for (const Observer& observer : models_->observers) {
-    for (std::size_t c = 0; c < observer.channels.size(); ++c, ++slot) {
-      if (active_[c] == 0) {
-        continue;
-      }
-      const TsModel& model = observer.channels[c].model;
-      for (std::size_t j = 0; j < model.regressors.size(); ++j) {
-        x[j] = RegressorValue(model, model.regressors[j], slot);
-      }
-      const double kept = Kept(model, x.data());
-      predictions_[slot] = kept;
-      extrapolations_[slot] = Extrapolation(model, x, kept);
-      residuals_[slot] = sample[model.output] - kept;
-      own_past_[Row(0) * predictions_.size() + slot] = kept;
+  for (std::size_t c = 0; c < active_.size(); ++c) {
+    const TsModel& model = models_->observers.front().channels[c].model;
+    readings_[c] = sample[model.output];
+    saturated_[c] = active_[c] != 0 && readings_[c] >= model.saturation ? 1 : 0;
+  }
+  for (const Group& group : groups_) {
+    if (active_[group.channel] != 0) {
+      StepGroup(group, sample);
     }
+  }
+}
+
+void ObserverBank::StepGroup(const Group& group, const Sample& sample) {
+  std::array<double, kMaxRegressors> x{};
+  std::array<double, kMaxRegressors> inside{};
+  FiringRules firing;
+  FiringRules firing_inside;
+  const TsModel& first = Model(group.slots.front());
+  for (std::size_t j = 0; j < first.regressors.size(); ++j) {
+    x[j] = RegressorValue(first, first.regressors[j], group.slots.front());
+  }
+  Weigh(first, x.data(), firing);
+  const bool beyond = Beyond(first, x, inside);
+  if (beyond) {
+    Weigh(first, inside.data(), firing_inside);
+  }
+  for (const std::size_t slot : group.slots) {
+    const TsModel& model = Model(slot);
+    const double prediction = Blend(model, x.data(), firing);
+    predictions_[slot] = prediction;
+    extrapolations_[slot] =
+        beyond
+            ? std::abs(prediction - Blend(model, inside.data(), firing_inside))
+            : 0.0;
+    residuals_[slot] = Residual(model, sample[model.output], prediction);
+    own_past_[Row(0) * predictions_.size() + slot] = prediction;
   }
 }
 

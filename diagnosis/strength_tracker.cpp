@@ -17,8 +17,20 @@ constexpr double kWorstInterpolation = 0.5;
 // A fault rarely develops faster than to full strength in 10 minutes.
 constexpr double kRateDeviation = 1.0 / 1500.0;
 
-double ChannelTime(const ChannelObserver& channel) {
-  return std::max(channel.correlation_time, 1.0);
+// Median over the observers, per channel.
+std::vector<double> ChannelTimes(const ModelSet& models) {
+  std::vector<double> times;
+  for (std::size_t c = 0; c < models.channels.size(); ++c) {
+    std::vector<double> all;
+    for (const Observer& observer : models.observers) {
+      all.push_back(std::max(observer.channels[c].correlation_time, 1.0));
+    }
+    const auto middle =
+        all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
+    std::nth_element(all.begin(), middle, all.end());
+    times.push_back(*middle);
+  }
+  return times;
 }
 
 }  // namespace
@@ -27,6 +39,7 @@ StrengthTracker::StrengthTracker(const ModelSet& models,
                                  const std::vector<int>& observers)
     : models_(&models),
       memory_(1.0 - 1.0 / models.decision.evidence_window),
+      channel_times_(ChannelTimes(models)),
       cell_cost_(kCells, 0.0) {
   nodes_.push_back({0, 0.0});
   for (const int index : observers) {
@@ -116,9 +129,11 @@ StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
       2.0 * high_share * low_share *
           Channel(high.observer, channel).residual_sd *
           Channel(low.observer, channel).residual_sd;
-  return {
-      bank.residual(low.observer, channel) - slope * (strength - low.strength),
-      slope, variance + error * error, nearest.observer};
+  const TsModel& model = Channel(nearest.observer, channel).model;
+  const double prediction = bank.prediction(low.observer, channel) +
+                            slope * (strength - low.strength);
+  return {Residual(model, bank.reading(channel), prediction), slope,
+          variance + error * error, nearest.observer};
 }
 
 // Of a residual under its own condition, and of what is extrapolated.
@@ -151,11 +166,12 @@ void StrengthTracker::Search(const ObserverBank& bank) {
         continue;
       }
       const Prediction p = At(bank, c, Cell(cell));
-      cost +=
-          (std::min(p.residual * p.residual / p.variance, kOutlier) +
-           std::log(p.variance)) /
-          ChannelTime(models_->observers[static_cast<std::size_t>(p.nearest)]
-                          .channels[static_cast<std::size_t>(c)]);
+      if (std::isnan(p.residual)) {
+        continue;
+      }
+      cost += (std::min(p.residual * p.residual / p.variance, kOutlier) +
+               (bank.saturated(c) ? 0.0 : std::log(p.variance))) /
+              channel_times_[static_cast<std::size_t>(c)];
     }
     cell_cost_[static_cast<std::size_t>(cell)] += cost;
   }
@@ -176,6 +192,7 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
   var_strength_ = (var_strength_ + 2.0 * covariance_ + var_rate_) / memory_;
   covariance_ = (covariance_ + var_rate_) / memory_;
   var_rate_ = std::min(var_rate_ / memory_, kRateDeviation * kRateDeviation);
+  KeepBounded();
   const int channels = static_cast<int>(models_->channels.size());
   for (int c = 0; c < channels; ++c) {
     if (!bank.active(c)) {
@@ -183,12 +200,16 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
     }
     const double s = std::clamp(strength_, lowest_, highest_);
     const Prediction p = At(bank, c, s);
+    if (std::isnan(p.residual)) {
+      continue;
+    }
     const double spread =
         p.variance + p.slope * p.slope * std::min(var_strength_, 1.0);
     const double distance = p.residual * p.residual / spread;
     const double bounded = std::min(distance, kOutlier);
-    evidence_ -=
-        0.5 * (bounded + std::log(spread)) / ChannelTime(Channel(p.nearest, c));
+    evidence_ -= 0.5 *
+                 (bounded + (bank.saturated(c) ? 0.0 : std::log(spread))) /
+                 channel_times_[static_cast<std::size_t>(c)];
     if (p.slope == 0.0 || segments_.empty()) {
       continue;
     }
@@ -203,11 +224,20 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
     covariance_ -= gain_s * p.slope * covariance_;
     var_strength_ -= gain_s * p.slope * var_strength_;
   }
-  var_strength_ = std::clamp(var_strength_, 0.0, 1.0);
+  KeepBounded();
   if (strength_ < lowest_ || strength_ > highest_) {
     strength_ = std::clamp(strength_, lowest_, highest_);
     rate_ = 0.0;
   }
+}
+
+// A strength that the residuals say nothing of stays within [0, 1] all the
+// same.
+void StrengthTracker::KeepBounded() {
+  var_strength_ = std::clamp(var_strength_, 0.0, 1.0);
+  var_rate_ = std::max(var_rate_, 0.0);
+  const double most = std::sqrt(var_strength_ * var_rate_);
+  covariance_ = std::clamp(covariance_, -most, most);
 }
 
 void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
@@ -218,6 +248,9 @@ void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
       continue;
     }
     const Prediction p = At(bank, c, strength_);
+    if (std::isnan(p.residual)) {
+      continue;
+    }
     const ChannelObserver& nearest = Channel(p.nearest, c);
     const double shrunk =
         p.residual * nearest.residual_sd / std::sqrt(p.variance);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "diagnosis/observer_bank.h"
@@ -22,8 +23,11 @@ namespace fdi {
 ///
 ///     L ← λ L − ½ Σ_c (ν²/S + ln S) / τ_c,
 ///
-/// τ_c the correlation time of the residual: log-likelihoods of faults differ
-/// long before single residuals do.
+/// τ_c the median correlation time of the residuals of the channel, the same
+/// for all faults: log-likelihoods of faults differ long before single
+/// residuals do. A reading at the transmitter's limit has
+/// no density: it costs ν²/S of a prediction below the limit, and nothing of
+/// one beyond.
 class StrengthTracker {
  public:
   /// `observers`: indices of one fault and direction by rising |strength|;
@@ -35,6 +39,9 @@ class StrengthTracker {
 
   /// Takes the residuals of one sample.
   void Step(const ObserverBank& bank);
+
+  /// Lifts the evidence to `least` if it is below.
+  void RaiseEvidence(double least) { evidence_ = std::max(evidence_, least); }
 
   double strength() const { return sign_ * strength_; }
   double evidence() const { return evidence_; }
@@ -66,12 +73,13 @@ class StrengthTracker {
   double Variance(const ObserverBank& bank, int observer, int channel) const;
   void Search(const ObserverBank& bank);
   void Follow(const ObserverBank& bank);
+  void KeepBounded();
   void UpdateFactor(const ObserverBank& bank);
   double Cell(int index) const;
 
-  static constexpr int kCells = 33;         // strengths tried at the start
-  static constexpr int kSearchSamples = 8;  // for so many samples
-  static constexpr double kOutlier = 25.0;  // bound of ν²/S
+  static constexpr int kCells = 33;          // strengths tried at the start
+  static constexpr int kSearchSamples = 40;  // for so many samples
+  static constexpr double kOutlier = 25.0;   // bound of ν²/S
 
   const ModelSet* models_;
   std::vector<Node> nodes_;  // the normal observer first
@@ -79,7 +87,8 @@ class StrengthTracker {
   double sign_{1.0};
   double lowest_{0.0};
   double highest_{0.0};
-  double memory_;  // λ
+  double memory_;                      // λ
+  std::vector<double> channel_times_;  // τ_c
 
   int age_{0};
   double strength_{0.0};

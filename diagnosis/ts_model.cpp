@@ -17,6 +17,8 @@ namespace {
 
 // A rule fires if its exponent is above log(1e-8).
 constexpr double kCoveredExponent = -18.420680743952367;
+// A rule of less than 4e-18 of the strongest adds nothing to a double.
+constexpr double kFiringExponent = -40.0;
 // exp(t) is taken as 0 below this, far above the subnormal numbers.
 constexpr double kLowestExponent = -700.0;
 // Keeps the difference of two exponents a number however far x is.
@@ -68,23 +70,25 @@ double LogMembership(const FuzzySet& set, double x) {
   return -0.5 * z * z;
 }
 
-// log β and y_i of one rule at x.
-struct RuleValue {
-  double exponent;
-  double output;
-};
-
-RuleValue EvaluateRule(const TsRule& rule, const double* x) {
-  RuleValue value{0.0, rule.intercept};
-  const std::size_t n = rule.slopes.size();
-  const FuzzySet* sets = rule.antecedents.data();
-  const double* slopes = rule.slopes.data();
-  for (std::size_t j = 0; j < n; ++j) {
-    value.exponent += LogMembership(sets[j], x[j]);
-    value.output += slopes[j] * x[j];
+double Exponent(const TsRule& rule, const double* x) {
+  double exponent = 0.0;
+  for (std::size_t j = 0; j < rule.antecedents.size(); ++j) {
+    exponent += LogMembership(rule.antecedents[j], x[j]);
   }
-  value.exponent = std::max(value.exponent, kFarthestExponent);
-  return value;
+  return std::max(exponent, kFarthestExponent);
+}
+
+double Output(const TsRule& rule, const double* x) {
+  double output = rule.intercept;
+  for (std::size_t j = 0; j < rule.slopes.size(); ++j) {
+    output += rule.slopes[j] * x[j];
+  }
+  return output;
+}
+
+bool SameSet(const FuzzySet& a, const FuzzySet& b) {
+  return a.left_center == b.left_center && a.right_center == b.right_center &&
+         a.left_width == b.left_width && a.right_width == b.right_width;
 }
 
 // Throws the DataErrors of Validate() with the place in front.
@@ -163,24 +167,63 @@ void ValidateRule(const TsRule& rule, std::size_t n, const Checker& checker) {
 
 }  // namespace
 
-TsPrediction Evaluate(const TsModel& model, const double* x) {
-  std::array<RuleValue, kMaxRules> values;
+void Weigh(const TsModel& model, const double* x, FiringRules& firing) {
+  std::array<double, kMaxRules> exponents;
   const std::size_t count =
       std::min<std::size_t>(model.rules.size(), kMaxRules);
   double largest = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < count; ++i) {
-    values[i] = EvaluateRule(model.rules[i], x);
-    largest = std::max(largest, values[i].exponent);
+    exponents[i] = Exponent(model.rules[i], x);
+    largest = std::max(largest, exponents[i]);
   }
-  double weighted_sum = 0.0;
+  std::size_t fired = 0;
   double sum = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
-    const double weight = Exp(values[i].exponent - largest);
-    weighted_sum += weight * values[i].output;
-    sum += weight;
+    if (exponents[i] - largest > kFiringExponent) {
+      firing.rules[fired] = static_cast<int>(i);
+      firing.weights[fired] = Exp(exponents[i] - largest);
+      sum += firing.weights[fired++];
+    }
   }
-  return {std::clamp(weighted_sum / sum, model.output_min, model.output_max),
-          largest >= kCoveredExponent};
+  for (std::size_t i = 0; i < fired; ++i) {
+    firing.weights[i] /= sum;
+  }
+  firing.count = static_cast<int>(fired);
+  firing.covered = largest >= kCoveredExponent;
+}
+
+double Blend(const TsModel& model, const double* x, const FiringRules& firing) {
+  double value = 0.0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(firing.count); ++i) {
+    const auto rule = static_cast<std::size_t>(firing.rules[i]);
+    value += firing.weights[i] * Output(model.rules[rule], x);
+  }
+  return std::clamp(value, model.output_min, model.output_max);
+}
+
+TsPrediction Evaluate(const TsModel& model, const double* x) {
+  FiringRules firing;
+  Weigh(model, x, firing);
+  return {Blend(model, x, firing), firing.covered};
+}
+
+bool SharesAntecedents(const TsModel& a, const TsModel& b) {
+  return a.regressors == b.regressors && a.parallel == b.parallel &&
+         a.output == b.output && a.regressor_min == b.regressor_min &&
+         a.regressor_max == b.regressor_max &&
+         std::equal(a.rules.begin(), a.rules.end(), b.rules.begin(),
+                    b.rules.end(), [](const TsRule& one, const TsRule& other) {
+                      return std::equal(one.antecedents.begin(),
+                                        one.antecedents.end(),
+                                        other.antecedents.begin(),
+                                        other.antecedents.end(), SameSet);
+                    });
+}
+
+double Residual(const TsModel& model, double reading, double prediction) {
+  return reading >= model.saturation && prediction >= model.saturation
+             ? std::numeric_limits<double>::quiet_NaN()
+             : reading - prediction;
 }
 
 int LongestLag(const TsModel& model) {
@@ -211,6 +254,8 @@ void Validate(const TsModel& model, const char* where) {
   checker.Finite(model.output_max, "output_max");
   checker.Check(model.output_min <= model.output_max,
                 "output_min above output_max");
+  checker.Check(model.saturation > model.output_min,
+                "saturation is not above output_min");
   const std::size_t count = model.rules.size();
   checker.Check(count >= 1 && count <= kMaxRules,
                 std::to_string(count) + " rules, accepted are 1 to " +

@@ -1,10 +1,16 @@
 #pragma once
 
+#include <array>
+#include <limits>
 #include <vector>
 
 #include "diagnosis/sample.h"
 
 namespace fdi {
+
+inline constexpr int kMaxLag = 16;
+inline constexpr int kMaxRegressors = 16;
+inline constexpr int kMaxRules = 32;
 
 /// One antecedent set: a two-sided Gaussian with a core,
 ///
@@ -50,6 +56,9 @@ struct TsModel {
   std::vector<double> regressor_max;  ///< per regressor.
   double output_min{0.0};             ///< Predictions are kept within
   double output_max{0.0};             ///< [output_min, output_max].
+  /// A reading from here on is at the upper limit of its transmitter, and the
+  /// true value may be any beyond; infinite where none was met.
+  double saturation{std::numeric_limits<double>::infinity()};
   std::vector<TsRule> rules;
 };
 
@@ -63,6 +72,28 @@ struct TsPrediction {
 /// that far from all rules the nearest one answers. Does not allocate.
 TsPrediction Evaluate(const TsModel& model, const double* x);
 
+/// The weights β_i / Σ β_i of the rules that fire at one x.
+struct FiringRules {
+  int count{0};
+  bool covered{true};                     ///< As in TsPrediction.
+  std::array<int, kMaxRules> rules;       ///< Their indices; `count` are set.
+  std::array<double, kMaxRules> weights;  ///< Sum to 1.
+};
+
+/// Finds the rules that weigh at least 4e-18 of the strongest.
+void Weigh(const TsModel& model, const double* x, FiringRules& firing);
+
+/// ŷ of `model` from the weights of a model with the same antecedents.
+double Blend(const TsModel& model, const double* x, const FiringRules& firing);
+
+/// True if the models have regressors, their ranges and antecedents in common,
+/// so that one Weigh() serves both.
+bool SharesAntecedents(const TsModel& a, const TsModel& b);
+
+/// r = y − ŷ; NaN if reading and prediction are both at the limit of the
+/// transmitter, where they say nothing about each other.
+double Residual(const TsModel& model, double reading, double prediction);
+
 /// The largest lag of the regressors.
 int LongestLag(const TsModel& model);
 
@@ -73,9 +104,5 @@ SignalMask RequiredSignals(const TsModel& model);
 ///   unusable: sizes that differ, a number that is not finite, no rule, a lag
 ///   beyond kMaxLag, a lag of 0 on the output itself.
 void Validate(const TsModel& model, const char* where);
-
-inline constexpr int kMaxLag = 16;
-inline constexpr int kMaxRegressors = 16;
-inline constexpr int kMaxRules = 32;
 
 }  // namespace fdi

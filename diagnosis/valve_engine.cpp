@@ -10,6 +10,7 @@
 #include "diagnosis/fault_bank.h"
 #include "diagnosis/isolation.h"
 #include "diagnosis/observer_bank.h"
+#include "diagnosis/residual_windows.h"
 #include "diagnosis/source_order.h"
 
 namespace fdi {
@@ -56,6 +57,9 @@ struct AbnormalRun {
   std::int64_t since_ns{0};
 };
 
+// Below and above of the residual; of each window below, above and energy.
+constexpr std::size_t kTestsPerChannel = 2 + 3 * kMaxWindows;
+
 // What depends on the model set; replaced as a whole by Adopt().
 struct Diagnosis {
   explicit Diagnosis(std::shared_ptr<const ModelSet> set)
@@ -63,6 +67,7 @@ struct Diagnosis {
         required(RequiredSignals(*models)),
         bank(*models),
         faults(*models),
+        windows(*models),
         isolation(models->decision),
         clearing(*models) {}
 
@@ -70,6 +75,7 @@ struct Diagnosis {
   SignalMask required;
   ObserverBank bank;
   FaultBank faults;
+  ResidualWindows windows;
   IsolationWindow isolation;
   ClearingWindow clearing;
 };
@@ -104,6 +110,7 @@ class ValveEngine::Impl {
   Transition Make(TransitionKind kind, std::int64_t stamp_ns,
                   EndReason reason) const;
   bool CountAbnormal();
+  void Count(std::size_t test, bool beyond);
   std::optional<std::int64_t> DetectionStamp() const;
 
   std::unique_ptr<Diagnosis> diagnosis_;
@@ -112,7 +119,7 @@ class ValveEngine::Impl {
   bool needs_initialisation_{true};
   int settling_{0};
   SignalMask present_{0};
-  std::array<AbnormalRun, 2 * kMaxChannels> runs_{};  // low, high a channel
+  std::array<AbnormalRun, kTestsPerChannel * kMaxChannels> runs_{};
   std::int64_t detection_stamp_ns_{0};
   FaultSet contender_{0};  // another set than the isolated one
   int contender_run_{0};
@@ -179,6 +186,7 @@ void ValveEngine::Impl::Initialise(const Sample& sample) {
   diagnosis_->bank.Initialise(sample);
   present_ = sample.present;
   needs_initialisation_ = false;
+  diagnosis_->windows.Restart();
   runs_.fill({});
   settling_ = std::max(models().decision.settling_samples, kMaxLag);
   verdict_.initialised = true;
@@ -215,25 +223,47 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
   return Quality::kLive;
 }
 
-// Counts runs per channel and side, as the thresholds were fitted: noise that
-// passes one threshold now and another one next is no detection.
+// What is left of a residual when the extrapolation in it is taken away.
+double Certain(double residual, double uncertain) {
+  return std::copysign(std::max(std::abs(residual) - uncertain, 0.0), residual);
+}
+
+// Counts runs per channel and test, as the limits were fitted: noise that
+// passes one limit now and another one next is no detection. Returns whether a
+// single residual is beyond its threshold.
 bool ValveEngine::Impl::CountAbnormal() {
-  bool abnormal = false;
-  const auto count = [&](AbnormalRun& run, bool beyond) {
-    run.since_ns = beyond && run.length == 0 ? verdict_.stamp_ns : run.since_ns;
-    run.length = beyond ? run.length + 1 : 0;
-    abnormal = abnormal || beyond;
-  };
+  std::array<double, kMaxChannels> certain{};
   for (std::size_t c = 0; c < models().channels.size(); ++c) {
-    const ChannelSpec& channel = models().channels[c];
-    const double r = verdict_.residuals[c];
     const double uncertain =
         kExtrapolationError *
         diagnosis_->bank.extrapolation(0, static_cast<int>(c));
-    count(runs_[2 * c], r < channel.lower_threshold - uncertain);
-    count(runs_[2 * c + 1], r > channel.upper_threshold + uncertain);
+    certain[c] = Certain(verdict_.residuals[c], uncertain);
+  }
+  diagnosis_->windows.Push({certain.data(), models().channels.size()});
+  bool abnormal = false;
+  for (std::size_t c = 0; c < models().channels.size(); ++c) {
+    const ChannelSpec& channel = models().channels[c];
+    std::size_t test = c * kTestsPerChannel;
+    const bool below = certain[c] < channel.lower_threshold;
+    const bool above = certain[c] > channel.upper_threshold;
+    abnormal = abnormal || below || above;
+    Count(test++, below);
+    Count(test++, above);
+    for (std::size_t w = 0; w < channel.windows.size(); ++w) {
+      const WindowLimits& limits = channel.windows[w];
+      const ResidualWindow& window = diagnosis_->windows.window(c, w);
+      Count(test++, window.full() && window.mean() < limits.lower_mean);
+      Count(test++, window.full() && window.mean() > limits.upper_mean);
+      Count(test++, window.full() && window.log_rms() > limits.upper_log_rms);
+    }
   }
   return abnormal;
+}
+
+void ValveEngine::Impl::Count(std::size_t test, bool beyond) {
+  AbnormalRun& run = runs_[test];
+  run.since_ns = beyond && run.length == 0 ? verdict_.stamp_ns : run.since_ns;
+  run.length = beyond ? run.length + 1 : 0;
 }
 
 // Start of the earliest run that is long enough for a detection.
@@ -254,7 +284,6 @@ void ValveEngine::Impl::Decide() {
   if (!episode_open() && !begins) {
     return;
   }
-  const double instant_normal = verdict_.normal_factor;
   if (begins) {
     diagnosis_->faults.Restart();
     diagnosis_->isolation.Restart();
@@ -267,13 +296,15 @@ void ValveEngine::Impl::Decide() {
   }
   Isolate();
   diagnosis_->clearing.Push(
-      {verdict_.residuals.data(), models().channels.size()}, instant_normal,
-      abnormal);
+      {verdict_.residuals.data(), models().channels.size()},
+      verdict_.normal_factor, abnormal);
   if (diagnosis_->clearing.Cleared()) {
     Emit(TransitionKind::kCleared, verdict_.stamp_ns);
     Emit(TransitionKind::kClosed, verdict_.stamp_ns, EndReason::kCleared);
     verdict_.state = State::kNormal;
     verdict_.isolated = 0;
+    diagnosis_->windows.Restart();
+    runs_.fill({});
   }
 }
 

@@ -16,7 +16,7 @@ namespace fdi::storage {
 namespace {
 
 constexpr std::uint32_t kMagic = 0x4D494446;  // "FDIM"
-constexpr std::uint32_t kFormat = 1;
+constexpr std::uint32_t kFormat = 2;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
 constexpr std::uint32_t kMaxText = 4096;
@@ -69,10 +69,10 @@ void Fields(A& a, T& rule) {
 template <typename A, Of<TsModel> T>
 void Fields(A& a, T& model) {
   auto& [output, parallel, regressors, regressor_min, regressor_max, output_min,
-         output_max, rules] = model;
+         output_max, saturation, rules] = model;
   a(output, parallel, Limited{regressors, kMaxRegressors},
     Limited{regressor_min, kMaxRegressors},
-    Limited{regressor_max, kMaxRegressors}, output_min, output_max,
+    Limited{regressor_max, kMaxRegressors}, output_min, output_max, saturation,
     Limited{rules, kMaxRules});
 }
 
@@ -82,10 +82,17 @@ void Fields(A& a, T& figures) {
   a(mse, vaf, bias, samples);
 }
 
+template <typename A, Of<WindowLimits> T>
+void Fields(A& a, T& window) {
+  auto& [length, lower_mean, upper_mean, upper_log_rms] = window;
+  a(length, lower_mean, upper_mean, upper_log_rms);
+}
+
 template <typename A, Of<ChannelSpec> T>
 void Fields(A& a, T& channel) {
-  auto& [name, output, lower_threshold, upper_threshold] = channel;
-  a(name, output, lower_threshold, upper_threshold);
+  auto& [name, output, lower_threshold, upper_threshold, windows] = channel;
+  a(name, output, lower_threshold, upper_threshold,
+    Limited{windows, kMaxWindows});
 }
 
 template <typename A, Of<ChannelObserver> T>

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "diagnosis/error.h"
+#include "diagnosis/residual_windows.h"
 #include "trainer/tail_fit.h"
 
 namespace fdi::trainer {
@@ -11,6 +12,8 @@ namespace {
 
 constexpr double kCoreQuantile = 0.05;
 constexpr double kSupportMargin = 1.0;  // standard deviations
+constexpr int kFewestWindows = 5;       // to fit limits to
+constexpr int kFewestValues = 100;
 
 double Mean(std::span<const double> values) {
   double sum = 0.0;
@@ -50,6 +53,33 @@ std::vector<double> Sustained(const std::vector<double>& series, double sign,
     sustained.push_back(lowest);
   }
   return sustained;
+}
+
+void FitWindow(const ResidualSeries& residuals, int length, double share,
+               ChannelSpec& channel) {
+  std::vector<double> above;
+  std::vector<double> below;
+  std::vector<double> energy;
+  for (const std::vector<double>& series : residuals) {
+    ResidualWindow window(length);
+    for (const double r : series) {
+      window.Push(r);
+      if (window.full()) {
+        above.push_back(window.mean());
+        below.push_back(-window.mean());
+        energy.push_back(window.log_rms());
+      }
+    }
+  }
+  if (static_cast<int>(above.size()) <
+      std::max(kFewestWindows * length, kFewestValues)) {
+    return;
+  }
+  const auto level = [&](const std::vector<double>& values) {
+    return FitTail(values, share, 2 * length).level;
+  };
+  channel.windows.push_back({length, -std::max(level(below), 1e-6),
+                             std::max(level(above), 1e-6), level(energy)});
 }
 
 }  // namespace
@@ -101,26 +131,43 @@ double CorrelationTime(std::span<const double> residuals) {
   return time;
 }
 
-void FitThresholds(const std::vector<std::vector<double>>& residuals,
+std::vector<double> Joined(const ResidualSeries& series) {
+  std::vector<double> joined;
+  for (const std::vector<double>& one : series) {
+    joined.insert(joined.end(), one.begin(), one.end());
+  }
+  return joined;
+}
+
+void FitThresholds(const std::vector<ResidualSeries>& residuals,
+                   const std::vector<std::vector<int>>& windows,
                    double rate_per_hour, ModelSet& models) {
-  Require(residuals.size() == models.channels.size(),
-          "there must be one series of residuals per channel");
-  const double per_sample = rate_per_hour * models.sample_period_s / 3600.0;
-  const double share =
-      per_sample / (2.0 * static_cast<double>(models.channels.size()));
-  for (std::size_t c = 0; c < residuals.size(); ++c) {
-    const int separation =
-        static_cast<int>(std::ceil(CorrelationTime(residuals[c])));
+  const std::size_t channels = models.channels.size();
+  Require(residuals.size() == channels && windows.size() == channels,
+          "there must be series of residuals and windows for every channel");
+  std::size_t tests = 0;
+  for (const std::vector<int>& lengths : windows) {
+    tests += 2 + 3 * lengths.size();
+  }
+  const double share = rate_per_hour * models.sample_period_s /
+                       (3600.0 * static_cast<double>(tests));
+  for (std::size_t c = 0; c < channels; ++c) {
+    ChannelSpec& channel = models.channels[c];
+    const std::vector<double> joined = Joined(residuals[c]);
+    const int separation = static_cast<int>(std::ceil(CorrelationTime(joined)));
     const auto level = [&](double sign) {
       const std::vector<double> series =
-          Sustained(residuals[c], sign, models.decision.detection_samples);
-      const double floor = 1e-6 + std::sqrt(Variance(residuals[c]));
+          Sustained(joined, sign, models.decision.detection_samples);
+      const double floor = 1e-6 + std::sqrt(Variance(joined));
       return std::max(floor, FitTail(series, share, separation).level);
     };
-    models.channels[c].upper_threshold = level(1.0);
-    models.channels[c].lower_threshold = -level(-1.0);
+    channel.upper_threshold = level(1.0);
+    channel.lower_threshold = -level(-1.0);
+    for (const int length : windows[c]) {
+      FitWindow(residuals[c], length, share, channel);
+    }
   }
-  models.threshold_hours = static_cast<double>(residuals.front().size()) *
+  models.threshold_hours = static_cast<double>(Joined(residuals[0]).size()) *
                            models.sample_period_s / 3600.0;
   models.false_alarms_per_hour = rate_per_hour;
 }

@@ -20,12 +20,23 @@ Trapezoid FitMembership(std::span<const double> residuals);
 /// τ = 1 + 2 Σ ρ_j up to the first autocorrelation below 0.05 [samples].
 double CorrelationTime(std::span<const double> residuals);
 
-/// Thresholds of the normal residual per channel for `rate` false alarms per
-/// hour over all channels, both sides and the n_d consecutive samples that a
-/// detection takes together (peaks over threshold, see tail_fit.h).
+/// Residuals of one channel, one series per stretch of time.
+using ResidualSeries = std::vector<std::vector<double>>;
+
+/// All series one after another.
+std::vector<double> Joined(const ResidualSeries& series);
+
+/// Thresholds of the normal residual per channel, and limits of its windows,
+/// for `rate` false alarms per hour over all tests together: each channel has
+/// two for the n_d consecutive samples that a detection takes, and three for
+/// each window, of which the energy is watched upwards only (peaks over
+/// threshold, see tail_fit.h). A window that the series are too short for gets
+/// no limits.
 ///
-/// @param residuals one series per channel.
-void FitThresholds(const std::vector<std::vector<double>>& residuals,
+/// @param residuals by channel.
+/// @param windows lengths N by channel [samples].
+void FitThresholds(const std::vector<ResidualSeries>& residuals,
+                   const std::vector<std::vector<int>>& windows,
                    double rate_per_hour, ModelSet& models);
 
 }  // namespace fdi::trainer

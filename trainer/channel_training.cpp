@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <random>
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
@@ -15,6 +16,8 @@ namespace {
 
 constexpr double kReuseTolerance = 1.02;
 constexpr double kPoolTolerance = 1.1;
+constexpr double kLimitShare = 0.005;
+constexpr double kSaturatedShare = 0.02;
 
 double MeanSquare(const std::vector<double>& values) {
   if (values.empty()) {
@@ -24,13 +27,19 @@ double MeanSquare(const std::vector<double>& values) {
          static_cast<double>(values.size());
 }
 
-// Regressors of the pool whose signals the samples carry.
+// Regressors of the pool, without the antecedents, whose signals the samples
+// carry.
 std::vector<Regressor> Available(const std::vector<Regressor>& pool,
+                                 const std::vector<Regressor>& antecedents,
                                  const Condition& normal) {
   std::vector<Regressor> available;
   const Sample& sample = normal.training.front().samples.front();
   std::copy_if(pool.begin(), pool.end(), std::back_inserter(available),
-               [&](const Regressor& r) { return sample.Has(r.signal); });
+               [&](const Regressor& r) {
+                 return sample.Has(r.signal) &&
+                        std::find(antecedents.begin(), antecedents.end(), r) ==
+                            antecedents.end();
+               });
   return available;
 }
 
@@ -42,26 +51,32 @@ std::string Describe(const Condition& condition) {
          std::to_string(condition.strength);
 }
 
-// Every n-th row, so that at most `most` remain.
+// One row of every n at random, so that at most `most` remain: every n-th one
+// would meet a periodic excitation always in the same phase.
 RegressionData Thinned(const RegressionData& data, int most) {
   const Eigen::Index stride =
       (data.y.size() + most - 1) / std::max<Eigen::Index>(1, most);
   if (stride <= 1) {
     return data;
   }
-  const Eigen::Index rows = (data.y.size() + stride - 1) / stride;
+  const Eigen::Index rows = data.y.size() / stride;
   RegressionData thinned;
+  thinned.saturation = data.saturation;
+  std::minstd_rand random(1);
   thinned.x.resize(rows, data.x.cols());
   thinned.y.resize(rows);
   for (Eigen::Index row = 0; row < rows; ++row) {
-    thinned.x.row(row) = data.x.row(row * stride);
-    thinned.y(row) = data.y(row * stride);
+    const auto offset =
+        static_cast<Eigen::Index>(random()) % static_cast<Eigen::Index>(stride);
+    thinned.x.row(row) = data.x.row(row * stride + offset);
+    thinned.y(row) = data.y(row * stride + offset);
   }
   return thinned;
 }
 
 RegressionData Joined(const RegressionData& a, const RegressionData& b) {
   RegressionData joined;
+  joined.saturation = a.saturation;
   joined.x.resize(a.x.rows() + b.x.rows(), a.x.cols());
   joined.x << a.x, b.x;
   joined.y.resize(a.y.size() + b.y.size());
@@ -87,25 +102,57 @@ TsModel FitRows(const ChannelPlan& plan,
     return MeanSquare(RunResiduals(model, condition.validation,
                                    options.settling, past_output));
   };
-  RuleSelection selection = SelectRules(data, options.rules, validation_error);
+  RuleSelectionOptions rules = options.rules;
+  for (const Regressor& antecedent : plan.antecedents) {
+    const auto at = std::find(regressors.begin(), regressors.end(), antecedent);
+    rules.fit.antecedents.push_back(at - regressors.begin());
+  }
+  RuleSelection selection = SelectRules(data, rules, validation_error);
   return MakeModel(std::move(selection.rules), data, regressors, plan.output,
                    plan.parallel);
 }
 
 }  // namespace
 
+double FindSaturation(const ChannelPlan& plan,
+                      const std::vector<Condition>& conditions) {
+  std::vector<double> readings;
+  for (const Condition& condition : conditions) {
+    for (const auto* stretches : {&condition.training, &condition.validation}) {
+      for (const Stretch& stretch : *stretches) {
+        for (const Sample& sample : stretch.samples) {
+          readings.push_back(sample[plan.output]);
+        }
+      }
+    }
+  }
+  const auto [low, high] =
+      std::minmax_element(readings.begin(), readings.end());
+  const double limit = *high - kLimitShare * (*high - *low);
+  const auto there = std::count_if(readings.begin(), readings.end(),
+                                   [&](double y) { return y >= limit; });
+  return plan.saturates &&
+                 static_cast<double>(there) >=
+                     kSaturatedShare * static_cast<double>(readings.size())
+             ? limit
+             : std::numeric_limits<double>::infinity();
+}
+
 std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
                                         const Condition& normal,
-                                        const FitOptions& options) {
+                                        const FitOptions& options,
+                                        double saturation) {
   std::vector<Regressor> best;
   double best_error = std::numeric_limits<double>::infinity();
   for (const std::vector<Regressor>& pool : plan.pools) {
-    const std::vector<Regressor> candidates = Available(pool, normal);
+    const std::vector<Regressor> candidates =
+        Available(pool, plan.antecedents, normal);
     if (candidates.empty()) {
+      best = best.empty() && !pool.empty() ? plan.antecedents : best;
       continue;
     }
     const auto chosen = [&](const std::vector<int>& indices) {
-      std::vector<Regressor> regressors;
+      std::vector<Regressor> regressors = plan.antecedents;
       for (const int i : indices) {
         regressors.push_back(candidates[static_cast<std::size_t>(i)]);
       }
@@ -114,9 +161,13 @@ std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
     FitOptions trial = options;
     trial.rules.min_rules = options.search_rules;
     trial.rules.max_rules = options.search_rules;
+    trial.rules.counts.clear();
+    trial.rules.both_methods = false;
+    trial.max_rows = options.search_rows;
     trial.rules.fit.clustering.num_starts = 1;
     const auto criterion = [&](const std::vector<int>& indices) {
-      const TsModel model = FitChannel(plan, chosen(indices), normal, trial);
+      const TsModel model =
+          FitChannel(plan, chosen(indices), normal, trial, saturation);
       return MeanSquare(
           RunResiduals(model, normal.validation, options.settling));
     };
@@ -137,9 +188,11 @@ std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
 
 TsModel FitChannel(const ChannelPlan& plan,
                    const std::vector<Regressor>& regressors,
-                   const Condition& condition, const FitOptions& options) {
-  const RegressionData data =
+                   const Condition& condition, const FitOptions& options,
+                   double saturation) {
+  RegressionData data =
       BuildRegression(condition.training, regressors, plan.output);
+  data.saturation = saturation;
   return FitRows(plan, regressors, Thinned(data, options.max_rows), condition,
                  options);
 }
@@ -148,11 +201,14 @@ TsModel FitFaultChannel(const ChannelPlan& plan, const TsModel& normal_model,
                         const Condition& normal, const Condition& condition,
                         const FitOptions& options) {
   const std::vector<Regressor>& regressors = normal_model.regressors;
-  const RegressionData normal_rows =
-      BuildRegression(normal.training, regressors, plan.output);
+  const auto rows_of = [&](const Condition& of) {
+    RegressionData rows = BuildRegression(of.training, regressors, plan.output);
+    rows.saturation = normal_model.saturation;
+    return rows;
+  };
+  const RegressionData normal_rows = rows_of(normal);
   const RegressionData fault_rows =
-      Thinned(BuildRegression(condition.training, regressors, plan.output),
-              options.max_rows);
+      Thinned(rows_of(condition), options.max_rows);
   const double past_output = normal_rows.y.mean();
   const auto error = [&](const TsModel& model) {
     return MeanSquare(RunResiduals(model, condition.validation,

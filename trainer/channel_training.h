@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -17,16 +18,33 @@ struct ChannelPlan {
   /// Pools of candidate regressors; the search runs in each, the pool with the
   /// lowest validation error wins. Separate pools keep apart what must not
   /// appear together, as CV and the measured X.
-  std::vector<std::vector<Regressor>> pools;
+  std::vector<std::vector<Regressor>> pools{};
+  /// Regressors that the rules are told apart by, always among those chosen;
+  /// empty: all of them.
+  std::vector<Regressor> antecedents{};
+  std::vector<int> rule_counts{};  ///< To try; empty: as FitOptions says.
+  /// Fault observers are the normal one with other consequents (AdaptModel).
+  bool adapted{false};
+  bool saturates{false};       ///< The transmitter may be at its upper limit.
+  std::vector<int> windows{};  ///< Lengths N of the windows [samples].
 };
 
 struct FitOptions {
   RuleSelectionOptions rules;
   StructureSearchOptions structure;
-  int search_rules{2};  ///< Rules of the models that the search compares.
-  int settling{30};     ///< Samples left out of every parallel run.
-  int max_rows{6000};   ///< Rows of a fit, evenly taken where there are more.
+  int search_rules{2};    ///< Rules of the models that the search compares,
+  int search_rows{3000};  ///< and rows that they are fitted to.
+  int settling{30};       ///< Samples left out of every parallel run.
+  int max_rows{6000};     ///< Rows of a fit, evenly taken where there are more.
 };
+
+inline constexpr double kNoSaturation = std::numeric_limits<double>::infinity();
+
+/// The reading from which on the transmitter of a channel is at its limit: 0.5
+/// % of the span of its readings below the largest, if at least 2 % of them are
+/// there; infinite otherwise.
+double FindSaturation(const ChannelPlan& plan,
+                      const std::vector<Condition>& conditions);
 
 /// Regressors of a channel, chosen bottom-up by the mean squared residual of
 /// parallel runs over the validation stretches of `normal`.
@@ -34,7 +52,8 @@ struct FitOptions {
 /// @throws DataError naming channel and signals if no pool has all its signals.
 std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
                                         const Condition& normal,
-                                        const FitOptions& options);
+                                        const FitOptions& options,
+                                        double saturation = kNoSaturation);
 
 /// Fits a model to the training stretches of a condition; the number of rules
 /// by SelectRules() with the parallel-run error on the validation stretches.
@@ -42,7 +61,8 @@ std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
 /// @throws DataError naming the condition if it has too few samples.
 TsModel FitChannel(const ChannelPlan& plan,
                    const std::vector<Regressor>& regressors,
-                   const Condition& condition, const FitOptions& options);
+                   const Condition& condition, const FitOptions& options,
+                   double saturation = kNoSaturation);
 
 /// The simplest model that explains a fault condition. A fault leaves many
 /// relations of the valve alone, and what is learnt from more data reaches

@@ -115,6 +115,9 @@ void AddStretch(const TrainingRun& run, std::size_t begin, std::size_t end,
   for (std::size_t k = begin; k < end; ++k) {
     Stretch& target = k < end - validated ? training : validation;
     target.samples.push_back(run.samples[k].sample);
+    if (key.fault != 0) {
+      target.strengths.push_back(TruthOf(run.samples[k]).strength);
+    }
     pool.strength_sum += TruthOf(run.samples[k]).strength;
     ++pool.strength_count;
   }

@@ -20,6 +20,8 @@ struct TrainingRun {
 struct Stretch {
   std::string run_id;
   std::vector<Sample> samples;
+  /// Of the fault, one per sample; empty in normal operation.
+  std::vector<double> strengths{};
 };
 
 /// A fault at a strength (or normal operation, fault 0) and its data.

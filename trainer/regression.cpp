@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "diagnosis/error.h"
 
@@ -53,12 +54,14 @@ RegressionData BuildRegression(std::span<const Stretch> stretches,
   return data;
 }
 
-std::vector<double> RunResiduals(const TsModel& model, const Stretch& stretch,
-                                 int settling,
-                                 std::optional<double> past_output) {
+namespace {
+
+// Calls take(residual, output) for every sample that counts.
+template <typename Take>
+void Run(const TsModel& model, const Stretch& stretch, int settling,
+         std::optional<double> past_output, Take take) {
   const int left_out = RunsOnItself(model) ? settling : LongestLag(model);
   std::vector<double> predictions(stretch.samples.size());
-  std::vector<double> residuals;
   std::array<double, kMaxRegressors> x{};
   for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
     for (std::size_t j = 0; j < model.regressors.size(); ++j) {
@@ -75,11 +78,31 @@ std::vector<double> RunResiduals(const TsModel& model, const Stretch& stretch,
     }
     predictions[k] = std::clamp(Evaluate(model, x.data()).value,
                                 model.output_min, model.output_max);
-    if (static_cast<int>(k) >= left_out) {
-      residuals.push_back(stretch.samples[k][model.output] - predictions[k]);
+    const double output = stretch.samples[k][model.output];
+    const double residual = Residual(model, output, predictions[k]);
+    if (static_cast<int>(k) >= left_out && !std::isnan(residual)) {
+      take(residual, output);
     }
   }
+}
+
+}  // namespace
+
+std::vector<double> RunResiduals(const TsModel& model, const Stretch& stretch,
+                                 int settling,
+                                 std::optional<double> past_output) {
+  std::vector<double> residuals;
+  Run(model, stretch, settling, past_output,
+      [&](double residual, double) { residuals.push_back(residual); });
   return residuals;
+}
+
+std::vector<double> RunOutputs(const TsModel& model, const Stretch& stretch,
+                               int settling) {
+  std::vector<double> outputs;
+  Run(model, stretch, settling, {},
+      [&](double, double output) { outputs.push_back(output); });
+  return outputs;
 }
 
 std::vector<double> RunResiduals(const TsModel& model,
@@ -110,7 +133,9 @@ TsModel MakeModel(std::vector<TsRule> rules, const RegressionData& data,
   const double high = data.y.maxCoeff();
   const double margin = 0.5 * (high - low) + 1e-9;
   model.output_min = low - margin;
-  model.output_max = high + margin;
+  const bool saturates = high >= data.saturation;
+  model.output_max = saturates ? high : high + margin;
+  model.saturation = data.saturation;
   model.rules = std::move(rules);
   return model;
 }

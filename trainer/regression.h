@@ -21,7 +21,8 @@ RegressionData BuildRegression(std::span<const Stretch> stretches,
 
 /// Residuals y − ŷ of one stretch, run as the engine runs the model: past of
 /// the first sample at rest, parallel models on their own predictions, limits
-/// kept. Left out are the first `settling` residuals of a model that runs on
+/// kept. Left out are samples that say nothing (Residual()) and the first
+/// `settling` residuals of a model that runs on
 /// its own predictions, of others those that lack a lag.
 ///
 /// @param past_output What a parallel model believes of its own past at the
@@ -37,11 +38,15 @@ std::vector<double> RunResiduals(const TsModel& model,
                                  int settling,
                                  std::optional<double> past_output = {});
 
+/// The outputs that the residuals of RunResiduals() belong to.
+std::vector<double> RunOutputs(const TsModel& model, const Stretch& stretch,
+                               int settling);
+
 /// True if the model is parallel and has its own output among its regressors.
 bool RunsOnItself(const TsModel& model);
 
-/// A model around `rules` with the ranges of `data` and an output that may
-/// leave the trained range by half of it.
+/// A model around `rules` with the ranges and the saturation of `data`, and an
+/// output that may leave the trained range by half of it.
 TsModel MakeModel(std::vector<TsRule> rules, const RegressionData& data,
                   const std::vector<Regressor>& regressors, Signal output,
                   bool parallel);

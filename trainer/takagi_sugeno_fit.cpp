@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "diagnosis/error.h"
@@ -24,6 +25,10 @@ constexpr double kConstantTolerance = 1e-12;
 // training error that makes another step worth its sharper edges.
 constexpr double kNarrowing = 0.7;
 constexpr double kWorthNarrowing = 0.02;
+constexpr int kCensoredRounds = 6;
+// The set of a regressor that tells no rules apart: 1 everywhere.
+constexpr FuzzySet kAnyValue{0.0, 0.0, std::numeric_limits<double>::infinity(),
+                             std::numeric_limits<double>::infinity()};
 
 void CheckData(const RegressionData& data, int num_rules) {
   Require(data.x.cols() >= 1, "X needs at least one column");
@@ -38,10 +43,15 @@ void CheckData(const RegressionData& data, int num_rules) {
           "X and y must be finite numbers");
 }
 
-// The columns of X that vary.
-std::vector<Index> VaryingColumns(const MatrixXd& x) {
+// The columns of X, or of some of them, that vary.
+std::vector<Index> VaryingColumns(const MatrixXd& x, std::vector<Index> among) {
+  if (among.empty()) {
+    among.resize(static_cast<std::size_t>(x.cols()));
+    std::iota(among.begin(), among.end(), Index{0});
+  }
   std::vector<Index> columns;
-  for (Index j = 0; j < x.cols(); ++j) {
+  for (const Index j : among) {
+    Require(j >= 0 && j < x.cols(), "an antecedent is no column of X");
     const double range = x.col(j).maxCoeff() - x.col(j).minCoeff();
     if (range > kConstantTolerance * x.col(j).cwiseAbs().maxCoeff()) {
       columns.push_back(j);
@@ -91,12 +101,31 @@ ArrayXd LogMembership(const FuzzySet& set, const ArrayXd& x) {
   return -0.5 * z.square();
 }
 
+// Fitted to y, and to what the prediction is where that is beyond the limit.
+Consequents EstimateCensored(const RegressionData& data,
+                             const MatrixXd& weights,
+                             const ConsequentOptions& options) {
+  Consequents found = EstimateConsequents(data.x, data.y, weights, options);
+  const bool censored = data.y.maxCoeff() >= data.saturation;
+  for (int round = 0; censored && round < kCensoredRounds; ++round) {
+    const VectorXd predicted =
+        (weights.array() * ((data.x * found.slopes.transpose()).rowwise() +
+                            found.intercepts.transpose())
+                               .array())
+            .rowwise()
+            .sum();
+    const VectorXd target = (data.y.array() >= data.saturation)
+                                .select(data.y.cwiseMax(predicted), data.y);
+    found = EstimateConsequents(data.x, target, weights, options);
+  }
+  return found;
+}
+
 // Consequents and data shares of rules with given antecedents.
 void EstimateRules(const RegressionData& data, const ConsequentOptions& options,
                    std::vector<TsRule>& rules) {
   const MatrixXd weights = DegreesOfFulfilment(rules, data.x);
-  const Consequents consequents =
-      EstimateConsequents(data.x, data.y, weights, options);
+  const Consequents consequents = EstimateCensored(data, weights, options);
   for (std::size_t i = 0; i < rules.size(); ++i) {
     const auto row = static_cast<Index>(i);
     const VectorXd slopes = consequents.slopes.row(row);
@@ -112,8 +141,10 @@ double TrainingError(const RegressionData& data,
   const VectorXd predicted = Predict(rules, data.x)
                                  .cwiseMax(data.y.minCoeff())
                                  .cwiseMin(data.y.maxCoeff());
-  return (data.y - predicted).squaredNorm() /
-         static_cast<double>(data.y.size());
+  const ArrayXd error = (data.y - predicted).array();
+  const auto silent =
+      data.y.array() >= data.saturation && predicted.array() >= data.saturation;
+  return silent.select(0.0, error).square().mean();
 }
 
 void ScaleWidths(double factor, std::vector<TsRule>& rules) {
@@ -128,10 +159,17 @@ void ScaleWidths(double factor, std::vector<TsRule>& rules) {
 // Rules with projected sets, all narrowed by one factor as long as that pays.
 std::vector<TsRule> ProjectedRules(const RegressionData& data,
                                    const FuzzyPartition& partition,
+                                   const std::vector<Index>& columns,
                                    const TakagiSugenoOptions& options) {
   std::vector<TsRule> rules;
-  for (auto& sets : ProjectAntecedents(data.x, partition.memberships)) {
-    rules.emplace_back().antecedents = std::move(sets);
+  const MatrixXd projected = data.x(Eigen::all, columns);
+  for (const auto& sets :
+       ProjectAntecedents(projected, partition.memberships)) {
+    auto& antecedents = rules.emplace_back().antecedents;
+    antecedents.assign(static_cast<std::size_t>(data.x.cols()), kAnyValue);
+    for (std::size_t j = 0; j < columns.size(); ++j) {
+      antecedents[static_cast<std::size_t>(columns[j])] = sets[j];
+    }
   }
   EstimateRules(data, options.consequents, rules);
   double error = TrainingError(data, rules);
@@ -158,15 +196,36 @@ struct Fit {
 
 Fit FitOnce(const RegressionData& data, const TakagiSugenoOptions& options) {
   CheckData(data, options.num_rules);
-  const std::vector<Index> columns = VaryingColumns(data.x);
+  const std::vector<Index> columns =
+      VaryingColumns(data.x, options.antecedents);
   const MatrixXd x = data.x(Eigen::all, columns);
   const MatrixXd z = Standardized(x, data.y);
   const FuzzyPartition partition = Cluster(z, options);
 
   Fit fit;
   fit.validity = SugenoYasukawa(z, partition, options.clustering.fuzziness);
-  fit.rules = ProjectedRules(data, partition, options);
+  fit.rules = ProjectedRules(data, partition, columns, options);
   return fit;
+}
+
+// All that SelectRules() compares.
+std::vector<TakagiSugenoOptions> Trials(const RuleSelectionOptions& options) {
+  std::vector<int> counts = options.counts;
+  for (int c = options.min_rules;
+       options.counts.empty() && c <= options.max_rules; ++c) {
+    counts.push_back(c);
+  }
+  std::vector<TakagiSugenoOptions> trials;
+  for (const int c : counts) {
+    TakagiSugenoOptions& trial = trials.emplace_back(options.fit);
+    trial.num_rules = c;
+    if (options.both_methods) {
+      trial.consequents.method = ConsequentMethod::kLocal;
+      trials.push_back(trial);
+      trials.back().consequents.method = ConsequentMethod::kGlobal;
+    }
+  }
+  return trials;
 }
 
 }  // namespace
@@ -211,20 +270,20 @@ std::vector<TsRule> FitTakagiSugeno(const RegressionData& data,
 RuleSelection SelectRules(const RegressionData& data,
                           const RuleSelectionOptions& options,
                           const ValidationError& validation) {
-  Require(options.min_rules >= 1 && options.max_rules >= options.min_rules,
+  Require(!options.counts.empty() || (options.min_rules >= 1 &&
+                                      options.max_rules >= options.min_rules),
           "min_rules must be at least 1 and at most max_rules");
   Require(options.tolerance >= 0.0, "tolerance must not be negative");
   RuleSelection selection;
   std::vector<std::vector<TsRule>> rules;
   double least = std::numeric_limits<double>::infinity();
-  for (int c = options.min_rules; c <= options.max_rules; ++c) {
-    TakagiSugenoOptions fit_options = options.fit;
-    fit_options.num_rules = c;
-    Fit fit = FitOnce(data, fit_options);
+  for (const TakagiSugenoOptions& trial : Trials(options)) {
+    Fit fit = FitOnce(data, trial);
     const double error = validation ? validation(fit.rules)
                                     : std::numeric_limits<double>::quiet_NaN();
     least = error < least ? error : least;
-    selection.tried.push_back({c, fit.validity, error});
+    selection.tried.push_back(
+        {trial.num_rules, trial.consequents.method, fit.validity, error});
     rules.push_back(std::move(fit.rules));
   }
   Require(!validation || std::isfinite(least),

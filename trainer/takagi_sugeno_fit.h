@@ -15,6 +15,9 @@ namespace fdi::trainer {
 struct RegressionData {
   Eigen::MatrixXd x;  ///< X, N×n.
   Eigen::VectorXd y;  ///< N.
+  /// Targets from here on are at the limit of the transmitter: the true value
+  /// may be any beyond, and no prediction beyond is in error.
+  double saturation{std::numeric_limits<double>::infinity()};
 };
 
 /// Settings of FitTakagiSugeno().
@@ -24,6 +27,9 @@ struct TakagiSugenoOptions {
   ConsequentOptions consequents;
   /// Lower bound on the common factor on the projected widths; 1: leave them.
   double min_width_factor{0.3};
+  /// Columns of X that the rules are told apart by; the others stand in the
+  /// consequents alone. Empty: all of them.
+  std::vector<Eigen::Index> antecedents;
 };
 
 /// Fits y = Σ w_i(x) (a_iᵀ x + b_i): Gustafson-Kessel clusters of Z = [X, y]
@@ -33,6 +39,10 @@ struct TakagiSugenoOptions {
 /// Memberships of fuzzy clusters fall off slowly, and so do the projected sets:
 /// neighbouring rules blur each other. All widths are therefore narrowed in
 /// steps by one common factor while that lowers the training error by 2 %.
+///
+/// Targets at the limit of a transmitter are replaced by the prediction where
+/// that is beyond, and the consequents estimated again, until both agree: least
+/// squares with a one-sided error there.
 ///
 /// The same data and options give the same bits; scaling a column of X or
 /// reordering the rows changes the result by rounding at most. A column of X
@@ -65,11 +75,14 @@ struct RuleSelectionOptions {
   int min_rules{2};         ///< ≥ 1.
   int max_rules{8};         ///< ≥ min_rules, at most kMaxRules.
   double tolerance{0.02};   ///< ≥ 0, relative validation error given away.
+  std::vector<int> counts;  ///< Numbers of rules to try instead of all between.
+  bool both_methods{false};  ///< Try local and global consequents alike.
 };
 
 /// One number of rules that was tried.
 struct RuleCount {
   int num_rules{0};
+  ConsequentMethod method{ConsequentMethod::kLocal};
   double validity{0.0};          ///< S(c) of the clusters.
   double validation_error{0.0};  ///< NaN without a validation.
 };

@@ -11,6 +11,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/calibration.h"
+#include "trainer/observer_adaptation.h"
 #include "trainer/parallel_for.h"
 #include "trainer/regression.h"
 #include "trainer/separability.h"
@@ -20,6 +21,8 @@ namespace {
 
 constexpr int kFolds = 4;
 constexpr std::size_t kFewResiduals = 20;
+constexpr double kLeastSd = 1e-6;
+constexpr double kLeastDeviation = 0.2;  // of the normal residual's
 
 // Shares of the work, for the progress bar.
 constexpr double kStructureShare = 0.3;
@@ -50,62 +53,91 @@ std::string ObserverName(const Condition& condition) {
   return FaultName(condition.fault) + text.data();
 }
 
-std::vector<double> Outputs(std::span<const Stretch> stretches, Signal output) {
-  std::vector<double> outputs;
-  for (const Stretch& stretch : stretches) {
-    for (const Sample& sample : stretch.samples) {
-      outputs.push_back(sample[output]);
-    }
+// @param least Lower bound on the deviation of the residual: what a stop or a
+// transmitter at its limit holds still now moves again with the next sample.
+ChannelObserver Calibrate(TsModel model, std::span<const double> residuals,
+                          std::span<const double> outputs, double least) {
+  ChannelObserver channel;
+  channel.validation = Figures(residuals, outputs);
+  channel.model = std::move(model);
+  if (residuals.empty()) {  // always at the limit of the transmitter
+    channel.residual_sd = least;
+    channel.membership = {-4.0 * least, -2.0 * least, 2.0 * least, 4.0 * least};
+    return channel;
   }
-  return outputs;
+  channel.membership = FitMembership(residuals);
+  channel.membership.a = std::min(channel.membership.a, -4.0 * least);
+  channel.membership.b = std::min(channel.membership.b, -2.0 * least);
+  channel.membership.c = std::max(channel.membership.c, 2.0 * least);
+  channel.membership.d = std::max(channel.membership.d, 4.0 * least);
+  channel.residual_sd = std::max(std::sqrt(channel.validation.mse), least);
+  channel.correlation_time = CorrelationTime(residuals);
+  return channel;
 }
 
-// Residuals of the validation stretches, of all stretches where those are too
-// short to tell anything.
+// By the residuals of the validation stretches, of all stretches where those
+// are too short to tell anything.
 ChannelObserver Calibrate(TsModel model, const Condition& condition,
-                          int settling) {
-  ChannelObserver channel;
+                          int settling, double least) {
   std::vector<double> residuals;
   std::vector<double> outputs;
   const auto add = [&](std::span<const Stretch> stretches) {
     for (const Stretch& stretch : stretches) {
       const std::vector<double> r = RunResiduals(model, stretch, settling);
-      const std::vector<double> y = Outputs({&stretch, 1}, model.output);
+      const std::vector<double> y = RunOutputs(model, stretch, settling);
       residuals.insert(residuals.end(), r.begin(), r.end());
-      outputs.insert(outputs.end(),
-                     y.end() - static_cast<std::ptrdiff_t>(r.size()), y.end());
+      outputs.insert(outputs.end(), y.begin(), y.end());
     }
   };
   add(condition.validation);
   if (residuals.size() < kFewResiduals) {
     add(condition.training);
   }
-  channel.validation = Figures(residuals, outputs);
-  channel.membership = FitMembership(residuals);
-  channel.residual_sd = std::max(std::sqrt(channel.validation.mse), 1e-6);
-  channel.correlation_time = CorrelationTime(residuals);
-  channel.model = std::move(model);
-  return channel;
+  return Calibrate(std::move(model), residuals, outputs, least);
 }
 
-// Block f of kFolds of every stretch, and all the others.
+ChannelObserver FitObserver(const ChannelPlan& plan,
+                            const ChannelObserver& normal_channel,
+                            const Condition& normal, const Condition& condition,
+                            const FitOptions& options) {
+  const TsModel& normal_model = normal_channel.model;
+  const double least = kLeastDeviation * normal_channel.residual_sd;
+  if (!plan.adapted || RunsOnItself(normal_model)) {
+    return Calibrate(
+        FitFaultChannel(plan, normal_model, normal, condition, options),
+        condition, options.settling, least);
+  }
+  AdaptedModel adapted = AdaptModel(normal_model, condition);
+  return Calibrate(std::move(adapted.model), adapted.residuals, adapted.outputs,
+                   least);
+}
+
 struct Fold {
   Condition rest;
   std::vector<Stretch> block;
 };
 
+// Every kFolds-th stretch and the others; of few stretches block f of kFolds of
+// each, and the rest of it.
 Fold MakeFold(const Condition& normal, int fold) {
   Fold result;
+  const bool whole_stretches = normal.training.size() >= 2 * kFolds;
   for (std::size_t i = 0; i < normal.training.size(); ++i) {
     std::vector<Sample> whole = normal.training[i].samples;
     const auto& tail = normal.validation[i].samples;
     whole.insert(whole.end(), tail.begin(), tail.end());
+    const std::string& id = normal.training[i].run_id;
+    if (whole_stretches) {
+      const bool left_out = static_cast<int>(i % kFolds) == fold;
+      (left_out ? result.block : result.rest.training)
+          .push_back({id, std::move(whole)});
+      continue;
+    }
     const auto cut = [&](int f) {
       return whole.begin() +
              static_cast<std::ptrdiff_t>(whole.size() *
                                          static_cast<std::size_t>(f) / kFolds);
     };
-    const std::string& id = normal.training[i].run_id;
     result.block.push_back({id, {cut(fold), cut(fold + 1)}});
     result.rest.training.push_back({id, {whole.begin(), cut(fold)}});
     result.rest.training.push_back({id, {cut(fold + 1), whole.end()}});
@@ -116,26 +148,28 @@ Fold MakeFold(const Condition& normal, int fold) {
   return result;
 }
 
-// Residuals of normal operation that no model was fitted to: every block is
-// predicted by a model of the other blocks.
-std::vector<std::vector<double>> CrossValidate(const Condition& normal,
-                                               const ModelSet& models,
-                                               const TrainingOptions& options) {
+// Residuals of normal operation that no model was fitted to: every fold is
+// predicted by a model of the others. By channel, one series per stretch.
+std::vector<ResidualSeries> CrossValidate(const Condition& normal,
+                                          const ModelSet& models,
+                                          const TrainingOptions& options) {
   const std::size_t channels = models.channels.size();
-  std::vector<std::vector<double>> parts(channels * kFolds);
+  std::vector<ResidualSeries> parts(channels * kFolds);
   ParallelFor(static_cast<int>(parts.size()), options.threads, [&](int i) {
     const auto c = static_cast<std::size_t>(i / kFolds);
     const Fold fold = MakeFold(normal, i % kFolds);
     const TsModel& chosen = models.observers.front().channels[c].model;
     FitOptions fixed = options.fit;
-    fixed.rules.min_rules = static_cast<int>(chosen.rules.size());
-    fixed.rules.max_rules = fixed.rules.min_rules;
-    const TsModel model =
-        FitChannel(options.channels[c], chosen.regressors, fold.rest, fixed);
-    parts[static_cast<std::size_t>(i)] =
-        RunResiduals(model, fold.block, options.fit.settling);
+    fixed.rules.counts = {static_cast<int>(chosen.rules.size())};
+    fixed.rules.min_rules = fixed.rules.counts.front();
+    const TsModel model = FitChannel(options.channels[c], chosen.regressors,
+                                     fold.rest, fixed, chosen.saturation);
+    for (const Stretch& stretch : fold.block) {
+      parts[static_cast<std::size_t>(i)].push_back(
+          RunResiduals(model, stretch, options.fit.settling));
+    }
   });
-  std::vector<std::vector<double>> joined(channels);
+  std::vector<ResidualSeries> joined(channels);
   for (std::size_t i = 0; i < parts.size(); ++i) {
     auto& series = joined[i / kFolds];
     series.insert(series.end(), parts[i].begin(), parts[i].end());
@@ -188,19 +222,31 @@ ModelSet Describe(const std::vector<TrainingRun>& runs,
 }
 
 // The normal observer's membership and deviation rest on all its data.
-void CalibrateNormal(const std::vector<std::vector<double>>& residuals,
+void CalibrateNormal(const std::vector<ResidualSeries>& series,
                      Observer& normal) {
-  for (std::size_t c = 0; c < residuals.size(); ++c) {
+  for (std::size_t c = 0; c < series.size(); ++c) {
+    const std::vector<double> residuals = Joined(series[c]);
     ChannelObserver& channel = normal.channels[c];
     double square = 0.0;
-    for (const double r : residuals[c]) {
+    for (const double r : residuals) {
       square += r * r;
     }
-    channel.membership = FitMembership(residuals[c]);
+    channel.membership = FitMembership(residuals);
     channel.residual_sd = std::max(
-        std::sqrt(square / static_cast<double>(residuals[c].size())), 1e-6);
-    channel.correlation_time = CorrelationTime(residuals[c]);
+        std::sqrt(square / static_cast<double>(residuals.size())), 1e-6);
+    channel.correlation_time = CorrelationTime(residuals);
   }
+}
+
+// The options of one channel.
+FitOptions FitOptionsOf(const TrainingOptions& options, std::size_t channel) {
+  FitOptions fit = options.fit;
+  const std::vector<int>& counts = options.channels[channel].rule_counts;
+  if (!counts.empty()) {
+    fit.rules.counts = counts;
+    fit.rules.min_rules = *std::min_element(counts.begin(), counts.end());
+  }
+  return fit;
 }
 
 }  // namespace
@@ -215,29 +261,30 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
   ModelSet models = Describe(runs, conditions, options);
   const int channels = static_cast<int>(options.channels.size());
   std::vector<std::vector<Regressor>> regressors(options.channels.size());
+  std::vector<double> saturations(options.channels.size());
   reporter.Tell(0.0, "choosing regressors");
   ParallelFor(channels, options.threads, [&](int c) {
     const auto i = static_cast<std::size_t>(c);
-    regressors[i] =
-        ChooseRegressors(options.channels[i], conditions.front(), options.fit);
+    saturations[i] = FindSaturation(options.channels[i], conditions);
+    regressors[i] = ChooseRegressors(options.channels[i], conditions.front(),
+                                     options.fit, saturations[i]);
   });
   Observer& normal = models.observers.front();
   ParallelFor(channels, options.threads, [&](int c) {
     const auto i = static_cast<std::size_t>(c);
-    normal.channels[i] =
-        Calibrate(FitChannel(options.channels[i], regressors[i],
-                             conditions.front(), options.fit),
-                  conditions.front(), options.fit.settling);
+    normal.channels[i] = Calibrate(
+        FitChannel(options.channels[i], regressors[i], conditions.front(),
+                   FitOptionsOf(options, i), saturations[i]),
+        conditions.front(), options.fit.settling, kLeastSd);
   });
   const int fits = static_cast<int>(conditions.size() - 1) * channels;
   std::atomic<int> done{0};
   ParallelFor(fits, options.threads, [&](int i) {
     const auto o = static_cast<std::size_t>(1 + i / channels);
     const auto c = static_cast<std::size_t>(i % channels);
-    models.observers[o].channels[c] = Calibrate(
-        FitFaultChannel(options.channels[c], normal.channels[c].model,
-                        conditions.front(), conditions[o], options.fit),
-        conditions[o], options.fit.settling);
+    models.observers[o].channels[c] =
+        FitObserver(options.channels[c], normal.channels[c], conditions.front(),
+                    conditions[o], options.fit);
     reporter.Tell(kStructureShare + kObserverShare * ++done / fits,
                   "fitting " + models.observers[o].name);
   });
@@ -245,7 +292,12 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
   const auto normal_residuals =
       CrossValidate(conditions.front(), models, options);
   CalibrateNormal(normal_residuals, models.observers.front());
-  FitThresholds(normal_residuals, options.false_alarms_per_hour, models);
+  std::vector<std::vector<int>> windows;
+  for (const ChannelPlan& plan : options.channels) {
+    windows.push_back(plan.windows);
+  }
+  FitThresholds(normal_residuals, windows, options.false_alarms_per_hour,
+                models);
   reporter.Tell(0.9, "comparing faults");
   FitInterpolationErrors(conditions, models);
   FindGroups(conditions, models);

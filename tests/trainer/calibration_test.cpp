@@ -100,17 +100,40 @@ TEST(TailFitTest, TooFewValuesAreRefused) {
 TEST(ThresholdsTest, ConsecutiveSamplesAllowALowerThreshold) {
   ModelSet models;
   models.channels = {{"X", Signal::kX, -1.0, 1.0}};
-  const std::vector<std::vector<double>> residuals{GaussianSeries(30000, 7)};
+  const std::vector<ResidualSeries> residuals{{GaussianSeries(30000, 7)}};
   models.decision.detection_samples = 1;
-  FitThresholds(residuals, 1e-3, models);
+  FitThresholds(residuals, {{}}, 1e-3, models);
   const double single = models.channels[0].upper_threshold;
   models.decision.detection_samples = 2;
-  FitThresholds(residuals, 1e-3, models);
+  FitThresholds(residuals, {{}}, 1e-3, models);
   // One in 1000 h over two sides: 1.4e-7 a sample is 5.1 alone, 3.4 in pairs.
   EXPECT_NEAR(single, 5.4, 0.7);
   EXPECT_NEAR(models.channels[0].upper_threshold, 3.7, 0.5);
   EXPECT_NEAR(models.channels[0].lower_threshold, -3.7, 0.5);
   EXPECT_NEAR(models.threshold_hours, 30000.0 / 3600.0, 1e-9);
+}
+
+// Mean and log-deviation of a window of N values of white noise of deviation 1
+// scatter by 1/√(2N) each: EWMA of gain 1/N.
+TEST(ThresholdsTest, WindowsAreLimitedWellWithinTheSamples) {
+  ModelSet models;
+  models.channels = {{"X", Signal::kX, -1.0, 1.0}};
+  const std::vector<ResidualSeries> residuals{
+      {GaussianSeries(60000, 8), GaussianSeries(60000, 9)}};
+  FitThresholds(residuals, {{50}}, 1e-3, models);
+  ASSERT_EQ(models.channels[0].windows.size(), 1U);
+  const WindowLimits& window = models.channels[0].windows[0];
+  EXPECT_EQ(window.length, 50);
+  EXPECT_NEAR(window.upper_mean, 0.55, 0.15);
+  EXPECT_NEAR(window.lower_mean, -0.55, 0.15);
+  EXPECT_NEAR(window.upper_log_rms, 0.45, 0.2);
+}
+
+TEST(ThresholdsTest, WindowThatTheSeriesAreTooShortForGetsNoLimits) {
+  ModelSet models;
+  models.channels = {{"X", Signal::kX, -1.0, 1.0}};
+  FitThresholds({{GaussianSeries(900, 10)}}, {{200}}, 1e-3, models);
+  EXPECT_TRUE(models.channels[0].windows.empty());
 }
 
 }  // namespace

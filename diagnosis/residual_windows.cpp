@@ -1,0 +1,53 @@
+#include "diagnosis/residual_windows.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fdi {
+namespace {
+
+constexpr double kLeastVariance = 1e-24;
+
+}  // namespace
+
+void ResidualWindow::Push(double residual) {
+  count_ = std::min(count_ + 1, length_);
+  const double gain = 1.0 / count_;
+  const double deviation = residual - mean_;
+  variance_ = (1.0 - gain) * (variance_ + gain * deviation * deviation);
+  mean_ += gain * deviation;
+}
+
+double ResidualWindow::log_rms() const {
+  return 0.5 * std::log(std::max(variance_, kLeastVariance));
+}
+
+ResidualWindows::ResidualWindows(const ModelSet& models) {
+  for (const ChannelSpec& channel : models.channels) {
+    std::vector<ResidualWindow>& windows = windows_.emplace_back();
+    for (const WindowLimits& limits : channel.windows) {
+      windows.emplace_back(limits.length);
+    }
+  }
+}
+
+void ResidualWindows::Restart() {
+  for (auto& channel : windows_) {
+    for (ResidualWindow& window : channel) {
+      window.Restart();
+    }
+  }
+}
+
+void ResidualWindows::Push(std::span<const double> residuals) {
+  for (std::size_t c = 0; c < windows_.size(); ++c) {
+    if (!std::isfinite(residuals[c])) {
+      continue;
+    }
+    for (ResidualWindow& window : windows_[c]) {
+      window.Push(residuals[c]);
+    }
+  }
+}
+
+}  // namespace fdi

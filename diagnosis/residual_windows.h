@@ -1,0 +1,54 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+
+namespace fdi {
+
+/// Mean and energy of residuals over windows of exponential memory. With the
+/// n-th value, gain g = max(1/n, 1/N), so that a window grows until its length
+/// N is reached,
+///
+///     v ← (1 − g) (v + g (r − m)²),   m ← m + g (r − m);
+///
+/// the energy is ½ log v. Small and slow faults show there long before single
+/// residuals pass a threshold.
+class ResidualWindow {
+ public:
+  explicit ResidualWindow(int length) : length_(length) {}
+
+  void Restart() { *this = ResidualWindow(length_); }
+  void Push(double residual);
+
+  bool full() const { return count_ >= length_; }
+  double mean() const { return mean_; }
+  double log_rms() const;
+
+ private:
+  int length_;
+  int count_{0};
+  double mean_{0.0};
+  double variance_{0.0};
+};
+
+/// The windows of all channels of a model set.
+class ResidualWindows {
+ public:
+  explicit ResidualWindows(const ModelSet& models);
+
+  void Restart();
+
+  /// @param residuals of the normal observer, one per channel; NaN abstains.
+  void Push(std::span<const double> residuals);
+
+  const ResidualWindow& window(std::size_t channel, std::size_t index) const {
+    return windows_[channel][index];
+  }
+
+ private:
+  std::vector<std::vector<ResidualWindow>> windows_;  // per channel
+};
+
+}  // namespace fdi
