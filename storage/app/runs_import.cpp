@@ -7,8 +7,8 @@
 #include "diagnosis/error.h"
 #include "storage/app/common.h"
 #include "storage/app/runs_json.h"
-#include "storage/app/tag_map.h"
 #include "storage/cli/logging.h"
+#include "storage/cli/tag_map.h"
 #include "storage/cli/time_text.h"
 #include "storage/csv.h"
 #include "storage/runs.h"
@@ -39,7 +39,7 @@ CsvTable Read(const ImportOptions& options, std::int64_t start_ns) {
   CsvOptions csv;
   csv.start_ns = start_ns;
   if (!options.map.empty()) {
-    csv.map = ReadTagMap(options.map);
+    csv.map = cli::ReadTagMap(options.map);
   }
   csv.required = ParseSignals(options.signals);
   csv.split_gaps = options.split_gaps;

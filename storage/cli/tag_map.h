@@ -4,7 +4,7 @@
 
 #include "storage/csv.h"
 
-namespace fdi::storage {
+namespace fdi::cli {
 
 /// Reads `--map FILE.toml`: where each signal stands in a foreign table.
 ///
@@ -21,6 +21,6 @@ namespace fdi::storage {
 /// Units: CV, X, SP: %, 1; P1, P2, Ps, Pz: kPa, Pa, bar, MPa; T1: degC, K;
 /// F: m3/h, m3/s, l/min, t/h, kg/h, kg/s.
 /// @throws ConfigError naming file, line and key; NotFoundError.
-ColumnMap ReadTagMap(const std::filesystem::path& path);
+storage::ColumnMap ReadTagMap(const std::filesystem::path& path);
 
-}  // namespace fdi::storage
+}  // namespace fdi::cli

@@ -1,4 +1,4 @@
-#include "storage/app/tag_map.h"
+#include "storage/cli/tag_map.h"
 
 #include <string>
 #include <string_view>
@@ -6,10 +6,12 @@
 #include "diagnosis/error.h"
 #include "storage/cli/toml_reader.h"
 
-namespace fdi::storage {
+namespace fdi::cli {
 namespace {
 
-using cli::TomlReader;
+using storage::ColumnMap;
+using storage::ColumnMapping;
+using storage::Sense;
 
 /// Quantities that share their units.
 enum class Quantity { kPercent, kPressure, kTemperature, kFlow, kNumber };
@@ -155,4 +157,4 @@ ColumnMap ReadTagMap(const std::filesystem::path& path) {
   return map;
 }
 
-}  // namespace fdi::storage
+}  // namespace fdi::cli

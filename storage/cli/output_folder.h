@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+namespace fdi::cli {
+
+/// Makes `folder` unless it is there; its parent must be.
+/// @throws DataError naming the parent that is missing, or the folder that
+///   cannot be made or written to.
+void EnsureFolder(const std::filesystem::path& folder);
+
+/// Writes `text` beside `path` first, so that a failure leaves no part of it.
+/// @throws DataError naming the file.
+void WriteFile(const std::filesystem::path& path, std::string_view text);
+
+}  // namespace fdi::cli
