@@ -211,14 +211,7 @@ void ControlValve::SetEffects(const FaultEffects& effects) {
     return;
   }
   dynamics.SetEffects(effects);
-  const std::span<double> state = impl_->x();
-  double& z = state[kActuatorState];
-  const double stopped = std::clamp(z, dynamics.LowStop(), dynamics.HighStop());
-  if (stopped != z) {
-    z = stopped;
-    state[kVelocityState] = 0.0;
-  }
-  dynamics.Commit(state.data());
+  dynamics.Commit(impl_->x().data());
 }
 
 void ControlValve::SetCommandNoise(double noise) {

@@ -83,14 +83,15 @@ void ValveDynamics::Align(double z) {
 }
 
 double ValveDynamics::ChamberPressureOf(const double* x) const {
-  return ChamberPressure(parameters_.actuator, x[kChargeState],
-                         x[kActuatorState] * parameters_.actuator.stroke_m);
+  return ChamberPressure(
+      parameters_.actuator, x[kChargeState],
+      Rod(x[kActuatorState]) * parameters_.actuator.stroke_m);
 }
 
 double ValveDynamics::ChargeFor(double pressure_pa, double z) const {
   const ActuatorParameters& a = parameters_.actuator;
   const double volume =
-      a.chamber_volume_m3 + a.diaphragm_area_m2 * a.stroke_m * z;
+      a.chamber_volume_m3 + a.diaphragm_area_m2 * a.stroke_m * Rod(z);
   return pressure_pa * volume / (a.ambient_pressure_pa * a.chamber_volume_m3) -
          1.0;
 }
@@ -146,15 +147,25 @@ double ValveDynamics::Signal(const double* x) const {
   return std::clamp(signal, -1.0, 1.0);
 }
 
+// Air through the relay into the chamber at the transducer's output `drive`.
+double ValveDynamics::RelayFlow(double chamber_pa, double drive) const {
+  const PositionerParameters& p = parameters_.positioner;
+  const double ambient = parameters_.actuator.ambient_pressure_pa;
+  const bool fills = drive > 0.0;
+  const double from = fills ? supply_pa_ : chamber_pa;
+  const double to = fills ? chamber_pa : ambient;
+  if (p.relay == AirRelay::kOrifice) {
+    return drive * p.orifice_coefficient * OrificeAirFlow(from, to);
+  }
+  return drive * (fills ? p.filling_cv : p.venting_cv) * AirFlow(from, to);
+}
+
 double ValveDynamics::AirMassRate(double chamber_pa, double signal) const {
   const PositionerParameters& p = parameters_.positioner;
   const double ambient = parameters_.actuator.ambient_pressure_pa;
   double drive = p.transducer_dead_zone ? TransducerOutput(signal) : signal;
   drive *= effects_.transducer_factor;
-  const double rate =
-      drive > 0.0 ? drive * p.filling_cv * AirFlow(supply_pa_, chamber_pa)
-                  : drive * p.venting_cv * AirFlow(chamber_pa, ambient);
-  return rate -
+  return RelayFlow(chamber_pa, drive) -
          effects_.air_leak * std::sqrt(std::max(0.0, chamber_pa - ambient));
 }
 

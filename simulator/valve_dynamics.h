@@ -32,7 +32,10 @@ enum class Motion { kFree, kRising, kFalling, kHeld };
 ///   n' = R T mdot / (P0 V0)
 ///   c1' = (CV - c1) / tau,   c2' = (c1 - c2) / tau
 ///   N = m g - K (x + x0) + (Pc - P0) A - (P1m - P2) A0 / Km
-///   mdot by (16) with if = transducer(clamp((17))), minus leaks
+///   mdot by the air relay with if = transducer(clamp((17))), minus leaks
+///
+/// The actuator's position drives spring and play; the rod's, behind the play
+/// and the stops, the chamber's volume (15), the plug and the feedback.
 class ValveDynamics final : public OdeSystem {
  public:
   explicit ValveDynamics(const ValveParameters& parameters);
@@ -59,9 +62,9 @@ class ValveDynamics final : public OdeSystem {
 
   /// Backlash width / stroke.
   double PlayWidth() const;
-  double rod_limit() const { return rod_limit_; }
-  double LowStop() const { return -0.5 * PlayWidth(); }
-  double HighStop() const { return rod_limit_ + 0.5 * PlayWidth(); }
+  /// Ends of the actuator's travel; the rod's are 0 and its limit.
+  double LowStop() const { return parameters_.actuator.lowest_travel; }
+  double HighStop() const { return parameters_.actuator.highest_travel; }
   /// Rod behind the play for an actuator position z.
   double Rod(double z) const;
   /// Rod and feedback follow the state of an accepted step.
@@ -88,6 +91,7 @@ class ValveDynamics final : public OdeSystem {
   const ValveParameters& parameters() const { return parameters_; }
 
  private:
+  double RelayFlow(double chamber_pa, double drive) const;
   double AirMassRate(double chamber_pa, double signal) const;
   double ErrorRate(const double* x) const;
 

@@ -84,7 +84,7 @@ MediumState MediumAt(double inlet_pressure_pa, double outlet_pressure_pa,
                      double temperature_c) {
   const double vapour = VapourPressure(temperature_c);
   return {std::max(inlet_pressure_pa, vapour), outlet_pressure_pa, vapour,
-          WaterDensity(temperature_c)};
+          LiquidDensity(temperature_c)};
 }
 
 double EffectivePressureDrop(const MediumState& medium, double recovery) {
@@ -122,6 +122,10 @@ double AirFlow(double from_pa, double to_pa) {
     return 2.065e-6 * from_pa;
   }
   return 4.13e-6 * SignedRoot(from_pa - to_pa, kRegularPa) * std::sqrt(to_pa);
+}
+
+double OrificeAirFlow(double from_pa, double to_pa) {
+  return SignedRoot(from_pa - to_pa, kRegularPa);
 }
 
 double TransducerOutput(double signal) {

@@ -40,7 +40,7 @@ double Flow(double kv_m3_h, double opening, double pressure_drop_pa,
 double FlowForce(double pressure_drop_pa, double plug_area_m2, double recovery);
 
 /// (15) Absolute pressure in the chamber Pc = (P0 V0 + R T m) / (V0 + A x),
-/// with R T m = charge P0 V0.
+/// with R T m = charge P0 V0 and x the position of the rod.
 double ChamberPressure(const ActuatorParameters& actuator, double charge,
                        double position_m);
 
@@ -48,6 +48,10 @@ double ChamberPressure(const ActuatorParameters& actuator, double charge,
 /// 4.13e-6 sqrt((Pa1 - Pa2) Pa2) while Pa2 >= Pa1/2, else 2.065e-6 Pa1 (the
 /// printed 2.06e-6 would leave a jump); backwards if Pa1 < Pa2.
 double AirFlow(double from_pa, double to_pa);
+
+/// Square-root law of the benchmark's air relay: sqrt(Pa1 - Pa2) [sqrt(Pa)],
+/// odd, regularised below 1 kPa.
+double OrificeAirFlow(double from_pa, double to_pa);
 
 /// Static table of the electro-pneumatic transducer, dead zone about 0.
 double TransducerOutput(double signal);

@@ -12,8 +12,7 @@ namespace {
 ValveParameters LublinActuator3() {
   ValveParameters valve;
   valve.positioner.transducer_dead_zone = true;
-  // The table's output ends at -0.55: venting is scaled back up.
-  valve.positioner.venting_cv = valve.positioner.filling_cv / 0.55;
+  valve.positioner.relay = AirRelay::kOrifice;
   return valve;
 }
 
@@ -65,6 +64,8 @@ void ValidateActuator(const ActuatorParameters& a) {
                1.2e5, 2e6);
   RequireRange("actuator.plug_area_m2", a.plug_area_m2, 0.0, 1.0);
   RequireRange("actuator.play_fraction", a.play_fraction, 0.0, 1.0);
+  RequireRange("actuator.lowest_travel", a.lowest_travel, -1.0, 0.0);
+  RequireRange("actuator.highest_travel", a.highest_travel, 1.0, 2.0);
   RequireRange("actuator.coulomb_friction_n", a.coulomb_friction_n, 0.0, 1e5);
 }
 
@@ -80,6 +81,8 @@ void ValidatePositioner(const PositionerParameters& p) {
   }
   RequireRange("positioner.filling_cv", p.filling_cv, 1e-6, 1.0);
   RequireRange("positioner.venting_cv", p.venting_cv, 1e-6, 1.0);
+  RequireRange("positioner.orifice_coefficient", p.orifice_coefficient, 1e-9,
+               1e-3);
 }
 
 }  // namespace

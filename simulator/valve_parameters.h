@@ -24,19 +24,31 @@ struct ActuatorParameters {
   double supply_pressure_gauge_pa{600e3};  ///< Above ambient.
   double plug_area_m2{1.9635e-3};          ///< A0, 50 mm plug.
   double play_fraction{0.01};              ///< Backlash width / stroke.
-  double coulomb_friction_n{0.0};          ///< F_f of (13), 0 = none.
+  /// Travel of the actuator before the play / stroke: it goes on where a stop
+  /// holds the rod.
+  double lowest_travel{-0.05};
+  double highest_travel{1.25};
+  double coulomb_friction_n{0.0};  ///< F_f of (13), 0 = none.
 };
 
-/// Positioner (17) with its filter, transducer and air relay (16).
+/// Law of the air flow between two pressures.
+enum class AirRelay {
+  kCompressible,  ///< (16), with a Cv each for filling and venting.
+  kOrifice        ///< mdot = c if sqrt(Pa1 - Pa2), the DAMADICS benchmark's.
+};
+
+/// Positioner (17) with its filter, transducer and air relay.
 struct PositionerParameters {
   double gain{100.0};  ///< Kp, on the error as a fraction of the stroke.
   double integral_time_s{std::numeric_limits<double>::infinity()};  ///< TI.
   double derivative_time_s{0.0};                                    ///< TD.
-  double filter_time_s{0.30};        ///< Each of the two lags on the command.
-  double sampling_period_s{0.0};     ///< 0 = continuous (17); benchmark: 0.035.
-  double filling_cv{1.05e-3};        ///< Cv of (16) while filling.
-  double venting_cv{1.05e-3};        ///< Cv of (16) while venting.
-  bool transducer_dead_zone{false};  ///< Electro-pneumatic table in series.
+  double filter_time_s{0.30};     ///< Each of the two lags on the command.
+  double sampling_period_s{0.0};  ///< 0 = continuous (17); benchmark: 0.035.
+  AirRelay relay{AirRelay::kCompressible};
+  double filling_cv{1.05e-3};          ///< Cv of (16) while filling.
+  double venting_cv{1.05e-3};          ///< Cv of (16) while venting.
+  double orifice_coefficient{2.5e-6};  ///< c of kOrifice [kg/(s sqrt(Pa))].
+  bool transducer_dead_zone{false};    ///< Electro-pneumatic table in series.
 };
 
 enum class FlowCharacteristic {
@@ -52,7 +64,8 @@ struct TrimParameters {
   double bypass_kv_m3_h{19.75};  ///< V3, fully open (fault f18).
 };
 
-/// A transmitter: reading = quantize(clamp(value + noise, low, high)).
+/// A transmitter: reading = quantize(clamp(clamp(value) + noise)), both to
+/// [low, high].
 struct Transmitter {
   double low;
   double high;
@@ -84,10 +97,11 @@ struct ValveParameters {
 
 /// The shipped sets:
 /// - lublin-actuator-3: data sheet and benchmark values of actuator 3 of the
-///   Lublin sugar factory (feedwater of the 4th boiler), flow in t/h.
+///   Lublin sugar factory (feedwater of the 4th boiler), flow in t/h, with the
+///   benchmark's air relay in place of (16).
 /// - lublin-actuator-3-refit: the same refitted to 40 minutes of the plant's
-///   record: Cv of (16) filling and venting (without the dead zone's table),
-///   filter time, Kv and exponent; all else as above.
+///   record: (16) with a Cv each for filling and venting (without the dead
+///   zone's table), filter time, Kv and exponent; all else as above.
 /// - paper-operating-point: linear trim in m3/h that gives the flow, position
 ///   and noise floor of [Mendonca et al., 2009], tables 3 and 4.
 std::vector<std::string> ParameterSetNames();

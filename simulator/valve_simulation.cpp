@@ -148,10 +148,11 @@ void ValveSimulation::Impl::AdvanceTo(std::uint64_t k) {
 
 double ValveSimulation::Impl::Read(const Transmitter& transmitter,
                                    double value) {
-  if (config_.noise) {
-    value += transmitter.noise_sd * noise_();
-  }
   value = std::clamp(value, transmitter.low, transmitter.high);
+  if (config_.noise) {
+    value = std::clamp(value + transmitter.noise_sd * noise_(), transmitter.low,
+                       transmitter.high);
+  }
   if (config_.resolution) {
     const double step =
         (transmitter.high - transmitter.low) /
@@ -168,7 +169,7 @@ Sample ValveSimulation::Impl::ReadAll(std::uint64_t k) {
   const ProcessInputs seen = valve_.Effective(inputs_);
   double flow = valve_.FlowM3PerHour(inputs_, excitation_->bypass_opening());
   if (i.flow_unit == FlowUnit::kTPerHour) {
-    flow *= WaterDensity(seen.temperature_c) / 1000.0;
+    flow *= LiquidDensity(seen.temperature_c) / 1000.0;
   }
   Sample sample;
   sample.stamp_ns =

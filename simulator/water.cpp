@@ -18,6 +18,11 @@ double WaterDensity(double temperature_c) {
           6.74694450e5 * std::pow(third, 110));
 }
 
+double LiquidDensity(double temperature_c) {
+  constexpr double kHottestC = 110.0;
+  return WaterDensity(std::min(temperature_c, kHottestC));
+}
+
 double VapourPressure(double temperature_c) {
   return std::pow(10.0, -2141.0 / (temperature_c + 273.15) + 10.7167);
 }

@@ -126,6 +126,53 @@ TEST(ControlValveTest, RodStopsAtTheTravelsEndsAndLeavesThem) {
   EXPECT_NEAR(valve.state().rod, 0.0, 2e-3);
 }
 
+// While the stop holds the rod the actuator runs to the end of its own travel;
+// the pressure built up meanwhile delays the rod's return.
+TEST(ControlValveTest, ActuatorGoesOnWhereAStopHoldsTheRod) {
+  ControlValve valve(ParameterSet("lublin-actuator-3"), 1.0);
+  valve.Settle(InputsAt(0.5));
+  FaultEffects clogged;
+  clogged.upper_stop_factor = 0.6;
+  valve.SetEffects(clogged);
+  Hold(valve, 0.9, 60);
+  EXPECT_DOUBLE_EQ(valve.state().rod, 0.6);
+  EXPECT_DOUBLE_EQ(valve.state().actuator, 1.25);
+  EXPECT_NEAR(valve.state().chamber_pressure_pa - 101325.0, 600e3, 1e3);
+  Hold(valve, 0.5, 20);
+  EXPECT_DOUBLE_EQ(valve.state().rod, 0.6);
+  Hold(valve, 0.5, 60);
+  EXPECT_NEAR(valve.state().rod, LeverPosition(0.5), 1e-2);
+}
+
+// The flow force opens the valve to the rod's end, the actuator to its own.
+TEST(ControlValveTest, ActuatorGoesOnBelowTheOpenEnd) {
+  ControlValve valve(ParameterSet("lublin-actuator-3"), 1.0);
+  valve.Settle(InputsAt(0.5));
+  Hold(valve, 0.0, 120);
+  EXPECT_NEAR(valve.state().rod, 0.0, 1e-3);
+  FaultEffects evaporation;
+  ApplyFault(7, 1.0, evaporation);
+  valve.SetEffects(evaporation);
+  Hold(valve, 0.0, 30);
+  EXPECT_EQ(valve.state().rod, 0.0);
+  EXPECT_DOUBLE_EQ(valve.state().actuator, -0.05);
+}
+
+// The relay of the benchmark: mdot = c if sqrt(dP), the dead zone's table in
+// between, against the air that entered.
+TEST(ControlValveTest, OrificeRelayFillsByTheRootOfThePressureDrop) {
+  ValveParameters parameters = ParameterSet("lublin-actuator-3");
+  ControlValve valve(parameters, 0.1);
+  valve.Settle(InputsAt(0.3));
+  valve.Advance(2.0, InputsAt(0.9), InputsAt(0.9));
+  const ValveState before = valve.state();
+  ASSERT_EQ(before.signal, 1.0);
+  valve.Advance(0.001, InputsAt(0.9), InputsAt(0.9));
+  const double drop = 701325.0 - before.chamber_pressure_pa;
+  EXPECT_NEAR((valve.state().air_mass_kg - before.air_mass_kg) / 0.001,
+              2.5e-6 * std::sqrt(drop), 0.01 * 2.5e-6 * std::sqrt(drop));
+}
+
 TEST(ControlValveTest, StopThatMovesTakesTheRodAlong) {
   ControlValve valve(ParameterSet("lublin-actuator-3"), 1.0);
   valve.Settle(InputsAt(0.7));

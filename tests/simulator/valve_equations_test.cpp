@@ -115,5 +115,11 @@ TEST(ValveEquationsTest, ChamberPressureIsThatOfAnIdealGas) {
   EXPECT_DOUBLE_EQ(ChamberPressure(a, 0.0, 0.0), a.ambient_pressure_pa);
 }
 
+TEST(ValveEquationsTest, OrificeAirFlowIsTheOddRootOfTheDrop) {
+  EXPECT_DOUBLE_EQ(OrificeAirFlow(350e3, 100e3), 500.0);
+  EXPECT_DOUBLE_EQ(OrificeAirFlow(100e3, 350e3), -500.0);
+  EXPECT_EQ(OrificeAirFlow(2e5, 2e5), 0.0);
+}
+
 }  // namespace
 }  // namespace fdi::simulator

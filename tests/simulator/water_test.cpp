@@ -14,6 +14,12 @@ TEST(WaterTest, DensityFollowsTheSteamTables) {
   EXPECT_NEAR(WaterDensity(300.0), 712.1, 1.5);
 }
 
+TEST(WaterTest, FlowingLiquidKeepsItsDensityBeyondBoiling) {
+  EXPECT_EQ(LiquidDensity(43.0), WaterDensity(43.0));
+  EXPECT_EQ(LiquidDensity(100.7), WaterDensity(100.7));
+  EXPECT_NEAR(LiquidDensity(268.0), 951.0, 1.0);
+}
+
 TEST(WaterTest, VapourPressureFollowsTheSteamTables) {
   EXPECT_NEAR(VapourPressure(200.0), 1.555e6, 0.01e6);
   EXPECT_NEAR(VapourPressure(100.0), 101.3e3, 7e3);
