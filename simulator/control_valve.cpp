@@ -14,11 +14,11 @@ constexpr double kStopReach = 1e-7;
 
 CvodeOptions OptionsFor(const ValveDynamics& dynamics, double scale) {
   CvodeOptions options;
-  options.relative_tolerance = 1e-6 * scale;
+  options.relative_tolerance = 6e-7 * scale;
   // Position, velocity, charge, lags, integral. A tight velocity doubles the
   // steps and changes nothing: it is slaved to the forces. The charge is not:
   // inside the play nothing brings its error back.
-  options.absolute_tolerances = {1e-5, 0.05, 1e-5, 3e-5, 3e-5, 6e-5};
+  options.absolute_tolerances = {6e-6, 0.03, 6e-6, 2e-5, 2e-5, 4e-5};
   options.absolute_tolerances.resize(dynamics.state_count());
   for (double& tolerance : options.absolute_tolerances) {
     tolerance *= scale;
@@ -41,12 +41,13 @@ class ControlValve::Impl {
   }
 
   void Settle(const ProcessInputs& inputs);
-  void Advance(double duration_s);
+  void Advance(double from_s, double to_s);
   void SelectMotion();
 
   ValveDynamics dynamics_;
   CvodeIntegrator integrator_;
-  double time_s_{0.0};            // Inside the present Advance().
+  double time_s_{0.0};            // Of the present Advance().
+  bool continues_{false};         // The solver's history is valid.
   double until_sampling_s_{0.0};  // Of a sampled positioner.
 
  private:
@@ -100,6 +101,7 @@ void ControlValve::Impl::Settle(const ProcessInputs& inputs) {
   state[kFirstLagState] = command;
   state[kSecondLagState] = command;
   time_s_ = 0.0;
+  continues_ = false;
   SelectMotion();
 }
 
@@ -155,12 +157,16 @@ bool ControlValve::Impl::AfterStep(StepResult result) {
 }
 
 void ControlValve::Impl::Integrate(double t_stop) {
-  integrator_.Restart(time_s_);
+  if (!continues_) {
+    SelectMotion();
+    integrator_.Restart(time_s_);
+  }
   while (time_s_ < t_stop) {
     const StepResult result = integrator_.StepTowards(t_stop);
     time_s_ = integrator_.time();
     dynamics_.Commit(x().data());
-    if (AfterStep(result) && time_s_ < t_stop) {
+    continues_ = !AfterStep(result);
+    if (!continues_ && time_s_ < t_stop) {
       dynamics_.Commit(x().data());
       integrator_.Restart(time_s_);
     }
@@ -171,22 +177,22 @@ void ControlValve::Impl::Integrate(double t_stop) {
   time_s_ = t_stop;
 }
 
-void ControlValve::Impl::Advance(double duration_s) {
-  time_s_ = 0.0;
-  SelectMotion();
+void ControlValve::Impl::Advance(double from_s, double to_s) {
+  time_s_ = from_s;
   const double sampling_s = dynamics_.parameters().positioner.sampling_period_s;
-  while (sampling_s > 0.0 && time_s_ < duration_s) {
+  while (sampling_s > 0.0 && time_s_ < to_s) {
     if (until_sampling_s_ <= 0.0) {
       dynamics_.HoldSignal(std::nullopt);
       dynamics_.HoldSignal(dynamics_.Signal(x().data()));
       until_sampling_s_ += sampling_s;
+      continues_ = false;
     }
-    const double step = std::min(until_sampling_s_, duration_s - time_s_);
+    const double step = std::min(until_sampling_s_, to_s - time_s_);
     until_sampling_s_ -= step;
     Integrate(time_s_ + step);
   }
-  if (time_s_ < duration_s) {
-    Integrate(duration_s);
+  if (time_s_ < to_s) {
+    Integrate(to_s);
   }
 }
 
@@ -203,6 +209,7 @@ void ControlValve::ColdStart() {
   const std::span<double> state = impl_->x();
   std::fill(state.begin(), state.end(), 0.0);
   impl_->dynamics_.Align(0.0);
+  impl_->continues_ = false;
 }
 
 void ControlValve::SetEffects(const FaultEffects& effects) {
@@ -212,6 +219,7 @@ void ControlValve::SetEffects(const FaultEffects& effects) {
   }
   dynamics.SetEffects(effects);
   dynamics.Commit(impl_->x().data());
+  impl_->continues_ = false;
 }
 
 void ControlValve::SetCommandNoise(double noise) {
@@ -221,7 +229,14 @@ void ControlValve::SetCommandNoise(double noise) {
 void ControlValve::Advance(double duration_s, const ProcessInputs& from,
                            const ProcessInputs& to) {
   impl_->dynamics_.SetInputs(from, to, duration_s);
-  impl_->Advance(duration_s);
+  impl_->continues_ = false;
+  impl_->Advance(0.0, duration_s);
+}
+
+void ControlValve::AdvanceSmoothly(double from_s, double to_s,
+                                   const InputFunction& inputs) {
+  impl_->dynamics_.FollowInputs(inputs, from_s);
+  impl_->Advance(from_s, to_s);
 }
 
 ValveState ControlValve::state() const {

@@ -55,6 +55,12 @@ class ControlValve final {
   void Advance(double duration_s, const ProcessInputs& from,
                const ProcessInputs& to);
 
+  /// Integrates from `from_s` to `to_s` under inputs that are smooth functions
+  /// of time. The solver goes on with its history from the last call, which
+  /// ended at `from_s`, unless the fault effects changed in between.
+  /// @throws CvodeError
+  void AdvanceSmoothly(double from_s, double to_s, const InputFunction& inputs);
+
   ValveState state() const;
 
   /// Net force on the moving mass but friction and damping [N], towards

@@ -55,13 +55,20 @@ class Sine final : public Excitation {
       : phase_s_(config.phase_s), period_s_(period_s) {}
 
   ProcessInputs Next(const FlowOfPressures&) override {
-    const double t = phase_s_ + static_cast<double>(sample_++) * period_s_;
+    return At(phase_s_ + static_cast<double>(sample_++) * period_s_);
+  }
+
+  InputFunction AsFunction() const override {
+    return [phase_s = phase_s_](double time_s) { return At(phase_s + time_s); };
+  }
+
+ private:
+  static ProcessInputs At(double t) {
     return FromRow({50.0 + 25.0 * std::sin(kTwoPi * 0.01 * t),
                     3500.0 + 175.0 * std::sin(kTwoPi * 0.1 * t),
                     2600.0 + 26.0 * std::sin(2.0 * t), 43.0});
   }
 
- private:
   double phase_s_;
   double period_s_;
   std::uint64_t sample_{0};

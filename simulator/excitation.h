@@ -91,6 +91,9 @@ void Validate(const ExcitationConfig& config);
 /// behind the valve [Pa], at its present opening.
 using FlowOfPressures = std::function<double(double, double)>;
 
+/// Process inputs at a time since the first sample [s].
+using InputFunction = std::function<ProcessInputs(double)>;
+
 /// Yields the process inputs of sample 0, 1, 2, ...
 class Excitation {
  public:
@@ -106,6 +109,9 @@ class Excitation {
 
   /// Hand valve V3 beside the valve, 0..1.
   virtual double bypass_opening() const { return 0.0; }
+
+  /// The inputs as smooth functions of time; empty if they are not.
+  virtual InputFunction AsFunction() const { return {}; }
 
   /// Inputs of the next sample. `flow` is only used by closed loops.
   virtual ProcessInputs Next(const FlowOfPressures& flow) = 0;

@@ -46,12 +46,29 @@ void ValveDynamics::SetInputs(const ProcessInputs& from,
                               const ProcessInputs& to, double duration_s) {
   const ProcessInputs start = Effective(from);
   const ProcessInputs end = Effective(to);
+  inputs_ = nullptr;
   command_ = start.command;
   inlet_pa_ = start.inlet_pressure_pa;
   inlet_slope_ = (end.inlet_pressure_pa - inlet_pa_) / duration_s;
   outlet_pa_ = start.outlet_pressure_pa;
   outlet_slope_ = (end.outlet_pressure_pa - outlet_pa_) / duration_s;
   vapour_pa_ = VapourPressure(start.temperature_c);
+}
+
+void ValveDynamics::FollowInputs(const InputFunction& inputs, double time_s) {
+  inputs_ = inputs;
+  vapour_pa_ = VapourPressure(Effective(inputs(time_s)).temperature_c);
+}
+
+ProcessInputs ValveDynamics::InputsAt(double t) const {
+  if (inputs_) {
+    return Effective(inputs_(t));
+  }
+  ProcessInputs inputs;
+  inputs.command = command_;
+  inputs.inlet_pressure_pa = inlet_pa_ + inlet_slope_ * t;
+  inputs.outlet_pressure_pa = outlet_pa_ + outlet_slope_ * t;
+  return inputs;
 }
 
 double ValveDynamics::PlayWidth() const {
@@ -97,13 +114,17 @@ double ValveDynamics::ChargeFor(double pressure_pa, double z) const {
 }
 
 double ValveDynamics::OpeningForce(double t, double z) const {
+  return OpeningForce(InputsAt(t), z);
+}
+
+double ValveDynamics::OpeningForce(const ProcessInputs& inputs,
+                                   double z) const {
   const ActuatorParameters& a = parameters_.actuator;
-  const double inlet = std::max(inlet_pa_ + inlet_slope_ * t, vapour_pa_);
-  const double outlet = outlet_pa_ + outlet_slope_ * t;
+  const double inlet = std::max(inputs.inlet_pressure_pa, vapour_pa_);
   const double spring = a.spring_rate_n_m * effects_.spring_factor *
                         (z * a.stroke_m + a.spring_preload_m);
   return spring +
-         FlowForce(inlet - outlet, a.plug_area_m2,
+         FlowForce(inlet - inputs.outlet_pressure_pa, a.plug_area_m2,
                    RecoveryCoefficient(Rod(z) + effects_.plug_offset)) -
          a.moving_mass_kg * kGravity;
 }
@@ -113,10 +134,15 @@ double ValveDynamics::BreakAwayForce() const {
 }
 
 double ValveDynamics::NetForce(double t, const double* x) const {
+  return NetForce(InputsAt(t), x);
+}
+
+double ValveDynamics::NetForce(const ProcessInputs& inputs,
+                               const double* x) const {
   const ActuatorParameters& a = parameters_.actuator;
   return (ChamberPressureOf(x) - a.ambient_pressure_pa) * a.diaphragm_area_m2 *
              effects_.area_factor -
-         OpeningForce(t, x[kActuatorState]);
+         OpeningForce(inputs, x[kActuatorState]);
 }
 
 // de/dt for the derivative action; the rod moves only while the play is taken.
@@ -174,12 +200,13 @@ void ValveDynamics::Derivatives(double t, const double* x,
   const ActuatorParameters& a = parameters_.actuator;
   const double tau = parameters_.positioner.filter_time_s;
   const double signal = Signal(x);
+  const ProcessInputs inputs = InputsAt(t);
   if (motion_ == Motion::kHeld) {
     dx[kActuatorState] = 0.0;
     dx[kVelocityState] = 0.0;
   } else {
     double force =
-        NetForce(t, x) - a.damping_n_s_m * a.stroke_m * x[kVelocityState];
+        NetForce(inputs, x) - a.damping_n_s_m * a.stroke_m * x[kVelocityState];
     if (motion_ == Motion::kRising) {
       force -= a.coulomb_friction_n;
     } else if (motion_ == Motion::kFalling) {
@@ -191,7 +218,8 @@ void ValveDynamics::Derivatives(double t, const double* x,
   dx[kChargeState] = AirMassRate(ChamberPressureOf(x), signal) * kGasConstant *
                      a.air_temperature_k /
                      (a.ambient_pressure_pa * a.chamber_volume_m3);
-  dx[kFirstLagState] = (command_ + command_noise_ - x[kFirstLagState]) / tau;
+  dx[kFirstLagState] =
+      (inputs.command + command_noise_ - x[kFirstLagState]) / tau;
   dx[kSecondLagState] = (x[kFirstLagState] - x[kSecondLagState]) / tau;
   if (has_integral_) {
     const double error = x[kSecondLagState] - Feedback(Rod(x[kActuatorState]));

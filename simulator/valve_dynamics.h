@@ -25,7 +25,8 @@ enum ValveStateIndex : std::size_t {
 enum class Motion { kFree, kRising, kFalling, kHeld };
 
 /// Right-hand side of equations (13)-(17) for one motion, constant fault
-/// effects, a held command and pressures that are linear in time.
+/// effects, and inputs that are smooth in time, or a held command with
+/// pressures that are linear in time.
 ///
 ///   z' = v
 ///   v' = (N - F_f sign(v) - b v) / m
@@ -47,6 +48,9 @@ class ValveDynamics final : public OdeSystem {
   /// Command of `from`; pressures from `from` at t = 0 to `to` at `duration_s`.
   void SetInputs(const ProcessInputs& from, const ProcessInputs& to,
                  double duration_s);
+  /// Inputs that are smooth functions of time, until SetInputs(); the vapour
+  /// pressure is that at `time_s`.
+  void FollowInputs(const InputFunction& inputs, double time_s);
   void SetCommandNoise(double noise) { command_noise_ = noise; }
   void set_motion(Motion motion) { motion_ = motion; }
   Motion motion() const { return motion_; }
@@ -91,6 +95,10 @@ class ValveDynamics final : public OdeSystem {
   const ValveParameters& parameters() const { return parameters_; }
 
  private:
+  // Command and pressures at time t, as the faults make them.
+  ProcessInputs InputsAt(double t) const;
+  double OpeningForce(const ProcessInputs& inputs, double z) const;
+  double NetForce(const ProcessInputs& inputs, const double* x) const;
   double RelayFlow(double chamber_pa, double drive) const;
   double AirMassRate(double chamber_pa, double signal) const;
   double ErrorRate(const double* x) const;
@@ -104,6 +112,7 @@ class ValveDynamics final : public OdeSystem {
   double rod_limit_{1.0};
   double rod_{0.0};
   double feedback_{0.0};
+  InputFunction inputs_;  // Empty while the command is held.
   double command_{0.0};
   double command_noise_{0.0};
   double inlet_pa_{0.0};

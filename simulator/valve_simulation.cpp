@@ -35,6 +35,12 @@ void Validate(const ValveSimulationConfig& config) {
   for (const FaultSchedule& fault : config.faults) {
     Validate(fault);
   }
+  if (config.continuous_inputs &&
+      !std::holds_alternative<SineExcitation>(config.excitation)) {
+    throw ConfigError("continuous_inputs is set for the excitation '" +
+                      std::string(ExcitationName(config.excitation)) +
+                      "': expected sine, the others are sampled");
+  }
   RequireRange("duration_s", config.duration_s, 1e-3, 1e10);
   RequireRange("period_s", config.period_s, 1e-3, 3600.0);
   RequireRange("tolerance_scale", config.tolerance_scale, 1e-6, 100.0);
@@ -48,6 +54,7 @@ class ValveSimulation::Impl {
         count_(SampleCount(config)),
         excitation_(
             MakeExcitation(config.excitation, config.period_s, config.seed)),
+        input_function_(excitation_->AsFunction()),
         noise_(config.seed, 1),
         positioner_noise_(config.seed, 2),
         valve_(config.parameters, config.tolerance_scale) {}
@@ -59,6 +66,7 @@ class ValveSimulation::Impl {
   std::uint64_t count_;
   std::uint64_t next_{0};
   std::unique_ptr<Excitation> excitation_;
+  InputFunction input_function_;
   NormalSource noise_;
   NormalSource positioner_noise_;
   ControlValve valve_;
@@ -126,7 +134,11 @@ void ValveSimulation::Impl::AdvanceAcrossFaults(double from_s, double to_s,
         std::lerp(here.inlet_pressure_pa, target.inlet_pressure_pa, share);
     there.outlet_pressure_pa =
         std::lerp(here.outlet_pressure_pa, target.outlet_pressure_pa, share);
-    valve_.Advance(until_s - at_s, here, there);
+    if (config_.continuous_inputs) {
+      valve_.AdvanceSmoothly(at_s, until_s, input_function_);
+    } else {
+      valve_.Advance(until_s - at_s, here, there);
+    }
     valve_.SetEffects(EffectsAt(config_.faults, until_s));
     here = there;
     at_s = until_s;

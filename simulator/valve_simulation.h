@@ -16,14 +16,17 @@ struct ValveSimulationConfig {
   ValveParameters parameters{};
   ExcitationConfig excitation{OperatingPointExcitation{}};
   std::vector<FaultSchedule> faults{};
-  std::uint64_t seed{1};        ///< Same seed, same run, bit for bit.
-  double duration_s{2000.0};    ///< Samples at 0, period, ... < duration; > 0.
-  double period_s{1.0};         ///< > 0.
-  std::int64_t start_ns{0};     ///< UTC of the first sample.
-  std::uint64_t source_id{0};   ///< Copied into every sample.
-  bool noise{true};             ///< Sensor and positioner noise.
-  bool resolution{true};        ///< Converter resolution of the transmitters.
-  bool cold_start{false};       ///< From X = 0 and vented, not in equilibrium.
+  std::uint64_t seed{1};       ///< Same seed, same run, bit for bit.
+  double duration_s{2000.0};   ///< Samples at 0, period, ... < duration; > 0.
+  double period_s{1.0};        ///< > 0.
+  std::int64_t start_ns{0};    ///< UTC of the first sample.
+  std::uint64_t source_id{0};  ///< Copied into every sample.
+  bool noise{true};            ///< Sensor and positioner noise.
+  bool resolution{true};       ///< Converter resolution of the transmitters.
+  bool cold_start{false};      ///< From X = 0 and vented, not in equilibrium.
+  /// The inputs act as the smooth functions of time that they are instead of a
+  /// command held, and pressures linear, from sample to sample. Sine only.
+  bool continuous_inputs{false};
   double tolerance_scale{1.0};  ///< On the integrator's tolerances.
 };
 

@@ -1,5 +1,6 @@
 // Comparisons with recordings that are not part of this repository: their
 // folder is named by the environment variable FDI_REFERENCE_DATA.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -13,7 +14,6 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
 #include "simulator/record_fit.h"
 #include "simulator/valve_simulation.h"
 
@@ -59,54 +59,40 @@ TEST(ReferenceDataTest, RefittedActuatorFollowsThePlant) {
   std::cout << "nominal X " << nominal.x_rmse_pct << " %, F "
             << nominal.flow_rmse << " t/h; refit X " << refit.x_rmse_pct
             << " %, F " << refit.flow_rmse << " t/h\n";
-  EXPECT_LE(refit.x_rmse_pct, 1.80);
+  EXPECT_LE(refit.x_rmse_pct, 1.70);
   EXPECT_LE(refit.flow_rmse, 1.90);
-  EXPECT_LE(nominal.x_rmse_pct, 2.5);
+  EXPECT_LE(nominal.x_rmse_pct, 2.3);
   EXPECT_LE(nominal.flow_rmse, 2.6);
 }
 
-struct Means {
-  double x;
-  double f;
-};
+using Rows = std::vector<std::vector<double>>;
 
-Means MeansOfReference(const std::vector<std::vector<double>>& rows) {
-  Means means{0.0, 0.0};
-  for (std::size_t k = rows.size() - 600; k < rows.size(); ++k) {
-    means.x += rows[k][5] / 600.0;
-    means.f += rows[k][6] / 600.0;
-  }
-  return means;
-}
-
-Means MeansOfSimulation(const std::optional<FaultSchedule>& fault,
-                        std::size_t samples) {
+// X and F of the simulated valve under the recordings' excitation.
+std::vector<Sample> Simulated(const std::optional<FaultSchedule>& fault,
+                              std::size_t samples) {
   ValveSimulationConfig config;
   config.parameters = ParameterSet("lublin-actuator-3");
   config.excitation = SineExcitation{};
+  config.continuous_inputs = true;
+  config.cold_start = true;
+  config.noise = false;
+  config.resolution = false;
   config.duration_s = static_cast<double>(samples);
   if (fault) {
     config.faults = {*fault};
   }
   ValveSimulation simulation(config);
-  Means means{0.0, 0.0};
-  for (std::size_t k = 0; k < samples; ++k) {
-    const Sample sample = simulation.Step().sample;
-    if (k + 600 >= samples) {
-      means.x += sample[Signal::kX] / 600.0;
-      means.f += sample[Signal::kF] / 600.0;
-    }
+  std::vector<Sample> result;
+  while (!simulation.finished()) {
+    result.push_back(simulation.Step().sample);
   }
-  return means;
+  return result;
 }
 
-// The fault of a file; none for f14, whose sign there is negative and which is
-// invisible either way.
-std::optional<FaultSchedule> FaultOf(
-    const std::vector<std::vector<double>>& rows, bool incipient) {
+std::optional<FaultSchedule> FaultOf(const Rows& rows, bool incipient) {
   FaultSchedule schedule;
   schedule.fault = static_cast<int>(rows.back()[7]);
-  if (schedule.fault == 14) {
+  if (schedule.fault == 0) {
     return std::nullopt;
   }
   schedule.start_s = 600.0;
@@ -116,45 +102,87 @@ std::optional<FaultSchedule> FaultOf(
   return schedule;
 }
 
-// Where the simulator knowingly differs by more than a third:
-// - f01_medium: our stop also stops the actuator, the reference's lets it run
-//   on, so that its rod leaves the stop later.
-// - f04_incipient: the reference's actuator loses its range at play 0.72.
-// - f07_small: the reference keeps the density of water below 100 degC.
-const std::map<std::string, const char*> kKnown{
-    {"sine_f01_medium.csv", "stop"},
-    {"sine_f04_incipient.csv", "range of the actuator"},
-    {"sine_f07_small.csv", "density"}};
+struct Stretch {
+  std::size_t first;
+  std::size_t last;  // Excluded.
+};
 
+// Root mean square of recording minus simulation.
+double Rms(const Rows& rows, const std::vector<Sample>& samples, Signal signal,
+           Stretch stretch) {
+  const std::size_t column = signal == Signal::kX ? 5 : 6;
+  double sum = 0.0;
+  for (std::size_t k = stretch.first; k < stretch.last; ++k) {
+    sum += std::pow(rows[k][column] - samples[k][signal], 2);
+  }
+  return std::sqrt(sum / static_cast<double>(stretch.last - stretch.first));
+}
+
+// Share of the fault's rms effect by which the simulation may miss it. Wider
+// for what is not understood: the reference's response to a force that changes
+// at once (f10, f11, f17) is larger, and its valve vents faster afterwards;
+// under f4 it crosses a wide play sooner.
+double AllowedShare(const std::string& name) {
+  const std::map<std::string, double> wider{{"sine_f04_incipient.csv", 0.55},
+                                            {"sine_f10_small.csv", 0.4},
+                                            {"sine_f11_big.csv", 0.4},
+                                            {"sine_f17_big.csv", 0.3}};
+  const auto found = wider.find(name);
+  return found == wider.end() ? 0.22 : found->second;
+}
+
+// The reference's actuator breaks into a cycle beyond a play of 0.6 strokes
+// and stands still, open, beyond 0.73.
+std::size_t LastComparable(const std::string& name, std::size_t count) {
+  return name == "sine_f04_incipient.csv" ? 2700 : count;
+}
+
+// 0.3 % and 0.3 t/h hold the recordings' noise of 0.14 % and 0.06 t/h.
 TEST(ReferenceDataTest, FaultsHaveTheEffectsOfTheReferenceModel) {
   const auto folder = ReferenceData();
   if (!folder) {
     GTEST_SKIP() << "FDI_REFERENCE_DATA is not set";
   }
-  const std::filesystem::path files = *folder / "valve-reference";
-  const Means healthy =
-      MeansOfReference(ReadRows(files / "sine_faultfree_201.csv"));
-  const Means ours = MeansOfSimulation(std::nullopt, 2400);
-  for (const auto& entry : std::filesystem::directory_iterator(files)) {
+  const std::vector<Sample> healthy = Simulated(std::nullopt, 5401);
+  int files = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(*folder / "valve-reference")) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with("sine_f0") && !name.starts_with("sine_f1")) {
+    if (!name.starts_with("sine_")) {
       continue;
     }
-    const auto rows = ReadRows(entry.path());
+    ++files;
+    const Rows rows = ReadRows(entry.path());
     const bool incipient = name.find("incipient") != std::string::npos;
-    const Means reference = MeansOfReference(rows);
-    const Means simulated =
-        MeansOfSimulation(FaultOf(rows, incipient), rows.size());
-    const double x = reference.x - healthy.x;
-    const double f = reference.f - healthy.f;
-    const double dx = simulated.x - ours.x - x;
-    const double df = simulated.f - ours.f - f;
-    // 0.5 % and 0.3 t/h are what phase and transients of the two models leave.
-    const bool alike = std::abs(dx) <= std::max(0.5, std::abs(x) / 3.0) &&
-                       std::abs(df) <= std::max(0.3, std::abs(f) / 3.0);
-    EXPECT_TRUE(alike || kKnown.count(name) > 0)
-        << name << ": X " << x << " differs by " << dx << ", F " << f
-        << " differs by " << df;
+    const auto samples = Simulated(FaultOf(rows, incipient), rows.size());
+    const Stretch before{30, 600};
+    EXPECT_LE(Rms(rows, samples, Signal::kX, before), 0.20) << name;
+    EXPECT_LE(Rms(rows, samples, Signal::kF, before), 0.12) << name;
+    const Stretch after{601, LastComparable(name, rows.size())};
+    for (const Signal signal : {Signal::kX, Signal::kF}) {
+      const double effect = Rms(rows, healthy, signal, after);
+      EXPECT_LE(Rms(rows, samples, signal, after),
+                std::max(0.3, AllowedShare(name) * effect))
+          << name << (signal == Signal::kX ? ": X" : ": F")
+          << ", effect of the fault " << effect;
+    }
+  }
+  EXPECT_EQ(files, 47);
+}
+
+// The pressure sensor of the positioner is not among the basic measurements.
+TEST(ReferenceDataTest, PressureSensorFaultIsInvisibleInTheReferenceToo) {
+  const auto folder = ReferenceData();
+  if (!folder) {
+    GTEST_SKIP() << "FDI_REFERENCE_DATA is not set";
+  }
+  const std::vector<Sample> healthy = Simulated(std::nullopt, 2401);
+  for (const char* size : {"small", "medium", "big"}) {
+    const Rows rows = ReadRows(*folder / "valve-reference" /
+                               ("sine_f14_" + std::string(size) + ".csv"));
+    EXPECT_LT(rows.back()[8], 0.0);
+    EXPECT_LE(Rms(rows, healthy, Signal::kX, {601, 2401}), 0.20) << size;
+    EXPECT_LE(Rms(rows, healthy, Signal::kF, {601, 2401}), 0.12) << size;
   }
 }
 
