@@ -62,6 +62,30 @@ Envelope::Envelope(double from, double to, int columns)
   Require(to > from && columns > 0, "Envelope: to > from and a column");
 }
 
+void Envelope::Column::Add(double value) {
+  const double low = std::min(first, second);
+  const double high = std::max(first, second);
+  if (!filled) {
+    first = value;
+    second = value;
+    filled = true;
+  } else if (value < low) {
+    first = high;
+    second = value;
+  } else if (value > high) {
+    first = low;
+    second = value;
+  }
+}
+
+void Envelope::Column::Add(const Column& next) {
+  broken = broken || next.broken;
+  if (next.filled) {
+    Add(next.first);
+    Add(next.second);
+  }
+}
+
 void Envelope::Add(double x, double y) {
   const double at = std::floor((x - from_) / per_column_);
   const double last = static_cast<double>(columns_.size() - 1);
@@ -73,24 +97,11 @@ void Envelope::Add(double x, double y) {
   }
   minimum_ = std::min(minimum_, y);
   maximum_ = std::max(maximum_, y);
-  if (!column.filled) {
-    column.first = y;
-    column.second = y;
-    column.filled = true;
-    return;
-  }
-  const double low = std::min(column.first, column.second);
-  const double high = std::max(column.first, column.second);
-  if (y < low) {
-    column.first = high;
-    column.second = y;
-  } else if (y > high) {
-    column.first = low;
-    column.second = y;
-  }
+  column.Add(y);
 }
 
-std::string Envelope::PathData(const SvgArea& area, const SvgScale& y) const {
+std::string Envelope::PathData(const SvgArea& area, const SvgScale& y,
+                               int merged) const {
   std::string data;
   std::vector<Point> line;
   const double width = area.width / static_cast<double>(columns_.size());
@@ -98,10 +109,16 @@ std::string Envelope::PathData(const SvgArea& area, const SvgScale& y) const {
   const auto at = [&](double value) {
     return halves(std::clamp(y(value), area.top, area.bottom()));
   };
-  for (std::size_t i = 0; i < columns_.size(); ++i) {
-    const Column& column = columns_[i];
+  const auto step = static_cast<std::size_t>(merged);
+  for (std::size_t i = 0; i < columns_.size(); i += step) {
+    const std::size_t end = std::min(i + step, columns_.size());
+    Column column;
+    for (std::size_t j = i; j < end; ++j) {
+      column.Add(columns_[j]);
+    }
     if (column.filled) {
-      const long x = halves(area.left + (static_cast<double>(i) + 0.5) * width);
+      const long x =
+          halves(area.left + 0.5 * static_cast<double>(i + end) * width);
       Append(line, {x, at(column.first)});
       Append(line, {x, at(column.second)});
     } else if (column.broken) {

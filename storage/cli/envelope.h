@@ -24,9 +24,11 @@ class Envelope {
   double minimum() const { return minimum_; }
   double maximum() const { return maximum_; }
 
-  /// The line as data of an SVG path, one column wide per pixel of `area`;
-  /// values beyond the scale lie on its border.
-  std::string PathData(const SvgArea& area, const SvgScale& y) const;
+  /// The line as data of an SVG path over `area`; values beyond the scale lie
+  /// on its border.
+  /// @param merged ≥ 1, so many adjacent columns are drawn as one.
+  std::string PathData(const SvgArea& area, const SvgScale& y,
+                       int merged = 1) const;
 
  private:
   struct Column {
@@ -34,6 +36,9 @@ class Envelope {
     double second{0.0};
     bool filled{false};
     bool broken{false};
+
+    void Add(double value);
+    void Add(const Column& next);
   };
 
   double from_;

@@ -78,6 +78,15 @@ TEST(EnvelopeTest, PeakOfOneValueIsKept) {
   EXPECT_EQ(envelope.PathData(kArea, kHeight), "M.5 50l50 0 0-50 1 50 48 0");
 }
 
+TEST(EnvelopeTest, MergedColumnsKeepTheirExtremes) {
+  Envelope envelope(0.0, 8.0, 8);
+  for (const double x : {0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5}) {
+    envelope.Add(x, x == 2.5 ? 1.0 : 0.0);
+  }
+  EXPECT_EQ(envelope.PathData({0.0, 0.0, 80.0, 50.0}, kHeight, 4),
+            "M20 50l0-50 40 50");
+}
+
 TEST(EnvelopeTest, NaNBreaksTheLineAndEmptyColumnsDoNot) {
   Envelope envelope(0.0, 10.0, 10);
   envelope.Add(0.5, 0.0);
