@@ -35,7 +35,8 @@ inline constexpr int kSvgSeries = 21;
 
 /// Rules for everything drawn here, light and dark by prefers-color-scheme.
 /// Classes: s0..s20 lines of series; right, partly, wrong, open bands; grid,
-/// frame, limit, mark lines; wide, main strokes; bar; text with end, middle or head.
+/// frame, limit, mark lines; wide, main strokes; bar; text with end, middle or
+/// head.
 std::string_view SvgStyle();
 
 /// `text` for element content and attribute values.

@@ -111,9 +111,111 @@ TEST(IndicesTest, RunWithoutFaultHasRatesButNoTimes) {
   const RunIndices r = ComputeIndices(all);
   EXPECT_EQ(r.fault, 0);
   EXPECT_GT(r.r_fd, 0.0);
-  EXPECT_EQ(r.t_dt, -1.0);
-  EXPECT_EQ(r.d_acc, -1.0);
+  for (const double index :
+       {r.t_dt_first, r.t_dt, r.t_it_first, r.t_it, r.t_exact, r.r_td, r.r_ti,
+        r.fs_d, r.fs_i, r.d_acc}) {
+    EXPECT_EQ(index, -1.0);
+  }
+  EXPECT_FALSE(r.detected);
+  EXPECT_EQ(r.r_mi, 0.0);
   EXPECT_EQ(r.episodes, 1);
+}
+
+TEST(IndicesTest, NeverDetectedHasNoTimesWhateverWasSaidBeforeTheFault) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 400, 460);  // Only before the fault.
+  Isolate(all, 430, 460, {6});
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_FALSE(r.detected);
+  for (const double index : {r.t_dt_first, r.t_dt, r.t_it_first, r.t_it,
+                             r.t_exact, r.fs_d, r.fs_i}) {
+    EXPECT_EQ(index, -1.0);
+  }
+  EXPECT_GT(r.r_fd, 0.0);
+  EXPECT_NEAR(r.r_fi, 30.0 / 600.0, 1e-12);
+  EXPECT_EQ(r.r_td, 0.0);
+  EXPECT_EQ(r.d_acc, 0.0);
+  EXPECT_TRUE(r.final_set.empty());
+}
+
+TEST(IndicesTest, DetectionThatIsOverAtTheHorizonKeepsItsTimes) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 720, 900);
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_FALSE(r.detected);
+  EXPECT_EQ(r.t_dt_first, 20.0);
+  EXPECT_EQ(r.t_dt, 20.0);
+  EXPECT_NEAR(r.r_td, 180.0 / 300.0, 1e-12);
+}
+
+TEST(IndicesTest, SetWithoutTheFaultIsDetectedButNeverIsolated) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 720, 1000);
+  Isolate(all, 740, 1000, {3, 18});
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_TRUE(r.detected);
+  for (const double index : {r.t_it_first, r.t_it, r.t_exact, r.fs_i}) {
+    EXPECT_EQ(index, -1.0);
+  }
+  EXPECT_EQ(r.r_ti, 0.0);
+  EXPECT_EQ(r.d_acc, 0.0);
+  EXPECT_NEAR(r.r_mi, 2.0 * 260.0 / 900.0, 1e-12);
+  EXPECT_EQ(r.wrong_isolations, 0);  // Only sets of one fault count.
+  EXPECT_EQ(r.final_set, (std::vector<int>{3, 18}));
+}
+
+TEST(IndicesTest, IsolationHasAFirstAndAPermanentTimeToo) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 710, 1000);
+  Isolate(all, 730, 760, {6});
+  Isolate(all, 760, 840, {3});
+  Isolate(all, 840, 1000, {3, 6});
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_EQ(r.t_it_first, 30.0);
+  EXPECT_EQ(r.t_it, 140.0);
+  EXPECT_EQ(r.t_exact, 30.0);
+  EXPECT_EQ(r.wrong_isolations, 1);
+  EXPECT_EQ(r.d_acc, 0.5);
+}
+
+TEST(IndicesTest, WhatHappensBehindTheHorizonDoesNotCount) {
+  std::vector<Indication> all = Quiet();
+  Detect(all, 720, 760);
+  Detect(all, 860, 1000);  // Behind the horizon,
+  Isolate(all, 880, 1000, {6});
+  const RunIndices r = ComputeIndices(all, 850.0);
+  EXPECT_FALSE(r.detected);
+  EXPECT_EQ(r.t_dt, 20.0);
+  EXPECT_EQ(r.t_it, -1.0);
+  EXPECT_EQ(r.d_acc, 0.0);
+  EXPECT_NEAR(r.r_td, 40.0 / 151.0, 1e-12);  // 700..850 s, both ends
+  EXPECT_EQ(r.r_mi, 0.0);
+  EXPECT_EQ(r.episodes, 2);  // of the whole run
+}
+
+TEST(IndicesTest, FaultFromTheFirstSampleLeavesNothingToBeFalse) {
+  std::vector<Indication> all = Quiet();
+  for (Indication& indication : all) {
+    indication.truth = {6, 0.5};
+  }
+  Detect(all, 40, 1000);
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_EQ(r.r_fd, -1.0);
+  EXPECT_EQ(r.r_fi, -1.0);
+  EXPECT_EQ(r.t_dt, 40.0);
+  EXPECT_TRUE(r.detected);
+}
+
+TEST(IndicesTest, RunThatNeverSettlesHasNoRates) {
+  std::vector<Indication> all = Quiet();
+  for (Indication& indication : all) {
+    indication.settled = false;
+    indication.truth = {};
+  }
+  const RunIndices r = ComputeIndices(all);
+  EXPECT_EQ(r.r_fd, -1.0);
+  EXPECT_EQ(r.r_mi, -1.0);
+  EXPECT_EQ(ComputeIndices({}).r_fd, -1.0);
 }
 
 TEST(SummaryTest, AccuracyIsTheMeanOverDetectedRuns) {

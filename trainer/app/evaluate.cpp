@@ -5,11 +5,16 @@
 #include <CLI/CLI.hpp>
 
 #include "diagnosis/error.h"
+#include "storage/cli/output_folder.h"
 #include "storage/cli/program.h"
+#include "storage/cli/tag_map.h"
 #include "storage/data_directory.h"
 #include "storage/models.h"
 #include "storage/runs.h"
 #include "trainer/app/evaluation_report.h"
+#include "trainer/app/file_runs.h"
+#include "trainer/app/report_page.h"
+#include "trainer/app/report_trace.h"
 #include "trainer/app/rescore.h"
 #include "trainer/app/run_input.h"
 #include "trainer/app/vectors_csv.h"
@@ -23,7 +28,10 @@ struct EvaluateOptions {
   std::string model_set;
   std::string valve;
   std::vector<std::string> runs;
+  std::vector<std::string> files;
+  std::filesystem::path map;
   std::filesystem::path vectors;
+  std::filesystem::path report;
   bool assume_normal{false};
   bool csv{false};
 };
@@ -55,22 +63,38 @@ double DurationOf(const storage::StoredRun& run) {
   return static_cast<double>(last - first) * 1e-9 + run.info.run.period_s;
 }
 
+struct Evaluation {
+  std::vector<EvaluatedRun> runs;
+  std::vector<RunTrace> traces;  // Of every run if there is a report.
+};
+
+// Also fills `trace`, and adds to `vectors`, unless there is none.
 EvaluatedRun EvaluateRun(const std::shared_ptr<const ModelSet>& models,
                          const storage::StoredRun& run, bool assume_normal,
-                         VectorsCsv* vectors) {
+                         VectorsCsv* vectors, RunTrace* trace) {
   const std::string name = RunName(run);
-  VerdictSink sink;
-  if (vectors != nullptr) {
-    sink = [&](const Sample&, const Verdict& verdict) {
-      vectors->Add(name, verdict);
-    };
+  const double duration_s = DurationOf(run);
+  std::optional<RunTraceRecorder> recorder;
+  if (trace != nullptr) {
+    recorder.emplace(*models, duration_s);
   }
+  const VerdictSink sink = [&](const Sample&, const Verdict& verdict) {
+    if (vectors != nullptr) {
+      vectors->Add(name, verdict);
+    }
+    if (recorder) {
+      recorder->Add(verdict);
+    }
+  };
   const std::vector<Indication> indications = Rescore(models, run, sink);
+  if (recorder) {
+    *trace = recorder->Finish(indications);
+  }
   EvaluatedRun result;
   result.indices = ComputeIndices(indications);
   result.indices.run_id = name;
   result.has_truth = assume_normal || HasTruth(run);
-  result.duration_s = DurationOf(run);
+  result.duration_s = duration_s;
   for (const Indication& indication : indications) {
     if (!indication.isolated.empty()) {
       result.last_set = indication.isolated;
@@ -79,48 +103,109 @@ EvaluatedRun EvaluateRun(const std::shared_ptr<const ModelSet>& models,
   return result;
 }
 
-std::vector<EvaluatedRun> EvaluateRuns(
-    const EvaluateOptions& options,
-    const std::shared_ptr<const ModelSet>& models,
+std::vector<storage::StoredRun> LoadRuns(
+    const EvaluateOptions& options, const ModelSet& models,
     const storage::DataDirectory& directory) {
-  storage::RunStore store(directory.runs());
   std::vector<storage::StoredRun> runs;
-  for (const std::string& selector : options.runs) {
-    runs.push_back(store.Load(selector));
+  if (!options.runs.empty()) {
+    storage::RunStore store(directory.runs());
+    for (const std::string& selector : options.runs) {
+      runs.push_back(store.Load(selector));
+    }
   }
+  std::optional<storage::ColumnMap> map;
+  if (!options.map.empty()) {
+    map = cli::ReadTagMap(options.map);
+  }
+  for (const std::string& file : options.files) {
+    runs.push_back(ReadRunFile(file, map, RequiredSignals(models)));
+  }
+  return runs;
+}
+
+Evaluation EvaluateRuns(const EvaluateOptions& options,
+                        const std::shared_ptr<const ModelSet>& models,
+                        const std::vector<storage::StoredRun>& runs) {
   std::optional<VectorsCsv> vectors;
   if (!options.vectors.empty()) {
     vectors.emplace(options.vectors, *models);
   }
-  std::vector<EvaluatedRun> results(runs.size());
+  Evaluation result;
+  result.runs.resize(runs.size());
+  result.traces.resize(options.report.empty() ? 0 : runs.size());
   const int threads = vectors ? 1 : 0;  // One file: in the order of the runs.
   ParallelFor(static_cast<int>(runs.size()), threads, [&](int i) {
     const auto r = static_cast<std::size_t>(i);
-    results[r] = EvaluateRun(models, runs[r], options.assume_normal,
-                             vectors ? &*vectors : nullptr);
+    result.runs[r] = EvaluateRun(
+        models, runs[r], options.assume_normal, vectors ? &*vectors : nullptr,
+        result.traces.empty() ? nullptr : &result.traces[r]);
   });
   if (vectors) {
     vectors->Commit();
   }
-  return results;
+  return result;
 }
 
 int Evaluate(const EvaluateOptions& options, const cli::Context& context) {
   if (options.csv && context.options.json) {
     throw ConfigError("either --json or --csv");
   }
+  if (options.runs.empty() && options.files.empty()) {
+    throw ConfigError("what to score: --runs ID,... or --file FILE.csv");
+  }
+  if (!options.report.empty()) {
+    cli::EnsureFolder(options.report);
+  }
   const storage::DataDirectory directory{context.options.data_dir};
   const auto models =
       std::make_shared<const ModelSet>(LoadModels(options, directory));
-  const auto runs = EvaluateRuns(options, models, directory);
+  const auto [runs, traces] =
+      EvaluateRuns(options, models, LoadRuns(options, *models, directory));
+  if (!options.report.empty()) {
+    cli::WriteFile(options.report / "index.html",
+                   ReportPage({*models, runs, traces, context.software,
+                               context.command_line}));
+  }
   if (context.options.json) {
     cli::PrintJson(std::cout, EvaluationJson(*models, runs));
   } else if (options.csv) {
     WriteEvaluationCsv(std::cout, runs);
   } else {
-    PrintEvaluation(std::cout, runs);
+    PrintEvaluation(std::cout, *models, runs);
   }
   return cli::kExitOk;
+}
+
+void AddOptions(CLI::App& verb, EvaluateOptions& options) {
+  CLI::Option* set = verb.add_option("--model-set", options.model_set,
+                                     "NAME (its active version)")
+                         ->type_name("NAME[@VERSION]");
+  verb.add_option("--valve", options.valve,
+                  "Take the model set assigned to this valve")
+      ->type_name("ID")
+      ->excludes(set);
+  verb.add_option("--runs", options.runs, "Runs, or stretches of them [s]")
+      ->delimiter(',')
+      ->type_name("ID[@from:to],...");
+  CLI::Option* files =
+      verb.add_option("--file", options.files,
+                      "CSV file scored without storing it; repeatable")
+          ->expected(1)
+          ->take_all()
+          ->type_name("FILE.csv[@from:to]");
+  verb.add_option("--map", options.map,
+                  "TOML file: names, units, scale, offset, sense of columns")
+      ->type_name("FILE.toml")
+      ->needs(files);
+  verb.add_option("--report", options.report,
+                  "Write DIR/index.html: tables and traces of every run")
+      ->type_name("DIR");
+  verb.add_option("--vectors", options.vectors,
+                  "Write every decision vector, numbers as hex floats")
+      ->type_name("FILE.csv");
+  verb.add_flag("--assume-normal", options.assume_normal,
+                "What has no truth counts as free of faults");
+  verb.add_flag("--csv", options.csv, "One line per run instead of tables");
 }
 
 }  // namespace
@@ -129,27 +214,11 @@ void AddEvaluateVerb(cli::Program& program) {
   auto options = std::make_shared<EvaluateOptions>();
   CLI::App& verb = program.AddVerb(
       "evaluate",
-      "Score stored runs with the monitor's engine: indices, confusion matrix",
+      "Score runs with the monitor's engine: indices, confusion matrix, report",
       [options](const cli::Context& context) {
         return Evaluate(*options, context);
       });
-  CLI::Option* set = verb.add_option("--model-set", options->model_set,
-                                     "NAME (its active version)")
-                         ->type_name("NAME[@VERSION]");
-  verb.add_option("--valve", options->valve,
-                  "Take the model set assigned to this valve")
-      ->type_name("ID")
-      ->excludes(set);
-  verb.add_option("--runs", options->runs, "Runs, or stretches of them [s]")
-      ->required()
-      ->delimiter(',')
-      ->type_name("ID[@from:to],...");
-  verb.add_option("--vectors", options->vectors,
-                  "Write every decision vector, numbers as hex floats")
-      ->type_name("FILE.csv");
-  verb.add_flag("--assume-normal", options->assume_normal,
-                "What has no truth counts as free of faults");
-  verb.add_flag("--csv", options->csv, "One line per run instead of tables");
+  AddOptions(verb, *options);
 }
 
 }  // namespace fdi::trainer

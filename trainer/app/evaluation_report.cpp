@@ -1,9 +1,8 @@
 #include "trainer/app/evaluation_report.h"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
-#include <set>
+#include <cmath>
 
 #include "diagnosis/fault_catalogue.h"
 #include "storage/cli/text_table.h"
@@ -14,79 +13,10 @@ namespace {
 using cli::Align;
 using cli::FormatNumber;
 
-std::string SetText(const std::vector<int>& set) {
-  std::string text;
-  for (const int fault : set) {
-    text += text.empty() ? "" : "|";
-    text += FaultName(fault);
-  }
-  return text;
-}
-
-std::string TruthText(const EvaluatedRun& run) {
-  return run.has_truth ? FaultName(run.indices.fault) : "";
-}
-
 std::string Shortest(double value) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
   return {text.data(), end.ptr};
-}
-
-// An index for people: "-" where it has no meaning.
-std::string Cell(double value, int decimals) {
-  return value == -1.0 ? "-" : FormatNumber(value, decimals);
-}
-
-// Name and value of every index that is a number, in the order of the contract.
-std::vector<std::pair<const char*, double>> Numbers(const RunIndices& i) {
-  return {{"t_dt_first", i.t_dt_first},
-          {"t_dt", i.t_dt},
-          {"t_it_first", i.t_it_first},
-          {"t_it", i.t_it},
-          {"r_fd", i.r_fd},
-          {"r_td", i.r_td},
-          {"r_fi", i.r_fi},
-          {"r_ti", i.r_ti},
-          {"r_mi", i.r_mi},
-          {"fs_d", i.fs_d},
-          {"fs_i", i.fs_i},
-          {"d_acc", i.d_acc}};
-}
-
-bool IsDetected(const EvaluatedRun& run) {
-  return run.indices.fault != 0 ? run.indices.detected
-                                : run.indices.episodes > 0;
-}
-
-// The set that a run ended with: under the fault, or at all without one.
-const std::vector<int>& Outcome(const EvaluatedRun& run) {
-  return run.indices.fault != 0 ? run.indices.final_set : run.last_set;
-}
-
-EvaluationSummary SummaryOf(const std::vector<EvaluatedRun>& runs) {
-  std::vector<RunIndices> indices;
-  std::vector<double> durations;
-  for (const EvaluatedRun& run : runs) {
-    if (run.has_truth) {
-      indices.push_back(run.indices);
-      durations.push_back(run.duration_s);
-    }
-  }
-  return Summarise(indices, durations);
-}
-
-std::ptrdiff_t CountUnlabelled(const std::vector<EvaluatedRun>& runs) {
-  return std::count_if(runs.begin(), runs.end(),
-                       [](const EvaluatedRun& run) { return !run.has_truth; });
-}
-
-int CountWrong(const std::vector<EvaluatedRun>& runs) {
-  int wrong = 0;
-  for (const EvaluatedRun& run : runs) {
-    wrong += run.indices.wrong_isolations;
-  }
-  return wrong;
 }
 
 void PrintRuns(std::ostream& out, const std::vector<EvaluatedRun>& runs) {
@@ -110,20 +40,21 @@ void PrintRuns(std::ostream& out, const std::vector<EvaluatedRun>& runs) {
                         {"final set"}});
   for (const EvaluatedRun& run : runs) {
     const RunIndices& i = run.indices;
-    table.AddRow({i.run_id, run.has_truth ? TruthText(run) : "?",
-                  i.fault != 0 ? FormatNumber(i.strength, 2) : "-",
-                  IsDetected(run) ? "yes" : "no", Cell(i.t_dt_first, 0),
-                  Cell(i.t_dt, 0), Cell(i.t_it_first, 0), Cell(i.t_it, 0),
-                  Cell(i.r_fd, 4), Cell(i.r_td, 3), Cell(i.r_fi, 4),
-                  Cell(i.r_ti, 3), Cell(i.r_mi, 3), Cell(i.fs_d, 2),
-                  Cell(i.fs_i, 2), Cell(i.d_acc, 2), std::to_string(i.episodes),
-                  SetText(Outcome(run))});
+    table.AddRow(
+        {i.run_id, run.has_truth ? TruthText(run) : "?",
+         i.fault != 0 ? FormatNumber(i.strength, 2) : "-",
+         IsDetected(run) ? "yes" : "no", IndexText(i.t_dt_first, 0),
+         IndexText(i.t_dt, 0), IndexText(i.t_it_first, 0), IndexText(i.t_it, 0),
+         IndexText(i.r_fd, 4), IndexText(i.r_td, 3), IndexText(i.r_fi, 4),
+         IndexText(i.r_ti, 3), IndexText(i.r_mi, 3), IndexText(i.fs_d, 2),
+         IndexText(i.fs_i, 2), IndexText(i.d_acc, 2),
+         std::to_string(i.episodes), SetText(Outcome(run))});
   }
   table.Print(out);
 }
 
-void PrintSummary(std::ostream& out, const std::vector<EvaluatedRun>& runs) {
-  const EvaluationSummary s = SummaryOf(runs);
+void PrintSummary(std::ostream& out, const EvaluationFigures& figures) {
+  const EvaluationSummary& s = figures.summary;
   const auto of_faulty = [&s](int count) {
     return std::to_string(count) + " of " + std::to_string(s.faulty_runs);
   };
@@ -131,35 +62,37 @@ void PrintSummary(std::ostream& out, const std::vector<EvaluatedRun>& runs) {
   table.AddRow({"faults detected", of_faulty(s.detected)});
   table.AddRow({"final set has the fault", of_faulty(s.contained)});
   table.AddRow({"final set is the fault", of_faulty(s.exact)});
-  table.AddRow({"mean accuracy of detected", Cell(s.mean_d_acc, 3)});
-  table.AddRow({"largest r_fd", Cell(s.max_r_fd, 4)});
   table.AddRow(
-      {"wrong single faults on the way", std::to_string(CountWrong(runs))});
+      {"final set is within its group", of_faulty(figures.exact_group)});
+  table.AddRow({"mean accuracy of detected", IndexText(s.mean_d_acc, 3)});
+  table.AddRow({"the same by group", IndexText(figures.mean_d_acc_group, 3)});
+  table.AddRow({"largest r_fd", IndexText(s.max_r_fd, 4)});
+  table.AddRow({"wrong single faults on the way",
+                std::to_string(figures.wrong_isolations)});
   table.AddRow({"episodes without fault",
                 std::to_string(s.fault_free_episodes) + " in " +
                     FormatNumber(s.fault_free_hours, 2) + " h"});
-  if (const auto unlabelled = CountUnlabelled(runs); unlabelled > 0) {
-    table.AddRow(
-        {"runs without truth, not counted", std::to_string(unlabelled)});
+  if (figures.without_truth > 0) {
+    table.AddRow({"runs without truth, not counted",
+                  std::to_string(figures.without_truth)});
   }
   out << '\n';
   table.Print(out);
 }
 
-void PrintConfusion(std::ostream& out, const ConfusionMatrix& matrix) {
-  std::vector<cli::TextTable::Column> columns{{"truth \\ outcome"}};
-  for (const int fault : matrix.columns) {
-    columns.push_back({FaultName(fault), Align::kRight});
+void PrintConfusion(std::ostream& out, const char* heading,
+                    const ConfusionMatrix& matrix) {
+  std::vector<cli::TextTable::Column> columns{{heading}};
+  for (const FaultGroup& group : matrix.columns) {
+    columns.push_back({SetText(group), Align::kRight});
   }
   columns.push_back({"unknown", Align::kRight});
   columns.push_back({"no alarm", Align::kRight});
   cli::TextTable table(std::move(columns));
   for (std::size_t r = 0; r < matrix.rows.size(); ++r) {
-    std::vector<std::string> row{FaultName(matrix.rows[r])};
+    std::vector<std::string> row{SetText(matrix.rows[r])};
     for (const double count : matrix.counts[r]) {
-      row.push_back(count == 0.0                 ? "."
-                    : count == std::round(count) ? FormatNumber(count, 0)
-                                                 : FormatNumber(count, 2));
+      row.push_back(CountText(count));
     }
     table.AddRow(std::move(row));
   }
@@ -174,7 +107,7 @@ cli::Json RunJson(const EvaluatedRun& run) {
   json["strength"] =
       run.has_truth ? cli::Json(run.indices.strength) : cli::Json();
   json["detected"] = IsDetected(run);
-  for (const auto& [name, value] : Numbers(run.indices)) {
+  for (const auto& [name, value] : IndexNumbers(run.indices)) {
     json[name] = value;
   }
   json["final_set"] = cli::Json::array();
@@ -187,10 +120,10 @@ cli::Json RunJson(const EvaluatedRun& run) {
 cli::Json ConfusionJson(const ConfusionMatrix& matrix) {
   cli::Json json = cli::Json::object();
   for (std::size_t r = 0; r < matrix.rows.size(); ++r) {
-    cli::Json& row = json[FaultName(matrix.rows[r])];
+    cli::Json& row = json[SetText(matrix.rows[r])];
     const std::vector<double>& counts = matrix.counts[r];
     for (std::size_t c = 0; c < matrix.columns.size(); ++c) {
-      row[FaultName(matrix.columns[c])] = counts[c];
+      row[SetText(matrix.columns[c])] = counts[c];
     }
     row["unknown"] = counts[counts.size() - 2];
     row["no_alarm"] = counts.back();
@@ -200,60 +133,67 @@ cli::Json ConfusionJson(const ConfusionMatrix& matrix) {
 
 }  // namespace
 
-ConfusionMatrix BuildConfusion(const std::vector<EvaluatedRun>& runs) {
-  std::set<int> rows;
-  std::set<int> columns;
-  for (const EvaluatedRun& run : runs) {
-    if (run.has_truth) {
-      rows.insert(run.indices.fault);
-      columns.insert(Outcome(run).begin(), Outcome(run).end());
-      if (run.indices.fault != 0) {
-        columns.insert(run.indices.fault);
-      }
-    }
-  }
-  ConfusionMatrix matrix;
-  matrix.rows.assign(rows.begin(), rows.end());
-  matrix.columns.assign(columns.begin(), columns.end());
-  matrix.counts.assign(rows.size(), std::vector<double>(columns.size() + 2));
-  for (const EvaluatedRun& run : runs) {
-    if (!run.has_truth) {
-      continue;
-    }
-    const auto row = std::distance(rows.begin(), rows.find(run.indices.fault));
-    std::vector<double>& counts = matrix.counts[static_cast<std::size_t>(row)];
-    const std::vector<int>& outcome = Outcome(run);
-    if (outcome.empty()) {
-      counts[columns.size() + (IsDetected(run) ? 0 : 1)] += 1.0;
-    }
-    for (const int fault : outcome) {
-      const auto column = std::distance(columns.begin(), columns.find(fault));
-      counts[static_cast<std::size_t>(column)] +=
-          1.0 / static_cast<double>(outcome.size());
-    }
-  }
-  return matrix;
+std::vector<std::pair<const char*, double>> IndexNumbers(const RunIndices& i) {
+  return {{"t_dt_first", i.t_dt_first},
+          {"t_dt", i.t_dt},
+          {"t_it_first", i.t_it_first},
+          {"t_it", i.t_it},
+          {"r_fd", i.r_fd},
+          {"r_td", i.r_td},
+          {"r_fi", i.r_fi},
+          {"r_ti", i.r_ti},
+          {"r_mi", i.r_mi},
+          {"fs_d", i.fs_d},
+          {"fs_i", i.fs_i},
+          {"d_acc", i.d_acc}};
 }
 
-void PrintEvaluation(std::ostream& out, const std::vector<EvaluatedRun>& runs) {
+std::string TruthText(const EvaluatedRun& run) {
+  return run.has_truth ? FaultName(run.indices.fault) : "";
+}
+
+std::string IndexText(double value, int decimals) {
+  return value == -1.0 ? "-" : FormatNumber(value, decimals);
+}
+
+std::string CountText(double count) {
+  return count == 0.0 ? "."
+                      : FormatNumber(count, count == std::round(count) ? 0 : 2);
+}
+
+std::string CsvCell(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) {
+    return text;
+  }
+  std::string quoted = "\"";
+  for (const char c : text) {
+    quoted += c == '"' ? "\"\"" : std::string(1, c);
+  }
+  return quoted + '"';
+}
+
+void PrintEvaluation(std::ostream& out, const ModelSet& models,
+                     const std::vector<EvaluatedRun>& runs) {
   PrintRuns(out, runs);
-  PrintSummary(out, runs);
-  PrintConfusion(out, BuildConfusion(runs));
+  PrintSummary(out, FiguresOf(runs, models.groups));
+  PrintConfusion(out, "truth \\ outcome", BuildConfusion(runs));
+  PrintConfusion(out, "truth \\ outcome by group",
+                 BuildConfusion(runs, models.groups));
 }
 
 void WriteEvaluationCsv(std::ostream& out,
                         const std::vector<EvaluatedRun>& runs) {
   out << "run_id,fault,strength,detected";
-  for (const auto& [name, value] : Numbers(RunIndices{})) {
+  for (const auto& [name, value] : IndexNumbers(RunIndices{})) {
     out << ',' << name;
   }
   out << ",final_set,t_exact,episodes,wrong_isolations\n";
   for (const EvaluatedRun& run : runs) {
     const RunIndices& i = run.indices;
-    out << i.run_id << ',' << TruthText(run) << ','
+    out << CsvCell(i.run_id) << ',' << TruthText(run) << ','
         << (run.has_truth ? Shortest(i.strength) : "") << ','
         << (IsDetected(run) ? "true" : "false");
-    for (const auto& [name, value] : Numbers(i)) {
+    for (const auto& [name, value] : IndexNumbers(i)) {
       out << ',' << Shortest(value);
     }
     out << ',' << SetText(Outcome(run)) << ',' << Shortest(i.t_exact) << ','
@@ -267,7 +207,8 @@ cli::Json EvaluationJson(const ModelSet& models,
   for (const EvaluatedRun& run : runs) {
     list.push_back(RunJson(run));
   }
-  const EvaluationSummary s = SummaryOf(runs);
+  const EvaluationFigures figures = FiguresOf(runs, models.groups);
+  const EvaluationSummary& s = figures.summary;
   return {{"runs", std::move(list)},
           {"summary",
            {{"model_set", models.name},
@@ -276,14 +217,19 @@ cli::Json EvaluationJson(const ModelSet& models,
             {"detected", s.detected},
             {"contained", s.contained},
             {"exact", s.exact},
+            {"contained_group", figures.contained_group},
+            {"exact_group", figures.exact_group},
             {"mean_d_acc", s.mean_d_acc},
+            {"mean_d_acc_group", figures.mean_d_acc_group},
             {"max_r_fd", s.max_r_fd},
-            {"wrong_isolations", CountWrong(runs)},
+            {"wrong_isolations", figures.wrong_isolations},
             {"fault_free_runs", s.fault_free_runs},
             {"fault_free_hours", s.fault_free_hours},
             {"fault_free_episodes", s.fault_free_episodes},
-            {"runs_without_truth", CountUnlabelled(runs)},
-            {"confusion", ConfusionJson(BuildConfusion(runs))}}}};
+            {"runs_without_truth", figures.without_truth},
+            {"confusion", ConfusionJson(BuildConfusion(runs))},
+            {"confusion_by_group",
+             ConfusionJson(BuildConfusion(runs, models.groups))}}}};
 }
 
 }  // namespace fdi::trainer

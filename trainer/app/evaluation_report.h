@@ -1,36 +1,35 @@
 #pragma once
 
 #include <ostream>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/model_set.h"
 #include "storage/cli/json_output.h"
-#include "trainer/evaluation.h"
+#include "trainer/app/evaluated_run.h"
 
 namespace fdi::trainer {
 
-/// One run and what the diagnosis made of it.
-struct EvaluatedRun {
-  RunIndices indices;
-  bool has_truth{true};
-  double duration_s{0.0};
-  std::vector<int> last_set;  ///< Last set isolated in the whole run.
-};
+/// Name and value of every index that is a number, in the order of the
+/// contract.
+std::vector<std::pair<const char*, double>> IndexNumbers(const RunIndices& i);
 
-/// Rows: what was true; columns: what the run ended with. A set of n faults
-/// counts 1/n in each of their columns, so that a row sums to its runs.
-struct ConfusionMatrix {
-  std::vector<int> rows;                    ///< Faults, 0 = normal.
-  std::vector<int> columns;                 ///< Faults that were indicated.
-  std::vector<std::vector<double>> counts;  ///< rows × (columns, then
-                                            ///< unknown fault, then no alarm).
-};
+/// "f3", "normal"; empty without truth.
+std::string TruthText(const EvaluatedRun& run);
 
-/// Runs without truth are left out.
-ConfusionMatrix BuildConfusion(const std::vector<EvaluatedRun>& runs);
+/// An index for people: "-" where it has no meaning.
+std::string IndexText(double value, int decimals);
 
-/// Indices per run, summary, confusion matrix.
-void PrintEvaluation(std::ostream& out, const std::vector<EvaluatedRun>& runs);
+/// "3", "0.33", "." for none: a cell of a confusion matrix.
+std::string CountText(double count);
+
+/// `text` as a cell of a CSV file, quoted where it has to be.
+std::string CsvCell(const std::string& text);
+
+/// Indices per run, summary, confusion matrix by fault and by group of the set.
+void PrintEvaluation(std::ostream& out, const ModelSet& models,
+                     const std::vector<EvaluatedRun>& runs);
 /// One line per run, the columns of the JSON and a few more.
 void WriteEvaluationCsv(std::ostream& out,
                         const std::vector<EvaluatedRun>& runs);

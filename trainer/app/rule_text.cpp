@@ -33,25 +33,6 @@ SignalRange HalfRange(const FuzzySet& set, double minimum, double maximum) {
       std::clamp(set.right_center + reach * set.right_width, minimum, maximum)};
 }
 
-std::string AntecedentText(const TsModel& model, const TsRule& rule,
-                           std::size_t j, FlowUnit flow_unit) {
-  const double minimum = model.regressor_min[j];
-  const double span = model.regressor_max[j] - minimum;
-  const SignalRange range =
-      HalfRange(rule.antecedents[j], minimum, model.regressor_max[j]);
-  if (!(range.maximum - range.minimum < kWholeRange * span)) {
-    return {};
-  }
-  const double middle =
-      (0.5 * (range.minimum + range.maximum) - minimum) / span;
-  const char* label = middle < 1.0 / 3.0   ? "low"
-                      : middle > 2.0 / 3.0 ? "high"
-                                           : "medium";
-  return RegressorText(model.regressors[j]) + " is " + label + " [" +
-         InSteps(range.minimum, span) + ".." + InSteps(range.maximum, span) +
-         ' ' + UnitOf(model.regressors[j].signal, flow_unit) + ']';
-}
-
 std::string ConsequentText(const TsModel& model, const TsRule& rule,
                            FlowUnit flow_unit) {
   std::string text = RegressorText({model.output, 0}) + " =";
@@ -84,14 +65,34 @@ std::string RegressorText(const Regressor& regressor) {
          (regressor.lag > 0 ? '-' + std::to_string(regressor.lag) : "") + ')';
 }
 
+std::string AntecedentWords(const TsModel& model, const TsRule& rule,
+                            std::size_t j, FlowUnit flow_unit) {
+  const double minimum = model.regressor_min[j];
+  const double span = model.regressor_max[j] - minimum;
+  const SignalRange range =
+      HalfRange(rule.antecedents[j], minimum, model.regressor_max[j]);
+  if (!(range.maximum - range.minimum < kWholeRange * span)) {
+    return {};
+  }
+  const double middle =
+      (0.5 * (range.minimum + range.maximum) - minimum) / span;
+  const char* label = middle < 1.0 / 3.0   ? "low"
+                      : middle > 2.0 / 3.0 ? "high"
+                                           : "medium";
+  return std::string(label) + " [" + InSteps(range.minimum, span) + ".." +
+         InSteps(range.maximum, span) + ' ' +
+         UnitOf(model.regressors[j].signal, flow_unit) + ']';
+}
+
 std::string RulesText(const TsModel& model, FlowUnit flow_unit) {
   std::string text;
   for (const TsRule& rule : model.rules) {
     std::string conditions;
     for (std::size_t j = 0; j < rule.antecedents.size(); ++j) {
-      const std::string condition = AntecedentText(model, rule, j, flow_unit);
-      if (!condition.empty()) {
-        conditions += (conditions.empty() ? "if " : " and ") + condition;
+      const std::string words = AntecedentWords(model, rule, j, flow_unit);
+      if (!words.empty()) {
+        conditions += (conditions.empty() ? "if " : " and ") +
+                      RegressorText(model.regressors[j]) + " is " + words;
       }
     }
     text += "  " + (conditions.empty() ? "always" : conditions) +

@@ -13,14 +13,19 @@ std::string UnitOf(Signal signal, FlowUnit flow_unit);
 /// "CV(k-1)"; "CV(k)" without lag.
 std::string RegressorText(const Regressor& regressor);
 
+/// "low [62.1..66.0 %]": the set of a rule on regressor `j`, where its
+/// membership is at least one half, within what the training data had; low,
+/// medium and high by its middle in thirds of that. Empty where it is nearly
+/// all of the data.
+std::string AntecedentWords(const TsModel& model, const TsRule& rule,
+                            std::size_t j, FlowUnit flow_unit);
+
 /// The rules of a model in words, one line each:
 ///
 ///     if CV(k-1) is low [62.1..66.0 %] and P1(k) is high [...]
 ///       then X(k) = 0.91 X(k-1) + 0.08 CV(k-1) + 0.7 %   (31 % of the data)
 ///
-/// The range is where the membership is at least one half, within what the
-/// training data had; low, medium and high by its middle in thirds of that. A
-/// regressor whose range is nearly all of the data is left out.
+/// with AntecedentWords(); a regressor without words is left out.
 std::string RulesText(const TsModel& model, FlowUnit flow_unit);
 
 }  // namespace fdi::trainer

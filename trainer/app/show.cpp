@@ -1,15 +1,20 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
 #include <CLI/CLI.hpp>
 
+#include "storage/cli/logging.h"
+#include "storage/cli/output_folder.h"
 #include "storage/cli/program.h"
 #include "storage/cli/text_table.h"
 #include "storage/cli/time_text.h"
 #include "storage/data_directory.h"
 #include "storage/models.h"
+#include "trainer/app/model_pictures.h"
 #include "trainer/app/model_report.h"
 #include "trainer/app/rule_text.h"
+#include "trainer/app/training_residuals.h"
 #include "trainer/app/verbs.h"
 
 namespace fdi::trainer {
@@ -18,6 +23,7 @@ namespace {
 struct ShowOptions {
   std::string model_set;
   bool rules{false};
+  std::filesystem::path pictures;
 };
 
 std::string Text(double value) {
@@ -153,11 +159,31 @@ cli::Json SetJson(const ModelSet& models, bool active, bool rules) {
   return json;
 }
 
+void DrawPictures(const ModelSet& models, const std::filesystem::path& folder,
+                  const storage::DataDirectory& directory,
+                  const cli::Context& context) {
+  cli::EnsureFolder(folder);
+  const TrainingResiduals residuals =
+      RepeatTrainingResiduals(models, directory);
+  for (const std::string& missing : residuals.missing) {
+    context.log(LogLevel::kWarning,
+                cli::EventLine("residuals_missing", {{"reason", missing}}));
+  }
+  const int count = WriteModelPictures(models, residuals, folder);
+  context.log(LogLevel::kInfo,
+              cli::EventLine("pictures_written",
+                             {{"folder", folder.string()},
+                              {"pictures", std::to_string(count)}}));
+}
+
 int Show(const ShowOptions& options, const cli::Context& context) {
   const storage::DataDirectory directory{context.options.data_dir};
   storage::ModelStore store(directory.models());
   const ModelSet models = store.Load(options.model_set);
   const bool active = store.Summary({models.name, models.version}).active;
+  if (!options.pictures.empty()) {
+    DrawPictures(models, options.pictures, directory, context);
+  }
   if (context.options.json) {
     cli::PrintJson(std::cout, SetJson(models, active, options.rules));
     return cli::kExitOk;
@@ -183,6 +209,10 @@ void AddShowVerb(cli::Program& program) {
       ->required()
       ->type_name("NAME[@VERSION]");
   verb.add_flag("--rules", options->rules, "Print the rules in words");
+  verb.add_option("--pictures", options->pictures,
+                  "Write SVG files: fuzzy sets of the normal models, residual "
+                  "memberships of all observers over their residuals")
+      ->type_name("DIR");
 }
 
 }  // namespace fdi::trainer

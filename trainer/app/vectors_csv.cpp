@@ -8,6 +8,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "trainer/app/evaluation_report.h"
 
 namespace fdi::trainer {
 
@@ -46,8 +47,8 @@ void VectorsCsv::AddNumber(double value) {
 }
 
 void VectorsCsv::Add(const std::string& run, const Verdict& verdict) {
-  out_ << run << ',' << verdict.stamp_ns << ',' << verdict.source_id << ','
-       << verdict.seq << ',' << IntakeName(verdict.intake) << ','
+  out_ << CsvCell(run) << ',' << verdict.stamp_ns << ',' << verdict.source_id
+       << ',' << verdict.seq << ',' << IntakeName(verdict.intake) << ','
        << (verdict.initialised ? 1 : 0) << ',' << QualityName(verdict.quality)
        << ',' << StateName(verdict.state);
   for (std::size_t c = 0; c < models_.channels.size(); ++c) {
