@@ -70,12 +70,27 @@ double LogMembership(const FuzzySet& set, double x) {
   return -0.5 * z * z;
 }
 
+// −½ ‖L (x − v)‖²; 0 for a rule without a center.
+double LogNearness(const TsRule& rule, const double* x) {
+  const double* entry = rule.metric.data();
+  double squares = 0.0;
+  for (std::size_t row = 0; row < rule.center.size(); ++row) {
+    double z = 0.0;
+    for (std::size_t j = 0; j <= row; ++j) {
+      z += *entry++ * (x[j] - rule.center[j]);
+    }
+    squares += z * z;
+  }
+  return -0.5 * squares;
+}
+
 double Exponent(const TsRule& rule, const double* x) {
-  double exponent = 0.0;
+  double exponent = LogNearness(rule, x);
   for (std::size_t j = 0; j < rule.antecedents.size(); ++j) {
     exponent += LogMembership(rule.antecedents[j], x[j]);
   }
-  return std::max(exponent, kFarthestExponent);
+  // In this order a distance beyond all numbers is the farthest, too.
+  return std::max(kFarthestExponent, exponent);
 }
 
 double Output(const TsRule& rule, const double* x) {
@@ -89,6 +104,12 @@ double Output(const TsRule& rule, const double* x) {
 bool SameSet(const FuzzySet& a, const FuzzySet& b) {
   return a.left_center == b.left_center && a.right_center == b.right_center &&
          a.left_width == b.left_width && a.right_width == b.right_width;
+}
+
+bool SamePremise(const TsRule& a, const TsRule& b) {
+  return std::equal(a.antecedents.begin(), a.antecedents.end(),
+                    b.antecedents.begin(), b.antecedents.end(), SameSet) &&
+         a.center == b.center && a.metric == b.metric;
 }
 
 // Throws the DataErrors of Validate() with the place in front.
@@ -152,6 +173,20 @@ void ValidateSet(const FuzzySet& set, const Checker& checker) {
   checker.Check(set.right_width > 0.0, "right width is not above 0");
 }
 
+void ValidateNearness(const TsRule& rule, std::size_t n,
+                      const Checker& checker) {
+  const std::size_t rows = rule.center.size();
+  checker.Check(rows <= n, "center has " + std::to_string(rows) +
+                               " entries, accepted are 0 to " +
+                               std::to_string(n));
+  checker.Size(rule.metric.size(), rows * (rows + 1) / 2, "metric");
+  for (const auto* entries : {&rule.center, &rule.metric}) {
+    for (const double entry : *entries) {
+      checker.Finite(entry, "an entry of center or metric");
+    }
+  }
+}
+
 void ValidateRule(const TsRule& rule, std::size_t n, const Checker& checker) {
   checker.Size(rule.antecedents.size(), n, "antecedents");
   checker.Size(rule.slopes.size(), n, "slopes");
@@ -160,6 +195,7 @@ void ValidateRule(const TsRule& rule, std::size_t n, const Checker& checker) {
     ValidateSet(rule.antecedents[j], checker.At("set " + name));
     checker.Finite(rule.slopes[j], "slope " + name);
   }
+  ValidateNearness(rule, n, checker);
   checker.Finite(rule.intercept, "intercept");
   checker.Check(rule.data_share >= 0.0 && rule.data_share <= 1.0,
                 "data share outside 0 to 1");
@@ -212,18 +248,13 @@ bool SharesAntecedents(const TsModel& a, const TsModel& b) {
          a.output == b.output && a.regressor_min == b.regressor_min &&
          a.regressor_max == b.regressor_max &&
          std::equal(a.rules.begin(), a.rules.end(), b.rules.begin(),
-                    b.rules.end(), [](const TsRule& one, const TsRule& other) {
-                      return std::equal(one.antecedents.begin(),
-                                        one.antecedents.end(),
-                                        other.antecedents.begin(),
-                                        other.antecedents.end(), SameSet);
-                    });
+                    b.rules.end(), SamePremise);
 }
 
 double Residual(const TsModel& model, double reading, double prediction) {
   return reading >= model.saturation && prediction >= model.saturation
              ? std::numeric_limits<double>::quiet_NaN()
-             : reading - prediction;
+             : reading - std::min(prediction, model.saturation);
 }
 
 int LongestLag(const TsModel& model) {

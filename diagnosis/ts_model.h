@@ -34,17 +34,26 @@ struct Regressor {
   bool operator==(const Regressor&) const = default;
 };
 
-/// R_i: if x_1 is A_i1 and ... then y_i = a_iᵀx + b_i.
+/// R_i: if x_1 is A_i1 and ... and x is near v_i then y_i = a_iᵀx + b_i.
+///
+/// The sets are the projections of a cluster on each regressor. Its distance
+/// in the product space tells the rule apart where clusters lie oblique: a rule
+/// with a center has sets that are 1 everywhere, other rules have no center.
 struct TsRule {
   std::vector<FuzzySet> antecedents;  ///< One per regressor.
   std::vector<double> slopes;         ///< a_i, one per regressor.
   double intercept{0.0};              ///< b_i [unit of the output].
-  double data_share{0.0};  ///< Share of the training data, sums to 1.
+  double data_share{0.0};        ///< Share of the training data, sums to 1.
+  std::vector<double> center{};  ///< v_i, of the first regressors; or empty.
+  /// L_i, lower triangular, row by row [1/unit of the regressor]; one row per
+  /// entry of the center. L_iᵀL_i is the inverse covariance of the cluster.
+  std::vector<double> metric{};
 };
 
 /// A multiple-input single-output Takagi-Sugeno model,
 ///
-///     ŷ = Σ β_i y_i / Σ β_i,   β_i = Π_j μ_Aij(x_j).
+///     ŷ = Σ β_i y_i / Σ β_i,
+///     β_i = Π_j μ_Aij(x_j) · exp(−½ ‖L_i (x − v_i)‖²).
 ///
 /// In a parallel model a regressor on the output itself (lag ≥ 1) reads the
 /// model's own past predictions, otherwise the measured past.
@@ -90,8 +99,8 @@ double Blend(const TsModel& model, const double* x, const FiringRules& firing);
 /// so that one Weigh() serves both.
 bool SharesAntecedents(const TsModel& a, const TsModel& b);
 
-/// r = y − ŷ; NaN if reading and prediction are both at the limit of the
-/// transmitter, where they say nothing about each other.
+/// r = y − min(ŷ, saturation); NaN if reading and prediction are both at the
+/// limit of the transmitter, where they say nothing about each other.
 double Residual(const TsModel& model, double reading, double prediction);
 
 /// The largest lag of the regressors.

@@ -61,9 +61,10 @@ void Fields(A& a, T& regressor) {
 
 template <typename A, Of<TsRule> T>
 void Fields(A& a, T& rule) {
-  auto& [antecedents, slopes, intercept, data_share] = rule;
+  auto& [antecedents, slopes, intercept, data_share, center, metric] = rule;
   a(Limited{antecedents, kMaxRegressors}, Limited{slopes, kMaxRegressors},
-    intercept, data_share);
+    intercept, data_share, Limited{center, kMaxRegressors},
+    Limited{metric, kMaxRegressors * (kMaxRegressors + 1) / 2});
 }
 
 template <typename A, Of<TsModel> T>

@@ -139,10 +139,12 @@ class Iteration {
         options_.covariance_weight * std::exp(LogDeterminant(eigenvalues) / n);
   }
 
-  // μ^m of cluster i into weights_.
+  // μ^m of cluster i into weights_; m = 2 and m = 1.5 without pow().
   void UpdateWeights(Index i) {
     if (options_.fuzziness == 2.0) {
       weights_ = u_.col(i).square();
+    } else if (options_.fuzziness == 1.5) {
+      weights_ = u_.col(i) * u_.col(i).sqrt();
     } else {
       weights_ = u_.col(i).pow(options_.fuzziness);
     }
@@ -223,7 +225,9 @@ class Iteration {
   // (min_j Dⱼₖ / Dᵢₖ)^(1/(m−1)) in scratch_.
   const ArrayXd& Ratio(Index i) {
     scratch_ = nearest_ / distances_.col(i);
-    if (options_.fuzziness != 2.0) {
+    if (options_.fuzziness == 1.5) {
+      scratch_ = scratch_.square();
+    } else if (options_.fuzziness != 2.0) {
       scratch_ = scratch_.pow(1.0 / (options_.fuzziness - 1.0));
     }
     return scratch_;

@@ -8,6 +8,7 @@
 #include "diagnosis/ts_model.h"
 #include "trainer/consequent_estimation.h"
 #include "trainer/gustafson_kessel.h"
+#include "trainer/rule_prediction.h"
 
 namespace fdi::trainer {
 
@@ -20,12 +21,19 @@ struct RegressionData {
   double saturation{std::numeric_limits<double>::infinity()};
 };
 
+/// What tells the rules apart.
+enum class AntecedentKind {
+  kProjected,    ///< Sets on each regressor: readable; the default.
+  kProductSpace  ///< The distance to the cluster: keeps oblique ones oblique.
+};
+
 /// Settings of FitTakagiSugeno().
 struct TakagiSugenoOptions {
   int num_rules{3};                   ///< c ≥ 1; 1 is one linear model.
   GustafsonKesselOptions clustering;  ///< num_clusters is taken from num_rules.
   ConsequentOptions consequents;
-  /// Lower bound on the common factor on the projected widths; 1: leave them.
+  AntecedentKind antecedent_kind{AntecedentKind::kProjected};
+  /// Lower bound on the common factor on the widths; 1: leave them.
   double min_width_factor{0.3};
   /// Columns of X that the rules are told apart by; the others stand in the
   /// consequents alone. Empty: all of them.
@@ -33,10 +41,12 @@ struct TakagiSugenoOptions {
 };
 
 /// Fits y = Σ w_i(x) (a_iᵀ x + b_i): Gustafson-Kessel clusters of Z = [X, y]
-/// scaled to unit variance, antecedents by projection onto the regressors,
-/// consequents by weighted least squares.
+/// scaled to unit variance, consequents by weighted least squares. Antecedents
+/// are projected onto the regressors (ProjectAntecedents), or are the distance
+/// to the cluster by its covariance restricted to X (PlaceByDistance); there
+/// every cluster is at least 1 % of the deviation of a regressor thick.
 ///
-/// Memberships of fuzzy clusters fall off slowly, and so do the projected sets:
+/// Memberships of fuzzy clusters fall off slowly, and so do the antecedents:
 /// neighbouring rules blur each other. All widths are therefore narrowed in
 /// steps by one common factor while that lowers the training error by 2 %.
 ///
@@ -56,15 +66,6 @@ struct TakagiSugenoOptions {
 std::vector<TsRule> FitTakagiSugeno(const RegressionData& data,
                                     const TakagiSugenoOptions& options = {});
 
-/// Normalized degrees of fulfilment βₖᵢ / Σⱼ βₖⱼ; N×c, each row sums to 1.
-/// The exponents are summed first, so far from all rules the nearest wins.
-Eigen::MatrixXd DegreesOfFulfilment(const std::vector<TsRule>& rules,
-                                    const Eigen::Ref<const Eigen::MatrixXd>& x);
-
-/// ŷ of the rules for every row of X, without the limits of a TsModel.
-Eigen::VectorXd Predict(const std::vector<TsRule>& rules,
-                        const Eigen::Ref<const Eigen::MatrixXd>& x);
-
 /// Error of a set of rules on data they were not fitted to, ≥ 0; infinite or
 /// NaN if unusable.
 using ValidationError = std::function<double(const std::vector<TsRule>&)>;
@@ -76,12 +77,14 @@ struct RuleSelectionOptions {
   int max_rules{8};         ///< ≥ min_rules, at most kMaxRules.
   double tolerance{0.02};   ///< ≥ 0, relative validation error given away.
   std::vector<int> counts;  ///< Numbers of rules to try instead of all between.
-  bool both_methods{false};  ///< Try local and global consequents alike.
+  bool both_methods{false};      ///< Try local and global consequents alike.
+  bool both_antecedents{false};  ///< And both kinds of antecedents.
 };
 
-/// One number of rules that was tried.
+/// What was tried with one number of rules.
 struct RuleCount {
   int num_rules{0};
+  AntecedentKind antecedents{AntecedentKind::kProjected};
   ConsequentMethod method{ConsequentMethod::kLocal};
   double validity{0.0};          ///< S(c) of the clusters.
   double validation_error{0.0};  ///< NaN without a validation.
@@ -94,7 +97,8 @@ struct RuleSelection {
 
 /// Chooses the number of rules: among those whose validation error is within
 /// `tolerance` of the lowest, the one with the smallest S(c) of Sugeno and
-/// Yasukawa; without a validation, the smallest S(c) alone.
+/// Yasukawa; without a validation, the smallest S(c) alone. Of what is tried
+/// with one number of rules, what comes first: projected, local.
 ///
 /// @throws std::invalid_argument as FitTakagiSugeno() does, or if no number of
 ///   rules gives a usable validation error.

@@ -4,6 +4,7 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -97,6 +98,56 @@ TEST(TsModelTest, FarFromAllRulesTheNearestOneAnswersAndIsMarked) {
   EXPECT_TRUE(std::isfinite(Evaluate(model, near_second).value));
 }
 
+// Covariance [4 3; 3 9] about (20, 30): at (22, 33) a squared distance of
+// (4·9 − 2·3·6 + 9·4)/27 = 4/3, at (22, 27) of 108/27 = 4.
+TEST(TsModelTest, ARuleWithACenterFiresByTheDistanceInTheProductSpace) {
+  TsModel model = TwoRules();
+  const FuzzySet anything{0.0, 0.0, kInfinity, kInfinity};
+  for (TsRule& rule : model.rules) {
+    rule.antecedents = {anything, anything};
+  }
+  const double root = std::sqrt(6.75);
+  model.rules[0].center = {20.0, 30.0};
+  model.rules[0].metric = {0.5, -0.75 / root, 1.0 / root};
+  for (const auto& [x2, squared] : {std::pair{33.0, 4.0 / 3.0}, {27.0, 4.0}}) {
+    const double x[] = {22.0, x2};
+    const double beta = std::exp(-0.5 * squared);
+    EXPECT_NEAR(Evaluate(model, x).value,
+                (beta * 23.0 + 10.0 - 2.0 * x2) / (beta + 1.0), 1e-12)
+        << x2;
+  }
+}
+
+TEST(TsModelTest, ACenterMayLeaveTheLastRegressorsOut) {
+  TsModel model = TwoRules();
+  model.rules.resize(1);
+  model.rules[0].antecedents[0].right_width = kInfinity;
+  model.rules[0].center = {20.0};
+  model.rules[0].metric = {1.0};
+  const double inside[] = {20.0 + 6.069, 1e6};
+  const double outside[] = {20.0 + 6.070, 1e6};
+  const double beyond_numbers[] = {1e300, 0.0};
+
+  EXPECT_TRUE(Evaluate(model, inside).covered);
+  EXPECT_FALSE(Evaluate(model, outside).covered);
+  EXPECT_FALSE(Evaluate(model, beyond_numbers).covered);
+  EXPECT_TRUE(std::isfinite(Evaluate(model, beyond_numbers).value));
+}
+
+TEST(TsModelTest, AntecedentsAreSharedOnlyWithTheSameCenterAndMetric) {
+  TsModel model = TwoRules();
+  model.rules[0].center = {20.0};
+  model.rules[0].metric = {1.0};
+  TsModel other = model;
+  other.rules[0].slopes[0] = 9.0;
+  EXPECT_TRUE(SharesAntecedents(model, other));
+  other.rules[0].center[0] = 20.5;
+  EXPECT_FALSE(SharesAntecedents(model, other));
+  other = model;
+  other.rules[0].metric[0] = 1.5;
+  EXPECT_FALSE(SharesAntecedents(model, other));
+}
+
 // One-sided w = 1: β = 1e-8 at a distance of √(2 ln 1e8) = 6.0697.
 TEST(TsModelTest, CoverEndsWhereEveryRuleFiresBelow1e8) {
   TsModel model = TwoRules();
@@ -181,6 +232,20 @@ INSTANTIATE_TEST_SUITE_P(
             [](TsModel& m) { m.rules[1].antecedents[0].right_width = kNan; }},
         Damage{"left center above",
                [](TsModel& m) { m.rules[1].antecedents[0].left_center = 60; }},
+        Damage{"rule 1: center has 3",
+               [](TsModel& m) {
+                 m.rules[0].center = {1.0, 2.0, 3.0};
+               }},
+        Damage{"rule 2: metric has 2 entries, expected 3",
+               [](TsModel& m) {
+                 m.rules[1].center = {1.0, 2.0};
+                 m.rules[1].metric = {1.0, 2.0};
+               }},
+        Damage{"center or metric is not",
+               [](TsModel& m) {
+                 m.rules[1].center = {1.0};
+                 m.rules[1].metric = {kNan};
+               }},
         Damage{"33 rules", [](TsModel& m) { m.rules.resize(33); }}));
 
 }  // namespace

@@ -71,6 +71,9 @@ TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
   EXPECT_EQ(b.model.rules[1].antecedents[1].right_width,
             std::numeric_limits<double>::infinity());
   EXPECT_EQ(b.model.rules[0].slopes, a.model.rules[0].slopes);
+  EXPECT_TRUE(b.model.rules[0].center.empty());
+  EXPECT_EQ(b.model.rules[1].center, a.model.rules[1].center);
+  EXPECT_EQ(b.model.rules[1].metric, a.model.rules[1].metric);
   EXPECT_EQ(b.membership.b, a.membership.b);
   EXPECT_EQ(b.residual_sd, a.residual_sd);
   const ValidationFigures& v = back.observers[1].channels[0].validation;
@@ -141,9 +144,9 @@ TEST(ModelCodecTest, RefusalsNameThePlaceAndTheReason) {
   damaged[40] ^= std::byte{1};
   EXPECT_THAT(Refusal(damaged), HasSubstr("blob 7 is damaged: its CRC-32"));
   auto newer = bytes;
-  newer[4] = std::byte{2};
+  newer[4] = std::byte{3};
   EXPECT_THAT(Refusal(WithValidChecksum(newer)),
-              HasSubstr("format version 2, this program reads 1"));
+              HasSubstr("format version 3, this program reads 2"));
   EXPECT_THAT(Refusal({}), HasSubstr("is not a model set"));
   // The length of the name stands first in the payload, after 16 bytes.
   auto huge = bytes;

@@ -51,6 +51,10 @@ inline ModelSet RandomModelSet(const std::string& name, int observers = 3,
         }
         rule.intercept = number();
         rule.data_share = 0.5;
+        if (r == 1) {
+          rule.center = {number(), number()};
+          rule.metric = {number(), -number(), number()};
+        }
         model.rules.push_back(rule);
       }
       channel.membership = {-4.0, -number(), number(), 4.0};

@@ -97,7 +97,27 @@ TEST(TakagiSugenoFitTest, TwoRulesFindTheSlopesOnBothSidesOfAKink) {
   EXPECT_LT(MeanSquaredError(rules, data), 2e-3 * variance);
 }
 
-TEST(TakagiSugenoFitTest, PredictAndEvaluateAgree) {
+// What holds for either kind of antecedents.
+class AntecedentKindTest : public testing::TestWithParam<AntecedentKind> {
+ protected:
+  static TakagiSugenoOptions Rules(int count) {
+    TakagiSugenoOptions options;
+    options.num_rules = count;
+    options.antecedent_kind = GetParam();
+    return options;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(All, AntecedentKindTest,
+                         testing::Values(AntecedentKind::kProjected,
+                                         AntecedentKind::kProductSpace),
+                         [](const auto& kind) {
+                           return kind.param == AntecedentKind::kProjected
+                                      ? "Projected"
+                                      : "ProductSpace";
+                         });
+
+TEST_P(AntecedentKindTest, PredictAndEvaluateAgree) {
   const RegressionData data = Sampled(300, Hills);
   TsModel model;
   model.output_min = -1e9;
@@ -111,7 +131,7 @@ TEST(TakagiSugenoFitTest, PredictAndEvaluateAgree) {
   }
 }
 
-TEST(TakagiSugenoFitTest, DegreesOfFulfilmentOfEachRowSumToOne) {
+TEST_P(AntecedentKindTest, DegreesOfFulfilmentOfEachRowSumToOne) {
   RegressionData data = Sampled(300, Hills);
   const auto rules = FitTakagiSugeno(data, Rules(4));
   data.x *= 1000.0;  // Far outside what was trained on.
@@ -125,7 +145,7 @@ TEST(TakagiSugenoFitTest, DegreesOfFulfilmentOfEachRowSumToOne) {
   EXPECT_NEAR(share, 1.0, 1e-12);
 }
 
-TEST(TakagiSugenoFitTest, GlobalEstimationHasTheLowerTrainingError) {
+TEST_P(AntecedentKindTest, GlobalEstimationHasTheLowerTrainingError) {
   const RegressionData data = Sampled(250, Hills);
   for (const int c : {2, 3, 5}) {
     TakagiSugenoOptions options = Rules(c);
@@ -138,7 +158,7 @@ TEST(TakagiSugenoFitTest, GlobalEstimationHasTheLowerTrainingError) {
   }
 }
 
-TEST(TakagiSugenoFitTest, NarrowingNeverRaisesTheTrainingError) {
+TEST_P(AntecedentKindTest, NarrowingNeverRaisesTheTrainingError) {
   const RegressionData data = Sampled(300, Hills);
   TakagiSugenoOptions options = Rules(5);
   const auto narrowed = FitTakagiSugeno(data, options);
@@ -149,7 +169,7 @@ TEST(TakagiSugenoFitTest, NarrowingNeverRaisesTheTrainingError) {
             MeanSquaredError(projected, data));
 }
 
-TEST(TakagiSugenoFitTest, UnitsOfTheDataDoNotMatter) {
+TEST_P(AntecedentKindTest, UnitsOfTheDataDoNotMatter) {
   const RegressionData data = Sampled(300, Hills);
   RegressionData scaled = data;
   scaled.x.col(0) = data.x.col(0).array() * 1e5 + 3.0;
@@ -162,7 +182,7 @@ TEST(TakagiSugenoFitTest, UnitsOfTheDataDoNotMatter) {
   EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 70.0 * 1e-7);
 }
 
-TEST(TakagiSugenoFitTest, OrderOfTheRowsDoesNotMatter) {
+TEST_P(AntecedentKindTest, OrderOfTheRowsDoesNotMatter) {
   const RegressionData data = Sampled(300, Hills);
   std::vector<Index> order(300);
   std::iota(order.begin(), order.end(), Index{0});
@@ -174,7 +194,7 @@ TEST(TakagiSugenoFitTest, OrderOfTheRowsDoesNotMatter) {
   EXPECT_LT((a - b).cwiseAbs().maxCoeff(), 1e-8);
 }
 
-TEST(TakagiSugenoFitTest, SameSeedGivesTheSameBits) {
+TEST_P(AntecedentKindTest, SameSeedGivesTheSameBits) {
   const RegressionData data = Sampled(300, Hills);
   const auto a = FitTakagiSugeno(data, Rules(4));
   const auto b = FitTakagiSugeno(data, Rules(4));
@@ -184,11 +204,13 @@ TEST(TakagiSugenoFitTest, SameSeedGivesTheSameBits) {
     EXPECT_EQ(a[i].slopes, b[i].slopes);
     EXPECT_EQ(a[i].intercept, b[i].intercept);
     EXPECT_EQ(a[i].data_share, b[i].data_share);
+    EXPECT_EQ(a[i].center, b[i].center);
+    EXPECT_EQ(a[i].metric, b[i].metric);
   }
 }
 
 // The column is left out of clustering: the others are fitted as without it.
-TEST(TakagiSugenoFitTest, AConstantColumnIsDropped) {
+TEST_P(AntecedentKindTest, AConstantColumnIsDropped) {
   const RegressionData data = Sampled(300, Hills);
   RegressionData padded{MatrixXd(300, 3), data.y};
   padded.x << data.x.col(0), VectorXd::Constant(300, 43.0), data.x.col(1);
@@ -203,7 +225,7 @@ TEST(TakagiSugenoFitTest, AConstantColumnIsDropped) {
   EXPECT_LT((Predict(rules, padded.x) - expected).cwiseAbs().maxCoeff(), 1e-9);
 }
 
-TEST(TakagiSugenoFitTest, ConstantDataGiveOneConstantRule) {
+TEST_P(AntecedentKindTest, ConstantDataGiveOneConstantRule) {
   const RegressionData data{MatrixXd::Constant(50, 2, 3.0),
                             VectorXd::Constant(50, 12.5)};
   const auto rules = FitTakagiSugeno(data, Rules(3));
@@ -220,6 +242,37 @@ TEST(TakagiSugenoFitTest, ATrivialPartitionGivesOneRule) {
   options.clustering.max_iterations = 1;
 
   EXPECT_EQ(FitTakagiSugeno(Sampled(300, Hills), options).size(), 1U);
+}
+
+// Slopes that change across a diagonal: sets on the axes blur it.
+TEST(TakagiSugenoFitTest, TheProductSpaceKeepsAnObliqueBorder) {
+  const RegressionData data = Sampled(500, [](double a, double b) {
+    const double across = a + (b - 3000.0) / 100.0;
+    return across < 0.0 ? -across : 3.0 * across;
+  });
+  TakagiSugenoOptions options = Rules(2);
+  const double projected =
+      MeanSquaredError(FitTakagiSugeno(data, options), data);
+  options.antecedent_kind = AntecedentKind::kProductSpace;
+  const auto rules = FitTakagiSugeno(data, options);
+
+  ASSERT_EQ(rules.size(), 2U);
+  EXPECT_EQ(rules[0].center.size(), 2U);
+  EXPECT_LT(MeanSquaredError(rules, data), 0.5 * projected);
+}
+
+// Antecedents on the second column alone: the first one is nowhere.
+TEST(TakagiSugenoFitTest, TheDistanceIsOverTheAntecedentsAlone) {
+  TakagiSugenoOptions options = Rules(3);
+  options.antecedent_kind = AntecedentKind::kProductSpace;
+  options.antecedents = {1};
+  const RegressionData data = Sampled(300, Hills);
+  const auto rules = FitTakagiSugeno(data, options);
+  MatrixXd moved = data.x;
+  moved.col(0).setConstant(1e3);
+
+  EXPECT_EQ(DegreesOfFulfilment(rules, moved),
+            DegreesOfFulfilment(rules, data.x));
 }
 
 TEST(TakagiSugenoFitTest, RefusesUnusableData) {
@@ -255,6 +308,24 @@ TEST(SelectRulesTest, ValidityDecidesAmongCountsThatValidateEquallyWell) {
                        });
   EXPECT_EQ(static_cast<int>(by_validity.rules.size()), smallest->num_rules);
   EXPECT_EQ(equal.rules.size(), by_validity.rules.size());
+}
+
+TEST(SelectRulesTest, BothKindsOfAntecedentsAreTriedWithBothMethods) {
+  RuleSelectionOptions options;
+  options.counts = {3};
+  options.both_methods = true;
+  options.both_antecedents = true;
+  const auto has_center = [](const std::vector<TsRule>& rules) {
+    return rules.front().center.empty() ? 2.0 : 1.0;
+  };
+  const auto selection = SelectRules(Sampled(300, Hills), options, has_center);
+
+  ASSERT_EQ(selection.tried.size(), 4U);
+  EXPECT_EQ(selection.tried[1].method, ConsequentMethod::kGlobal);
+  EXPECT_EQ(selection.tried[1].antecedents, AntecedentKind::kProjected);
+  EXPECT_EQ(selection.tried[2].method, ConsequentMethod::kLocal);
+  EXPECT_EQ(selection.tried[2].antecedents, AntecedentKind::kProductSpace);
+  EXPECT_FALSE(selection.rules.front().center.empty());
 }
 
 TEST(SelectRulesTest, UnusableCountsArePassedOver) {
