@@ -10,7 +10,7 @@ packages=(
   libeigen3-dev libsundials-dev
   libsqlite3-dev libsqlitecpp-dev sqlite3 zlib1g-dev libssl-dev
   libcli11-dev libtomlplusplus-dev libspdlog-dev nlohmann-json3-dev
-  libgtest-dev libgmock-dev
+  libgtest-dev libgmock-dev libbenchmark-dev
   gnuplot-nox
 )
 
