@@ -99,13 +99,19 @@ std::vector<TsRule> Completed(std::vector<TsRule> rules,
   return rules;
 }
 
-// The numbers of rules that are tried.
-std::vector<int> Counts(const RuleSelectionOptions& options) {
+// The numbers of rules to try for which there are enough rows; the smallest in
+// any case, to be refused.
+std::vector<int> Counts(const RuleSelectionOptions& options,
+                        const RegressionData& data) {
   std::vector<int> counts = options.counts;
   for (int c = options.min_rules;
        options.counts.empty() && c <= options.max_rules; ++c) {
     counts.push_back(c);
   }
+  const int least = *std::min_element(counts.begin(), counts.end());
+  std::erase_if(counts, [&](int c) {
+    return c > least && c * (data.x.cols() + 1) > data.x.rows();
+  });
   return counts;
 }
 
@@ -162,7 +168,7 @@ RuleSelection SelectRules(const RegressionData& data,
   RuleSelection selection;
   std::vector<std::vector<TsRule>> rules;
   double least = kInfinity;
-  for (const int count : Counts(options)) {
+  for (const int count : Counts(options, data)) {
     const auto variants = Variants(options, count);
     const RuleClusters clusters = FindRuleClusters(data, variants.front());
     const double validity = SugenoYasukawa(clusters.z, clusters.partition,

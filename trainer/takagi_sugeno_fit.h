@@ -98,7 +98,8 @@ struct RuleSelection {
 /// Chooses the number of rules: among those whose validation error is within
 /// `tolerance` of the lowest, the one with the smallest S(c) of Sugeno and
 /// Yasukawa; without a validation, the smallest S(c) alone. Of what is tried
-/// with one number of rules, what comes first: projected, local.
+/// with one number of rules, what comes first: projected, local. Numbers that
+/// the rows of X do not suffice for are left out.
 ///
 /// @throws std::invalid_argument as FitTakagiSugeno() does, or if no number of
 ///   rules gives a usable validation error.

@@ -12,6 +12,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/trainer/sampled_function.h"
+
 namespace fdi::trainer {
 namespace {
 
@@ -25,20 +27,6 @@ double MeanSquaredError(const std::vector<TsRule>& rules,
          static_cast<double>(data.y.size());
 }
 
-// Two inputs of different size, uniformly spread, and a target f(x₁, x₂).
-template <typename Function>
-RegressionData Sampled(Index rows, Function f) {
-  std::mt19937 generator(21);
-  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  RegressionData data{MatrixXd(rows, 2), VectorXd(rows)};
-  for (Index k = 0; k < rows; ++k) {
-    data.x(k, 0) = uniform(generator);
-    data.x(k, 1) = 3000.0 + 100.0 * uniform(generator);
-    data.y(k) = f(data.x(k, 0), data.x(k, 1));
-  }
-  return data;
-}
-
 double Ramp(double a, double b) {
   return 2.0 * a - 0.01 * b + 5.0;
 }
@@ -46,10 +34,6 @@ double Ramp(double a, double b) {
 // Slope −1 for a < 0.2, slope 3 above.
 double Kink(double a, double b) {
   return (a < 0.2 ? 0.2 - a : 3.0 * (a - 0.2)) + 1e-4 * b;
-}
-
-double Hills(double a, double b) {
-  return std::sin(3.0 * a) + std::cos(b / 50.0);
 }
 
 TakagiSugenoOptions Rules(int count) {
@@ -284,66 +268,6 @@ TEST(TakagiSugenoFitTest, RefusesUnusableData) {
   data = Sampled(20, Ramp);
   data.y.conservativeResize(19);
   EXPECT_THROW(FitTakagiSugeno(data, Rules(2)), std::invalid_argument);
-}
-
-TEST(SelectRulesTest, ValidityDecidesAmongCountsThatValidateEquallyWell) {
-  RuleSelectionOptions options;
-  options.min_rules = 1;
-  options.max_rules = 5;
-  const RegressionData data = Sampled(250, Hills);
-  const auto by_error =
-      SelectRules(data, options, [](const std::vector<TsRule>& rules) {
-        return rules.size() == 3 ? 1.0 : 2.0;
-      });
-  const auto by_validity = SelectRules(data, options);
-  const auto equal = SelectRules(
-      data, options, [](const std::vector<TsRule>&) { return 1.0; });
-
-  EXPECT_EQ(by_error.rules.size(), 3U);
-  ASSERT_EQ(by_error.tried.size(), 5U);
-  const auto smallest =
-      std::min_element(by_validity.tried.begin(), by_validity.tried.end(),
-                       [](const RuleCount& a, const RuleCount& b) {
-                         return a.validity < b.validity;
-                       });
-  EXPECT_EQ(static_cast<int>(by_validity.rules.size()), smallest->num_rules);
-  EXPECT_EQ(equal.rules.size(), by_validity.rules.size());
-}
-
-TEST(SelectRulesTest, BothKindsOfAntecedentsAreTriedWithBothMethods) {
-  RuleSelectionOptions options;
-  options.counts = {3};
-  options.both_methods = true;
-  options.both_antecedents = true;
-  const auto has_center = [](const std::vector<TsRule>& rules) {
-    return rules.front().center.empty() ? 2.0 : 1.0;
-  };
-  const auto selection = SelectRules(Sampled(300, Hills), options, has_center);
-
-  ASSERT_EQ(selection.tried.size(), 4U);
-  EXPECT_EQ(selection.tried[1].method, ConsequentMethod::kGlobal);
-  EXPECT_EQ(selection.tried[1].antecedents, AntecedentKind::kProjected);
-  EXPECT_EQ(selection.tried[2].method, ConsequentMethod::kLocal);
-  EXPECT_EQ(selection.tried[2].antecedents, AntecedentKind::kProductSpace);
-  EXPECT_FALSE(selection.rules.front().center.empty());
-}
-
-TEST(SelectRulesTest, UnusableCountsArePassedOver) {
-  RuleSelectionOptions options;
-  options.max_rules = 4;
-  const RegressionData data = Sampled(300, Hills);
-  const auto selection =
-      SelectRules(data, options, [](const std::vector<TsRule>& rules) {
-        return rules.size() == 3 ? 0.5
-                                 : std::numeric_limits<double>::quiet_NaN();
-      });
-  EXPECT_EQ(selection.rules.size(), 3U);
-
-  EXPECT_THROW(SelectRules(data, options,
-                           [](const std::vector<TsRule>&) {
-                             return std::numeric_limits<double>::infinity();
-                           }),
-               std::invalid_argument);
 }
 
 }  // namespace
