@@ -35,5 +35,26 @@ TEST(RuleTextTest, RangesAreWhereTheMembershipIsAtLeastOneHalf) {
             "    then F(k) = 0.1 P1(k) + 2 t/h   (75 % of the data)\n");
 }
 
+// The second regressor is none of the antecedents.
+TEST(RuleTextTest, ARuleWithACenterIsNearIt) {
+  constexpr FuzzySet kAny{0.0, 0.0, kShoulder, kShoulder};
+  TsModel model;
+  model.output = Signal::kF;
+  model.regressors = {{Signal::kCv, 0}, {Signal::kT1, 0}, {Signal::kP1, 2}};
+  model.regressor_min = {20.0, 90.0, 3400.0};
+  model.regressor_max = {80.0, 110.0, 3600.0};
+  TsRule& rule = model.rules.emplace_back();
+  rule.antecedents = {kAny, kAny, kAny};
+  rule.slopes = {0.5, 0.0, 0.0};
+  rule.intercept = 1.0;
+  rule.data_share = 0.5;
+  rule.center = {50.0, 0.0, 3500.0};
+  rule.metric = {0.1, 0.0, 0.0, -0.2, 0.0, 0.01};
+
+  EXPECT_EQ(RulesText(model, FlowUnit::kTPerHour),
+            "  if near (CV(k) 50 %, P1(k-2) 3500 kPa)\n"
+            "    then F(k) = 0.5 CV(k) + 1 t/h   (50 % of the data)\n");
+}
+
 }  // namespace
 }  // namespace fdi::trainer

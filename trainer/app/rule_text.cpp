@@ -53,6 +53,23 @@ std::string ConsequentText(const TsModel& model, const TsRule& rule,
          UnitOf(model.output, flow_unit);
 }
 
+// "near (CV(k) 50 %, P1(k) 3500 kPa)": the center of a rule, without the
+// regressors that its metric does not read; empty for a rule without one.
+std::string NearnessText(const TsModel& model, const TsRule& rule,
+                         FlowUnit flow_unit) {
+  std::string text;
+  for (std::size_t j = 0; j < rule.center.size(); ++j) {
+    const std::size_t diagonal = j * (j + 1) / 2 + j;
+    if (rule.metric[diagonal] == 0.0) {
+      continue;
+    }
+    text += (text.empty() ? "" : ", ") + RegressorText(model.regressors[j]) +
+            ' ' + Digits(rule.center[j], 4) + ' ' +
+            UnitOf(model.regressors[j].signal, flow_unit);
+  }
+  return text.empty() ? text : "near (" + text + ')';
+}
+
 }  // namespace
 
 std::string UnitOf(Signal signal, FlowUnit flow_unit) {
@@ -94,6 +111,10 @@ std::string RulesText(const TsModel& model, FlowUnit flow_unit) {
         conditions += (conditions.empty() ? "if " : " and ") +
                       RegressorText(model.regressors[j]) + " is " + words;
       }
+    }
+    const std::string nearness = NearnessText(model, rule, flow_unit);
+    if (!nearness.empty()) {
+      conditions += (conditions.empty() ? "if " : " and ") + nearness;
     }
     text += "  " + (conditions.empty() ? "always" : conditions) +
             "\n    then " + ConsequentText(model, rule, flow_unit) + "   (" +
