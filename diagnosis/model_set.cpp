@@ -27,6 +27,8 @@ void ValidateDecision(const ModelSet& models) {
         "n_d must be in 1..1000");
   Check(p.isolation_samples >= 1 && p.isolation_samples <= 10000, models,
         "t_k must be in 1..10000");
+  Check(p.reisolation_samples >= 1 && p.reisolation_samples <= 10000, models,
+        "samples before another set is isolated must be in 1..10000");
   Check(p.clearing_samples >= 1 && p.clearing_samples <= 100000, models,
         "t_c must be in 1..100000");
   Check(p.settling_samples >= 0 && p.settling_samples <= 100000, models,

@@ -75,6 +75,8 @@ struct DecisionParameters {
   double isolation_fraction{0.9};   ///< Share of t_k samples with d ≥ T.
   double join_fraction{0.75};  ///< Faults with d ≥ T in this share of the t_k
                                ///< samples join a set that others support.
+  int reisolation_samples{5};  ///< So long another set must hold to replace
+                               ///< the isolated one.
   int clearing_samples{60};    ///< t_c
   int settling_samples{30};
   double evidence_window{200.0};  ///< Memory of evidence [samples].

@@ -22,6 +22,12 @@ double ResidualWindow::log_rms() const {
   return 0.5 * std::log(std::max(variance_, kLeastVariance));
 }
 
+bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window) {
+  return window.full() && (window.mean() < limits.lower_mean ||
+                           window.mean() > limits.upper_mean ||
+                           window.log_rms() > limits.upper_log_rms);
+}
+
 ResidualWindows::ResidualWindows(const ModelSet& models) {
   for (const ChannelSpec& channel : models.channels) {
     std::vector<ResidualWindow>& windows = windows_.emplace_back();

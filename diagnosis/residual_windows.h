@@ -33,6 +33,9 @@ class ResidualWindow {
   double variance_{0.0};
 };
 
+/// True if a full window is beyond one of its limits.
+bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window);
+
 /// The windows of all channels of a model set.
 class ResidualWindows {
  public:

@@ -12,12 +12,11 @@ constexpr double kReachBelow = 0.5;
 constexpr double kReachAbove = 1.5;
 constexpr double kLoneReachBelow = 0.75;
 constexpr double kLoneReachAbove = 1.25;
-// Interpolation that errs by more than this is none.
-constexpr double kWorstInterpolation = 0.5;
 // A fault rarely develops faster than to full strength in 10 minutes.
 constexpr double kRateDeviation = 1.0 / 1500.0;
 
-// Median over the observers, per channel.
+// Median over the observers, per channel, times the channels of the same
+// output: they share its noise, and what one of them says the others repeat.
 std::vector<double> ChannelTimes(const ModelSet& models) {
   std::vector<double> times;
   for (std::size_t c = 0; c < models.channels.size(); ++c) {
@@ -28,7 +27,12 @@ std::vector<double> ChannelTimes(const ModelSet& models) {
     const auto middle =
         all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
     std::nth_element(all.begin(), middle, all.end());
-    times.push_back(*middle);
+    const auto same =
+        std::count_if(models.channels.begin(), models.channels.end(),
+                      [&](const ChannelSpec& channel) {
+                        return channel.output == models.channels[c].output;
+                      });
+    times.push_back(*middle * static_cast<double>(same));
   }
   return times;
 }
@@ -41,12 +45,13 @@ StrengthTracker::StrengthTracker(const ModelSet& models,
       memory_(1.0 - 1.0 / models.decision.evidence_window),
       channel_times_(ChannelTimes(models)),
       cell_cost_(kCells, 0.0) {
-  nodes_.push_back({0, 0.0});
+  nodes_.push_back({0, 0.0, 0.0});
   for (const int index : observers) {
     const double s = models.observers[static_cast<std::size_t>(index)].strength;
-    nodes_.push_back({index, std::abs(s)});
+    nodes_.push_back({index, std::abs(s), 0.0});
     sign_ = s < 0.0 ? -1.0 : 1.0;
-    segments_.push_back(MakeSegment(nodes_[nodes_.size() - 2], nodes_.back()));
+    segments_.push_back(
+        ErrorsBetween(nodes_[nodes_.size() - 2], nodes_.back()));
   }
   SetReach();
 }
@@ -57,18 +62,17 @@ const ChannelObserver& StrengthTracker::Channel(int observer,
       .channels[static_cast<std::size_t>(channel)];
 }
 
-StrengthTracker::Segment StrengthTracker::MakeSegment(const Node& low,
-                                                      const Node& high) const {
-  Segment segment{true, {}};
+StrengthTracker::Errors StrengthTracker::ErrorsBetween(const Node& low,
+                                                       const Node& high) const {
+  Errors errors;
   for (int c = 0; c < static_cast<int>(models_->channels.size()); ++c) {
     double error = Channel(high.observer, c).interpolation_error;
     if (low.observer != 0) {
       error = std::min(error, Channel(low.observer, c).interpolation_error);
     }
-    segment.errors.push_back(error);
-    segment.open = segment.open && error <= kWorstInterpolation;
+    errors.push_back(error);
   }
-  return segment;
+  return errors;
 }
 
 void StrengthTracker::SetReach() {
@@ -78,9 +82,8 @@ void StrengthTracker::SetReach() {
   const bool lone = segments_.size() == 1;
   const double below = lone ? kLoneReachBelow : kReachBelow;
   const double above = lone ? kLoneReachAbove : kReachAbove;
-  lowest_ = nodes_[1].strength * (segments_.front().open ? below : 1.0);
-  highest_ = std::min(
-      1.0, nodes_.back().strength * (segments_.back().open ? above : 1.0));
+  lowest_ = nodes_[1].strength * below;
+  highest_ = std::min(1.0, nodes_.back().strength * above);
 }
 
 void StrengthTracker::Restart() {
@@ -90,6 +93,54 @@ void StrengthTracker::Restart() {
   evidence_ = 0.0;
   factor_ = 0.0;
   std::fill(cell_cost_.begin(), cell_cost_.end(), 0.0);
+  for (Node& node : nodes_) {
+    node.evidence = 0.0;
+  }
+}
+
+const StrengthTracker::Node& StrengthTracker::BestNode() const {
+  return *std::max_element(
+      nodes_.begin() + (segments_.empty() ? 0 : 1), nodes_.end(),
+      [](const Node& a, const Node& b) { return a.evidence < b.evidence; });
+}
+
+double StrengthTracker::evidence() const {
+  return std::max(evidence_, BestNode().evidence);
+}
+
+double StrengthTracker::strength() const {
+  const Node& best = BestNode();
+  return sign_ * (best.evidence > evidence_ ? best.strength : strength_);
+}
+
+void StrengthTracker::RaiseEvidence(double least) {
+  evidence_ = std::max(evidence_, least);
+  for (Node& node : nodes_) {
+    node.evidence = std::max(node.evidence, least);
+  }
+}
+
+// −½ (ν²/S + ln S)/τ of one channel; outliers count up to a bound.
+double StrengthTracker::Gain(const ObserverBank& bank, int channel,
+                             double residual, double variance) const {
+  const double distance = std::min(residual * residual / variance, kOutlier);
+  const double density = bank.saturated(channel) ? 0.0 : std::log(variance);
+  return -0.5 * (distance + density) /
+         channel_times_[static_cast<std::size_t>(channel)];
+}
+
+void StrengthTracker::GatherOfNodes(const ObserverBank& bank) {
+  const int channels = static_cast<int>(models_->channels.size());
+  for (Node& node : nodes_) {
+    node.evidence *= memory_;
+    for (int c = 0; c < channels; ++c) {
+      const double residual = bank.residual(node.observer, c);
+      if (bank.active(c) && !std::isnan(residual)) {
+        node.evidence +=
+            Gain(bank, c, residual, Variance(bank, node.observer, c));
+      }
+    }
+  }
 }
 
 double StrengthTracker::Cell(int index) const {
@@ -111,15 +162,11 @@ StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
   const bool high_nearer =
       j == 0 || strength - low.strength > high.strength - strength;
   const Node& nearest = high_nearer ? high : low;
-  if (!segments_[j].open) {
-    return {bank.residual(nearest.observer, channel), 0.0,
-            Variance(bank, nearest.observer, channel), nearest.observer};
-  }
   const double slope = (bank.prediction(high.observer, channel) -
                         bank.prediction(low.observer, channel)) /
                        (high.strength - low.strength);
-  const double error = segments_[j].errors[static_cast<std::size_t>(channel)] *
-                       slope * (strength - nearest.strength);
+  const double error = segments_[j][static_cast<std::size_t>(channel)] * slope *
+                       (strength - nearest.strength);
   const double high_share = std::clamp(
       (strength - low.strength) / (high.strength - low.strength), 0.0, 1.0);
   const double low_share = 1.0 - high_share;
@@ -146,6 +193,7 @@ double StrengthTracker::Variance(const ObserverBank& bank, int observer,
 }
 
 void StrengthTracker::Step(const ObserverBank& bank) {
+  GatherOfNodes(bank);
   if (!segments_.empty() && age_ < kSearchSamples) {
     Search(bank);
   } else {

@@ -15,19 +15,20 @@ namespace fdi {
 ///
 ///     ŷ(s) = ŷ_j + (ŷ_{j+1} − ŷ_j) (s − s_j) / (s_{j+1} − s_j),
 ///
-/// unless the trainer found that interpolation fails there; then the nearer
-/// observer answers. s is followed with its rate by a Kalman filter of fading
-/// memory over all active channels, so that a developing fault is met at every
-/// strength, not at the trained ones only. The innovations ν of variance S give
-/// the evidence
+/// with a variance that grows with what interpolation errs by there. s is
+/// followed with its rate by a Kalman filter of fading memory over all active
+/// channels, so that a developing fault is met at every strength, not at the
+/// trained ones only. The innovations ν of variance S give the evidence
 ///
 ///     L ← λ L − ½ Σ_c (ν²/S + ln S) / τ_c,
 ///
-/// τ_c the median correlation time of the residuals of the channel, the same
-/// for all faults: log-likelihoods of faults differ long before single
-/// residuals do. A reading at the transmitter's limit has
-/// no density: it costs ν²/S of a prediction below the limit, and nothing of
-/// one beyond.
+/// τ_c the median correlation time of the residuals of the channel times the
+/// number of channels with its output, the same for all faults: log-likelihoods
+/// of faults differ long before single residuals do. A reading at the
+/// transmitter's limit has no density: it costs ν²/S of a prediction below the
+/// limit, and nothing of one beyond. Each observer gathers evidence of its own
+/// strength alike; the fault has that of the best, so that no interpolation can
+/// spoil a strength that was trained.
 class StrengthTracker {
  public:
   /// `observers`: indices of one fault and direction by rising |strength|;
@@ -40,11 +41,12 @@ class StrengthTracker {
   /// Takes the residuals of one sample.
   void Step(const ObserverBank& bank);
 
-  /// Lifts the evidence to `least` if it is below.
-  void RaiseEvidence(double least) { evidence_ = std::max(evidence_, least); }
+  /// Lifts all evidence to `least` where it is below.
+  void RaiseEvidence(double least);
 
-  double strength() const { return sign_ * strength_; }
-  double evidence() const { return evidence_; }
+  /// Of the best explanation, followed or trained.
+  double strength() const;
+  double evidence() const;
 
   /// Smallest membership over the active channels of the residual at the
   /// followed strength.
@@ -54,11 +56,9 @@ class StrengthTracker {
   struct Node {
     int observer;
     double strength;  // |s|
+    double evidence{0.0};
   };
-  struct Segment {               // between node j and j + 1
-    bool open;                   // interpolation holds
-    std::vector<double> errors;  // κ per channel
-  };
+  using Errors = std::vector<double>;  // κ per channel, between two nodes
   struct Prediction {
     double residual;
     double slope;     // dŷ/ds
@@ -67,10 +67,14 @@ class StrengthTracker {
   };
 
   const ChannelObserver& Channel(int observer, int channel) const;
-  Segment MakeSegment(const Node& low, const Node& high) const;
+  Errors ErrorsBetween(const Node& low, const Node& high) const;
   void SetReach();
   Prediction At(const ObserverBank& bank, int channel, double strength) const;
   double Variance(const ObserverBank& bank, int observer, int channel) const;
+  const Node& BestNode() const;
+  double Gain(const ObserverBank& bank, int channel, double residual,
+              double variance) const;
+  void GatherOfNodes(const ObserverBank& bank);
   void Search(const ObserverBank& bank);
   void Follow(const ObserverBank& bank);
   void KeepBounded();
@@ -82,8 +86,8 @@ class StrengthTracker {
   static constexpr double kOutlier = 25.0;   // bound of ν²/S
 
   const ModelSet* models_;
-  std::vector<Node> nodes_;  // the normal observer first
-  std::vector<Segment> segments_;
+  std::vector<Node> nodes_;       // the normal observer first
+  std::vector<Errors> segments_;  // between node j and j + 1
   double sign_{1.0};
   double lowest_{0.0};
   double highest_{0.0};

@@ -357,11 +357,11 @@ void ValveEngine::Impl::Isolate() {
     Emit(TransitionKind::kIsolated, verdict_.stamp_ns);
     return;
   }
-  // Another set has to hold for a quarter of t_k before it replaces this one.
+  // Another set has to hold for a while before it replaces this one.
   contender_run_ = supported == contender_ ? contender_run_ + 1 : 1;
   contender_ = supported;
   if (supported != verdict_.isolated &&
-      4 * contender_run_ >= models().decision.isolation_samples) {
+      contender_run_ >= models().decision.reisolation_samples) {
     verdict_.isolated = supported;
     Emit(TransitionKind::kReisolated, verdict_.stamp_ns);
   }

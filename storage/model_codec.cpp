@@ -113,11 +113,12 @@ void Fields(A& a, T& observer) {
 template <typename A, Of<DecisionParameters> T>
 void Fields(A& a, T& decision) {
   auto& [isolation_threshold, detection_samples, isolation_samples,
-         isolation_fraction, join_fraction, clearing_samples, settling_samples,
-         evidence_window, evidence_core, evidence_support] = decision;
+         isolation_fraction, join_fraction, reisolation_samples,
+         clearing_samples, settling_samples, evidence_window, evidence_core,
+         evidence_support] = decision;
   a(isolation_threshold, detection_samples, isolation_samples,
-    isolation_fraction, join_fraction, clearing_samples, settling_samples,
-    evidence_window, evidence_core, evidence_support);
+    isolation_fraction, join_fraction, reisolation_samples, clearing_samples,
+    settling_samples, evidence_window, evidence_core, evidence_support);
 }
 
 template <typename A, Of<ModelSet> T>

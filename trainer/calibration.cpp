@@ -14,6 +14,9 @@ constexpr double kCoreQuantile = 0.05;
 constexpr double kSupportMargin = 1.0;  // standard deviations
 constexpr int kFewestWindows = 5;       // to fit limits to
 constexpr int kFewestValues = 100;
+// Under inputs unlike those of the training a model is biased: no limit on a
+// mean is closer than this share of the deviation.
+constexpr double kLeastMean = 0.5;
 
 double Mean(std::span<const double> values) {
   double sum = 0.0;
@@ -78,11 +81,21 @@ void FitWindow(const ResidualSeries& residuals, int length, double share,
   const auto level = [&](const std::vector<double>& values) {
     return FitTail(values, share, 2 * length).level;
   };
-  channel.windows.push_back({length, -std::max(level(below), 1e-6),
-                             std::max(level(above), 1e-6), level(energy)});
+  const double least =
+      kLeastMean * std::sqrt(Variance(Joined(residuals))) + 1e-6;
+  channel.windows.push_back({length, -std::max(level(below), least),
+                             std::max(level(above), least), level(energy)});
 }
 
 }  // namespace
+
+std::vector<double> Joined(const ResidualSeries& series) {
+  std::vector<double> joined;
+  for (const std::vector<double>& one : series) {
+    joined.insert(joined.end(), one.begin(), one.end());
+  }
+  return joined;
+}
 
 ValidationFigures Figures(std::span<const double> residuals,
                           std::span<const double> outputs) {
@@ -129,14 +142,6 @@ double CorrelationTime(std::span<const double> residuals) {
     time += 2.0 * rho;
   }
   return time;
-}
-
-std::vector<double> Joined(const ResidualSeries& series) {
-  std::vector<double> joined;
-  for (const std::vector<double>& one : series) {
-    joined.insert(joined.end(), one.begin(), one.end());
-  }
-  return joined;
 }
 
 void FitThresholds(const std::vector<ResidualSeries>& residuals,

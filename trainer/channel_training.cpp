@@ -96,6 +96,14 @@ TsModel FitRows(const ChannelPlan& plan,
                     std::to_string(data.y.size()) + " samples for at least " +
                     std::to_string(needed) + " parameters");
   }
+  const std::int64_t validated = CountSamples(condition.validation);
+  if (validated <= options.settling) {
+    throw DataError(Describe(condition) + ", channel " + plan.name + ": " +
+                    std::to_string(validated) +
+                    " samples for validation, more than " +
+                    std::to_string(options.settling) + " are needed (run " +
+                    condition.training.front().run_id + ")");
+  }
   const auto validation_error = [&](const std::vector<TsRule>& rules) {
     const TsModel model =
         MakeModel(rules, data, regressors, plan.output, plan.parallel);
@@ -163,6 +171,7 @@ std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
     trial.rules.max_rules = options.search_rules;
     trial.rules.counts.clear();
     trial.rules.both_methods = false;
+    trial.rules.both_antecedents = false;
     trial.max_rows = options.search_rows;
     trial.rules.fit.clustering.num_starts = 1;
     const auto criterion = [&](const std::vector<int>& indices) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <string>
 
@@ -144,6 +145,73 @@ void CutRun(const TrainingRun& run, const DatasetOptions& options,
   }
 }
 
+// The range of a signal over the samples of normal operation; empty: none.
+struct Range {
+  double low{std::numeric_limits<double>::infinity()};
+  double high{-std::numeric_limits<double>::infinity()};
+
+  void Add(const TrainingRun& run, Signal signal) {
+    for (const LabelledSample& sample : run.samples) {
+      if (TruthOf(sample).fault == 0) {
+        low = std::min(low, sample.sample[signal]);
+        high = std::max(high, sample.sample[signal]);
+      }
+    }
+  }
+};
+
+// A command, position or flow that is the same in all normal operation teaches
+// nothing; pressures and temperatures may be steady, but not zero.
+void CheckSignals(const std::vector<TrainingRun>& runs) {
+  for (const Signal signal : {Signal::kCv, Signal::kP1, Signal::kP2,
+                              Signal::kT1, Signal::kX, Signal::kF}) {
+    if (!runs.front().samples.front().sample.Has(signal)) {
+      continue;
+    }
+    const std::string name(SignalName(signal));
+    const bool must_vary =
+        signal == Signal::kCv || signal == Signal::kX || signal == Signal::kF;
+    Range all;
+    std::string ids;
+    for (const TrainingRun& run : runs) {
+      Range range;
+      range.Add(run, signal);
+      all.Add(run, signal);
+      ids += (ids.empty() ? "" : ", ") + run.id;
+      if (!must_vary && range.low == 0.0 && range.high == 0.0) {
+        throw DataError("run " + run.id + ": signal " + name +
+                        " is 0 in every sample; is it not measured? Leave "
+                        "the column out");
+      }
+    }
+    if (must_vary && all.low == all.high) {
+      throw DataError("run " + ids + ": signal " + name + " is " +
+                      std::to_string(all.low) +
+                      " in every sample of normal operation; a model needs it "
+                      "to vary");
+    }
+  }
+}
+
+// A fault that is named and leaves no condition would be missing silently.
+void CheckFaults(const std::vector<TrainingRun>& runs, const Pools& pools,
+                 const DatasetOptions& options) {
+  for (const TrainingRun& run : runs) {
+    for (const LabelledSample& sample : run.samples) {
+      const int fault = TruthOf(sample).fault;
+      const auto pool = pools.lower_bound({fault, -1000});
+      if (pool == pools.end() || pool->first.first != fault) {
+        throw DataError("run " + run.id + ": no stretch of " +
+                        (fault == 0 ? "normal operation" : FaultName(fault)) +
+                        " has " + std::to_string(options.shortest_stretch) +
+                        " samples in a row, the first " +
+                        std::to_string(options.dropped_after_step) +
+                        " after a start or a step not counted");
+      }
+    }
+  }
+}
+
 void CheckRuns(const std::vector<TrainingRun>& runs,
                const DatasetOptions& options) {
   Require(!runs.empty(), "no run was given");
@@ -173,6 +241,7 @@ void CheckRuns(const std::vector<TrainingRun>& runs,
                       first.id);
     }
   }
+  CheckSignals(runs);
 }
 
 }  // namespace
@@ -184,6 +253,7 @@ std::vector<Condition> BuildConditions(const std::vector<TrainingRun>& runs,
   for (const TrainingRun& run : runs) {
     CutRun(run, options, pools);
   }
+  CheckFaults(runs, pools, options);
   std::vector<Condition> conditions;
   for (auto& [key, pool] : pools) {
     pool.condition.strength =

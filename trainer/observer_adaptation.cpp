@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -25,7 +26,8 @@ constexpr int kFewest = 20;
 constexpr std::array<double, 5> kPenalties{0.03, 0.3, 3.0, 30.0, 300.0};
 constexpr double kSharedPenalty = 0.01;  // of what all rules have in common
 constexpr double kWorthAdapting = 0.98;  // of the normal model's error
-constexpr int kCensoredRounds = 6;
+constexpr int kCensoredRounds = 40;
+constexpr double kCensoredTolerance = 1e-3;  // of the span of the output
 
 // The rows of all stretches of a condition in order of time.
 struct Rows {
@@ -109,20 +111,25 @@ class Problem {
           const VectorXd& normal)
       : data_(data), design_(design), normal_(normal) {}
 
-  // θ for the rows with a non-zero weight.
-  VectorXd Solve(const MatrixXd& gram, const VectorXd& use,
-                 double penalty) const {
+  // θ for the rows with a non-zero weight, starting from `theta`.
+  VectorXd Solve(const MatrixXd& gram, const VectorXd& use, double penalty,
+                 VectorXd theta) const {
     MatrixXd regular = gram;
     regular.diagonal().array() += penalty;
     const Eigen::LLT<MatrixXd> factor(regular);
-    VectorXd theta = VectorXd::Zero(design_.cols());
     const bool censored = data_.y.maxCoeff() >= data_.saturation;
+    const double span = data_.y.maxCoeff() - data_.y.minCoeff();
+    VectorXd predicted = Predict(theta);
     for (int round = 0; round < (censored ? kCensoredRounds : 1); ++round) {
-      const VectorXd predicted = normal_ + design_ * theta;
       const VectorXd target = (data_.y.array() >= data_.saturation)
                                   .select(data_.y.cwiseMax(predicted), data_.y);
       theta = factor.solve(design_.transpose() *
                            (target - normal_).cwiseProduct(use));
+      const VectorXd before = std::exchange(predicted, Predict(theta));
+      if ((predicted - before).lpNorm<Eigen::Infinity>() <
+          kCensoredTolerance * span) {
+        break;
+      }
     }
     return theta;
   }
@@ -159,14 +166,16 @@ double MeanSquare(const VectorXd& residuals) {
   return count > 0.0 ? sum / count : 0.0;
 }
 
-// Every row predicted by a model of the other folds.
+// Every row predicted by a model of the other folds; those of the penalty
+// before, in `thetas`, are where they start.
 VectorXd CrossPredict(const Problem& problem, const MatrixXd& design,
                       const std::vector<MatrixXd>& grams,
-                      const std::vector<VectorXd>& uses, double penalty) {
+                      const std::vector<VectorXd>& uses, double penalty,
+                      std::vector<VectorXd>& thetas) {
   VectorXd predicted(design.rows());
   for (std::size_t f = 0; f < kFolds; ++f) {
-    const VectorXd all =
-        problem.Predict(problem.Solve(grams[f], uses[f], penalty));
+    thetas[f] = problem.Solve(grams[f], uses[f], penalty, thetas[f]);
+    const VectorXd all = problem.Predict(thetas[f]);
     predicted = (uses[f].array() > 0.0).select(predicted, all);
   }
   return predicted;
@@ -193,9 +202,7 @@ TsModel Widened(const TsModel& normal, const VectorXd& y) {
   TsModel model = normal;
   const double margin = 0.5 * (y.maxCoeff() - y.minCoeff());
   model.output_min = std::min(model.output_min, y.minCoeff() - margin);
-  if (!(model.output_max >= model.saturation)) {
-    model.output_max = std::max(model.output_max, y.maxCoeff() + margin);
-  }
+  model.output_max = std::max(model.output_max, y.maxCoeff() + margin);
   return model;
 }
 
@@ -233,9 +240,11 @@ AdaptedModel AdaptModel(const TsModel& normal, const Condition& condition) {
   VectorXd best = Residuals(adapted.model, y, base);
   double error = kWorthAdapting * MeanSquare(best);
   std::optional<double> chosen;
+  std::vector<VectorXd> thetas(kFolds, VectorXd::Zero(design.cols()));
   for (const double penalty : kPenalties) {
-    const VectorXd residuals = Residuals(
-        adapted.model, y, CrossPredict(problem, design, grams, uses, penalty));
+    const VectorXd residuals =
+        Residuals(adapted.model, y,
+                  CrossPredict(problem, design, grams, uses, penalty, thetas));
     if (MeanSquare(residuals) < error) {
       error = MeanSquare(residuals);
       best = residuals;
@@ -243,8 +252,10 @@ AdaptedModel AdaptModel(const TsModel& normal, const Condition& condition) {
     }
   }
   if (chosen) {
-    AddTo(adapted.model,
-          problem.Solve(whole, VectorXd::Ones(y.size()), *chosen), scale);
+    AddTo(
+        adapted.model,
+        problem.Solve(whole, VectorXd::Ones(y.size()), *chosen, thetas.front()),
+        scale);
   } else {
     adapted.model = normal;
   }

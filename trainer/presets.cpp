@@ -100,8 +100,23 @@ TrainingOptions Extended() {
   f.adapted = true;
   f.saturates = true;
   f.windows = {30, 200};
-  options.channels = {x, f, Plausibility("T1", kT1), Plausibility("P1", kP1),
+  // The flow at the command is coarser, but independent of the position sensor.
+  ChannelPlan fc = x;
+  fc.name = "F(CV)";
+  fc.output = kF;
+  fc.saturates = true;
+  options.channels = {x,
+                      f,
+                      fc,
+                      Plausibility("T1", kT1),
+                      Plausibility("P1", kP1),
                       Plausibility("P2", kP2)};
+  // Faults of a benchmark are told apart over several periods of the command;
+  // what interpolation between observers leaves in error counts as much.
+  options.decision.evidence_window = 400.0;
+  options.decision.evidence_core = 4.0;
+  options.decision.evidence_support = 10.0;
+  options.decision.reisolation_samples = 60;
   options.fit.rules.both_methods = true;
   // As if every regressor had noise of 1 % of its deviation: lags of a smooth
   // command are all but collinear, and their slopes would amplify its rounding.

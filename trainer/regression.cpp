@@ -131,10 +131,11 @@ TsModel MakeModel(std::vector<TsRule> rules, const RegressionData& data,
   }
   const double low = data.y.minCoeff();
   const double high = data.y.maxCoeff();
-  const double margin = 0.5 * (high - low) + 1e-9;
+  // What a transmitter at its limit hides may be far beyond.
+  const double reach = high >= data.saturation ? 2.0 : 0.5;
+  const double margin = reach * (high - low) + 1e-9;
   model.output_min = low - margin;
-  const bool saturates = high >= data.saturation;
-  model.output_max = saturates ? high : high + margin;
+  model.output_max = high + margin;
   model.saturation = data.saturation;
   model.rules = std::move(rules);
   return model;

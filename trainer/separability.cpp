@@ -1,12 +1,14 @@
 #include "trainer/separability.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
 
 #include "diagnosis/fault_bank.h"
 #include "diagnosis/observer_bank.h"
+#include "diagnosis/residual_windows.h"
 
 namespace fdi::trainer {
 namespace {
@@ -105,12 +107,30 @@ struct Shares {
   std::vector<double> accepted;
 };
 
+// True if a residual or a window of the normal observer is beyond its limits.
+bool IsAbnormal(const ModelSet& models, const ObserverBank& bank,
+                const ResidualWindows& windows) {
+  for (std::size_t c = 0; c < models.channels.size(); ++c) {
+    const ChannelSpec& channel = models.channels[c];
+    const double r = bank.residual(0, static_cast<int>(c));
+    bool beyond = r < channel.lower_threshold || r > channel.upper_threshold;
+    for (std::size_t w = 0; w < channel.windows.size(); ++w) {
+      beyond = beyond || IsBeyond(channel.windows[w], windows.window(c, w));
+    }
+    if (bank.active(static_cast<int>(c)) && beyond) {
+      return true;
+    }
+  }
+  return false;
+}
+
 void ScoreStretch(const Stretch& stretch, const ModelSet& models,
                   Shares& shares) {
   ObserverBank bank(models);
   FaultBank faults(models);
   Verdict verdict;
   bank.Initialise(stretch.samples.front());
+  ResidualWindows windows(models);
   faults.Restart();
   const int start = models.decision.settling_samples;
   for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
@@ -118,6 +138,11 @@ void ScoreStretch(const Stretch& stretch, const ModelSet& models,
     if (static_cast<int>(k) < start) {
       continue;
     }
+    std::array<double, kMaxChannels> residuals{};
+    for (std::size_t c = 0; c < models.channels.size(); ++c) {
+      residuals[c] = bank.residual(0, static_cast<int>(c));
+    }
+    windows.Push({residuals.data(), models.channels.size()});
     faults.Score(bank, verdict);
     faults.Follow(bank);
     faults.Compete(verdict);
@@ -125,15 +150,7 @@ void ScoreStretch(const Stretch& stretch, const ModelSet& models,
       continue;
     }
     shares.samples += 1.0;
-    for (std::size_t c = 0; c < models.channels.size(); ++c) {
-      const double r = bank.residual(0, static_cast<int>(c));
-      if (bank.active(static_cast<int>(c)) &&
-          (r < models.channels[c].lower_threshold ||
-           r > models.channels[c].upper_threshold)) {
-        shares.abnormal += 1.0;
-        break;
-      }
-    }
+    shares.abnormal += IsAbnormal(models, bank, windows) ? 1.0 : 0.0;
     for (std::size_t i = 0; i < models.faults.size(); ++i) {
       shares.accepted[i] +=
           verdict.fault_factors[i] >= models.decision.isolation_threshold;

@@ -144,6 +144,8 @@ std::string ScenarioText(const Scenario& scenario) {
                        QuoteToml(cli::FormatTime(config.start_ns, true)));
   }
   lines.emplace_back("cold_start", BooleanText(config.cold_start));
+  lines.emplace_back("continuous_inputs",
+                     BooleanText(config.continuous_inputs));
   lines.emplace_back("noise", BooleanText(config.noise));
   lines.emplace_back("resolution", BooleanText(config.resolution));
   lines.emplace_back("tolerance_scale", Shortest(config.tolerance_scale));

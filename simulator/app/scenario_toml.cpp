@@ -231,6 +231,8 @@ void ApplyScenario(TomlReader& table, const path& folder, Scenario& scenario) {
           [&] { config.start_ns = cli::ParseTime(*start, true); });
   }
   config.cold_start = table.Boolean("cold_start").value_or(config.cold_start);
+  config.continuous_inputs =
+      table.Boolean("continuous_inputs").value_or(config.continuous_inputs);
   config.noise = table.Boolean("noise").value_or(config.noise);
   config.resolution = table.Boolean("resolution").value_or(config.resolution);
 }

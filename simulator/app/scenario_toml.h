@@ -32,6 +32,7 @@ struct Scenario {
 ///     period_s = 1
 ///     start = "2026-11-20T00:00:00Z"
 ///     cold_start = false
+///     continuous_inputs = false  # sine only: not held from sample to sample
 ///     noise = true
 ///     resolution = true
 ///     tolerance_scale = 1

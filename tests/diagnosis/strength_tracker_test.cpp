@@ -1,5 +1,7 @@
 #include "diagnosis/strength_tracker.h"
 
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "tests/diagnosis/linear_plant.h"
@@ -70,25 +72,54 @@ TEST_F(StrengthTrackerTest, EvidenceTellsSlopeFromOffsetOnlyInMotion) {
   }
 }
 
-TEST_F(StrengthTrackerTest, StaysAtAnObserverWhereInterpolationFails) {
-  ModelSet models = LinearPlant();
-  for (int i = kF6First; i < kF6First + 2; ++i) {
-    for (ChannelObserver& channel :
-         models.observers[static_cast<std::size_t>(i)].channels) {
-      channel.interpolation_error = 1.0;
+// Between the observers the fault is explained either way, but worth less where
+// the trainer found that interpolation errs.
+TEST_F(StrengthTrackerTest, DoubtfulInterpolationGathersLessEvidence) {
+  std::vector<double> evidence;
+  for (const double error : {0.02, 1.0}) {
+    ModelSet models = LinearPlant();
+    for (int i = kF6First; i < kF6First + 2; ++i) {
+      for (ChannelObserver& channel :
+           models.observers[static_cast<std::size_t>(i)].channels) {
+        channel.interpolation_error = error;
+      }
     }
+    ObserverBank bank(models);
+    Begin(bank);
+    StrengthTracker tracker(models, {kF6First, kF6First + 1});
+    tracker.Restart();
+    for (std::uint64_t k = 0; k < 100; ++k) {
+      Sample sample = PlantSample(k);
+      AddF6(sample, 0.7);
+      bank.Step(sample);
+      tracker.Step(bank);
+    }
+    evidence.push_back(tracker.evidence());
+  }
+  EXPECT_GT(evidence[0], evidence[1] + 10.0);
+}
+
+// However interpolation errs, a strength that was trained is met.
+TEST_F(StrengthTrackerTest, TrainedStrengthHasTheEvidenceOfItsObserver) {
+  ModelSet models = LinearPlant();
+  for (ChannelObserver& channel : models.observers[kF6First].channels) {
+    channel.interpolation_error = 1.0;
   }
   ObserverBank bank(models);
   Begin(bank);
-  StrengthTracker tracker(models, {kF6First, kF6First + 1});
-  tracker.Restart();
+  StrengthTracker f6(models, {kF6First, kF6First + 1});
+  StrengthTracker alone(models, {kF6First + 1});
+  f6.Restart();
+  alone.Restart();
   for (std::uint64_t k = 0; k < 100; ++k) {
     Sample sample = PlantSample(k);
-    AddF6(sample, 0.7);
+    AddF6(sample, 1.0);
     bank.Step(sample);
-    tracker.Step(bank);
+    f6.Step(bank);
+    alone.Step(bank);
   }
-  EXPECT_EQ(tracker.factor(), 0.0);  // 4 units from the nearer observer
+  EXPECT_NEAR(f6.strength(), 1.0, 0.01);
+  EXPECT_GE(f6.evidence(), alone.evidence() - 1.0);
 }
 
 TEST_F(StrengthTrackerTest, LoneObserverReachesAQuarterFurther) {
@@ -99,7 +130,7 @@ TEST_F(StrengthTrackerTest, LoneObserverReachesAQuarterFurther) {
   tracker.Restart();
   for (std::uint64_t k = 0; k < 100; ++k) {
     Sample sample = PlantSample(k);
-    AddF6(sample, 1.0);
+    AddF6(sample, 0.65);
     bank.Step(sample);
     tracker.Step(bank);
   }

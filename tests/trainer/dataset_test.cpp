@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "diagnosis/error.h"
@@ -134,6 +135,48 @@ TEST(DatasetTest, FaultRunsAloneAreRefused) {
                                           return FaultTruth{6, 0.5};
                                         })}),
                DataError);
+}
+
+std::string Refusal(const std::vector<TrainingRun>& runs) {
+  try {
+    BuildConditions(runs);
+  } catch (const DataError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(DatasetTest, FaultWithoutEnoughSamplesIsRefusedByRunAndFault) {
+  const auto late = MakeRun("b", 400, [](int k) {
+    return FaultTruth{19, k < 360 ? 0.0 : 0.5};
+  });
+  EXPECT_THAT(
+      Refusal({MakeRun("a", 400, Normal()), late}),
+      testing::AllOf(testing::HasSubstr("run b"), testing::HasSubstr("f19"),
+                     testing::HasSubstr("60 samples")));
+}
+
+TEST(DatasetTest, ConstantPositionIsRefusedUnlessAnotherRunMovesIt) {
+  TrainingRun still = MakeRun("b", 400, Normal());
+  for (LabelledSample& sample : still.samples) {
+    sample.sample.Set(Signal::kX, 50.0);
+  }
+  EXPECT_THAT(Refusal({still}), testing::AllOf(testing::HasSubstr("run b"),
+                                               testing::HasSubstr("signal X")));
+  EXPECT_EQ(Refusal({MakeRun("a", 400, Normal()), still}), "accepted");
+}
+
+TEST(DatasetTest, PressureOfZerosIsRefusedASteadyOneIsNot) {
+  TrainingRun run = MakeRun("b", 400, Normal());
+  for (LabelledSample& sample : run.samples) {
+    sample.sample.Set(Signal::kP1, 3500.0);
+  }
+  EXPECT_EQ(Refusal({run}), "accepted");
+  for (LabelledSample& sample : run.samples) {
+    sample.sample.Set(Signal::kP1, 0.0);
+  }
+  EXPECT_THAT(Refusal({run}), testing::AllOf(testing::HasSubstr("run b"),
+                                             testing::HasSubstr("signal P1")));
 }
 
 }  // namespace

@@ -39,29 +39,34 @@ class FieldWriter {
   std::string& text_;
 };
 
-void WriteSource(const SimulatedRun& run, std::string& text) {
-  text += "[run.simulate]\n" + simulator::ScenarioText(run.scenario);
+void WriteSource(const char* table, const SimulatedRun& run,
+                 std::string& text) {
+  text += std::string("[") + table + ".simulate]\n" +
+          simulator::ScenarioText(run.scenario);
 }
 
-void WriteSource(const ImportedRun& run, std::string& text) {
+void WriteSource(const char*, const ImportedRun& run, std::string& text) {
   text += "import = " + QuoteToml(run.file.string()) +
           "\nvalve = " + QuoteToml(run.valve_id) + '\n';
 }
 
-void WriteSource(const RecordedRun& run, std::string& text) {
+void WriteSource(const char*, const RecordedRun& run, std::string& text) {
   text += "run = " + QuoteToml(run.selector) + '\n';
 }
 
-void WriteRun(const CampaignRun& run, std::string& text) {
-  text += "\n[[run]]\n";
+void WriteRun(const char* table, const CampaignRun& run, std::string& text) {
+  text += std::string("\n[[") + table + "]]\n";
   FieldWriter writer(text);
+  if (run.horizon_s > 0.0) {
+    writer.Line("horizon_s", Shortest(run.horizon_s));
+  }
   if (std::isfinite(run.stretch.from_s)) {
     writer.Line("from_s", Shortest(run.stretch.from_s));
   }
   if (std::isfinite(run.stretch.to_s)) {
     writer.Line("to_s", Shortest(run.stretch.to_s));
   }
-  std::visit([&text](const auto& source) { WriteSource(source, text); },
+  std::visit([&](const auto& source) { WriteSource(table, source, text); },
              run.source);
 }
 
@@ -78,9 +83,23 @@ std::string CampaignText(const Campaign& campaign) {
   text += "\n[training]\n";
   VisitTraining(training, writer);
   for (const CampaignRun& run : campaign.runs) {
-    WriteRun(run, text);
+    WriteRun("run", run, text);
+  }
+  for (const CampaignRun& run : campaign.validation) {
+    WriteRun("validation", run, text);
   }
   return text;
+}
+
+std::string RunLabel(const CampaignRun& run) {
+  if (const auto* simulated = std::get_if<SimulatedRun>(&run.source)) {
+    const auto& faults = simulated->scenario.config.faults;
+    return faults.empty() ? "normal" : simulator::ToText(faults.front());
+  }
+  if (const auto* imported = std::get_if<ImportedRun>(&run.source)) {
+    return imported->file.stem().string();
+  }
+  return std::get<RecordedRun>(run.source).selector;
 }
 
 }  // namespace fdi::trainer

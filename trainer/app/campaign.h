@@ -31,13 +31,21 @@ struct CampaignRun {
   std::variant<SimulatedRun, ImportedRun, RecordedRun> source;
   /// Seconds from the start of a simulated or imported run to train on.
   storage::RunSelector stretch;
+  /// Of a run to score, from its start [s]: what comes later does not count;
+  /// 0: all counts.
+  double horizon_s{0.0};
 };
 
 /// A training from nothing: which runs, and what is done with them.
 struct Campaign {
   TrainingOptions training;
-  std::vector<CampaignRun> runs;
+  std::vector<CampaignRun> runs;        ///< To train on.
+  std::vector<CampaignRun> validation;  ///< To score, never to train on.
 };
+
+/// "f1:abrupt@900:strength=0.25" for a simulated run, the stem of an imported
+/// file, the selector of a recorded run.
+std::string RunLabel(const CampaignRun& run);
 
 /// Reads a campaign:
 ///
@@ -57,12 +65,19 @@ struct Campaign {
 ///     faults = ["f3", "f6:incipient@60+600"]  # each, alone ...
 ///     strengths = [0.05, 0.5, 1]              # ... at each strength
 ///     [[run]]
-///     import = "plant.csv"            # relative to the campaign file
+///     import = "plant.csv"            # relative to the campaign file; may
+///     hold
+///                                     # ${VARIABLE}, and * in the file's name
 ///     valve = "LC51_03"
 ///     from_s = 60
 ///     to_s = 1500
 ///     [[run]]
 ///     run = "1a2b3c@600:"
+///     [[validation]]                  # as [[run]]; scored by evaluate alone
+///     simulate = {duration_s = 1501}
+///     faults = ["f1:abrupt@900"]
+///     strengths = [0.25, 0.5]
+///     horizon_s = 1500
 ///
 /// A fault that is only named acts at once from 0. Seeds: run i (from 0) of an
 /// expanded [[run]] has that of its `simulate` + i; without one, run n of all

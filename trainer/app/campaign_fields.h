@@ -13,6 +13,7 @@ void VisitDecision(DecisionParameters& d, Visitor&& visit) {
   visit("isolation_samples", d.isolation_samples, 1, 10000);
   visit("isolation_fraction", d.isolation_fraction, 0.01, 1.0);
   visit("join_fraction", d.join_fraction, 0.01, 1.0);
+  visit("reisolation_samples", d.reisolation_samples, 1, 10000);
   visit("clearing_samples", d.clearing_samples, 1, 100000);
   visit("settling_samples", d.settling_samples, 0, 100000);
   visit("evidence_window", d.evidence_window, 2.0, 1e6);

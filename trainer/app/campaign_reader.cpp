@@ -6,6 +6,7 @@
 #include "storage/cli/toml_reader.h"
 #include "trainer/app/campaign.h"
 #include "trainer/app/campaign_fields.h"
+#include "trainer/app/matching_files.h"
 
 namespace fdi::trainer {
 namespace {
@@ -106,7 +107,10 @@ class Reader {
       simulator::ApplyScenario(*scenario, folder_, common_);
     }
     for (TomlReader& run : root_.Tables("run")) {
-      ReadRun(run);
+      ReadRun("run", run, campaign_.runs);
+    }
+    for (TomlReader& run : root_.Tables("validation")) {
+      ReadRun("validation", run, campaign_.validation);
     }
     root_.Finish();
     if (campaign_.runs.empty()) {
@@ -130,36 +134,38 @@ class Reader {
     }
   }
 
-  void ReadRun(TomlReader& table) {
+  void ReadRun(const char* kind, TomlReader& table,
+               std::vector<CampaignRun>& runs) {
     const bool simulate = table.Has("simulate");
     const bool import = table.Has("import");
     const bool recorded = table.Has("run");
     if (simulate + import + recorded != 1) {
-      throw ConfigError(file_.string() + ": [[run]] " +
-                        std::to_string(++tables_) +
+      throw ConfigError(file_.string() + ": [[" + kind + "]] " +
+                        std::to_string(runs.size() + 1) +
                         ": exactly one of simulate, import, run is needed");
     }
-    ++tables_;
     CampaignRun run;
+    run.horizon_s = table.Number("horizon_s", 0.0, 1e12).value_or(0.0);
     if (recorded) {
       const std::string selector = *table.Text("run");
       AtKey(table, "run", [&] { storage::ParseRunSelector(selector); });
       run.source = RecordedRun{selector};
-      campaign_.runs.push_back(std::move(run));
+      runs.push_back(std::move(run));
       return;
     }
     ReadStretch(table, run.stretch);
     if (import) {
-      run.source = ImportedRun{Resolve(*table.Text("import")),
-                               table.Text("valve").value_or(common_.valve_id)};
-      campaign_.runs.push_back(std::move(run));
+      const std::string valve = table.Text("valve").value_or(common_.valve_id);
+      const std::string pattern = *table.Text("import");
+      AtKey(table, "import", [&] {
+        for (const path& file : MatchingFiles(pattern, folder_)) {
+          run.source = ImportedRun{file, valve};
+          runs.push_back(run);
+        }
+      });
       return;
     }
-    ReadSimulated(table, run);
-  }
-
-  path Resolve(const std::string& file) const {
-    return path(file).is_absolute() ? path(file) : folder_ / file;
+    ReadSimulated(table, run, runs);
   }
 
   static void ReadStretch(TomlReader& table, storage::RunSelector& stretch) {
@@ -170,7 +176,8 @@ class Reader {
     }
   }
 
-  void ReadSimulated(TomlReader& table, CampaignRun run) {
+  void ReadSimulated(TomlReader& table, CampaignRun run,
+                     std::vector<CampaignRun>& runs) {
     constexpr int kMostRepeats = 10000;
     simulator::Scenario scenario = common_;
     TomlReader own = *table.Table("simulate");
@@ -187,7 +194,7 @@ class Reader {
         one.config.seed += own_seed ? index : simulated_;
         AtKey(table, "simulate", [&] { simulator::Validate(one.config); });
         run.source = SimulatedRun{std::move(one)};
-        campaign_.runs.push_back(run);
+        runs.push_back(run);
       }
     }
   }
@@ -197,7 +204,6 @@ class Reader {
   TomlReader root_;
   Campaign campaign_;
   simulator::Scenario common_;
-  int tables_{0};
   std::uint64_t simulated_{0};
 };
 

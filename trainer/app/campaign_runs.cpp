@@ -37,33 +37,32 @@ bool SameSample(const LabelledSample& a, const storage::StoredSample& b) {
 
 class Collector {
  public:
-  Collector(const Campaign& campaign, const storage::DataDirectory& directory,
+  Collector(const std::vector<CampaignRun>& runs,
+            const storage::DataDirectory& directory,
             const CollectOptions& options, const CollectProgress& progress)
-      : campaign_(campaign),
+      : runs_(runs),
         directory_(directory),
         options_(options),
         progress_(progress),
-        ids_(campaign.runs.size()) {}
+        ids_(runs.size()) {}
 
   CollectedRuns Collect() {
     Open();
     for (std::size_t i = 0; i < ids_.size(); ++i) {
-      if (const auto* run =
-              std::get_if<RecordedRun>(&campaign_.runs[i].source)) {
+      if (const auto* run = std::get_if<RecordedRun>(&runs_[i].source)) {
         store_->Info(run->selector);
         ids_[i] = run->selector;
       }
     }
     ReadFiles();
     for (std::size_t i = 0; i < ids_.size(); ++i) {
-      if (const auto* run =
-              std::get_if<SimulatedRun>(&campaign_.runs[i].source)) {
+      if (const auto* run = std::get_if<SimulatedRun>(&runs_[i].source)) {
         FindSimulated(i, *run);
       }
     }
     SimulateMissing();
     for (std::size_t i = 0; i < ids_.size(); ++i) {
-      result_.runs.push_back(Load(i));
+      result_.selectors.push_back(SelectorOf(i));
     }
     return std::move(result_);
   }
@@ -72,10 +71,9 @@ class Collector {
   // A campaign of recorded runs alone writes nothing.
   void Open() {
     const bool writes =
-        std::any_of(campaign_.runs.begin(), campaign_.runs.end(),
-                    [](const CampaignRun& run) {
-                      return !std::holds_alternative<RecordedRun>(run.source);
-                    });
+        std::any_of(runs_.begin(), runs_.end(), [](const CampaignRun& run) {
+          return !std::holds_alternative<RecordedRun>(run.source);
+        });
     if (writes) {
       storage::EnsureExists(directory_);
     }
@@ -88,7 +86,7 @@ class Collector {
   void ReadFiles() {
     std::vector<std::pair<std::size_t, storage::CsvTable>> missing;
     for (std::size_t i = 0; i < ids_.size(); ++i) {
-      const auto* run = std::get_if<ImportedRun>(&campaign_.runs[i].source);
+      const auto* run = std::get_if<ImportedRun>(&runs_[i].source);
       if (run == nullptr) {
         continue;
       }
@@ -100,7 +98,7 @@ class Collector {
       }
     }
     for (const auto& [i, table] : missing) {
-      const auto& run = std::get<ImportedRun>(campaign_.runs[i].source);
+      const auto& run = std::get<ImportedRun>(runs_[i].source);
       storage::NewRun row;
       row.valve_id = run.valve_id;
       row.start_ns = options_.start_ns;
@@ -195,7 +193,7 @@ class Collector {
   }
 
   const SimulatedRun& SimulatedAt(std::size_t i) const {
-    return std::get<SimulatedRun>(campaign_.runs[i].source);
+    return std::get<SimulatedRun>(runs_[i].source);
   }
 
   template <typename Report>
@@ -241,20 +239,17 @@ class Collector {
     return recorder.Id(key);
   }
 
-  TrainingRun Load(std::size_t i) {
-    const storage::RunSelector& stretch = campaign_.runs[i].stretch;
-    std::string selector = ids_[i];
-    if (stretch.IsStretch()) {
-      storage::StoredRun name;
-      name.info.id = ids_[i];
-      name.selector = stretch;
-      selector = RunName(name);
+  std::string SelectorOf(std::size_t i) const {
+    if (!runs_[i].stretch.IsStretch()) {
+      return ids_[i];
     }
-    return ToTrainingRun(store_->Load(selector),
-                         campaign_.training.dataset.assume_normal);
+    storage::StoredRun name;
+    name.info.id = ids_[i];
+    name.selector = runs_[i].stretch;
+    return RunName(name);
   }
 
-  const Campaign& campaign_;
+  const std::vector<CampaignRun>& runs_;
   const storage::DataDirectory& directory_;
   const CollectOptions& options_;
   const CollectProgress& progress_;
@@ -267,11 +262,11 @@ class Collector {
 
 }  // namespace
 
-CollectedRuns CollectRuns(const Campaign& campaign,
+CollectedRuns CollectRuns(const std::vector<CampaignRun>& runs,
                           const storage::DataDirectory& directory,
                           const CollectOptions& options,
                           const CollectProgress& progress) {
-  return Collector(campaign, directory, options, progress).Collect();
+  return Collector(runs, directory, options, progress).Collect();
 }
 
 }  // namespace fdi::trainer

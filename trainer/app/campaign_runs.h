@@ -25,9 +25,9 @@ struct CollectOptions {
 };
 
 struct CollectedRuns {
-  std::vector<TrainingRun> runs;  ///< In the order of the campaign.
-  int simulated{0};               ///< New in runs.db.
-  int imported{0};                ///< New in runs.db.
+  std::vector<std::string> selectors;  ///< In the order asked for.
+  int simulated{0};                    ///< New in runs.db.
+  int imported{0};                     ///< New in runs.db.
   int reused{0};  ///< Simulated or imported before, by the same software.
 };
 
@@ -35,13 +35,13 @@ struct CollectedRuns {
 /// stop it. Called from one thread at a time.
 using CollectProgress = std::function<void(double, const std::string&)>;
 
-/// Brings together the runs of a campaign: loads those that runs.db has,
-/// imports files and simulates the others on all cores. Every new run is stored
-/// in one transaction when it is complete.
+/// Brings together runs of a campaign: finds those that runs.db has, imports
+/// files and simulates the others on all cores. Every new run is stored in one
+/// transaction when it is complete.
 ///
 /// @throws NotFoundError, DataError, ConfigError naming run or file; nothing
 ///   is simulated before all files and recorded runs were found.
-CollectedRuns CollectRuns(const Campaign& campaign,
+CollectedRuns CollectRuns(const std::vector<CampaignRun>& runs,
                           const storage::DataDirectory& directory,
                           const CollectOptions& options,
                           const CollectProgress& progress = {});

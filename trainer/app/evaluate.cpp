@@ -7,10 +7,15 @@
 #include "diagnosis/error.h"
 #include "storage/cli/output_folder.h"
 #include "storage/cli/program.h"
+#include "storage/cli/progress.h"
+#include "storage/cli/stop_signals.h"
 #include "storage/cli/tag_map.h"
+#include "storage/cli/time_text.h"
 #include "storage/data_directory.h"
 #include "storage/models.h"
 #include "storage/runs.h"
+#include "trainer/app/campaign.h"
+#include "trainer/app/campaign_runs.h"
 #include "trainer/app/evaluation_report.h"
 #include "trainer/app/file_runs.h"
 #include "trainer/app/report_page.h"
@@ -29,11 +34,19 @@ struct EvaluateOptions {
   std::string valve;
   std::vector<std::string> runs;
   std::vector<std::string> files;
+  std::filesystem::path campaign;
   std::filesystem::path map;
   std::filesystem::path vectors;
   std::filesystem::path report;
   bool assume_normal{false};
   bool csv{false};
+};
+
+// A run to score, under the name it is listed by.
+struct ScoredRun {
+  storage::StoredRun run;
+  std::string name;
+  double horizon_s{0.0};
 };
 
 ModelSet LoadModels(const EvaluateOptions& options,
@@ -70,9 +83,9 @@ struct Evaluation {
 
 // Also fills `trace`, and adds to `vectors`, unless there is none.
 EvaluatedRun EvaluateRun(const std::shared_ptr<const ModelSet>& models,
-                         const storage::StoredRun& run, bool assume_normal,
+                         const ScoredRun& scored, bool assume_normal,
                          VectorsCsv* vectors, RunTrace* trace) {
-  const std::string name = RunName(run);
+  const auto& [run, name, horizon_s] = scored;
   const double duration_s = DurationOf(run);
   std::optional<RunTraceRecorder> recorder;
   if (trace != nullptr) {
@@ -91,7 +104,7 @@ EvaluatedRun EvaluateRun(const std::shared_ptr<const ModelSet>& models,
     *trace = recorder->Finish(indications);
   }
   EvaluatedRun result;
-  result.indices = ComputeIndices(indications);
+  result.indices = ComputeIndices(indications, horizon_s);
   result.indices.run_id = name;
   result.has_truth = assume_normal || HasTruth(run);
   result.duration_s = duration_s;
@@ -103,14 +116,55 @@ EvaluatedRun EvaluateRun(const std::shared_ptr<const ModelSet>& models,
   return result;
 }
 
-std::vector<storage::StoredRun> LoadRuns(
-    const EvaluateOptions& options, const ModelSet& models,
-    const storage::DataDirectory& directory) {
-  std::vector<storage::StoredRun> runs;
+// The validation runs of a campaign, simulated or imported where missing.
+void AddValidation(const std::filesystem::path& file,
+                   const cli::Context& context,
+                   const storage::DataDirectory& directory,
+                   std::vector<ScoredRun>& runs) {
+  const Campaign campaign = LoadCampaign(file);
+  if (campaign.validation.empty()) {
+    throw ConfigError(file.string() + ": there is no [[validation]]");
+  }
+  const cli::StopSignals signals;
+  std::optional<cli::Progress> progress;
+  const CollectedRuns collected = CollectRuns(
+      campaign.validation, directory, {context.software, cli::NowNs(), 0},
+      [&](double share, const std::string& what) {
+        if (signals.stop_requested()) {
+          throw Interrupted("interrupted");
+        }
+        if (!progress) {
+          progress.emplace("simulate");
+        }
+        progress->Update(share, what);
+      });
+  if (progress) {
+    progress->Finish();
+  }
+  storage::RunStore store(directory.runs());
+  for (std::size_t i = 0; i < campaign.validation.size(); ++i) {
+    runs.push_back({store.Load(collected.selectors[i]),
+                    RunLabel(campaign.validation[i]),
+                    campaign.validation[i].horizon_s});
+  }
+}
+
+std::vector<ScoredRun> LoadRuns(const EvaluateOptions& options,
+                                const ModelSet& models,
+                                const cli::Context& context,
+                                const storage::DataDirectory& directory) {
+  std::vector<ScoredRun> runs;
+  const auto add = [&](storage::StoredRun run) {
+    std::string name = RunName(run);
+    runs.push_back({std::move(run), std::move(name), 0.0});
+  };
+  if (!options.campaign.empty()) {
+    AddValidation(options.campaign, context, directory, runs);
+  }
   if (!options.runs.empty()) {
     storage::RunStore store(directory.runs());
     for (const std::string& selector : options.runs) {
-      runs.push_back(store.Load(selector));
+      add(store.Load(selector));
     }
   }
   std::optional<storage::ColumnMap> map;
@@ -118,14 +172,14 @@ std::vector<storage::StoredRun> LoadRuns(
     map = cli::ReadTagMap(options.map);
   }
   for (const std::string& file : options.files) {
-    runs.push_back(ReadRunFile(file, map, RequiredSignals(models)));
+    add(ReadRunFile(file, map, RequiredSignals(models)));
   }
   return runs;
 }
 
 Evaluation EvaluateRuns(const EvaluateOptions& options,
                         const std::shared_ptr<const ModelSet>& models,
-                        const std::vector<storage::StoredRun>& runs) {
+                        const std::vector<ScoredRun>& runs) {
   std::optional<VectorsCsv> vectors;
   if (!options.vectors.empty()) {
     vectors.emplace(options.vectors, *models);
@@ -150,8 +204,11 @@ int Evaluate(const EvaluateOptions& options, const cli::Context& context) {
   if (options.csv && context.options.json) {
     throw ConfigError("either --json or --csv");
   }
-  if (options.runs.empty() && options.files.empty()) {
-    throw ConfigError("what to score: --runs ID,... or --file FILE.csv");
+  if (options.runs.empty() && options.files.empty() &&
+      options.campaign.empty()) {
+    throw ConfigError(
+        "what to score: --runs ID,..., --file FILE.csv or "
+        "--campaign FILE.toml");
   }
   if (!options.report.empty()) {
     cli::EnsureFolder(options.report);
@@ -159,8 +216,8 @@ int Evaluate(const EvaluateOptions& options, const cli::Context& context) {
   const storage::DataDirectory directory{context.options.data_dir};
   const auto models =
       std::make_shared<const ModelSet>(LoadModels(options, directory));
-  const auto [runs, traces] =
-      EvaluateRuns(options, models, LoadRuns(options, *models, directory));
+  const auto [runs, traces] = EvaluateRuns(
+      options, models, LoadRuns(options, *models, context, directory));
   if (!options.report.empty()) {
     cli::WriteFile(options.report / "index.html",
                    ReportPage({*models, runs, traces, context.software,
@@ -193,6 +250,9 @@ void AddOptions(CLI::App& verb, EvaluateOptions& options) {
           ->expected(1)
           ->take_all()
           ->type_name("FILE.csv[@from:to]");
+  verb.add_option("--campaign", options.campaign,
+                  "Its validation runs; simulates or imports what is missing")
+      ->type_name("FILE.toml");
   verb.add_option("--map", options.map,
                   "TOML file: names, units, scale, offset, sense of columns")
       ->type_name("FILE.toml")

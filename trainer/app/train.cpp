@@ -12,9 +12,11 @@
 #include "storage/cli/time_text.h"
 #include "storage/data_directory.h"
 #include "storage/models.h"
+#include "storage/runs.h"
 #include "trainer/app/campaign.h"
 #include "trainer/app/campaign_runs.h"
 #include "trainer/app/model_report.h"
+#include "trainer/app/run_input.h"
 #include "trainer/app/verbs.h"
 #include "trainer/training.h"
 
@@ -45,7 +47,7 @@ Campaign MakeCampaign(const TrainOptions& options) {
     campaign.training = PresetOptions(options.preset);
     for (const std::string& run : options.runs) {
       storage::ParseRunSelector(run);
-      campaign.runs.push_back({RecordedRun{run}, {}});
+      campaign.runs.push_back({RecordedRun{run}, {}, 0.0});
     }
   }
   TrainingOptions& training = campaign.training;
@@ -75,7 +77,7 @@ CollectedRuns Collect(const Campaign& campaign, const cli::Context& context,
   const storage::DataDirectory directory{context.options.data_dir};
   std::optional<cli::Progress> progress;
   CollectedRuns collected =
-      CollectRuns(campaign, directory,
+      CollectRuns(campaign.runs, directory,
                   {context.software, cli::NowNs(), campaign.training.threads},
                   [&](double share, const std::string& what) {
                     RequireGoOn(signals);
@@ -90,11 +92,22 @@ CollectedRuns Collect(const Campaign& campaign, const cli::Context& context,
   context.log(
       LogLevel::kInfo,
       cli::EventLine("runs_collected",
-                     {{"runs", std::to_string(collected.runs.size())},
+                     {{"runs", std::to_string(collected.selectors.size())},
                       {"simulated", std::to_string(collected.simulated)},
                       {"imported", std::to_string(collected.imported)},
                       {"reused", std::to_string(collected.reused)}}));
   return collected;
+}
+
+std::vector<TrainingRun> LoadRuns(const std::vector<std::string>& selectors,
+                                  const storage::DataDirectory& directory,
+                                  bool assume_normal) {
+  storage::RunStore store(directory.runs());
+  std::vector<TrainingRun> runs;
+  for (const std::string& selector : selectors) {
+    runs.push_back(ToTrainingRun(store.Load(selector), assume_normal));
+  }
+  return runs;
 }
 
 ModelSet TrainAndStore(Campaign& campaign, const TrainOptions& options,
@@ -107,12 +120,13 @@ ModelSet TrainAndStore(Campaign& campaign, const TrainOptions& options,
   campaign.training.software = context.software;
   campaign.training.created_ns = cli::NowNs();
   cli::Progress progress("train");
-  const ModelSet models =
-      TrainModelSet(collected.runs, campaign.training,
-                    [&](double share, std::string_view stage) {
-                      RequireGoOn(signals);
-                      progress.Update(share, std::string(stage));
-                    });
+  const ModelSet models = TrainModelSet(
+      LoadRuns(collected.selectors, directory,
+               campaign.training.dataset.assume_normal),
+      campaign.training, [&](double share, std::string_view stage) {
+        RequireGoOn(signals);
+        progress.Update(share, std::string(stage));
+      });
   RequireGoOn(signals);
   progress.Finish();
   return store.Save(models, options.activate ? storage::Activation::kAlways
@@ -142,7 +156,8 @@ void AddOptions(CLI::App& verb, TrainOptions& options) {
           ->delimiter(',')
           ->type_name("ID[@from:to],...");
   CLI::Option* preset =
-      verb.add_option("--preset", options.preset, "paper")->type_name("NAME");
+      verb.add_option("--preset", options.preset, "paper or extended")
+          ->type_name("NAME");
   verb.add_option("--campaign", options.campaign,
                   "Settings and runs; simulates or imports what is missing")
       ->type_name("FILE.toml")
