@@ -23,8 +23,8 @@ class AppValidationTest : public TrainerProgram {
 
 TEST_F(AppValidationTest, ValidationRunsAreScoredAndNotTrainedOn) {
   Write("c.toml", Quick() + TwoConditions() + Validation());
-  const json models = RunJson("train --campaign c.toml");
-  EXPECT_EQ(models["training_runs"], 2);
+  ASSERT_EQ(Run("train --campaign c.toml").code, 0);
+  EXPECT_EQ(RunJson("show quick")["training_runs"].size(), 2U);
   const json scored = RunJson("evaluate --model-set quick --campaign c.toml");
   ASSERT_EQ(scored["runs"].size(), 3U);
   EXPECT_EQ(scored["runs"][0]["run_id"], "f19:abrupt@200:strength=0.5");
@@ -44,6 +44,25 @@ TEST_F(AppValidationTest, HorizonEndsWhatCounts) {
   const json scored = RunJson("evaluate --model-set quick --campaign c.toml");
   EXPECT_TRUE(scored["runs"][0]["detected"]);
   EXPECT_FALSE(scored["runs"][1]["detected"]);
+}
+
+TEST_F(AppValidationTest, OtherSeedsAreOtherRuns) {
+  Write("c.toml", Quick() + TwoConditions());
+  Write("v.toml", Quick() + Validation());
+  ASSERT_EQ(Run("train --campaign c.toml").code, 0);
+  const std::string call = "evaluate --model-set quick --campaign v.toml";
+  ASSERT_EQ(Run(call + " --vectors a.csv").code, 0);
+  ASSERT_EQ(Run(call + " --vectors b.csv").code, 0);
+  ASSERT_EQ(Run(call + " --seed-offset 9 --vectors c.csv").code, 0);
+  EXPECT_EQ(Read("a.csv"), Read("b.csv"));
+  EXPECT_NE(Read("a.csv"), Read("c.csv"));
+}
+
+TEST_F(AppValidationTest, CampaignWithoutRunsIsNotTrained) {
+  Write("v.toml", Quick() + Validation());
+  const Outcome outcome = Run("train --campaign v.toml");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("v.toml"), HasSubstr("[[run]]")));
 }
 
 TEST_F(AppValidationTest, CampaignWithoutValidationIsNamed) {

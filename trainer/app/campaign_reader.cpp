@@ -113,8 +113,9 @@ class Reader {
       ReadRun("validation", run, campaign_.validation);
     }
     root_.Finish();
-    if (campaign_.runs.empty()) {
-      throw ConfigError(file_.string() + ": there is no [[run]]");
+    if (campaign_.runs.empty() && campaign_.validation.empty()) {
+      throw ConfigError(file_.string() +
+                        ": there is no [[run]] and no [[validation]]");
     }
     return std::move(campaign_);
   }

@@ -35,6 +35,7 @@ struct EvaluateOptions {
   std::vector<std::string> runs;
   std::vector<std::string> files;
   std::filesystem::path campaign;
+  std::uint64_t seed_offset{0};
   std::filesystem::path map;
   std::filesystem::path vectors;
   std::filesystem::path report;
@@ -117,35 +118,40 @@ EvaluatedRun EvaluateRun(const std::shared_ptr<const ModelSet>& models,
 }
 
 // The validation runs of a campaign, simulated or imported where missing.
-void AddValidation(const std::filesystem::path& file,
-                   const cli::Context& context,
+void AddValidation(const EvaluateOptions& options, const cli::Context& context,
                    const storage::DataDirectory& directory,
                    std::vector<ScoredRun>& runs) {
-  const Campaign campaign = LoadCampaign(file);
-  if (campaign.validation.empty()) {
-    throw ConfigError(file.string() + ": there is no [[validation]]");
+  std::vector<CampaignRun> validation =
+      LoadCampaign(options.campaign).validation;
+  if (validation.empty()) {
+    throw ConfigError(options.campaign.string() +
+                      ": there is no [[validation]]");
+  }
+  for (CampaignRun& run : validation) {
+    if (auto* simulated = std::get_if<SimulatedRun>(&run.source)) {
+      simulated->scenario.config.seed += options.seed_offset;
+    }
   }
   const cli::StopSignals signals;
   std::optional<cli::Progress> progress;
-  const CollectedRuns collected = CollectRuns(
-      campaign.validation, directory, {context.software, cli::NowNs(), 0},
-      [&](double share, const std::string& what) {
-        if (signals.stop_requested()) {
-          throw Interrupted("interrupted");
-        }
-        if (!progress) {
-          progress.emplace("simulate");
-        }
-        progress->Update(share, what);
-      });
+  const CollectedRuns collected =
+      CollectRuns(validation, directory, {context.software, cli::NowNs(), 0},
+                  [&](double share, const std::string& what) {
+                    if (signals.stop_requested()) {
+                      throw Interrupted("interrupted");
+                    }
+                    if (!progress) {
+                      progress.emplace("simulate");
+                    }
+                    progress->Update(share, what);
+                  });
   if (progress) {
     progress->Finish();
   }
   storage::RunStore store(directory.runs());
-  for (std::size_t i = 0; i < campaign.validation.size(); ++i) {
-    runs.push_back({store.Load(collected.selectors[i]),
-                    RunLabel(campaign.validation[i]),
-                    campaign.validation[i].horizon_s});
+  for (std::size_t i = 0; i < validation.size(); ++i) {
+    runs.push_back({store.Load(collected.selectors[i]), RunLabel(validation[i]),
+                    validation[i].horizon_s});
   }
 }
 
@@ -159,7 +165,7 @@ std::vector<ScoredRun> LoadRuns(const EvaluateOptions& options,
     runs.push_back({std::move(run), std::move(name), 0.0});
   };
   if (!options.campaign.empty()) {
-    AddValidation(options.campaign, context, directory, runs);
+    AddValidation(options, context, directory, runs);
   }
   if (!options.runs.empty()) {
     storage::RunStore store(directory.runs());
@@ -253,6 +259,10 @@ void AddOptions(CLI::App& verb, EvaluateOptions& options) {
   verb.add_option("--campaign", options.campaign,
                   "Its validation runs; simulates or imports what is missing")
       ->type_name("FILE.toml");
+  verb.add_option("--seed-offset", options.seed_offset,
+                  "Added to the seeds of simulated validation runs")
+      ->check(CLI::Range(0, 1000000000))
+      ->type_name("N");
   verb.add_option("--map", options.map,
                   "TOML file: names, units, scale, offset, sense of columns")
       ->type_name("FILE.toml")

@@ -43,6 +43,10 @@ Campaign MakeCampaign(const TrainOptions& options) {
   Campaign campaign;
   if (!options.campaign.empty()) {
     campaign = LoadCampaign(options.campaign);
+    if (campaign.runs.empty()) {
+      throw ConfigError(options.campaign.string() +
+                        ": there is no [[run]] to train on");
+    }
   } else {
     campaign.training = PresetOptions(options.preset);
     for (const std::string& run : options.runs) {
