@@ -1,6 +1,7 @@
 #include "trainer/app/model_report.h"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 #include "diagnosis/fault_catalogue.h"
@@ -36,6 +37,29 @@ void PrintChannels(std::ostream& out, const ModelSet& models) {
                   RegressorsText(models.observers[0].channels[c].model)});
   }
   table.Print(out);
+}
+
+// Limits on windows, if there are any.
+void PrintWindows(std::ostream& out, const ModelSet& models) {
+  cli::TextTable table({{"channel"},
+                        {"window [samples]", Align::kRight},
+                        {"mean below", Align::kRight},
+                        {"mean above", Align::kRight},
+                        {"deviation above", Align::kRight}});
+  bool any = false;
+  for (const ChannelSpec& channel : models.channels) {
+    for (const WindowLimits& window : channel.windows) {
+      any = true;
+      table.AddRow({channel.name, std::to_string(window.length),
+                    FormatNumber(window.lower_mean, 3),
+                    FormatNumber(window.upper_mean, 3),
+                    FormatNumber(std::exp(window.upper_log_rms), 3)});
+    }
+  }
+  if (any) {
+    out << '\n';
+    table.Print(out);
+  }
 }
 
 void PrintObservers(std::ostream& out, const ModelSet& models) {
@@ -116,6 +140,7 @@ std::string GroupsText(const ModelSet& models) {
 
 void PrintModels(std::ostream& out, const ModelSet& models) {
   PrintChannels(out, models);
+  PrintWindows(out, models);
   out << '\n';
   PrintObservers(out, models);
   out << "\nnot told apart: " << GroupsText(models)

@@ -95,11 +95,23 @@ cli::Json DecisionJson(const DecisionParameters& d) {
           {"isolation_samples", d.isolation_samples},
           {"isolation_fraction", d.isolation_fraction},
           {"join_fraction", d.join_fraction},
+          {"reisolation_samples", d.reisolation_samples},
           {"clearing_samples", d.clearing_samples},
           {"settling_samples", d.settling_samples},
           {"evidence_window", d.evidence_window},
           {"evidence_core", d.evidence_core},
           {"evidence_support", d.evidence_support}};
+}
+
+cli::Json WindowsJson(const ChannelSpec& channel) {
+  cli::Json windows = cli::Json::array();
+  for (const WindowLimits& window : channel.windows) {
+    windows.push_back({{"length", window.length},
+                       {"lower_mean", window.lower_mean},
+                       {"upper_mean", window.upper_mean},
+                       {"upper_log_rms", window.upper_log_rms}});
+  }
+  return windows;
 }
 
 cli::Json RuleJson(const TsRule& rule) {
@@ -110,10 +122,9 @@ cli::Json RuleJson(const TsRule& rule) {
                     {"left_width", set.left_width},
                     {"right_width", set.right_width}});
   }
-  return {{"antecedents", std::move(sets)},
-          {"slopes", rule.slopes},
-          {"intercept", rule.intercept},
-          {"data_share", rule.data_share}};
+  return {{"antecedents", std::move(sets)}, {"center", rule.center},
+          {"metric", rule.metric},          {"slopes", rule.slopes},
+          {"intercept", rule.intercept},    {"data_share", rule.data_share}};
 }
 
 void AddRules(const ModelSet& models, cli::Json& json) {
@@ -151,7 +162,8 @@ cli::Json SetJson(const ModelSet& models, bool active, bool rules) {
          {"output", SignalName(channel.output)},
          {"unit", UnitOf(channel.output, models.flow_unit)},
          {"lower_threshold", channel.lower_threshold},
-         {"upper_threshold", channel.upper_threshold}});
+         {"upper_threshold", channel.upper_threshold},
+         {"windows", WindowsJson(channel)}});
   }
   if (rules) {
     AddRules(models, json);
