@@ -6,11 +6,11 @@
 #include <limits>
 
 #include "diagnosis/clearing.h"
+#include "diagnosis/detection.h"
 #include "diagnosis/error.h"
 #include "diagnosis/fault_bank.h"
 #include "diagnosis/isolation.h"
 #include "diagnosis/observer_bank.h"
-#include "diagnosis/residual_windows.h"
 #include "diagnosis/source_order.h"
 
 namespace fdi {
@@ -51,15 +51,6 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
 
 }  // namespace
 
-// Consecutive residuals beyond one threshold.
-struct AbnormalRun {
-  int length{0};
-  std::int64_t since_ns{0};
-};
-
-// Below and above of the residual; of each window below, above and energy.
-constexpr std::size_t kTestsPerChannel = 2 + 3 * kMaxWindows;
-
 // What depends on the model set; replaced as a whole by Adopt().
 struct Diagnosis {
   explicit Diagnosis(std::shared_ptr<const ModelSet> set)
@@ -67,7 +58,7 @@ struct Diagnosis {
         required(RequiredSignals(*models)),
         bank(*models),
         faults(*models),
-        windows(*models),
+        detection(*models),
         isolation(models->decision),
         clearing(*models) {}
 
@@ -75,7 +66,7 @@ struct Diagnosis {
   SignalMask required;
   ObserverBank bank;
   FaultBank faults;
-  ResidualWindows windows;
+  Detection detection;
   IsolationWindow isolation;
   ClearingWindow clearing;
 };
@@ -109,9 +100,6 @@ class ValveEngine::Impl {
             EndReason reason = EndReason::kNone);
   Transition Make(TransitionKind kind, std::int64_t stamp_ns,
                   EndReason reason) const;
-  bool CountAbnormal();
-  void Count(std::size_t test, bool beyond);
-  std::optional<std::int64_t> DetectionStamp() const;
 
   std::unique_ptr<Diagnosis> diagnosis_;
   SourceOrder order_;
@@ -119,7 +107,6 @@ class ValveEngine::Impl {
   bool needs_initialisation_{true};
   int settling_{0};
   SignalMask present_{0};
-  std::array<AbnormalRun, kTestsPerChannel * kMaxChannels> runs_{};
   std::int64_t detection_stamp_ns_{0};
   FaultSet contender_{0};  // another set than the isolated one
   int contender_run_{0};
@@ -186,8 +173,7 @@ void ValveEngine::Impl::Initialise(const Sample& sample) {
   diagnosis_->bank.Initialise(sample);
   present_ = sample.present;
   needs_initialisation_ = false;
-  diagnosis_->windows.Restart();
-  runs_.fill({});
+  diagnosis_->detection.Restart();
   settling_ = std::max(models().decision.settling_samples, kMaxLag);
   verdict_.initialised = true;
 }
@@ -223,63 +209,10 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
   return Quality::kLive;
 }
 
-// What is left of a residual when the extrapolation in it is taken away.
-double Certain(double residual, double uncertain) {
-  return std::copysign(std::max(std::abs(residual) - uncertain, 0.0), residual);
-}
-
-// Counts runs per channel and test, as the limits were fitted: noise that
-// passes one limit now and another one next is no detection. Returns whether a
-// single residual is beyond its threshold.
-bool ValveEngine::Impl::CountAbnormal() {
-  std::array<double, kMaxChannels> certain{};
-  for (std::size_t c = 0; c < models().channels.size(); ++c) {
-    const double uncertain =
-        kExtrapolationError *
-        diagnosis_->bank.extrapolation(0, static_cast<int>(c));
-    certain[c] = Certain(verdict_.residuals[c], uncertain);
-  }
-  diagnosis_->windows.Push({certain.data(), models().channels.size()});
-  bool abnormal = false;
-  for (std::size_t c = 0; c < models().channels.size(); ++c) {
-    const ChannelSpec& channel = models().channels[c];
-    std::size_t test = c * kTestsPerChannel;
-    const bool below = certain[c] < channel.lower_threshold;
-    const bool above = certain[c] > channel.upper_threshold;
-    abnormal = abnormal || below || above;
-    Count(test++, below);
-    Count(test++, above);
-    for (std::size_t w = 0; w < channel.windows.size(); ++w) {
-      const WindowLimits& limits = channel.windows[w];
-      const ResidualWindow& window = diagnosis_->windows.window(c, w);
-      Count(test++, window.full() && window.mean() < limits.lower_mean);
-      Count(test++, window.full() && window.mean() > limits.upper_mean);
-      Count(test++, window.full() && window.log_rms() > limits.upper_log_rms);
-    }
-  }
-  return abnormal;
-}
-
-void ValveEngine::Impl::Count(std::size_t test, bool beyond) {
-  AbnormalRun& run = runs_[test];
-  run.since_ns = beyond && run.length == 0 ? verdict_.stamp_ns : run.since_ns;
-  run.length = beyond ? run.length + 1 : 0;
-}
-
-// Start of the earliest run that is long enough for a detection.
-std::optional<std::int64_t> ValveEngine::Impl::DetectionStamp() const {
-  std::optional<std::int64_t> stamp;
-  for (const AbnormalRun& run : runs_) {
-    if (run.length >= models().decision.detection_samples) {
-      stamp = std::min(stamp.value_or(run.since_ns), run.since_ns);
-    }
-  }
-  return stamp;
-}
-
 void ValveEngine::Impl::Decide() {
-  const bool abnormal = CountAbnormal();
-  const std::optional<std::int64_t> stamp = DetectionStamp();
+  const bool abnormal =
+      diagnosis_->detection.Push(diagnosis_->bank, verdict_.stamp_ns);
+  const std::optional<std::int64_t> stamp = diagnosis_->detection.stamp_ns();
   const bool begins = !episode_open() && stamp.has_value();
   if (!episode_open() && !begins) {
     return;
@@ -303,8 +236,7 @@ void ValveEngine::Impl::Decide() {
     Emit(TransitionKind::kClosed, verdict_.stamp_ns, EndReason::kCleared);
     verdict_.state = State::kNormal;
     verdict_.isolated = 0;
-    diagnosis_->windows.Restart();
-    runs_.fill({});
+    diagnosis_->detection.Restart();
   }
 }
 

@@ -11,6 +11,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/calibration.h"
+#include "trainer/cross_validation.h"
 #include "trainer/observer_adaptation.h"
 #include "trainer/parallel_for.h"
 #include "trainer/regression.h"
@@ -19,7 +20,6 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr int kFolds = 4;
 constexpr std::size_t kFewResiduals = 20;
 constexpr double kLeastSd = 1e-6;
 constexpr double kLeastDeviation = 0.2;  // of the normal residual's
@@ -110,71 +110,6 @@ ChannelObserver FitObserver(const ChannelPlan& plan,
   AdaptedModel adapted = AdaptModel(normal_model, condition);
   return Calibrate(std::move(adapted.model), adapted.residuals, adapted.outputs,
                    least);
-}
-
-struct Fold {
-  Condition rest;
-  std::vector<Stretch> block;
-};
-
-// Every kFolds-th stretch and the others; of few stretches block f of kFolds of
-// each, and the rest of it.
-Fold MakeFold(const Condition& normal, int fold) {
-  Fold result;
-  const bool whole_stretches = normal.training.size() >= 2 * kFolds;
-  for (std::size_t i = 0; i < normal.training.size(); ++i) {
-    std::vector<Sample> whole = normal.training[i].samples;
-    const auto& tail = normal.validation[i].samples;
-    whole.insert(whole.end(), tail.begin(), tail.end());
-    const std::string& id = normal.training[i].run_id;
-    if (whole_stretches) {
-      const bool left_out = static_cast<int>(i % kFolds) == fold;
-      (left_out ? result.block : result.rest.training)
-          .push_back({id, std::move(whole)});
-      continue;
-    }
-    const auto cut = [&](int f) {
-      return whole.begin() +
-             static_cast<std::ptrdiff_t>(whole.size() *
-                                         static_cast<std::size_t>(f) / kFolds);
-    };
-    result.block.push_back({id, {cut(fold), cut(fold + 1)}});
-    result.rest.training.push_back({id, {whole.begin(), cut(fold)}});
-    result.rest.training.push_back({id, {cut(fold + 1), whole.end()}});
-  }
-  std::erase_if(result.rest.training,
-                [](const Stretch& s) { return s.samples.empty(); });
-  result.rest.validation = result.block;
-  return result;
-}
-
-// Residuals of normal operation that no model was fitted to: every fold is
-// predicted by a model of the others. By channel, one series per stretch.
-std::vector<ResidualSeries> CrossValidate(const Condition& normal,
-                                          const ModelSet& models,
-                                          const TrainingOptions& options) {
-  const std::size_t channels = models.channels.size();
-  std::vector<ResidualSeries> parts(channels * kFolds);
-  ParallelFor(static_cast<int>(parts.size()), options.threads, [&](int i) {
-    const auto c = static_cast<std::size_t>(i / kFolds);
-    const Fold fold = MakeFold(normal, i % kFolds);
-    const TsModel& chosen = models.observers.front().channels[c].model;
-    FitOptions fixed = options.fit;
-    fixed.rules.counts = {static_cast<int>(chosen.rules.size())};
-    fixed.rules.min_rules = fixed.rules.counts.front();
-    const TsModel model = FitChannel(options.channels[c], chosen.regressors,
-                                     fold.rest, fixed, chosen.saturation);
-    for (const Stretch& stretch : fold.block) {
-      parts[static_cast<std::size_t>(i)].push_back(
-          RunResiduals(model, stretch, options.fit.settling));
-    }
-  });
-  std::vector<ResidualSeries> joined(channels);
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    auto& series = joined[i / kFolds];
-    series.insert(series.end(), parts[i].begin(), parts[i].end());
-  }
-  return joined;
 }
 
 SignalRange TrainedCommands(const std::vector<Condition>& conditions) {
@@ -290,7 +225,8 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
   });
   reporter.Tell(kStructureShare + kObserverShare, "setting thresholds");
   const auto normal_residuals =
-      CrossValidate(conditions.front(), models, options);
+      CrossValidate(conditions.front(), models.observers.front(),
+                    options.channels, options.fit, options.threads);
   CalibrateNormal(normal_residuals, models.observers.front());
   std::vector<std::vector<int>> windows;
   for (const ChannelPlan& plan : options.channels) {

@@ -1,0 +1,74 @@
+#include "diagnosis/detection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace fdi {
+namespace {
+
+// What is left of a residual when the extrapolation in it is taken away.
+double Certain(double residual, double uncertain) {
+  return std::copysign(std::max(std::abs(residual) - uncertain, 0.0), residual);
+}
+
+}  // namespace
+
+Detection::Detection(const ModelSet& models)
+    : models_(&models), windows_(models) {}
+
+void Detection::Restart() {
+  windows_.Restart();
+  runs_.fill({});
+}
+
+bool Detection::Push(const ObserverBank& bank, std::int64_t stamp_ns) {
+  const std::size_t channels = models_->channels.size();
+  std::array<double, kMaxChannels> certain{};
+  for (std::size_t c = 0; c < channels; ++c) {
+    const int channel = static_cast<int>(c);
+    certain[c] =
+        bank.active(channel)
+            ? Certain(bank.residual(0, channel),
+                      kExtrapolationError * bank.extrapolation(0, channel))
+            : std::numeric_limits<double>::quiet_NaN();
+  }
+  windows_.Push({certain.data(), channels});
+  bool abnormal = false;
+  for (std::size_t c = 0; c < channels; ++c) {
+    const ChannelSpec& channel = models_->channels[c];
+    std::size_t test = c * kTestsPerChannel;
+    const bool below = certain[c] < channel.lower_threshold;
+    const bool above = certain[c] > channel.upper_threshold;
+    abnormal = abnormal || below || above;
+    Count(test++, below, stamp_ns);
+    Count(test++, above, stamp_ns);
+    for (std::size_t w = 0; w < channel.windows.size(); ++w) {
+      const WindowLimits& limits = channel.windows[w];
+      const ResidualWindow& window = windows_.window(c, w);
+      const bool full = window.full();
+      Count(test++, full && window.mean() < limits.lower_mean, stamp_ns);
+      Count(test++, full && window.mean() > limits.upper_mean, stamp_ns);
+      Count(test++, full && window.log_rms() > limits.upper_log_rms, stamp_ns);
+    }
+  }
+  return abnormal;
+}
+
+void Detection::Count(std::size_t test, bool beyond, std::int64_t stamp_ns) {
+  Run& run = runs_[test];
+  run.since_ns = beyond && run.length == 0 ? stamp_ns : run.since_ns;
+  run.length = beyond ? run.length + 1 : 0;
+}
+
+std::optional<std::int64_t> Detection::stamp_ns() const {
+  std::optional<std::int64_t> stamp;
+  for (const Run& run : runs_) {
+    if (run.length >= models_->decision.detection_samples) {
+      stamp = std::min(stamp.value_or(run.since_ns), run.since_ns);
+    }
+  }
+  return stamp;
+}
+
+}  // namespace fdi

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "diagnosis/observer_bank.h"
+#include "diagnosis/residual_windows.h"
+
+namespace fdi {
+
+/// Detects a fault: equation (1) on the residuals of the normal observer, and
+/// alike on their windows. Each test counts for itself, as its limits were
+/// fitted: noise that passes one limit now and another one next is no
+/// detection. What extrapolation put into a residual is taken away first.
+class Detection {
+ public:
+  /// `models` must outlive the detection.
+  explicit Detection(const ModelSet& models);
+
+  void Restart();
+
+  /// Takes the residuals of one sample. Returns whether a single residual is
+  /// beyond its threshold.
+  bool Push(const ObserverBank& bank, std::int64_t stamp_ns);
+
+  /// First sample of the earliest run beyond a limit that is n_d long.
+  std::optional<std::int64_t> stamp_ns() const;
+
+ private:
+  struct Run {  // samples beyond one limit, without a break
+    int length{0};
+    std::int64_t since_ns{0};
+  };
+  // Below and above of the residual; of each window below, above and energy.
+  static constexpr std::size_t kTestsPerChannel = 2 + 3 * kMaxWindows;
+
+  void Count(std::size_t test, bool beyond, std::int64_t stamp_ns);
+
+  const ModelSet* models_;
+  ResidualWindows windows_;
+  std::array<Run, kTestsPerChannel * kMaxChannels> runs_{};
+};
+
+}  // namespace fdi
