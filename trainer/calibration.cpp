@@ -14,9 +14,11 @@ constexpr double kCoreQuantile = 0.05;
 constexpr double kSupportMargin = 1.0;  // standard deviations
 constexpr int kFewestWindows = 5;       // to fit limits to
 constexpr int kFewestValues = 100;
-// Under inputs unlike those of the training a model is biased: no limit on a
-// mean is closer than this share of the deviation.
+// Under inputs unlike those of the training a model errs more: no limit on a
+// mean is closer than this share of the deviation, none on the deviation closer
+// than so many times it.
 constexpr double kLeastMean = 0.5;
+constexpr double kLeastDeviation = 1.4;
 
 double Mean(std::span<const double> values) {
   double sum = 0.0;
@@ -81,10 +83,11 @@ void FitWindow(const ResidualSeries& residuals, int length, double share,
   const auto level = [&](const std::vector<double>& values) {
     return FitTail(values, share, 2 * length).level;
   };
-  const double least =
-      kLeastMean * std::sqrt(Variance(Joined(residuals))) + 1e-6;
-  channel.windows.push_back({length, -std::max(level(below), least),
-                             std::max(level(above), least), level(energy)});
+  const double sd = std::sqrt(Variance(Joined(residuals))) + 1e-6;
+  const double least = kLeastMean * sd;
+  channel.windows.push_back(
+      {length, -std::max(level(below), least), std::max(level(above), least),
+       std::max(level(energy), std::log(kLeastDeviation * sd))});
 }
 
 }  // namespace
