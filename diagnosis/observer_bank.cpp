@@ -38,13 +38,6 @@ bool Beyond(const TsModel& model, const std::array<double, kMaxRegressors>& x,
   return beyond;
 }
 
-bool ReadsOwnPast(const TsModel& model) {
-  return model.parallel &&
-         std::any_of(
-             model.regressors.begin(), model.regressors.end(),
-             [&](const Regressor& r) { return r.signal == model.output; });
-}
-
 }  // namespace
 
 ObserverBank::ObserverBank(const ModelSet& models)
@@ -72,7 +65,7 @@ void ObserverBank::MakeGroups() {
   for (std::size_t slot = 0; slot < predictions_.size(); ++slot) {
     const std::size_t channel = slot % models_->channels.size();
     const auto fits = [&](const Group& group) {
-      return group.channel == channel && !ReadsOwnPast(Model(slot)) &&
+      return group.channel == channel && !RunsOnItself(Model(slot)) &&
              SharesAntecedents(Model(group.slots.front()), Model(slot));
     };
     const auto group = std::find_if(groups_.begin(), groups_.end(), fits);

@@ -217,9 +217,7 @@ void StrengthTracker::Search(const ObserverBank& bank) {
       if (std::isnan(p.residual)) {
         continue;
       }
-      cost += (std::min(p.residual * p.residual / p.variance, kOutlier) +
-               (bank.saturated(c) ? 0.0 : std::log(p.variance))) /
-              channel_times_[static_cast<std::size_t>(c)];
+      cost -= 2.0 * Gain(bank, c, p.residual, p.variance);
     }
     cell_cost_[static_cast<std::size_t>(cell)] += cost;
   }
@@ -254,10 +252,7 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
     const double spread =
         p.variance + p.slope * p.slope * std::min(var_strength_, 1.0);
     const double distance = p.residual * p.residual / spread;
-    const double bounded = std::min(distance, kOutlier);
-    evidence_ -= 0.5 *
-                 (bounded + (bank.saturated(c) ? 0.0 : std::log(spread))) /
-                 channel_times_[static_cast<std::size_t>(c)];
+    evidence_ += Gain(bank, c, p.residual, spread);
     if (p.slope == 0.0 || segments_.empty()) {
       continue;
     }

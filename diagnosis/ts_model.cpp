@@ -257,6 +257,13 @@ double Residual(const TsModel& model, double reading, double prediction) {
              : reading - std::min(prediction, model.saturation);
 }
 
+bool RunsOnItself(const TsModel& model) {
+  return model.parallel &&
+         std::any_of(
+             model.regressors.begin(), model.regressors.end(),
+             [&](const Regressor& r) { return r.signal == model.output; });
+}
+
 int LongestLag(const TsModel& model) {
   int longest = 0;
   for (const Regressor& regressor : model.regressors) {

@@ -103,6 +103,9 @@ bool SharesAntecedents(const TsModel& a, const TsModel& b);
 /// limit of the transmitter, where they say nothing about each other.
 double Residual(const TsModel& model, double reading, double prediction);
 
+/// True if the model is parallel and has its own output among its regressors.
+bool RunsOnItself(const TsModel& model);
+
 /// The largest lag of the regressors.
 int LongestLag(const TsModel& model);
 

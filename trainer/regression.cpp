@@ -19,13 +19,6 @@ int LongestLagOf(const std::vector<Regressor>& regressors) {
 
 }  // namespace
 
-bool RunsOnItself(const TsModel& model) {
-  return model.parallel &&
-         std::any_of(
-             model.regressors.begin(), model.regressors.end(),
-             [&](const Regressor& r) { return r.signal == model.output; });
-}
-
 RegressionData BuildRegression(std::span<const Stretch> stretches,
                                const std::vector<Regressor>& regressors,
                                Signal output) {

@@ -42,9 +42,6 @@ std::vector<double> RunResiduals(const TsModel& model,
 std::vector<double> RunOutputs(const TsModel& model, const Stretch& stretch,
                                int settling);
 
-/// True if the model is parallel and has its own output among its regressors.
-bool RunsOnItself(const TsModel& model);
-
 /// A model around `rules` with the ranges and the saturation of `data`, and an
 /// output that may leave the trained range by half of it.
 TsModel MakeModel(std::vector<TsRule> rules, const RegressionData& data,
