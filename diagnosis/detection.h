@@ -24,6 +24,10 @@ class Detection {
   /// beyond its threshold.
   bool Push(const ObserverBank& bank, std::int64_t stamp_ns);
 
+  void Save(SnapshotWriter& writer) const { windows_.Save(writer); }
+  /// @returns false, leaving windows undefined, if they are not to be read.
+  bool Restore(SnapshotReader& reader) { return windows_.Restore(reader); }
+
   /// First sample of the earliest run beyond a limit that is n_d long.
   std::optional<std::int64_t> stamp_ns() const;
 

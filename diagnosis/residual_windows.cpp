@@ -22,6 +22,17 @@ double ResidualWindow::log_rms() const {
   return 0.5 * std::log(std::max(variance_, kLeastVariance));
 }
 
+void ResidualWindow::Save(SnapshotWriter& writer) const {
+  writer.Put(length_, count_, mean_, variance_);
+}
+
+bool ResidualWindow::Restore(SnapshotReader& reader) {
+  int length = 0;
+  return reader.Get(length, count_, mean_, variance_) && length == length_ &&
+         count_ >= 0 && count_ <= length_ && std::isfinite(mean_) &&
+         std::isfinite(variance_) && variance_ >= 0.0;
+}
+
 bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window) {
   return window.full() && (window.mean() < limits.lower_mean ||
                            window.mean() > limits.upper_mean ||
@@ -54,6 +65,25 @@ void ResidualWindows::Push(std::span<const double> residuals) {
       window.Push(residuals[c]);
     }
   }
+}
+
+void ResidualWindows::Save(SnapshotWriter& writer) const {
+  for (const auto& channel : windows_) {
+    for (const ResidualWindow& window : channel) {
+      window.Save(writer);
+    }
+  }
+}
+
+bool ResidualWindows::Restore(SnapshotReader& reader) {
+  for (auto& channel : windows_) {
+    for (ResidualWindow& window : channel) {
+      if (!window.Restore(reader)) {
+        return false;
+      }
+    }
+  }
+  return true;
 }
 
 }  // namespace fdi

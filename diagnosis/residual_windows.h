@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/snapshot.h"
 
 namespace fdi {
 
@@ -26,6 +27,10 @@ class ResidualWindow {
   double mean() const { return mean_; }
   double log_rms() const;
 
+  void Save(SnapshotWriter& writer) const;
+  /// @returns false if there is no window of this length to be read.
+  bool Restore(SnapshotReader& reader);
+
  private:
   int length_;
   int count_{0};
@@ -45,6 +50,9 @@ class ResidualWindows {
 
   /// @param residuals of the normal observer, one per channel; NaN abstains.
   void Push(std::span<const double> residuals);
+
+  void Save(SnapshotWriter& writer) const;
+  bool Restore(SnapshotReader& reader);
 
   const ResidualWindow& window(std::size_t channel, std::size_t index) const {
     return windows_[channel][index];

@@ -11,10 +11,14 @@
 #include "diagnosis/fault_bank.h"
 #include "diagnosis/isolation.h"
 #include "diagnosis/observer_bank.h"
+#include "diagnosis/snapshot.h"
 #include "diagnosis/source_order.h"
 
 namespace fdi {
 namespace {
+
+constexpr std::uint32_t kSnapshotFormat = 1;
+constexpr std::int64_t kSnapshotLifeNs = 600'000'000'000;
 
 std::shared_ptr<const ModelSet> Checked(
     std::shared_ptr<const ModelSet> models) {
@@ -51,6 +55,12 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
 
 }  // namespace
 
+// Accumulators of a snapshot that wait for the next sample.
+struct Resumed {
+  std::int64_t stamp_ns;
+  Detection detection;
+};
+
 // What depends on the model set; replaced as a whole by Adopt().
 struct Diagnosis {
   explicit Diagnosis(std::shared_ptr<const ModelSet> set)
@@ -69,6 +79,7 @@ struct Diagnosis {
   Detection detection;
   IsolationWindow isolation;
   ClearingWindow clearing;
+  std::unique_ptr<Resumed> resumed;
 };
 
 class ValveEngine::Impl {
@@ -82,6 +93,8 @@ class ValveEngine::Impl {
   const Verdict& Step(const Sample& sample);
   std::optional<Transition> EndEpisode(EndReason reason);
   std::optional<Transition> Adopt(std::shared_ptr<const ModelSet> models);
+  std::vector<std::byte> Save() const;
+  bool Restore(std::span<const std::byte> bytes);
 
   const ModelSet& models() const { return *diagnosis_->models; }
   bool episode_open() const { return verdict_.state != State::kNormal; }
@@ -90,6 +103,7 @@ class ValveEngine::Impl {
   void ClearVerdict();
   void Reject(Intake intake);
   void Initialise(const Sample& sample);
+  void Resume(std::int64_t stamp_ns);
   void ReadResiduals();
   Quality Judge(const Sample& sample);
   void Decide();
@@ -174,6 +188,7 @@ void ValveEngine::Impl::Initialise(const Sample& sample) {
   present_ = sample.present;
   needs_initialisation_ = false;
   diagnosis_->detection.Restart();
+  Resume(sample.stamp_ns);
   settling_ = std::max(models().decision.settling_samples, kMaxLag);
   verdict_.initialised = true;
 }
@@ -348,6 +363,36 @@ std::optional<Transition> ValveEngine::Impl::Adopt(
   return closed;
 }
 
+std::vector<std::byte> ValveEngine::Impl::Save() const {
+  SnapshotWriter writer;
+  writer.Put(kSnapshotFormat, models().content_hash, verdict_.stamp_ns);
+  diagnosis_->detection.Save(writer);
+  return writer.Take();
+}
+
+bool ValveEngine::Impl::Restore(std::span<const std::byte> bytes) {
+  SnapshotReader reader(bytes);
+  std::uint32_t format = 0;
+  std::uint64_t content_hash = 0;
+  Resumed resumed{0, Detection(models())};
+  if (!reader.Get(format, content_hash, resumed.stamp_ns) ||
+      format != kSnapshotFormat || content_hash != models().content_hash ||
+      !resumed.detection.Restore(reader) || !reader.AtEnd()) {
+    return false;
+  }
+  diagnosis_->resumed = std::make_unique<Resumed>(std::move(resumed));
+  return true;
+}
+
+// Takes up a snapshot that is recent at `stamp_ns`; it serves once.
+void ValveEngine::Impl::Resume(std::int64_t stamp_ns) {
+  const std::unique_ptr<Resumed> resumed = std::move(diagnosis_->resumed);
+  if (resumed && stamp_ns > resumed->stamp_ns &&
+      stamp_ns - resumed->stamp_ns <= kSnapshotLifeNs) {
+    diagnosis_->detection = std::move(resumed->detection);
+  }
+}
+
 ValveEngine::ValveEngine(std::shared_ptr<const ModelSet> models)
     : impl_(std::make_unique<Impl>(std::move(models))) {}
 ValveEngine::~ValveEngine() = default;
@@ -365,6 +410,14 @@ std::optional<Transition> ValveEngine::EndEpisode(EndReason reason) {
 std::optional<Transition> ValveEngine::Adopt(
     std::shared_ptr<const ModelSet> models) {
   return impl_->Adopt(std::move(models));
+}
+
+std::vector<std::byte> ValveEngine::Save() const {
+  return impl_->Save();
+}
+
+bool ValveEngine::Restore(std::span<const std::byte> bytes) {
+  return impl_->Restore(bytes);
 }
 
 const ModelSet& ValveEngine::models() const {

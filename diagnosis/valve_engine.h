@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "diagnosis/model_set.h"
 #include "diagnosis/sample.h"
@@ -36,6 +39,17 @@ class ValveEngine {
   /// Continues with another model set from the next sample on; order and
   /// source of the samples stay known. As EndEpisode(kModelChanged).
   std::optional<Transition> Adopt(std::shared_ptr<const ModelSet> models);
+
+  /// The slow accumulators, for Restore() after a restart of the program:
+  /// windows of detection, with the stamp of the last sample and the content
+  /// hash of the model set. An open episode is not among them.
+  std::vector<std::byte> Save() const;
+
+  /// Goes on with what Save() gave, if the next sample that reaches the
+  /// observers is at most 10 minutes younger; otherwise it counts for nothing.
+  /// @returns false and changes nothing if the bytes are damaged, of another
+  ///   format or of another model set.
+  bool Restore(std::span<const std::byte> bytes);
 
   const ModelSet& models() const;
   bool episode_open() const;
