@@ -10,7 +10,7 @@
 namespace fdi {
 namespace {
 
-constexpr std::array<FaultFacts, kFaultCount> kFaults{{
+constexpr std::array<FaultFacts, kLastFault> kFaults{{
     {"f1", "valve clogging", "F1", false},
     {"f2", "plug or seat sedimentation", "", false},
     {"f3", "plug or seat erosion", "F2", false},
@@ -30,6 +30,9 @@ constexpr std::array<FaultFacts, kFaultCount> kFaults{{
     {"f17", "unexpected pressure change across the valve", "", true},
     {"f18", "bypass valve open", "", false},
     {"f19", "flow sensor fault", "F5", true},
+    {"t1", "temperature transmitter fault", "", true},
+    {"p1", "inlet pressure transmitter fault", "", true},
+    {"p2", "outlet pressure transmitter fault", "", true},
 }};
 
 constexpr std::array<int, 5> kPaperFaults{1, 3, 6, 7, 19};
@@ -51,7 +54,7 @@ std::optional<int> NumberAfter(std::string_view text, std::string_view prefix) {
 }  // namespace
 
 const FaultFacts& FaultFactsOf(int fault) {
-  Require(fault >= 1 && fault <= kFaultCount, "fault must be in 1..19");
+  Require(fault >= 1 && fault <= kLastFault, "fault must be in 1..22");
   return kFaults[static_cast<std::size_t>(fault - 1)];
 }
 
@@ -59,7 +62,7 @@ std::string FaultName(int fault) {
   if (fault == 0) {
     return "normal";
   }
-  if (fault < 0 || fault > kFaultCount) {
+  if (fault < 0 || fault > kLastFault) {
     return "unknown";
   }
   return std::string(FaultFactsOf(fault).name);
@@ -80,15 +83,33 @@ std::optional<int> ParseFault(std::string_view name) {
   if (number && *number >= 1 && *number <= kFaultCount) {
     return number;
   }
+  for (int fault = kFaultCount + 1; fault <= kLastFault; ++fault) {
+    if (lower == FaultFactsOf(fault).name) {
+      return fault;
+    }
+  }
   return std::nullopt;
+}
+
+std::optional<Signal> TransmitterOf(int fault) {
+  switch (fault) {
+    case kTemperatureTransmitterFault:
+      return Signal::kT1;
+    case kInletPressureTransmitterFault:
+      return Signal::kP1;
+    case kOutletPressureTransmitterFault:
+      return Signal::kP2;
+    default:
+      return std::nullopt;
+  }
 }
 
 int RequireFault(std::string_view name) {
   if (const auto fault = ParseFault(name)) {
     return *fault;
   }
-  throw ConfigError("unknown fault '" + std::string(name) +
-                    "': expected f1..f19 or paper1..paper5");
+  throw ConfigError("unknown fault '" + std::string(name) + "': expected " +
+                    std::string(kFaultNames) + " or paper1..paper5");
 }
 
 }  // namespace fdi

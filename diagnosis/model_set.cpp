@@ -59,7 +59,7 @@ void ValidateObserver(const ModelSet& models, const Observer& observer) {
   const std::string where = "observer '" + observer.name + "': ";
   Check(observer.channels.size() == models.channels.size(), models,
         where + "not one model per channel");
-  Check(observer.fault >= 0 && observer.fault <= kFaultCount, models,
+  Check(observer.fault >= 0 && observer.fault <= kLastFault, models,
         where + "fault beyond f1..f19");
   Check(std::abs(observer.strength) <= 1.0, models,
         where + "strength beyond [-1, 1]");

@@ -92,7 +92,7 @@ struct Sample {
 
 /// The truth beside a simulated or labelled sample; never seen by an engine.
 struct FaultTruth {
-  int fault{0};          ///< 1..19, 0 = none acting.
+  int fault{0};          ///< 1..22, 0 = none acting.
   double strength{0.0};  ///< Signed; 0 while the fault does not act.
 };
 

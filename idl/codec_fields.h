@@ -84,13 +84,13 @@ bool GetArray(const std::vector<double>& wire, Array& values) {
 }
 
 inline bool IsFault(int fault) {
-  return fault >= 1 && fault <= kFaultCount;
+  return fault >= 1 && fault <= kLastFault;
 }
 
 inline std::uint8_t ToWireFault(int fault, const char* field) {
   if (!IsFault(fault) && fault != 0) {
     throw DataError(std::string(field) + " is fault " + std::to_string(fault) +
-                    ", accepted are 0 to " + std::to_string(kFaultCount));
+                    ", accepted are 0 to " + std::to_string(kLastFault));
   }
   return static_cast<std::uint8_t>(fault);
 }

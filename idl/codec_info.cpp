@@ -52,7 +52,7 @@ bool DecodeLists(const v1::ModelSetInfo& wire, ModelSetInfoMessage& message) {
   }
   message.observers.clear();
   for (const v1::ObserverInfo& observer : wire.observers()) {
-    if (observer.fault() > kFaultCount) {
+    if (observer.fault() > kLastFault) {
       return false;
     }
     message.observers.push_back(

@@ -13,7 +13,7 @@ namespace fdi::monitor {
 
 /// A fault in the running of an episode.
 struct Candidate {
-  int fault{0};          ///< 1..19
+  int fault{0};          ///< 1..22
   double factor{0.0};    ///< Decision factor at the transition [-].
   double strength{0.0};  ///< Estimated; signed.
   bool isolated{false};  ///< Member of the isolated set.

@@ -14,7 +14,7 @@ void ExtendLeak(double s, FaultEffects& e) {
   e.air_leak += 0.1 * s * 2e-6;
 }
 
-constexpr Effect kEffects[kFaultCount] = {
+constexpr Effect kEffects[kLastFault] = {
     /* f1 */ [](double s, FaultEffects& e) { e.upper_stop_factor *= 1.0 - s; },
     /* f2 */
     [](double s, FaultEffects& e) {
@@ -59,6 +59,10 @@ constexpr Effect kEffects[kFaultCount] = {
     /* f18 */ [](double s, FaultEffects& e) { e.bypass_opening += s; },
     /* f19 */
     [](double s, FaultEffects& e) { e.flow_reading_factor *= 1.0 - s; },
+    /* t1 */
+    [](double s, FaultEffects& e) { e.temperature_reading_step += s; },
+    /* p1 */ [](double s, FaultEffects& e) { e.inlet_reading_step += s; },
+    /* p2 */ [](double s, FaultEffects& e) { e.outlet_reading_step += s; },
 };
 
 }  // namespace

@@ -25,6 +25,10 @@ struct FaultEffects {
   double outlet_factor{1.0};        ///< On P2.
   double bypass_opening{0.0};       ///< Of V3, 0..1.
   double flow_reading_factor{1.0};  ///< On the flow reading.
+  /// Steps of the readings of T1, P1 and P2, fractions of their span.
+  double temperature_reading_step{0.0};
+  double inlet_reading_step{0.0};
+  double outlet_reading_step{0.0};
 
   friend bool operator==(const FaultEffects&, const FaultEffects&) = default;
 };
@@ -32,11 +36,12 @@ struct FaultEffects {
 /// The water is never hotter than this [degC].
 inline constexpr double kMaxTemperatureC = 300.0;
 
-/// Adds what `fault` (1..19) does at `strength` to `effects`. Several faults
+/// Adds what `fault` (1..22) does at `strength` to `effects`. Several faults
 /// may be combined; strength 0 leaves `effects` as it is.
 ///
-/// Sizes after the DAMADICS benchmark's definition of its faults.
-/// @throws std::invalid_argument if `fault` is not in 1..19 or `strength` is
+/// Sizes after the DAMADICS benchmark's definition of its faults; a transmitter
+/// fault moves the reading by strength x span.
+/// @throws std::invalid_argument if `fault` is not in 1..22 or `strength` is
 ///   outside [0, 1] ([-1, 1] for the signed faults of the catalogue).
 void ApplyFault(int fault, double strength, FaultEffects& effects);
 

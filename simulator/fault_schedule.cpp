@@ -42,17 +42,19 @@ void ReadTimes(std::string_view text, std::string_view profile,
                FaultSchedule& schedule) {
   std::string_view times = profile;
   const std::string_view kind = CutAt(times, '@');
-  if (kind != "abrupt" && kind != "incipient") {
+  if (kind != "abrupt" && kind != "incipient" && kind != "flatline") {
     Refuse(text, "profile '" + std::string(kind) +
-                     "' is neither abrupt nor incipient");
+                     "' is neither abrupt, incipient nor flatline");
   }
+  schedule.flatline = kind == "flatline";
   if (times.empty()) {
     Refuse(text, "the start time after '@' is missing");
   }
   const bool has_duration = times.find('+') != std::string_view::npos;
   if (has_duration != (kind == "incipient")) {
-    Refuse(text, kind == "abrupt" ? "an abrupt fault takes no duration"
-                                  : "the duration after '+' is missing");
+    Refuse(text, kind == "incipient"
+                     ? "the duration after '+' is missing"
+                     : "only an incipient fault takes a duration");
   }
   schedule.start_s = ReadNumber(text, CutAt(times, '+'), "start");
   if (has_duration) {
@@ -67,7 +69,7 @@ void ReadOption(std::string_view text, std::string_view option,
                 FaultSchedule& schedule) {
   std::string_view value = option;
   const std::string_view key = CutAt(value, '=');
-  if (key == "strength") {
+  if (key == "strength" && !schedule.flatline) {
     schedule.final_strength = ReadNumber(text, value, "strength");
   } else if (key == "from" && schedule.development_s > 0.0) {
     schedule.initial_strength = ReadNumber(text, value, "from");
@@ -75,6 +77,8 @@ void ReadOption(std::string_view text, std::string_view option,
     schedule.end_s = ReadNumber(text, value, "until");
   } else if (key == "from") {
     Refuse(text, "'from' belongs to incipient faults");
+  } else if (key == "strength") {
+    Refuse(text, "a flatline has no strength");
   } else {
     Refuse(text, "unknown option '" + std::string(key) + "'");
   }
@@ -114,14 +118,18 @@ FaultSchedule ParseFaultSchedule(std::string_view text) {
 
 std::string ToText(const FaultSchedule& schedule) {
   std::string text = FaultName(schedule.fault);
-  if (schedule.development_s > 0.0) {
+  if (schedule.flatline) {
+    text += ":flatline@" + Shortest(schedule.start_s);
+  } else if (schedule.development_s > 0.0) {
     text += ":incipient@" + Shortest(schedule.start_s) + '+' +
             Shortest(schedule.development_s) +
             ":from=" + Shortest(schedule.initial_strength);
   } else {
     text += ":abrupt@" + Shortest(schedule.start_s);
   }
-  text += ":strength=" + Shortest(schedule.final_strength);
+  if (!schedule.flatline) {
+    text += ":strength=" + Shortest(schedule.final_strength);
+  }
   if (std::isfinite(schedule.end_s)) {
     text += ":until=" + Shortest(schedule.end_s);
   }
@@ -130,7 +138,7 @@ std::string ToText(const FaultSchedule& schedule) {
 
 void Validate(const FaultSchedule& schedule) {
   constexpr double kForever = 1e10;
-  RequireRange("fault number", schedule.fault, 1, kFaultCount);
+  RequireRange("fault number", schedule.fault, 1, kLastFault);
   const double least = FaultFactsOf(schedule.fault).is_signed ? -1.0 : 0.0;
   const std::string name = FaultName(schedule.fault);
   RequireRange("start of " + name + " [s]", schedule.start_s, 0.0, kForever);
@@ -141,6 +149,10 @@ void Validate(const FaultSchedule& schedule) {
                1.0);
   if (!(schedule.end_s > schedule.start_s)) {
     throw ConfigError("end of " + name + " is not after its start");
+  }
+  if (schedule.flatline && !TransmitterOf(schedule.fault)) {
+    throw ConfigError(name + " has no reading that could stay: a flatline is " +
+                      "of t1, p1 or p2");
   }
 }
 
@@ -171,7 +183,9 @@ FaultEffects EffectsAt(const std::vector<FaultSchedule>& schedules,
                        double time_s) {
   FaultEffects effects;
   for (const FaultSchedule& schedule : schedules) {
-    ApplyFault(schedule.fault, StrengthAt(schedule, time_s), effects);
+    if (!schedule.flatline) {
+      ApplyFault(schedule.fault, StrengthAt(schedule, time_s), effects);
+    }
   }
   return effects;
 }

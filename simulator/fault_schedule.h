@@ -14,21 +14,26 @@ namespace fdi::simulator {
 /// linearly from initial_strength to final_strength over development_s, stays
 /// there, and is 0 again from end_s on.
 struct FaultSchedule {
-  int fault{0};               ///< 1..19.
+  int fault{0};               ///< 1..22.
   double start_s{0.0};        ///< From the first sample, >= 0.
   double development_s{0.0};  ///< >= 0; 0 = abrupt.
   double initial_strength{0.0};
   double final_strength{1.0};
   double end_s{std::numeric_limits<double>::infinity()};  ///< > start_s.
+  /// The reading stays what it was at the first sample from start_s on; of t1,
+  /// p1, p2 only. No effect on the process, no development; strength 1.
+  bool flatline{false};
 };
 
 /// The accepted forms, for messages and help.
 inline constexpr std::string_view kFaultForms =
     "FAULT:abrupt@START[:strength=S][:until=T] or "
-    "FAULT:incipient@START+DURATION[:from=S0][:strength=S][:until=T]";
+    "FAULT:incipient@START+DURATION[:from=S0][:strength=S][:until=T] or "
+    "t1|p1|p2:flatline@START[:until=T]";
 
 /// Reads "f19:abrupt@50:strength=0.75" or
-/// "f1:incipient@500+1200:from=0.25:strength=0.6:until=3000"; times in s.
+/// "f1:incipient@500+1200:from=0.25:strength=0.6:until=3000" or
+/// "t1:flatline@50"; times in s.
 /// strength is 1 and from is 0 where they are not given.
 /// @throws ConfigError naming the text, the reason and kFaultForms.
 FaultSchedule ParseFaultSchedule(std::string_view text);
@@ -45,7 +50,7 @@ double StrengthAt(const FaultSchedule& schedule, double time_s);
 /// The first schedule that acts at `time_s`, else {0, 0}.
 FaultTruth TruthAt(const std::vector<FaultSchedule>& schedules, double time_s);
 
-/// All that act at `time_s`, combined.
+/// All that act at `time_s`, combined; flatlines have no effect of this kind.
 FaultEffects EffectsAt(const std::vector<FaultSchedule>& schedules,
                        double time_s);
 

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "simulator/control_valve.h"
 #include "simulator/random.h"
 #include "simulator/require_range.h"
@@ -57,7 +59,8 @@ class ValveSimulation::Impl {
         input_function_(excitation_->AsFunction()),
         noise_(config.seed, 1),
         positioner_noise_(config.seed, 2),
-        valve_(config.parameters, config.tolerance_scale) {}
+        valve_(config.parameters, config.tolerance_scale),
+        held_(config.faults.size()) {}
 
   LabelledSample Step();
 
@@ -72,6 +75,7 @@ class ValveSimulation::Impl {
   ControlValve valve_;
   ProcessInputs inputs_;   // Of the last sample.
   ProcessInputs reached_;  // Pressures up to which the valve is integrated.
+  std::vector<std::optional<double>> held_;  // Per schedule: its flatline.
 
  private:
   double TimeOf(std::uint64_t k) const {
@@ -83,7 +87,8 @@ class ValveSimulation::Impl {
   void AdvanceTo(std::uint64_t k);
   void AdvanceAcrossFaults(double from_s, double to_s,
                            const ProcessInputs& target);
-  double Read(const Transmitter& transmitter, double value);
+  double Read(const Transmitter& transmitter, double value, double step = 0.0);
+  void HoldFlatlines(double time_s, Sample& sample);
   Sample ReadAll(std::uint64_t k);
 };
 
@@ -158,21 +163,36 @@ void ValveSimulation::Impl::AdvanceTo(std::uint64_t k) {
   inputs_ = open_loop ? target : NextInputs();
 }
 
-double ValveSimulation::Impl::Read(const Transmitter& transmitter,
-                                   double value) {
+// `step` is a fault of the transmitter, as a fraction of its span.
+double ValveSimulation::Impl::Read(const Transmitter& transmitter, double value,
+                                   double step) {
   value = std::clamp(value, transmitter.low, transmitter.high);
   if (config_.noise) {
     value = std::clamp(value + transmitter.noise_sd * noise_(), transmitter.low,
                        transmitter.high);
   }
+  value = std::clamp(value + step * (transmitter.high - transmitter.low),
+                     transmitter.low, transmitter.high);
   if (config_.resolution) {
-    const double step =
+    const double digit =
         (transmitter.high - transmitter.low) /
         (std::ldexp(1.0, config_.parameters.instruments.resolution_bits) - 1.0);
     value =
-        transmitter.low + step * std::round((value - transmitter.low) / step);
+        transmitter.low + digit * std::round((value - transmitter.low) / digit);
   }
   return value;
+}
+
+// A flatline starts with the first reading from its start on.
+void ValveSimulation::Impl::HoldFlatlines(double time_s, Sample& sample) {
+  for (std::size_t i = 0; i < config_.faults.size(); ++i) {
+    const FaultSchedule& fault = config_.faults[i];
+    if (fault.flatline && StrengthAt(fault, time_s) != 0.0) {
+      double& reading = sample.values[Index(*TransmitterOf(fault.fault))];
+      held_[i] = held_[i].value_or(reading);
+      reading = *held_[i];
+    }
+  }
 }
 
 Sample ValveSimulation::Impl::ReadAll(std::uint64_t k) {
@@ -190,12 +210,16 @@ Sample ValveSimulation::Impl::ReadAll(std::uint64_t k) {
   sample.seq = k;
   sample.flow_unit = i.flow_unit;
   sample.Set(Signal::kCv, Read(i.command, 100.0 * inputs_.command));
-  sample.Set(Signal::kP1, Read(i.pressure, 1e-3 * seen.inlet_pressure_pa));
-  sample.Set(Signal::kP2, Read(i.pressure, 1e-3 * seen.outlet_pressure_pa));
-  sample.Set(Signal::kT1, Read(i.temperature, seen.temperature_c));
+  sample.Set(Signal::kP1, Read(i.pressure, 1e-3 * seen.inlet_pressure_pa,
+                               effects.inlet_reading_step));
+  sample.Set(Signal::kP2, Read(i.pressure, 1e-3 * seen.outlet_pressure_pa,
+                               effects.outlet_reading_step));
+  sample.Set(Signal::kT1, Read(i.temperature, seen.temperature_c,
+                               effects.temperature_reading_step));
   sample.Set(Signal::kX, Read(i.position, 100.0 * valve_.state().rod *
                                               effects.position_reading_factor));
   sample.Set(Signal::kF, Read(i.flow, flow * effects.flow_reading_factor));
+  HoldFlatlines(TimeOf(k), sample);
   return sample;
 }
 

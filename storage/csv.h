@@ -83,8 +83,8 @@ struct CsvRow {
 ///
 /// Header: t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h (or F_t_h), in any
 /// order and case; optional SP_pct,CVI,Ps_kPa,Pz_kPa; optional truth: fault
-/// (f1..f19, normal) or fault_no (0..19) with fault_strength, where only a
-/// non-zero strength marks a fault. Further columns are ignored.
+/// (f1..f19, t1, p1, p2, normal) or fault_no (0..22) with fault_strength, where
+/// only a non-zero strength marks a fault. Further columns are ignored.
 class CsvReader {
  public:
   /// @throws ConfigError if a map has a flow without its unit.

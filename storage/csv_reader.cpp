@@ -248,15 +248,16 @@ FaultTruth CsvReader::Truth() const {
   int fault = 0;
   if (fault_by_number_) {
     const double number = Number(*fault_column_);
-    if (number != std::floor(number) || number < 0.0 || number > kFaultCount) {
+    if (number != std::floor(number) || number < 0.0 || number > kLastFault) {
       Refuse(name + Quoted(cell) + " is not in 0.." +
-             std::to_string(kFaultCount));
+             std::to_string(kLastFault));
     }
     fault = static_cast<int>(number);
   } else if (!cell.empty() && !SameName(cell, "normal")) {
     const std::optional<int> parsed = ParseFault(cell);
     if (!parsed) {
-      Refuse(name + Quoted(cell) + " is not a fault (f1..f19, normal)");
+      Refuse(name + Quoted(cell) + " is not a fault (" +
+             std::string(kFaultNames) + ", normal)");
     }
     fault = *parsed;
   }

@@ -14,7 +14,8 @@ std::string CheckedLabel(std::string_view label) {
   const auto fault = ParseFault(label);
   if (!fault) {
     throw ConfigError("unknown label '" + std::string(label) +
-                      "'; accepted are true, false and f1..f19");
+                      "'; accepted are true, false and " +
+                      std::string(kFaultNames));
   }
   return FaultName(*fault);
 }

@@ -16,9 +16,9 @@ std::optional<double> BoundOf(double t_s) {
 }
 
 void CheckLabel(int fault, double strength) {
-  if (fault < 0 || fault > kFaultCount) {
+  if (fault < 0 || fault > kLastFault) {
     throw ConfigError("label: fault " + std::to_string(fault) +
-                      " is not in 0..19");
+                      " is not in 0..22");
   }
   const bool fits = fault == 0 ? strength == 0.0
                                : strength != 0.0 && std::abs(strength) <= 1.0;

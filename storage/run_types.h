@@ -43,7 +43,7 @@ struct NewRun {
 struct RunLabel {
   double from_s{0.0};
   double to_s{std::numeric_limits<double>::infinity()};
-  int fault{0};  ///< 0 = normal, else 1..19.
+  int fault{0};  ///< 0 = normal, else 1..22.
   double strength{0.0};
 };
 

@@ -16,7 +16,7 @@ struct EffectField {
   double FaultEffects::*field;
 };
 
-constexpr std::array<EffectField, 20> kFields = {{
+constexpr std::array<EffectField, 23> kFields = {{
     {"upper travel stop x", &FaultEffects::upper_stop_factor},
     {"plug against rod +", &FaultEffects::plug_offset},
     {"Kv x", &FaultEffects::kv_factor},
@@ -37,6 +37,9 @@ constexpr std::array<EffectField, 20> kFields = {{
     {"P2 x", &FaultEffects::outlet_factor},
     {"bypass opening +", &FaultEffects::bypass_opening},
     {"flow reading x", &FaultEffects::flow_reading_factor},
+    {"T1 reading, share of span, +", &FaultEffects::temperature_reading_step},
+    {"P1 reading, share of span, +", &FaultEffects::inlet_reading_step},
+    {"P2 reading, share of span, +", &FaultEffects::outlet_reading_step},
 }};
 
 // What differs from the healthy valve: "Kv x 0.8, opening + 0.1".
@@ -63,7 +66,7 @@ int PrintFaults(const cli::GlobalOptions& options) {
                         {"paper"}});
   cli::Json json;
   json["faults"] = cli::Json::array();
-  for (int fault = 1; fault <= kFaultCount; ++fault) {
+  for (int fault = 1; fault <= kLastFault; ++fault) {
     const FaultFacts& facts = FaultFactsOf(fault);
     const double least = facts.is_signed ? -1.0 : 0.0;
     const std::string effect = EffectText(fault, 1.0);

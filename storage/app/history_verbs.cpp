@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "diagnosis/fault_catalogue.h"
 #include "storage/app/common.h"
 #include "storage/app/history_options.h"
 #include "storage/app/verbs.h"
@@ -259,7 +260,8 @@ CLI::App& AddNote(cli::Program& program, CLI::App& group, const char* name,
 
 void HistoryOptions::AddTo(CLI::App& verb) {
   verb.add_option("--valve", valve, "Glob over valve ids");
-  verb.add_option("--fault", fault, "f1..f19, paper1..paper5 or unknown");
+  verb.add_option("--fault", fault,
+                  std::string(kFaultNames) + ", paper1..paper5 or unknown");
   window.AddTo(verb);
   verb.add_option("--state", state,
                   "any, open, detected, isolated, closed or unacked");

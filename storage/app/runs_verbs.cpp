@@ -176,7 +176,8 @@ int Label(const LabelOptions& options, const Context& context) {
     return cli::kExitOk;
   }
   if (options.fault.empty()) {
-    throw ConfigError("FAULT is needed: normal or f1..f19, or --remove");
+    throw ConfigError("FAULT is needed: normal or " + std::string(kFaultNames) +
+                      ", or --remove");
   }
   const bool normal = options.fault == "normal";
   const int fault = normal ? 0 : RequireFault(options.fault);
@@ -213,7 +214,8 @@ void AddLabel(cli::Program& program, CLI::App& group) {
       group, "label", "Say what was true in a run, or a stretch of it",
       [options](const Context& c) { return Label(*options, c); });
   verb.add_option("run", options->run, "ID or ID@from:to in s")->required();
-  verb.add_option("fault", options->fault, "normal or f1..f19");
+  verb.add_option("fault", options->fault,
+                  "normal or " + std::string(kFaultNames));
   verb.add_option("--strength", options->strength, "Strength of the fault [-]")
       ->check(CLI::Range(-1.0, 1.0));
   verb.add_flag("--remove", options->remove, "Remove all labels of the run");

@@ -87,7 +87,14 @@ TEST(FaultCatalogueTest, NamesAreReadInAnyCaseAndPaperNamesMapToTheFive) {
   EXPECT_FALSE(ParseFault("f20").has_value());
   EXPECT_FALSE(ParseFault("paper6").has_value());
   EXPECT_FALSE(ParseFault("f1x").has_value());
-  for (int fault = 1; fault <= kFaultCount; ++fault) {
+  EXPECT_FALSE(ParseFault("p3").has_value());
+  EXPECT_EQ(ParseFault("T1"), 20);
+  EXPECT_EQ(ParseFault("p1"), 21);
+  EXPECT_EQ(ParseFault("P2"), 22);
+  EXPECT_EQ(TransmitterOf(20), Signal::kT1);
+  EXPECT_EQ(TransmitterOf(22), Signal::kP2);
+  EXPECT_EQ(TransmitterOf(19), std::nullopt);
+  for (int fault = 1; fault <= kLastFault; ++fault) {
     EXPECT_EQ(ParseFault(FaultName(fault)), fault);
   }
 }

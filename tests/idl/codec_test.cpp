@@ -185,7 +185,7 @@ TEST(CodecTest, ModelSetsArriveWhole) {
   models.version = 2;
   models.sample_period_s = 0.1;
   models.channels = {{"X", Signal::kX, -0.5, 0.4}};
-  models.faults = {1, 19};
+  models.faults = {1, 19, 22};
   models.observers.resize(2);
   models.observers[1].name = "f19 0.50";
   models.observers[1].fault = 19;

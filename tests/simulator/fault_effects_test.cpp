@@ -11,14 +11,14 @@ namespace {
 
 TEST(FaultEffectsTest, StrengthZeroLeavesTheValveHealthy) {
   FaultEffects effects;
-  for (int fault = 1; fault <= kFaultCount; ++fault) {
+  for (int fault = 1; fault <= kLastFault; ++fault) {
     ApplyFault(fault, 0.0, effects);
   }
   EXPECT_EQ(effects, FaultEffects{});
 }
 
 TEST(FaultEffectsTest, EveryFaultChangesSomething) {
-  for (int fault = 1; fault <= kFaultCount; ++fault) {
+  for (int fault = 1; fault <= kLastFault; ++fault) {
     FaultEffects effects;
     ApplyFault(fault, 0.5, effects);
     EXPECT_NE(effects, FaultEffects{}) << FaultName(fault);
@@ -49,7 +49,7 @@ TEST(FaultEffectsTest, SignOfPressureFaultChoosesTheSide) {
 TEST(FaultEffectsTest, RefusesUnknownFaultsAndStrengths) {
   FaultEffects effects;
   EXPECT_THROW(ApplyFault(0, 0.5, effects), std::invalid_argument);
-  EXPECT_THROW(ApplyFault(20, 0.5, effects), std::invalid_argument);
+  EXPECT_THROW(ApplyFault(23, 0.5, effects), std::invalid_argument);
   EXPECT_THROW(ApplyFault(1, -0.5, effects), std::invalid_argument);
   EXPECT_THROW(ApplyFault(19, 1.5, effects), std::invalid_argument);
 }

@@ -50,9 +50,21 @@ TEST(FaultScheduleTest, StrengthIsOneAndTheRampStartsAtZeroByDefault) {
   EXPECT_EQ(s.final_strength, 1.0);
 }
 
+TEST(FaultScheduleTest, ReadsAFlatline) {
+  const FaultSchedule s = ParseFaultSchedule("T1:flatline@50:until=90");
+  EXPECT_EQ(s.fault, 20);
+  EXPECT_TRUE(s.flatline);
+  EXPECT_EQ(TruthAt({s}, 49.0).fault, 0);
+  EXPECT_EQ(TruthAt({s}, 50.0).fault, 20);
+  EXPECT_EQ(TruthAt({s}, 50.0).strength, 1.0);
+  EXPECT_EQ(TruthAt({s}, 90.0).fault, 0);
+  EXPECT_EQ(EffectsAt({s}, 60.0), FaultEffects{});
+}
+
 TEST(FaultScheduleTest, TextReadsBackAsTheSameSchedule) {
   for (const char* text :
-       {"f19:abrupt@50:strength=-0.75",
+       {"f19:abrupt@50:strength=-0.75", "p2:abrupt@5:strength=-1",
+        "t1:flatline@50", "p1:flatline@50:until=90.5",
         "f1:incipient@500+1200:from=0.25:strength=0.6:until=3000.5"}) {
     EXPECT_EQ(ToText(ParseFaultSchedule(text)), text);
   }
@@ -65,7 +77,11 @@ TEST(FaultScheduleTest, MessagesNameTheReasonAndTheAcceptedForm) {
   EXPECT_THAT(MessageFor("f1:abrupt"), HasSubstr("start time"));
   EXPECT_THAT(MessageFor("f1:abrupt@x"), HasSubstr("'x' is not a number"));
   EXPECT_THAT(MessageFor("f1:abrupt@1e999"), HasSubstr("not a number"));
-  EXPECT_THAT(MessageFor("f1:abrupt@50+10"), HasSubstr("no duration"));
+  EXPECT_THAT(MessageFor("f1:abrupt@50+10"), HasSubstr("takes a duration"));
+  EXPECT_THAT(MessageFor("t1:flatline@50+10"), HasSubstr("takes a duration"));
+  EXPECT_THAT(MessageFor("t1:flatline@50:strength=0.5"),
+              HasSubstr("no strength"));
+  EXPECT_THAT(MessageFor("f19:flatline@50"), HasSubstr("t1, p1 or p2"));
   EXPECT_THAT(MessageFor("f1:incipient@50"), HasSubstr("duration"));
   EXPECT_THAT(MessageFor("f1:incipient@50+0"), HasSubstr("above 0"));
   EXPECT_THAT(MessageFor("f1:abrupt@50:strenght=1"), HasSubstr("'strenght'"));

@@ -80,11 +80,13 @@ TEST(CsvTest, TruthNeedsAStrengthOtherThanZero) {
   const CsvTable by_number = Read(
       "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h,fault_no,fault_strength\n"
       "0,1,2,3,4,5,6,18,0\n"
-      "1,1,2,3,4,5,6,18,-0.25\n");
+      "1,1,2,3,4,5,6,18,-0.25\n"
+      "2,1,2,3,4,5,6,22,1\n");
   const CsvTable by_name = Read(
       "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h,fault,fault_strength\n"
       "0,1,2,3,4,5,6,normal,0\n"
-      "1,1,2,3,4,5,6,F18,-0.25\n");
+      "1,1,2,3,4,5,6,F18,-0.25\n"
+      "2,1,2,3,4,5,6,P2,1\n");
 
   for (const CsvTable& table : {by_number, by_name}) {
     const auto& samples = table.runs.at(0).samples;
@@ -92,6 +94,7 @@ TEST(CsvTest, TruthNeedsAStrengthOtherThanZero) {
     EXPECT_EQ(samples[0].truth->fault, 0);
     EXPECT_EQ(samples[1].truth->fault, 18);
     EXPECT_EQ(samples[1].truth->strength, -0.25);
+    EXPECT_EQ(samples[2].truth->fault, 22);
   }
 }
 
@@ -124,6 +127,7 @@ TEST(CsvTest, RefusalsNameFileLineColumnAndReason) {
   const std::string truth =
       std::string(kHeader) + ",fault,fault_strength\n0,1,2,3,4,5,6,";
   EXPECT_THAT(Refusal(truth + "f20,0.5"), HasSubstr("\"f20\" is not a fault"));
+  EXPECT_THAT(Refusal(truth + "f20,0.5"), HasSubstr("f1..f19, t1, p1, p2"));
   EXPECT_THAT(Refusal(truth + "normal,0.5"), HasSubstr("needs a fault"));
   EXPECT_THAT(Refusal(truth + "f1,1.5"), HasSubstr("not in [-1, 1]"));
 }

@@ -324,13 +324,40 @@ TEST_F(RunsTest, LabelsOverrideTheTruthOfTheirStretch) {
   ASSERT_TRUE(labels.Step());
   EXPECT_EQ(labels.Text(0), "normal, f18 -0.5 @1.0:3.0");
 
-  EXPECT_THROW(store.Label(id, 20, 0.5), ConfigError);
+  EXPECT_THROW(store.Label(id, 23, 0.5), ConfigError);
   EXPECT_THROW(store.Label(id, 1, -1.5), ConfigError);
   EXPECT_THROW(store.Label(id, 1, 0.0), ConfigError);
   EXPECT_THROW(store.Label(id, 0, 0.5), ConfigError);
   EXPECT_THROW(store.Label(id + "@4:9", 1, 0.5), NotFoundError);
   EXPECT_EQ(store.RemoveLabels(id), 2);
   EXPECT_FALSE(store.Load(id).samples[0].truth);
+}
+
+TEST_F(RunsTest, LabelsOfAnOlderFileStayAndTransmitterFaultsCanBeAdded) {
+  Schema first = RunsSchema();
+  first.migrations.resize(1);
+  {
+    Database old(file_, first, Access::kOccasionalWriter);
+    Transaction transaction(old);
+    old.Run(
+        "INSERT INTO run (id, valve_id, source_id, start_ns, period_s, "
+        "flow_unit, origin, scenario, software, state, created_ns) VALUES "
+        "('000000000001', 'V', 1, 0, 1.0, 'm3/h', 'imported', '', '', "
+        "'complete', 0)");
+    old.Run(
+        "INSERT INTO run_label (run_id, fault, strength, created_ns) "
+        "VALUES (1, 6, 0.5, 0)");
+    transaction.Commit();
+  }
+  Database database(file_, RunsSchema(), Access::kOccasionalWriter);
+  Transaction transaction(database);
+  database.Run(
+      "INSERT INTO run_label (run_id, fault, strength, created_ns) "
+      "VALUES (1, 21, -0.5, 0)");
+  transaction.Commit();
+  Statement labels = database.Prepare("SELECT labels FROM run_summary");
+  ASSERT_TRUE(labels.Step());
+  EXPECT_EQ(labels.Text(0), "f6 0.5, p1 -0.5");
 }
 
 TEST_F(RunsTest, ListSelectsByValveOriginAndTime) {
