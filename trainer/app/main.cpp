@@ -8,5 +8,6 @@ int main(int argc, char** argv) {
   fdi::trainer::AddTrainVerb(program);
   fdi::trainer::AddEvaluateVerb(program);
   fdi::trainer::AddShowVerb(program);
+  fdi::trainer::AddInjectVerb(program);
   return program.Run(argc, argv);
 }

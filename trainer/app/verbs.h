@@ -10,5 +10,6 @@ namespace fdi::trainer {
 void AddTrainVerb(cli::Program& program);
 void AddEvaluateVerb(cli::Program& program);
 void AddShowVerb(cli::Program& program);
+void AddInjectVerb(cli::Program& program);
 
 }  // namespace fdi::trainer
