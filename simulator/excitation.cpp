@@ -76,7 +76,8 @@ class Sine final : public Excitation {
 
 class Recorded final : public Excitation {
  public:
-  explicit Recorded(RecordedExcitation config) : config_(std::move(config)) {}
+  Recorded(RecordedExcitation config, double period_s)
+      : config_(std::move(config)), period_s_(period_s) {}
 
   // Beyond the last row it is held: the pressures of the last period need one
   // more.
@@ -85,8 +86,27 @@ class Recorded final : public Excitation {
     return FromRow(config_.rows[std::min(row_++, last)]);
   }
 
+  InputFunction AsFunction() const override {
+    return [this](double time_s) { return At(time_s / period_s_); };
+  }
+
  private:
+  // Linear between the rows.
+  ProcessInputs At(double row) const {
+    const auto last = static_cast<double>(config_.rows.size() - 1);
+    const double at = std::clamp(row, 0.0, last);
+    const auto i = static_cast<std::size_t>(at);
+    const InputRow& a = config_.rows[i];
+    const InputRow& b = config_.rows[std::min(i + 1, config_.rows.size() - 1)];
+    const double share = at - std::floor(at);
+    return FromRow({std::lerp(a.cv_pct, b.cv_pct, share),
+                    std::lerp(a.p1_kpa, b.p1_kpa, share),
+                    std::lerp(a.p2_kpa, b.p2_kpa, share),
+                    std::lerp(a.t1_degc, b.t1_degc, share)});
+  }
+
   RecordedExcitation config_;
+  double period_s_;
   std::size_t row_{0};
 };
 
@@ -181,7 +201,8 @@ std::unique_ptr<Excitation> MakeExcitation(const ExcitationConfig& config,
   if (const auto* e = std::get_if<LevelLoopExcitation>(&config)) {
     return std::make_unique<LevelLoop>(*e, period_s, seed);
   }
-  return std::make_unique<Recorded>(std::get<RecordedExcitation>(config));
+  return std::make_unique<Recorded>(std::get<RecordedExcitation>(config),
+                                    period_s);
 }
 
 }  // namespace fdi::simulator

@@ -38,10 +38,11 @@ void Validate(const ValveSimulationConfig& config) {
     Validate(fault);
   }
   if (config.continuous_inputs &&
-      !std::holds_alternative<SineExcitation>(config.excitation)) {
+      !std::holds_alternative<SineExcitation>(config.excitation) &&
+      !std::holds_alternative<RecordedExcitation>(config.excitation)) {
     throw ConfigError("continuous_inputs is set for the excitation '" +
                       std::string(ExcitationName(config.excitation)) +
-                      "': expected sine, the others are sampled");
+                      "': expected sine or csv, the others are sampled");
   }
   RequireRange("duration_s", config.duration_s, 1e-3, 1e10);
   RequireRange("period_s", config.period_s, 1e-3, 3600.0);

@@ -24,8 +24,9 @@ struct ValveSimulationConfig {
   bool noise{true};            ///< Sensor and positioner noise.
   bool resolution{true};       ///< Converter resolution of the transmitters.
   bool cold_start{false};      ///< From X = 0 and vented, not in equilibrium.
-  /// The inputs act as the smooth functions of time that they are instead of a
-  /// command held, and pressures linear, from sample to sample. Sine only.
+  /// The inputs act as functions of time instead of a command held, and
+  /// pressures linear, from sample to sample: the sine as it is, a recorded
+  /// excitation linear between its samples.
   bool continuous_inputs{false};
   double tolerance_scale{1.0};  ///< On the integrator's tolerances.
 };
