@@ -27,6 +27,9 @@ constexpr std::array<SignalFacts, kSignalCount> kFacts{{
     {"Pz", "kPa", {-100.0, 2000.0}},
 }};
 
+constexpr std::array<std::string_view, 5> kModeNames = {
+    "AUTO", "MANUAL", "INHIBITED", "OUT_OF_SERVICE", "CALIBRATING"};
+
 bool EqualIgnoringCase(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
     return std::tolower(static_cast<unsigned char>(x)) ==
@@ -55,6 +58,19 @@ std::optional<Signal> ParseSignal(std::string_view name) {
 
 SignalRange PlausibleRange(Signal signal) {
   return kFacts[Index(signal)].range;
+}
+
+std::string_view ValveModeName(ValveMode mode) {
+  return kModeNames[static_cast<std::size_t>(mode)];
+}
+
+std::optional<ValveMode> ParseValveMode(std::string_view name) {
+  for (std::size_t i = 0; i < kModeNames.size(); ++i) {
+    if (EqualIgnoringCase(name, kModeNames[i])) {
+      return static_cast<ValveMode>(i);
+    }
+  }
+  return std::nullopt;
 }
 
 std::string_view FlowUnitName(FlowUnit unit) {

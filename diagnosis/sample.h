@@ -64,6 +64,14 @@ enum class ValveMode : std::uint8_t {
   kCalibrating
 };
 
+/// "AUTO", "MANUAL", "INHIBITED", "OUT_OF_SERVICE" or "CALIBRATING".
+std::string_view ValveModeName(ValveMode mode);
+/// The mode called `name`, in any case.
+std::optional<ValveMode> ParseValveMode(std::string_view name);
+/// All names, for messages and help.
+inline constexpr std::string_view kValveModeNames =
+    "AUTO, MANUAL, INHIBITED, OUT_OF_SERVICE, CALIBRATING";
+
 enum class FlowUnit : std::uint8_t { kM3PerHour, kTPerHour };
 
 /// "m3/h" or "t/h".

@@ -80,14 +80,42 @@ CsvRun EmptyRun(const CsvHeader& header, double period_s) {
   return run;
 }
 
-void AppendHeader(std::string& text, const std::vector<SignalColumn>& columns,
-                  bool with_truth) {
+/// What a table has.
+struct Columns {
+  std::vector<SignalColumn> signals;
+  bool mode{false};
+  bool truth{false};
+};
+
+Columns ColumnsOf(std::span<const LabelledSample> samples, FlowUnit flow_unit) {
+  Columns columns;
+  SignalMask occurring = 0;
+  for (const LabelledSample& labelled : samples) {
+    occurring = static_cast<SignalMask>(occurring | labelled.sample.present);
+    columns.truth = columns.truth || labelled.truth;
+    columns.mode = columns.mode || labelled.sample.mode != ValveMode::kAuto;
+  }
+  for (const SignalColumn& column : kSignalColumns) {
+    const bool wrong_unit =
+        column.signal == Signal::kF && column.flow_unit != flow_unit;
+    if ((occurring & MaskOf(column.signal)) != 0 && !wrong_unit) {
+      columns.signals.push_back(column);
+    }
+  }
+  return columns;
+}
+
+void AppendHeader(std::string& text, const Columns& columns) {
   text += kTimeColumn;
-  for (const SignalColumn& column : columns) {
+  for (const SignalColumn& column : columns.signals) {
     text += ',';
     text += column.name;
   }
-  if (with_truth) {
+  if (columns.mode) {
+    text += ',';
+    text += kModeColumn;
+  }
+  if (columns.truth) {
     text += ',';
     text += kFaultColumn;
     text += ',';
@@ -97,11 +125,10 @@ void AppendHeader(std::string& text, const std::vector<SignalColumn>& columns,
 }
 
 void AppendRow(std::string& text, const LabelledSample& labelled,
-               const std::vector<SignalColumn>& columns, bool with_truth,
-               std::int64_t start_ns) {
+               const Columns& columns, std::int64_t start_ns) {
   const Sample& sample = labelled.sample;
   AppendNumber(text, static_cast<double>(sample.stamp_ns - start_ns) / 1e9);
-  for (const SignalColumn& column : columns) {
+  for (const SignalColumn& column : columns.signals) {
     text += ',';
     const bool there =
         sample.Has(column.signal) &&
@@ -109,7 +136,11 @@ void AppendRow(std::string& text, const LabelledSample& labelled,
     AppendNumber(text, there ? sample[column.signal]
                              : std::numeric_limits<double>::quiet_NaN());
   }
-  if (with_truth) {
+  if (columns.mode) {
+    text += ',';
+    text += ValveModeName(sample.mode);
+  }
+  if (columns.truth) {
     const FaultTruth truth = labelled.truth.value_or(FaultTruth{});
     text += ',';
     text += FaultName(truth.fault);
@@ -164,24 +195,11 @@ CsvTable ReadCsvFile(const std::filesystem::path& path, CsvOptions options) {
 
 void WriteCsv(std::ostream& output, std::span<const LabelledSample> samples,
               FlowUnit flow_unit, std::int64_t start_ns) {
-  SignalMask occurring = 0;
-  bool with_truth = false;
-  for (const LabelledSample& labelled : samples) {
-    occurring = static_cast<SignalMask>(occurring | labelled.sample.present);
-    with_truth = with_truth || labelled.truth;
-  }
-  std::vector<SignalColumn> columns;
-  for (const SignalColumn& column : kSignalColumns) {
-    const bool wrong_unit =
-        column.signal == Signal::kF && column.flow_unit != flow_unit;
-    if ((occurring & MaskOf(column.signal)) != 0 && !wrong_unit) {
-      columns.push_back(column);
-    }
-  }
+  const Columns columns = ColumnsOf(samples, flow_unit);
   std::string text;
-  AppendHeader(text, columns, with_truth);
+  AppendHeader(text, columns);
   for (const LabelledSample& labelled : samples) {
-    AppendRow(text, labelled, columns, with_truth, start_ns);
+    AppendRow(text, labelled, columns, start_ns);
     output << text;
     text.clear();
   }

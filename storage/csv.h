@@ -84,7 +84,8 @@ struct CsvRow {
 /// Header: t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h (or F_t_h), in any
 /// order and case; optional SP_pct,CVI,Ps_kPa,Pz_kPa; optional truth: fault
 /// (f1..f19, t1, p1, p2, normal) or fault_no (0..22) with fault_strength, where
-/// only a non-zero strength marks a fault. Further columns are ignored.
+/// only a non-zero strength marks a fault; optional mode (kValveModeNames; AUTO
+/// if the column is not there). Further columns are ignored.
 class CsvReader {
  public:
   /// @throws ConfigError if a map has a flow without its unit.
@@ -123,6 +124,7 @@ class CsvReader {
   void CheckHeader() const;
   double Number(std::size_t column) const;
   FaultTruth Truth() const;
+  ValveMode Mode() const;
   bool CheckTime(double t_s);
   [[noreturn]] void Refuse(const std::string& reason) const;
 
@@ -134,6 +136,7 @@ class CsvReader {
   std::optional<std::size_t> time_column_;
   std::optional<std::size_t> fault_column_;
   std::optional<std::size_t> strength_column_;
+  std::optional<std::size_t> mode_column_;
   bool fault_by_number_{false};
   double period_s_{0.0};
   double last_t_s_{0.0};
@@ -152,10 +155,10 @@ CsvTable ReadCsv(std::istream& input, const CsvOptions& options = {});
 CsvTable ReadCsvFile(const std::filesystem::path& path,
                      CsvOptions options = {});
 
-/// Writes the columns of the contract for the signals that occur; fault and
-/// fault_strength if truth is known. Numbers read back as the same bits.
-/// t_s counts from `start_ns`. A signal that one sample lacks, or
-/// a flow in another unit than the run's, is `nan`.
+/// Writes the columns of the contract for the signals that occur; mode if it is
+/// not AUTO throughout; fault and fault_strength if truth is known. Numbers
+/// read back as the same bits. t_s counts from `start_ns`. A signal that one
+/// sample lacks, or a flow in another unit than the run's, is `nan`.
 void WriteCsv(std::ostream& output, std::span<const LabelledSample> samples,
               FlowUnit flow_unit, std::int64_t start_ns);
 

@@ -32,6 +32,7 @@ inline constexpr std::array<SignalColumn, kSignalCount + 1> kSignalColumns{{
 }};
 
 inline constexpr std::string_view kTimeColumn = "t_s";
+inline constexpr std::string_view kModeColumn = "mode";
 inline constexpr std::string_view kFaultColumn = "fault";
 inline constexpr std::string_view kFaultNumberColumn = "fault_no";
 inline constexpr std::string_view kStrengthColumn = "fault_strength";

@@ -8,6 +8,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/csv.h"
+#include "storage/csv_cells.h"
 #include "storage/csv_columns.h"
 
 namespace fdi::storage {
@@ -17,32 +18,6 @@ namespace {
 constexpr double kStepTolerance = 0.01;
 /// Beyond it, nanoseconds since `start_ns` would not fit (100 years).
 constexpr double kMaxSeconds = 3.2e9;
-
-std::string_view Trim(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!text.empty() && blank(text.front())) {
-    text.remove_prefix(1);
-  }
-  while (!text.empty() && blank(text.back())) {
-    text.remove_suffix(1);
-  }
-  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') {
-    text = text.substr(1, text.size() - 2);
-  }
-  return text;
-}
-
-void SplitCells(std::string_view line, std::vector<std::string_view>& cells) {
-  cells.clear();
-  while (true) {
-    const std::size_t comma = line.find(',');
-    cells.push_back(Trim(line.substr(0, comma)));
-    if (comma == std::string_view::npos) {
-      return;
-    }
-    line.remove_prefix(comma + 1);
-  }
-}
 
 std::string Quoted(std::string_view text) {
   return '"' + std::string(text.substr(0, 60)) + '"';
@@ -78,7 +53,7 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
   if (line_ == 1 && line.starts_with(kByteOrderMark)) {
     line.remove_prefix(kByteOrderMark.size());
   }
-  if (Trim(line).empty()) {
+  if (TrimCell(line).empty()) {
     return std::nullopt;
   }
   SplitCells(line, cells_);
@@ -103,6 +78,9 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
       value = c.offset + c.scale * value;
     }
     sample.Set(c.signal, c.sense == Sense::kOpening ? 100.0 - value : value);
+  }
+  if (mode_column_) {
+    sample.mode = Mode();
   }
   if (header_.has_truth) {
     row.labelled.truth = Truth();
@@ -175,6 +153,13 @@ bool CsvReader::AddByContract(std::size_t column, std::string_view name) {
     strength_column_ = column;
     return true;
   }
+  if (SameName(name, kModeColumn)) {
+    if (mode_column_) {
+      Refuse("column " + Quoted(name) + " is there twice");
+    }
+    mode_column_ = column;
+    return true;
+  }
   for (const SignalColumn& known : kSignalColumns) {
     if (SameName(name, known.name)) {
       if (known.signal == Signal::kF) {
@@ -235,6 +220,16 @@ double CsvReader::Number(std::size_t column) const {
            " is not a finite number");
   }
   return value;
+}
+
+ValveMode CsvReader::Mode() const {
+  const std::string_view cell = cells_[*mode_column_];
+  const std::optional<ValveMode> mode = ParseValveMode(cell);
+  if (!mode) {
+    Refuse("column " + Quoted(names_[*mode_column_]) + ": " + Quoted(cell) +
+           " is none of " + std::string(kValveModeNames));
+  }
+  return *mode;
 }
 
 FaultTruth CsvReader::Truth() const {

@@ -57,7 +57,15 @@ std::optional<JsonRow> JsonLineReader::TakeLine(std::string_view line) {
   }
   JsonRow row;
   for (const auto& [key, value] : object.items()) {
-    if (FindColumn(key) == nullptr && !IsTime(key)) {
+    if (storage::SameName(key, storage::kModeColumn)) {
+      const auto mode =
+          ParseValveMode(value.is_string() ? value.get<std::string>() : "");
+      if (!mode) {
+        Refuse("key \"" + key + "\": " + value.dump().substr(0, 60) +
+               " is none of " + std::string(kValveModeNames));
+      }
+      row.sample.mode = *mode;
+    } else if (FindColumn(key) == nullptr && !IsTime(key)) {
       if (rows_ == 0 && !IsTruth(key)) {
         ignored_keys_.push_back(key);
       }

@@ -24,10 +24,11 @@ struct JsonRow {
 /// Reads samples as JSON lines, one object a line, with the names of the CSV
 /// contract as keys:
 ///
-///     {"t_s": 0, "CV_pct": 70.1, "X_pct": 71.0, "F_t_h": 12.5}
+///     {"t_s": 0, "CV_pct": 70.1, "X_pct": 71.0, "F_t_h": 12.5, "mode": "AUTO"}
 ///
 /// A signal that is null or missing is not present in that sample; CV and one
-/// of X, F must be. t_s is in all lines or in none. Further keys are ignored.
+/// of X, F must be. t_s is in all lines or in none; no mode means AUTO. Further
+/// keys are ignored.
 class JsonLineReader {
  public:
   explicit JsonLineReader(JsonLineOptions options)

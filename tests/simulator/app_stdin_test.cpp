@@ -25,7 +25,8 @@ TEST_F(AppStdinTest, EachJsonLineIsPublishedAtOnce) {
   ASSERT_TRUE(
       reader.TakeUntil([&] { return reader.Samples("J").size() == 1; }));
   process.Send(
-      "\n{\"t_s\": 1, \"CV_pct\": 71, \"X_pct\": null, \"F_t_h\": 13}\n");
+      "\n{\"t_s\": 1, \"CV_pct\": 71, \"X_pct\": null, \"F_t_h\": 13, "
+      "\"mode\": \"MANUAL\"}\n");
   ASSERT_TRUE(
       reader.TakeUntil([&] { return reader.Samples("J").size() == 2; }));
   process.CloseInput();
@@ -37,6 +38,8 @@ TEST_F(AppStdinTest, EachJsonLineIsPublishedAtOnce) {
   EXPECT_TRUE(got[0].Has(Signal::kX));
   EXPECT_FALSE(got[0].Has(Signal::kP1));
   EXPECT_FALSE(got[1].Has(Signal::kX));
+  EXPECT_EQ(got[0].mode, ValveMode::kAuto);
+  EXPECT_EQ(got[1].mode, ValveMode::kManual);
   EXPECT_EQ(got[1].flow_unit, FlowUnit::kTPerHour);
   EXPECT_EQ(got[1].stamp_ns - got[0].stamp_ns, 1'000'000'000);
 }
@@ -98,6 +101,8 @@ TEST_F(AppStdinTest, JsonLinesAreRefusedWithLineAndKey) {
       {"{\"t_s\":0,\"CV_pct\":1}", "X_pct"},
       {"{\"t_s\":0,\"CV_pct\":\"a\",\"X_pct\":1}", "not a finite number"},
       {"{\"t_s\":0,\"CV_pct\":1,\"X_pct\":1e999}", "stdin:1"},
+      {"{\"t_s\":0,\"CV_pct\":1,\"X_pct\":1,\"mode\":\"HAND\"}",
+       "none of AUTO, MANUAL"},
       {"{\"t_s\":0,", "not a JSON object"},
       {"{\"CV_pct\":1,\"F_t_h\":1,\"F_m3_h\":1}", "F_"},
       {"{\"t_s\":0,\"CV_pct\":1,\"X_pct\":1}\n{\"CV_pct\":1,\"X_pct\":1}",

@@ -19,6 +19,8 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
 
 constexpr std::string_view kHeader =
     "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h";
@@ -96,6 +98,31 @@ TEST(CsvTest, TruthNeedsAStrengthOtherThanZero) {
     EXPECT_EQ(samples[1].truth->strength, -0.25);
     EXPECT_EQ(samples[2].truth->fault, 22);
   }
+}
+
+TEST(CsvTest, ModeIsAnOptionalColumn) {
+  const std::string text =
+      "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h,mode\n"
+      "0,1,2,3,4,5,6,AUTO\n"
+      "1,1,2,3,4,5,6,MANUAL\n"
+      "2,1,2,3,4,5,6,OUT_OF_SERVICE\n";
+  const CsvTable table = Read(text);
+  const auto& samples = table.runs.at(0).samples;
+  EXPECT_EQ(samples[0].sample.mode, ValveMode::kAuto);
+  EXPECT_EQ(samples[1].sample.mode, ValveMode::kManual);
+  EXPECT_EQ(samples[2].sample.mode, ValveMode::kOutOfService);
+  EXPECT_THAT(table.header.ignored_columns, IsEmpty());
+
+  std::ostringstream written;
+  WriteCsv(written, samples, FlowUnit::kM3PerHour, 0);
+  EXPECT_EQ(written.str(), text);
+  std::ostringstream plain;
+  WriteCsv(plain, std::span(samples).first(1), FlowUnit::kM3PerHour, 0);
+  EXPECT_THAT(plain.str(), Not(HasSubstr("mode")));
+
+  EXPECT_THAT(Refusal(std::string(kHeader) + ",Mode\n0,1,2,3,4,5,6,HAND"),
+              AllOf(HasSubstr("\"HAND\" is none of AUTO, MANUAL"),
+                    HasSubstr("plant.csv:2:")));
 }
 
 TEST(CsvTest, RefusalsNameFileLineColumnAndReason) {
