@@ -110,12 +110,6 @@ class Recorded final : public Excitation {
   std::size_t row_{0};
 };
 
-void RequireDisturbance(const std::string& field,
-                        const Disturbance& disturbance) {
-  RequireRange(field + ".sd", disturbance.sd, 0.0, 1e4);
-  RequireRange(field + ".correlation", disturbance.correlation, 0.0, 0.9999);
-}
-
 void ValidateOne(const OperatingPointExcitation& e) {
   RequireRange("operating-point.cv_pct", e.cv_pct, 0.0, 100.0);
   RequireRange("operating-point.p1_kpa", e.p1_kpa, 0.0, 2e4);
@@ -164,6 +158,12 @@ constexpr std::string_view kNames[] = {"operating-point", "sine", "level-loop",
                                        "csv"};
 
 }  // namespace
+
+void RequireDisturbance(const std::string& field,
+                        const Disturbance& disturbance) {
+  RequireRange(field + ".sd", disturbance.sd, 0.0, 1e4);
+  RequireRange(field + ".correlation", disturbance.correlation, 0.0, 0.9999);
+}
 
 std::string_view ExcitationName(const ExcitationConfig& config) {
   return kNames[config.index()];

@@ -4,9 +4,12 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
+
+#include "diagnosis/sample.h"
 
 namespace fdi::simulator {
 
@@ -24,6 +27,7 @@ struct InputRow {
   double p1_kpa;
   double p2_kpa;
   double t1_degc;
+  ValveMode mode{ValveMode::kAuto};  ///< Of the sample.
 };
 
 /// A first-order autoregressive disturbance: stationary standard deviation and
@@ -31,7 +35,13 @@ struct InputRow {
 struct Disturbance {
   double sd{0.0};           ///< >= 0.
   double correlation{0.0};  ///< a, in [0, 1).
+
+  friend bool operator==(const Disturbance&, const Disturbance&) = default;
 };
+
+/// @throws ConfigError naming `field` and the range.
+void RequireDisturbance(const std::string& field,
+                        const Disturbance& disturbance);
 
 /// Work about one operating point in open loop, with an optional slow sine on
 /// the command, so that faults that look alike at a fixed position separate.
@@ -112,6 +122,10 @@ class Excitation {
 
   /// The inputs as smooth functions of time; empty if they are not.
   virtual InputFunction AsFunction() const { return {}; }
+
+  /// While held, a closed loop neither controls nor advances: its pressures
+  /// follow the flow, and its command means nothing.
+  virtual void Hold(bool /*held*/) {}
 
   /// Inputs of the next sample. `flow` is only used by closed loops.
   virtual ProcessInputs Next(const FlowOfPressures& flow) = 0;

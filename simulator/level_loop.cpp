@@ -119,7 +119,7 @@ double LevelLoop::LevelController(double level_pct) {
 }
 
 ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {
-  if (started_) {
+  if (started_ && !held_) {
     AdvanceBoiler();
   }
   started_ = true;
@@ -127,7 +127,7 @@ ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {
       std::max(0.0, config_.steam_demand_t_h + steam_.Next()) * kKgPerSPerTPerH;
   pump_offset_pa_ = 1e3 * pump_.Next();
   const double reading = boiler_.level_pct + level_noise_.Next();
-  const double cv_pct = LevelController(reading);
+  const double cv_pct = held_ ? integral_pct_ : LevelController(reading);
   // The more flows, the less pressure is left to drive it: bisection.
   double low = 0.0;
   double high = 1000.0;
@@ -137,7 +137,9 @@ ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {
         flow(InletPressure(middle), OutletPressure(middle)) > middle;
     (more ? low : high) = middle;
   }
-  boiler_.feed_flow_kg_s = low * FeedDensity() / 3600.0;
+  if (!held_) {
+    boiler_.feed_flow_kg_s = low * FeedDensity() / 3600.0;
+  }
   return {cv_pct / 100.0, InletPressure(low), OutletPressure(low),
           kFeedTemperatureC};
 }

@@ -38,6 +38,7 @@ class LevelLoop final : public Excitation {
   bool is_open_loop() const override { return false; }
   ProcessInputs Rest() const override;
   double bypass_opening() const override { return config_.bypass_opening; }
+  void Hold(bool held) override { held_ = held; }
   ProcessInputs Next(const FlowOfPressures& flow) override;
 
   const BoilerState& boiler() const { return boiler_; }
@@ -58,6 +59,7 @@ class LevelLoop final : public Excitation {
   double firing_integral_w_{0.0};
   double integral_pct_;
   bool started_{false};
+  bool held_{false};
 };
 
 }  // namespace fdi::simulator

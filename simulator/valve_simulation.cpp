@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
@@ -29,6 +30,18 @@ std::uint64_t SampleCount(const ValveSimulationConfig& config) {
   return count;
 }
 
+std::unique_ptr<Excitation> ExcitationOf(const ValveSimulationConfig& config) {
+  auto base = MakeExcitation(config.excitation, config.period_s, config.seed);
+  return config.inputs.empty() ? std::move(base)
+                               : WithProfiles(std::move(base), config.inputs,
+                                              config.period_s, config.seed);
+}
+
+ValveMode RecordedMode(const ValveSimulationConfig& config, std::uint64_t k) {
+  const auto* recorded = std::get_if<RecordedExcitation>(&config.excitation);
+  return recorded == nullptr ? ValveMode::kAuto : recorded->rows[k].mode;
+}
+
 }  // namespace
 
 void Validate(const ValveSimulationConfig& config) {
@@ -36,6 +49,15 @@ void Validate(const ValveSimulationConfig& config) {
   Validate(config.excitation);
   for (const FaultSchedule& fault : config.faults) {
     Validate(fault);
+  }
+  for (const InputProfile& profile : config.inputs) {
+    Validate(profile);
+  }
+  for (const ModeStretch& stretch : config.modes) {
+    Validate(stretch);
+  }
+  if (config.continuous_inputs && !config.inputs.empty()) {
+    throw ConfigError("continuous_inputs is set: expected no [[input]]");
   }
   if (config.continuous_inputs &&
       !std::holds_alternative<SineExcitation>(config.excitation) &&
@@ -55,8 +77,7 @@ class ValveSimulation::Impl {
       : config_(config),
         period_ns_(std::llround(config.period_s * kNsPerS)),
         count_(SampleCount(config)),
-        excitation_(
-            MakeExcitation(config.excitation, config.period_s, config.seed)),
+        excitation_(ExcitationOf(config)),
         input_function_(excitation_->AsFunction()),
         noise_(config.seed, 1),
         positioner_noise_(config.seed, 2),
@@ -210,6 +231,7 @@ Sample ValveSimulation::Impl::ReadAll(std::uint64_t k) {
   sample.source_id = config_.source_id;
   sample.seq = k;
   sample.flow_unit = i.flow_unit;
+  sample.mode = ModeAt(config_.modes, TimeOf(k), RecordedMode(config_, k));
   sample.Set(Signal::kCv, Read(i.command, 100.0 * inputs_.command));
   sample.Set(Signal::kP1, Read(i.pressure, 1e-3 * seen.inlet_pressure_pa,
                                effects.inlet_reading_step));

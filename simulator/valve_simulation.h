@@ -7,6 +7,7 @@
 #include "diagnosis/sample.h"
 #include "simulator/excitation.h"
 #include "simulator/fault_schedule.h"
+#include "simulator/operation.h"
 #include "simulator/valve_parameters.h"
 
 namespace fdi::simulator {
@@ -15,6 +16,10 @@ namespace fdi::simulator {
 struct ValveSimulationConfig {
   ValveParameters parameters{};
   ExcitationConfig excitation{OperatingPointExcitation{}};
+  std::vector<InputProfile> inputs{};  ///< Laid over the excitation.
+  /// The first that has a sample's time wins, else the recorded excitation's
+  /// mode, else AUTO.
+  std::vector<ModeStretch> modes{};
   std::vector<FaultSchedule> faults{};
   std::uint64_t seed{1};       ///< Same seed, same run, bit for bit.
   double duration_s{2000.0};   ///< Samples at 0, period, ... < duration; > 0.
@@ -26,7 +31,7 @@ struct ValveSimulationConfig {
   bool cold_start{false};      ///< From X = 0 and vented, not in equilibrium.
   /// The inputs act as functions of time instead of a command held, and
   /// pressures linear, from sample to sample: the sine as it is, a recorded
-  /// excitation linear between its samples.
+  /// excitation linear between its samples. Not under profiles.
   bool continuous_inputs{false};
   double tolerance_scale{1.0};  ///< On the integrator's tolerances.
 };

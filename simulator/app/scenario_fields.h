@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "simulator/excitation.h"
+#include "simulator/operation.h"
 #include "simulator/valve_parameters.h"
 
 /// The fields of parameters and excitations by their names in TOML: one list
@@ -48,6 +49,18 @@ void VisitFields(LevelLoopExcitation& e, Visitor&& visit) {
   visit("inlet_opening", e.inlet_opening);
   visit("outlet_opening", e.outlet_opening);
   visit("bypass_opening", e.bypass_opening);
+}
+
+template <typename Visitor>
+void VisitFields(InputProfile& p, Visitor&& visit) {
+  visit("t_s", p.t_s);
+  visit("cv_pct", p.cv_pct);
+  visit("p1_kpa", p.p1_kpa);
+  visit("p2_kpa", p.p2_kpa);
+  visit("t1_degc", p.t1_degc);
+  visit("cv_noise_pct", p.cv_noise_pct);
+  visit("p1_noise_kpa", p.p1_noise_kpa);
+  visit("p2_noise_kpa", p.p2_noise_kpa);
 }
 
 /// Its rows come from a file.

@@ -37,6 +37,13 @@ class FieldWriter {
   void operator()(const char* key, double field) { Add(key, Shortest(field)); }
   void operator()(const char* key, int field) { Add(key, Shortest(field)); }
   void operator()(const char* key, bool field) { Add(key, BooleanText(field)); }
+  void operator()(const char* key, std::vector<double>& field) {
+    std::string list;
+    for (const double value : field) {
+      list += (list.empty() ? "" : ", ") + Shortest(value);
+    }
+    Add(key, '[' + list + ']');
+  }
   void operator()(const char* key, std::string& field) {
     Add(key, QuoteToml(field));
   }
@@ -105,6 +112,33 @@ void AppendExcitation(const Scenario& scenario, Lines& result) {
       excitation);
 }
 
+// A list of inline tables: [{t_s = [0, 10], ...}, ...].
+std::string InputList(const std::vector<InputProfile>& inputs) {
+  const Lines defaults = LinesOf("", InputProfile{});
+  std::string text = "[";
+  for (const InputProfile& input : inputs) {
+    Lines lines;
+    AppendDifferences(LinesOf("", input), defaults, lines);
+    std::string table;
+    for (const auto& [key, value] : lines) {  // key: ".t_s"
+      table += (table.empty() ? "" : ", ") + key.substr(1) + " = " + value;
+    }
+    text += (text.size() > 1 ? ", {" : "{") + table + '}';
+  }
+  return text + ']';
+}
+
+std::string ModeList(const std::vector<ModeStretch>& modes) {
+  std::string text = "[";
+  for (const ModeStretch& stretch : modes) {
+    text += (text.size() > 1 ? ", " : "") + std::string("{from_s = ") +
+            Shortest(stretch.from_s) +
+            ", until_s = " + Shortest(stretch.until_s) +
+            ", mode = " + QuoteToml(ValveModeName(stretch.mode)) + '}';
+  }
+  return text + ']';
+}
+
 std::string FaultList(const std::vector<FaultSchedule>& faults) {
   std::string text = "[";
   for (const FaultSchedule& fault : faults) {
@@ -135,6 +169,12 @@ std::string ScenarioText(const Scenario& scenario) {
   Lines lines = {{"valve", QuoteToml(scenario.valve_id)}};
   AppendParameters(config.parameters, lines);
   AppendExcitation(scenario, lines);
+  if (!config.inputs.empty()) {
+    lines.emplace_back("input", InputList(config.inputs));
+  }
+  if (!config.modes.empty()) {
+    lines.emplace_back("mode", ModeList(config.modes));
+  }
   lines.emplace_back("faults", FaultList(config.faults));
   lines.emplace_back("seed", Shortest(config.seed));
   lines.emplace_back("duration_s", Shortest(config.duration_s));

@@ -16,6 +16,8 @@ namespace {
 using cli::TomlReader;
 using std::filesystem::path;
 
+constexpr double kForever = 1e10;
+
 path Resolve(const path& folder, const path& file) {
   return file.is_absolute() ? file : folder / file;
 }
@@ -36,6 +38,9 @@ class FieldReader {
   }
   void operator()(const char* key, bool& field) {
     field = table_.Boolean(key).value_or(field);
+  }
+  void operator()(const char* key, std::vector<double>& field) {
+    field = table_.Numbers(key);
   }
   void operator()(const char* key, std::string& field) {
     field = table_.Text(key).value_or(field);
@@ -113,8 +118,8 @@ void LoadExcitation(const path& folder, const std::string& file,
   recorded.rows.reserve(run.samples.size());
   for (const LabelledSample& row : run.samples) {
     const Sample& s = row.sample;
-    recorded.rows.push_back(
-        {s[Signal::kCv], s[Signal::kP1], s[Signal::kP2], s[Signal::kT1]});
+    recorded.rows.push_back({s[Signal::kCv], s[Signal::kP1], s[Signal::kP2],
+                             s[Signal::kT1], s.mode});
   }
   scenario.excitation_file = file;
   scenario.config.period_s = run.period_s;
@@ -148,6 +153,42 @@ void ReadFaults(TomlReader& table, ValveSimulationConfig& config) {
   for (const std::string& text : texts) {
     AtKey(table, kKey,
           [&] { config.faults.push_back(ParseFaultSchedule(text)); });
+  }
+}
+
+void ReadInputs(TomlReader& table, ValveSimulationConfig& config) {
+  constexpr const char* kKey = "input";
+  auto profiles = table.Tables(kKey);
+  if (!table.Has(kKey)) {
+    return;
+  }
+  config.inputs.clear();
+  for (TomlReader& own : profiles) {
+    InputProfile& profile = config.inputs.emplace_back();
+    VisitFields(profile, FieldReader(own));
+    AtKey(own, "t_s", [&] { Validate(profile); });
+  }
+}
+
+void ReadModes(TomlReader& table, ValveSimulationConfig& config) {
+  constexpr const char* kKey = "mode";
+  auto stretches = table.Tables(kKey);
+  if (!table.Has(kKey)) {
+    return;
+  }
+  config.modes.clear();
+  for (TomlReader& own : stretches) {
+    ModeStretch& stretch = config.modes.emplace_back();
+    stretch.from_s = own.Number("from_s").value_or(0.0);
+    stretch.until_s = own.Number("until_s").value_or(kForever);
+    const auto name = own.Text("mode");
+    const auto mode = ParseValveMode(name.value_or(""));
+    if (!mode) {
+      own.Refuse("mode", "'" + name.value_or("") + "': expected one of " +
+                             std::string(kValveModeNames));
+    }
+    stretch.mode = *mode;
+    AtKey(own, "from_s", [&] { Validate(stretch); });
   }
 }
 
@@ -224,6 +265,8 @@ void ApplyScenario(TomlReader& table, const path& folder, Scenario& scenario) {
   scenario.valve_id = table.Text("valve").value_or(scenario.valve_id);
   ReadParameters(table, folder, config.parameters);
   ReadExcitation(table, folder, scenario);
+  ReadInputs(table, config);
+  ReadModes(table, config);
   ReadFaults(table, config);
   ReadNumbers(table, config);
   if (const auto start = table.Text("start")) {

@@ -26,7 +26,7 @@ struct Scenario {
 ///                                        # "FILE.toml", or a table
 ///     excitation = "level-loop"          # or operating-point, sine,
 ///                                        # "csv:FILE", or a table
-///     faults = ["f19:abrupt@50:strength=0.75"]
+///     faults = ["f19:abrupt@50:strength=0.75"]   # kFaultForms
 ///     seed = 7
 ///     duration_s = 2000
 ///     period_s = 1
@@ -41,6 +41,16 @@ struct Scenario {
 ///     name = "operating-point"           # absent: the present one
 ///     amplitude_pct = 5
 ///     cv_noise_pct.sd = 0.3
+///
+///     [[input]]                          # InputProfile, laid over it
+///     t_s = [0, 600]
+///     cv_pct = [100, 60]                 # also p1_kpa, p2_kpa, t1_degc
+///     p1_noise_kpa = {sd = 22, correlation = 0.85}   # also cv_.., p2_..
+///
+///     [[mode]]                           # AUTO elsewhere
+///     from_s = 0                         # absent: 0
+///     until_s = 600                      # absent: to the end
+///     mode = "MANUAL"                    # kValveModeNames
 ///
 ///     [parameters]                       # the fields of valve_parameters.h
 ///     base = "lublin-actuator-3"         # absent: the present ones

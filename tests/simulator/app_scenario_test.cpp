@@ -52,6 +52,20 @@ TEST(ScenarioTomlTest, EveryKeyReachesItsField) {
       noise = false
       resolution = false
       tolerance_scale = 0.1
+      [[input]]
+      t_s = [0, 60]
+      cv_pct = [100, 60]
+      cv_noise_pct.sd = 0.5
+      [[input]]
+      t_s = [10, 20.5]
+      t1_degc = [20, 100]
+      [[mode]]
+      from_s = 100
+      until_s = 200
+      mode = "MANUAL"
+      [[mode]]
+      from_s = 300
+      mode = "out_of_service"
       [excitation]
       name = "level-loop"
       proportional_gain = 4
@@ -74,6 +88,15 @@ TEST(ScenarioTomlTest, EveryKeyReachesItsField) {
   EXPECT_EQ(config.period_s, 0.5);
   EXPECT_EQ(config.start_ns, 1'795'132'800'000'000'000);
   EXPECT_TRUE(config.cold_start);
+  ASSERT_EQ(config.inputs.size(), 2U);
+  EXPECT_EQ(config.inputs[0].cv_pct, (std::vector<double>{100.0, 60.0}));
+  EXPECT_EQ(config.inputs[0].cv_noise_pct.sd, 0.5);
+  EXPECT_EQ(config.inputs[1].t_s, (std::vector<double>{10.0, 20.5}));
+  EXPECT_EQ(config.inputs[1].t1_degc, (std::vector<double>{20.0, 100.0}));
+  ASSERT_EQ(config.modes.size(), 2U);
+  EXPECT_EQ(config.modes[0], (ModeStretch{100.0, 200.0, ValveMode::kManual}));
+  EXPECT_EQ(config.modes[1].mode, ValveMode::kOutOfService);
+  EXPECT_GT(config.modes[1].until_s, 1e9);
   EXPECT_FALSE(config.noise);
   EXPECT_FALSE(config.resolution);
   EXPECT_EQ(config.tolerance_scale, 0.1);
@@ -96,6 +119,8 @@ TEST(ScenarioTomlTest, TheTextRestoresTheScenario) {
       faults = ["f17:incipient@0.1+333.3:from=-0.1:strength=-0.7:until=1e4"]
       seed = 9223372036854775807
       parameters = "paper-operating-point"
+      mode = [{from_s = 1, until_s = 2.5, mode = "MANUAL"}, {from_s = 9, mode = "INHIBITED"}]
+      input = [{t_s = [0, 0.1], p1_kpa = [2000, 3000.5], p1_noise_kpa = {sd = 3}}, {t_s = [5, 6], cv_pct = [0, 9]}]
       [excitation]
       amplitude_pct = 0.30000000000000004
       cv_noise_pct = { sd = 0.1, correlation = 0.9 })"));
@@ -103,7 +128,8 @@ TEST(ScenarioTomlTest, TheTextRestoresTheScenario) {
   EXPECT_EQ(ScenarioText(Read(text)), text);
   EXPECT_THAT(text, AllOf(HasSubstr("0.30000000000000004"),
                           HasSubstr("excitation.cv_noise_pct.sd = 0.1\n"),
-                          HasSubstr("from=-0.1"),
+                          HasSubstr("from=-0.1"), HasSubstr("3000.5"),
+                          HasSubstr("\"INHIBITED\""),
                           HasSubstr("seed = 9223372036854775807")));
 }
 
@@ -137,6 +163,12 @@ TEST(ScenarioTomlTest, ARefusalNamesPlaceKeyAndWhatIsAccepted) {
               AllOf(HasSubstr("test.toml:1"), HasSubstr("f1..f19")));
   EXPECT_THAT(RefusalOf("faults = ['f1:abrupt@3:strength=2']"),
               AllOf(HasSubstr("strength"), HasSubstr("1")));
+  EXPECT_THAT(RefusalOf("[[mode]]\nmode = 'HAND'"),
+              AllOf(HasSubstr("test.toml:2"), HasSubstr("MANUAL")));
+  EXPECT_THAT(RefusalOf("[[input]]\nt_s = [1]"),
+              AllOf(HasSubstr("test.toml:2"), HasSubstr("at least 2")));
+  EXPECT_THAT(RefusalOf("[[input]]\nt_s = [1, 2]\nx_pct = 1\ncv_pct = [1, 2]"),
+              AllOf(HasSubstr("test.toml:3"), HasSubstr("p1_kpa")));
   EXPECT_THAT(RefusalOf("duration_s = -5"), HasSubstr("-5 is not in"));
   EXPECT_THAT(RefusalOf("parameters.trim.exponent = 900"),
               AllOf(HasSubstr("trim.exponent"), HasSubstr("900")));
@@ -158,6 +190,31 @@ TEST(ScenarioTomlTest, ASettingKeepsWhatItDoesNotName) {
   EXPECT_FALSE(scenario.config.noise);
   EXPECT_THROW(ApplySetting("noise", scenario), ConfigError);
   EXPECT_THROW(ApplySetting("noise=maybe", scenario), ConfigError);
+}
+
+TEST(ScenarioTomlTest, ACsvExcitationKeepsTheModes) {
+  const storage::TemporaryDirectory folder;
+  std::ofstream(folder.path() / "in.csv")
+      << "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,mode\n"
+         "0,50,3500,2600,40,50,AUTO\n1,51,3501,2601,41,50,MANUAL\n";
+  Scenario scenario;
+  ChooseExcitation("csv:in.csv", folder.path(), scenario);
+  const auto& rows =
+      std::get<RecordedExcitation>(scenario.config.excitation).rows;
+  EXPECT_EQ(rows[0].mode, ValveMode::kAuto);
+  EXPECT_EQ(rows[1].mode, ValveMode::kManual);
+}
+
+TEST(ScenarioTomlTest, TheOperationScenariosCanBeRead) {
+  int count = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(FDI_OPERATION_SCENARIOS)) {
+    Scenario scenario;
+    ApplyScenarioFile(entry.path(), scenario);
+    EXPECT_NO_THROW(Validate(scenario.config)) << entry.path();
+    ++count;
+  }
+  EXPECT_GE(count, 6);
 }
 
 TEST(ScenarioTomlTest, ACsvExcitationGivesPeriodAndDurationUnlessOverruled) {
