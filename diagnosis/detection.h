@@ -20,6 +20,9 @@ class Detection {
 
   void Restart();
 
+  /// Samples are missing: runs end, the windows stay.
+  void Interrupt() { runs_.fill({}); }
+
   /// Takes the residuals of one sample. Returns whether a single residual is
   /// beyond its threshold.
   bool Push(const ObserverBank& bank, std::int64_t stamp_ns);

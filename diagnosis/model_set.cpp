@@ -82,6 +82,20 @@ void ValidateObserver(const ModelSet& models, const Observer& observer) {
   }
 }
 
+void ValidateRegion(const ModelSet& models) {
+  const ValidityRegion& region = models.validity;
+  for (const SignalRange& range :
+       {region.cv, region.dp, region.t1, region.p1, region.p2}) {
+    Check(range.minimum < range.maximum, models,
+          "ranges of validity must not be empty");
+  }
+  Check(region.cv_step > 0.0, models, "the step of CV must be positive");
+  Check(region.flow_cutoff >= 0.0, models,
+        "the flow cut-off must not be negative");
+  Check(region.rearm_samples >= 0 && region.rearm_samples <= 100000, models,
+        "samples before a valve is armed again must be in 0..100000");
+}
+
 }  // namespace
 
 int FaultIndex(const ModelSet& models, int fault) {
@@ -128,6 +142,7 @@ void Validate(const ModelSet& models) {
   Check(std::is_sorted(models.faults.begin(), models.faults.end()), models,
         "faults must be ascending");
   ValidateDecision(models);
+  ValidateRegion(models);
   for (std::size_t i = 0; i < models.observers.size(); ++i) {
     const Observer& observer = models.observers[i];
     Check((i == 0) == (observer.fault == 0), models,

@@ -7,6 +7,7 @@
 #include "diagnosis/membership.h"
 #include "diagnosis/sample.h"
 #include "diagnosis/ts_model.h"
+#include "diagnosis/validity_region.h"
 
 namespace fdi {
 
@@ -95,7 +96,7 @@ struct ModelSet {
   std::string preset;    ///< "paper", ...
   double sample_period_s{1.0};
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
-  SignalRange trained_cv{0.0, 100.0};  ///< Commands seen in training [%].
+  ValidityRegion validity;
   DecisionParameters decision;
   std::vector<ChannelSpec> channels;
   std::vector<Observer> observers;

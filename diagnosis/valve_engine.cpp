@@ -1,15 +1,12 @@
 #include "diagnosis/valve_engine.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
 
-#include "diagnosis/clearing.h"
+#include "diagnosis/coverage.h"
 #include "diagnosis/detection.h"
+#include "diagnosis/episode.h"
 #include "diagnosis/error.h"
-#include "diagnosis/fault_bank.h"
-#include "diagnosis/isolation.h"
+#include "diagnosis/intake.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/snapshot.h"
 #include "diagnosis/source_order.h"
@@ -18,7 +15,6 @@ namespace fdi {
 namespace {
 
 constexpr std::uint32_t kSnapshotFormat = 1;
-constexpr std::int64_t kSnapshotLifeNs = 600'000'000'000;
 
 std::shared_ptr<const ModelSet> Checked(
     std::shared_ptr<const ModelSet> models) {
@@ -27,39 +23,7 @@ std::shared_ptr<const ModelSet> Checked(
   return models;
 }
 
-// The first reason why the required signals of `sample` are unusable.
-Intake CheckValues(const ModelSet& models, SignalMask required,
-                   const Sample& sample) {
-  if ((required & MaskOf(Signal::kF)) != 0 && sample.Has(Signal::kF) &&
-      sample.flow_unit != models.flow_unit) {
-    return Intake::kUnit;
-  }
-  for (std::size_t i = 0; i < kSignalCount; ++i) {
-    const auto signal = static_cast<Signal>(i);
-    if ((required & MaskOf(signal)) == 0 || !sample.Has(signal)) {
-      continue;
-    }
-    if (sample.quality[i] == SignalQuality::kBad) {
-      return Intake::kBadQuality;
-    }
-    if (!std::isfinite(sample.values[i])) {
-      return Intake::kNotFinite;
-    }
-    const SignalRange range = PlausibleRange(signal);
-    if (sample.values[i] < range.minimum || sample.values[i] > range.maximum) {
-      return Intake::kRange;
-    }
-  }
-  return Intake::kAccepted;
-}
-
 }  // namespace
-
-// Accumulators of a snapshot that wait for the next sample.
-struct Resumed {
-  std::int64_t stamp_ns;
-  Detection detection;
-};
 
 // What depends on the model set; replaced as a whole by Adopt().
 struct Diagnosis {
@@ -67,19 +31,16 @@ struct Diagnosis {
       : models(Checked(std::move(set))),
         required(RequiredSignals(*models)),
         bank(*models),
-        faults(*models),
+        coverage(*models),
         detection(*models),
-        isolation(models->decision),
-        clearing(*models) {}
+        episode(*models) {}
 
   std::shared_ptr<const ModelSet> models;
   SignalMask required;
   ObserverBank bank;
-  FaultBank faults;
+  Coverage coverage;
   Detection detection;
-  IsolationWindow isolation;
-  ClearingWindow clearing;
-  std::unique_ptr<Resumed> resumed;
+  Episode episode;
 };
 
 class ValveEngine::Impl {
@@ -93,6 +54,7 @@ class ValveEngine::Impl {
   const Verdict& Step(const Sample& sample);
   std::optional<Transition> EndEpisode(EndReason reason);
   std::optional<Transition> Adopt(std::shared_ptr<const ModelSet> models);
+  void HoldIsolation(bool hold);
   std::vector<std::byte> Save() const;
   bool Restore(std::span<const std::byte> bytes);
 
@@ -101,29 +63,20 @@ class ValveEngine::Impl {
 
  private:
   void ClearVerdict();
+  void TakeSource(const Sample& sample);
   void Reject(Intake intake);
   void Initialise(const Sample& sample);
-  void Resume(std::int64_t stamp_ns);
   void ReadResiduals();
   Quality Judge(const Sample& sample);
   void Decide();
-  void Detect(std::int64_t stamp_ns);
-  void Isolate();
-  FaultSet WithGroups(FaultSet set) const;
-  void Emit(TransitionKind kind, std::int64_t stamp_ns,
-            EndReason reason = EndReason::kNone);
-  Transition Make(TransitionKind kind, std::int64_t stamp_ns,
-                  EndReason reason) const;
 
   std::unique_ptr<Diagnosis> diagnosis_;
   SourceOrder order_;
   Verdict verdict_;
+  bool isolation_held_{false};
+  bool has_source_{false};
   bool needs_initialisation_{true};
-  int settling_{0};
   SignalMask present_{0};
-  std::int64_t detection_stamp_ns_{0};
-  FaultSet contender_{0};  // another set than the isolated one
-  int contender_run_{0};
 };
 
 void ValveEngine::Impl::ClearVerdict() {
@@ -145,11 +98,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
     return verdict_;
   }
   if (placement.new_source) {
-    if (episode_open()) {
-      Emit(TransitionKind::kClosed, sample.stamp_ns, EndReason::kSuperseded);
-      verdict_.state = State::kNormal;
-    }
-    needs_initialisation_ = true;
+    TakeSource(sample);
   }
   if (placement.intake != Intake::kAccepted) {
     Reject(placement.intake);
@@ -165,20 +114,36 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
   }
   diagnosis_->bank.Step(sample);
   ReadResiduals();
-  diagnosis_->faults.Score(diagnosis_->bank, verdict_);
+  diagnosis_->episode.Score(diagnosis_->bank, verdict_);
   verdict_.quality = Judge(sample);
   if (verdict_.quality == Quality::kLive) {
     Decide();
   } else if (episode_open()) {
-    diagnosis_->faults.Compete(verdict_);
+    diagnosis_->episode.Hold(verdict_);
   }
   verdict_.detected = episode_open();
   return verdict_;
 }
 
+// What was known of another source says nothing about this one; a snapshot
+// restored before the first source does.
+void ValveEngine::Impl::TakeSource(const Sample& sample) {
+  if (episode_open()) {
+    verdict_.transitions[0] = diagnosis_->episode.Close(
+        EndReason::kSuperseded, sample.stamp_ns, verdict_);
+    verdict_.transition_count = 1;
+  }
+  if (has_source_) {
+    diagnosis_->coverage.Restart();
+  }
+  has_source_ = true;
+  needs_initialisation_ = true;
+}
+
 void ValveEngine::Impl::Reject(Intake intake) {
   verdict_.intake = intake;
   verdict_.quality = Quality::kBadInput;
+  verdict_.uncovered = 0;
   verdict_.detected = episode_open();
   needs_initialisation_ = true;
 }
@@ -187,9 +152,11 @@ void ValveEngine::Impl::Initialise(const Sample& sample) {
   diagnosis_->bank.Initialise(sample);
   present_ = sample.present;
   needs_initialisation_ = false;
-  diagnosis_->detection.Restart();
-  Resume(sample.stamp_ns);
-  settling_ = std::max(models().decision.settling_samples, kMaxLag);
+  if (diagnosis_->coverage.Settle(sample.stamp_ns)) {
+    diagnosis_->detection.Interrupt();
+  } else {
+    diagnosis_->detection.Restart();
+  }
   verdict_.initialised = true;
 }
 
@@ -205,139 +172,28 @@ void ValveEngine::Impl::ReadResiduals() {
 }
 
 Quality ValveEngine::Impl::Judge(const Sample& sample) {
+  verdict_.uncovered = 0;
   if (diagnosis_->bank.active_channels() == 0) {
     return Quality::kBadInput;
   }
-  if (sample.mode != ValveMode::kAuto) {
-    settling_ = models().decision.settling_samples;
-    return Quality::kInhibited;
-  }
-  if (settling_ > 0) {
-    --settling_;
-    return Quality::kSettling;
-  }
-  const double cv = sample[Signal::kCv];
-  if (sample.Has(Signal::kCv) &&
-      (cv < models().trained_cv.minimum || cv > models().trained_cv.maximum)) {
-    return Quality::kUncovered;
-  }
-  return Quality::kLive;
+  const Quality quality =
+      diagnosis_->coverage.Judge(sample, diagnosis_->bank, episode_open());
+  verdict_.uncovered = diagnosis_->coverage.reasons();
+  return quality;
 }
 
 void ValveEngine::Impl::Decide() {
-  const bool abnormal =
-      diagnosis_->detection.Push(diagnosis_->bank, verdict_.stamp_ns);
-  const std::optional<std::int64_t> stamp = diagnosis_->detection.stamp_ns();
-  const bool begins = !episode_open() && stamp.has_value();
-  if (!episode_open() && !begins) {
-    return;
+  Detection& detection = diagnosis_->detection;
+  if (diagnosis_->coverage.armed_now()) {
+    detection.Restart();
   }
-  if (begins) {
-    diagnosis_->faults.Restart();
-    diagnosis_->isolation.Restart();
-    diagnosis_->clearing.Restart();
+  const bool abnormal = detection.Push(diagnosis_->bank, verdict_.stamp_ns);
+  const bool was_open = episode_open();
+  diagnosis_->episode.Step(diagnosis_->bank, detection.stamp_ns(), abnormal,
+                           verdict_);
+  if (was_open && !episode_open()) {
+    detection.Restart();
   }
-  diagnosis_->faults.Follow(diagnosis_->bank);
-  diagnosis_->faults.Compete(verdict_);
-  if (begins) {
-    Detect(*stamp);
-  }
-  Isolate();
-  diagnosis_->clearing.Push(
-      {verdict_.residuals.data(), models().channels.size()},
-      verdict_.normal_factor, abnormal);
-  if (diagnosis_->clearing.Cleared()) {
-    Emit(TransitionKind::kCleared, verdict_.stamp_ns);
-    Emit(TransitionKind::kClosed, verdict_.stamp_ns, EndReason::kCleared);
-    verdict_.state = State::kNormal;
-    verdict_.isolated = 0;
-    diagnosis_->detection.Restart();
-  }
-}
-
-void ValveEngine::Impl::Detect(std::int64_t stamp_ns) {
-  verdict_.state = State::kDetected;
-  verdict_.isolated = 0;
-  detection_stamp_ns_ = stamp_ns;
-  contender_ = 0;
-  contender_run_ = 0;
-  Emit(TransitionKind::kDetected, detection_stamp_ns_);
-}
-
-FaultSet ValveEngine::Impl::WithGroups(FaultSet set) const {
-  FaultSet joined = set;
-  const double half = 0.5 * models().decision.isolation_threshold;
-  for (const std::vector<int>& group : models().groups) {
-    FaultSet members = 0;
-    FaultSet close = 0;
-    for (const int fault : group) {
-      const auto i = static_cast<std::size_t>(FaultIndex(models(), fault));
-      members |= FaultSet{1} << i;
-      if (verdict_.fault_factors[i] >= half) {
-        close |= FaultSet{1} << i;
-      }
-    }
-    if ((members & set) != 0) {
-      joined |= close;
-    }
-  }
-  return joined;
-}
-
-void ValveEngine::Impl::Isolate() {
-  const double threshold = models().decision.isolation_threshold;
-  FaultSet above = 0;
-  for (std::size_t i = 0; i < models().faults.size(); ++i) {
-    if (verdict_.fault_factors[i] >= threshold) {
-      above |= FaultSet{1} << i;
-    }
-  }
-  diagnosis_->isolation.Push(above);
-  FaultSet supported = diagnosis_->isolation.Supported();
-  if (supported == 0 || verdict_.normal_factor >= threshold) {
-    return;
-  }
-  supported = WithGroups(supported);
-  if (verdict_.state == State::kDetected) {
-    verdict_.state = State::kIsolated;
-    verdict_.isolated = supported;
-    Emit(TransitionKind::kIsolated, verdict_.stamp_ns);
-    return;
-  }
-  // Another set has to hold for a while before it replaces this one.
-  contender_run_ = supported == contender_ ? contender_run_ + 1 : 1;
-  contender_ = supported;
-  if (supported != verdict_.isolated &&
-      contender_run_ >= models().decision.reisolation_samples) {
-    verdict_.isolated = supported;
-    Emit(TransitionKind::kReisolated, verdict_.stamp_ns);
-  }
-}
-
-Transition ValveEngine::Impl::Make(TransitionKind kind, std::int64_t stamp_ns,
-                                   EndReason reason) const {
-  Transition transition;
-  transition.kind = kind;
-  transition.stamp_ns = stamp_ns;
-  transition.detection_stamp_ns = detection_stamp_ns_;
-  transition.faults = verdict_.isolated;
-  transition.reason = reason;
-  for (std::size_t i = 0; i < models().faults.size(); ++i) {
-    const bool counts =
-        verdict_.isolated == 0 || (verdict_.isolated >> i & 1U) != 0;
-    if (counts && verdict_.fault_factors[i] >= transition.factor) {
-      transition.factor = verdict_.fault_factors[i];
-      transition.strength =
-          verdict_.isolated == 0 ? 0.0 : verdict_.strengths[i];
-    }
-  }
-  return transition;
-}
-
-void ValveEngine::Impl::Emit(TransitionKind kind, std::int64_t stamp_ns,
-                             EndReason reason) {
-  verdict_.transitions[static_cast<std::size_t>(verdict_.transition_count++)] =
-      Make(kind, stamp_ns, reason);
 }
 
 std::optional<Transition> ValveEngine::Impl::EndEpisode(EndReason reason) {
@@ -345,17 +201,13 @@ std::optional<Transition> ValveEngine::Impl::EndEpisode(EndReason reason) {
   if (!episode_open()) {
     return std::nullopt;
   }
-  const Transition closed =
-      Make(TransitionKind::kClosed, verdict_.stamp_ns, reason);
-  verdict_.state = State::kNormal;
-  verdict_.isolated = 0;
-  verdict_.detected = false;
-  return closed;
+  return diagnosis_->episode.Close(reason, verdict_.stamp_ns, verdict_);
 }
 
 std::optional<Transition> ValveEngine::Impl::Adopt(
     std::shared_ptr<const ModelSet> models) {
   auto replacement = std::make_unique<Diagnosis>(std::move(models));
+  replacement->episode.HoldIsolation(isolation_held_);
   std::optional<Transition> closed = EndEpisode(EndReason::kModelChanged);
   diagnosis_ = std::move(replacement);
   order_.SetPeriod(diagnosis_->models->sample_period_s);
@@ -363,9 +215,15 @@ std::optional<Transition> ValveEngine::Impl::Adopt(
   return closed;
 }
 
+void ValveEngine::Impl::HoldIsolation(bool hold) {
+  isolation_held_ = hold;
+  diagnosis_->episode.HoldIsolation(hold);
+}
+
 std::vector<std::byte> ValveEngine::Impl::Save() const {
   SnapshotWriter writer;
-  writer.Put(kSnapshotFormat, models().content_hash, verdict_.stamp_ns);
+  writer.Put(kSnapshotFormat, models().content_hash);
+  diagnosis_->coverage.Save(writer);
   diagnosis_->detection.Save(writer);
   return writer.Take();
 }
@@ -374,23 +232,17 @@ bool ValveEngine::Impl::Restore(std::span<const std::byte> bytes) {
   SnapshotReader reader(bytes);
   std::uint32_t format = 0;
   std::uint64_t content_hash = 0;
-  Resumed resumed{0, Detection(models())};
-  if (!reader.Get(format, content_hash, resumed.stamp_ns) ||
-      format != kSnapshotFormat || content_hash != models().content_hash ||
-      !resumed.detection.Restore(reader) || !reader.AtEnd()) {
+  Coverage coverage(models());
+  Detection detection(models());
+  if (!reader.Get(format, content_hash) || format != kSnapshotFormat ||
+      content_hash != models().content_hash || !coverage.Restore(reader) ||
+      !detection.Restore(reader) || !reader.AtEnd()) {
     return false;
   }
-  diagnosis_->resumed = std::make_unique<Resumed>(std::move(resumed));
+  diagnosis_->coverage = coverage;
+  diagnosis_->detection = std::move(detection);
+  needs_initialisation_ = true;
   return true;
-}
-
-// Takes up a snapshot that is recent at `stamp_ns`; it serves once.
-void ValveEngine::Impl::Resume(std::int64_t stamp_ns) {
-  const std::unique_ptr<Resumed> resumed = std::move(diagnosis_->resumed);
-  if (resumed && stamp_ns > resumed->stamp_ns &&
-      stamp_ns - resumed->stamp_ns <= kSnapshotLifeNs) {
-    diagnosis_->detection = std::move(resumed->detection);
-  }
 }
 
 ValveEngine::ValveEngine(std::shared_ptr<const ModelSet> models)
@@ -410,6 +262,10 @@ std::optional<Transition> ValveEngine::EndEpisode(EndReason reason) {
 std::optional<Transition> ValveEngine::Adopt(
     std::shared_ptr<const ModelSet> models) {
   return impl_->Adopt(std::move(models));
+}
+
+void ValveEngine::HoldIsolation(bool hold) {
+  impl_->HoldIsolation(hold);
 }
 
 std::vector<std::byte> ValveEngine::Save() const {

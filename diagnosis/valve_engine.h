@@ -40,9 +40,14 @@ class ValveEngine {
   /// source of the samples stay known. As EndEpisode(kModelChanged).
   std::optional<Transition> Adopt(std::shared_ptr<const ModelSet> models);
 
+  /// While held, episodes are detected and stay unknown: for a valve whose
+  /// baseline is not trusted. Stays over Adopt().
+  void HoldIsolation(bool hold);
+
   /// The slow accumulators, for Restore() after a restart of the program:
-  /// windows of detection, with the stamp of the last sample and the content
-  /// hash of the model set. An open episode is not among them.
+  /// windows of detection and whether the valve is armed (Coverage), with the
+  /// stamp of the last sample and the content hash of the model set. An open
+  /// episode is not among them.
   std::vector<std::byte> Save() const;
 
   /// Goes on with what Save() gave, if the next sample that reaches the

@@ -45,6 +45,24 @@ std::string_view StateName(State state) {
       state, std::array<std::string_view, 3>{"NORMAL", "DETECTED", "ISOLATED"});
 }
 
+std::string_view UnknownName(Unknown unknown) {
+  return NameOf(unknown, std::array<std::string_view, 3>{"", "too_early",
+                                                         "outside_known"});
+}
+
+std::string CoverageReasonsName(CoverageReasons reasons) {
+  constexpr std::array<std::string_view, kCoverageReasonCount> kNames{
+      "mode", "cv", "cv_step", "parked", "dp", "t1", "p1", "p2", "waiting"};
+  std::string name;
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    if ((reasons >> i & 1U) != 0) {
+      name += name.empty() ? "" : "|";
+      name += kNames[i];
+    }
+  }
+  return name;
+}
+
 std::string_view TransitionName(TransitionKind kind) {
   return NameOf(
       kind, std::array<std::string_view, 5>{"DETECTED", "ISOLATED",

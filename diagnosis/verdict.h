@@ -36,6 +36,34 @@ enum class Quality : std::uint8_t {
   kUnassigned,
 };
 
+/// Why a sample was not judged; see Coverage.
+enum class CoverageReason : std::uint8_t {
+  kMode,     ///< Another mode than AUTO.
+  kCv,       ///< CV beyond the trained range.
+  kCvStep,   ///< CV steps as never in training.
+  kParked,   ///< At an end of its travel, without flow.
+  kDp,       ///< P1 − P2 unlike normal operation.
+  kT1,       ///< T1 likewise.
+  kP1,       ///< P1 alike.
+  kP2,       ///< P2 alike.
+  kWaiting,  ///< Inside, not yet for long enough.
+};
+inline constexpr int kCoverageReasonCount = 9;
+
+/// A set of reasons as bits.
+using CoverageReasons = std::uint16_t;
+
+constexpr CoverageReasons BitOf(CoverageReason reason) {
+  return static_cast<CoverageReasons>(1U << static_cast<unsigned>(reason));
+}
+
+/// What is known of an episode that no fault has been named for.
+enum class Unknown : std::uint8_t {
+  kNone,          ///< No episode, or one with a set.
+  kTooEarly,      ///< Known faults may still explain it.
+  kOutsideKnown,  ///< None does: no factor reached T/2 in the last t_k samples.
+};
+
 enum class State : std::uint8_t { kNormal, kDetected, kIsolated };
 
 enum class TransitionKind : std::uint8_t {
@@ -67,6 +95,7 @@ struct Transition {
   double strength{0.0};  ///< Estimated, of the fault with that factor; 0
                          ///< until isolated.
   EndReason reason{EndReason::kNone};  ///< Of kClosed.
+  Unknown unknown{Unknown::kNone};     ///< As in the verdict at that time.
 };
 
 /// Everything the engine says about one sample.
@@ -77,7 +106,9 @@ struct Verdict {
   Intake intake{Intake::kAccepted};
   bool initialised{false};  ///< Observers were re-initialised at this sample.
   Quality quality{Quality::kSettling};
+  CoverageReasons uncovered{0};  ///< Why it is not LIVE; 0: other reasons.
   State state{State::kNormal};
+  Unknown unknown{Unknown::kNone};
   bool detected{false};    ///< An episode is open.
   double confidence{0.0};  ///< Share of the channels that could vote.
   /// r = y − ŷ of the normal observer per channel; NaN where it abstains.
@@ -95,9 +126,12 @@ struct Verdict {
   }
 };
 
-std::string_view IntakeName(Intake intake);            ///< "accepted", ...
-std::string_view QualityName(Quality quality);         ///< "LIVE", ...
-std::string_view StateName(State state);               ///< "NORMAL", ...
+std::string_view IntakeName(Intake intake);     ///< "accepted", ...
+std::string_view QualityName(Quality quality);  ///< "LIVE", ...
+std::string_view StateName(State state);        ///< "NORMAL", ...
+std::string_view UnknownName(Unknown unknown);  ///< "too_early", ...
+/// "cv|dp", in the order of CoverageReason; empty for none.
+std::string CoverageReasonsName(CoverageReasons reasons);
 std::string_view TransitionName(TransitionKind kind);  ///< "DETECTED", ...
 std::string_view EndReasonName(EndReason reason);      ///< "cleared", ...
 

@@ -16,7 +16,7 @@ namespace fdi::storage {
 namespace {
 
 constexpr std::uint32_t kMagic = 0x4D494446;  // "FDIM"
-constexpr std::uint32_t kFormat = 2;
+constexpr std::uint32_t kFormat = 3;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
 constexpr std::uint32_t kMaxText = 4096;
@@ -39,6 +39,12 @@ template <typename A, Of<SignalRange> T>
 void Fields(A& a, T& range) {
   auto& [minimum, maximum] = range;
   a(minimum, maximum);
+}
+
+template <typename A, Of<ValidityRegion> T>
+void Fields(A& a, T& region) {
+  auto& [cv, cv_step, dp, t1, p1, p2, flow_cutoff, rearm_samples] = region;
+  a(cv, cv_step, dp, t1, p1, p2, flow_cutoff, rearm_samples);
 }
 
 template <typename A, Of<Trapezoid> T>
@@ -125,10 +131,10 @@ template <typename A, Of<ModelSet> T>
 void Fields(A& a, T& models) {
   // version and content_hash are given by the store.
   auto& [name, version, content_hash, created_ns, software, preset,
-         sample_period_s, flow_unit, trained_cv, decision, channels, observers,
+         sample_period_s, flow_unit, validity, decision, channels, observers,
          faults, groups, undetectable, training_runs, threshold_hours,
          false_alarms_per_hour] = models;
-  a(name, created_ns, software, preset, sample_period_s, flow_unit, trained_cv,
+  a(name, created_ns, software, preset, sample_period_s, flow_unit, validity,
     decision, Limited{channels, kMaxChannels},
     Limited{observers, kMaxObservers}, Limited{faults, kMaxFaults},
     Limited{groups, kMaxFaults}, Limited{undetectable, kMaxFaults},
@@ -257,7 +263,7 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
   if (format != kFormat) {
     throw DataError(std::string(where) + ": format version " +
                     std::to_string(format) + ", this program reads " +
-                    std::to_string(kFormat));
+                    std::to_string(kFormat) + "; train the model set anew");
   }
   if (reader.Get<std::uint64_t>() != bytes.size() - kFrame) {
     reader.Refuse("its length differs");

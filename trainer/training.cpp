@@ -16,6 +16,7 @@
 #include "trainer/parallel_for.h"
 #include "trainer/regression.h"
 #include "trainer/separability.h"
+#include "trainer/validity.h"
 
 namespace fdi::trainer {
 namespace {
@@ -112,20 +113,6 @@ ChannelObserver FitObserver(const ChannelPlan& plan,
                    least);
 }
 
-SignalRange TrainedCommands(const std::vector<Condition>& conditions) {
-  SignalRange range{1e9, -1e9};
-  for (const Condition& condition : conditions) {
-    for (const Stretch& stretch : condition.training) {
-      for (const Sample& sample : stretch.samples) {
-        range.minimum = std::min(range.minimum, sample[Signal::kCv]);
-        range.maximum = std::max(range.maximum, sample[Signal::kCv]);
-      }
-    }
-  }
-  const double margin = std::max(5.0, 0.1 * (range.maximum - range.minimum));
-  return {range.minimum - margin, range.maximum + margin};
-}
-
 ModelSet Describe(const std::vector<TrainingRun>& runs,
                   const std::vector<Condition>& conditions,
                   const TrainingOptions& options) {
@@ -136,7 +123,7 @@ ModelSet Describe(const std::vector<TrainingRun>& runs,
   models.preset = options.preset;
   models.sample_period_s = runs.front().period_s;
   models.flow_unit = runs.front().flow_unit;
-  models.trained_cv = TrainedCommands(conditions);
+  models.validity = TrainedRegion(conditions);
   models.decision = options.decision;
   for (const ChannelPlan& plan : options.channels) {
     models.channels.push_back({plan.name, plan.output, -1.0, 1.0});

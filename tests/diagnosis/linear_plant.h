@@ -81,7 +81,7 @@ inline ModelSet LinearPlant() {
                       F6(0.5),
                       F6(1.0)};
   models.faults = {1, 3, 6};
-  models.trained_cv = {0.0, 90.0};
+  models.validity.cv = {0.0, 90.0};
   return models;
 }
 

@@ -48,7 +48,8 @@ TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
   models.observers[1].channels[0].validation.mse = 5e-324;
   models.decision.settling_samples = 17;
   models.decision.evidence_support = 8.5;
-  models.trained_cv = {10.25, 90.75};
+  models.validity.cv = {10.25, 90.75};
+  models.validity.rearm_samples = 61;
 
   const auto bytes = EncodeModelSet(models);
   const ModelSet back = DecodeModelSet(bytes, "test");
@@ -57,7 +58,9 @@ TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
   EXPECT_EQ(back.name, "valve");
   EXPECT_EQ(back.created_ns, models.created_ns);
   EXPECT_EQ(back.flow_unit, FlowUnit::kTPerHour);
-  EXPECT_EQ(back.trained_cv.maximum, 90.75);
+  EXPECT_EQ(back.validity.cv.maximum, 90.75);
+  EXPECT_EQ(back.validity.dp.minimum, kUnbounded.minimum);
+  EXPECT_EQ(back.validity.rearm_samples, 61);
   EXPECT_EQ(back.decision.settling_samples, 17);
   EXPECT_EQ(back.decision.evidence_support, 8.5);
   EXPECT_EQ(back.faults, models.faults);
@@ -143,10 +146,10 @@ TEST(ModelCodecTest, RefusalsNameThePlaceAndTheReason) {
   auto damaged = bytes;
   damaged[40] ^= std::byte{1};
   EXPECT_THAT(Refusal(damaged), HasSubstr("blob 7 is damaged: its CRC-32"));
-  auto newer = bytes;
-  newer[4] = std::byte{3};
-  EXPECT_THAT(Refusal(WithValidChecksum(newer)),
-              HasSubstr("format version 3, this program reads 2"));
+  auto older = bytes;
+  older[4] = std::byte{2};
+  EXPECT_THAT(Refusal(WithValidChecksum(older)),
+              HasSubstr("format version 2, this program reads 3"));
   EXPECT_THAT(Refusal({}), HasSubstr("is not a model set"));
   // The length of the name stands first in the payload, after 16 bytes.
   auto huge = bytes;

@@ -66,8 +66,8 @@ void PrintSummary(std::ostream& out, const ModelSet& models, bool active,
   add("preset", models.preset);
   add("sample period", Text(models.sample_period_s) + " s");
   add("flow unit", std::string(FlowUnitName(models.flow_unit)));
-  add("commands", Text(models.trained_cv.minimum) + ".." +
-                      Text(models.trained_cv.maximum) + " %");
+  add("commands", Text(models.validity.cv.minimum) + ".." +
+                      Text(models.validity.cv.maximum) + " %");
   add("faults", FaultsText(models.faults));
   add("thresholds", "for " + Text(models.false_alarms_per_hour) +
                         " false alarms per hour, from " +
@@ -150,7 +150,7 @@ cli::Json SetJson(const ModelSet& models, bool active, bool rules) {
   json["preset"] = models.preset;
   json["sample_period_s"] = models.sample_period_s;
   json["flow_unit"] = FlowUnitName(models.flow_unit);
-  json["trained_cv"] = {models.trained_cv.minimum, models.trained_cv.maximum};
+  json["trained_cv"] = {models.validity.cv.minimum, models.validity.cv.maximum};
   json["threshold_hours"] = models.threshold_hours;
   json["false_alarms_per_hour"] = models.false_alarms_per_hour;
   json["decision"] = DecisionJson(models.decision);

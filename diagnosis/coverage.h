@@ -1,0 +1,83 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "diagnosis/model_set.h"
+#include "diagnosis/observer_bank.h"
+#include "diagnosis/snapshot.h"
+#include "diagnosis/verdict.h"
+
+namespace fdi {
+
+/// Accumulators hold over an interruption of at most this: 10 min.
+inline constexpr std::int64_t kLongestInterruptionNs = 600'000'000'000;
+
+/// Decides whether a valve is where its model set was trained: it is ARMED or
+/// not, and judged only while it is.
+///
+/// It is disarmed by what the process does with it: another mode than AUTO, a
+/// command beyond the trained range or stepping as never in training, or being
+/// parked, at an end of its travel without flow. It is armed again after
+/// `rearm_samples` in a row without all that and with dP, T1, P1 and P2 as in
+/// normal operation: cold feedwater and rising pressure at a start-up are no
+/// broken thermometer. A new stream takes the settling samples only. Once the
+/// valve is armed, dP, T1, P1 and P2 alone never disarm it: they are judged.
+/// Those that were off while an episode was open do not keep it from being
+/// armed again.
+class Coverage {
+ public:
+  /// `models` must outlive it.
+  explicit Coverage(const ModelSet& models);
+
+  /// A new stream: nothing is known.
+  void Restart();
+
+  /// The observers were initialised at `stamp_ns`: they have to settle.
+  /// @returns true if what was known before still holds: the last sample is at
+  ///   most kLongestInterruptionNs older.
+  bool Settle(std::int64_t stamp_ns);
+
+  /// kLive, kSettling, kInhibited or kUncovered.
+  Quality Judge(const Sample& sample, const ObserverBank& bank,
+                bool episode_open);
+
+  /// Why the last sample was not judged.
+  CoverageReasons reasons() const { return reasons_; }
+  /// True at the sample that armed the valve.
+  bool armed_now() const { return armed_now_; }
+
+  void Save(SnapshotWriter& writer) const;
+  /// @returns false, leaving it undefined, if there is nothing to be read.
+  bool Restore(SnapshotReader& reader);
+
+ private:
+  struct Input {  // T1, P1 or P2
+    Signal signal;
+    CoverageReason reason;
+    SignalRange range;
+    std::optional<int> channel;  // that holds it against its normal band
+  };
+
+  CoverageReasons Operation(const Sample& sample);
+  CoverageReasons Inputs(const Sample& sample, const ObserverBank& bank) const;
+  bool Parked(const Sample& sample);
+  Quality JudgeArmed(CoverageReasons inputs, bool episode_open);
+  Quality JudgeDisarmed(CoverageReasons operation, CoverageReasons inputs);
+
+  const ModelSet* models_;
+  std::array<Input, 3> inputs_;
+  bool armed_{false};
+  bool armed_now_{false};
+  int settling_{0};  // samples that the observers still need
+  int inside_{0};    // samples in a row
+  int needed_{0};    // of them
+  int at_end_{0};    // samples in a row at an end of the travel, no flow
+  std::optional<double> last_cv_;
+  std::optional<std::int64_t> last_stamp_ns_;
+  CoverageReasons excused_{0};
+  CoverageReasons reasons_{0};
+};
+
+}  // namespace fdi

@@ -1,0 +1,167 @@
+#include "diagnosis/episode.h"
+
+#include <algorithm>
+
+namespace fdi {
+
+Episode::Episode(const ModelSet& models)
+    : models_(&models),
+      faults_(models),
+      isolation_(models.decision),
+      clearing_(models) {}
+
+void Episode::Score(const ObserverBank& bank, Verdict& verdict) const {
+  faults_.Score(bank, verdict);
+}
+
+void Episode::Step(const ObserverBank& bank,
+                   std::optional<std::int64_t> detected, bool abnormal,
+                   Verdict& verdict) {
+  const bool begins = verdict.state == State::kNormal;
+  if (begins && !detected) {
+    return;
+  }
+  if (begins) {
+    faults_.Restart();
+    isolation_.Restart();
+    clearing_.Restart();
+  }
+  faults_.Follow(bank);
+  faults_.Compete(verdict);
+  if (begins) {
+    Open(*detected, verdict);
+  }
+  Isolate(verdict);
+  JudgeUnknown(verdict);
+  clearing_.Push({verdict.residuals.data(), models_->channels.size()},
+                 verdict.normal_factor, abnormal);
+  if (clearing_.Cleared()) {
+    Emit(TransitionKind::kCleared, verdict.stamp_ns, verdict);
+    Emit(TransitionKind::kClosed, verdict.stamp_ns, verdict,
+         EndReason::kCleared);
+    verdict.state = State::kNormal;
+    verdict.isolated = 0;
+    verdict.unknown = Unknown::kNone;
+  }
+}
+
+void Episode::Hold(Verdict& verdict) const {
+  faults_.Compete(verdict);
+}
+
+Transition Episode::Close(EndReason reason, std::int64_t stamp_ns,
+                          Verdict& verdict) {
+  const Transition closed =
+      Make(TransitionKind::kClosed, stamp_ns, reason, verdict);
+  verdict.state = State::kNormal;
+  verdict.isolated = 0;
+  verdict.unknown = Unknown::kNone;
+  verdict.detected = false;
+  return closed;
+}
+
+void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
+  verdict.state = State::kDetected;
+  verdict.isolated = 0;
+  verdict.unknown = Unknown::kTooEarly;
+  detection_stamp_ns_ = stamp_ns;
+  age_ = 0;
+  without_fault_ = 0;
+  contender_ = 0;
+  contender_run_ = 0;
+  Emit(TransitionKind::kDetected, detection_stamp_ns_, verdict);
+}
+
+FaultSet Episode::FactorsFrom(double threshold, const Verdict& verdict) const {
+  FaultSet from = 0;
+  for (std::size_t i = 0; i < models_->faults.size(); ++i) {
+    if (verdict.fault_factors[i] >= threshold) {
+      from |= FaultSet{1} << i;
+    }
+  }
+  return from;
+}
+
+FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
+  FaultSet joined = set;
+  const FaultSet close =
+      FactorsFrom(0.5 * models_->decision.isolation_threshold, verdict);
+  for (const std::vector<int>& group : models_->groups) {
+    FaultSet members = 0;
+    for (const int fault : group) {
+      members |= FaultSet{1} << FaultIndex(*models_, fault);
+    }
+    if ((members & set) != 0) {
+      joined |= members & close;
+    }
+  }
+  return joined;
+}
+
+void Episode::Isolate(Verdict& verdict) {
+  const double threshold = models_->decision.isolation_threshold;
+  isolation_.Push(FactorsFrom(threshold, verdict));
+  FaultSet supported = isolation_.Supported();
+  if (isolation_held_ || supported == 0 || verdict.normal_factor >= threshold) {
+    return;
+  }
+  supported = WithGroups(supported, verdict);
+  if (verdict.state == State::kDetected) {
+    verdict.state = State::kIsolated;
+    verdict.isolated = supported;
+    verdict.unknown = Unknown::kNone;
+    Emit(TransitionKind::kIsolated, verdict.stamp_ns, verdict);
+    return;
+  }
+  // Another set has to hold for a while before it replaces this one.
+  contender_run_ = supported == contender_ ? contender_run_ + 1 : 1;
+  contender_ = supported;
+  if (supported != verdict.isolated &&
+      contender_run_ >= models_->decision.reisolation_samples) {
+    verdict.isolated = supported;
+    Emit(TransitionKind::kReisolated, verdict.stamp_ns, verdict);
+  }
+}
+
+// Nothing that is known explains what goes on if no factor reached T/2 in the
+// last t_k samples, and there were twice as many to find one.
+void Episode::JudgeUnknown(Verdict& verdict) {
+  const DecisionParameters& decision = models_->decision;
+  const bool explained =
+      FactorsFrom(0.5 * decision.isolation_threshold, verdict) != 0;
+  without_fault_ = explained ? 0 : without_fault_ + 1;
+  ++age_;
+  if (verdict.state == State::kDetected) {
+    const bool outside = without_fault_ >= decision.isolation_samples &&
+                         age_ > 2 * decision.isolation_samples;
+    verdict.unknown = outside ? Unknown::kOutsideKnown : Unknown::kTooEarly;
+  }
+}
+
+Transition Episode::Make(TransitionKind kind, std::int64_t stamp_ns,
+                         EndReason reason, const Verdict& verdict) const {
+  Transition transition;
+  transition.kind = kind;
+  transition.stamp_ns = stamp_ns;
+  transition.detection_stamp_ns = detection_stamp_ns_;
+  transition.faults = verdict.isolated;
+  transition.reason = reason;
+  transition.unknown = verdict.unknown;
+  for (std::size_t i = 0; i < models_->faults.size(); ++i) {
+    const bool counts =
+        verdict.isolated == 0 || (verdict.isolated >> i & 1U) != 0;
+    if (counts && verdict.fault_factors[i] >= transition.factor) {
+      transition.factor = verdict.fault_factors[i];
+      transition.strength = verdict.isolated == 0 ? 0.0 : verdict.strengths[i];
+    }
+  }
+  return transition;
+}
+
+void Episode::Emit(TransitionKind kind, std::int64_t stamp_ns, Verdict& verdict,
+                   EndReason reason) const {
+  verdict.transitions[static_cast<std::size_t>(verdict.transition_count++)] =
+      Make(kind, stamp_ns, reason, verdict);
+}
+
+}  // namespace fdi

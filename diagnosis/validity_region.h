@@ -1,0 +1,29 @@
+#pragma once
+
+#include <limits>
+
+#include "diagnosis/sample.h"
+
+namespace fdi {
+
+/// A range that holds every value.
+inline constexpr SignalRange kUnbounded{
+    -std::numeric_limits<double>::infinity(),
+    std::numeric_limits<double>::infinity()};
+
+/// Where the observers of a model set were trained, margins included; see
+/// Coverage for what becomes of a valve outside.
+struct ValidityRegion {
+  SignalRange cv{0.0, 100.0};  ///< Commands [%].
+  double cv_step{200.0};  ///< Largest change of CV from sample to sample [%].
+  SignalRange dp{kUnbounded};  ///< P1 − P2 in normal operation [kPa].
+  SignalRange t1{kUnbounded};  ///< T1 likewise [°C]; of a model set that has
+                               ///< a channel T1 its thresholds hold instead.
+  SignalRange p1{kUnbounded};  ///< P1 alike [kPa].
+  SignalRange p2{kUnbounded};  ///< P2 alike [kPa].
+  double flow_cutoff{0.0};     ///< A flow below is none [unit of the flow].
+  int rearm_samples{60};       ///< Inside before a valve that was outside, or
+                               ///< in another mode than AUTO, is judged again.
+};
+
+}  // namespace fdi
