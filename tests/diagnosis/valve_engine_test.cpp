@@ -1,7 +1,6 @@
 #include "diagnosis/valve_engine.h"
 
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -10,6 +9,7 @@
 
 #include "diagnosis/error.h"
 #include "tests/diagnosis/allocation_count.h"
+#include "tests/diagnosis/engine_run.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {
@@ -19,103 +19,15 @@ using testing::AddF3;
 using testing::AddF6;
 using testing::Noise;
 using testing::PlantSample;
+using testing::Seen;
 using testing::SharedPlant;
+using testing::StampOf;
+using testing::StepRange;
 
 constexpr int kSettled = kMaxLag;  // samples before LIVE
 
-struct Seen {
-  std::vector<Transition> transitions;
-  Verdict last;
-};
-
-// Steps samples [begin, end) with `change` applied to each.
-Seen StepRange(ValveEngine& engine, int begin, int end,
-               const std::function<void(Sample&)>& change = {}) {
-  Seen seen;
-  for (int k = begin; k < end; ++k) {
-    Sample sample = PlantSample(static_cast<std::uint64_t>(k));
-    if (change) {
-      change(sample);
-    }
-    seen.last = engine.Step(sample);
-    for (const Transition& transition : seen.last.Transitions()) {
-      seen.transitions.push_back(transition);
-    }
-  }
-  return seen;
-}
-
-std::int64_t StampOf(int k) {
-  return PlantSample(static_cast<std::uint64_t>(k)).stamp_ns;
-}
-
 void FullF6(Sample& sample) {
   AddF6(sample, 1.0);
-}
-
-// A shift of one deviation passes no threshold, its mean does.
-TEST(ValveEngineTest, WindowFindsWhatNoThresholdSees) {
-  ModelSet models = *SharedPlant();
-  for (const bool watched : {false, true}) {
-    if (watched) {
-      models.channels[1].windows = {
-          {50, -0.6 * testing::kNoise, 0.6 * testing::kNoise, 3.0}};
-    }
-    ValveEngine engine(std::make_shared<const ModelSet>(models));
-    Noise noise(5);
-    const auto add = [&](Sample& s) { noise.Add(s); };
-    EXPECT_TRUE(StepRange(engine, 0, 300, add).transitions.empty());
-    const Seen seen = StepRange(engine, 300, 600, [&](Sample& s) {
-      noise.Add(s);
-      AddF6(s, testing::kNoise / 20.0);
-    });
-    EXPECT_EQ(!seen.transitions.empty(), watched);
-  }
-}
-
-// Twice the noise on F: the mean stays, the energy does not.
-TEST(ValveEngineTest, EnergyOfAWindowIsWatchedUpwards) {
-  ModelSet models = *SharedPlant();
-  models.channels[1].lower_threshold = -100.0;
-  models.channels[1].upper_threshold = 100.0;
-  models.channels[1].windows = {
-      {50, -10.0, 10.0, std::log(1.5 * testing::kNoise)}};
-  ValveEngine engine(std::make_shared<const ModelSet>(models));
-  Noise noise(6);
-  const auto add = [&](Sample& s) { noise.Add(s); };
-  EXPECT_TRUE(StepRange(engine, 0, 300, add).transitions.empty());
-  const Seen seen = StepRange(engine, 300, 500, [&](Sample& s) {
-    const double flow = s[Signal::kF];
-    noise.Add(s);
-    s.values[Index(Signal::kF)] = flow + 2.0 * (s[Signal::kF] - flow);
-  });
-  ASSERT_FALSE(seen.transitions.empty());
-  EXPECT_EQ(seen.transitions[0].kind, TransitionKind::kDetected);
-}
-
-// Reading and prediction at the limit of the flow transmitter say nothing; a
-// reading below it does.
-TEST(ValveEngineTest, SaturatedChannelAbstains) {
-  ModelSet models = *SharedPlant();
-  for (Observer& observer : models.observers) {
-    observer.channels[1].model.saturation = 60.0;
-  }
-  ValveEngine engine(std::make_shared<const ModelSet>(models));
-  const auto clip = [](Sample& s) {
-    s.values[Index(Signal::kF)] = std::min(s[Signal::kF], 60.0);
-  };
-  bool abstained = false;
-  for (int k = 0; k < 300; ++k) {
-    Sample sample = PlantSample(static_cast<std::uint64_t>(k));
-    clip(sample);
-    const Verdict& verdict = engine.Step(sample);
-    EXPECT_EQ(verdict.transition_count, 0);
-    abstained = abstained || std::isnan(verdict.residuals[1]);
-  }
-  EXPECT_TRUE(abstained);
-  const Seen seen = StepRange(
-      engine, 300, 320, [](Sample& s) { s.values[Index(Signal::kF)] = 40.0; });
-  EXPECT_TRUE(seen.last.detected);
 }
 
 TEST(ValveEngineTest, NormalOperationOpensNoEpisode) {
@@ -215,6 +127,61 @@ TEST(ValveEngineTest, FaultThatMatchesNoObserverStaysUnknown) {
   ASSERT_EQ(seen.transitions.size(), 1U);
   EXPECT_EQ(seen.last.state, State::kDetected);
   EXPECT_EQ(FaultSetName(engine.models(), seen.last.isolated), "unknown");
+}
+
+// 20 below what any fault explains: after 2 t_k samples it is none of them.
+TEST(ValveEngineTest, UnknownIsOutsideWhatIsKnownOnceNothingExplainsIt) {
+  ValveEngine engine(SharedPlant());
+  const int t_k = engine.models().decision.isolation_samples;
+  StepRange(engine, 0, 50);
+  const auto strange = [](Sample& s) { s.values[Index(Signal::kF)] -= 20.0; };
+  // The detection is complete with sample 51.
+  const Seen early = StepRange(engine, 50, 51 + 2 * t_k, strange);
+  ASSERT_FALSE(early.transitions.empty());
+  EXPECT_EQ(early.transitions[0].unknown, Unknown::kTooEarly);
+  EXPECT_EQ(early.last.unknown, Unknown::kTooEarly);
+  const Seen later = StepRange(engine, 51 + 2 * t_k, 52 + 2 * t_k, strange);
+  EXPECT_EQ(later.last.unknown, Unknown::kOutsideKnown);
+  const auto closed = engine.EndEpisode(EndReason::kStreamEnded);
+  ASSERT_TRUE(closed.has_value());
+  EXPECT_EQ(closed->unknown, Unknown::kOutsideKnown);
+  EXPECT_EQ(engine.Step(PlantSample(80)).unknown, Unknown::kNone);
+}
+
+// f6 explains it every other sample: not long enough to name it.
+TEST(ValveEngineTest, UnknownIsTooEarlyWhileKnownFaultsMayExplainIt) {
+  ValveEngine engine(SharedPlant());
+  StepRange(engine, 0, 50);
+  int toggle = 0;
+  const Seen seen = StepRange(engine, 50, 200, [&](Sample& s) {
+    AddF6(s, ++toggle % 2 == 0 ? 1.0 : 3.0);
+  });
+  EXPECT_EQ(seen.last.state, State::kDetected);
+  EXPECT_EQ(seen.last.unknown, Unknown::kTooEarly);
+}
+
+TEST(ValveEngineTest, NamedEpisodeIsNotUnknown) {
+  ValveEngine engine(SharedPlant());
+  StepRange(engine, 0, 50);
+  const Seen seen = StepRange(engine, 50, 100, FullF6);
+  ASSERT_EQ(seen.last.state, State::kIsolated);
+  EXPECT_EQ(seen.last.unknown, Unknown::kNone);
+  EXPECT_EQ(seen.transitions.back().unknown, Unknown::kNone);
+}
+
+TEST(ValveEngineTest, HeldIsolationNamesNothing) {
+  ValveEngine engine(SharedPlant());
+  engine.HoldIsolation(true);
+  StepRange(engine, 0, 50);
+  const Seen seen = StepRange(engine, 50, 200, FullF6);
+  ASSERT_EQ(seen.transitions.size(), 1U);
+  EXPECT_EQ(seen.last.state, State::kDetected);
+  EXPECT_EQ(seen.last.isolated, 0U);
+  engine.Adopt(SharedPlant());
+  StepRange(engine, 200, 250);
+  EXPECT_EQ(StepRange(engine, 250, 350, FullF6).last.state, State::kDetected);
+  engine.HoldIsolation(false);
+  EXPECT_EQ(StepRange(engine, 350, 351, FullF6).last.state, State::kIsolated);
 }
 
 TEST(ValveEngineTest, EpisodeClearsAfterTcNormalSamples) {

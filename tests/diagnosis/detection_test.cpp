@@ -1,0 +1,89 @@
+#include "diagnosis/detection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/valve_engine.h"
+#include "tests/diagnosis/engine_run.h"
+#include "tests/diagnosis/linear_plant.h"
+
+namespace fdi {
+namespace {
+
+using testing::AddF6;
+using testing::Noise;
+using testing::PlantSample;
+using testing::Seen;
+using testing::SharedPlant;
+using testing::StepRange;
+
+// A shift of one deviation passes no threshold, its mean does.
+TEST(DetectionTest, WindowFindsWhatNoThresholdSees) {
+  ModelSet models = *SharedPlant();
+  for (const bool watched : {false, true}) {
+    if (watched) {
+      models.channels[1].windows = {
+          {50, -0.6 * testing::kNoise, 0.6 * testing::kNoise, 3.0}};
+    }
+    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    Noise noise(5);
+    const auto add = [&](Sample& s) { noise.Add(s); };
+    EXPECT_TRUE(StepRange(engine, 0, 300, add).transitions.empty());
+    const Seen seen = StepRange(engine, 300, 600, [&](Sample& s) {
+      noise.Add(s);
+      AddF6(s, testing::kNoise / 20.0);
+    });
+    EXPECT_EQ(!seen.transitions.empty(), watched);
+  }
+}
+
+// Twice the noise on F: the mean stays, the energy does not.
+TEST(DetectionTest, EnergyOfAWindowIsWatchedUpwards) {
+  ModelSet models = *SharedPlant();
+  models.channels[1].lower_threshold = -100.0;
+  models.channels[1].upper_threshold = 100.0;
+  models.channels[1].windows = {
+      {50, -10.0, 10.0, std::log(1.5 * testing::kNoise)}};
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  Noise noise(6);
+  const auto add = [&](Sample& s) { noise.Add(s); };
+  EXPECT_TRUE(StepRange(engine, 0, 300, add).transitions.empty());
+  const Seen seen = StepRange(engine, 300, 500, [&](Sample& s) {
+    const double flow = s[Signal::kF];
+    noise.Add(s);
+    s.values[Index(Signal::kF)] = flow + 2.0 * (s[Signal::kF] - flow);
+  });
+  ASSERT_FALSE(seen.transitions.empty());
+  EXPECT_EQ(seen.transitions[0].kind, TransitionKind::kDetected);
+}
+
+// Reading and prediction at the limit of the flow transmitter say nothing; a
+// reading below it does.
+TEST(DetectionTest, SaturatedChannelAbstains) {
+  ModelSet models = *SharedPlant();
+  for (Observer& observer : models.observers) {
+    observer.channels[1].model.saturation = 60.0;
+  }
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  const auto clip = [](Sample& s) {
+    s.values[Index(Signal::kF)] = std::min(s[Signal::kF], 60.0);
+  };
+  bool abstained = false;
+  for (int k = 0; k < 300; ++k) {
+    Sample sample = PlantSample(static_cast<std::uint64_t>(k));
+    clip(sample);
+    const Verdict& verdict = engine.Step(sample);
+    EXPECT_EQ(verdict.transition_count, 0);
+    abstained = abstained || std::isnan(verdict.residuals[1]);
+  }
+  EXPECT_TRUE(abstained);
+  const Seen seen = StepRange(
+      engine, 300, 320, [](Sample& s) { s.values[Index(Signal::kF)] = 40.0; });
+  EXPECT_TRUE(seen.last.detected);
+}
+
+}  // namespace
+}  // namespace fdi
