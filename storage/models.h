@@ -3,18 +3,21 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "storage/baseline.h"
 #include "storage/csv.h"
 #include "storage/database.h"
 
 namespace fdi::storage {
 
 /// Schema of models.db: tables model_set, observer, channel, training_run,
-/// valve, generation and the view model_summary; see docs/data.md.
+/// valve, valve_event, baseline, valve_type, generation and the view
+/// model_summary; see docs/data.md.
 const Schema& ModelsSchema();
 
 /// `NAME`, which means its active version, or `NAME@VERSION`.
@@ -58,6 +61,16 @@ struct ValveEntry {
   double period_s{1.0};
   std::uint32_t epoch{0};  ///< Replacements and recalibrations.
   std::optional<ModelReference> model_set;
+  /// In which the assigned set was made by onboarding; see BaselineState.
+  std::optional<std::uint32_t> baseline_epoch;
+
+  BaselineState baseline() const {
+    if (!baseline_epoch) {
+      return BaselineState::kNone;
+    }
+    return *baseline_epoch == epoch ? BaselineState::kValid
+                                    : BaselineState::kProvisional;
+  }
 };
 
 /// Whether a version that is stored becomes the active one of its name.
@@ -105,9 +118,34 @@ class ModelStore {
   /// @throws NotFoundError if there is no entry of that pattern.
   void RemoveValve(std::string_view pattern);
   /// Assigns a model set, or none, to the entry of `pattern`; adds the entry
-  /// if it is not there. @throws NotFoundError if there is no such model set.
+  /// if it is not there. Another set than before has no baseline.
+  /// @throws NotFoundError if there is no such model set.
   void AssignModelSet(std::string_view pattern,
                       const std::optional<ModelReference>& reference);
+
+  /// The valve was onboarded in its present epoch: keeps `record`, assigns its
+  /// model set, and the baseline is valid. Adds the entry if it is not there.
+  /// @throws NotFoundError if there is no such model set; ConfigError if the
+  ///   epoch is not the valve's.
+  void SetBaseline(std::string_view pattern, const BaselineRecord& record);
+  /// By epoch, then time.
+  std::vector<BaselineRecord> Baselines(std::string_view pattern);
+
+  /// Opens the next epoch; a baseline is provisional from now on.
+  /// @returns the entry as it is now. @throws NotFoundError if there is none.
+  ValveEntry AddValveEvent(std::string_view pattern, const ValveEvent& event);
+  std::vector<ValveEvent> ValveEvents(std::string_view pattern);
+
+  /// Keeps a valve type, in place of one of that name. @throws ConfigError if
+  /// the name is not one of a model set.
+  void SaveTemplate(const std::string& name, std::span<const std::byte> bytes,
+                    const std::string& summary);
+  /// @throws NotFoundError naming what is there.
+  ValveType LoadTemplate(std::string_view name);
+  /// By name, without bytes.
+  std::vector<ValveType> ListTemplates();
+  /// @throws NotFoundError
+  void DeleteTemplate(std::string_view name);
 
   /// The first entry whose pattern matches.
   std::optional<ValveEntry> FindValve(std::string_view valve_id);
@@ -125,6 +163,12 @@ class ModelStore {
  private:
   std::int64_t RequireId(const ModelReference& reference);
   void BumpGeneration();
+  ValveEntry RequireEntry(std::string_view pattern);
+  /// The entry of `pattern`, or one for valves as the model set needs them.
+  ValveEntry EntryOrNew(std::string_view pattern,
+                        const std::optional<ModelReference>& reference);
+  /// Within a transaction.
+  void StoreEntry(const ValveEntry& entry);
 
   Database database_;
 };

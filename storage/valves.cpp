@@ -6,7 +6,7 @@ namespace {
 
 constexpr std::string_view kColumns =
     "pattern, type, flow_unit, sense, signals, period_s, epoch, model_set,"
-    " model_set_version";
+    " model_set_version, baseline_epoch";
 
 std::string Select(std::string_view rest) {
   return "SELECT " + std::string(kColumns) + " FROM valve " +
@@ -27,6 +27,9 @@ ValveEntry ReadEntry(const Statement& row) {
     if (!row.IsNull(8)) {
       entry.model_set->version = row.Int(8);
     }
+  }
+  if (!row.IsNull(9)) {
+    entry.baseline_epoch = static_cast<std::uint32_t>(row.Int64(9));
   }
   return entry;
 }
@@ -57,23 +60,28 @@ void ModelStore::PutValve(const ValveEntry& entry) {
                       "needed");
   }
   Transaction transaction(database_);
+  StoreEntry(entry);
+  transaction.Commit();
+}
+
+void ModelStore::StoreEntry(const ValveEntry& entry) {
   if (entry.model_set) {
     RequireId(*entry.model_set);
   }
   database_.Run(
       "INSERT INTO valve (" + std::string(kColumns) +
-          ") VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (pattern)"
+          ") VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (pattern)"
           " DO UPDATE SET type = excluded.type, flow_unit = excluded.flow_unit,"
           " sense = excluded.sense, signals = excluded.signals,"
           " period_s = excluded.period_s, epoch = excluded.epoch,"
           " model_set = excluded.model_set,"
-          " model_set_version = excluded.model_set_version",
+          " model_set_version = excluded.model_set_version,"
+          " baseline_epoch = excluded.baseline_epoch",
       entry.pattern, entry.type, FlowUnitName(entry.flow_unit),
       entry.sense == Sense::kOpening ? "opening" : "closing", entry.signals,
       entry.period_s, entry.epoch, NameOf(entry.model_set),
-      VersionOf(entry.model_set));
+      VersionOf(entry.model_set), entry.baseline_epoch);
   BumpGeneration();
-  transaction.Commit();
 }
 
 void ModelStore::RemoveValve(std::string_view pattern) {
@@ -87,21 +95,37 @@ void ModelStore::RemoveValve(std::string_view pattern) {
   transaction.Commit();
 }
 
-void ModelStore::AssignModelSet(
+ValveEntry ModelStore::RequireEntry(std::string_view pattern) {
+  Statement row = database_.Prepare(Select("WHERE pattern = ?"));
+  if (!row.Bind(pattern).Step()) {
+    throw NotFoundError("there is no valve entry \"" + std::string(pattern) +
+                        "\" in " + database_.path().string());
+  }
+  return ReadEntry(row);
+}
+
+ValveEntry ModelStore::EntryOrNew(
     std::string_view pattern, const std::optional<ModelReference>& reference) {
+  Statement row = database_.Prepare(Select("WHERE pattern = ?"));
+  if (row.Bind(pattern).Step()) {
+    return ReadEntry(row);
+  }
   ValveEntry entry;
   entry.pattern = std::string(pattern);
   if (reference) {
-    // The valves of a new entry are taken to be as the model set needs them.
     const ModelSummary summary = Summary(*reference);
     entry.flow_unit = summary.flow_unit;
     entry.period_s = summary.period_s;
   }
-  Statement row = database_.Prepare(Select("WHERE pattern = ?"));
-  if (row.Bind(pattern).Step()) {
-    entry = ReadEntry(row);
+  return entry;
+}
+
+void ModelStore::AssignModelSet(
+    std::string_view pattern, const std::optional<ModelReference>& reference) {
+  ValveEntry entry = EntryOrNew(pattern, reference);
+  if (entry.model_set != reference) {
+    entry.baseline_epoch.reset();
   }
-  row.Reset();
   entry.model_set = reference;
   PutValve(entry);
 }

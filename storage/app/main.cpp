@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
   fdi::storage::AddRunsVerbs(program);
   fdi::storage::AddModelsVerbs(program);
   fdi::storage::AddValvesVerbs(program);
+  fdi::storage::AddTypesVerbs(program);
   fdi::storage::AddHistoryVerbs(program);
   fdi::storage::AddEvidenceVerbs(program);
   fdi::storage::AddMaintenanceVerbs(program);

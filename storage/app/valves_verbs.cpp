@@ -5,8 +5,10 @@
 
 #include "diagnosis/error.h"
 #include "storage/app/common.h"
+#include "storage/app/valve_baselines.h"
 #include "storage/app/verbs.h"
 #include "storage/cli/text_table.h"
+#include "storage/cli/time_text.h"
 #include "storage/models.h"
 
 namespace fdi::storage {
@@ -37,6 +39,7 @@ Json ValveJson(const ValveEntry& valve) {
           {"signals", SignalsJson(valve.signals)},
           {"period_s", valve.period_s},
           {"epoch", valve.epoch},
+          {"baseline", std::string(BaselineStateName(valve.baseline()))},
           {"model_set",
            valve.model_set ? Json(ToString(*valve.model_set)) : Json()}};
 }
@@ -58,13 +61,15 @@ int List(const Context& context) {
                         {"signals"},
                         {"Ts [s]", Align::kRight},
                         {"epoch", Align::kRight},
+                        {"baseline"},
                         {"model set"}});
   for (const ValveEntry& valve : valves) {
-    table.AddRow({valve.pattern, valve.type,
-                  std::string(FlowUnitName(valve.flow_unit)),
-                  SenseText(valve.sense), SignalsText(valve.signals),
-                  cli::FormatNumber(valve.period_s, 3),
-                  std::to_string(valve.epoch), SetText(valve.model_set)});
+    table.AddRow(
+        {valve.pattern, valve.type, std::string(FlowUnitName(valve.flow_unit)),
+         SenseText(valve.sense), SignalsText(valve.signals),
+         cli::FormatNumber(valve.period_s, 3), std::to_string(valve.epoch),
+         std::string(BaselineStateName(valve.baseline())),
+         SetText(valve.model_set)});
   }
   table.Print(std::cout);
   return cli::kExitOk;
@@ -83,6 +88,9 @@ int Show(const std::string& valve_id, const Context& context) {
     Json object = entry ? ValveJson(*entry) : Json::object();
     object["valve_id"] = valve_id;
     object["diagnosed_with"] = assigned ? Json(ToString(*assigned)) : Json();
+    if (entry) {
+      AddEpochs(store, entry->pattern, object);
+    }
     cli::PrintJson(std::cout, object);
     return cli::kExitOk;
   }
@@ -98,9 +106,13 @@ int Show(const std::string& valve_id, const Context& context) {
          {"% of", SenseText(entry->sense)},
          {"signals", SignalsText(entry->signals)},
          {"sample period", cli::FormatNumber(entry->period_s, 3) + " s"},
-         {"epoch", std::to_string(entry->epoch)}});
+         {"epoch", std::to_string(entry->epoch)},
+         {"baseline", std::string(BaselineStateName(entry->baseline()))}});
   }
   PrintFields(std::cout, fields);
+  if (entry) {
+    PrintEpochs(std::cout, store, entry->pattern, context);
+  }
   return cli::kExitOk;
 }
 
@@ -109,7 +121,8 @@ void Report(const ValveEntry& entry, const Context& context) {
     cli::PrintJson(std::cout, ValveJson(entry));
   } else {
     std::cout << entry.pattern << ": model set " << SetText(entry.model_set)
-              << ", epoch " << entry.epoch << '\n';
+              << ", epoch " << entry.epoch << ", baseline "
+              << BaselineStateName(entry.baseline()) << '\n';
   }
 }
 
@@ -162,13 +175,23 @@ int Assign(const std::string& pattern, const std::string& set,
   return cli::kExitOk;
 }
 
-// A replaced or recalibrated valve is another valve to its models.
-int Event(const std::string& pattern, const Context& context) {
-  ModelStore store = OpenToChange(context);
-  ValveEntry entry = RequireEntry(store, pattern);
-  ++entry.epoch;
-  store.PutValve(entry);
-  Report(entry, context);
+struct EventOptions {
+  std::string pattern;
+  std::string kind;
+  std::string note;
+  std::string at;
+  std::string who{UserName()};
+};
+
+// A replaced, repacked or recalibrated valve is another valve to its models.
+int Event(const EventOptions& options, const Context& context) {
+  ValveEvent event;
+  event.kind = ParseValveEventKind(options.kind);
+  event.note = options.note;
+  event.at_ns =
+      options.at.empty() ? cli::NowNs() : cli::ParseTime(options.at, true);
+  event.who = options.who;
+  Report(OpenToChange(context).AddValveEvent(options.pattern, event), context);
   return cli::kExitOk;
 }
 
@@ -201,6 +224,23 @@ void AddAdd(cli::Program& program, CLI::App& group) {
   verb.add_option("--model-set", options->model_set, "NAME[@VERSION]");
 }
 
+void AddEvent(cli::Program& program, CLI::App& group) {
+  auto options = std::make_shared<EventOptions>();
+  CLI::App& verb = program.AddVerb(
+      group, "event",
+      "Note what was done to a valve: the next epoch, in which no fault is "
+      "isolated until the valve is onboarded again",
+      [options](const Context& c) { return Event(*options, c); });
+  verb.add_option("valve", options->pattern, "Id, or the glob of an entry")
+      ->required();
+  verb.add_option("--kind", options->kind, "replaced, repacked, recalibrated")
+      ->required();
+  verb.add_option("--note", options->note, "Free text");
+  verb.add_option("--at", options->at, "When, RFC 3339 in UTC (default: now)")
+      ->type_name("UTC");
+  verb.add_option("--by", options->who, "Who says so");
+}
+
 }  // namespace
 
 void AddValvesVerbs(cli::Program& program) {
@@ -229,8 +269,7 @@ void AddValvesVerbs(cli::Program& program) {
   assign.add_option("valve", *pattern, "Id or glob")->required();
   assign.add_option("model-set", *set, "NAME[@VERSION] or none")->required();
 
-  add_by_name("event", "Note a replacement or recalibration (next epoch)",
-              Event);
+  AddEvent(program, group);
   add_by_name("remove", "Remove an entry", Remove);
 }
 

@@ -9,8 +9,10 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
+#include "storage/models.h"
 #include "storage/runs.h"
 #include "tests/storage/history_fixture.h"
+#include "tests/storage/model_set_fixture.h"
 
 namespace fdi::storage {
 namespace {
@@ -261,7 +263,13 @@ TEST_F(FdiStoreTest, LabelsAreShownAndRemoved) {
 
 TEST_F(FdiStoreTest, ValvesAreDescribedAndTheirEpochCounts) {
   EXPECT_EQ(Store("valves add 'LV-*' --flow-unit t/h --sense opening").code, 0);
-  EXPECT_EQ(Store("valves event 'LV-*'").code, 0);
+  EXPECT_EQ(Store("valves event 'LV-*' --kind repacked --note 'new packing' "
+                  "--at 2026-01-02T03:04:05Z --by me")
+                .code,
+            0);
+  EXPECT_EQ(Store("valves event 'LV-*'").code, 2);
+  EXPECT_EQ(Store("valves event 'LV-*' --kind painted").code, 2);
+  EXPECT_EQ(Store("valves event LV-1 --kind replaced").code, 5);
 
   const json valve = StoreJson("valves show LV-7");
 
@@ -269,7 +277,40 @@ TEST_F(FdiStoreTest, ValvesAreDescribedAndTheirEpochCounts) {
   EXPECT_EQ(valve["flow_unit"], "t/h");
   EXPECT_EQ(valve["sense"], "opening");
   EXPECT_EQ(valve["epoch"], 1);
+  EXPECT_EQ(valve["baseline"], "provisional");
   EXPECT_TRUE(valve["diagnosed_with"].is_null());
+  ASSERT_EQ(valve["events"].size(), 1U);
+  EXPECT_EQ(valve["events"][0]["kind"], "repacked");
+  EXPECT_EQ(valve["events"][0]["at_utc"], "2026-01-02T03:04:05Z");
+}
+
+TEST_F(FdiStoreTest, BaselinesOfEpochsAreShownSideBySide) {
+  {
+    ModelStore models(directory_.path() / "models.db",
+                      Access::kOccasionalWriter);
+    models.Save(RandomModelSet("pump", 3, 1));
+    BaselineRecord record{0,   "pump",           1,
+                          1.5, {{"kv", 118.25}}, {{"X", 0.25, 0.001, 99.5}}};
+    models.SetBaseline("LV-1", record);
+    models.AddValveEvent("LV-1", {});
+    record.epoch = 1;
+    record.parameters = {{"kv", 131.5}, {"play", 0.02}};
+    models.SetBaseline("LV-1", record);
+    models.SaveTemplate("globe", std::vector<std::byte>(7), "19 faults");
+  }
+  const std::string shown = Store("valves show LV-1").out;
+  EXPECT_THAT(shown, AllOf(HasSubstr("epoch 0: pump@1"),
+                           HasSubstr("epoch 1: pump@1"), HasSubstr("valid"),
+                           testing::ContainsRegex("kv +118.25[0-9]* +131.5"),
+                           testing::ContainsRegex("play +- +0.02")));
+  const json valve = StoreJson("valves show LV-1");
+  EXPECT_EQ(valve["baselines"][1]["parameters"]["kv"], 131.5);
+  EXPECT_EQ(valve["baselines"][0]["channels"][0]["vaf"], 99.5);
+
+  EXPECT_EQ(StoreJson("types list")["types"][0]["name"], "globe");
+  EXPECT_EQ(StoreJson("types show globe")["bytes"], 7);
+  EXPECT_EQ(Store("types delete globe").code, 0);
+  EXPECT_EQ(Store("types show globe").code, 5);
 }
 
 class FdiStoreHistoryTest : public FdiStoreTest {

@@ -1,5 +1,6 @@
 #include "storage/models.h"
 
+#include <cmath>
 #include <fstream>
 
 #include <gmock/gmock.h>
@@ -252,6 +253,81 @@ TEST_F(ModelsTest, ChangeCounterTellsOfActivationsAndAssignmentsOnly) {
   EXPECT_FALSE(counter.Changed());
   store_.AssignModelSet("FV-1", ModelReference{"pump", {}});
   EXPECT_TRUE(counter.Changed());
+}
+
+TEST_F(ModelsTest, AnEventMakesTheBaselineProvisionalUntilTheNextOnboarding) {
+  store_.Save(RandomModelSet("pump", 3, 1));
+  store_.Save(RandomModelSet("pump", 3, 2));
+  BaselineRecord found;
+  found.model_set = "pump";
+  found.version = 1;
+  found.hours = 1.5;
+  found.parameters = {{"kv", 118.25}, {"a \"b\"", -1e-9}};
+  found.channels = {{"X", 0.25, -0.001, 99.5}, {"F|X", 1.0, 0.5, std::nan("")}};
+  store_.SetBaseline("V1", found);
+  EXPECT_EQ(Assigned("V1"), "pump@1");
+  EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kValid);
+
+  const auto generation = store_.Generation();
+  const ValveEntry after = store_.AddValveEvent(
+      "V1", {0, ValveEventKind::kRepacked, "new packing", 5, "me"});
+  EXPECT_EQ(after.epoch, 1U);
+  EXPECT_GT(store_.Generation(), generation);
+  EXPECT_EQ(Assigned("V1"), "pump@1");
+  EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kProvisional);
+  EXPECT_THROW(store_.SetBaseline("V1", found), ConfigError);  // Epoch 0.
+
+  BaselineRecord left = found;
+  left.epoch = 1;
+  left.version = 2;
+  store_.SetBaseline("V1", left);
+  EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kValid);
+  const auto baselines = store_.Baselines("V1");
+  ASSERT_EQ(baselines.size(), 2U);
+  EXPECT_EQ(baselines[0].epoch, 0U);
+  EXPECT_EQ(baselines[0].parameters, found.parameters);
+  EXPECT_EQ(baselines[0].channels[0].rmse, 0.25);
+  EXPECT_EQ(baselines[0].channels[1].name, "F|X");
+  EXPECT_TRUE(std::isnan(baselines[0].channels[1].vaf));
+  EXPECT_EQ(baselines[1].version, 2);
+  const auto events = store_.ValveEvents("V1");
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].epoch, 1U);
+  EXPECT_EQ(events[0].kind, ValveEventKind::kRepacked);
+  EXPECT_EQ(events[0].note, "new packing");
+}
+
+TEST_F(ModelsTest, ASetThatTheUserAssignsHasNoBaseline) {
+  store_.Save(RandomModelSet("pump", 3, 1));
+  store_.Save(RandomModelSet("pump", 3, 2));
+  store_.AssignModelSet("V1", ParseModelReference("pump@1"));
+  EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kNone);
+  store_.AddValveEvent("V1", {});
+  EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kProvisional);
+  store_.AssignModelSet("V1", ParseModelReference("pump@1"));  // The same one.
+  EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kProvisional);
+  store_.AssignModelSet("V1", ParseModelReference("pump@2"));
+  EXPECT_EQ(store_.FindValve("V1")->baseline(), BaselineState::kNone);
+  EXPECT_THROW(store_.AddValveEvent("V2", {}), NotFoundError);
+}
+
+TEST_F(ModelsTest, ValveTypesKeepTheirBytes) {
+  const std::vector<std::byte> bytes{std::byte{0}, std::byte{255}};
+  store_.SaveTemplate("globe", std::vector<std::byte>(9), "old");
+  store_.SaveTemplate("globe", bytes, "DN100, 19 faults");
+  EXPECT_EQ(store_.LoadTemplate("globe").bytes, bytes);
+  const auto list = store_.ListTemplates();
+  ASSERT_EQ(list.size(), 1U);
+  EXPECT_EQ(list[0].summary, "DN100, 19 faults");
+  EXPECT_EQ(list[0].size, 2U);
+  EXPECT_TRUE(list[0].bytes.empty());
+  EXPECT_THAT(
+      MessageOf<NotFoundError>([&] { store_.LoadTemplate("butterfly"); }),
+      HasSubstr("there are globe"));
+  EXPECT_THROW(store_.SaveTemplate("a@1", bytes, ""), ConfigError);
+  store_.DeleteTemplate("globe");
+  EXPECT_THAT(store_.ListTemplates(), IsEmpty());
+  EXPECT_THROW(store_.DeleteTemplate("globe"), NotFoundError);
 }
 
 }  // namespace
