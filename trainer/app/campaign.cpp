@@ -5,6 +5,7 @@
 #include <cmath>
 #include <concepts>
 
+#include "diagnosis/error.h"
 #include "simulator/app/scenario_fields.h"
 #include "trainer/app/campaign_fields.h"
 
@@ -71,6 +72,20 @@ void WriteRun(const char* table, const CampaignRun& run, std::string& text) {
 }
 
 }  // namespace
+
+std::vector<CampaignRun> ValidationRuns(const std::filesystem::path& path,
+                                        std::uint64_t seed_offset) {
+  std::vector<CampaignRun> validation = LoadCampaign(path).validation;
+  if (validation.empty()) {
+    throw ConfigError(path.string() + ": there is no [[validation]]");
+  }
+  for (CampaignRun& run : validation) {
+    if (auto* simulated = std::get_if<SimulatedRun>(&run.source)) {
+      simulated->scenario.config.seed += seed_offset;
+    }
+  }
+  return validation;
+}
 
 std::string CampaignText(const Campaign& campaign) {
   TrainingOptions training = campaign.training;

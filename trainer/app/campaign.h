@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <variant>
@@ -86,6 +87,11 @@ std::string RunLabel(const CampaignRun& run);
 /// @throws NotFoundError if there is no such file.
 /// @throws ConfigError naming file, line, key and what is accepted.
 Campaign LoadCampaign(const std::filesystem::path& path);
+
+/// The [[validation]] of a campaign; `seed_offset` is added to the seeds of
+/// simulated runs. @throws as LoadCampaign(), or ConfigError if it has none.
+std::vector<CampaignRun> ValidationRuns(const std::filesystem::path& path,
+                                        std::uint64_t seed_offset);
 
 /// The text from which LoadCampaign() restores `campaign`, all runs spelled
 /// out.

@@ -9,6 +9,7 @@
 #include "storage/csv.h"
 #include "storage/runs.h"
 #include "trainer/app/run_input.h"
+#include "trainer/app/simulated_run.h"
 #include "trainer/parallel_for.h"
 
 namespace fdi::trainer {
@@ -18,7 +19,6 @@ using simulator::ValveSimulation;
 using storage::RunInfo;
 using storage::RunOrigin;
 
-constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15ULL;
 constexpr std::uint64_t kSamplesPerReport = 500;
 
 bool SameBits(double a, double b) {
@@ -155,21 +155,15 @@ class Collector {
     }
   }
 
-  simulator::ValveSimulationConfig ConfigOf(const SimulatedRun& run) const {
-    simulator::ValveSimulationConfig config = run.scenario.config;
-    config.start_ns =
-        config.start_ns != 0 ? config.start_ns : options_.start_ns;
-    config.source_id = (config.seed + 1) * kGolden;
-    return config;
-  }
-
   void SimulateMissing() {
     if (missing_.empty()) {
       return;
     }
     std::uint64_t total = 0;
     for (const std::size_t i : missing_) {
-      total += ValveSimulation(ConfigOf(SimulatedAt(i))).sample_count();
+      total +=
+          ValveSimulation(SimulationConfigOf(SimulatedAt(i), options_.start_ns))
+              .sample_count();
     }
     storage::RunRecorder recorder(directory_.runs());
     std::uint64_t done = 0;
@@ -199,7 +193,7 @@ class Collector {
   template <typename Report>
   std::vector<LabelledSample> Simulate(const SimulatedRun& run,
                                        const Report& report) const {
-    ValveSimulation simulation(ConfigOf(run));
+    ValveSimulation simulation(SimulationConfigOf(run, options_.start_ns));
     const auto& faults = run.scenario.config.faults;
     const std::string what =
         faults.empty() ? "normal" : simulator::ToText(faults.front());
@@ -219,18 +213,8 @@ class Collector {
 
   std::string Record(storage::RunRecorder& recorder, const SimulatedRun& run,
                      const std::vector<LabelledSample>& samples) const {
-    const simulator::ValveSimulationConfig config = ConfigOf(run);
-    storage::NewRun row;
-    row.valve_id = run.scenario.valve_id;
-    row.source_id = config.source_id;
-    row.start_ns = config.start_ns;
-    row.period_s = config.period_s;
-    row.flow_unit = config.parameters.instruments.flow_unit;
-    row.origin = RunOrigin::kSimulated;
-    row.scenario = simulator::ScenarioText(run.scenario);
-    row.seed = config.seed;
-    row.software = options_.software;
-    const auto key = recorder.Begin(row);
+    const auto key =
+        recorder.Begin(RunRowOf(run, options_.start_ns, options_.software));
     for (const LabelledSample& sample : samples) {
       recorder.Append(key, sample);
     }

@@ -1,245 +1,56 @@
-#include <iostream>
-#include <memory>
-#include <optional>
-
 #include <CLI/CLI.hpp>
 
 #include "diagnosis/error.h"
-#include "storage/cli/output_folder.h"
-#include "storage/cli/program.h"
-#include "storage/cli/progress.h"
-#include "storage/cli/stop_signals.h"
-#include "storage/cli/tag_map.h"
-#include "storage/cli/time_text.h"
-#include "storage/data_directory.h"
-#include "storage/models.h"
-#include "storage/runs.h"
-#include "trainer/app/campaign.h"
-#include "trainer/app/campaign_runs.h"
-#include "trainer/app/evaluation_report.h"
-#include "trainer/app/file_runs.h"
-#include "trainer/app/report_page.h"
-#include "trainer/app/report_trace.h"
-#include "trainer/app/rescore.h"
-#include "trainer/app/run_input.h"
-#include "trainer/app/vectors_csv.h"
+#include "trainer/app/evaluate_options.h"
 #include "trainer/app/verbs.h"
-#include "trainer/parallel_for.h"
+#include "trainer/baselines/baseline.h"
 
 namespace fdi::trainer {
 namespace {
-
-struct EvaluateOptions {
-  std::string model_set;
-  std::string valve;
-  std::vector<std::string> runs;
-  std::vector<std::string> files;
-  std::filesystem::path campaign;
-  std::uint64_t seed_offset{0};
-  std::filesystem::path map;
-  std::filesystem::path vectors;
-  std::filesystem::path report;
-  bool assume_normal{false};
-  bool csv{false};
-};
-
-// A run to score, under the name it is listed by.
-struct ScoredRun {
-  storage::StoredRun run;
-  std::string name;
-  double horizon_s{0.0};
-};
-
-ModelSet LoadModels(const EvaluateOptions& options,
-                    const storage::DataDirectory& directory) {
-  if (options.model_set.empty() == options.valve.empty()) {
-    throw ConfigError("either --model-set NAME[@VERSION] or --valve ID");
-  }
-  storage::ModelStore store(directory.models());
-  if (!options.model_set.empty()) {
-    return store.Load(options.model_set);
-  }
-  const auto assigned = store.AssignedModelSet(options.valve);
-  if (!assigned) {
-    throw NotFoundError("no model set is assigned to valve " + options.valve +
-                        ": see fdi-store valves assign");
-  }
-  return store.Load(*assigned);
-}
-
-double DurationOf(const storage::StoredRun& run) {
-  std::int64_t first = run.samples.front().sample.stamp_ns;
-  std::int64_t last = first;
-  for (const storage::StoredSample& stored : run.samples) {
-    first = std::min(first, stored.sample.stamp_ns);
-    last = std::max(last, stored.sample.stamp_ns);
-  }
-  return static_cast<double>(last - first) * 1e-9 + run.info.run.period_s;
-}
-
-struct Evaluation {
-  std::vector<EvaluatedRun> runs;
-  std::vector<RunTrace> traces;  // Of every run if there is a report.
-};
-
-// Also fills `trace`, and adds to `vectors`, unless there is none.
-EvaluatedRun EvaluateRun(const std::shared_ptr<const ModelSet>& models,
-                         const ScoredRun& scored, bool assume_normal,
-                         VectorsCsv* vectors, RunTrace* trace) {
-  const auto& [run, name, horizon_s] = scored;
-  const double duration_s = DurationOf(run);
-  std::optional<RunTraceRecorder> recorder;
-  if (trace != nullptr) {
-    recorder.emplace(*models, duration_s);
-  }
-  const VerdictSink sink = [&](const Sample&, const Verdict& verdict) {
-    if (vectors != nullptr) {
-      vectors->Add(name, verdict);
-    }
-    if (recorder) {
-      recorder->Add(verdict);
-    }
-  };
-  const std::vector<Indication> indications = Rescore(models, run, sink);
-  if (recorder) {
-    *trace = recorder->Finish(indications);
-  }
-  EvaluatedRun result;
-  result.indices = ComputeIndices(indications, horizon_s);
-  result.indices.run_id = name;
-  result.has_truth = assume_normal || HasTruth(run);
-  result.duration_s = duration_s;
-  for (const Indication& indication : indications) {
-    if (!indication.isolated.empty()) {
-      result.last_set = indication.isolated;
-    }
-  }
-  return result;
-}
-
-// The validation runs of a campaign, simulated or imported where missing.
-void AddValidation(const EvaluateOptions& options, const cli::Context& context,
-                   const storage::DataDirectory& directory,
-                   std::vector<ScoredRun>& runs) {
-  std::vector<CampaignRun> validation =
-      LoadCampaign(options.campaign).validation;
-  if (validation.empty()) {
-    throw ConfigError(options.campaign.string() +
-                      ": there is no [[validation]]");
-  }
-  for (CampaignRun& run : validation) {
-    if (auto* simulated = std::get_if<SimulatedRun>(&run.source)) {
-      simulated->scenario.config.seed += options.seed_offset;
-    }
-  }
-  const cli::StopSignals signals;
-  std::optional<cli::Progress> progress;
-  const CollectedRuns collected =
-      CollectRuns(validation, directory, {context.software, cli::NowNs(), 0},
-                  [&](double share, const std::string& what) {
-                    if (signals.stop_requested()) {
-                      throw Interrupted("interrupted");
-                    }
-                    if (!progress) {
-                      progress.emplace("simulate");
-                    }
-                    progress->Update(share, what);
-                  });
-  if (progress) {
-    progress->Finish();
-  }
-  storage::RunStore store(directory.runs());
-  for (std::size_t i = 0; i < validation.size(); ++i) {
-    runs.push_back({store.Load(collected.selectors[i]), RunLabel(validation[i]),
-                    validation[i].horizon_s});
-  }
-}
-
-std::vector<ScoredRun> LoadRuns(const EvaluateOptions& options,
-                                const ModelSet& models,
-                                const cli::Context& context,
-                                const storage::DataDirectory& directory) {
-  std::vector<ScoredRun> runs;
-  const auto add = [&](storage::StoredRun run) {
-    std::string name = RunName(run);
-    runs.push_back({std::move(run), std::move(name), 0.0});
-  };
-  if (!options.campaign.empty()) {
-    AddValidation(options, context, directory, runs);
-  }
-  if (!options.runs.empty()) {
-    storage::RunStore store(directory.runs());
-    for (const std::string& selector : options.runs) {
-      add(store.Load(selector));
-    }
-  }
-  std::optional<storage::ColumnMap> map;
-  if (!options.map.empty()) {
-    map = cli::ReadTagMap(options.map);
-  }
-  for (const std::string& file : options.files) {
-    add(ReadRunFile(file, map, RequiredSignals(models)));
-  }
-  return runs;
-}
-
-Evaluation EvaluateRuns(const EvaluateOptions& options,
-                        const std::shared_ptr<const ModelSet>& models,
-                        const std::vector<ScoredRun>& runs) {
-  std::optional<VectorsCsv> vectors;
-  if (!options.vectors.empty()) {
-    vectors.emplace(options.vectors, *models);
-  }
-  Evaluation result;
-  result.runs.resize(runs.size());
-  result.traces.resize(options.report.empty() ? 0 : runs.size());
-  const int threads = vectors ? 1 : 0;  // One file: in the order of the runs.
-  ParallelFor(static_cast<int>(runs.size()), threads, [&](int i) {
-    const auto r = static_cast<std::size_t>(i);
-    result.runs[r] = EvaluateRun(
-        models, runs[r], options.assume_normal, vectors ? &*vectors : nullptr,
-        result.traces.empty() ? nullptr : &result.traces[r]);
-  });
-  if (vectors) {
-    vectors->Commit();
-  }
-  return result;
-}
 
 int Evaluate(const EvaluateOptions& options, const cli::Context& context) {
   if (options.csv && context.options.json) {
     throw ConfigError("either --json or --csv");
   }
-  if (options.runs.empty() && options.files.empty() &&
-      options.campaign.empty()) {
-    throw ConfigError(
-        "what to score: --runs ID,..., --file FILE.csv or "
-        "--campaign FILE.toml");
+  if (options.leave_one_out) {
+    return EvaluateLeaveOneOut(options, context);
   }
-  if (!options.report.empty()) {
-    cli::EnsureFolder(options.report);
+  if (options.seeds > 0) {
+    return EvaluateSeeds(options, context);
   }
-  const storage::DataDirectory directory{context.options.data_dir};
-  const auto models =
-      std::make_shared<const ModelSet>(LoadModels(options, directory));
-  const auto [runs, traces] = EvaluateRuns(
-      options, models, LoadRuns(options, *models, context, directory));
-  if (!options.report.empty()) {
-    cli::WriteFile(options.report / "index.html",
-                   ReportPage({*models, runs, traces, context.software,
-                               context.command_line}));
+  if (!options.verdicts.empty()) {
+    return EvaluateVerdicts(options, context);
   }
-  if (context.options.json) {
-    cli::PrintJson(std::cout, EvaluationJson(*models, runs));
-  } else if (options.csv) {
-    WriteEvaluationCsv(std::cout, runs);
-  } else {
-    PrintEvaluation(std::cout, *models, runs);
+  if (!options.baseline.empty()) {
+    return EvaluateBaseline(options, context);
   }
-  return cli::kExitOk;
+  return EvaluateModels(options, context);
 }
 
-void AddOptions(CLI::App& verb, EvaluateOptions& options) {
+void AddSelection(CLI::App& verb, RunSelection& selection) {
+  verb.add_option("--runs", selection.runs, "Runs, or stretches of them [s]")
+      ->delimiter(',')
+      ->type_name("ID[@from:to],...");
+  CLI::Option* files =
+      verb.add_option("--file", selection.files,
+                      "CSV file scored without storing it; repeatable")
+          ->expected(1)
+          ->take_all()
+          ->type_name("FILE.csv[@from:to]");
+  verb.add_option("--campaign", selection.campaign,
+                  "Its validation runs; simulates or imports what is missing")
+      ->type_name("FILE.toml");
+  verb.add_option("--seed-offset", selection.seed_offset,
+                  "Added to the seeds of simulated validation runs")
+      ->check(CLI::Range(0, 1000000000))
+      ->type_name("N");
+  verb.add_option("--map", selection.map,
+                  "TOML file: names, units, scale, offset, sense of columns")
+      ->type_name("FILE.toml")
+      ->needs(files);
+}
+
+void AddModels(CLI::App& verb, EvaluateOptions& options) {
   CLI::Option* set = verb.add_option("--model-set", options.model_set,
                                      "NAME (its active version)")
                          ->type_name("NAME[@VERSION]");
@@ -247,26 +58,17 @@ void AddOptions(CLI::App& verb, EvaluateOptions& options) {
                   "Take the model set assigned to this valve")
       ->type_name("ID")
       ->excludes(set);
-  verb.add_option("--runs", options.runs, "Runs, or stretches of them [s]")
+  verb.add_option("--without", options.without,
+                  "As if the set had never been told of these faults")
       ->delimiter(',')
-      ->type_name("ID[@from:to],...");
-  CLI::Option* files =
-      verb.add_option("--file", options.files,
-                      "CSV file scored without storing it; repeatable")
-          ->expected(1)
-          ->take_all()
-          ->type_name("FILE.csv[@from:to]");
-  verb.add_option("--campaign", options.campaign,
-                  "Its validation runs; simulates or imports what is missing")
-      ->type_name("FILE.toml");
-  verb.add_option("--seed-offset", options.seed_offset,
-                  "Added to the seeds of simulated validation runs")
-      ->check(CLI::Range(0, 1000000000))
-      ->type_name("N");
-  verb.add_option("--map", options.map,
-                  "TOML file: names, units, scale, offset, sense of columns")
-      ->type_name("FILE.toml")
-      ->needs(files);
+      ->type_name("FAULT,...");
+  verb.add_option("--without-channels", options.without_channels,
+                  "As if the set did not have these residual channels")
+      ->delimiter(',')
+      ->type_name("CHANNEL,...");
+}
+
+void AddOutputs(CLI::App& verb, EvaluateOptions& options) {
   verb.add_option("--report", options.report,
                   "Write DIR/index.html: tables and traces of every run")
       ->type_name("DIR");
@@ -276,6 +78,58 @@ void AddOptions(CLI::App& verb, EvaluateOptions& options) {
   verb.add_flag("--assume-normal", options.assume_normal,
                 "What has no truth counts as free of faults");
   verb.add_flag("--csv", options.csv, "One line per run instead of tables");
+}
+
+// What scores otherwise; each excludes the others and the outputs it lacks.
+void AddWays(CLI::App& verb, EvaluateOptions& options) {
+  CLI::Option* leave =
+      verb.add_flag("--leave-one-out", options.leave_one_out,
+                    "Score each fault by a set that does not know it");
+  CLI::Option* seeds =
+      verb.add_option("--seeds", options.seeds,
+                      "Repeat the simulated validation runs with so many "
+                      "seeds; shares with 95 % intervals")
+          ->check(CLI::Range(1, 10000))
+          ->type_name("N");
+  CLI::Option* verdicts =
+      verb.add_option("--verdicts", options.verdicts,
+                      "Score another detector: t_s,detected[,faults] of each "
+                      "run, in the order of the runs")
+          ->delimiter(',')
+          ->type_name("FILE.csv,...");
+  CLI::Option* baseline =
+      verb.add_option("--baseline", options.baseline,
+                      "Score a detector that readers know, fitted to the "
+                      "training runs of the campaign, or those given")
+          ->check(CLI::IsMember(BaselineNames()))
+          ->type_name("NAME");
+  const std::vector<CLI::Option*> ways{leave, seeds, verdicts, baseline};
+  for (CLI::Option* way : ways) {
+    for (CLI::Option* other : ways) {
+      if (way != other) {
+        way->excludes(other);
+      }
+    }
+    way->excludes("--report")->excludes("--vectors");
+  }
+  leave->excludes("--csv")->excludes("--without");
+  seeds->excludes("--csv")->excludes("--runs")->excludes("--file");
+  seeds->needs("--campaign");
+  for (CLI::Option* way : {verdicts, baseline}) {
+    way->excludes("--model-set")->excludes("--valve");
+    way->excludes("--without")->excludes("--without-channels");
+  }
+  verb.add_option("--train-runs", options.train_runs,
+                  "Runs that the baseline is fitted to")
+      ->delimiter(',')
+      ->needs(baseline)
+      ->type_name("ID[@from:to],...");
+  verb.add_option("--train-file", options.train_files,
+                  "CSV file that the baseline is fitted to; repeatable")
+      ->expected(1)
+      ->take_all()
+      ->needs(baseline)
+      ->type_name("FILE.csv[@from:to]");
 }
 
 }  // namespace
@@ -288,7 +142,10 @@ void AddEvaluateVerb(cli::Program& program) {
       [options](const cli::Context& context) {
         return Evaluate(*options, context);
       });
-  AddOptions(verb, *options);
+  AddModels(verb, *options);
+  AddSelection(verb, options->selection);
+  AddOutputs(verb, *options);
+  AddWays(verb, *options);
 }
 
 }  // namespace fdi::trainer

@@ -133,6 +133,17 @@ cli::Json ConfusionJson(const ConfusionMatrix& matrix) {
 
 }  // namespace
 
+cli::Json DetectorJson(const Detector& detector) {
+  if (detector.version == 0) {
+    return {{"detector", detector.name}};
+  }
+  return {{"model_set", detector.name}, {"version", detector.version}};
+}
+
+Detector DetectorOf(const ModelSet& models) {
+  return {models.name, models.version, models.groups};
+}
+
 std::vector<std::pair<const char*, double>> IndexNumbers(const RunIndices& i) {
   return {{"t_dt_first", i.t_dt_first},
           {"t_dt", i.t_dt},
@@ -172,13 +183,15 @@ std::string CsvCell(const std::string& text) {
   return quoted + '"';
 }
 
-void PrintEvaluation(std::ostream& out, const ModelSet& models,
+void PrintEvaluation(std::ostream& out, const Detector& detector,
                      const std::vector<EvaluatedRun>& runs) {
   PrintRuns(out, runs);
-  PrintSummary(out, FiguresOf(runs, models.groups));
+  PrintSummary(out, FiguresOf(runs, detector.groups));
   PrintConfusion(out, "truth \\ outcome", BuildConfusion(runs));
-  PrintConfusion(out, "truth \\ outcome by group",
-                 BuildConfusion(runs, models.groups));
+  if (!detector.groups.empty()) {
+    PrintConfusion(out, "truth \\ outcome by group",
+                   BuildConfusion(runs, detector.groups));
+  }
 }
 
 void WriteEvaluationCsv(std::ostream& out,
@@ -201,35 +214,33 @@ void WriteEvaluationCsv(std::ostream& out,
   }
 }
 
-cli::Json EvaluationJson(const ModelSet& models,
+cli::Json EvaluationJson(const Detector& detector,
                          const std::vector<EvaluatedRun>& runs) {
   cli::Json list = cli::Json::array();
   for (const EvaluatedRun& run : runs) {
     list.push_back(RunJson(run));
   }
-  const EvaluationFigures figures = FiguresOf(runs, models.groups);
+  const EvaluationFigures figures = FiguresOf(runs, detector.groups);
   const EvaluationSummary& s = figures.summary;
-  return {{"runs", std::move(list)},
-          {"summary",
-           {{"model_set", models.name},
-            {"version", models.version},
-            {"faulty_runs", s.faulty_runs},
-            {"detected", s.detected},
-            {"contained", s.contained},
-            {"exact", s.exact},
-            {"contained_group", figures.contained_group},
-            {"exact_group", figures.exact_group},
-            {"mean_d_acc", s.mean_d_acc},
-            {"mean_d_acc_group", figures.mean_d_acc_group},
-            {"max_r_fd", s.max_r_fd},
-            {"wrong_isolations", figures.wrong_isolations},
-            {"fault_free_runs", s.fault_free_runs},
-            {"fault_free_hours", s.fault_free_hours},
-            {"fault_free_episodes", s.fault_free_episodes},
-            {"runs_without_truth", figures.without_truth},
-            {"confusion", ConfusionJson(BuildConfusion(runs))},
-            {"confusion_by_group",
-             ConfusionJson(BuildConfusion(runs, models.groups))}}}};
+  cli::Json summary = DetectorJson(detector);
+  summary.update({{"faulty_runs", s.faulty_runs},
+                  {"detected", s.detected},
+                  {"contained", s.contained},
+                  {"exact", s.exact},
+                  {"contained_group", figures.contained_group},
+                  {"exact_group", figures.exact_group},
+                  {"mean_d_acc", s.mean_d_acc},
+                  {"mean_d_acc_group", figures.mean_d_acc_group},
+                  {"max_r_fd", s.max_r_fd},
+                  {"wrong_isolations", figures.wrong_isolations},
+                  {"fault_free_runs", s.fault_free_runs},
+                  {"fault_free_hours", s.fault_free_hours},
+                  {"fault_free_episodes", s.fault_free_episodes},
+                  {"runs_without_truth", figures.without_truth},
+                  {"confusion", ConfusionJson(BuildConfusion(runs))},
+                  {"confusion_by_group",
+                   ConfusionJson(BuildConfusion(runs, detector.groups))}});
+  return {{"runs", std::move(list)}, {"summary", std::move(summary)}};
 }
 
 }  // namespace fdi::trainer

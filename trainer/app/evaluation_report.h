@@ -11,6 +11,16 @@
 
 namespace fdi::trainer {
 
+/// Who answered: a model set, or by name alone anybody's detector.
+struct Detector {
+  std::string name;
+  int version{0};  ///< Of a model set.
+  std::vector<FaultGroup> groups{};
+};
+Detector DetectorOf(const ModelSet& models);
+/// {"model_set", "version"}, or {"detector"}.
+cli::Json DetectorJson(const Detector& detector);
+
 /// Name and value of every index that is a number, in the order of the
 /// contract.
 std::vector<std::pair<const char*, double>> IndexNumbers(const RunIndices& i);
@@ -27,14 +37,14 @@ std::string CountText(double count);
 /// `text` as a cell of a CSV file, quoted where it has to be.
 std::string CsvCell(const std::string& text);
 
-/// Indices per run, summary, confusion matrix by fault and by group of the set.
-void PrintEvaluation(std::ostream& out, const ModelSet& models,
+/// Indices per run, summary, confusion matrix by fault and by group.
+void PrintEvaluation(std::ostream& out, const Detector& detector,
                      const std::vector<EvaluatedRun>& runs);
 /// One line per run, the columns of the JSON and a few more.
 void WriteEvaluationCsv(std::ostream& out,
                         const std::vector<EvaluatedRun>& runs);
-/// {"runs": [...], "summary": {...}}.
-cli::Json EvaluationJson(const ModelSet& models,
+/// {"runs": [...], "summary": {what DetectorJson() says, figures}}.
+cli::Json EvaluationJson(const Detector& detector,
                          const std::vector<EvaluatedRun>& runs);
 
 }  // namespace fdi::trainer

@@ -33,11 +33,6 @@ void RequireSuited(const ModelSet& models, const storage::StoredRun& run) {
   }
 }
 
-bool OutOfOrder(Intake intake) {
-  return intake == Intake::kRepeat || intake == Intake::kLate ||
-         intake == Intake::kSuperseded;
-}
-
 // Tells whether the samples alone made the live engine initialise itself.
 class InitialisationWatch {
  public:
@@ -80,14 +75,6 @@ std::vector<int> FaultsIn(const ModelSet& models, FaultSet set) {
   return faults;
 }
 
-FaultTruth TruthOf(const storage::StoredSample& stored) {
-  FaultTruth truth = stored.truth.value_or(FaultTruth{});
-  if (truth.strength == 0.0) {
-    truth.fault = 0;
-  }
-  return truth;
-}
-
 // A detection counts from its first abnormal sample.
 void BackdateDetections(const Verdict& verdict, std::int64_t start_ns,
                         std::vector<Indication>& all) {
@@ -104,6 +91,19 @@ void BackdateDetections(const Verdict& verdict, std::int64_t start_ns,
 }
 
 }  // namespace
+
+bool OutOfOrder(Intake intake) {
+  return intake == Intake::kRepeat || intake == Intake::kLate ||
+         intake == Intake::kSuperseded;
+}
+
+FaultTruth TruthOf(const storage::StoredSample& stored) {
+  FaultTruth truth = stored.truth.value_or(FaultTruth{});
+  if (truth.strength == 0.0) {
+    truth.fault = 0;
+  }
+  return truth;
+}
 
 std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
                                 const storage::StoredRun& run,

@@ -8,6 +8,13 @@
 
 namespace fdi::trainer {
 
+/// Repeats, late samples and those of a superseded source, which no engine
+/// answers.
+bool OutOfOrder(Intake intake);
+
+/// The truth beside a sample; {0, 0} while no fault acts or none is known.
+FaultTruth TruthOf(const storage::StoredSample& stored);
+
 /// Runs the monitor's own engine over a stored run as the live one met it: all
 /// samples in the order of arrival, those of a superseded source left out; the
 /// models adopted anew where another set began to answer, the episode ended
