@@ -22,7 +22,9 @@ void Detection::Restart() {
   runs_.fill({});
 }
 
-bool Detection::Push(const ObserverBank& bank, std::int64_t stamp_ns) {
+bool Detection::Push(const ObserverBank& bank, const Sample& sample) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const std::int64_t stamp_ns = sample.stamp_ns;
   const std::size_t channels = models_->channels.size();
   std::array<double, kMaxChannels> certain{};
   for (std::size_t c = 0; c < channels; ++c) {
@@ -31,9 +33,10 @@ bool Detection::Push(const ObserverBank& bank, std::int64_t stamp_ns) {
         bank.active(channel)
             ? Certain(bank.residual(0, channel),
                       kExtrapolationError * bank.extrapolation(0, channel))
-            : std::numeric_limits<double>::quiet_NaN();
+            : kNan;
   }
-  windows_.Push({certain.data(), channels});
+  windows_.Push({certain.data(), channels},
+                sample.Has(Signal::kCv) ? sample[Signal::kCv] : kNan);
   bool abnormal = false;
   for (std::size_t c = 0; c < channels; ++c) {
     const ChannelSpec& channel = models_->channels[c];
@@ -49,7 +52,10 @@ bool Detection::Push(const ObserverBank& bank, std::int64_t stamp_ns) {
       const bool full = window.full();
       Count(test++, full && window.mean() < limits.lower_mean, stamp_ns);
       Count(test++, full && window.mean() > limits.upper_mean, stamp_ns);
-      Count(test++, full && window.log_rms() > limits.upper_log_rms, stamp_ns);
+      Count(test++,
+            full &&
+                window.log_rms() > UpperLogRms(limits, windows_.command(c, w)),
+            stamp_ns);
     }
   }
   return abnormal;

@@ -23,9 +23,9 @@ class Detection {
   /// Samples are missing: runs end, the windows stay.
   void Interrupt() { runs_.fill({}); }
 
-  /// Takes the residuals of one sample. Returns whether a single residual is
+  /// Takes one sample and its residuals. Returns whether a single residual is
   /// beyond its threshold.
-  bool Push(const ObserverBank& bank, std::int64_t stamp_ns);
+  bool Push(const ObserverBank& bank, const Sample& sample);
 
   void Save(SnapshotWriter& writer) const { windows_.Save(writer); }
   /// @returns false, leaving windows undefined, if they are not to be read.

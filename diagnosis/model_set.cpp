@@ -50,8 +50,11 @@ void ValidateChannel(const ModelSet& models, const ChannelSpec& channel) {
           where + "windows must be 2 to 100000 samples long");
     Check(window.lower_mean < 0.0 && window.upper_mean > 0.0, models,
           where + "limits of a window must enclose zero");
-    Check(std::isfinite(window.upper_log_rms), models,
-          where + "limits of a window must be finite");
+    Check(std::isfinite(window.upper_log_rms) &&
+              std::isfinite(window.log_activity),
+          models, where + "limits of a window must be finite");
+    Check(window.activity_slope >= 0.0 && window.activity_slope <= 1.0, models,
+          where + "the slope of a window must be in [0, 1]");
   }
 }
 

@@ -30,12 +30,19 @@ struct ValidationFigures {
 };
 
 /// Limits on the normal residual over an exponential window: its mean and the
-/// logarithm of its deviation about that mean (ResidualWindows).
+/// logarithm of its deviation about that mean (ResidualWindows). What a model
+/// errs by grows with what the command does: the limit on the deviation is
+///
+///     upper_log_rms + activity_slope · (a − log_activity), not below the first
+///
+/// with a the logarithm of the deviation of CV over the same window.
 struct WindowLimits {
-  int length{30};             ///< N [samples].
-  double lower_mean{0.0};     ///< < 0 [unit].
-  double upper_mean{0.0};     ///< > 0 [unit].
-  double upper_log_rms{0.0};  ///< Of the deviation in units of the output.
+  int length{30};              ///< N [samples].
+  double lower_mean{0.0};      ///< < 0 [unit].
+  double upper_mean{0.0};      ///< > 0 [unit].
+  double upper_log_rms{0.0};   ///< Of the deviation in units of the output.
+  double activity_slope{0.0};  ///< In [0, 1] [-].
+  double log_activity{0.0};    ///< Of CV in training [log %].
 };
 
 /// A residual channel of the model set: which output it watches.

@@ -7,6 +7,7 @@ namespace fdi {
 namespace {
 
 constexpr double kLeastVariance = 1e-24;
+constexpr double kMostActivity = 4.0;  // times that of the training
 
 }  // namespace
 
@@ -33,52 +34,68 @@ bool ResidualWindow::Restore(SnapshotReader& reader) {
          std::isfinite(variance_) && variance_ >= 0.0;
 }
 
-bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window) {
+double UpperLogRms(const WindowLimits& limits, const ResidualWindow& command) {
+  if (!command.full()) {
+    return limits.upper_log_rms;
+  }
+  const double more = std::clamp(command.log_rms() - limits.log_activity, 0.0,
+                                 std::log(kMostActivity));
+  return limits.upper_log_rms + limits.activity_slope * more;
+}
+
+bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window,
+              const ResidualWindow& command) {
   return window.full() && (window.mean() < limits.lower_mean ||
                            window.mean() > limits.upper_mean ||
-                           window.log_rms() > limits.upper_log_rms);
+                           window.log_rms() > UpperLogRms(limits, command));
 }
 
 ResidualWindows::ResidualWindows(const ModelSet& models) {
   for (const ChannelSpec& channel : models.channels) {
-    std::vector<ResidualWindow>& windows = windows_.emplace_back();
+    std::vector<Pair>& windows = windows_.emplace_back();
     for (const WindowLimits& limits : channel.windows) {
-      windows.emplace_back(limits.length);
+      windows.push_back(
+          {ResidualWindow(limits.length), ResidualWindow(limits.length)});
     }
   }
 }
 
 void ResidualWindows::Restart() {
   for (auto& channel : windows_) {
-    for (ResidualWindow& window : channel) {
-      window.Restart();
+    for (Pair& window : channel) {
+      window.residual.Restart();
+      window.command.Restart();
     }
   }
 }
 
-void ResidualWindows::Push(std::span<const double> residuals) {
+void ResidualWindows::Push(std::span<const double> residuals, double cv) {
   for (std::size_t c = 0; c < windows_.size(); ++c) {
     if (!std::isfinite(residuals[c])) {
       continue;
     }
-    for (ResidualWindow& window : windows_[c]) {
-      window.Push(residuals[c]);
+    for (Pair& window : windows_[c]) {
+      window.residual.Push(residuals[c]);
+      if (std::isfinite(cv)) {
+        window.command.Push(cv);
+      }
     }
   }
 }
 
 void ResidualWindows::Save(SnapshotWriter& writer) const {
   for (const auto& channel : windows_) {
-    for (const ResidualWindow& window : channel) {
-      window.Save(writer);
+    for (const Pair& window : channel) {
+      window.residual.Save(writer);
+      window.command.Save(writer);
     }
   }
 }
 
 bool ResidualWindows::Restore(SnapshotReader& reader) {
   for (auto& channel : windows_) {
-    for (ResidualWindow& window : channel) {
-      if (!window.Restore(reader)) {
+    for (Pair& window : channel) {
+      if (!window.residual.Restore(reader) || !window.command.Restore(reader)) {
         return false;
       }
     }

@@ -38,10 +38,17 @@ class ResidualWindow {
   double variance_{0.0};
 };
 
-/// True if a full window is beyond one of its limits.
-bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window);
+/// The limit on the energy of a window while `command`, the window of CV over
+/// the same samples, is as active as it is; see WindowLimits. The activity
+/// counts up to four times that of the training.
+double UpperLogRms(const WindowLimits& limits, const ResidualWindow& command);
 
-/// The windows of all channels of a model set.
+/// True if a full window is beyond one of its limits.
+bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window,
+              const ResidualWindow& command);
+
+/// The windows of all channels of a model set, each with that of CV over the
+/// same samples.
 class ResidualWindows {
  public:
   explicit ResidualWindows(const ModelSet& models);
@@ -49,17 +56,25 @@ class ResidualWindows {
   void Restart();
 
   /// @param residuals of the normal observer, one per channel; NaN abstains.
-  void Push(std::span<const double> residuals);
+  /// @param cv NaN without the signal: no limit is raised.
+  void Push(std::span<const double> residuals, double cv);
 
   void Save(SnapshotWriter& writer) const;
   bool Restore(SnapshotReader& reader);
 
   const ResidualWindow& window(std::size_t channel, std::size_t index) const {
-    return windows_[channel][index];
+    return windows_[channel][index].residual;
+  }
+  const ResidualWindow& command(std::size_t channel, std::size_t index) const {
+    return windows_[channel][index].command;
   }
 
  private:
-  std::vector<std::vector<ResidualWindow>> windows_;  // per channel
+  struct Pair {
+    ResidualWindow residual;
+    ResidualWindow command;
+  };
+  std::vector<std::vector<Pair>> windows_;  // per channel
 };
 
 }  // namespace fdi

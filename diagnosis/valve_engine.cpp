@@ -68,7 +68,7 @@ class ValveEngine::Impl {
   void Initialise(const Sample& sample);
   void ReadResiduals();
   Quality Judge(const Sample& sample);
-  void Decide();
+  void Decide(const Sample& sample);
 
   std::unique_ptr<Diagnosis> diagnosis_;
   SourceOrder order_;
@@ -117,7 +117,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
   diagnosis_->episode.Score(diagnosis_->bank, verdict_);
   verdict_.quality = Judge(sample);
   if (verdict_.quality == Quality::kLive) {
-    Decide();
+    Decide(sample);
   } else if (episode_open()) {
     diagnosis_->episode.Hold(verdict_);
   }
@@ -182,12 +182,12 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
   return quality;
 }
 
-void ValveEngine::Impl::Decide() {
+void ValveEngine::Impl::Decide(const Sample& sample) {
   Detection& detection = diagnosis_->detection;
   if (diagnosis_->coverage.armed_now()) {
     detection.Restart();
   }
-  const bool abnormal = detection.Push(diagnosis_->bank, verdict_.stamp_ns);
+  const bool abnormal = detection.Push(diagnosis_->bank, sample);
   const bool was_open = episode_open();
   diagnosis_->episode.Step(diagnosis_->bank, detection.stamp_ns(), abnormal,
                            verdict_);

@@ -91,8 +91,10 @@ void Fields(A& a, T& figures) {
 
 template <typename A, Of<WindowLimits> T>
 void Fields(A& a, T& window) {
-  auto& [length, lower_mean, upper_mean, upper_log_rms] = window;
-  a(length, lower_mean, upper_mean, upper_log_rms);
+  auto& [length, lower_mean, upper_mean, upper_log_rms, activity_slope,
+         log_activity] = window;
+  a(length, lower_mean, upper_mean, upper_log_rms, activity_slope,
+    log_activity);
 }
 
 template <typename A, Of<ChannelSpec> T>

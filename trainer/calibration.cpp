@@ -19,6 +19,7 @@ constexpr int kFewestValues = 100;
 // than so many times it.
 constexpr double kLeastMean = 0.5;
 constexpr double kLeastDeviation = 1.4;
+constexpr double kLeastActivityVariance = 1e-6;  // to tell a slope from
 
 double Mean(std::span<const double> values) {
   double sum = 0.0;
@@ -60,34 +61,88 @@ std::vector<double> Sustained(const std::vector<double>& series, double sign,
   return sustained;
 }
 
-void FitWindow(const ResidualSeries& residuals, int length, double share,
-               ChannelSpec& channel) {
-  std::vector<double> above;
-  std::vector<double> below;
-  std::vector<double> energy;
-  for (const std::vector<double>& series : residuals) {
+// What the windows of all series have seen, one entry per full window.
+struct WindowHistory {
+  std::vector<double> mean;
+  std::vector<double> energy;    // log-deviation of the residual
+  std::vector<double> activity;  // log-deviation of CV; empty without CV
+};
+
+WindowHistory SlideWindow(const ResidualSeries& residuals,
+                          const ResidualSeries& commands, int length) {
+  WindowHistory history;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
     ResidualWindow window(length);
-    for (const double r : series) {
-      window.Push(r);
+    ResidualWindow command(length);
+    for (std::size_t k = 0; k < residuals[i].size(); ++k) {
+      window.Push(residuals[i][k]);
+      if (!commands.empty()) {
+        command.Push(commands[i][k]);
+      }
       if (window.full()) {
-        above.push_back(window.mean());
-        below.push_back(-window.mean());
-        energy.push_back(window.log_rms());
+        history.mean.push_back(window.mean());
+        history.energy.push_back(window.log_rms());
+        if (!commands.empty()) {
+          history.activity.push_back(command.log_rms());
+        }
       }
     }
   }
-  if (static_cast<int>(above.size()) <
+  return history;
+}
+
+// Of the line of y over x, in [0, 1]: a residual grows with what causes it.
+double Slope(std::span<const double> x, std::span<const double> y) {
+  const double mean_x = Mean(x);
+  const double mean_y = Mean(y);
+  double covariance = 0.0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    covariance += (x[k] - mean_x) * (y[k] - mean_y);
+  }
+  const double variance = Variance(x) * static_cast<double>(x.size());
+  return variance > kLeastActivityVariance * static_cast<double>(x.size())
+             ? std::clamp(covariance / variance, 0.0, 1.0)
+             : 0.0;
+}
+
+void FitActivity(WindowHistory& history, WindowLimits& limits) {
+  if (history.activity.empty()) {
+    return;
+  }
+  limits.activity_slope = Slope(history.activity, history.energy);
+  std::vector<double> sorted = history.activity;
+  std::sort(sorted.begin(), sorted.end());
+  limits.log_activity = SortedQuantile(sorted, 0.5);
+  for (std::size_t k = 0; k < history.energy.size(); ++k) {
+    history.energy[k] -=
+        limits.activity_slope *
+        std::max(history.activity[k] - limits.log_activity, 0.0);
+  }
+}
+
+void FitWindow(const ResidualSeries& residuals, const ResidualSeries& commands,
+               int length, double share, ChannelSpec& channel) {
+  WindowHistory history = SlideWindow(residuals, commands, length);
+  if (static_cast<int>(history.mean.size()) <
       std::max(kFewestWindows * length, kFewestValues)) {
     return;
   }
   const auto level = [&](const std::vector<double>& values) {
     return FitTail(values, share, 2 * length).level;
   };
+  WindowLimits limits;
+  limits.length = length;
+  FitActivity(history, limits);
   const double sd = std::sqrt(Variance(Joined(residuals))) + 1e-6;
   const double least = kLeastMean * sd;
-  channel.windows.push_back(
-      {length, -std::max(level(below), least), std::max(level(above), least),
-       std::max(level(energy), std::log(kLeastDeviation * sd))});
+  limits.upper_mean = std::max(level(history.mean), least);
+  for (double& mean : history.mean) {
+    mean = -mean;
+  }
+  limits.lower_mean = -std::max(level(history.mean), least);
+  limits.upper_log_rms =
+      std::max(level(history.energy), std::log(kLeastDeviation * sd));
+  channel.windows.push_back(limits);
 }
 
 }  // namespace
@@ -149,9 +204,11 @@ double CorrelationTime(std::span<const double> residuals) {
 
 void FitThresholds(const std::vector<ResidualSeries>& residuals,
                    const std::vector<std::vector<int>>& windows,
-                   double rate_per_hour, ModelSet& models) {
+                   double rate_per_hour, ModelSet& models,
+                   const std::vector<ResidualSeries>& commands) {
   const std::size_t channels = models.channels.size();
-  Require(residuals.size() == channels && windows.size() == channels,
+  Require(residuals.size() == channels && windows.size() == channels &&
+              (commands.empty() || commands.size() == channels),
           "there must be series of residuals and windows for every channel");
   std::size_t tests = 0;
   for (const std::vector<int>& lengths : windows) {
@@ -172,7 +229,8 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
     channel.upper_threshold = level(1.0);
     channel.lower_threshold = -level(-1.0);
     for (const int length : windows[c]) {
-      FitWindow(residuals[c], length, share, channel);
+      FitWindow(residuals[c], commands.empty() ? ResidualSeries() : commands[c],
+                length, share, channel);
     }
   }
   models.threshold_hours = static_cast<double>(Joined(residuals[0]).size()) *

@@ -33,10 +33,17 @@ std::vector<double> Joined(const ResidualSeries& series);
 /// threshold, see tail_fit.h). A window that the series are too short for gets
 /// no limits.
 ///
+/// The limit on the energy follows the activity of CV (WindowLimits): the slope
+/// is that of the line through the log-deviations of residual and command over
+/// the windows, the activity of the training their median; the tail is fitted
+/// to what is left above the line.
+///
 /// @param residuals by channel.
 /// @param windows lengths N by channel [samples].
+/// @param commands CV at the samples of the residuals; empty: no slopes.
 void FitThresholds(const std::vector<ResidualSeries>& residuals,
                    const std::vector<std::vector<int>>& windows,
-                   double rate_per_hour, ModelSet& models);
+                   double rate_per_hour, ModelSet& models,
+                   const std::vector<ResidualSeries>& commands = {});
 
 }  // namespace fdi::trainer

@@ -46,16 +46,26 @@ Fold MakeFold(const Condition& normal, int fold) {
   return result;
 }
 
+// Of channel c and fold f at c · kFolds + f.
+std::vector<ResidualSeries> JoinedFolds(
+    const std::vector<ResidualSeries>& parts) {
+  std::vector<ResidualSeries> joined(parts.size() / kFolds);
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    auto& series = joined[i / kFolds];
+    series.insert(series.end(), parts[i].begin(), parts[i].end());
+  }
+  return joined;
+}
+
 }  // namespace
 
-std::vector<ResidualSeries> CrossValidate(const Condition& normal,
-                                          const Observer& chosen,
-                                          const std::vector<ChannelPlan>& plans,
-                                          const FitOptions& options,
-                                          int threads) {
+NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
+                              const std::vector<ChannelPlan>& plans,
+                              const FitOptions& options, int threads) {
   const std::size_t channels = plans.size();
-  std::vector<ResidualSeries> parts(channels * kFolds);
-  ParallelFor(static_cast<int>(parts.size()), threads, [&](int i) {
+  std::vector<ResidualSeries> residuals(channels * kFolds);
+  std::vector<ResidualSeries> commands(channels * kFolds);
+  ParallelFor(static_cast<int>(residuals.size()), threads, [&](int i) {
     const auto c = static_cast<std::size_t>(i / kFolds);
     const Fold fold = MakeFold(normal, i % kFolds);
     const TsModel& model_of_all = chosen.channels[c].model;
@@ -65,16 +75,13 @@ std::vector<ResidualSeries> CrossValidate(const Condition& normal,
     const TsModel model = FitChannel(plans[c], model_of_all.regressors,
                                      fold.rest, fixed, model_of_all.saturation);
     for (const Stretch& stretch : fold.block) {
-      parts[static_cast<std::size_t>(i)].push_back(
+      residuals[static_cast<std::size_t>(i)].push_back(
           RunResiduals(model, stretch, options.settling));
+      commands[static_cast<std::size_t>(i)].push_back(
+          RunCommands(model, stretch, options.settling));
     }
   });
-  std::vector<ResidualSeries> joined(channels);
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    auto& series = joined[i / kFolds];
-    series.insert(series.end(), parts[i].begin(), parts[i].end());
-  }
-  return joined;
+  return {JoinedFolds(residuals), JoinedFolds(commands)};
 }
 
 }  // namespace fdi::trainer

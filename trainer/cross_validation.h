@@ -9,6 +9,12 @@
 
 namespace fdi::trainer {
 
+/// Residuals of normal operation, by channel, and CV at the same samples.
+struct NormalResiduals {
+  std::vector<ResidualSeries> residuals;
+  std::vector<ResidualSeries> commands;
+};
+
 /// Residuals of normal operation that no model was fitted to: four folds, each
 /// predicted by models of the others with the regressors and as many rules as
 /// those of `chosen`. Folds are whole stretches where there are eight or more,
@@ -17,11 +23,9 @@ namespace fdi::trainer {
 /// @param chosen The normal observer fitted to all data.
 /// @param plans By channel.
 /// @param threads 0: all of the machine.
-/// @return by channel, one series per stretch or block.
-std::vector<ResidualSeries> CrossValidate(const Condition& normal,
-                                          const Observer& chosen,
-                                          const std::vector<ChannelPlan>& plans,
-                                          const FitOptions& options,
-                                          int threads);
+/// @return one series per stretch or block.
+NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
+                              const std::vector<ChannelPlan>& plans,
+                              const FitOptions& options, int threads);
 
 }  // namespace fdi::trainer

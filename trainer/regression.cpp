@@ -74,9 +74,18 @@ void Run(const TsModel& model, const Stretch& stretch, int settling,
     const double output = stretch.samples[k][model.output];
     const double residual = Residual(model, output, predictions[k]);
     if (static_cast<int>(k) >= left_out && !std::isnan(residual)) {
-      take(residual, output);
+      take(residual, stretch.samples[k]);
     }
   }
+}
+
+// Of the samples that the residuals belong to.
+std::vector<double> RunSignal(const TsModel& model, const Stretch& stretch,
+                              int settling, Signal signal) {
+  std::vector<double> values;
+  Run(model, stretch, settling, {},
+      [&](double, const Sample& sample) { values.push_back(sample[signal]); });
+  return values;
 }
 
 }  // namespace
@@ -86,16 +95,18 @@ std::vector<double> RunResiduals(const TsModel& model, const Stretch& stretch,
                                  std::optional<double> past_output) {
   std::vector<double> residuals;
   Run(model, stretch, settling, past_output,
-      [&](double residual, double) { residuals.push_back(residual); });
+      [&](double residual, const Sample&) { residuals.push_back(residual); });
   return residuals;
 }
 
 std::vector<double> RunOutputs(const TsModel& model, const Stretch& stretch,
                                int settling) {
-  std::vector<double> outputs;
-  Run(model, stretch, settling, {},
-      [&](double, double output) { outputs.push_back(output); });
-  return outputs;
+  return RunSignal(model, stretch, settling, model.output);
+}
+
+std::vector<double> RunCommands(const TsModel& model, const Stretch& stretch,
+                                int settling) {
+  return RunSignal(model, stretch, settling, Signal::kCv);
 }
 
 std::vector<double> RunResiduals(const TsModel& model,

@@ -42,6 +42,10 @@ std::vector<double> RunResiduals(const TsModel& model,
 std::vector<double> RunOutputs(const TsModel& model, const Stretch& stretch,
                                int settling);
 
+/// CV at the samples that the residuals of RunResiduals() belong to.
+std::vector<double> RunCommands(const TsModel& model, const Stretch& stretch,
+                                int settling);
+
 /// A model around `rules` with the ranges and the saturation of `data`, and an
 /// output that may leave the trained range by half of it.
 TsModel MakeModel(std::vector<TsRule> rules, const RegressionData& data,

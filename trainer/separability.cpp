@@ -115,7 +115,8 @@ bool IsAbnormal(const ModelSet& models, const ObserverBank& bank,
     const double r = bank.residual(0, static_cast<int>(c));
     bool beyond = r < channel.lower_threshold || r > channel.upper_threshold;
     for (std::size_t w = 0; w < channel.windows.size(); ++w) {
-      beyond = beyond || IsBeyond(channel.windows[w], windows.window(c, w));
+      beyond = beyond || IsBeyond(channel.windows[w], windows.window(c, w),
+                                  windows.command(c, w));
     }
     if (bank.active(static_cast<int>(c)) && beyond) {
       return true;
@@ -142,7 +143,8 @@ void ScoreStretch(const Stretch& stretch, const ModelSet& models,
     for (std::size_t c = 0; c < models.channels.size(); ++c) {
       residuals[c] = bank.residual(0, static_cast<int>(c));
     }
-    windows.Push({residuals.data(), models.channels.size()});
+    windows.Push({residuals.data(), models.channels.size()},
+                 stretch.samples[k][Signal::kCv]);
     faults.Score(bank, verdict);
     faults.Follow(bank);
     faults.Compete(verdict);

@@ -211,16 +211,16 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
                   "fitting " + models.observers[o].name);
   });
   reporter.Tell(kStructureShare + kObserverShare, "setting thresholds");
-  const auto normal_residuals =
+  const NormalResiduals normal_data =
       CrossValidate(conditions.front(), models.observers.front(),
                     options.channels, options.fit, options.threads);
-  CalibrateNormal(normal_residuals, models.observers.front());
+  CalibrateNormal(normal_data.residuals, models.observers.front());
   std::vector<std::vector<int>> windows;
   for (const ChannelPlan& plan : options.channels) {
     windows.push_back(plan.windows);
   }
-  FitThresholds(normal_residuals, windows, options.false_alarms_per_hour,
-                models);
+  FitThresholds(normal_data.residuals, windows, options.false_alarms_per_hour,
+                models, normal_data.commands);
   reporter.Tell(0.9, "comparing faults");
   FitInterpolationErrors(conditions, models);
   FindGroups(conditions, models);

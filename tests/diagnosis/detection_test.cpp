@@ -60,6 +60,34 @@ TEST(DetectionTest, EnergyOfAWindowIsWatchedUpwards) {
   EXPECT_EQ(seen.transitions[0].kind, TransitionKind::kDetected);
 }
 
+// A model that errs by a share of what the command does.
+TEST(DetectionTest, LimitOnEnergyFollowsTheExcitation) {
+  ModelSet models = *SharedPlant();
+  models.channels[1].lower_threshold = -100.0;
+  models.channels[1].upper_threshold = 100.0;
+  WindowLimits limits{80, -10.0, 10.0, std::log(1.5)};
+  limits.activity_slope = 1.0;
+  limits.log_activity = std::log(10.0 / std::sqrt(2.0));
+  const auto detects = [&](double slope, double swing, double error) {
+    limits.activity_slope = slope;
+    models.channels[1].windows = {limits};
+    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    for (std::uint64_t k = 0; k < 400; ++k) {
+      // Deviation 1 of the residual at a swing of 10 and an error of 0.14.
+      Sample sample = PlantSample(k, swing);
+      sample.values[Index(Signal::kF)] += error * (sample[Signal::kCv] - 50.0);
+      engine.Step(sample);
+    }
+    return engine.episode_open();
+  };
+  EXPECT_FALSE(detects(1.0, 10.0, 0.14));
+  EXPECT_FALSE(detects(1.0, 20.0, 0.14));
+  EXPECT_TRUE(detects(0.0, 20.0, 0.14));
+  EXPECT_TRUE(detects(1.0, 10.0, 0.28));
+  // Upwards only: a valve at rest is held to the limit as fitted.
+  EXPECT_FALSE(detects(1.0, 2.0, 0.14));
+}
+
 // Reading and prediction at the limit of the flow transmitter say nothing; a
 // reading below it does.
 TEST(DetectionTest, SaturatedChannelAbstains) {

@@ -51,11 +51,27 @@ TEST(ResidualWindowsTest, ChannelThatAbstainsKeepsItsWindow) {
                      {"F", Signal::kF, -1.0, 1.0, {{2, -1.0, 1.0, 0.0}}}};
   ResidualWindows windows(models);
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  windows.Push(std::array{1.0, 3.0});
-  windows.Push(std::array{2.0, nan});
+  windows.Push(std::array{1.0, 3.0}, 50.0);
+  windows.Push(std::array{2.0, nan}, nan);
   EXPECT_TRUE(windows.window(0, 0).full());
   EXPECT_FALSE(windows.window(1, 0).full());
   EXPECT_DOUBLE_EQ(windows.window(1, 0).mean(), 3.0);
+  EXPECT_FALSE(windows.command(0, 0).full());
+}
+
+TEST(ResidualWindowTest, LimitOnEnergyRisesWithTheActivityOfTheCommand) {
+  WindowLimits limits{2, -1.0, 1.0, 0.3};
+  limits.activity_slope = 0.5;
+  const auto limit = [&](double deviation) {
+    ResidualWindow command(2);
+    command.Push(50.0 - deviation);
+    command.Push(50.0 + deviation);
+    return UpperLogRms(limits, command);
+  };
+  EXPECT_DOUBLE_EQ(UpperLogRms(limits, ResidualWindow(2)), 0.3);
+  EXPECT_DOUBLE_EQ(limit(0.5), 0.3);
+  EXPECT_DOUBLE_EQ(limit(2.0), 0.3 + 0.5 * std::log(2.0));
+  EXPECT_DOUBLE_EQ(limit(100.0), 0.3 + 0.5 * std::log(4.0));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "diagnosis/residual_windows.h"
 #include "tests/trainer/gaussian.h"
 #include "trainer/tail_fit.h"
 
@@ -127,6 +128,56 @@ TEST(ThresholdsTest, WindowsAreLimitedWellWithinTheSamples) {
   EXPECT_NEAR(window.upper_mean, 0.55, 0.15);
   EXPECT_NEAR(window.lower_mean, -0.55, 0.15);
   EXPECT_NEAR(window.upper_log_rms, 0.45, 0.2);
+}
+
+// The residual is a quarter of what the command does, and noise; activity
+// changes every 300 samples.
+TEST(ThresholdsTest, LimitOnEnergyIsConditionedOnTheActivityOfTheCommand) {
+  const std::vector<double> noise = GaussianSeries(60000, 11);
+  const std::vector<double> moves = GaussianSeries(60000, 12);
+  std::vector<double> command;
+  std::vector<double> residual;
+  for (std::size_t k = 0; k < noise.size(); ++k) {
+    command.push_back(60.0 + moves[k] * (k / 300 % 3 == 0 ? 8.0 : 4.0));
+    residual.push_back(0.25 * (command[k] - 60.0) + 0.1 * noise[k]);
+  }
+  ModelSet models;
+  models.channels = {{"X", Signal::kX, -1.0, 1.0}};
+  FitThresholds({{residual}}, {{60}}, 1e-3, models, {{command}});
+  const WindowLimits with = models.channels[0].windows[0];
+  EXPECT_NEAR(with.activity_slope, 1.0, 0.05);
+  EXPECT_NEAR(std::exp(with.log_activity), 4.0, 1.0);
+  models.channels[0].windows.clear();
+  FitThresholds({{residual}}, {{60}}, 1e-3, models);
+  const WindowLimits without = models.channels[0].windows[0];
+  EXPECT_EQ(without.activity_slope, 0.0);
+  EXPECT_LT(with.upper_log_rms, without.upper_log_rms - 0.3);
+  // Unlike any in training: more active, and as active with twice the
+  // residual.
+  const auto alarms = [&](double activity, double gain) {
+    ResidualWindow window(60);
+    ResidualWindow moved(60);
+    bool beyond = false;
+    for (std::size_t k = 0; k < 3000; ++k) {
+      const double move = activity * moves[k];
+      window.Push(gain * move + 0.1 * noise[k]);
+      moved.Push(move);
+      beyond = beyond || IsBeyond(with, window, moved);
+    }
+    return beyond;
+  };
+  EXPECT_FALSE(alarms(8.0, 0.25));
+  EXPECT_FALSE(alarms(13.0, 0.25));
+  EXPECT_TRUE(alarms(8.0, 0.5));
+}
+
+TEST(ThresholdsTest, WindowsOfACommandAtRestHaveNoSlope) {
+  ModelSet models;
+  models.channels = {{"X", Signal::kX, -1.0, 1.0}};
+  const std::vector<double> at_rest(30000, 60.0);
+  FitThresholds({{GaussianSeries(30000, 13)}}, {{60}}, 1e-3, models,
+                {{at_rest}});
+  EXPECT_EQ(models.channels[0].windows[0].activity_slope, 0.0);
 }
 
 TEST(ThresholdsTest, WindowThatTheSeriesAreTooShortForGetsNoLimits) {

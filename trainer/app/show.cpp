@@ -109,7 +109,9 @@ cli::Json WindowsJson(const ChannelSpec& channel) {
     windows.push_back({{"length", window.length},
                        {"lower_mean", window.lower_mean},
                        {"upper_mean", window.upper_mean},
-                       {"upper_log_rms", window.upper_log_rms}});
+                       {"upper_log_rms", window.upper_log_rms},
+                       {"activity_slope", window.activity_slope},
+                       {"log_activity", window.log_activity}});
   }
   return windows;
 }
