@@ -14,9 +14,10 @@ void Episode::Score(const ObserverBank& bank, Verdict& verdict) const {
   faults_.Score(bank, verdict);
 }
 
-void Episode::Step(const ObserverBank& bank,
+void Episode::Step(const Sample& sample, const ObserverBank& bank,
                    std::optional<std::int64_t> detected, bool abnormal,
                    Verdict& verdict) {
+  clearing_.Observe(sample.Has(Signal::kCv) ? sample[Signal::kCv] : 0.0);
   const bool begins = verdict.state == State::kNormal;
   if (begins && !detected) {
     return;

@@ -26,8 +26,9 @@ class Episode {
   /// A sample that is judged: opens, continues or clears the episode.
   /// @param detected Stamp of a detection, if there is one.
   /// @param abnormal A single residual is beyond its threshold.
-  void Step(const ObserverBank& bank, std::optional<std::int64_t> detected,
-            bool abnormal, Verdict& verdict);
+  void Step(const Sample& sample, const ObserverBank& bank,
+            std::optional<std::int64_t> detected, bool abnormal,
+            Verdict& verdict);
 
   /// A sample that is not: an open episode waits, with the evidence so far.
   void Hold(Verdict& verdict) const;

@@ -189,8 +189,8 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   }
   const bool abnormal = detection.Push(diagnosis_->bank, sample);
   const bool was_open = episode_open();
-  diagnosis_->episode.Step(diagnosis_->bank, detection.stamp_ns(), abnormal,
-                           verdict_);
+  diagnosis_->episode.Step(sample, diagnosis_->bank, detection.stamp_ns(),
+                           abnormal, verdict_);
   if (was_open && !episode_open()) {
     detection.Restart();
   }

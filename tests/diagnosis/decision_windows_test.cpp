@@ -1,4 +1,6 @@
 #include <array>
+#include <cmath>
+#include <functional>
 
 #include <gtest/gtest.h>
 
@@ -98,6 +100,55 @@ TEST_F(ClearingWindowTest, NormalFactorHoldsItBack) {
   EXPECT_FALSE(window_.Cleared());
   Push(18, 0.0, 1.0);
   EXPECT_TRUE(window_.Cleared());
+}
+
+// CV swings by 20 until a fault is detected at sample 200 and by `swing` from
+// sample 300 on, where the fault is gone. @returns when it clears, 0 if never.
+int ClearsAt(double swing_before, const std::function<double(int)>& cv_after) {
+  ModelSet models = testing::LinearPlant();
+  models.decision.clearing_samples = 60;
+  ClearingWindow window(models);
+  const std::array<double, 2> residuals{};
+  for (int k = 0; k < 3000; ++k) {
+    window.Observe(k < 300 ? 50.0 + swing_before * std::sin(0.3 * k)
+                           : cv_after(k));
+    if (k == 200) {
+      window.Restart();
+    }
+    if (k >= 200) {
+      window.Push(residuals, 1.0, k < 300);
+    }
+    if (k > 200 && window.Cleared()) {
+      return k;
+    }
+  }
+  return 0;
+}
+
+TEST(ClearingEvidenceTest, ClearsUnderTheExcitationOfTheDetection) {
+  EXPECT_EQ(
+      ClearsAt(20.0, [](int k) { return 50.0 + 20.0 * std::sin(0.3 * k); }),
+      359);
+  EXPECT_EQ(
+      ClearsAt(20.0, [](int k) { return 50.0 + 12.0 * std::sin(0.3 * k); }),
+      359);
+}
+
+TEST(ClearingEvidenceTest, ValveThatStandsStillDoesNotClear) {
+  EXPECT_EQ(ClearsAt(20.0, [](int) { return 50.0; }), 0);
+  EXPECT_EQ(ClearsAt(20.0, [](int k) { return 50.0 + std::sin(0.3 * k); }), 0);
+}
+
+TEST(ClearingEvidenceTest, SlowMoveOverTheSameRangeIsEvidence) {
+  EXPECT_NEAR(ClearsAt(20.0, [](int k) { return 70.0 - 0.02 * (k - 300); }),
+              300 + 2000, 5);
+}
+
+TEST(ClearingEvidenceTest, ValveThatStoodStillAtTheDetectionClears) {
+  EXPECT_EQ(ClearsAt(0.0, [](int) { return 50.0; }), 359);
+  EXPECT_EQ(
+      ClearsAt(0.1, [](int k) { return 50.0 + 0.07 * std::sin(0.3 * k); }),
+      359);
 }
 
 }  // namespace

@@ -197,6 +197,20 @@ TEST(ValveEngineTest, EpisodeClearsAfterTcNormalSamples) {
   EXPECT_FALSE(engine.episode_open());
 }
 
+TEST(ValveEngineTest, ValveThatStandsStillAfterwardsStaysInItsEpisode) {
+  ModelSet models = testing::LinearPlant();
+  models.decision.clearing_samples = 60;
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  StepRange(engine, 0, 100);
+  StepRange(engine, 100, 200, FullF6);
+  for (std::uint64_t k = 200; k < 1000; ++k) {
+    engine.Step(PlantSample(k, 0.0));
+  }
+  EXPECT_TRUE(engine.episode_open());
+  StepRange(engine, 1000, 1100);
+  EXPECT_FALSE(engine.episode_open());
+}
+
 TEST(ValveEngineTest, FaultBelowTheThresholdDoesNotClear) {
   ValveEngine engine(SharedPlant());
   StepRange(engine, 0, 50);
