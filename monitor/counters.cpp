@@ -1,6 +1,21 @@
 #include "monitor/counters.h"
 
+#include <algorithm>
+#include <cctype>
+
 namespace fdi::monitor {
+
+namespace {
+
+std::string LowerCase(std::string_view name) {
+  std::string lower(name);
+  std::ranges::transform(lower, lower.begin(), [](char c) {
+    return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  });
+  return lower;
+}
+
+}  // namespace
 
 std::string_view CounterName(Counter counter) {
   static constexpr std::array<std::string_view, kCounterCount> kNames{
@@ -32,7 +47,7 @@ std::string_view CounterName(Counter counter) {
 
 std::vector<std::pair<std::string, std::uint64_t>> Counters::Snapshot() const {
   std::vector<std::pair<std::string, std::uint64_t>> totals;
-  totals.reserve(kCounterCount + kIntakeCount);
+  totals.reserve(kCounterCount + kIntakeCount + kQualityCount);
   for (std::size_t i = 0; i < kCounterCount; ++i) {
     const auto counter = static_cast<Counter>(i);
     totals.emplace_back(CounterName(counter), (*this)[counter]);
@@ -40,6 +55,11 @@ std::vector<std::pair<std::string, std::uint64_t>> Counters::Snapshot() const {
   for (std::size_t i = 0; i < kIntakeCount; ++i) {
     const auto intake = static_cast<Intake>(i);
     totals.emplace_back(IntakeName(intake), (*this)[intake]);
+  }
+  for (std::size_t i = 0; i < kQualityCount; ++i) {
+    const auto quality = static_cast<Quality>(i);
+    totals.emplace_back("samples_" + LowerCase(QualityName(quality)),
+                        (*this)[quality]);
   }
   return totals;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "diagnosis/quality_count.h"
 #include "diagnosis/verdict.h"
 
 namespace fdi::monitor {
@@ -55,6 +56,11 @@ class Counters {
     intake_[static_cast<std::size_t>(intake)].fetch_add(
         1, std::memory_order_relaxed);
   }
+  /// Samples, or sample periods without any: STALE.
+  void Add(Quality quality, std::uint64_t n = 1) {
+    quality_[static_cast<std::size_t>(quality)].fetch_add(
+        n, std::memory_order_relaxed);
+  }
   std::uint64_t operator[](Counter counter) const {
     return values_[static_cast<std::size_t>(counter)].load(
         std::memory_order_relaxed);
@@ -64,12 +70,19 @@ class Counters {
         std::memory_order_relaxed);
   }
 
-  /// Name and total of each, intake reasons as "accepted", "range", ...
+  std::uint64_t operator[](Quality quality) const {
+    return quality_[static_cast<std::size_t>(quality)].load(
+        std::memory_order_relaxed);
+  }
+
+  /// Name and total of each, intake reasons as "accepted", "range", ...,
+  /// samples by quality as "samples_live", "samples_uncovered", ...
   std::vector<std::pair<std::string, std::uint64_t>> Snapshot() const;
 
  private:
   std::array<std::atomic<std::uint64_t>, kCounterCount> values_{};
   std::array<std::atomic<std::uint64_t>, kIntakeCount> intake_{};
+  std::array<std::atomic<std::uint64_t>, kQualityCount> quality_{};
 };
 
 }  // namespace fdi::monitor

@@ -76,6 +76,12 @@ void EpisodeWriter::Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) {
   Enqueue(Resumption{episode.episode_id, stamp_ns});
 }
 
+void EpisodeWriter::Keep(Checkpoint checkpoint) {
+  const std::lock_guard lock(mutex_);
+  checkpoint_ = Merged(std::move(checkpoint_), std::move(checkpoint));
+  changed_.notify_one();
+}
+
 bool EpisodeWriter::Enqueue(Record record) {
   const std::lock_guard lock(mutex_);
   if (records_.size() >= options_.max_records) {
@@ -116,7 +122,8 @@ void EpisodeWriter::Stop() {
 
 void EpisodeWriter::Run() {
   const auto has_work = [this] {
-    return stopping_ || !records_.empty() || trace_points_ >= kPointsPerCommit;
+    return stopping_ || !records_.empty() || !checkpoint_.empty() ||
+           trace_points_ >= kPointsPerCommit;
   };
   while (true) {
     {
@@ -130,7 +137,8 @@ void EpisodeWriter::Run() {
     }
     const bool served = Serve();
     const std::lock_guard lock(mutex_);
-    const bool idle = records_.empty() && traces_.empty();
+    const bool idle =
+        records_.empty() && traces_.empty() && checkpoint_.empty();
     if (stopping_ && (idle || !served)) {
       return;
     }
@@ -145,7 +153,7 @@ bool EpisodeWriter::Serve() {
     return false;
   }
   while (true) {
-    if (!WriteRecords()) {
+    if (!WriteRecords() || !WriteCheckpoint()) {
       FailWaitingEvents();
       return false;
     }
@@ -180,6 +188,21 @@ bool EpisodeWriter::WriteRecords() {
     const std::lock_guard lock(mutex_);
     records_.pop_front();
   }
+}
+
+// One that fails waits for the next, which is laid on top of it.
+bool EpisodeWriter::WriteCheckpoint() {
+  Checkpoint checkpoint;
+  {
+    const std::lock_guard lock(mutex_);
+    checkpoint = std::exchange(checkpoint_, {});
+  }
+  if (checkpoint.empty() || Attempt([&] { history_.Keep(checkpoint); })) {
+    return true;
+  }
+  const std::lock_guard lock(mutex_);
+  checkpoint_ = Merged(std::move(checkpoint), std::move(checkpoint_));
+  return false;
 }
 
 // Buffers evidence and commits it at once, so that no event waits for it.

@@ -51,6 +51,9 @@ class EpisodeWriter : public EpisodeOutlet {
   void Gap(DataGap gap) override;
   void Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) override;
 
+  /// Keeps `checkpoint`, on top of one that is still waiting.
+  void Keep(Checkpoint checkpoint);
+
   /// Stores and publishes what is there and ends the threads.
   void Stop();
 
@@ -73,6 +76,7 @@ class EpisodeWriter : public EpisodeOutlet {
   bool Serve();
   bool WriteRecords();
   bool WriteTraces();
+  bool WriteCheckpoint();
   bool WriteRecord(const Record& record);
   bool Attempt(const std::function<void()>& call);
   bool Commit();
@@ -91,6 +95,7 @@ class EpisodeWriter : public EpisodeOutlet {
   std::condition_variable changed_;
   std::deque<Record> records_;
   std::deque<EpisodeTrace> traces_;
+  Checkpoint checkpoint_;
   std::size_t trace_points_{0};
   bool stopping_{false};
   std::chrono::steady_clock::time_point stop_by_;

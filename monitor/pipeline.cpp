@@ -43,14 +43,17 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
       directory_(options_.max_valves, options_.valve_glob),
       registry_(options_.registry, std::move(resolver), writer_, counters, log),
       queue_(options_.queue_samples),
-      last_tend_(std::chrono::steady_clock::now()) {}
+      last_tend_(std::chrono::steady_clock::now()),
+      last_checkpoint_(last_tend_) {}
 
 Pipeline::~Pipeline() {
   Stop();
 }
 
-void Pipeline::Start(const std::vector<OpenEpisode>& open) {
-  registry_.Recover(open, std::chrono::steady_clock::now());
+void Pipeline::Start(const std::vector<OpenEpisode>& open,
+                     std::vector<Accumulator> accumulators) {
+  registry_.Recover(open, std::move(accumulators),
+                    std::chrono::steady_clock::now());
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -149,10 +152,15 @@ void Pipeline::Diagnose() {
       last_tend_ = now;
       registry_.Tend(now, options_.history.utc_now_ns());
     }
+    if (now - last_checkpoint_ >= options_.checkpoint_period) {
+      last_checkpoint_ = now;
+      writer_.Keep(registry_.TakeCheckpoint());
+    }
   }
   registry_.Tend(std::chrono::steady_clock::now(),
                  options_.history.utc_now_ns());
   registry_.Flush();
+  writer_.Keep(registry_.TakeCheckpoint());
 }
 
 void Pipeline::AdoptPendingResolver() {
@@ -179,6 +187,9 @@ void Pipeline::Handle(const Item& item) {
   counters_.Add(outcome.models != nullptr ? Counter::kDiagnosed
                                           : Counter::kUnassigned);
   counters_.Add(verdict.intake);
+  if (CountsAsTime(verdict)) {
+    counters_.Add(verdict.quality);
+  }
   if (verdict.intake != Intake::kAccepted) {
     CountRejection(item, verdict.intake);
   }

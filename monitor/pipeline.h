@@ -27,6 +27,7 @@ struct PipelineOptions {
   int max_valves{2000};
   std::string valve_glob{"*"};
   std::size_t queue_samples{8192};  ///< Between intake and diagnosis.
+  std::chrono::milliseconds checkpoint_period{60'000};
   RegistryOptions registry;
   EpisodeWriterOptions history;  ///< utc_now_ns is needed.
   SampleRecorderOptions recorder;
@@ -57,7 +58,9 @@ class Pipeline {
   Pipeline& operator=(const Pipeline&) = delete;
 
   /// Begins to diagnose. @param open episodes that the last session left open.
-  void Start(const std::vector<OpenEpisode>& open);
+  /// @param accumulators of valves, as the last session kept them.
+  void Start(const std::vector<OpenEpisode>& open,
+             std::vector<Accumulator> accumulators = {});
 
   /// A sample that was received. One intake thread. Waits while the queue is
   /// full. @param writer who sent it. @returns false once stopped.
@@ -112,6 +115,7 @@ class Pipeline {
   ValveRegistry registry_;
   BoundedQueue<Item> queue_;
   TimePoint last_tend_;
+  TimePoint last_checkpoint_;
 
   std::mutex resolver_mutex_;
   std::shared_ptr<const ModelResolver> next_resolver_;

@@ -7,6 +7,7 @@
 
 #include "diagnosis/model_set.h"
 #include "diagnosis/verdict.h"
+#include "monitor/checkpoint.h"
 #include "monitor/records.h"
 
 /// What the monitor needs from outside; the program wires it to DDS and SQLite.
@@ -21,6 +22,10 @@ class ModelResolver {
   /// @throws std::exception if it cannot be had: the valve goes without.
   virtual std::shared_ptr<const ModelSet> ModelsFor(
       std::string_view valve_id) const = 0;
+  /// Its faults are detected and not named: the baseline is provisional.
+  virtual bool IsolationHeld(std::string_view /*valve_id*/) const {
+    return false;
+  }
 };
 
 /// Takes decision vectors to the bus. Diagnosis thread.
@@ -42,7 +47,7 @@ class EventSink {
 };
 
 /// Keeps episodes. History thread. Every call may fail with a std::exception,
-/// can be repeated then, and doing it twice is a no-op.
+/// can be repeated then, and doing it twice is a no-op except where noted.
 class HistorySink {
  public:
   virtual ~HistorySink() = default;
@@ -53,6 +58,9 @@ class HistorySink {
   /// Buffers. Evidence of an episode that is not there is dropped.
   virtual void AddTrace(const EpisodeTrace& trace) = 0;
   virtual void AddGap(const DataGap& gap) = 0;
+  /// On the disk on return, as a whole or, if it fails, not at all. Twice
+  /// counts twice.
+  virtual void Keep(const Checkpoint& checkpoint) = 0;
   /// The event is on the bus. Buffers.
   virtual void MarkSent(const EpisodeEvent& event) = 0;
   /// Stores what is buffered, and a sign of life; called each second.

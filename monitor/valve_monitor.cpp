@@ -1,5 +1,6 @@
 #include "monitor/valve_monitor.h"
 
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -25,6 +26,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
                                 TimePoint received, EpisodeOutlet& outlet) {
   const bool first = !std::exchange(seen_, true);
   received_ = received;
+  stale_counted_ = received;
   stale_ = false;
   ended_ = false;
   const bool swapped = std::exchange(swapped_, false);
@@ -36,14 +38,49 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     unassigned_.stamp_ns = sample.stamp_ns;
     unassigned_.source_id = sample.source_id;
     unassigned_.seq = sample.seq;
+    stamp_ns_ = sample.stamp_ns;
+    coverage_.Add(sample.stamp_ns, Quality::kUnassigned);
     return {unassigned_, nullptr, swapped};
   }
+  RestoreOnce(sample.source_id);
   const Verdict& verdict = engine_->Step(sample);
+  if (CountsAsTime(verdict)) {
+    source_id_ = sample.source_id;
+    stamp_ns_ = sample.stamp_ns;
+    coverage_.Add(sample.stamp_ns, verdict.quality);
+  }
   if (verdict.intake != Intake::kSuperseded) {
     writer_ = writer;
   }
   tracker_.Step(sample, verdict, models_, outlet);
   return {verdict, models_.get(), swapped};
+}
+
+void ValveMonitor::RestoreOnce(std::uint64_t source_id) {
+  if (saved_ && saved_->source_id == source_id) {
+    engine_->Restore(saved_->bytes);
+  }
+  saved_.reset();
+}
+
+void ValveMonitor::HoldIsolation(bool hold) {
+  isolation_held_ = hold;
+  if (engine_) {
+    engine_->HoldIsolation(hold);
+  }
+}
+
+void ValveMonitor::TakeCheckpoint(Checkpoint& checkpoint) {
+  coverage_.TakeTo(id_, period_s(), checkpoint.coverage);
+  if (engine_ && seen_ && !stale_ && !ended_) {
+    checkpoint.accumulators.push_back(
+        {id_, source_id_, models_->content_hash, stamp_ns_, engine_->Save()});
+  }
+}
+
+double ValveMonitor::period_s() const {
+  return models_ ? models_->sample_period_s
+                 : static_cast<double>(unassigned_interval_ns_) / 1e9;
 }
 
 bool ValveMonitor::EndStream(std::uint64_t writer, EpisodeOutlet& outlet) {
@@ -70,6 +107,7 @@ bool ValveMonitor::Adopt(std::shared_ptr<const ModelSet> models,
     }
   } else if (models) {
     engine_.emplace(models);
+    engine_->HoldIsolation(isolation_held_);
   } else {
     Close(EndReason::kModelChanged, outlet);
     engine_.reset();
@@ -80,15 +118,29 @@ bool ValveMonitor::Adopt(std::shared_ptr<const ModelSet> models,
 }
 
 bool ValveMonitor::CheckStale(TimePoint now) {
-  const double period_s =
-      models_ ? models_->sample_period_s
-              : static_cast<double>(unassigned_interval_ns_) / 1e9;
-  const std::chrono::duration<double> limit(kStalePeriods * period_s);
+  const std::chrono::duration<double> limit(kStalePeriods * period_s());
   if (!seen_ || ended_ || stale_ || now - received_ <= limit) {
     return false;
   }
   stale_ = true;
   return true;
+}
+
+std::uint64_t ValveMonitor::CountStale(TimePoint now) {
+  if (!stale_) {
+    return 0;
+  }
+  const std::chrono::duration<double> silence = now - stale_counted_;
+  const double periods = std::floor(silence.count() / period_s());
+  if (periods < 1.0) {
+    return 0;
+  }
+  const std::chrono::duration<double> counted(periods * period_s());
+  stale_counted_ += std::chrono::duration_cast<TimePoint::duration>(counted);
+  const std::chrono::nanoseconds since = stale_counted_ - received_;
+  const auto samples = static_cast<std::uint64_t>(periods);
+  coverage_.Add(stamp_ns_ + since.count(), Quality::kStale, samples);
+  return samples;
 }
 
 void ValveMonitor::CheckTimeout(TimePoint now,

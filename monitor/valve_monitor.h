@@ -7,6 +7,7 @@
 #include <string>
 
 #include "diagnosis/valve_engine.h"
+#include "monitor/checkpoint.h"
 #include "monitor/episode_tracker.h"
 
 namespace fdi::monitor {
@@ -34,6 +35,17 @@ class ValveMonitor {
   /// Before the first Step().
   void Recover(const OpenEpisode& episode) { tracker_.Recover(episode); }
 
+  /// What an earlier session kept, if the first sample comes from the source
+  /// that it is of. Before the first Step().
+  void Resume(Accumulator accumulator) { saved_ = std::move(accumulator); }
+
+  /// See ModelResolver::IsolationHeld().
+  void HoldIsolation(bool hold);
+
+  /// Adds what is kept of the valve: time since the last call and, of a valve
+  /// that speaks, the accumulators.
+  void TakeCheckpoint(Checkpoint& checkpoint);
+
   /// @param writer who sent it; see EndStream().
   ValveOutcome Step(const Sample& sample, std::uint64_t writer,
                     TimePoint received, EpisodeOutlet& outlet);
@@ -50,6 +62,10 @@ class ValveMonitor {
   /// Labels the valve STALE if it was silent for three periods.
   /// @returns whether it became so by this call.
   bool CheckStale(TimePoint now);
+
+  /// Periods in which a STALE valve was silent since the last call; they are
+  /// time of the valve.
+  std::uint64_t CountStale(TimePoint now);
 
   /// Closes an open episode after a long silence.
   void CheckTimeout(TimePoint now, std::chrono::milliseconds timeout,
@@ -69,12 +85,19 @@ class ValveMonitor {
 
  private:
   void Close(EndReason reason, EpisodeOutlet& outlet);
+  void RestoreOnce(std::uint64_t source_id);
+  double period_s() const;
 
   std::string id_;
   std::shared_ptr<const ModelSet> models_;
   std::optional<ValveEngine> engine_;
   EpisodeTracker tracker_;
   Verdict unassigned_;
+  CoverageBook coverage_;
+  std::optional<Accumulator> saved_;
+  std::uint64_t source_id_{0};
+  std::int64_t stamp_ns_{0};
+  bool isolation_held_{false};
   std::int64_t unassigned_interval_ns_{1'000'000'000};
   bool swapped_{false};
   bool seen_{false};
@@ -82,6 +105,7 @@ class ValveMonitor {
   bool ended_{false};
   std::uint64_t writer_{0};
   TimePoint received_;
+  TimePoint stale_counted_;  // Silence up to here is counted.
 };
 
 }  // namespace fdi::monitor

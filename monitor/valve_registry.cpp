@@ -16,7 +16,11 @@ ValveRegistry::ValveRegistry(const RegistryOptions& options,
       log_(log) {}
 
 void ValveRegistry::Recover(const std::vector<OpenEpisode>& episodes,
+                            std::vector<Accumulator> accumulators,
                             TimePoint now) {
+  for (Accumulator& accumulator : accumulators) {
+    accumulators_[accumulator.valve_id] = std::move(accumulator);
+  }
   for (const OpenEpisode& episode : episodes) {
     const auto [known, fresh] = recovered_.emplace(episode.valve_id, episode);
     if (fresh) {
@@ -79,6 +83,11 @@ ValveMonitor& ValveRegistry::At(const ValveDirectory::Entry& valve) {
       place->Recover(open->second);
       recovered_.erase(open);
     }
+    place->HoldIsolation(resolver_->IsolationHeld(id));
+    if (const auto kept = accumulators_.find(id); kept != accumulators_.end()) {
+      place->Resume(std::move(kept->second));
+      accumulators_.erase(kept);
+    }
     const std::lock_guard lock(mutex_);
     names_.push_back(id);
   }
@@ -106,6 +115,9 @@ void ValveRegistry::Reassign(std::shared_ptr<const ModelResolver> resolver) {
         valve->Adopt(std::move(models), outlet_)) {
       ++swapped;
     }
+    if (valve) {
+      valve->HoldIsolation(resolver_->IsolationHeld(valve->id()));
+    }
   }
   counters_.Add(Counter::kModelSwaps, swapped);
   log_.Line(LogLevel::kInfo,
@@ -122,6 +134,7 @@ void ValveRegistry::Tend(TimePoint now, std::int64_t now_ns) {
       log_.Report(LogId::kStale, "valve_stale",
                   [&valve] { return "valve=" + valve->id(); });
     }
+    counters_.Add(Quality::kStale, valve->CountStale(now));
     valve->CheckTimeout(now, options_.stale_timeout, outlet_);
   }
   if (recovering_ && now >= recovery_deadline_) {
@@ -164,6 +177,16 @@ void ValveRegistry::Flush() {
       valve->Flush(outlet_);
     }
   }
+}
+
+Checkpoint ValveRegistry::TakeCheckpoint() {
+  Checkpoint checkpoint;
+  for (const std::unique_ptr<ValveMonitor>& valve : valves_) {
+    if (valve) {
+      valve->TakeCheckpoint(checkpoint);
+    }
+  }
+  return checkpoint;
 }
 
 ValveCensus ValveRegistry::census() const {

@@ -45,8 +45,10 @@ class ValveRegistry {
                 std::shared_ptr<const ModelResolver> resolver,
                 EpisodeOutlet& outlet, Counters& counters, ThrottledLog& log);
 
-  /// Episodes that the last session left open. Before the first Step().
-  void Recover(const std::vector<OpenEpisode>& episodes, TimePoint now);
+  /// Episodes that the last session left open, and accumulators that it kept.
+  /// Before the first Step().
+  void Recover(const std::vector<OpenEpisode>& episodes,
+               std::vector<Accumulator> accumulators, TimePoint now);
 
   ValveOutcome Step(const ValveDirectory::Entry& valve, const Sample& sample,
                     std::uint64_t writer, TimePoint received);
@@ -62,6 +64,9 @@ class ValveRegistry {
 
   /// Hands over evidence that is not written yet.
   void Flush();
+
+  /// What is to be kept of all valves; time since the last call.
+  Checkpoint TakeCheckpoint();
 
   /// Thread safe; as of the last Tend().
   ValveCensus census() const;
@@ -81,6 +86,7 @@ class ValveRegistry {
   ThrottledLog& log_;
   std::vector<std::unique_ptr<ValveMonitor>> valves_;
   std::unordered_map<std::string, OpenEpisode> recovered_;
+  std::unordered_map<std::string, Accumulator> accumulators_;
   TimePoint recovery_deadline_;
   bool recovering_{false};
 

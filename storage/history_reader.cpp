@@ -156,6 +156,10 @@ std::vector<DataGap> HistoryReader::Gaps(const EpisodeFilter& filter) {
   return gaps;
 }
 
+std::vector<CoverageTime> HistoryReader::Coverage(const EpisodeFilter& filter) {
+  return ReadCoverage(database_, filter);
+}
+
 std::vector<MonitorSession> HistoryReader::Sessions() {
   Statement row = database_.Prepare(
       "SELECT session_id, start_ns, alive_ns, stop_ns, coalesce(clean, 0), "

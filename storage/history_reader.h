@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "storage/database.h"
+#include "storage/history_coverage.h"
 #include "storage/history_types.h"
 
 namespace fdi::storage {
@@ -36,6 +37,9 @@ class HistoryReader {
   /// Gaps that touch the filter's time, of its valves and of all valves.
   std::vector<DataGap> Gaps(const EpisodeFilter& filter = {});
   std::vector<MonitorSession> Sessions();
+
+  /// Time by valve and quality; the filter's fault and state do not count.
+  std::vector<CoverageTime> Coverage(const EpisodeFilter& filter = {});
 
   Database& database() { return database_; }
 

@@ -12,7 +12,8 @@ const char* const kEpisodeColumns =
     "v.fault, v.peak_factor, v.model_set, v.end_reason, v.label, v.acked_by, "
     "e.source_id, e.model_hash, e.detected_ns, e.isolated_ns, e.cleared_ns, "
     "e.ended_ns, (SELECT max(last_ns) FROM episode_trace t WHERE t.episode_id "
-    "= e.episode_id), e.session_id, e.fault_bits, e.strength, e.flow_unit, "
+    "= e.episode_id), e.session_id, e.fault_bits, e.strength, "
+    "e.unknown_kind, e.flow_unit, "
     "e.channels, e.faults";
 
 Episode ReadEpisode(const Statement& row) {
@@ -39,6 +40,7 @@ Episode ReadEpisode(const Statement& row) {
   episode.session_id = row.OptionalInt64(c++);
   episode.fault_bits = row.Uint64(c++);
   episode.strength = row.Double(c++);
+  episode.unknown_kind = row.OptionalText(c++);
   episode.flow_unit =
       ParseFlowUnit(row.Text(c++)).value_or(FlowUnit::kM3PerHour);
   episode.channels = SplitNames(row.Text(c++));

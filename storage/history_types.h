@@ -100,6 +100,8 @@ struct Episode {
   std::optional<std::int64_t> session_id;
   FaultSet fault_bits{0};
   double strength{0.0};
+  /// While no fault is isolated: "too_early" or "outside_known".
+  std::optional<std::string> unknown_kind;
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   std::vector<std::string> channels;  ///< Of the trace.
   std::vector<std::string> faults;    ///< Of the trace, by index.

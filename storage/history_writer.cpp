@@ -74,6 +74,7 @@ class HistoryWriter::Impl {
  private:
   std::optional<std::int64_t> Store(const Entry& entry);
   void StoreIsolation(const Entry& entry, const std::string& id);
+  void StoreUnknown(const Transition& t, const std::string& id);
   void InsertEpisode(const NewEvent& event, std::uint64_t episode_id);
   void RequireEpisode(std::uint64_t episode_id);
   void StorePending();
@@ -183,6 +184,7 @@ std::optional<std::int64_t> HistoryWriter::Impl::Store(const Entry& entry) {
   cached_("INSERT INTO event_outbox (event_id) VALUES (?)")
       .Bind(event_id)
       .Run();
+  StoreUnknown(t, id);
   if (IsIsolation(t.kind)) {
     StoreIsolation(entry, id);
   } else if (t.kind == TransitionKind::kCleared) {
@@ -199,6 +201,20 @@ std::optional<std::int64_t> HistoryWriter::Impl::Store(const Entry& entry) {
         .Run();
   }
   return event_id;
+}
+
+// Why there is no name; none of an episode that got one.
+void HistoryWriter::Impl::StoreUnknown(const Transition& t,
+                                       const std::string& id) {
+  if (t.unknown == Unknown::kNone && !IsIsolation(t.kind)) {
+    return;
+  }
+  const auto kind = t.unknown == Unknown::kNone
+                        ? std::nullopt
+                        : std::optional<std::string>(UnknownName(t.unknown));
+  cached_("UPDATE episode SET unknown_kind = ? WHERE episode_id = ?")
+      .Bind(kind, id)
+      .Run();
 }
 
 void HistoryWriter::Impl::StoreIsolation(const Entry& entry,
@@ -355,6 +371,18 @@ bool HistoryWriter::AppendTrace(std::uint64_t episode_id,
 
 void HistoryWriter::EndTrace(std::uint64_t episode_id) {
   impl_->traces().End(episode_id);
+}
+
+void HistoryWriter::Keep(std::span<const CoverageCount> counts,
+                         std::span<const StoredAccumulator> accumulators) {
+  Transaction transaction(impl_->database());
+  StoreCoverage(impl_->database(), counts);
+  StoreAccumulators(impl_->database(), accumulators);
+  transaction.Commit();
+}
+
+std::vector<StoredAccumulator> HistoryWriter::Accumulators() {
+  return ReadAccumulators(impl_->database());
 }
 
 void HistoryWriter::AddGap(const DataGap& gap) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "storage/database.h"
+#include "storage/history_coverage.h"
 #include "storage/history_types.h"
 
 namespace fdi::storage {
@@ -72,6 +73,14 @@ class HistoryWriter {
                    std::span<const TraceInstant> instants);
   /// The trace of the episode is complete; frees its buffer after writing.
   void EndTrace(std::uint64_t episode_id);
+
+  /// Adds `counts` to the time that is stored and replaces the accumulators of
+  /// those valves; on the disk on return. Twice counts twice.
+  void Keep(std::span<const CoverageCount> counts,
+            std::span<const StoredAccumulator> accumulators);
+
+  /// As they were kept last.
+  std::vector<StoredAccumulator> Accumulators();
 
   /// Adds a gap; the same gap twice is one. Buffers.
   void AddGap(const DataGap& gap);

@@ -79,6 +79,29 @@ std::vector<OpenEpisode> HistoryStore::OpenEpisodes() {
   return episodes;
 }
 
+std::vector<Accumulator> HistoryStore::Accumulators() {
+  std::vector<Accumulator> accumulators;
+  for (storage::StoredAccumulator& stored : writer_.Accumulators()) {
+    accumulators.push_back({stored.valve_id, stored.source_id,
+                            stored.model_hash, stored.stamp_ns,
+                            std::move(stored.bytes)});
+  }
+  return accumulators;
+}
+
+void HistoryStore::Keep(const Checkpoint& checkpoint) {
+  std::vector<storage::CoverageCount> counts;
+  for (const CoverageDay& day : checkpoint.coverage) {
+    counts.push_back({day.valve_id, day.day, day.period_s, day.samples});
+  }
+  std::vector<storage::StoredAccumulator> accumulators;
+  for (const Accumulator& a : checkpoint.accumulators) {
+    accumulators.push_back(
+        {a.valve_id, a.source_id, a.model_hash, a.stamp_ns, a.bytes});
+  }
+  writer_.Keep(counts, accumulators);
+}
+
 std::vector<storage::UnsentEvent> HistoryStore::UnsentEvents() {
   return writer_.UnsentEvents();
 }

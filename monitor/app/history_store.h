@@ -29,6 +29,8 @@ class HistoryStore : public HistorySink {
 
   /// Episodes that earlier sessions left open. Before anything is recorded.
   std::vector<OpenEpisode> OpenEpisodes();
+  /// What the last session kept of its valves.
+  std::vector<Accumulator> Accumulators();
   std::vector<storage::UnsentEvent> UnsentEvents();
   void MarkResent(const storage::UnsentEvent& event);
 
@@ -36,6 +38,7 @@ class HistoryStore : public HistorySink {
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) override;
   void AddTrace(const EpisodeTrace& trace) override;
   void AddGap(const DataGap& gap) override;
+  void Keep(const Checkpoint& checkpoint) override;
   void MarkSent(const EpisodeEvent& event) override;
   void Commit() override;
 

@@ -66,6 +66,12 @@ std::shared_ptr<const ModelSet> ModelAssignment::ModelsFor(
   return assigned ? Load(*assigned) : default_;
 }
 
+bool ModelAssignment::IsolationHeld(std::string_view valve_id) const {
+  const std::lock_guard lock(mutex_);
+  const auto entry = store_.FindValve(valve_id);
+  return entry && entry->baseline() == storage::BaselineState::kProvisional;
+}
+
 std::string ModelAssignment::DefaultName() const {
   return default_ ? default_->name + "@" + std::to_string(default_->version)
                   : "none";

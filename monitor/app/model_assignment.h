@@ -35,6 +35,9 @@ class ModelAssignment : public ModelResolver {
   std::shared_ptr<const ModelSet> ModelsFor(
       std::string_view valve_id) const override;
 
+  /// While the baseline of the valve is provisional.
+  bool IsolationHeld(std::string_view valve_id) const override;
+
   /// "NAME@VERSION", or "none".
   std::string DefaultName() const;
 

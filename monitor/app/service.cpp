@@ -91,7 +91,7 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
       started_ns_(cli::NowNs()),
       last_status_line_(std::chrono::steady_clock::now()) {
   ResendEvents();
-  pipeline_.Start(history_.OpenEpisodes());
+  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators());
   intake_ = std::jthread([this](const std::stop_token& stop) { Intake(stop); });
 }
 

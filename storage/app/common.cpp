@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "diagnosis/error.h"
+#include "storage/cli/text_table.h"
 #include "storage/cli/time_text.h"
 
 namespace fdi::storage {
@@ -118,6 +119,29 @@ std::int64_t TimeWindow::until_ns(const cli::Context& context) const {
   return until.empty()
              ? std::numeric_limits<std::int64_t>::max()
              : cli::ParseTimeOrAgo(until, context.options.utc, cli::NowNs());
+}
+
+cli::Json HoursJson(const std::vector<CoverageTime>& coverage) {
+  cli::Json valves = cli::Json::object();
+  for (const CoverageTime& time : coverage) {
+    valves[time.valve_id][time.quality] = time.hours;
+  }
+  return valves;
+}
+
+void PrintHours(std::ostream& out, const std::vector<CoverageTime>& coverage) {
+  if (coverage.empty()) {
+    return;
+  }
+  cli::TextTable table({{"valve"},
+                        {"quality"},
+                        {"hours", cli::Align::kRight},
+                        {"samples", cli::Align::kRight}});
+  for (const CoverageTime& time : coverage) {
+    table.AddRow({time.valve_id, time.quality, cli::FormatNumber(time.hours, 2),
+                  std::to_string(time.samples)});
+  }
+  table.Print(out);
 }
 
 std::string UserName() {

@@ -13,6 +13,7 @@
 #include "storage/cli/json_output.h"
 #include "storage/cli/program.h"
 #include "storage/data_directory.h"
+#include "storage/history_coverage.h"
 #include "storage/history_types.h"
 
 namespace CLI {
@@ -60,6 +61,11 @@ struct TimeWindow {
   std::int64_t since_ns(const cli::Context& context) const;
   std::int64_t until_ns(const cli::Context& context) const;
 };
+
+/// {"V1": {"LIVE": 12.5, ...}, ...}: hours by valve and quality.
+cli::Json HoursJson(const std::vector<CoverageTime>& coverage);
+/// The same as a table; nothing if there are none.
+void PrintHours(std::ostream& out, const std::vector<CoverageTime>& coverage);
 
 /// --by, the user's name by default.
 std::string UserName();

@@ -89,12 +89,18 @@ Json EventJson(const EpisodeEvent& event) {
   return object;
 }
 
+// "unknown (outside_known)": why there is no name.
+std::string FaultText(const Episode& e) {
+  const std::string why = e.unknown_kind ? " (" + *e.unknown_kind + ")" : "";
+  return e.fault ? *e.fault + why : "- (not isolated yet)" + why;
+}
+
 void PrintEpisode(const Episode& e, std::size_t instants,
                   const Context& context) {
   PrintFields(std::cout, {{"episode", e.episode_id},
                           {"valve", e.valve_id},
                           {"source", Hex(e.source_id)},
-                          {"fault", e.fault.value_or("- (not isolated yet)")},
+                          {"fault", FaultText(e)},
                           {"detected", TimeText(e.detected_ns, context)},
                           {"isolated", TimeText(e.isolated_ns, context)},
                           {"cleared", TimeText(e.cleared_ns, context)},
@@ -118,6 +124,7 @@ int Show(const std::string& id, const Context& context) {
     object["source_id"] = Hex(episode.source_id);
     object["model_hash"] = Hex(episode.model_hash);
     object["strength"] = episode.strength;
+    object["unknown_kind"] = OptionalJson(episode.unknown_kind);
     object["ended_utc"] = TimeJson(episode.ended_ns);
     object["trace_instants"] = trace.size();
     object["events"] = Json::array();
@@ -170,6 +177,7 @@ int Statistics(const HistoryOptions& options, const Context& context) {
   HistoryReader reader(DataOf(context).history());
   const auto statistics = reader.Statistics(options.Filter(context));
   const auto gaps = reader.Gaps(options.Filter(context));
+  const auto coverage = reader.Coverage(options.Filter(context));
   std::int64_t gap_ns = 0;
   for (const DataGap& gap : gaps) {
     gap_ns += gap.to_ns - gap.from_ns;
@@ -180,6 +188,7 @@ int Statistics(const HistoryOptions& options, const Context& context) {
       list.push_back(StatisticsJson(s));
     }
     cli::PrintJson(std::cout, {{"statistics", list},
+                               {"hours", HoursJson(coverage)},
                                {"gaps", gaps.size()},
                                {"gaps_s", static_cast<double>(gap_ns) * 1e-9}});
     return cli::kExitOk;
@@ -207,6 +216,7 @@ int Statistics(const HistoryOptions& options, const Context& context) {
                   TimeText(s.last_detected_ns, context)});
   }
   table.Print(std::cout);
+  PrintHours(std::cout, coverage);
   std::cout << gaps.size() << " data gaps, " << cli::FormatDuration(gap_ns)
             << " in all\n";
   return cli::kExitOk;

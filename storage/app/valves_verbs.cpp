@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -9,6 +10,7 @@
 #include "storage/app/verbs.h"
 #include "storage/cli/text_table.h"
 #include "storage/cli/time_text.h"
+#include "storage/history.h"
 #include "storage/models.h"
 
 namespace fdi::storage {
@@ -75,6 +77,18 @@ int List(const Context& context) {
   return cli::kExitOk;
 }
 
+// Time by quality; nothing if no monitor has run here.
+std::vector<CoverageTime> CoverageOf(const std::string& valve_id,
+                                     const Context& context) {
+  const auto path = DataOf(context).history();
+  if (!std::filesystem::exists(path)) {
+    return {};
+  }
+  EpisodeFilter filter;
+  filter.valve_glob = valve_id;
+  return HistoryReader(path).Coverage(filter);
+}
+
 // What counts for one valve: the entry that matches it and the set it gets.
 int Show(const std::string& valve_id, const Context& context) {
   ModelStore store(DataOf(context).models());
@@ -91,6 +105,7 @@ int Show(const std::string& valve_id, const Context& context) {
     if (entry) {
       AddEpochs(store, entry->pattern, object);
     }
+    object["hours"] = HoursJson(CoverageOf(valve_id, context));
     cli::PrintJson(std::cout, object);
     return cli::kExitOk;
   }
@@ -113,6 +128,7 @@ int Show(const std::string& valve_id, const Context& context) {
   if (entry) {
     PrintEpochs(std::cout, store, entry->pattern, context);
   }
+  PrintHours(std::cout, CoverageOf(valve_id, context));
   return cli::kExitOk;
 }
 

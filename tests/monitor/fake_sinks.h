@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "monitor/episode_tracker.h"
 #include "monitor/sinks.h"
 
 /// Sinks that remember, wait or fail as a test wants. Thread safe.
@@ -43,6 +44,9 @@ class FixedResolver : public ModelResolver {
  public:
   explicit FixedResolver(std::shared_ptr<const ModelSet> models)
       : models_(std::move(models)) {}
+  bool IsolationHeld(std::string_view valve_id) const override {
+    return valve_id.starts_with("provisional");
+  }
   std::shared_ptr<const ModelSet> ModelsFor(
       std::string_view valve_id) const override {
     if (valve_id.starts_with("broken")) {
@@ -97,6 +101,9 @@ class FakeHistory : public HistorySink {
       ++attempts;
       FailIfBroken();
       ++recorded[{event.episode_id, event.transition.kind}];
+      if (event.transition.kind == TransitionKind::kDetected) {
+        detected.push_back(event.transition.detection_stamp_ns);
+      }
     });
   }
   void Resume(std::uint64_t /*id*/, std::int64_t /*stamp*/) override {
@@ -112,6 +119,13 @@ class FakeHistory : public HistorySink {
     notice.Apply([&] {
       FailIfBroken();
       gaps.push_back(gap);
+    });
+  }
+  void Keep(const Checkpoint& checkpoint) override {
+    notice.Apply([&] {
+      FailIfBroken();
+      kept = Merged(std::move(kept), checkpoint);
+      ++checkpoints;
     });
   }
   void MarkSent(const EpisodeEvent& /*event*/) override {
@@ -130,6 +144,9 @@ class FakeHistory : public HistorySink {
   int attempts{0};
   std::map<std::pair<std::uint64_t, TransitionKind>, int> recorded;
   std::vector<DataGap> gaps;
+  Checkpoint kept;
+  int checkpoints{0};
+  std::vector<std::int64_t> detected;  // Stamps.
   std::size_t trace_points{0};
   int sent{0};
 
@@ -139,6 +156,16 @@ class FakeHistory : public HistorySink {
       throw std::runtime_error("disk is full");
     }
   }
+};
+
+/// Takes what a valve says, and forgets it.
+class FakeOutlet : public EpisodeOutlet {
+ public:
+  void Event(EpisodeEvent /*event*/) override {}
+  void Evidence(EpisodeTrace /*trace*/) override {}
+  void Gap(DataGap /*gap*/) override {}
+  void Resumed(const OpenEpisode& /*episode*/,
+               std::int64_t /*stamp_ns*/) override {}
 };
 
 class FakeRuns : public SampleSink {

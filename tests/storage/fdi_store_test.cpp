@@ -363,6 +363,15 @@ TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
   EXPECT_EQ(shown["label"], "f1");
   EXPECT_EQ(shown["events"].back()["kind"], "LABEL");
   EXPECT_EQ(shown["trace_instants"], 100);
+  {
+    HistoryWriter writer(path_);
+    CoverageCount count{"LV-1", 20'000, 1.0, {}};
+    count.samples.Add(Quality::kLive, 7200);
+    writer.Keep(std::vector{count}, {});
+  }
+  EXPECT_EQ(StoreJson("history stats")["hours"]["LV-1"]["LIVE"], 2.0);
+  EXPECT_THAT(Store("history stats").out,
+              testing::ContainsRegex("LV-1 +LIVE +2.00 +7200"));
   const json statistics = StoreJson("history stats")["statistics"];
   EXPECT_EQ(statistics[0]["labelled_false"], 1);
   EXPECT_EQ(Store("history label last perhaps").code, 2);
@@ -400,7 +409,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 1);
+  EXPECT_EQ(report["databases"][2]["version"], 2);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
 }

@@ -326,5 +326,61 @@ TEST_F(HistoryWriterTest, DamagedTraceIsRefusedByName) {
   EXPECT_THROW(HistoryReader(path_).Trace(Id()), DataError);
 }
 
+TEST_F(HistoryWriterTest, TimeAddsUpByDayAndQuality) {
+  HistoryWriter writer(path_);
+  CoverageCount day{"LV-1", 20'000, 2.0, {}};
+  day.samples.Add(Quality::kLive, 1800);
+  day.samples.Add(Quality::kUncovered, 900);
+  CoverageCount next = day;
+  next.day = 20'001;
+  writer.Keep(std::vector{day, next}, {});
+  writer.Keep(std::vector{day}, {});
+
+  HistoryReader reader(path_);
+  auto times = reader.Coverage();
+  ASSERT_EQ(times.size(), 2U);
+  EXPECT_EQ(times[0].quality, "LIVE");
+  EXPECT_EQ(times[0].samples, 5400);
+  EXPECT_DOUBLE_EQ(times[0].hours, 3.0);
+  EpisodeFilter filter;
+  filter.since_ns = 20'001 * 86'400 * kSecond;
+  times = reader.Coverage(filter);
+  ASSERT_EQ(times.size(), 2U);
+  EXPECT_DOUBLE_EQ(times[1].hours, 0.5);
+  filter.valve_glob = "X*";
+  EXPECT_TRUE(reader.Coverage(filter).empty());
+  EXPECT_EQ(Sql("SELECT day_utc FROM coverage_hours LIMIT 1"), "2024-10-04");
+}
+
+TEST_F(HistoryWriterTest, TheNewestAccumulatorOfAValveIsKept) {
+  HistoryWriter writer(path_);
+  const std::vector<std::byte> bytes{std::byte{1}, std::byte{0}};
+  writer.Keep({}, std::vector{StoredAccumulator{"A", 1, 2, 3, {}},
+                              StoredAccumulator{"B", 4, 5, 6, bytes}});
+  const std::uint64_t large = 0xFFFF'FFFF'FFFF'FFFFULL;
+  writer.Keep({}, std::vector{StoredAccumulator{"A", large, 7, 8, bytes}});
+  const auto kept = HistoryWriter(path_).Accumulators();
+  ASSERT_EQ(kept.size(), 2U);
+  EXPECT_EQ(kept[0].source_id, large);
+  EXPECT_EQ(kept[0].stamp_ns, 8);
+  EXPECT_EQ(kept[0].bytes, bytes);
+  EXPECT_EQ(kept[1].model_hash, 5U);
+}
+
+TEST_F(HistoryWriterTest, UnknownSaysWhyUntilAFaultIsIsolated) {
+  HistoryWriter writer(path_);
+  HistoryReader reader(path_);
+  NewEvent detected = Event(Kind::kDetected, 0);
+  detected.transition.unknown = Unknown::kTooEarly;
+  writer.Record(detected);
+  EXPECT_EQ(reader.Show("last").unknown_kind, "too_early");
+  NewEvent cleared = Event(Kind::kCleared, 50);
+  cleared.transition.unknown = Unknown::kOutsideKnown;
+  writer.Record(cleared);
+  EXPECT_EQ(reader.Show("last").unknown_kind, "outside_known");
+  writer.Record(Event(Kind::kIsolated, 60, 1, 0.9));
+  EXPECT_EQ(reader.Show("last").unknown_kind, std::nullopt);
+}
+
 }  // namespace
 }  // namespace fdi::storage

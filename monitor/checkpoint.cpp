@@ -1,0 +1,64 @@
+#include "monitor/checkpoint.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+namespace fdi::monitor {
+namespace {
+
+constexpr std::int64_t kDayNs = 86'400'000'000'000;
+
+std::int64_t DayOf(std::int64_t stamp_ns) {
+  return stamp_ns / kDayNs - (stamp_ns % kDayNs < 0 ? 1 : 0);
+}
+
+}  // namespace
+
+Checkpoint Merged(Checkpoint older, Checkpoint newer) {
+  std::map<std::pair<std::string, std::int64_t>, std::size_t> places;
+  for (std::size_t i = 0; i < older.coverage.size(); ++i) {
+    places[{older.coverage[i].valve_id, older.coverage[i].day}] = i;
+  }
+  for (CoverageDay& day : newer.coverage) {
+    const auto place = places.find({day.valve_id, day.day});
+    if (place == places.end() ||
+        older.coverage[place->second].period_s != day.period_s) {
+      older.coverage.push_back(std::move(day));
+    } else {
+      older.coverage[place->second].samples.Add(day.samples);
+    }
+  }
+  std::map<std::string, Accumulator> latest;
+  for (auto* list : {&older.accumulators, &newer.accumulators}) {
+    for (Accumulator& accumulator : *list) {
+      latest[accumulator.valve_id] = std::move(accumulator);
+    }
+  }
+  older.accumulators.clear();
+  for (auto& [valve, accumulator] : latest) {
+    older.accumulators.push_back(std::move(accumulator));
+  }
+  return older;
+}
+
+void CoverageBook::Add(std::int64_t stamp_ns, Quality quality,
+                       std::uint64_t samples) {
+  const std::int64_t day = DayOf(stamp_ns);
+  auto place = std::ranges::find(days_, day, &Day::day);
+  if (place == days_.end()) {
+    days_.push_back({day, {}});
+    place = days_.end() - 1;
+  }
+  place->samples.Add(quality, samples);
+}
+
+void CoverageBook::TakeTo(const std::string& valve_id, double period_s,
+                          std::vector<CoverageDay>& days) {
+  for (const Day& day : days_) {
+    days.push_back({valve_id, day.day, period_s, day.samples});
+  }
+  days_.clear();
+}
+
+}  // namespace fdi::monitor
