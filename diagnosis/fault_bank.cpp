@@ -122,9 +122,11 @@ void FaultBank::Compete(Verdict& verdict) const {
   for (const Family& family : families_) {
     const std::size_t i = family.fault_index;
     const StrengthTracker& tracker = family.tracker;
+    const double most =
+        tracker.refutable() ? 1.0 : 0.5 * models_->decision.isolation_threshold;
     const double factor =
-        std::min(std::max(instant[i], tracker.factor()),
-                 EvidenceMembership(best - tracker.evidence()));
+        std::min({std::max(instant[i], tracker.factor()), most,
+                  EvidenceMembership(best - tracker.evidence())});
     verdict.fault_factors[i] = std::max(verdict.fault_factors[i], factor);
     if (tracker.evidence() > leading[i]) {
       leading[i] = tracker.evidence();

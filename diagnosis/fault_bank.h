@@ -14,7 +14,9 @@ namespace fdi {
 ///     d_f = min( max(γ_observers, γ_tracker), μ_L(L_best − L_f) ),
 ///
 /// μ_L falling from 1 to 0 between the evidence core and support. Normal
-/// operation competes alike with d_0.
+/// operation competes alike with d_0. A fault that no reading since the
+/// detection could have refuted has d_f = T/2 at most: it is a candidate, and
+/// not named for want of evidence.
 class FaultBank {
  public:
   /// `models` must outlive the bank.

@@ -14,28 +14,8 @@ constexpr double kLoneReachBelow = 0.75;
 constexpr double kLoneReachAbove = 1.25;
 // A fault rarely develops faster than to full strength in 10 minutes.
 constexpr double kRateDeviation = 1.0 / 1500.0;
-
-// Median over the observers, per channel, times the channels of the same
-// output: they share its noise, and what one of them says the others repeat.
-std::vector<double> ChannelTimes(const ModelSet& models) {
-  std::vector<double> times;
-  for (std::size_t c = 0; c < models.channels.size(); ++c) {
-    std::vector<double> all;
-    for (const Observer& observer : models.observers) {
-      all.push_back(std::max(observer.channels[c].correlation_time, 1.0));
-    }
-    const auto middle =
-        all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-    std::nth_element(all.begin(), middle, all.end());
-    const auto same =
-        std::count_if(models.channels.begin(), models.channels.end(),
-                      [&](const ChannelSpec& channel) {
-                        return channel.output == models.channels[c].output;
-                      });
-    times.push_back(*middle * static_cast<double>(same));
-  }
-  return times;
-}
+// What a fault does to a channel counts from this share of the deviation on.
+constexpr double kLeastEffect = 0.25;
 
 }  // namespace
 
@@ -44,11 +24,13 @@ StrengthTracker::StrengthTracker(const ModelSet& models,
     : models_(&models),
       memory_(1.0 - 1.0 / models.decision.evidence_window),
       channel_times_(ChannelTimes(models)),
-      cell_cost_(kCells, 0.0) {
-  nodes_.push_back({0, 0.0, 0.0});
+      evidence_(models.channels.size()),
+      cells_(kCells, ChannelEvidence(models.channels.size())) {
+  nodes_.push_back({0, 0.0, ChannelEvidence(models.channels.size())});
   for (const int index : observers) {
     const double s = models.observers[static_cast<std::size_t>(index)].strength;
-    nodes_.push_back({index, std::abs(s), 0.0});
+    nodes_.push_back(
+        {index, std::abs(s), ChannelEvidence(models.channels.size())});
     sign_ = s < 0.0 ? -1.0 : 1.0;
     segments_.push_back(
         ErrorsBetween(nodes_[nodes_.size() - 2], nodes_.back()));
@@ -90,33 +72,38 @@ void StrengthTracker::Restart() {
   age_ = 0;
   strength_ = lowest_;
   rate_ = 0.0;
-  evidence_ = 0.0;
+  refutable_ = false;
+  evidence_.Clear();
   factor_ = 0.0;
-  std::fill(cell_cost_.begin(), cell_cost_.end(), 0.0);
+  for (ChannelEvidence& cell : cells_) {
+    cell.Clear();
+  }
   for (Node& node : nodes_) {
-    node.evidence = 0.0;
+    node.evidence.Clear();
   }
 }
 
 const StrengthTracker::Node& StrengthTracker::BestNode() const {
-  return *std::max_element(
-      nodes_.begin() + (segments_.empty() ? 0 : 1), nodes_.end(),
-      [](const Node& a, const Node& b) { return a.evidence < b.evidence; });
+  return *std::max_element(nodes_.begin() + (segments_.empty() ? 0 : 1),
+                           nodes_.end(), [](const Node& a, const Node& b) {
+                             return a.evidence.total() < b.evidence.total();
+                           });
 }
 
 double StrengthTracker::evidence() const {
-  return std::max(evidence_, BestNode().evidence);
+  return std::max(evidence_.total(), BestNode().evidence.total());
 }
 
 double StrengthTracker::strength() const {
   const Node& best = BestNode();
-  return sign_ * (best.evidence > evidence_ ? best.strength : strength_);
+  return sign_ * (best.evidence.total() > evidence_.total() ? best.strength
+                                                            : strength_);
 }
 
 void StrengthTracker::RaiseEvidence(double least) {
-  evidence_ = std::max(evidence_, least);
+  evidence_.RaiseTo(least);
   for (Node& node : nodes_) {
-    node.evidence = std::max(node.evidence, least);
+    node.evidence.RaiseTo(least);
   }
 }
 
@@ -132,12 +119,12 @@ double StrengthTracker::Gain(const ObserverBank& bank, int channel,
 void StrengthTracker::GatherOfNodes(const ObserverBank& bank) {
   const int channels = static_cast<int>(models_->channels.size());
   for (Node& node : nodes_) {
-    node.evidence *= memory_;
+    node.evidence.Fade(bank, memory_);
     for (int c = 0; c < channels; ++c) {
       const double residual = bank.residual(node.observer, c);
       if (bank.active(c) && !std::isnan(residual)) {
-        node.evidence +=
-            Gain(bank, c, residual, Variance(bank, node.observer, c));
+        node.evidence.Add(
+            c, Gain(bank, c, residual, Variance(bank, node.observer, c)));
       }
     }
   }
@@ -194,6 +181,7 @@ double StrengthTracker::Variance(const ObserverBank& bank, int observer,
 
 void StrengthTracker::Step(const ObserverBank& bank) {
   GatherOfNodes(bank);
+  refutable_ = refutable_ || CouldBeRefuted(bank);
   if (!segments_.empty() && age_ < kSearchSamples) {
     Search(bank);
   } else {
@@ -203,12 +191,31 @@ void StrengthTracker::Step(const ObserverBank& bank) {
   UpdateFactor(bank);
 }
 
-// Least cost over a grid of constant strengths: the filter is only locally
+// True if a reading tells this fault from normal operation: some observer of it
+// predicts another one, and the transmitter is not at its limit.
+bool StrengthTracker::CouldBeRefuted(const ObserverBank& bank) const {
+  const int channels = static_cast<int>(models_->channels.size());
+  for (int c = 0; c < channels; ++c) {
+    if (!bank.active(c) || bank.saturated(c)) {
+      continue;
+    }
+    for (std::size_t j = 1; j < nodes_.size(); ++j) {
+      const int observer = nodes_[j].observer;
+      const double effect =
+          std::abs(bank.prediction(observer, c) - bank.prediction(0, c));
+      if (effect > kLeastEffect * Channel(observer, c).residual_sd) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+// Most evidence over a grid of constant strengths: the filter is only locally
 // right, and a fault without effect at small strengths has no slope there.
 void StrengthTracker::Search(const ObserverBank& bank) {
   const int channels = static_cast<int>(models_->channels.size());
   for (int cell = 0; cell < kCells; ++cell) {
-    double cost = 0.0;
     for (int c = 0; c < channels; ++c) {
       if (!bank.active(c)) {
         continue;
@@ -217,13 +224,17 @@ void StrengthTracker::Search(const ObserverBank& bank) {
       if (std::isnan(p.residual)) {
         continue;
       }
-      cost -= 2.0 * Gain(bank, c, p.residual, p.variance);
+      cells_[static_cast<std::size_t>(cell)].Add(
+          c, Gain(bank, c, p.residual, p.variance));
     }
-    cell_cost_[static_cast<std::size_t>(cell)] += cost;
   }
-  const auto best = std::min_element(cell_cost_.begin(), cell_cost_.end());
-  strength_ = Cell(static_cast<int>(best - cell_cost_.begin()));
-  evidence_ = -0.5 * *best;
+  const auto best =
+      std::max_element(cells_.begin(), cells_.end(),
+                       [](const ChannelEvidence& a, const ChannelEvidence& b) {
+                         return a.total() < b.total();
+                       });
+  strength_ = Cell(static_cast<int>(best - cells_.begin()));
+  evidence_ = *best;
   const double width = (highest_ - lowest_) / (kCells - 1);
   var_strength_ = width * width;
   var_rate_ = kRateDeviation * kRateDeviation;
@@ -232,7 +243,7 @@ void StrengthTracker::Search(const ObserverBank& bank) {
 }
 
 void StrengthTracker::Follow(const ObserverBank& bank) {
-  evidence_ *= memory_;
+  evidence_.Fade(bank, memory_);
   // Prediction: s ← s + ṡ; the old information fades by λ.
   strength_ += rate_;
   var_strength_ = (var_strength_ + 2.0 * covariance_ + var_rate_) / memory_;
@@ -252,7 +263,7 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
     const double spread =
         p.variance + p.slope * p.slope * std::min(var_strength_, 1.0);
     const double distance = p.residual * p.residual / spread;
-    evidence_ += Gain(bank, c, p.residual, spread);
+    evidence_.Add(c, Gain(bank, c, p.residual, spread));
     if (p.slope == 0.0 || segments_.empty()) {
       continue;
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "diagnosis/channel_evidence.h"
 #include "diagnosis/observer_bank.h"
 
 namespace fdi {
@@ -22,13 +23,12 @@ namespace fdi {
 ///
 ///     L ← λ L − ½ Σ_c (ν²/S + ln S) / τ_c,
 ///
-/// τ_c the median correlation time of the residuals of the channel times the
-/// number of channels with its output, the same for all faults: log-likelihoods
-/// of faults differ long before single residuals do. A reading at the
-/// transmitter's limit has no density: it costs ν²/S of a prediction below the
-/// limit, and nothing of one beyond. Each observer gathers evidence of its own
-/// strength alike; the fault has that of the best, so that no interpolation can
-/// spoil a strength that was trained.
+/// τ_c (ChannelTimes) the same for all faults: log-likelihoods of faults differ
+/// long before single residuals do. A reading at the transmitter's limit has no
+/// density: it costs ν²/S of a prediction below the limit, and nothing of one
+/// beyond; what the channel said before is held (ChannelEvidence). Each
+/// observer gathers evidence of its own strength alike; the fault has that of
+/// the best, so that no interpolation can spoil a strength that was trained.
 class StrengthTracker {
  public:
   /// `observers`: indices of one fault and direction by rising |strength|;
@@ -48,6 +48,11 @@ class StrengthTracker {
   double strength() const;
   double evidence() const;
 
+  /// True once a reading since the detection could have refuted the fault: on a
+  /// channel where it differs from normal operation, below the transmitter's
+  /// limit. A fault that is not yet refutable is not named.
+  bool refutable() const { return refutable_; }
+
   /// Smallest membership over the active channels of the residual at the
   /// followed strength.
   double factor() const { return factor_; }
@@ -56,7 +61,7 @@ class StrengthTracker {
   struct Node {
     int observer;
     double strength;  // |s|
-    double evidence{0.0};
+    ChannelEvidence evidence;
   };
   using Errors = std::vector<double>;  // κ per channel, between two nodes
   struct Prediction {
@@ -75,6 +80,7 @@ class StrengthTracker {
   double Gain(const ObserverBank& bank, int channel, double residual,
               double variance) const;
   void GatherOfNodes(const ObserverBank& bank);
+  bool CouldBeRefuted(const ObserverBank& bank) const;
   void Search(const ObserverBank& bank);
   void Follow(const ObserverBank& bank);
   void KeepBounded();
@@ -100,9 +106,10 @@ class StrengthTracker {
   double var_strength_{0.0};
   double var_rate_{0.0};
   double covariance_{0.0};
-  double evidence_{0.0};
+  ChannelEvidence evidence_;
   double factor_{0.0};
-  std::vector<double> cell_cost_;
+  bool refutable_{false};
+  std::vector<ChannelEvidence> cells_;
 };
 
 }  // namespace fdi

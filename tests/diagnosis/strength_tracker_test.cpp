@@ -1,9 +1,12 @@
 #include "diagnosis/strength_tracker.h"
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "diagnosis/fault_bank.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {
@@ -135,6 +138,94 @@ TEST_F(StrengthTrackerTest, LoneObserverReachesAQuarterFurther) {
     tracker.Step(bank);
   }
   EXPECT_NEAR(tracker.strength(), 0.625, 1e-9);
+}
+
+// The plant with a flow transmitter that reads 60 at most.
+ModelSet SaturatingPlant() {
+  ModelSet models = LinearPlant();
+  for (Observer& observer : models.observers) {
+    observer.channels[1].model.saturation = 60.0;
+  }
+  return models;
+}
+
+Sample SaturatingSample(std::uint64_t k, double cv, double f3, Noise& noise) {
+  Sample sample = PlantSample(k);
+  sample.Set(Signal::kCv, cv);
+  sample.Set(Signal::kX, cv);
+  sample.Set(Signal::kF, 100.0 - cv);
+  AddF3(sample, f3);
+  noise.Add(sample);
+  sample.Set(Signal::kF, std::min(sample[Signal::kF], 60.0));
+  return sample;
+}
+
+// F tells f3 from f6 for 200 samples; then it is at its limit for three times
+// the memory of evidence.
+TEST_F(StrengthTrackerTest,
+       WhatWasEliminatedStaysSoWhileTheReadingIsSaturated) {
+  const ModelSet models = SaturatingPlant();
+  ObserverBank bank(models);
+  bank.Initialise(PlantSample(0));
+  StrengthTracker f3(models, {kF3First, kF3First + 1});
+  StrengthTracker f6(models, {kF6First, kF6First + 1});
+  f3.Restart();
+  f6.Restart();
+  Noise noise(4);
+  const auto step = [&](std::uint64_t k, double cv) {
+    bank.Step(SaturatingSample(k, cv, 0.6, noise));
+    f3.Step(bank);
+    f6.Step(bank);
+  };
+  std::uint64_t k = 0;
+  for (; k < 200; ++k) {
+    step(k, 75.0 + 15.0 * std::sin(0.2 * static_cast<double>(k)));
+  }
+  const double before = f3.evidence() - f6.evidence();
+  ASSERT_GT(before, 20.0);
+  for (; k < 800; ++k) {
+    step(k, 10.0);
+    ASSERT_TRUE(bank.saturated(1));
+  }
+  EXPECT_NEAR(f3.evidence() - f6.evidence(), before, 0.1 * before);
+  // Once it reads again, evidence fades as ever.
+  for (; k < 2000; ++k) {
+    step(k, 50.0 + 20.0 * 1.01);
+  }
+  EXPECT_LT(std::abs(f3.evidence() - f6.evidence()), 0.5 * before);
+}
+
+// Where F is at its limit f6 differs from normal operation nowhere.
+TEST(FaultBankTest, FaultIsNotNamedForWantOfEvidence) {
+  const ModelSet models = SaturatingPlant();
+  const double threshold = models.decision.isolation_threshold;
+  const auto f6 = static_cast<std::size_t>(FaultIndex(models, 6));
+  ObserverBank bank(models);
+  FaultBank faults(models);
+  Verdict verdict;
+  Noise noise(5);
+  std::uint64_t k = 0;
+  bank.Initialise(SaturatingSample(k, 10.0, 0.0, noise));
+  faults.Restart();
+  const auto step = [&](double cv, double fault) {
+    Sample sample = SaturatingSample(++k, cv, 0.0, noise);
+    if (cv > 60.0) {
+      AddF6(sample, fault);
+    }
+    bank.Step(sample);
+    faults.Score(bank, verdict);
+    faults.Follow(bank);
+    faults.Compete(verdict);
+  };
+  for (int i = 0; i < 50; ++i) {
+    step(10.0, 1.0);
+    EXPECT_LE(verdict.fault_factors[f6], 0.5 * threshold);
+  }
+  EXPECT_EQ(verdict.fault_factors[f6], 0.5 * threshold);  // a candidate
+  for (int i = 0; i < 20; ++i) {
+    step(70.0, 1.0);
+  }
+  EXPECT_EQ(verdict.fault_factors[f6], 1.0);
 }
 
 }  // namespace
