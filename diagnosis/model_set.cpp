@@ -66,6 +66,10 @@ void ValidateObserver(const ModelSet& models, const Observer& observer) {
         where + "fault beyond f1..f19");
   Check(std::abs(observer.strength) <= 1.0, models,
         where + "strength beyond [-1, 1]");
+  Check(observer.fault != 0 ||
+            std::none_of(observer.channels.begin(), observer.channels.end(),
+                         [](const auto& c) { return c.difference; }),
+        models, where + "the normal observer is no difference to itself");
   Check((observer.fault == 0) == (observer.strength == 0.0), models,
         where + "strength 0 belongs to the normal observer alone");
   for (std::size_t c = 0; c < observer.channels.size(); ++c) {

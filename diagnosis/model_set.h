@@ -58,6 +58,10 @@ struct ChannelSpec {
 /// One channel of one observer.
 struct ChannelObserver {
   TsModel model;
+  /// The model is what the condition adds to the prediction of the normal
+  /// observer, ŷ = ŷ_0 + δ: the mismatch of the normal observer is then common
+  /// to all. Never true for the normal observer itself.
+  bool difference{false};
   Trapezoid membership;          ///< Over r = y − ŷ [unit of the output].
   double residual_sd{1.0};       ///< On validation data [unit], > 0.
   double correlation_time{1.0};  ///< Of the residual [samples], ≥ 1.

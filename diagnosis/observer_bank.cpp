@@ -61,11 +61,21 @@ const TsModel& ObserverBank::Model(std::size_t slot) const {
   return models_->observers[slot / channels].channels[slot % channels].model;
 }
 
+bool ObserverBank::IsDifference(std::size_t slot) const {
+  const std::size_t channels = models_->channels.size();
+  return models_->observers[slot / channels]
+      .channels[slot % channels]
+      .difference;
+}
+
+// Groups stand in the order of their first slots: those of the normal observer
+// come first, so that a difference finds what it is added to.
 void ObserverBank::MakeGroups() {
   for (std::size_t slot = 0; slot < predictions_.size(); ++slot) {
     const std::size_t channel = slot % models_->channels.size();
     const auto fits = [&](const Group& group) {
       return group.channel == channel && !RunsOnItself(Model(slot)) &&
+             IsDifference(group.slots.front()) == IsDifference(slot) &&
              SharesAntecedents(Model(group.slots.front()), Model(slot));
     };
     const auto group = std::find_if(groups_.begin(), groups_.end(), fits);
@@ -133,14 +143,19 @@ void ObserverBank::StepGroup(const Group& group, const Sample& sample) {
   if (beyond) {
     Weigh(first, inside.data(), firing_inside);
   }
+  const bool difference = IsDifference(group.slots.front());
+  const double base = difference ? predictions_[group.channel] : 0.0;
+  const double base_extrapolation =
+      difference ? extrapolations_[group.channel] : 0.0;
   for (const std::size_t slot : group.slots) {
     const TsModel& model = Model(slot);
-    const double prediction = Blend(model, x.data(), firing);
+    const double own = Blend(model, x.data(), firing);
+    const double prediction = base + own;
     predictions_[slot] = prediction;
     extrapolations_[slot] =
-        beyond
-            ? std::abs(prediction - Blend(model, inside.data(), firing_inside))
-            : 0.0;
+        base_extrapolation +
+        (beyond ? std::abs(own - Blend(model, inside.data(), firing_inside))
+                : 0.0);
     residuals_[slot] = Residual(model, sample[model.output], prediction);
     own_past_[Row(0) * predictions_.size() + slot] = prediction;
   }

@@ -65,6 +65,7 @@ class ObserverBank {
     return static_cast<std::size_t>((head_ + depth_ - lag) % depth_);
   }
   const TsModel& Model(std::size_t slot) const;
+  bool IsDifference(std::size_t slot) const;
   void MakeGroups();
   double RegressorValue(const TsModel& model, const Regressor& regressor,
                         std::size_t slot) const;

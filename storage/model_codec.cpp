@@ -106,10 +106,10 @@ void Fields(A& a, T& channel) {
 
 template <typename A, Of<ChannelObserver> T>
 void Fields(A& a, T& channel) {
-  auto& [model, membership, residual_sd, correlation_time, interpolation_error,
-         validation] = channel;
-  a(model, membership, residual_sd, correlation_time, interpolation_error,
-    validation);
+  auto& [model, difference, membership, residual_sd, correlation_time,
+         interpolation_error, validation] = channel;
+  a(model, difference, membership, residual_sd, correlation_time,
+    interpolation_error, validation);
 }
 
 template <typename A, Of<Observer> T>

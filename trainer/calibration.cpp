@@ -4,47 +4,15 @@
 #include <cmath>
 
 #include "diagnosis/error.h"
-#include "diagnosis/residual_windows.h"
+#include "trainer/statistics.h"
 #include "trainer/tail_fit.h"
+#include "trainer/window_limits.h"
 
 namespace fdi::trainer {
 namespace {
 
 constexpr double kCoreQuantile = 0.05;
 constexpr double kSupportMargin = 1.0;  // standard deviations
-constexpr int kFewestWindows = 5;       // to fit limits to
-constexpr int kFewestValues = 100;
-// Under inputs unlike those of the training a model errs more: no limit on a
-// mean is closer than this share of the deviation, none on the deviation closer
-// than so many times it.
-constexpr double kLeastMean = 0.5;
-constexpr double kLeastDeviation = 1.4;
-constexpr double kLeastActivityVariance = 1e-6;  // to tell a slope from
-
-double Mean(std::span<const double> values) {
-  double sum = 0.0;
-  for (const double value : values) {
-    sum += value;
-  }
-  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
-}
-
-double Variance(std::span<const double> values) {
-  const double mean = Mean(values);
-  double sum = 0.0;
-  for (const double value : values) {
-    sum += (value - mean) * (value - mean);
-  }
-  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
-}
-
-double SortedQuantile(const std::vector<double>& sorted, double q) {
-  const double at = q * static_cast<double>(sorted.size() - 1);
-  const auto low = static_cast<std::size_t>(at);
-  const std::size_t high = std::min(low + 1, sorted.size() - 1);
-  return sorted[low] +
-         (at - static_cast<double>(low)) * (sorted[high] - sorted[low]);
-}
 
 // min of n_d consecutive values: what a detection needs to be beyond.
 std::vector<double> Sustained(const std::vector<double>& series, double sign,
@@ -59,90 +27,6 @@ std::vector<double> Sustained(const std::vector<double>& series, double sign,
     sustained.push_back(lowest);
   }
   return sustained;
-}
-
-// What the windows of all series have seen, one entry per full window.
-struct WindowHistory {
-  std::vector<double> mean;
-  std::vector<double> energy;    // log-deviation of the residual
-  std::vector<double> activity;  // log-deviation of CV; empty without CV
-};
-
-WindowHistory SlideWindow(const ResidualSeries& residuals,
-                          const ResidualSeries& commands, int length) {
-  WindowHistory history;
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    ResidualWindow window(length);
-    ResidualWindow command(length);
-    for (std::size_t k = 0; k < residuals[i].size(); ++k) {
-      window.Push(residuals[i][k]);
-      if (!commands.empty()) {
-        command.Push(commands[i][k]);
-      }
-      if (window.full()) {
-        history.mean.push_back(window.mean());
-        history.energy.push_back(window.log_rms());
-        if (!commands.empty()) {
-          history.activity.push_back(command.log_rms());
-        }
-      }
-    }
-  }
-  return history;
-}
-
-// Of the line of y over x, in [0, 1]: a residual grows with what causes it.
-double Slope(std::span<const double> x, std::span<const double> y) {
-  const double mean_x = Mean(x);
-  const double mean_y = Mean(y);
-  double covariance = 0.0;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    covariance += (x[k] - mean_x) * (y[k] - mean_y);
-  }
-  const double variance = Variance(x) * static_cast<double>(x.size());
-  return variance > kLeastActivityVariance * static_cast<double>(x.size())
-             ? std::clamp(covariance / variance, 0.0, 1.0)
-             : 0.0;
-}
-
-void FitActivity(WindowHistory& history, WindowLimits& limits) {
-  if (history.activity.empty()) {
-    return;
-  }
-  limits.activity_slope = Slope(history.activity, history.energy);
-  std::vector<double> sorted = history.activity;
-  std::sort(sorted.begin(), sorted.end());
-  limits.log_activity = SortedQuantile(sorted, 0.5);
-  for (std::size_t k = 0; k < history.energy.size(); ++k) {
-    history.energy[k] -=
-        limits.activity_slope *
-        std::max(history.activity[k] - limits.log_activity, 0.0);
-  }
-}
-
-void FitWindow(const ResidualSeries& residuals, const ResidualSeries& commands,
-               int length, double share, ChannelSpec& channel) {
-  WindowHistory history = SlideWindow(residuals, commands, length);
-  if (static_cast<int>(history.mean.size()) <
-      std::max(kFewestWindows * length, kFewestValues)) {
-    return;
-  }
-  const auto level = [&](const std::vector<double>& values) {
-    return FitTail(values, share, 2 * length).level;
-  };
-  WindowLimits limits;
-  limits.length = length;
-  FitActivity(history, limits);
-  const double sd = std::sqrt(Variance(Joined(residuals))) + 1e-6;
-  const double least = kLeastMean * sd;
-  limits.upper_mean = std::max(level(history.mean), least);
-  for (double& mean : history.mean) {
-    mean = -mean;
-  }
-  limits.lower_mean = -std::max(level(history.mean), least);
-  limits.upper_log_rms =
-      std::max(level(history.energy), std::log(kLeastDeviation * sd));
-  channel.windows.push_back(limits);
 }
 
 }  // namespace
@@ -229,8 +113,12 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
     channel.upper_threshold = level(1.0);
     channel.lower_threshold = -level(-1.0);
     for (const int length : windows[c]) {
-      FitWindow(residuals[c], commands.empty() ? ResidualSeries() : commands[c],
-                length, share, channel);
+      const auto limits = FitWindow(
+          residuals[c], commands.empty() ? ResidualSeries() : commands[c],
+          length, share);
+      if (limits) {
+        channel.windows.push_back(*limits);
+      }
     }
   }
   models.threshold_hours = static_cast<double>(Joined(residuals[0]).size()) *

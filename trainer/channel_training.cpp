@@ -122,6 +122,15 @@ TsModel FitRows(const ChannelPlan& plan,
 
 }  // namespace
 
+FitOptions FitOptionsOf(const ChannelPlan& plan, FitOptions options) {
+  const std::vector<int>& counts = plan.rule_counts;
+  if (!counts.empty()) {
+    options.rules.counts = counts;
+    options.rules.min_rules = *std::min_element(counts.begin(), counts.end());
+  }
+  return options;
+}
+
 double FindSaturation(const ChannelPlan& plan,
                       const std::vector<Condition>& conditions) {
   std::vector<double> readings;

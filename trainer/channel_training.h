@@ -25,6 +25,9 @@ struct ChannelPlan {
   std::vector<int> rule_counts{};  ///< To try; empty: as FitOptions says.
   /// Fault observers are the normal one with other consequents (AdaptModel).
   bool adapted{false};
+  /// What a normal observer that runs on its own past may read beside it, for
+  /// difference observers (FitNormalChannel); empty: it never does.
+  std::vector<Regressor> own_past_pool{};
   bool saturates{false};       ///< The transmitter may be at its upper limit.
   std::vector<int> windows{};  ///< Lengths N of the windows [samples].
 };
@@ -37,6 +40,9 @@ struct FitOptions {
   int settling{30};       ///< Samples left out of every parallel run.
   int max_rows{6000};     ///< Rows of a fit, evenly taken where there are more.
 };
+
+/// `options` with the numbers of rules that the plan tries.
+FitOptions FitOptionsOf(const ChannelPlan& plan, FitOptions options);
 
 inline constexpr double kNoSaturation = std::numeric_limits<double>::infinity();
 

@@ -21,7 +21,7 @@ using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
-constexpr int kFolds = 4;
+constexpr std::size_t kFolds = 4;
 constexpr int kFewest = 20;
 constexpr std::array<double, 5> kPenalties{0.03, 0.3, 3.0, 30.0, 300.0};
 constexpr double kSharedPenalty = 0.01;  // of what all rules have in common
@@ -52,7 +52,7 @@ Rows CollectRows(const TsModel& normal, const Condition& condition) {
     const Index n = parts.back().y.size();
     const std::size_t lag = whole.samples.size() - static_cast<std::size_t>(n);
     for (Index k = 0; k < n; ++k) {
-      rows.fold.push_back(static_cast<int>(k * kFolds / n));
+      rows.fold.push_back(static_cast<int>(k * static_cast<Index>(kFolds) / n));
       rows.shares.push_back(
           whole.strengths.empty()
               ? 1.0
@@ -104,45 +104,35 @@ MatrixXd Design(const TsModel& model, const MatrixXd& x, const Scale& scale) {
   return design;
 }
 
-// What a least-squares problem over some of the rows needs.
-class Problem {
- public:
-  Problem(const RegressionData& data, const MatrixXd& design,
-          const VectorXd& normal)
-      : data_(data), design_(design), normal_(normal) {}
-
-  // θ for the rows with a non-zero weight, starting from `theta`.
-  VectorXd Solve(const MatrixXd& gram, const VectorXd& use, double penalty,
-                 VectorXd theta) const {
-    MatrixXd regular = gram;
-    regular.diagonal().array() += penalty;
-    const Eigen::LLT<MatrixXd> factor(regular);
-    const bool censored = data_.y.maxCoeff() >= data_.saturation;
-    const double span = data_.y.maxCoeff() - data_.y.minCoeff();
-    VectorXd predicted = Predict(theta);
-    for (int round = 0; round < (censored ? kCensoredRounds : 1); ++round) {
-      const VectorXd target = (data_.y.array() >= data_.saturation)
-                                  .select(data_.y.cwiseMax(predicted), data_.y);
-      theta = factor.solve(design_.transpose() *
-                           (target - normal_).cwiseProduct(use));
-      const VectorXd before = std::exchange(predicted, Predict(theta));
-      if ((predicted - before).lpNorm<Eigen::Infinity>() <
-          kCensoredTolerance * span) {
-        break;
-      }
-    }
-    return theta;
-  }
-
-  VectorXd Predict(const VectorXd& theta) const {
-    return normal_ + design_ * theta;
-  }
-
- private:
-  const RegressionData& data_;
-  const MatrixXd& design_;
-  const VectorXd& normal_;
+// What the penalties and folds make of the rows of a condition: everything but
+// the targets.
+struct Systems {
+  std::vector<VectorXd> uses;                 // per fold: 1 where a row counts
+  std::vector<Eigen::LLT<MatrixXd>> factors;  // per penalty: folds, then all
 };
+
+Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
+  Systems systems;
+  std::vector<MatrixXd> grams;
+  for (int f = 0; f < static_cast<int>(kFolds); ++f) {
+    VectorXd use(design.rows());
+    for (Index k = 0; k < design.rows(); ++k) {
+      use(k) = folds[static_cast<std::size_t>(k)] == f ? 0.0 : 1.0;
+    }
+    grams.push_back(design.transpose() * (use.asDiagonal() * design));
+    systems.uses.push_back(std::move(use));
+  }
+  grams.push_back(design.transpose() * design);
+  systems.uses.push_back(VectorXd::Ones(design.rows()));
+  for (const double penalty : kPenalties) {
+    for (const MatrixXd& gram : grams) {
+      MatrixXd regular = gram;
+      regular.diagonal().array() += penalty;
+      systems.factors.emplace_back(regular);
+    }
+  }
+  return systems;
+}
 
 // Residuals as the engine forms them; NaN where they say nothing.
 VectorXd Residuals(const TsModel& limits, const VectorXd& y,
@@ -164,21 +154,6 @@ double MeanSquare(const VectorXd& residuals) {
     count += std::isnan(r) ? 0.0 : 1.0;
   }
   return count > 0.0 ? sum / count : 0.0;
-}
-
-// Every row predicted by a model of the other folds; those of the penalty
-// before, in `thetas`, are where they start.
-VectorXd CrossPredict(const Problem& problem, const MatrixXd& design,
-                      const std::vector<MatrixXd>& grams,
-                      const std::vector<VectorXd>& uses, double penalty,
-                      std::vector<VectorXd>& thetas) {
-  VectorXd predicted(design.rows());
-  for (std::size_t f = 0; f < kFolds; ++f) {
-    thetas[f] = problem.Solve(grams[f], uses[f], penalty, thetas[f]);
-    const VectorXd all = problem.Predict(thetas[f]);
-    predicted = (uses[f].array() > 0.0).select(predicted, all);
-  }
-  return predicted;
 }
 
 void AddTo(TsModel& model, const VectorXd& theta, const Scale& scale) {
@@ -206,58 +181,123 @@ TsModel Widened(const TsModel& normal, const VectorXd& y) {
   return model;
 }
 
+void RequireEnough(const Condition& condition, const Rows& rows) {
+  if (rows.data.y.size() < kFewest) {
+    throw DataError(FaultName(condition.fault) + " at strength " +
+                    std::to_string(condition.strength) + ": " +
+                    std::to_string(rows.data.y.size()) + " samples, at least " +
+                    std::to_string(kFewest) + " are needed");
+  }
+}
+
 }  // namespace
 
 AdaptedModel AdaptModel(const TsModel& normal, const Condition& condition) {
-  Require(!RunsOnItself(normal), "only a model of measured past is adapted");
-  const Rows rows = CollectRows(normal, condition);
-  const VectorXd& y = rows.data.y;
-  if (y.size() < kFewest) {
-    throw DataError(FaultName(condition.fault) + " at strength " +
-                    std::to_string(condition.strength) + ": " +
-                    std::to_string(y.size()) + " samples, at least " +
-                    std::to_string(kFewest) + " are needed");
+  return Adaptation(normal, condition).Fit(condition);
+}
+
+struct Adaptation::Impl {
+  Impl(const TsModel& model, const Condition& condition)
+      : normal(model), scale(ScaleOf(model)) {
+    const Rows rows = CollectRows(normal, condition);
+    RequireEnough(condition, rows);
+    x = rows.data.x;
+    shares = rows.shares;
+    design = Design(normal, x, scale);
+    design.array().colwise() *=
+        Eigen::Map<const Eigen::ArrayXd>(shares.data(), x.rows());
+    base = Predict(normal.rules, x);
+    systems = Factorize(design, rows.fold);
   }
-  const Scale scale = ScaleOf(normal);
-  MatrixXd design = Design(normal, rows.data.x, scale);
-  design.array().colwise() *=
-      Eigen::Map<const Eigen::ArrayXd>(rows.shares.data(), y.size());
-  const VectorXd base = Predict(normal.rules, rows.data.x);
-  const Problem problem(rows.data, design, base);
-  const MatrixXd whole = design.transpose() * design;
-  std::vector<VectorXd> uses;
-  std::vector<MatrixXd> grams;
-  for (int f = 0; f < kFolds; ++f) {
-    VectorXd use(y.size());
-    for (Index k = 0; k < y.size(); ++k) {
-      use(k) = rows.fold[static_cast<std::size_t>(k)] == f ? 0.0 : 1.0;
+
+  VectorXd Predicted(const VectorXd& theta) const {
+    return base + design * theta;
+  }
+  VectorXd Solve(const VectorXd& y, std::size_t penalty, std::size_t fold,
+                 VectorXd theta) const;
+  VectorXd CrossPredict(const VectorXd& y, std::size_t penalty,
+                        std::vector<VectorXd>& thetas) const;
+
+  TsModel normal;
+  Scale scale;
+  MatrixXd x;
+  std::vector<double> shares;
+  MatrixXd design;
+  VectorXd base;  // the normal model's
+  Systems systems;
+};
+
+// θ for the rows that `fold` uses (kFolds: all), starting from `theta`.
+VectorXd Adaptation::Impl::Solve(const VectorXd& y, std::size_t penalty,
+                                 std::size_t fold, VectorXd theta) const {
+  const Eigen::LLT<MatrixXd>& factor =
+      systems.factors[penalty * (kFolds + 1) + fold];
+  const bool censored = y.maxCoeff() >= normal.saturation;
+  const double span = y.maxCoeff() - y.minCoeff();
+  VectorXd predicted = Predicted(theta);
+  for (int round = 0; round < (censored ? kCensoredRounds : 1); ++round) {
+    const VectorXd target =
+        (y.array() >= normal.saturation).select(y.cwiseMax(predicted), y);
+    theta = factor.solve(design.transpose() *
+                         (target - base).cwiseProduct(systems.uses[fold]));
+    const VectorXd before = std::exchange(predicted, Predicted(theta));
+    if ((predicted - before).lpNorm<Eigen::Infinity>() <
+        kCensoredTolerance * span) {
+      break;
     }
-    grams.push_back(design.transpose() * (use.asDiagonal() * design));
-    uses.push_back(std::move(use));
   }
+  return theta;
+}
+
+// Every row predicted by a model of the other folds; those of the penalty
+// before, in `thetas`, are where they start.
+VectorXd Adaptation::Impl::CrossPredict(const VectorXd& y, std::size_t penalty,
+                                        std::vector<VectorXd>& thetas) const {
+  VectorXd predicted(y.size());
+  for (std::size_t f = 0; f < kFolds; ++f) {
+    thetas[f] = Solve(y, penalty, f, thetas[f]);
+    const VectorXd all = Predicted(thetas[f]);
+    predicted = (systems.uses[f].array() > 0.0).select(predicted, all);
+  }
+  return predicted;
+}
+
+Adaptation::Adaptation(const TsModel& normal, const Condition& condition) {
+  Require(!RunsOnItself(normal), "only a model of measured past is adapted");
+  impl_ = std::make_unique<Impl>(normal, condition);
+}
+Adaptation::~Adaptation() = default;
+Adaptation::Adaptation(Adaptation&&) noexcept = default;
+Adaptation& Adaptation::operator=(Adaptation&&) noexcept = default;
+
+bool Adaptation::Serves(const Condition& condition) const {
+  const Rows rows = CollectRows(impl_->normal, condition);
+  return rows.data.x == impl_->x && rows.shares == impl_->shares;
+}
+
+AdaptedModel Adaptation::Fit(const Condition& condition) const {
+  const VectorXd y = CollectRows(impl_->normal, condition).data.y;
+  Require(y.size() == impl_->base.size(), "other rows than those prepared");
   AdaptedModel adapted;
-  adapted.model = Widened(normal, y);
-  VectorXd best = Residuals(adapted.model, y, base);
+  adapted.model = Widened(impl_->normal, y);
+  VectorXd best = Residuals(adapted.model, y, impl_->base);
   double error = kWorthAdapting * MeanSquare(best);
-  std::optional<double> chosen;
-  std::vector<VectorXd> thetas(kFolds, VectorXd::Zero(design.cols()));
-  for (const double penalty : kPenalties) {
+  std::optional<std::size_t> chosen;
+  std::vector<VectorXd> thetas(kFolds, VectorXd::Zero(impl_->design.cols()));
+  for (std::size_t p = 0; p < kPenalties.size(); ++p) {
     const VectorXd residuals =
-        Residuals(adapted.model, y,
-                  CrossPredict(problem, design, grams, uses, penalty, thetas));
+        Residuals(adapted.model, y, impl_->CrossPredict(y, p, thetas));
     if (MeanSquare(residuals) < error) {
       error = MeanSquare(residuals);
       best = residuals;
-      chosen = penalty;
+      chosen = p;
     }
   }
   if (chosen) {
-    AddTo(
-        adapted.model,
-        problem.Solve(whole, VectorXd::Ones(y.size()), *chosen, thetas.front()),
-        scale);
+    AddTo(adapted.model, impl_->Solve(y, *chosen, kFolds, thetas.front()),
+          impl_->scale);
   } else {
-    adapted.model = normal;
+    adapted.model = impl_->normal;
   }
   for (Index k = 0; k < y.size(); ++k) {
     if (!std::isnan(best(k))) {

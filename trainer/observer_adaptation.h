@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "diagnosis/ts_model.h"
@@ -35,5 +36,29 @@ struct AdaptedModel {
 /// @throws std::invalid_argument if it does.
 /// @throws DataError if the condition has fewer than 20 samples.
 AdaptedModel AdaptModel(const TsModel& normal, const Condition& condition);
+
+/// AdaptModel() for conditions that differ in their outputs alone, as those of
+/// faults that leave the inputs as they are: what depends on the regressors is
+/// computed once. Fit() may be called from several threads.
+class Adaptation {
+ public:
+  /// @throws As AdaptModel().
+  Adaptation(const TsModel& normal, const Condition& condition);
+  ~Adaptation();
+  Adaptation(Adaptation&&) noexcept;
+  Adaptation& operator=(Adaptation&&) noexcept;
+  Adaptation(const Adaptation&) = delete;
+  Adaptation& operator=(const Adaptation&) = delete;
+
+  /// True if `condition` has the regressors that this was made for.
+  bool Serves(const Condition& condition) const;
+
+  /// @param condition that it serves.
+  AdaptedModel Fit(const Condition& condition) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace fdi::trainer

@@ -47,13 +47,8 @@ RegressionData BuildRegression(std::span<const Stretch> stretches,
   return data;
 }
 
-namespace {
-
-// Calls take(residual, output) for every sample that counts.
-template <typename Take>
-void Run(const TsModel& model, const Stretch& stretch, int settling,
-         std::optional<double> past_output, Take take) {
-  const int left_out = RunsOnItself(model) ? settling : LongestLag(model);
+std::vector<double> RunPredictions(const TsModel& model, const Stretch& stretch,
+                                   std::optional<double> past_output) {
   std::vector<double> predictions(stretch.samples.size());
   std::array<double, kMaxRegressors> x{};
   for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
@@ -71,10 +66,26 @@ void Run(const TsModel& model, const Stretch& stretch, int settling,
     }
     predictions[k] = std::clamp(Evaluate(model, x.data()).value,
                                 model.output_min, model.output_max);
-    const double output = stretch.samples[k][model.output];
-    const double residual = Residual(model, output, predictions[k]);
-    if (static_cast<int>(k) >= left_out && !std::isnan(residual)) {
-      take(residual, stretch.samples[k]);
+  }
+  return predictions;
+}
+
+namespace {
+
+// Calls take(residual, sample) for every sample that counts.
+template <typename Take>
+void Run(const TsModel& model, const Stretch& stretch, int settling,
+         std::optional<double> past_output, Take take) {
+  const std::vector<double> predictions =
+      RunPredictions(model, stretch, past_output);
+  const auto left_out = static_cast<std::size_t>(
+      RunsOnItself(model) ? settling : LongestLag(model));
+  for (std::size_t k = left_out; k < stretch.samples.size(); ++k) {
+    const Sample& sample = stretch.samples[k];
+    const double residual =
+        Residual(model, sample[model.output], predictions[k]);
+    if (!std::isnan(residual)) {
+      take(residual, sample);
     }
   }
 }

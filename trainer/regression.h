@@ -19,6 +19,14 @@ RegressionData BuildRegression(std::span<const Stretch> stretches,
                                const std::vector<Regressor>& regressors,
                                Signal output);
 
+/// ŷ of every sample of a stretch, run as the engine runs the model: past of
+/// the first sample at rest, parallel models on their own predictions, limits
+/// kept.
+///
+/// @param past_output As of RunResiduals().
+std::vector<double> RunPredictions(const TsModel& model, const Stretch& stretch,
+                                   std::optional<double> past_output = {});
+
 /// Residuals y − ŷ of one stretch, run as the engine runs the model: past of
 /// the first sample at rest, parallel models on their own predictions, limits
 /// kept. Left out are samples that say nothing (Residual()) and the first

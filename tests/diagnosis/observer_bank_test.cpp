@@ -36,6 +36,26 @@ Sample Reading(double cv, double x) {
   return sample;
 }
 
+// X̂ = X̂_0 + 0.1 CV: it follows the dynamics of the normal observer.
+TEST(ObserverBankTest, DifferenceIsAddedToTheNormalPrediction) {
+  ModelSet models = FirstOrder(true);
+  ChannelObserver difference = LinearModel(Signal::kX, 0.1, 0.0);
+  difference.difference = true;
+  models.observers.push_back({"f1 0.50", 1, 0.5, {difference}});
+  models.observers.push_back({"f1 1.00", 1, 1.0, {difference}});
+  models.observers[2].channels[0].model.rules[0].slopes = {0.2};
+  models.faults = {1};
+  ObserverBank bank(models);
+  bank.Initialise(Reading(60.0, 80.0));
+  for (int k = 1; k <= 10; ++k) {
+    bank.Step(Reading(60.0, 5.0));
+    const double normal = 60.0 + 20.0 * std::pow(0.5, k);
+    EXPECT_NEAR(bank.prediction(0, 0), normal, 1e-12);
+    EXPECT_NEAR(bank.prediction(1, 0), normal + 6.0, 1e-12);
+    EXPECT_NEAR(bank.residual(2, 0), 5.0 - normal - 12.0, 1e-12);
+  }
+}
+
 TEST(ObserverBankTest, ParallelObserverForgetsTheMeasuredPast) {
   const ModelSet models = FirstOrder(true);
   ObserverBank bank(models);

@@ -183,8 +183,28 @@ TEST(ThresholdsTest, WindowsOfACommandAtRestHaveNoSlope) {
 TEST(ThresholdsTest, WindowThatTheSeriesAreTooShortForGetsNoLimits) {
   ModelSet models;
   models.channels = {{"X", Signal::kX, -1.0, 1.0}};
-  FitThresholds({{GaussianSeries(900, 10)}}, {{200}}, 1e-3, models);
+  FitThresholds({{GaussianSeries(290, 10)}}, {{200}}, 1e-3, models);
   EXPECT_TRUE(models.channels[0].windows.empty());
+}
+
+// 25 minutes hold four windows of 200 s: their tail tells nothing, the noise
+// of the samples does. An AR(1) of 0.9 has a correlation time of 19 samples;
+// the limit on its mean is z σ √(19/400) with z = 5.5 at this rate.
+TEST(ThresholdsTest, ShortRecordsBoundWindowsByTheirCorrelation) {
+  const std::vector<double> white = GaussianSeries(1500, 10);
+  std::vector<double> slow(1, 0.0);
+  for (const double e : white) {
+    slow.push_back(0.9 * slow.back() + std::sqrt(1.0 - 0.81) * e);
+  }
+  ModelSet models;
+  models.channels = {{"X", Signal::kX, -1.0, 1.0},
+                     {"F", Signal::kF, -1.0, 1.0}};
+  FitThresholds({{white}, {slow}}, {{200}, {200}}, 1e-3, models);
+  ASSERT_EQ(models.channels[0].windows.size(), 1U);
+  ASSERT_EQ(models.channels[1].windows.size(), 1U);
+  EXPECT_NEAR(models.channels[0].windows[0].upper_mean, 0.5, 0.05);
+  EXPECT_NEAR(models.channels[1].windows[0].upper_mean, 1.2, 0.35);
+  EXPECT_LT(models.channels[0].windows[0].upper_log_rms, std::log(1.5));
 }
 
 }  // namespace

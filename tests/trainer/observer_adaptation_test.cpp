@@ -114,5 +114,20 @@ TEST(AdaptModelTest, ConditionOfFewSamplesIsNamed) {
   }
 }
 
+// What is prepared once gives the same bits as a problem of its own.
+TEST(AdaptationTest, ServesConditionsThatDifferInTheirOutputsAlone) {
+  const Adaptation prepared(Normal(), Fault(0.0, 0.5, 0.5));
+  const Condition fault = Fault(0.6, 0.5, 0.5);
+  ASSERT_TRUE(prepared.Serves(fault));
+  const AdaptedModel once = prepared.Fit(fault);
+  const AdaptedModel own = AdaptModel(Normal(), fault);
+  EXPECT_EQ(once.model.rules[0].slopes, own.model.rules[0].slopes);
+  EXPECT_EQ(once.residuals, own.residuals);
+  Condition elsewhere = fault;
+  elsewhere.training[0].samples[7].Set(Signal::kX, 1.0);
+  EXPECT_FALSE(prepared.Serves(elsewhere));
+  EXPECT_FALSE(prepared.Serves(Fault(0.6, 0.2, 0.8)));
+}
+
 }  // namespace
 }  // namespace fdi::trainer

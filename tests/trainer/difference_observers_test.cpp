@@ -1,0 +1,126 @@
+#include "trainer/difference_observers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/observer_bank.h"
+#include "trainer/evaluation.h"
+
+namespace fdi::trainer {
+namespace {
+
+constexpr double kFlowNoise = 0.8;
+
+// X follows CV with a lag; F falls with X, with a swell that no model knows.
+TrainingRun HealthyRun(unsigned seed, int count) {
+  TrainingRun run;
+  run.id = "healthy" + std::to_string(seed);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  double cv = 60.0;
+  double x = 60.0;
+  for (int k = 0; k < count; ++k) {
+    cv = 60.0 + 0.9 * (cv - 60.0) + 2.0 * noise(random);
+    x += 0.6 * (cv - x);
+    Sample sample;
+    sample.stamp_ns = k * 1'000'000'000LL;
+    sample.seq = static_cast<std::uint64_t>(k);
+    sample.source_id = 1;
+    sample.Set(Signal::kCv, cv);
+    sample.Set(Signal::kX, x + 0.1 * noise(random));
+    sample.Set(Signal::kF, 45.0 - 0.45 * x + 0.5 * std::sin(0.05 * k) +
+                               kFlowNoise * noise(random));
+    run.samples.push_back({sample, FaultTruth{}});
+  }
+  return run;
+}
+
+// f19: F (1 − s); f13: X (1 + s).
+std::vector<Sample> WithFault(const FaultCondition& fault,
+                              const Stretch& healthy) {
+  std::vector<Sample> samples = healthy.samples;
+  for (Sample& sample : samples) {
+    const Signal signal = fault.fault == 19 ? Signal::kF : Signal::kX;
+    const double factor =
+        fault.fault == 19 ? 1.0 - fault.strength : 1.0 + fault.strength;
+    sample.Set(signal, sample[signal] * factor);
+  }
+  return samples;
+}
+
+TrainingOptions TwoChannels() {
+  TrainingOptions options = PresetOptions("extended");
+  options.name = "two";
+  options.threads = 1;
+  options.channels.resize(2);  // X and F(X)
+  options.channels[0].rule_counts = {1, 4};
+  options.channels[1].rule_counts = {2};
+  options.channels[0].own_past_pool = {
+      {Signal::kCv, 0}, {Signal::kCv, 1}, {Signal::kX, 1}};
+  return options;
+}
+
+const ModelSet& Trained() {
+  static const ModelSet models = TrainDifferenceSet(
+      {HealthyRun(1, 1500)},
+      {{13, 0.1}, {13, 0.2}, {19, 0.02}, {19, 0.25}, {19, 0.5}}, WithFault,
+      100.0, TwoChannels());
+  return models;
+}
+
+// 2 % of a flow of 18 is half its noise: fitted to the noisy readings the
+// observer would err by more than it has to say.
+TEST(DifferenceObserversTest, SaysWhatTheFaultChangesWithoutTheNoise) {
+  const ModelSet& models = Trained();
+  ObserverBank bank(models);
+  const TrainingRun run = HealthyRun(2, 400);
+  bank.Initialise(run.samples.front().sample);
+  for (const LabelledSample& labelled : run.samples) {
+    bank.Step(labelled.sample);
+    const double normal = bank.prediction(0, 1);
+    EXPECT_NEAR(bank.prediction(3, 1), 0.98 * normal, 0.08);
+    EXPECT_NEAR(bank.prediction(5, 1), 0.5 * normal, 0.5);
+  }
+}
+
+TEST(DifferenceObserversTest, FaultObserversFollowTheDynamicsOfTheNormalOne) {
+  const ModelSet& models = Trained();
+  ASSERT_TRUE(RunsOnItself(models.observers[0].channels[0].model));
+  EXPECT_TRUE(models.observers[2].channels[0].difference);
+  EXPECT_FALSE(models.observers[2].channels[1].difference);
+  EXPECT_LT(models.observers[2].channels[0].residual_sd, 0.6);
+}
+
+// A fault was never seen on this valve, but is named.
+TEST(DifferenceObserversTest, FaultsNeverSeenAreNamed) {
+  const auto models = std::make_shared<const ModelSet>(Trained());
+  for (const FaultCondition& fault :
+       {FaultCondition{19, 0.35}, FaultCondition{13, 0.15}}) {
+    TrainingRun run = HealthyRun(3, 900);
+    Stretch stretch{run.id, {}};
+    for (const LabelledSample& labelled : run.samples) {
+      stretch.samples.push_back(labelled.sample);
+    }
+    const std::vector<Sample> faulty = WithFault(fault, stretch);
+    for (std::size_t k = 300; k < faulty.size(); ++k) {
+      run.samples[k] = {faulty[k], FaultTruth{fault.fault, fault.strength}};
+    }
+    const RunIndices indices = ComputeIndices(ScoreRun(models, run));
+    EXPECT_TRUE(indices.detected) << fault.fault;
+    EXPECT_EQ(indices.r_fd, 0.0) << fault.fault;
+    EXPECT_EQ(indices.final_set, std::vector<int>{fault.fault});
+  }
+}
+
+TEST(DifferenceObserversTest, HealthyDataGiveNoEpisode) {
+  const auto models = std::make_shared<const ModelSet>(Trained());
+  EXPECT_EQ(ComputeIndices(ScoreRun(models, HealthyRun(4, 7200))).episodes, 0);
+}
+
+}  // namespace
+}  // namespace fdi::trainer

@@ -1,0 +1,138 @@
+#include "trainer/difference_observers.h"
+
+#include <atomic>
+
+#include "diagnosis/error.h"
+#include "trainer/calibration.h"
+#include "trainer/cross_validation.h"
+#include "trainer/difference_fit.h"
+#include "trainer/model_set_description.h"
+#include "trainer/observer_calibration.h"
+#include "trainer/parallel_for.h"
+#include "trainer/reporter.h"
+#include "trainer/separability.h"
+
+namespace fdi::trainer {
+namespace {
+
+constexpr double kLeastSd = 1e-6;
+constexpr double kLimitShare = 0.005;  // of the range of the transmitter
+
+// Shares of the work, for the progress bar.
+constexpr double kNormalShare = 0.1;
+constexpr double kObserverShare = 0.75;
+
+// Every stretch with its validation part.
+std::vector<Stretch> WholeStretches(const Condition& condition) {
+  std::vector<Stretch> whole = condition.training;
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    const std::vector<Sample>& tail = condition.validation[i].samples;
+    whole[i].samples.insert(whole[i].samples.end(), tail.begin(), tail.end());
+  }
+  return whole;
+}
+
+std::vector<Stretch> Synthesize(const FaultCondition& fault,
+                                const std::vector<Stretch>& healthy,
+                                const FaultSynthesis& synthesize) {
+  std::vector<Stretch> faulty;
+  for (const Stretch& stretch : healthy) {
+    faulty.push_back({stretch.run_id, synthesize(fault, stretch)});
+    Require(faulty.back().samples.size() == stretch.samples.size(),
+            "a synthesis must keep the number of samples");
+  }
+  return faulty;
+}
+
+// The last share of every stretch, where faults are compared.
+Condition ValidationPart(const FaultCondition& fault,
+                         const std::vector<Stretch>& faulty, double share) {
+  Condition condition{fault.fault, fault.strength, {}, {}};
+  for (const Stretch& stretch : faulty) {
+    const auto count = static_cast<std::ptrdiff_t>(
+        share * static_cast<double>(stretch.samples.size()));
+    condition.validation.push_back(
+        {stretch.run_id,
+         {stretch.samples.end() - count, stretch.samples.end()}});
+  }
+  return condition;
+}
+
+ModelSet Describe(const std::vector<TrainingRun>& healthy,
+                  const Condition& normal,
+                  const std::vector<FaultCondition>& faults,
+                  const TrainingOptions& options) {
+  ModelSet models = DescribeModelSet(healthy, {normal}, options);
+  AddObserver(0, 0.0, models);
+  for (const FaultCondition& fault : faults) {
+    AddObserver(fault.fault, fault.strength, models);
+  }
+  return models;
+}
+
+}  // namespace
+
+ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
+                            const std::vector<FaultCondition>& faults,
+                            const FaultSynthesis& synthesize, double flow_limit,
+                            const TrainingOptions& options,
+                            const Progress& progress) {
+  Require(!options.channels.empty(), "a model set needs a channel");
+  Require(faults.size() < kMaxObservers, "there are too many faults");
+  Reporter reporter(progress);
+  reporter.Tell(0.0, "fitting the normal observer");
+  const std::vector<Condition> conditions =
+      BuildConditions(healthy, options.dataset);
+  const Condition& normal = conditions.front();
+  const std::vector<Stretch> whole = WholeStretches(normal);
+  const std::size_t channel_count = options.channels.size();
+  ModelSet models = Describe(healthy, normal, faults, options);
+  std::vector<NormalChannel> channels(channel_count);
+  ParallelFor(static_cast<int>(channel_count), options.threads, [&](int c) {
+    const auto i = static_cast<std::size_t>(c);
+    const ChannelPlan& plan = options.channels[i];
+    channels[i] = FitNormalChannel(
+        plan, normal, whole, options,
+        plan.saturates ? (1.0 - kLimitShare) * flow_limit : kNoSaturation);
+  });
+  std::vector<ChannelPlan> plans;
+  std::vector<std::vector<int>> windows;
+  Observer& observer = models.observers.front();
+  for (std::size_t c = 0; c < channel_count; ++c) {
+    plans.push_back(channels[c].plan);
+    windows.push_back(channels[c].plan.windows);
+    observer.channels[c] =
+        CalibrateOn(channels[c].normal, normal, options.fit.settling, kLeastSd);
+  }
+  const NormalResiduals held_out =
+      CrossValidate(normal, observer, plans, options.fit, options.threads);
+  CalibrateNormal(held_out.residuals, observer);
+  std::vector<Condition> compared(faults.size() + 1);
+  compared.front() = normal;
+  std::atomic<int> done{0};
+  ParallelFor(static_cast<int>(faults.size()), options.threads, [&](int i) {
+    const FaultCondition& fault = faults[static_cast<std::size_t>(i)];
+    Observer& of_fault = models.observers[static_cast<std::size_t>(i) + 1];
+    const std::vector<Stretch> faulty = Synthesize(fault, whole, synthesize);
+    for (std::size_t c = 0; c < channel_count; ++c) {
+      of_fault.channels[c] = FitDifference(
+          channels[c], models.observers.front().channels[c], whole, faulty,
+          fault.fault, fault.strength, options.fit.settling);
+    }
+    compared[static_cast<std::size_t>(i) + 1] =
+        ValidationPart(fault, faulty, options.dataset.validation_share);
+    reporter.Tell(kNormalShare + kObserverShare * ++done /
+                                     static_cast<double>(faults.size()),
+                  "fitting " + of_fault.name);
+  });
+  reporter.Tell(kNormalShare + kObserverShare, "comparing faults");
+  FitThresholds(held_out.residuals, windows, options.false_alarms_per_hour,
+                models, held_out.commands);
+  FitInterpolationErrors(compared, models);
+  FindGroups(compared, models);
+  Validate(models);
+  reporter.Tell(1.0, "done");
+  return models;
+}
+
+}  // namespace fdi::trainer
