@@ -50,16 +50,6 @@ std::pair<int, int> RisingEdges(const std::vector<Indication>& all, Zone zone,
   return edges;
 }
 
-std::vector<int> FaultsIn(const ModelSet& models, FaultSet set) {
-  std::vector<int> faults;
-  for (std::size_t i = 0; i < models.faults.size(); ++i) {
-    if ((set >> i & 1U) != 0) {
-      faults.push_back(models.faults[i]);
-    }
-  }
-  return faults;
-}
-
 void IndexFault(const std::vector<Indication>& all, Zone zone,
                 RunIndices& result) {
   const double start_s = all[zone.first].time_s;
@@ -105,6 +95,16 @@ void IndexFault(const std::vector<Indication>& all, Zone zone,
 }
 
 }  // namespace
+
+std::vector<int> FaultsIn(const ModelSet& models, FaultSet set) {
+  std::vector<int> faults;
+  for (std::size_t i = 0; i < models.faults.size(); ++i) {
+    if ((set >> i & 1U) != 0) {
+      faults.push_back(models.faults[i]);
+    }
+  }
+  return faults;
+}
 
 RunIndices ComputeIndices(const std::vector<Indication>& all,
                           double horizon_s) {

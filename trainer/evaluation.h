@@ -52,6 +52,9 @@ struct RunIndices {
 RunIndices ComputeIndices(const std::vector<Indication>& indications,
                           double horizon_s = 0.0);
 
+/// The numbers of the faults in `set`, ascending.
+std::vector<int> FaultsIn(const ModelSet& models, FaultSet set);
+
 /// Called for every sample with what the engine said about it.
 using VerdictSink = std::function<void(const Sample&, const Verdict&)>;
 

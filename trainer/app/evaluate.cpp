@@ -12,6 +12,10 @@ int Evaluate(const EvaluateOptions& options, const cli::Context& context) {
   if (options.csv && context.options.json) {
     throw ConfigError("either --json or --csv");
   }
+  if (!options.selection.map.empty() && options.selection.files.empty() &&
+      options.train_files.empty() && options.history.empty()) {
+    throw ConfigError("--map is of --file, --train-file or --history");
+  }
   if (options.leave_one_out) {
     return EvaluateLeaveOneOut(options, context);
   }
@@ -24,6 +28,9 @@ int Evaluate(const EvaluateOptions& options, const cli::Context& context) {
   if (!options.baseline.empty()) {
     return EvaluateBaseline(options, context);
   }
+  if (!options.history.empty()) {
+    return EvaluateHistory(options, context);
+  }
   return EvaluateModels(options, context);
 }
 
@@ -31,12 +38,11 @@ void AddSelection(CLI::App& verb, RunSelection& selection) {
   verb.add_option("--runs", selection.runs, "Runs, or stretches of them [s]")
       ->delimiter(',')
       ->type_name("ID[@from:to],...");
-  CLI::Option* files =
-      verb.add_option("--file", selection.files,
-                      "CSV file scored without storing it; repeatable")
-          ->expected(1)
-          ->take_all()
-          ->type_name("FILE.csv[@from:to]");
+  verb.add_option("--file", selection.files,
+                  "CSV file scored without storing it; repeatable")
+      ->expected(1)
+      ->take_all()
+      ->type_name("FILE.csv[@from:to]");
   verb.add_option("--campaign", selection.campaign,
                   "Its validation runs; simulates or imports what is missing")
       ->type_name("FILE.toml");
@@ -46,18 +52,16 @@ void AddSelection(CLI::App& verb, RunSelection& selection) {
       ->type_name("N");
   verb.add_option("--map", selection.map,
                   "TOML file: names, units, scale, offset, sense of columns")
-      ->type_name("FILE.toml")
-      ->needs(files);
+      ->type_name("FILE.toml");
 }
 
 void AddModels(CLI::App& verb, EvaluateOptions& options) {
-  CLI::Option* set = verb.add_option("--model-set", options.model_set,
-                                     "NAME (its active version)")
-                         ->type_name("NAME[@VERSION]");
+  verb.add_option("--model-set", options.model_set, "NAME (its active version)")
+      ->type_name("NAME[@VERSION]");
   verb.add_option("--valve", options.valve,
-                  "Take the model set assigned to this valve")
-      ->type_name("ID")
-      ->excludes(set);
+                  "Take the model set assigned to this valve; of a history, "
+                  "the valve of all files")
+      ->type_name("ID");
   verb.add_option("--without", options.without,
                   "As if the set had never been told of these faults")
       ->delimiter(',')
@@ -78,6 +82,30 @@ void AddOutputs(CLI::App& verb, EvaluateOptions& options) {
   verb.add_flag("--assume-normal", options.assume_normal,
                 "What has no truth counts as free of faults");
   verb.add_flag("--csv", options.csv, "One line per run instead of tables");
+}
+
+CLI::Option* AddHistory(CLI::App& verb, EvaluateOptions& options) {
+  CLI::Option* history =
+      verb.add_option("--history", options.history,
+                      "Back-test: CSV files of months, in folders named after "
+                      "their valves (or all of --valve)")
+          ->type_name("DIR|GLOB");
+  CLI::Option* orders =
+      verb.add_option("--work-orders", options.work_orders,
+                      "What was found when: valve,time,found (a fault or "
+                      "nothing)")
+          ->needs(history)
+          ->type_name("FILE.csv");
+  history->needs(orders);
+  verb.add_option("--horizon", options.horizon_days,
+                  "Days by which an episode may come before its work order")
+      ->needs(history)
+      ->check(CLI::Range(0.001, 3650.0))
+      ->type_name("DAYS");
+  for (const char* other : {"--runs", "--file", "--campaign", "--csv"}) {
+    history->excludes(other);
+  }
+  return history;
 }
 
 // What scores otherwise; each excludes the others and the outputs it lacks.
@@ -103,7 +131,9 @@ void AddWays(CLI::App& verb, EvaluateOptions& options) {
                       "training runs of the campaign, or those given")
           ->check(CLI::IsMember(BaselineNames()))
           ->type_name("NAME");
-  const std::vector<CLI::Option*> ways{leave, seeds, verdicts, baseline};
+  CLI::Option* history = AddHistory(verb, options);
+  const std::vector<CLI::Option*> ways{leave, seeds, verdicts, baseline,
+                                       history};
   for (CLI::Option* way : ways) {
     for (CLI::Option* other : ways) {
       if (way != other) {

@@ -25,6 +25,9 @@ struct EvaluateOptions {
   std::string baseline;                  ///< Of BaselineNames(); empty: none.
   std::vector<std::string> train_runs;   ///< Of the baseline.
   std::vector<std::string> train_files;  ///< Of the baseline.
+  std::string history;                   ///< Folder or pattern of CSV files.
+  std::filesystem::path work_orders;
+  double horizon_days{30.0};  ///< Between an episode and its work order.
   std::filesystem::path vectors;
   std::filesystem::path report;
   bool assume_normal{false};
@@ -52,10 +55,12 @@ int EvaluateSeeds(const EvaluateOptions& options, const cli::Context& context);
 /// What another detector said.
 int EvaluateVerdicts(const EvaluateOptions& options,
                      const cli::Context& context);
-
 /// A detector that readers know, fitted to training runs.
 int EvaluateBaseline(const EvaluateOptions& options,
                      const cli::Context& context);
+/// Months of files against a list of work orders.
+int EvaluateHistory(const EvaluateOptions& options,
+                    const cli::Context& context);
 
 /// As tables, or what --json or --csv asks for.
 void PrintResult(const EvaluateOptions& options, const cli::Context& context,

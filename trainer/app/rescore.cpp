@@ -65,16 +65,6 @@ class InitialisationWatch {
   bool rejected_{true};  // Whatever initialises at the first is explained.
 };
 
-std::vector<int> FaultsIn(const ModelSet& models, FaultSet set) {
-  std::vector<int> faults;
-  for (std::size_t i = 0; i < models.faults.size(); ++i) {
-    if ((set >> i & 1U) != 0) {
-      faults.push_back(models.faults[i]);
-    }
-  }
-  return faults;
-}
-
 // A detection counts from its first abnormal sample.
 void BackdateDetections(const Verdict& verdict, std::int64_t start_ns,
                         std::vector<Indication>& all) {
