@@ -3,6 +3,19 @@
 #include <algorithm>
 
 namespace fdi {
+namespace {
+
+// A transmitter that is stuck needs no observer to be told by.
+void KnowStuck(FaultSet stuck, Verdict& verdict) {
+  verdict.normal_factor = 0.0;
+  for (std::size_t i = 0; i < verdict.fault_factors.size(); ++i) {
+    const bool is = (stuck >> i & 1U) != 0;
+    verdict.fault_factors[i] = is ? 1.0 : 0.0;
+    verdict.strengths[i] = is ? 1.0 : verdict.strengths[i];
+  }
+}
+
+}  // namespace
 
 Episode::Episode(const ModelSet& models)
     : models_(&models),
@@ -15,11 +28,10 @@ void Episode::Score(const ObserverBank& bank, Verdict& verdict) const {
 }
 
 void Episode::Step(const Sample& sample, const ObserverBank& bank,
-                   std::optional<std::int64_t> detected, bool abnormal,
-                   Verdict& verdict) {
+                   const Findings& findings, Verdict& verdict) {
   clearing_.Observe(sample.Has(Signal::kCv) ? sample[Signal::kCv] : 0.0);
   const bool begins = verdict.state == State::kNormal;
-  if (begins && !detected) {
+  if (begins && !findings.detected) {
     return;
   }
   if (begins) {
@@ -29,13 +41,16 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
   }
   faults_.Follow(bank);
   faults_.Compete(verdict);
+  if (findings.stuck != 0) {
+    KnowStuck(findings.stuck, verdict);
+  }
   if (begins) {
-    Open(*detected, verdict);
+    Open(*findings.detected, verdict);
   }
   Isolate(verdict);
   JudgeUnknown(verdict);
   clearing_.Push({verdict.residuals.data(), models_->channels.size()},
-                 verdict.normal_factor, abnormal);
+                 verdict.normal_factor, findings.abnormal);
   if (clearing_.Cleared()) {
     Emit(TransitionKind::kCleared, verdict.stamp_ns, verdict);
     Emit(TransitionKind::kClosed, verdict.stamp_ns, verdict,

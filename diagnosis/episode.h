@@ -12,6 +12,13 @@
 
 namespace fdi {
 
+/// What was found in one sample.
+struct Findings {
+  std::optional<std::int64_t> detected;  ///< Stamp of a detection.
+  bool abnormal{false};  ///< Something is beyond its threshold right now.
+  FaultSet stuck{0};     ///< Faults of transmitters that are stuck: certain.
+};
+
 /// The episode of a valve from its detection to its end: which faults explain
 /// it, equation (6), and when it is over. State, set and transitions stand in
 /// the verdict that every call is given; its factors must have been scored.
@@ -24,11 +31,8 @@ class Episode {
   void Score(const ObserverBank& bank, Verdict& verdict) const;
 
   /// A sample that is judged: opens, continues or clears the episode.
-  /// @param detected Stamp of a detection, if there is one.
-  /// @param abnormal A single residual is beyond its threshold.
   void Step(const Sample& sample, const ObserverBank& bank,
-            std::optional<std::int64_t> detected, bool abnormal,
-            Verdict& verdict);
+            const Findings& findings, Verdict& verdict);
 
   /// A sample that is not: an open episode waits, with the evidence so far.
   void Hold(Verdict& verdict) const;

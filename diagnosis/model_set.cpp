@@ -96,6 +96,8 @@ void ValidateRegion(const ModelSet& models) {
     Check(range.minimum < range.maximum, models,
           "ranges of validity must not be empty");
   }
+  Check(std::min({models.stuck.t1, models.stuck.p1, models.stuck.p2}) >= 0,
+        models, "limits on repeated readings must not be negative");
   Check(region.cv_step > 0.0, models, "the step of CV must be positive");
   Check(region.flow_cutoff >= 0.0, models,
         "the flow cut-off must not be negative");

@@ -96,6 +96,14 @@ struct DecisionParameters {
   double evidence_support{9.0};   ///< by more than this: 0 [log-likelihood].
 };
 
+/// How many samples in a row a transmitter may repeat one reading; 0: any
+/// number, it is not watched. See StuckReadings.
+struct StuckLimits {
+  int t1{0};
+  int p1{0};
+  int p2{0};
+};
+
 /// The stored knowledge about one kind of valve: what the trainer writes, the
 /// monitor loads, and both run. Observer 0 is the normal one.
 struct ModelSet {
@@ -108,6 +116,7 @@ struct ModelSet {
   double sample_period_s{1.0};
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   ValidityRegion validity;
+  StuckLimits stuck;
   DecisionParameters decision;
   std::vector<ChannelSpec> channels;
   std::vector<Observer> observers;

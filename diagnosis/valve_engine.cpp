@@ -10,6 +10,7 @@
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/snapshot.h"
 #include "diagnosis/source_order.h"
+#include "diagnosis/stuck_readings.h"
 
 namespace fdi {
 namespace {
@@ -33,6 +34,7 @@ struct Diagnosis {
         bank(*models),
         coverage(*models),
         detection(*models),
+        stuck(*models),
         episode(*models) {}
 
   std::shared_ptr<const ModelSet> models;
@@ -40,6 +42,7 @@ struct Diagnosis {
   ObserverBank bank;
   Coverage coverage;
   Detection detection;
+  StuckReadings stuck;
   Episode episode;
 };
 
@@ -113,6 +116,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
     Initialise(sample);
   }
   diagnosis_->bank.Step(sample);
+  diagnosis_->stuck.Push(sample);
   ReadResiduals();
   diagnosis_->episode.Score(diagnosis_->bank, verdict_);
   verdict_.quality = Judge(sample);
@@ -135,6 +139,7 @@ void ValveEngine::Impl::TakeSource(const Sample& sample) {
   }
   if (has_source_) {
     diagnosis_->coverage.Restart();
+    diagnosis_->stuck.Restart();
   }
   has_source_ = true;
   needs_initialisation_ = true;
@@ -187,10 +192,16 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   if (diagnosis_->coverage.armed_now()) {
     detection.Restart();
   }
-  const bool abnormal = detection.Push(diagnosis_->bank, sample);
+  Findings findings;
+  findings.stuck = diagnosis_->stuck.faults();
+  findings.abnormal =
+      detection.Push(diagnosis_->bank, sample) || findings.stuck != 0;
+  findings.detected = detection.stamp_ns();
+  if (!findings.detected) {
+    findings.detected = diagnosis_->stuck.stamp_ns();
+  }
   const bool was_open = episode_open();
-  diagnosis_->episode.Step(sample, diagnosis_->bank, detection.stamp_ns(),
-                           abnormal, verdict_);
+  diagnosis_->episode.Step(sample, diagnosis_->bank, findings, verdict_);
   if (was_open && !episode_open()) {
     detection.Restart();
   }

@@ -47,6 +47,12 @@ void Fields(A& a, T& region) {
   a(cv, cv_step, dp, t1, p1, p2, flow_cutoff, rearm_samples);
 }
 
+template <typename A, Of<StuckLimits> T>
+void Fields(A& a, T& limits) {
+  auto& [t1, p1, p2] = limits;
+  a(t1, p1, p2);
+}
+
 template <typename A, Of<Trapezoid> T>
 void Fields(A& archive, T& trapezoid) {
   auto& [a, b, c, d] = trapezoid;
@@ -133,11 +139,11 @@ template <typename A, Of<ModelSet> T>
 void Fields(A& a, T& models) {
   // version and content_hash are given by the store.
   auto& [name, version, content_hash, created_ns, software, preset,
-         sample_period_s, flow_unit, validity, decision, channels, observers,
-         faults, groups, undetectable, training_runs, threshold_hours,
-         false_alarms_per_hour] = models;
+         sample_period_s, flow_unit, validity, stuck, decision, channels,
+         observers, faults, groups, undetectable, training_runs,
+         threshold_hours, false_alarms_per_hour] = models;
   a(name, created_ns, software, preset, sample_period_s, flow_unit, validity,
-    decision, Limited{channels, kMaxChannels},
+    stuck, decision, Limited{channels, kMaxChannels},
     Limited{observers, kMaxObservers}, Limited{faults, kMaxFaults},
     Limited{groups, kMaxFaults}, Limited{undetectable, kMaxFaults},
     Limited{training_runs, kMaxTrainingRuns}, threshold_hours,

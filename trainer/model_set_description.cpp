@@ -32,6 +32,7 @@ ModelSet DescribeModelSet(const std::vector<TrainingRun>& runs,
   models.sample_period_s = runs.front().period_s;
   models.flow_unit = runs.front().flow_unit;
   models.validity = TrainedRegion(conditions);
+  models.stuck = FitStuckLimits(conditions.front());
   models.decision = options.decision;
   for (const ChannelPlan& plan : options.channels) {
     models.channels.push_back({plan.name, plan.output, -1.0, 1.0});

@@ -17,6 +17,8 @@ constexpr double kLeastStep = 5.0;
 constexpr double kInputMargin = 0.5;  // of the range
 constexpr double kLeastPressureShare = 0.05;
 constexpr double kLeastTemperature = 10.0;
+constexpr int kStuckFactor = 10;
+constexpr int kStuckMargin = 60;  // samples
 constexpr double kNoFlow = 0.02;  // of the largest flow
 
 SignalRange Joined(SignalRange a, SignalRange b) {
@@ -67,7 +69,31 @@ double Largest(SignalRange range) {
   return std::max(std::abs(range.minimum), std::abs(range.maximum));
 }
 
+int StuckLimit(const Condition& normal, Signal signal) {
+  int longest = 0;
+  for (const auto* stretches : {&normal.training, &normal.validation}) {
+    for (const Stretch& stretch : *stretches) {
+      int length = 0;
+      double last = 0.0;
+      for (const Sample& sample : stretch.samples) {
+        if (!sample.Has(signal)) {
+          return 0;
+        }
+        length = length > 0 && sample[signal] == last ? length + 1 : 1;
+        last = sample[signal];
+        longest = std::max(longest, length);
+      }
+    }
+  }
+  return longest == 0 ? 0 : kStuckFactor * longest + kStuckMargin;
+}
+
 }  // namespace
+
+StuckLimits FitStuckLimits(const Condition& normal) {
+  return {StuckLimit(normal, Signal::kT1), StuckLimit(normal, Signal::kP1),
+          StuckLimit(normal, Signal::kP2)};
+}
 
 ValidityRegion TrainedRegion(const std::vector<Condition>& conditions) {
   Require(!conditions.empty() && !conditions.front().training.empty() &&

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "diagnosis/validity_region.h"
+#include "diagnosis/model_set.h"
 #include "trainer/dataset.h"
 
 namespace fdi::trainer {
@@ -17,5 +17,10 @@ namespace fdi::trainer {
 /// side, at least 5 % of the largest pressure and 10 °C; still far from
 /// equal pressures and cold water. Less than 2 % of the largest flow is none.
 ValidityRegion TrainedRegion(const std::vector<Condition>& conditions);
+
+/// Ten times the longest run of one reading in normal operation, and a minute:
+/// a quantised signal that is at rest repeats itself. Signals that the runs
+/// lack are not watched.
+StuckLimits FitStuckLimits(const Condition& normal);
 
 }  // namespace fdi::trainer

@@ -50,6 +50,7 @@ TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
   models.decision.evidence_support = 8.5;
   models.validity.cv = {10.25, 90.75};
   models.validity.rearm_samples = 61;
+  models.stuck = {260, 0, 70};
 
   const auto bytes = EncodeModelSet(models);
   const ModelSet back = DecodeModelSet(bytes, "test");
@@ -61,6 +62,8 @@ TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
   EXPECT_EQ(back.validity.cv.maximum, 90.75);
   EXPECT_EQ(back.validity.dp.minimum, kUnbounded.minimum);
   EXPECT_EQ(back.validity.rearm_samples, 61);
+  EXPECT_EQ(back.stuck.t1, 260);
+  EXPECT_EQ(back.stuck.p2, 70);
   EXPECT_EQ(back.decision.settling_samples, 17);
   EXPECT_EQ(back.decision.evidence_support, 8.5);
   EXPECT_EQ(back.faults, models.faults);

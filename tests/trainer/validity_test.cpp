@@ -42,6 +42,23 @@ TEST(TrainedRegionTest, CommandsOfAllConditionsInputsOfNormalOperation) {
   EXPECT_DOUBLE_EQ(region.flow_cutoff, 0.5);
 }
 
+TEST(StuckLimitsTest, TenTimesTheLongestRunAndAMinute) {
+  Condition normal;
+  normal.training = {{"a", {}}};
+  for (const double t1 : {100.0, 100.0, 100.0, 101.0, 100.0}) {
+    normal.training[0].samples.push_back(
+        At(50.0, 3500.0 + t1, 2600.0, t1, 1.0));
+  }
+  normal.validation = {{"a", {normal.training[0].samples.back()}}};
+  normal.validation[0].samples[0].Set(Signal::kP2, 2500.0);
+  const StuckLimits limits = FitStuckLimits(normal);
+  EXPECT_EQ(limits.t1, 90);
+  EXPECT_EQ(limits.p1, 90);
+  EXPECT_EQ(limits.p2, 110);
+  normal.training[0].samples[0].present = MaskOf(Signal::kCv);
+  EXPECT_EQ(FitStuckLimits(normal).t1, 0);
+}
+
 TEST(TrainedRegionTest, SignalsThatAreLackingHaveNoBounds) {
   std::vector<Condition> conditions = Conditions();
   for (Condition& condition : conditions) {
