@@ -69,6 +69,7 @@ void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
   for (const Transition& transition : verdict.Transitions()) {
     Take(transition, verdict, models, outlet);
   }
+  FollowUnknown(verdict, *models);
   if (open_ && open_->tracing) {
     const bool complete = sample.stamp_ns > open_->trace_until_ns;
     if (complete || verdict.transition_count > 0 ||
@@ -191,10 +192,31 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
     open_->isolated = true;
   }
   open_->faults = transition.faults;
-  if (transition.reason != EndReason::kSuperseded) {
+  const bool ends = transition.kind == TransitionKind::kCleared ||
+                    transition.kind == TransitionKind::kClosed;
+  if (transition.reason != EndReason::kSuperseded &&
+      !(ends && transition.faults == 0)) {
     open_->candidates = CandidatesOf(*models, verdict, transition.faults);
   }
   Emit(recorded, models, outlet);
+}
+
+// An episode without a name keeps the faults that could explain it last; none
+// once none of the known ones does. Normal samples say nothing of that.
+void EpisodeTracker::FollowUnknown(const Verdict& verdict,
+                                   const ModelSet& models) {
+  if (!open_ || verdict.state != State::kDetected ||
+      verdict.normal_factor >= models.decision.isolation_threshold) {
+    return;
+  }
+  if (verdict.unknown == Unknown::kOutsideKnown) {
+    open_->candidates.clear();
+    return;
+  }
+  std::vector<Candidate> candidates = CandidatesOf(models, verdict, 0);
+  if (!candidates.empty()) {
+    open_->candidates = std::move(candidates);
+  }
 }
 
 void EpisodeTracker::Emit(Transition transition,

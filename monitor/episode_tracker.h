@@ -94,6 +94,7 @@ class EpisodeTracker {
             EpisodeOutlet& outlet);
   void Begin(const Transition& transition, const Verdict& verdict,
              EpisodeOutlet& outlet);
+  void FollowUnknown(const Verdict& verdict, const ModelSet& models);
   void Emit(Transition transition,
             const std::shared_ptr<const ModelSet>& models,
             EpisodeOutlet& outlet);

@@ -31,6 +31,8 @@ struct EpisodeEvent {
   std::uint64_t seq{0};        ///< Of the sample at the transition.
   std::uint64_t episode_id{0};
   Transition transition;
+  /// In the running. At the end of an episode that got no name: those that
+  /// could explain it last; none if it is outside all known faults.
   std::vector<Candidate> candidates;
   /// That made the transition; null if an earlier session did.
   std::shared_ptr<const ModelSet> models;

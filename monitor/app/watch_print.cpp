@@ -25,6 +25,23 @@ std::string IsolatedNames(const idl::FaultEventMessage& message) {
   return names.empty() ? "unknown" : names;
 }
 
+// Why there is no name: the faults that may yet be it, or that none is known.
+std::string WhyUnknown(const idl::FaultEventMessage& message) {
+  if (message.transition.faults != 0) {
+    return "";
+  }
+  std::string names;
+  for (const idl::FaultCandidate& candidate : message.candidates) {
+    names += (names.empty() ? "" : "|") + FaultName(candidate.fault);
+  }
+  if (!names.empty()) {
+    return " too_early=" + names;
+  }
+  return message.transition.kind == TransitionKind::kDetected
+             ? " too_early"
+             : " outside_known";
+}
+
 }  // namespace
 
 void WatchPrinter::Learn(const idl::ModelSetInfoMessage& info) {
@@ -82,7 +99,7 @@ std::string WatchPrinter::Line(const idl::FaultEventMessage& message) const {
   std::string line =
       cli::FormatTime(t.stamp_ns, utc_) + " " + message.valve_id + " EVENT " +
       std::string(TransitionName(t.kind)) + " " + IsolatedNames(message) +
-      " factor=" + cli::FormatNumber(t.factor, 2) +
+      WhyUnknown(message) + " factor=" + cli::FormatNumber(t.factor, 2) +
       " episode=" + Hex(message.episode_id);
   if (t.reason != EndReason::kNone) {
     line += " reason=" + std::string(EndReasonName(t.reason));

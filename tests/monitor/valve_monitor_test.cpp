@@ -95,6 +95,24 @@ TEST_F(ValveMonitorTest, AFaultIsDetectedIsolatedAndClearedAsOneEpisode) {
   EXPECT_EQ(notebook_.events[3].transition.reason, EndReason::kCleared);
 }
 
+TEST_F(ValveMonitorTest, AnEpisodeWithoutANameKeepsWhatCouldExplainItLast) {
+  Feed(0, 100);
+  Feed(100, 103, kF7Offset);
+  Feed(103, 200);
+  ASSERT_THAT(notebook_.Kinds(),
+              ElementsAre(TransitionKind::kDetected, TransitionKind::kCleared,
+                          TransitionKind::kClosed));
+  ASSERT_EQ(notebook_.events[2].candidates.size(), 1U);
+  EXPECT_EQ(notebook_.events[2].candidates[0].fault, 7);
+  EXPECT_FALSE(notebook_.events[2].candidates[0].isolated);
+
+  notebook_.events.clear();
+  Feed(200, 250, 45.0);  // Like no fault there is.
+  Feed(250, 300);
+  ASSERT_EQ(notebook_.events.size(), 3U);
+  EXPECT_THAT(notebook_.events[2].candidates, testing::IsEmpty());
+}
+
 TEST_F(ValveMonitorTest, EvidenceRunsFromBeforeDetectionToTheEndWithoutHoles) {
   Feed(0, 100);
   Feed(100, 150, kF7Offset);
