@@ -49,8 +49,8 @@ class StrengthTracker {
   double evidence() const;
 
   /// True once a reading since the detection could have refuted the fault: on a
-  /// channel where it differs from normal operation, below the transmitter's
-  /// limit. A fault that is not yet refutable is not named.
+  /// channel where it differs from normal operation and the transmitter's limit
+  /// does not hide both. A fault that is not yet refutable is not named.
   bool refutable() const { return refutable_; }
 
   /// Smallest membership over the active channels of the residual at the

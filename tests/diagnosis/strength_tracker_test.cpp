@@ -228,5 +228,28 @@ TEST(FaultBankTest, FaultIsNotNamedForWantOfEvidence) {
   EXPECT_EQ(verdict.fault_factors[f6], 1.0);
 }
 
+// The valve is half closed, and the flow reads the limit all the same: any
+// reading below would have refuted f6, so it is named.
+TEST(FaultBankTest, ReadingAtTheLimitSpeaksForWhatPredictsIt) {
+  const ModelSet models = SaturatingPlant();
+  const auto f6 = static_cast<std::size_t>(FaultIndex(models, 6));
+  ObserverBank bank(models);
+  FaultBank faults(models);
+  Verdict verdict;
+  Noise noise(5);
+  bank.Initialise(SaturatingSample(0, 44.0, 0.0, noise));
+  faults.Restart();
+  for (std::uint64_t k = 1; k < 50; ++k) {
+    Sample sample = SaturatingSample(k, 44.0, 0.0, noise);
+    sample.Set(Signal::kF, 60.0);
+    bank.Step(sample);
+    faults.Score(bank, verdict);
+    faults.Follow(bank);
+    faults.Compete(verdict);
+  }
+  EXPECT_EQ(verdict.fault_factors[f6], 1.0);
+  EXPECT_LT(verdict.normal_factor, 0.1);
+}
+
 }  // namespace
 }  // namespace fdi
