@@ -194,7 +194,7 @@ TEST_F(AppRunTest, TheFaultsAreListed) {
   EXPECT_THAT(text.out, AllOf(HasSubstr("f19"), HasSubstr("flow reading x 0"),
                               HasSubstr("F5")));
   const auto faults = nlohmann::json::parse(json.out)["faults"];
-  ASSERT_EQ(faults.size(), 19U);
+  ASSERT_EQ(faults.size(), 22U);
   EXPECT_EQ(faults[6]["name"], "f7");
   EXPECT_EQ(faults[6]["paper_name"], "F4");
   EXPECT_EQ(faults[3]["strength_min"], -1.0);
