@@ -73,14 +73,16 @@ TEST(FaultInjectionTest, OpeningFaultsMultiplyTheFlowAsTheEquationDoes) {
 }
 
 TEST(FaultInjectionTest, NearlyClosedValveDoesNotMultiplyNoise) {
-  Sample closed = Healthy();
-  closed.Set(Signal::kX, 100.0);
-  closed.Set(Signal::kF, 0.05);
-  const double added = Faulty("f6:abrupt@50:strength=0.3", closed)[Signal::kF];
-  closed.Set(Signal::kF, 0.0);
-  EXPECT_NEAR(Faulty("f6:abrupt@50:strength=0.3", closed)[Signal::kF],
-              added - 0.05, 1e-9);
-  EXPECT_GT(added, 5.0);
+  const auto added = [](double x_pct, double flow) {
+    Sample sample = Healthy();
+    sample.Set(Signal::kX, x_pct);
+    sample.Set(Signal::kF, flow);
+    return Faulty("f6:abrupt@50:strength=0.3", sample)[Signal::kF] - flow;
+  };
+  // The equation has about 0.5 t/h at 99.5 %: it is off by more than twice.
+  EXPECT_NEAR(added(99.5, 2.0), added(99.5, 3.0), 1e-9);
+  EXPECT_NEAR(added(100.0, 0.0), added(100.0, 0.05), 1e-9);
+  EXPECT_GT(added(100.0, 0.0), 5.0);
 }
 
 TEST(FaultInjectionTest, TransmittersStepByAShareOfTheirSpanOrStandStill) {
