@@ -7,33 +7,51 @@
 
 namespace fdi::simulator {
 
-RecordFit FitToRecord(const ValveParameters& parameters,
-                      const std::vector<RecordRow>& record, std::size_t first,
-                      std::size_t last) {
+std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
+                                         const std::vector<RecordRow>& record,
+                                         std::size_t first, std::size_t last,
+                                         const RecordDrive& drive) {
   Require(first < last && last <= record.size(),
           "rows to compare must lie inside the record");
   RecordedExcitation excitation;
-  for (const RecordRow& row : record) {
-    excitation.rows.push_back(row.input);
+  for (std::size_t k = first; k < last; ++k) {
+    excitation.rows.push_back(record[k].input);
   }
   ValveSimulationConfig config;
   config.parameters = parameters;
-  config.excitation = excitation;
-  config.duration_s = static_cast<double>(record.size()) * config.period_s;
+  config.excitation = std::move(excitation);
+  config.period_s = drive.period_s;
+  config.duration_s = static_cast<double>(last - first) * drive.period_s;
+  config.continuous_inputs = drive.interpolated_command;
   config.noise = false;
   config.resolution = false;
   ValveSimulation simulation(config);
-  double x_sum = 0.0;
-  double flow_sum = 0.0;
-  for (std::size_t k = 0; k < last; ++k) {
+  std::vector<RecordAnswer> answers;
+  while (!simulation.finished()) {
     const Sample sample = simulation.Step().sample;
-    if (k >= first) {
-      x_sum += std::pow(sample[Signal::kX] - record[k].x_pct, 2);
-      flow_sum += std::pow(sample[Signal::kF] - record[k].flow, 2);
-    }
+    answers.push_back({sample[Signal::kX], sample[Signal::kF]});
+  }
+  return answers;
+}
+
+RecordFit FitToRecord(const ValveParameters& parameters,
+                      const std::vector<RecordRow>& record, std::size_t first,
+                      std::size_t last, const RecordDrive& drive) {
+  Require(first < last && last <= record.size(),
+          "rows to compare must lie inside the record");
+  const auto answers = SimulateRecord(parameters, record, 0, last, drive);
+  RecordFit fit;
+  for (std::size_t k = first; k < last; ++k) {
+    const double x_error = answers[k].x_pct - record[k].x_pct;
+    const double flow_error = answers[k].flow - record[k].flow;
+    fit.x_rmse_pct += x_error * x_error;
+    fit.flow_rmse += flow_error * flow_error;
+    fit.x_bias_pct += x_error;
+    fit.flow_bias += flow_error;
   }
   const auto count = static_cast<double>(last - first);
-  return {std::sqrt(x_sum / count), std::sqrt(flow_sum / count)};
+  return {std::sqrt(fit.x_rmse_pct / count), std::sqrt(fit.flow_rmse / count),
+          fit.x_bias_pct / count, fit.flow_bias / count};
 }
 
 }  // namespace fdi::simulator

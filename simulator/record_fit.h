@@ -14,19 +14,40 @@ struct RecordRow {
   double flow;  ///< In the flow unit of the parameter set.
 };
 
-/// Root mean square differences of simulation and record.
-struct RecordFit {
-  double x_rmse_pct;
-  double flow_rmse;
+/// How the inputs of a record act between its rows.
+struct RecordDrive {
+  double period_s{1.0};  ///< Of the rows, > 0.
+  /// The command is linear from row to row instead of held.
+  bool interpolated_command{false};
 };
 
-/// Drives a fault-free valve with the inputs of `record` (noise and resolution
-/// off, in equilibrium with the first row) and compares X and F over the rows
-/// [first, last).
-/// @throws ConfigError if `parameters` or a row is not valid.
+/// What the simulated valve answers to one row.
+struct RecordAnswer {
+  double x_pct;
+  double flow;
+};
+
+/// Differences simulation - record over some rows.
+struct RecordFit {
+  double x_rmse_pct{0.0};
+  double flow_rmse{0.0};
+  double x_bias_pct{0.0};  ///< Mean difference.
+  double flow_bias{0.0};
+};
+
+/// Answers of a fault-free valve to the inputs of rows [first, last): noise and
+/// resolution off, in equilibrium with the first of them.
+/// @throws ConfigError if `parameters`, `drive` or a row is not valid.
 /// @throws std::invalid_argument unless first < last <= record.size().
+std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
+                                         const std::vector<RecordRow>& record,
+                                         std::size_t first, std::size_t last,
+                                         const RecordDrive& drive = {});
+
+/// Drives the valve with all rows and compares X and F over [first, last).
+/// @throws as SimulateRecord().
 RecordFit FitToRecord(const ValveParameters& parameters,
                       const std::vector<RecordRow>& record, std::size_t first,
-                      std::size_t last);
+                      std::size_t last, const RecordDrive& drive = {});
 
 }  // namespace fdi::simulator

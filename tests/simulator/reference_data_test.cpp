@@ -15,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "simulator/record_fit.h"
+#include "simulator/valve_identification.h"
 #include "simulator/valve_simulation.h"
 
 namespace fdi::simulator {
@@ -42,16 +43,21 @@ std::vector<std::vector<double>> ReadRows(const std::filesystem::path& file) {
   return rows;
 }
 
+std::vector<RecordRow> ReadRecord(const std::filesystem::path& file) {
+  std::vector<RecordRow> record;
+  for (const auto& row : ReadRows(file)) {
+    record.push_back({{row[1], row[2], row[3], row[4]}, row[5], row[6]});
+  }
+  return record;
+}
+
 TEST(ReferenceDataTest, RefittedActuatorFollowsThePlant) {
   const auto folder = ReferenceData();
   if (!folder) {
     GTEST_SKIP() << "FDI_REFERENCE_DATA is not set";
   }
-  std::vector<RecordRow> record;
-  for (const auto& row :
-       ReadRows(*folder / "plant/lublin_actuator3_2001-10-11_first40min.csv")) {
-    record.push_back({{row[1], row[2], row[3], row[4]}, row[5], row[6]});
-  }
+  const auto record =
+      ReadRecord(*folder / "plant/lublin_actuator3_2001-10-11_first40min.csv");
   const RecordFit nominal =
       FitToRecord(ParameterSet("lublin-actuator-3"), record, 60, 2400);
   const RecordFit refit =
@@ -63,6 +69,41 @@ TEST(ReferenceDataTest, RefittedActuatorFollowsThePlant) {
   EXPECT_LE(refit.flow_rmse, 1.90);
   EXPECT_LE(nominal.x_rmse_pct, 2.3);
   EXPECT_LE(nominal.flow_rmse, 2.6);
+}
+
+// The first 25 minutes of the plant's record fit the valve to the other 15; a
+// model that is not ours is fitted on one record and followed on another.
+TEST(ReferenceDataTest, IdentifiedValveFollowsRowsItHasNotSeen) {
+  const auto folder = ReferenceData();
+  if (!folder) {
+    GTEST_SKIP() << "FDI_REFERENCE_DATA is not set";
+  }
+  const ValveParameters nominal = ParameterSet("lublin-actuator-3");
+  const auto plant =
+      ReadRecord(*folder / "plant/lublin_actuator3_2001-10-11_first40min.csv");
+  const ValveFit at_plant =
+      FitValve({{{plant.begin(), plant.begin() + 1500}}}, nominal);
+  EXPECT_EQ(at_plant.parameters.positioner.relay, AirRelay::kCompressible);
+  const RecordFit rest = FitToRecord(at_plant.parameters, plant, 1500, 2400,
+                                     {1.0, at_plant.interpolated_command});
+  EXPECT_LE(rest.x_rmse_pct, 1.70);
+  EXPECT_LE(rest.flow_rmse, 1.95);
+  for (const FittedParameter& p : at_plant.values) {
+    EXPECT_EQ(p.identified,
+              !p.name.starts_with("actuator.") && p.name != "positioner.gain")
+        << p.name;
+  }
+  const auto other = *folder / "valve-reference";
+  const ValveFit at_other =
+      FitValve({{ReadRecord(other / "plant_faultfree_211.csv")}},
+               ParameterSet("lublin-actuator-3-refit"));
+  EXPECT_EQ(at_other.parameters.positioner.relay, AirRelay::kOrifice);
+  EXPECT_TRUE(at_other.interpolated_command);
+  const RecordFit unseen = FitToRecord(
+      at_other.parameters, ReadRecord(other / "plant_faultfree_212.csv"), 60,
+      2400, {1.0, at_other.interpolated_command});
+  EXPECT_LE(unseen.x_rmse_pct, 0.40);
+  EXPECT_LE(unseen.flow_rmse, 0.35);
 }
 
 using Rows = std::vector<std::vector<double>>;

@@ -1,0 +1,235 @@
+#include "simulator/robust_least_squares.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "diagnosis/error.h"
+
+namespace fdi::simulator {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+double Median(std::vector<double> values) {
+  const auto middle =
+      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Standard deviation of a normal distribution with that median deviation.
+double RobustScale(const VectorXd& residuals) {
+  std::vector<double> sizes(static_cast<std::size_t>(residuals.size()));
+  std::transform(residuals.begin(), residuals.end(), sizes.begin(),
+                 [](double r) { return std::abs(r); });
+  return 1.4826 * Median(std::move(sizes));
+}
+
+// Share of independent rows in a series with that lag-1 correlation.
+double IndependentShare(const VectorXd& r) {
+  const double power = r.squaredNorm();
+  if (r.size() < 2 || power == 0.0) {
+    return 1.0;
+  }
+  const double correlation =
+      r.head(r.size() - 1).dot(r.tail(r.size() - 1)) / power;
+  const double bounded = std::clamp(correlation, 0.0, 0.99);
+  return (1.0 - bounded) / (1.0 + bounded);
+}
+
+double HuberWeight(double u, double corner) {
+  return std::abs(u) <= corner ? 1.0 : corner / std::abs(u);
+}
+
+double HuberLoss(double u, double corner) {
+  const double size = std::abs(u);
+  return size <= corner ? 0.5 * u * u : corner * (size - 0.5 * corner);
+}
+
+}  // namespace
+
+double MeanHuberLoss(const MatrixXd& residuals, const VectorXd& scale,
+                     double huber) {
+  double total = 0.0;
+  for (Index j = 0; j < residuals.cols(); ++j) {
+    for (Index k = 0; k < residuals.rows(); ++k) {
+      total += HuberLoss(residuals(k, j) / scale[j], huber);
+    }
+  }
+  return total / static_cast<double>(residuals.size());
+}
+
+namespace {
+
+class Minimiser {
+ public:
+  Minimiser(const ResidualFunction& residuals, const PointBounds& bounds,
+            const RobustFitOptions& options)
+      : residuals_(residuals), bounds_(bounds), options_(options) {}
+
+  RobustFit Run(const VectorXd& start);
+
+ private:
+  void Rescale();
+  double Loss(const MatrixXd& r, const VectorXd& point) const;
+  void Linearise();
+  VectorXd Step(double damping) const;
+  bool Improve();
+
+  VectorXd Inside(const VectorXd& point) const {
+    return point.cwiseMax(bounds_.lower).cwiseMin(bounds_.upper);
+  }
+  VectorXd PriorPrecision() const {
+    return bounds_.prior_sd.array().square().inverse();
+  }
+
+  const ResidualFunction& residuals_;
+  const PointBounds& bounds_;
+  const RobustFitOptions& options_;
+  MatrixXd present_;  // Residuals at fit_.point.
+  VectorXd gradient_;
+  double share_{1.0};  // c.
+  double damping_{1e-2};
+  RobustFit fit_;
+};
+
+void Minimiser::Rescale() {
+  fit_.scale.resize(present_.cols());
+  share_ = 1.0;
+  for (Index j = 0; j < present_.cols(); ++j) {
+    fit_.scale[j] =
+        std::max(options_.least_scale[j], RobustScale(present_.col(j)));
+    share_ = std::min(share_, IndependentShare(present_.col(j)));
+  }
+}
+
+double Minimiser::Loss(const MatrixXd& r, const VectorXd& point) const {
+  const VectorXd off =
+      (point - bounds_.prior_mean).cwiseQuotient(bounds_.prior_sd);
+  return share_ * static_cast<double>(r.size()) *
+             MeanHuberLoss(r, fit_.scale, options_.huber) +
+         0.5 * off.squaredNorm();
+}
+
+// Information, scores and gradient of the data at the present point.
+void Minimiser::Linearise() {
+  const Index p = fit_.point.size();
+  std::vector<VectorXd> points;
+  VectorXd steps(p);
+  for (Index i = 0; i < p; ++i) {
+    const double ahead = fit_.point[i] + options_.difference_step;
+    steps[i] = ahead <= bounds_.upper[i] ? options_.difference_step
+                                         : -options_.difference_step;
+    points.push_back(fit_.point);
+    points.back()[i] += steps[i];
+  }
+  const std::vector<MatrixXd> moved = residuals_(points);
+  fit_.information = MatrixXd::Zero(p, p);
+  fit_.scatter = MatrixXd::Zero(p, p);
+  gradient_ = VectorXd::Zero(p);
+  VectorXd score = VectorXd::Zero(p);
+  for (Index k = 0; k < present_.rows(); ++k) {
+    for (Index j = 0; j < present_.cols(); ++j) {
+      VectorXd slope(p);
+      for (Index i = 0; i < p; ++i) {
+        slope[i] = (moved[static_cast<std::size_t>(i)](k, j) - present_(k, j)) /
+                   (steps[i] * fit_.scale[j]);
+      }
+      const double u = present_(k, j) / fit_.scale[j];
+      const double weight = HuberWeight(u, options_.huber);
+      fit_.information.noalias() += weight * slope * slope.transpose();
+      score += weight * u * slope;
+    }
+    if ((k + 1) % options_.block_rows == 0 || k + 1 == present_.rows()) {
+      fit_.scatter.noalias() += score * score.transpose();
+      gradient_ += score;
+      score.setZero();
+    }
+  }
+}
+
+// Entries at a bound that the gradient presses against stay where they are.
+VectorXd Minimiser::Step(double damping) const {
+  const VectorXd precision = PriorPrecision();
+  MatrixXd h = share_ * fit_.information;
+  h.diagonal() += precision;
+  VectorXd g = share_ * gradient_ +
+               precision.cwiseProduct(fit_.point - bounds_.prior_mean);
+  h.diagonal() *= 1.0 + damping;
+  for (Index i = 0; i < g.size(); ++i) {
+    const bool pressed = (fit_.point[i] <= bounds_.lower[i] && g[i] > 0.0) ||
+                         (fit_.point[i] >= bounds_.upper[i] && g[i] < 0.0);
+    if (pressed) {
+      h.row(i).setZero();
+      h.col(i).setZero();
+      h(i, i) = 1.0;
+      g[i] = 0.0;
+    }
+  }
+  return -h.ldlt().solve(g);
+}
+
+// One accepted step; false where none lowers the loss by enough.
+bool Minimiser::Improve() {
+  constexpr int kTrials = 5;
+  constexpr double kDampingFactor = 8.0;
+  const double before = Loss(present_, fit_.point);
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const VectorXd point = Inside(fit_.point + Step(damping_));
+    const MatrixXd r = residuals_({point}).front();
+    const double after = Loss(r, point);
+    if (after < before) {
+      fit_.point = point;
+      present_ = r;
+      damping_ /= kDampingFactor;
+      return before - after > options_.tolerance * before;
+    }
+    damping_ *= kDampingFactor;
+  }
+  return false;
+}
+
+RobustFit Minimiser::Run(const VectorXd& start) {
+  fit_.point = Inside(start);
+  present_ = residuals_({fit_.point}).front();
+  bool improves = true;
+  for (int i = 0; improves && i < options_.max_iterations; ++i) {
+    Rescale();
+    Linearise();
+    improves = Improve();
+  }
+  Rescale();
+  fit_.residuals = present_;
+  return fit_;
+}
+
+}  // namespace
+
+RobustFit FitRobustly(const ResidualFunction& residuals, const VectorXd& start,
+                      const PointBounds& bounds,
+                      const RobustFitOptions& options) {
+  const Index p = start.size();
+  Require(bounds.lower.size() == p && bounds.upper.size() == p &&
+              bounds.prior_mean.size() == p && bounds.prior_sd.size() == p,
+          "bounds and prior must have the size of the point");
+  return Minimiser(residuals, bounds, options).Run(start);
+}
+
+VectorXd StandardDeviations(const RobustFit& fit, const PointBounds& bounds,
+                            const std::vector<Index>& kept) {
+  MatrixXd h = fit.information(kept, kept);
+  MatrixXd middle = fit.scatter(kept, kept);
+  const VectorXd precision = bounds.prior_sd(kept).array().square().inverse();
+  h.diagonal() += precision;
+  middle.diagonal() += precision;
+  const MatrixXd inverse = h.inverse();
+  const MatrixXd sandwich = inverse * middle * inverse;
+  return inverse.diagonal().cwiseMax(sandwich.diagonal()).cwiseSqrt();
+}
+
+}  // namespace fdi::simulator

@@ -1,0 +1,79 @@
+#include "simulator/robust_least_squares.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "simulator/random.h"
+#include "simulator/valve_equations.h"
+#include "simulator/valve_unknowns.h"
+#include "simulator/water.h"
+
+namespace fdi::simulator {
+namespace {
+
+// y = 2 exp(0.5 t) with noise 0.1 and each tenth row off by 5; a third entry
+// that nothing depends on.
+TEST(RobustLeastSquaresTest, ResistsOutliersAndKnowsWhatItCannotTell) {
+  constexpr Eigen::Index kRows = 400;
+  NormalSource noise(1, 1);
+  Eigen::VectorXd y(kRows);
+  for (Eigen::Index k = 0; k < kRows; ++k) {
+    const double t = 0.005 * static_cast<double>(k);
+    y[k] = 2.0 * std::exp(0.5 * t) + 0.1 * noise() + (k % 10 == 0 ? 5.0 : 0.0);
+  }
+  const auto residuals = [&](const std::vector<Eigen::VectorXd>& points) {
+    std::vector<Eigen::MatrixXd> result;
+    for (const Eigen::VectorXd& p : points) {
+      Eigen::MatrixXd r(kRows, 1);
+      for (Eigen::Index k = 0; k < kRows; ++k) {
+        r(k, 0) = p[0] * std::exp(p[1] * 0.005 * static_cast<double>(k)) - y[k];
+      }
+      result.push_back(r);
+    }
+    return result;
+  };
+  const PointBounds bounds{
+      Eigen::Vector3d(0.1, -1.0, -1.0), Eigen::Vector3d(9.0, 2.0, 1.0),
+      Eigen::Vector3d(1.0, 0.0, 0.3), Eigen::Vector3d(5.0, 5.0, 0.5)};
+  RobustFitOptions options;
+  options.max_iterations = 20;
+  options.least_scale = Eigen::VectorXd::Constant(1, 0.01);
+  const RobustFit fit =
+      FitRobustly(residuals, Eigen::Vector3d(1.0, 0.0, 0.3), bounds, options);
+  EXPECT_NEAR(fit.point[0], 2.0, 0.04);
+  EXPECT_NEAR(fit.point[1], 0.5, 0.02);
+  EXPECT_NEAR(fit.point[2], 0.3, 1e-9);
+  EXPECT_NEAR(fit.scale[0], 0.1, 0.02);
+  const Eigen::VectorXd sd = StandardDeviations(fit, bounds, {0, 1, 2});
+  EXPECT_LT(sd[0], 0.03);
+  EXPECT_LT(sd[1], 0.02);
+  EXPECT_NEAR(sd[2], 0.5, 1e-6);
+}
+
+TEST(ValveUnknownsTest, TheTrimFollowsFromPositionAndFlowAlone) {
+  ValveParameters truth = ParameterSet("lublin-actuator-3");
+  truth.trim.kv_m3_h = 80.0;
+  truth.trim.exponent = 4.2;
+  HealthyRecord record;
+  for (int k = 0; k < 40; ++k) {
+    const InputRow input{0.0, 3500.0 + k, 2600.0, 100.7};
+    const double x_pct = 55.0 + 0.5 * k;
+    const MediumState medium = MediumAt(1e3 * input.p1_kpa, 2.6e6, 100.7);
+    const double flow =
+        Flow(80.0, Opening(truth.trim, 0.01 * x_pct),
+             EffectivePressureDrop(medium, RecoveryCoefficient(0.01 * x_pct)),
+             medium.density_kg_m3);
+    record.rows.push_back({input, x_pct, 1e-3 * flow * LiquidDensity(100.7)});
+  }
+  const TrimParameters trim =
+      RegressTrim({record}, ParameterSet("lublin-actuator-3"));
+  EXPECT_NEAR(trim.kv_m3_h, 80.0, 0.01);
+  EXPECT_NEAR(trim.exponent, 4.2, 1e-4);
+  record.rows.resize(10);
+  EXPECT_EQ(RegressTrim({record}, truth).kv_m3_h, 80.0);
+}
+
+}  // namespace
+}  // namespace fdi::simulator

@@ -1,0 +1,166 @@
+#include "simulator/valve_identification.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/error.h"
+#include "simulator/random.h"
+#include "simulator/valve_simulation.h"
+
+namespace fdi::simulator {
+namespace {
+
+// A command that is set anew every 5..25 s and jitters in between, as a level
+// controller moves it.
+std::vector<InputRow> BusyInputs(std::size_t count, std::uint64_t seed) {
+  NormalSource noise(seed, 7);
+  DisturbanceProcess p1({22.0, 0.85}, {seed, 8});
+  DisturbanceProcess p2({13.0, 0.6}, {seed, 9});
+  std::vector<InputRow> rows;
+  double level = 60.0;
+  std::size_t until = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (k == until) {
+      level = std::clamp(62.0 + 12.0 * noise(), 46.0, 85.0);
+      until = k + 5 +
+              static_cast<std::size_t>(std::min(20.0, 8.0 * std::abs(noise())));
+    }
+    rows.push_back({std::clamp(level + 0.8 * noise(), 44.0, 90.0),
+                    3555.0 + p1.Next(), 2615.0 + p2.Next(), 100.7});
+  }
+  return rows;
+}
+
+// What the transmitters of such a valve record, noise on.
+HealthyRecord Recording(const ValveParameters& parameters, std::size_t count,
+                        std::uint64_t seed, bool interpolated = false) {
+  ValveSimulationConfig config;
+  config.parameters = parameters;
+  config.excitation = RecordedExcitation{BusyInputs(count, seed)};
+  config.continuous_inputs = interpolated;
+  config.duration_s = static_cast<double>(count);
+  config.seed = seed;
+  ValveSimulation simulation(config);
+  HealthyRecord record;
+  while (!simulation.finished()) {
+    const Sample s = simulation.Step().sample;
+    record.rows.push_back(
+        {{s[Signal::kCv], s[Signal::kP1], s[Signal::kP2], s[Signal::kT1]},
+         s[Signal::kX],
+         s[Signal::kF]});
+  }
+  return record;
+}
+
+const FittedParameter& Named(const ValveFit& fit, const std::string& name) {
+  const auto found =
+      std::find_if(fit.values.begin(), fit.values.end(),
+                   [&](const FittedParameter& p) { return p.name == name; });
+  if (found == fit.values.end()) {
+    throw NotFoundError(name);
+  }
+  return *found;
+}
+
+// The refit with the parameters a healthy record should tell moved.
+ValveParameters MovedRefit(double kv, double exponent, double cv,
+                           double filter) {
+  ValveParameters valve = ParameterSet("lublin-actuator-3-refit");
+  valve.trim.kv_m3_h *= kv;
+  valve.trim.exponent *= exponent;
+  valve.positioner.filling_cv *= cv;
+  valve.positioner.venting_cv *= cv;
+  valve.positioner.filter_time_s *= filter;
+  return valve;
+}
+
+void ExpectRecovered(const ValveFit& fit, const std::string& name, double truth,
+                     double share) {
+  const FittedParameter& p = Named(fit, name);
+  EXPECT_TRUE(p.identified) << name << " sd " << p.relative_sd;
+  EXPECT_NEAR(p.value / truth, 1.0, share) << name;
+}
+
+class RecoveryTest : public ::testing::TestWithParam<int> {};
+
+TEST_P(RecoveryTest, RecoversTheParametersOfASimulatedValve) {
+  const double sign = GetParam() > 0 ? 1.0 : -1.0;
+  const ValveParameters truth = MovedRefit(1.0 + 0.2 * sign, 1.0 - 0.15 * sign,
+                                           1.0 + 0.2 * sign, 1.0 + 0.3 * sign);
+  const bool interpolated = GetParam() > 0;
+  const HealthyRecord record = Recording(truth, 800, 3, interpolated);
+  const ValveFit fit =
+      FitValve({record}, ParameterSet("lublin-actuator-3-refit"));
+  EXPECT_EQ(fit.interpolated_command, interpolated);
+  EXPECT_EQ(fit.parameters.positioner.relay, AirRelay::kCompressible);
+  ExpectRecovered(fit, "trim.kv_m3_h", truth.trim.kv_m3_h, 0.05);
+  ExpectRecovered(fit, "trim.exponent", truth.trim.exponent, 0.05);
+  ExpectRecovered(fit, "positioner.filling_cv", truth.positioner.filling_cv,
+                  0.10);
+  ExpectRecovered(fit, "positioner.venting_cv", truth.positioner.venting_cv,
+                  0.05);
+  ExpectRecovered(fit, "positioner.filter_time_s",
+                  truth.positioner.filter_time_s, 0.05);
+  const RecordFit floor =
+      FitToRecord(truth, record.rows, 60, 800, {1.0, interpolated});
+  EXPECT_LE(fit.fitted.x_rmse_pct, 1.05 * floor.x_rmse_pct);
+  EXPECT_LE(fit.fitted.flow_rmse, 1.05 * floor.flow_rmse);
+  EXPECT_LE(std::abs(fit.fitted.flow_bias), 0.1 * floor.flow_rmse);
+  EXPECT_GT(fit.nominal.flow_rmse, 2.0 * floor.flow_rmse);
+  for (const char* name : {"positioner.gain", "actuator.play_fraction",
+                           "actuator.supply_pressure_gauge_pa"}) {
+    EXPECT_FALSE(Named(fit, name).identified) << name;
+    EXPECT_EQ(Named(fit, name).value, Named(fit, name).nominal) << name;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(ValveIdentification, RecoveryTest,
+                         ::testing::Values(-1, 1));
+
+TEST(ValveIdentificationTest, FindsTheAirRelayAndDoesNotNeedFlow) {
+  ValveParameters truth = ParameterSet("lublin-actuator-3");
+  truth.positioner.orifice_coefficient *= 1.2;
+  const HealthyRecord record = Recording(truth, 300, 5);
+  ValveFitOptions options;
+  options.has_flow = false;
+  options.threads = 1;
+  const ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");
+  const ValveFit fit = FitValve({record}, nominal, options);
+  EXPECT_EQ(fit.parameters.positioner.relay, AirRelay::kOrifice);
+  EXPECT_TRUE(fit.parameters.positioner.transducer_dead_zone);
+  ExpectRecovered(fit, "positioner.orifice_coefficient",
+                  truth.positioner.orifice_coefficient, 0.05);
+  EXPECT_EQ(fit.parameters.trim.kv_m3_h, nominal.trim.kv_m3_h);
+  EXPECT_EQ(fit.parameters.trim.exponent, nominal.trim.exponent);
+  options.threads = 3;
+  const ValveFit again = FitValve({record}, nominal, options);
+  for (std::size_t i = 0; i < fit.values.size(); ++i) {
+    EXPECT_EQ(fit.values[i].value, again.values[i].value);
+  }
+}
+
+TEST(ValveIdentificationTest, NamesWhatItCannotUse) {
+  const ValveParameters valve = ParameterSet("lublin-actuator-3-refit");
+  HealthyRecord record = Recording(valve, 179, 1);
+  EXPECT_THROW(FitValve({record}, valve), DataError);
+  EXPECT_THROW(FitValve({}, valve), DataError);
+  record = Recording(valve, 200, 1);
+  record.rows[17].x_pct = std::numeric_limits<double>::quiet_NaN();
+  try {
+    FitValve({record}, valve);
+    FAIL() << "expected DataError";
+  } catch (const DataError& error) {
+    EXPECT_NE(std::string(error.what()).find("row 17"), std::string::npos);
+  }
+  ValveFitOptions options;
+  options.max_rows = 10;
+  EXPECT_THROW(FitValve({record}, valve, options), ConfigError);
+}
+
+}  // namespace
+}  // namespace fdi::simulator
