@@ -9,5 +9,7 @@ int main(int argc, char** argv) {
   fdi::trainer::AddEvaluateVerb(program);
   fdi::trainer::AddShowVerb(program);
   fdi::trainer::AddInjectVerb(program);
+  fdi::trainer::AddOnboardVerb(program);
+  fdi::trainer::AddCoverageVerb(program);
   return program.Run(argc, argv);
 }

@@ -11,5 +11,7 @@ void AddTrainVerb(cli::Program& program);
 void AddEvaluateVerb(cli::Program& program);
 void AddShowVerb(cli::Program& program);
 void AddInjectVerb(cli::Program& program);
+void AddOnboardVerb(cli::Program& program);
+void AddCoverageVerb(cli::Program& program);
 
 }  // namespace fdi::trainer

@@ -1,0 +1,130 @@
+#include "trainer/onboarding/fault_synthesis.h"
+
+#include <algorithm>
+
+#include "diagnosis/error.h"
+#include "simulator/valve_simulation.h"
+
+namespace fdi::trainer {
+namespace {
+
+using simulator::Transmitter;
+
+constexpr double kLeastRatioFlow = 0.02;  // of the range of the transmitter
+
+double Held(const Transmitter& transmitter, double value) {
+  return std::clamp(value, transmitter.low, transmitter.high);
+}
+
+std::vector<Sample> Run(const simulator::ValveSimulationConfig& config) {
+  simulator::ValveSimulation simulation(config);
+  std::vector<Sample> samples;
+  while (!simulation.finished()) {
+    samples.push_back(simulation.Step().sample);
+  }
+  return samples;
+}
+
+double FaultyFlow(const Transmitter& transmitter, double reading,
+                  double healthy, double faulty) {
+  const double least = kLeastRatioFlow * (transmitter.high - transmitter.low);
+  return Held(transmitter, healthy > least ? reading * faulty / healthy
+                                           : reading + faulty - healthy);
+}
+
+}  // namespace
+
+simulator::InputRow InputsOf(const Sample& sample,
+                             const simulator::InputRow& levels) {
+  const auto value = [&](Signal signal, double level) {
+    return sample.Has(signal) ? sample[signal] : level;
+  };
+  return {value(Signal::kCv, levels.cv_pct), value(Signal::kP1, levels.p1_kpa),
+          value(Signal::kP2, levels.p2_kpa),
+          value(Signal::kT1, levels.t1_degc)};
+}
+
+FaultSynthesizer::FaultSynthesizer(ValveType type) : type_(std::move(type)) {
+  Validate(type_.parameters);
+}
+
+std::vector<Sample> FaultSynthesizer::Simulate(
+    const FaultCondition& fault, const std::vector<Sample>& inputs) const {
+  simulator::RecordedExcitation excitation;
+  for (const Sample& sample : inputs) {
+    excitation.rows.push_back(InputsOf(sample, type_.levels));
+  }
+  simulator::ValveSimulationConfig config;
+  config.parameters = type_.parameters;
+  config.excitation = std::move(excitation);
+  config.continuous_inputs = type_.interpolated_command;
+  config.period_s =
+      inputs.size() > 1
+          ? 1e-9 * static_cast<double>(inputs[1].stamp_ns - inputs[0].stamp_ns)
+          : 1.0;
+  config.duration_s = config.period_s * static_cast<double>(inputs.size());
+  config.noise = false;
+  config.resolution = false;
+  if (fault.fault != 0) {
+    simulator::FaultSchedule schedule;
+    schedule.fault = fault.fault;
+    schedule.final_strength = fault.strength;
+    config.faults = {schedule};
+  }
+  return Run(config);
+}
+
+std::vector<Sample> FaultSynthesizer::Healthy(const Stretch& stretch) const {
+  const std::pair key{stretch.run_id, stretch.samples.front().stamp_ns};
+  {
+    const std::scoped_lock lock(mutex_);
+    const auto found = healthy_.find(key);
+    if (found != healthy_.end()) {
+      return found->second;
+    }
+  }
+  std::vector<Sample> samples = Simulate({}, stretch.samples);
+  const std::scoped_lock lock(mutex_);
+  healthy_.emplace(key, samples);
+  return samples;
+}
+
+std::vector<Sample> FaultSynthesizer::operator()(const FaultCondition& fault,
+                                                 const Stretch& healthy) const {
+  const std::vector<Sample> without = Healthy(healthy);
+  const std::vector<Sample> with = Simulate(fault, healthy.samples);
+  std::vector<Sample> samples = healthy.samples;
+  const simulator::InstrumentParameters& instruments =
+      type_.parameters.instruments;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    Sample& sample = samples[k];
+    const auto add = [&](Signal signal, const Transmitter& transmitter) {
+      if (sample.Has(signal)) {
+        sample.Set(signal, Held(transmitter, sample[signal] + with[k][signal] -
+                                                 without[k][signal]));
+      }
+    };
+    add(Signal::kP1, instruments.pressure);
+    add(Signal::kP2, instruments.pressure);
+    add(Signal::kT1, instruments.temperature);
+    add(Signal::kX, instruments.position);
+    if (sample.Has(Signal::kF)) {
+      sample.Set(Signal::kF,
+                 FaultyFlow(instruments.flow, sample[Signal::kF],
+                            without[k][Signal::kF], with[k][Signal::kF]));
+    }
+  }
+  return samples;
+}
+
+std::vector<Sample> SimulateHealthy(const ValveType& type, double duration_s,
+                                    std::uint64_t seed) {
+  simulator::ValveSimulationConfig config;
+  config.parameters = type.parameters;
+  config.excitation = simulator::LevelLoopExcitation{};
+  config.duration_s = duration_s;
+  config.seed = seed;
+  return Run(config);
+}
+
+}  // namespace fdi::trainer

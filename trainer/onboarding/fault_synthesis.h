@@ -1,0 +1,55 @@
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "trainer/onboarding/valve_type.h"
+
+namespace fdi::trainer {
+
+/// The inputs of a simulation: what the sample has, else the level.
+simulator::InputRow InputsOf(const Sample& sample,
+                             const simulator::InputRow& levels);
+
+/// Puts simulated faults onto recorded healthy samples. The valve type is
+/// simulated with the recorded inputs, once healthy (0) and once with the fault
+/// (i); the recorded readings take over the difference, a flow the ratio,
+///
+///     X + X_i − X_0,   F F_i/F_0,   P + P_i − P_0,   T + T_i − T_0,
+///
+/// each kept within the range of its transmitter. What simulation and valve
+/// differ by is thus in the faulty samples as it is in the healthy ones. CV
+/// stays: the reaction of the control loop is left out. Only signals that the
+/// samples have are given back. Thread safe.
+class FaultSynthesizer {
+ public:
+  /// @throws ConfigError if the parameters are not valid.
+  explicit FaultSynthesizer(ValveType type);
+
+  /// @param healthy One period apart, in the flow unit of the type.
+  /// @throws CvodeError if a simulation fails.
+  std::vector<Sample> operator()(const FaultCondition& fault,
+                                 const Stretch& healthy) const;
+
+  const ValveType& type() const { return type_; }
+
+ private:
+  std::vector<Sample> Simulate(const FaultCondition& fault,
+                               const std::vector<Sample>& inputs) const;
+  std::vector<Sample> Healthy(const Stretch& stretch) const;
+
+  ValveType type_;
+  mutable std::mutex mutex_;
+  mutable std::map<std::pair<std::string, std::int64_t>, std::vector<Sample>>
+      healthy_;  // by run and first stamp
+};
+
+/// A healthy valve of the type, simulated for `duration_s` in the feedwater
+/// loop with the noise of its transmitters; for valves without a record.
+std::vector<Sample> SimulateHealthy(const ValveType& type, double duration_s,
+                                    std::uint64_t seed);
+
+}  // namespace fdi::trainer

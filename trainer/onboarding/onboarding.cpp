@@ -1,0 +1,237 @@
+#include "trainer/onboarding/onboarding.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <thread>
+
+#include "diagnosis/error.h"
+#include "trainer/onboarding/signal_subset.h"
+
+namespace fdi::trainer {
+namespace {
+
+// Shares of the work, for the progress bar.
+constexpr double kFitShare = 0.2;
+constexpr double kTrainShare = 0.7;
+
+constexpr std::size_t kLeastSamples = 600;
+
+Progress Part(const Progress& progress, double from, double share) {
+  return [&progress, from, share](double done, std::string_view stage) {
+    if (progress) {
+      progress(from + share * done, stage);
+    }
+  };
+}
+
+void RequireHealthy(const std::vector<TrainingRun>& runs) {
+  Require(!runs.empty(), "no run was given");
+  std::size_t samples = 0;
+  for (const TrainingRun& run : runs) {
+    samples += run.samples.size();
+    for (const LabelledSample& labelled : run.samples) {
+      if (labelled.truth && labelled.truth->strength != 0.0) {
+        throw DataError("run " + run.id +
+                        " has samples with a fault: onboarding takes healthy "
+                        "ones, select them with ID@from:to");
+      }
+    }
+  }
+  if (samples < kLeastSamples) {
+    throw DataError("the runs have " + std::to_string(samples) +
+                    " samples, onboarding takes at least " +
+                    std::to_string(kLeastSamples));
+  }
+}
+
+void RequireUnit(const std::vector<TrainingRun>& runs, const ValveType& type) {
+  const FlowUnit unit = type.parameters.instruments.flow_unit;
+  if (runs.front().flow_unit != unit &&
+      runs.front().samples.front().sample.Has(Signal::kF)) {
+    throw DataError("run " + runs.front().id + " has its flow in " +
+                    std::string(FlowUnitName(runs.front().flow_unit)) +
+                    ", valve type " + type.name + " in " +
+                    std::string(FlowUnitName(unit)));
+  }
+}
+
+// Stretches without a gap as records of the simulator.
+std::vector<simulator::HealthyRecord> Records(
+    const std::vector<TrainingRun>& runs, const simulator::InputRow& levels) {
+  std::vector<simulator::HealthyRecord> records;
+  for (const TrainingRun& run : runs) {
+    const auto period_ns = std::llround(run.period_s * 1e9);
+    std::int64_t last_ns = 0;
+    for (const LabelledSample& labelled : run.samples) {
+      const Sample& sample = labelled.sample;
+      if (&labelled == &run.samples.front() ||
+          sample.stamp_ns - last_ns > 3 * period_ns / 2) {
+        records.emplace_back();
+      }
+      last_ns = sample.stamp_ns;
+      records.back().rows.push_back(
+          {InputsOf(sample, levels), sample[Signal::kX], sample[Signal::kF]});
+    }
+  }
+  return records;
+}
+
+simulator::ValveFit FitType(const std::vector<TrainingRun>& runs,
+                            const OnboardingOptions& options) {
+  simulator::ValveFitOptions fit;
+  fit.has_flow = runs.front().samples.front().sample.Has(Signal::kF);
+  fit.period_s = runs.front().period_s;
+  fit.threads =
+      options.threads > 0
+          ? options.threads
+          : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  return simulator::FitValve(Records(runs, options.type.levels),
+                             options.type.parameters, fit);
+}
+
+double NaiveError(const std::vector<TrainingRun>& runs, Signal output) {
+  double sum = 0.0;
+  double squares = 0.0;
+  double count = 0.0;
+  for (const TrainingRun& run : runs) {
+    for (const LabelledSample& labelled : run.samples) {
+      const Sample& sample = labelled.sample;
+      const double y =
+          sample[output] - (output == Signal::kX ? sample[Signal::kCv] : 0.0);
+      sum += y;
+      squares += y * y;
+      count += 1.0;
+    }
+  }
+  const double mean = output == Signal::kX ? 0.0 : sum / count;
+  return std::sqrt(std::max(0.0, squares / count - mean * mean));
+}
+
+std::vector<ChannelFit> FitsOf(const ModelSet& models,
+                               const std::vector<TrainingRun>& runs) {
+  std::vector<ChannelFit> fits;
+  const Observer& normal = models.observers.front();
+  for (std::size_t c = 0; c < models.channels.size(); ++c) {
+    const ChannelObserver& channel = normal.channels[c];
+    fits.push_back({models.channels[c].name, models.channels[c].output,
+                    channel.residual_sd, channel.validation.bias,
+                    channel.validation.vaf,
+                    NaiveError(runs, models.channels[c].output)});
+  }
+  return fits;
+}
+
+// The longest part without a gap, for the coverage table.
+Stretch LongestStretch(const std::vector<TrainingRun>& runs) {
+  Stretch longest;
+  for (const TrainingRun& run : runs) {
+    const auto period_ns = std::llround(run.period_s * 1e9);
+    Stretch stretch{run.id, {}};
+    for (const LabelledSample& labelled : run.samples) {
+      if (!stretch.samples.empty() &&
+          labelled.sample.stamp_ns - stretch.samples.back().stamp_ns >
+              3 * period_ns / 2) {
+        stretch.samples.clear();
+      }
+      stretch.samples.push_back(labelled.sample);
+      if (stretch.samples.size() > longest.samples.size()) {
+        longest = stretch;
+      }
+    }
+  }
+  return longest;
+}
+
+TrainingOptions TrainingOf(const OnboardingOptions& options,
+                           SignalMask signals) {
+  TrainingOptions training = OnboardingPreset(signals);
+  training.name = options.name;
+  training.threads = options.threads;
+  training.false_alarms_per_hour = options.false_alarms_per_hour;
+  training.software = options.software;
+  training.created_ns = options.created_ns;
+  training.dataset.assume_normal = true;
+  return training;
+}
+
+CoverageTable AssessSubset(const ValveType& type, const TrainingRun& full,
+                           SignalMask signals, const OnboardingOptions& options,
+                           const Progress& progress) {
+  const TrainingRun run = WithSignals(full, signals);
+  const FaultSynthesizer synthesize(type);
+  const std::vector<FaultCondition> faults = OnboardingFaults(signals);
+  const auto models = std::make_shared<const ModelSet>(
+      TrainDifferenceSet({run}, faults, std::ref(synthesize),
+                         type.parameters.instruments.flow.high,
+                         TrainingOf(options, signals), progress));
+  return AssessCoverage(models, faults, synthesize, LongestStretch({run}),
+                        options.threads);
+}
+
+}  // namespace
+
+Onboarding Onboard(const std::vector<TrainingRun>& runs,
+                   const OnboardingOptions& options, const Progress& progress) {
+  RequireHealthy(runs);
+  const SignalMask signals =
+      runs.front().samples.front().sample.present & kBasicSignals;
+  const TrainingOptions training = TrainingOf(options, signals);
+  RequireUnit(runs, options.type);
+  Onboarding result;
+  result.type = options.type;
+  if (options.fit) {
+    Part(progress, 0.0, kFitShare)(0.0, "fitting the physical parameters");
+    result.fit = FitType(runs, options);
+    result.type.parameters = result.fit->parameters;
+    result.type.interpolated_command = result.fit->interpolated_command;
+  }
+  const FaultSynthesizer synthesize(result.type);
+  const std::vector<FaultCondition> faults = OnboardingFaults(signals);
+  result.models =
+      TrainDifferenceSet(runs, faults, std::ref(synthesize),
+                         result.type.parameters.instruments.flow.high, training,
+                         Part(progress, kFitShare, kTrainShare));
+  result.channels = FitsOf(result.models, runs);
+  for (const TrainingRun& run : runs) {
+    result.hours +=
+        run.period_s * static_cast<double>(run.samples.size()) / 3600.0;
+  }
+  if (options.assess) {
+    Part(progress, kFitShare + kTrainShare, 0.0)(0.0, "scoring every fault");
+    result.coverage =
+        AssessCoverage(std::make_shared<const ModelSet>(result.models), faults,
+                       synthesize, LongestStretch(runs), options.threads);
+  }
+  Part(progress, 1.0, 0.0)(0.0, "done");
+  return result;
+}
+
+CoverageTable AssessType(const ValveType& type, SignalMask signals,
+                         bool with_gains, const OnboardingOptions& options,
+                         const Progress& progress) {
+  constexpr double kSeconds = 1800.0;
+  const TrainingRun full = SimulatedRun(type, kSeconds);
+  std::vector<Signal> missing;
+  for (const Signal signal :
+       {Signal::kF, Signal::kP1, Signal::kP2, Signal::kT1}) {
+    if (with_gains && (signals & MaskOf(signal)) == 0) {
+      missing.push_back(signal);
+    }
+  }
+  const double share = 1.0 / static_cast<double>(missing.size() + 1);
+  CoverageTable table =
+      AssessSubset(type, full, signals, options, Part(progress, 0.0, share));
+  double from = share;
+  for (const Signal signal : missing) {
+    const auto more = static_cast<SignalMask>(signals | MaskOf(signal));
+    table.gains.push_back(GainOf(
+        signal, table,
+        AssessSubset(type, full, more, options, Part(progress, from, share))));
+    from += share;
+  }
+  return table;
+}
+
+}  // namespace fdi::trainer
