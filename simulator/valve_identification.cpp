@@ -212,14 +212,13 @@ void Identification::KeepIdentified(
 // Tries each stated parameter beside those that are kept.
 void Identification::AddStated(Hypothesis& hypothesis,
                                std::vector<FittedParameter>& rejected) const {
-  constexpr int kTrialIterations = 4;
   for (const ValveUnknown& unknown :
        Unknowns(hypothesis.base.parameters, /*stated=*/true)) {
     Hypothesis trial = hypothesis;
     trial.unknowns.push_back(unknown);
     trial.point.conservativeResize(trial.point.size() + 1);
     trial.point.tail<1>() = BoundsOf({unknown}).prior_mean;
-    trial.fit = Fit(trial, segments_, kTrialIterations);
+    trial.fit = Fit(trial, segments_, kMostIterations);
     trial.point = trial.fit.point;
     const double sd =
         StandardDeviations(trial.fit, BoundsOf(trial.unknowns),

@@ -144,6 +144,18 @@ TEST(ValveIdentificationTest, FindsTheAirRelayAndDoesNotNeedFlow) {
   }
 }
 
+// Noise of the recorded pressures, which act on the simulated plug, would raise
+// the gain by a quarter: here they are exact.
+TEST(ValveIdentificationTest, LeavesAStatedValueThatDoesNotFit) {
+  ValveParameters truth = ParameterSet("lublin-actuator-3-refit");
+  truth.positioner.gain = 40.0;
+  truth.instruments.pressure.noise_sd = 0.0;
+  const HealthyRecord record = Recording(truth, 800, 6);
+  const ValveFit fit =
+      FitValve({record}, ParameterSet("lublin-actuator-3-refit"));
+  ExpectRecovered(fit, "positioner.gain", 40.0, 0.1);
+}
+
 TEST(ValveIdentificationTest, NamesWhatItCannotUse) {
   const ValveParameters valve = ParameterSet("lublin-actuator-3-refit");
   HealthyRecord record = Recording(valve, 179, 1);
