@@ -49,12 +49,11 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample) {
     for (std::size_t w = 0; w < channel.windows.size(); ++w) {
       const WindowLimits& limits = channel.windows[w];
       const ResidualWindow& window = windows_.window(c, w);
-      const bool full = window.full();
-      Count(test++, full && window.mean() < limits.lower_mean, stamp_ns);
-      Count(test++, full && window.mean() > limits.upper_mean, stamp_ns);
-      Count(test++,
-            full &&
-                window.log_rms() > UpperLogRms(limits, windows_.command(c, w)),
+      const ResidualWindow& command = windows_.command(c, w);
+      const bool applies = Applies(limits, window, command);
+      Count(test++, applies && window.mean() < limits.lower_mean, stamp_ns);
+      Count(test++, applies && window.mean() > limits.upper_mean, stamp_ns);
+      Count(test++, applies && window.log_rms() > UpperLogRms(limits, command),
             stamp_ns);
     }
   }

@@ -53,6 +53,8 @@ void ValidateChannel(const ModelSet& models, const ChannelSpec& channel) {
     Check(std::isfinite(window.upper_log_rms) &&
               std::isfinite(window.log_activity),
           models, where + "limits of a window must be finite");
+    Check(window.command.minimum < window.command.maximum, models,
+          where + "commands of a window must not be empty");
     Check(window.activity_slope >= 0.0 && window.activity_slope <= 1.0, models,
           where + "the slope of a window must be in [0, 1]");
   }

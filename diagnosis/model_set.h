@@ -35,7 +35,9 @@ struct ValidationFigures {
 ///
 ///     upper_log_rms + activity_slope · (a − log_activity), not below the first
 ///
-/// with a the logarithm of the deviation of CV over the same window.
+/// with a the logarithm of the deviation of CV over the same window. Where CV
+/// stays, in its mean over the window, as it never did in training, what models
+/// err by there does not average out as it did: the window has no limits.
 struct WindowLimits {
   int length{30};              ///< N [samples].
   double lower_mean{0.0};      ///< < 0 [unit].
@@ -43,6 +45,7 @@ struct WindowLimits {
   double upper_log_rms{0.0};   ///< Of the deviation in units of the output.
   double activity_slope{0.0};  ///< In [0, 1] [-].
   double log_activity{0.0};    ///< Of CV in training [log %].
+  SignalRange command{kUnbounded};  ///< Means of CV that it holds for [%].
 };
 
 /// A residual channel of the model set: which output it watches.

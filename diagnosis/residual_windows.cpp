@@ -43,11 +43,19 @@ double UpperLogRms(const WindowLimits& limits, const ResidualWindow& command) {
   return limits.upper_log_rms + limits.activity_slope * more;
 }
 
+bool Applies(const WindowLimits& limits, const ResidualWindow& window,
+             const ResidualWindow& command) {
+  return window.full() &&
+         (!command.full() || (command.mean() >= limits.command.minimum &&
+                              command.mean() <= limits.command.maximum));
+}
+
 bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window,
               const ResidualWindow& command) {
-  return window.full() && (window.mean() < limits.lower_mean ||
-                           window.mean() > limits.upper_mean ||
-                           window.log_rms() > UpperLogRms(limits, command));
+  return Applies(limits, window, command) &&
+         (window.mean() < limits.lower_mean ||
+          window.mean() > limits.upper_mean ||
+          window.log_rms() > UpperLogRms(limits, command));
 }
 
 ResidualWindows::ResidualWindows(const ModelSet& models) {

@@ -43,7 +43,12 @@ class ResidualWindow {
 /// counts up to four times that of the training.
 double UpperLogRms(const WindowLimits& limits, const ResidualWindow& command);
 
-/// True if a full window is beyond one of its limits.
+/// True if the limits hold for a window: it is full, and the mean of CV over it
+/// is one that they were fitted to. Without CV they always hold.
+bool Applies(const WindowLimits& limits, const ResidualWindow& window,
+             const ResidualWindow& command);
+
+/// True if limits that apply are passed.
 bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window,
               const ResidualWindow& command);
 

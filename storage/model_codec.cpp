@@ -98,9 +98,9 @@ void Fields(A& a, T& figures) {
 template <typename A, Of<WindowLimits> T>
 void Fields(A& a, T& window) {
   auto& [length, lower_mean, upper_mean, upper_log_rms, activity_slope,
-         log_activity] = window;
-  a(length, lower_mean, upper_mean, upper_log_rms, activity_slope,
-    log_activity);
+         log_activity, command] = window;
+  a(length, lower_mean, upper_mean, upper_log_rms, activity_slope, log_activity,
+    command);
 }
 
 template <typename A, Of<ChannelSpec> T>

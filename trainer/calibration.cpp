@@ -11,6 +11,11 @@
 namespace fdi::trainer {
 namespace {
 
+// T1, P1 and P2 vary more from day to day, and with where the valve stays, than
+// in the hours of a training: means over windows within so many deviations are
+// normal, and single readings beyond the thresholds tell.
+constexpr double kLeastMeanOfInput = 2.0;
+
 constexpr double kCoreQuantile = 0.05;
 constexpr double kSupportMargin = 1.0;  // standard deviations
 
@@ -27,6 +32,11 @@ std::vector<double> Sustained(const std::vector<double>& series, double sign,
     sustained.push_back(lowest);
   }
   return sustained;
+}
+
+bool IsInput(Signal signal) {
+  return signal == Signal::kT1 || signal == Signal::kP1 ||
+         signal == Signal::kP2;
 }
 
 }  // namespace
@@ -113,10 +123,16 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
     channel.upper_threshold = level(1.0);
     channel.lower_threshold = -level(-1.0);
     for (const int length : windows[c]) {
-      const auto limits = FitWindow(
-          residuals[c], commands.empty() ? ResidualSeries() : commands[c],
-          length, share);
+      auto limits = FitWindow(residuals[c],
+                              commands.empty() ? ResidualSeries() : commands[c],
+                              length, share);
       if (limits) {
+        const double least =
+            IsInput(channel.output)
+                ? kLeastMeanOfInput * std::sqrt(Variance(joined))
+                : 0.0;
+        limits->upper_mean = std::max(limits->upper_mean, least);
+        limits->lower_mean = std::min(limits->lower_mean, -least);
         channel.windows.push_back(*limits);
       }
     }

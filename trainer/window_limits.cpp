@@ -19,6 +19,8 @@ constexpr double kSeenMean = 1.25;   // times what the record showed
 constexpr double kSeenLogRms = 0.1;  // more than what the record showed
 constexpr double kLeastMean = 0.5;   // deviations
 constexpr double kLeastDeviation = 1.4;
+constexpr double kCommandMargin = 0.5;           // of the range
+constexpr double kLeastCommandMargin = 2.0;      // %
 constexpr double kLeastActivityVariance = 1e-6;  // to tell a slope from
 
 // What the windows of all series have seen, one entry per full window.
@@ -26,6 +28,7 @@ struct WindowHistory {
   std::vector<double> mean;
   std::vector<double> energy;    // log-deviation of the residual
   std::vector<double> activity;  // log-deviation of CV; empty without CV
+  std::vector<double> command;   // mean of CV; likewise
 };
 
 WindowHistory SlideWindow(const ResidualSeries& residuals,
@@ -44,6 +47,7 @@ WindowHistory SlideWindow(const ResidualSeries& residuals,
         history.energy.push_back(window.log_rms());
         if (!commands.empty()) {
           history.activity.push_back(command.log_rms());
+          history.command.push_back(command.mean());
         }
       }
     }
@@ -69,6 +73,11 @@ void FitActivity(WindowHistory& history, WindowLimits& limits) {
   if (history.activity.empty()) {
     return;
   }
+  const auto [lowest, highest] =
+      std::minmax_element(history.command.begin(), history.command.end());
+  const double margin =
+      std::max(kCommandMargin * (*highest - *lowest), kLeastCommandMargin);
+  limits.command = {*lowest - margin, *highest + margin};
   limits.activity_slope = Slope(history.activity, history.energy);
   std::vector<double> sorted = history.activity;
   std::sort(sorted.begin(), sorted.end());

@@ -23,7 +23,9 @@ namespace fdi::trainer {
 /// those of the training a model errs more: no limit on a mean is closer than
 /// half a deviation, none on the deviation closer than 1.4 times it.
 ///
-/// The limit on the energy follows the activity of CV, see FitThresholds().
+/// The limit on the energy follows the activity of CV, see FitThresholds(). All
+/// limits hold for means of CV over the window as in the record, and half their
+/// range beyond, 2 % at least.
 ///
 /// @param commands CV at the samples of the residuals; empty: no slope.
 /// @return Nothing if there are fewer than 100 full windows.

@@ -60,6 +60,26 @@ TEST(DetectionTest, EnergyOfAWindowIsWatchedUpwards) {
   EXPECT_EQ(seen.transitions[0].kind, TransitionKind::kDetected);
 }
 
+// An error of the model at one end of the range, where CV never stayed in
+// training, is no drift; at the usual place it is.
+TEST(DetectionTest, WindowHoldsForTheCommandsItWasFittedTo) {
+  ModelSet models = *SharedPlant();
+  WindowLimits limits{30, -0.5, 0.5, 10.0};
+  limits.command = {45.0, 60.0};
+  models.channels[1].windows = {limits};
+  for (const double cv : {50.0, 75.0}) {
+    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    for (std::uint64_t k = 0; k < 200; ++k) {
+      Sample sample = PlantSample(k, 0.0);
+      sample.Set(Signal::kCv, cv);
+      sample.Set(Signal::kX, cv);
+      sample.Set(Signal::kF, 101.0 - cv);  // threshold 2
+      engine.Step(sample);
+    }
+    EXPECT_EQ(engine.episode_open(), cv == 50.0);
+  }
+}
+
 // A model that errs by a share of what the command does.
 TEST(DetectionTest, LimitOnEnergyFollowsTheExcitation) {
   ModelSet models = *SharedPlant();

@@ -161,7 +161,7 @@ TEST(ThresholdsTest, LimitOnEnergyIsConditionedOnTheActivityOfTheCommand) {
     for (std::size_t k = 0; k < 3000; ++k) {
       const double move = activity * moves[k];
       window.Push(gain * move + 0.1 * noise[k]);
-      moved.Push(move);
+      moved.Push(60.0 + move);
       beyond = beyond || IsBeyond(with, window, moved);
     }
     return beyond;
@@ -169,6 +169,30 @@ TEST(ThresholdsTest, LimitOnEnergyIsConditionedOnTheActivityOfTheCommand) {
   EXPECT_FALSE(alarms(8.0, 0.25));
   EXPECT_FALSE(alarms(13.0, 0.25));
   EXPECT_TRUE(alarms(8.0, 0.5));
+}
+
+TEST(ThresholdsTest, WindowsHoldWhereTheCommandStayedInTraining) {
+  std::vector<double> command;
+  for (int k = 0; k < 30000; ++k) {
+    command.push_back(k < 15000 ? 50.0 : 60.0);
+  }
+  ModelSet models;
+  models.channels = {{"X", Signal::kX, -1.0, 1.0}};
+  FitThresholds({{GaussianSeries(30000, 14)}}, {{60}}, 1e-3, models,
+                {{command}});
+  const SignalRange held = models.channels[0].windows[0].command;
+  EXPECT_NEAR(held.minimum, 45.0, 0.1);
+  EXPECT_NEAR(held.maximum, 65.0, 0.1);
+}
+
+TEST(ThresholdsTest, MeansOfInputsHaveRoomForAnotherDay) {
+  for (const Signal output : {Signal::kX, Signal::kP2}) {
+    ModelSet models;
+    models.channels = {{"c", output, -1.0, 1.0}};
+    FitThresholds({{GaussianSeries(30000, 15)}}, {{60}}, 1e-3, models);
+    EXPECT_NEAR(models.channels[0].windows[0].upper_mean,
+                output == Signal::kX ? 0.55 : 2.0, 0.15);
+  }
 }
 
 TEST(ThresholdsTest, WindowsOfACommandAtRestHaveNoSlope) {
