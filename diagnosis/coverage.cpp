@@ -6,6 +6,7 @@
 namespace fdi {
 namespace {
 
+constexpr int kMeanSettling = 30;     // samples until the mean of CV counts
 constexpr double kEndOfTravel = 2.0;  // from 0 or 100 [% of CV]
 
 bool Within(const SignalRange& range, double value) {
@@ -87,8 +88,13 @@ CoverageReasons Coverage::Operation(const Sample& sample) {
   const ValidityRegion& region = models_->validity;
   const double cv = sample[Signal::kCv];
   const bool steps = last_cv_ && std::abs(cv - *last_cv_) > region.cv_step;
+  averaged_ = last_cv_ ? std::min(averaged_ + 1, kMeanSettling) : 0;
+  mean_cv_ = last_cv_ ? mean_cv_ + kCvMeanGain * (cv - mean_cv_) : cv;
   last_cv_ = cv;
-  reasons |= If(!Within(region.cv, cv), CoverageReason::kCv);
+  const bool within =
+      Within(region.cv, cv) &&
+      (averaged_ < kMeanSettling || Within(region.cv_mean, mean_cv_));
+  reasons |= If(!within, CoverageReason::kCv);
   reasons |= If(steps, CoverageReason::kCvStep);
   reasons |= If(Parked(sample), CoverageReason::kParked);
   return reasons;

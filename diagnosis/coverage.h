@@ -18,8 +18,8 @@ inline constexpr std::int64_t kLongestInterruptionNs = 600'000'000'000;
 /// not, and judged only while it is.
 ///
 /// It is disarmed by what the process does with it: another mode than AUTO, a
-/// command beyond the trained range or stepping as never in training, or being
-/// parked, at an end of its travel without flow. It is armed again after
+/// command beyond the trained range, staying or stepping as never there, or
+/// being parked, at an end of its travel without flow. It is armed again after
 /// `rearm_samples` in a row without all that and with dP, T1, P1 and P2 as in
 /// normal operation: cold feedwater and rising pressure at a start-up are no
 /// broken thermometer. A new stream takes the settling samples only. Once the
@@ -75,6 +75,8 @@ class Coverage {
   int needed_{0};    // of them
   int at_end_{0};    // samples in a row at an end of the travel, no flow
   std::optional<double> last_cv_;
+  double mean_cv_{0.0};
+  int averaged_{0};  // samples in mean_cv_, at most as many as it settles in
   std::optional<std::int64_t> last_stamp_ns_;
   CoverageReasons excused_{0};
   CoverageReasons reasons_{0};

@@ -143,7 +143,9 @@ void Episode::Isolate(Verdict& verdict) {
 // last t_k samples, and there were twice as many to find one.
 void Episode::JudgeUnknown(Verdict& verdict) {
   const DecisionParameters& decision = models_->decision;
+  // What is normal again needs no fault.
   const bool explained =
+      verdict.normal_factor >= decision.isolation_threshold ||
       FactorsFrom(0.5 * decision.isolation_threshold, verdict) != 0;
   without_fault_ = explained ? 0 : without_fault_ + 1;
   ++age_;

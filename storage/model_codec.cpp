@@ -43,8 +43,9 @@ void Fields(A& a, T& range) {
 
 template <typename A, Of<ValidityRegion> T>
 void Fields(A& a, T& region) {
-  auto& [cv, cv_step, dp, t1, p1, p2, flow_cutoff, rearm_samples] = region;
-  a(cv, cv_step, dp, t1, p1, p2, flow_cutoff, rearm_samples);
+  auto& [cv, cv_mean, cv_step, dp, t1, p1, p2, flow_cutoff, rearm_samples] =
+      region;
+  a(cv, cv_mean, cv_step, dp, t1, p1, p2, flow_cutoff, rearm_samples);
 }
 
 template <typename A, Of<StuckLimits> T>

@@ -39,6 +39,16 @@ bool IsInput(Signal signal) {
          signal == Signal::kP2;
 }
 
+// True if the normal model of the channel predicts an output of the valve from
+// the command.
+bool ReadsCommand(const ModelSet& models, std::size_t channel) {
+  if (models.observers.empty() || IsInput(models.channels[channel].output)) {
+    return false;
+  }
+  const TsModel& model = models.observers.front().channels[channel].model;
+  return (RequiredSignals(model) & MaskOf(Signal::kCv)) != 0;
+}
+
 }  // namespace
 
 std::vector<double> Joined(const ResidualSeries& series) {
@@ -125,7 +135,7 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
     for (const int length : windows[c]) {
       auto limits = FitWindow(residuals[c],
                               commands.empty() ? ResidualSeries() : commands[c],
-                              length, share);
+                              length, share, ReadsCommand(models, c));
       if (limits) {
         const double least =
             IsInput(channel.output)

@@ -1,5 +1,6 @@
 #include "trainer/difference_observers.h"
 
+#include <algorithm>
 #include <atomic>
 
 #include "diagnosis/error.h"
@@ -32,6 +33,33 @@ std::vector<Stretch> WholeStretches(const Condition& condition) {
   return whole;
 }
 
+// Blocks of 600 samples, evenly spread, where there are more than 3600 in all:
+// faults are exact, and more of the same tells nothing about them.
+std::vector<Stretch> Excerpt(const std::vector<Stretch>& stretches) {
+  constexpr std::size_t kBlock = 600;
+  constexpr std::size_t kMost = 3600;
+  if (CountSamples(stretches) <= static_cast<std::int64_t>(kMost)) {
+    return stretches;
+  }
+  std::vector<Stretch> blocks;
+  for (const Stretch& stretch : stretches) {
+    for (std::size_t k = 0; k + kBlock <= stretch.samples.size(); k += kBlock) {
+      const auto begin =
+          stretch.samples.begin() + static_cast<std::ptrdiff_t>(k);
+      blocks.push_back({stretch.run_id,
+                        {begin, begin + static_cast<std::ptrdiff_t>(kBlock)}});
+    }
+  }
+  if (blocks.size() * kBlock <= kMost) {
+    return blocks.empty() ? stretches : blocks;
+  }
+  std::vector<Stretch> chosen;
+  for (std::size_t i = 0; i < kMost / kBlock; ++i) {
+    chosen.push_back(std::move(blocks[i * blocks.size() * kBlock / kMost]));
+  }
+  return chosen;
+}
+
 std::vector<Stretch> Synthesize(const FaultCondition& fault,
                                 const std::vector<Stretch>& healthy,
                                 const FaultSynthesis& synthesize) {
@@ -56,6 +84,19 @@ Condition ValidationPart(const FaultCondition& fault,
          {stretch.samples.end() - count, stretch.samples.end()}});
   }
   return condition;
+}
+
+// A model on its own past errs after a large move of the command, one way or
+// the other: some hours may hold the largest errors of one way alone.
+void BalanceThresholds(ModelSet& models) {
+  for (std::size_t c = 0; c < models.channels.size(); ++c) {
+    if (RunsOnItself(models.observers.front().channels[c].model)) {
+      ChannelSpec& channel = models.channels[c];
+      channel.upper_threshold =
+          std::max(channel.upper_threshold, -channel.lower_threshold);
+      channel.lower_threshold = -channel.upper_threshold;
+    }
+  }
 }
 
 ModelSet Describe(const std::vector<TrainingRun>& healthy,
@@ -84,7 +125,7 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
   const std::vector<Condition> conditions =
       BuildConditions(healthy, options.dataset);
   const Condition& normal = conditions.front();
-  const std::vector<Stretch> whole = WholeStretches(normal);
+  const std::vector<Stretch> whole = Excerpt(WholeStretches(normal));
   const std::size_t channel_count = options.channels.size();
   ModelSet models = Describe(healthy, normal, faults, options);
   std::vector<NormalChannel> channels(channel_count);
@@ -128,6 +169,7 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
   reporter.Tell(kNormalShare + kObserverShare, "comparing faults");
   FitThresholds(held_out.residuals, windows, options.false_alarms_per_hour,
                 models, held_out.commands);
+  BalanceThresholds(models);
   FitInterpolationErrors(compared, models);
   FindGroups(compared, models);
   Validate(models);

@@ -36,6 +36,23 @@ std::ptrdiff_t RequireChannel(const ModelSet& models, const std::string& name) {
                     "'; it has" + known);
 }
 
+// Nor is a transmitter watched whose channel is gone.
+void ForgetRepeats(Signal signal, StuckLimits& limits) {
+  switch (signal) {
+    case Signal::kT1:
+      limits.t1 = 0;
+      break;
+    case Signal::kP1:
+      limits.p1 = 0;
+      break;
+    case Signal::kP2:
+      limits.p2 = 0;
+      break;
+    default:
+      break;
+  }
+}
+
 }  // namespace
 
 ModelSet WithoutFaults(ModelSet models, const std::vector<int>& faults) {
@@ -70,6 +87,8 @@ ModelSet WithoutChannels(ModelSet models,
       throw ConfigError("model set " + models.name +
                         " would be left without channels");
     }
+    ForgetRepeats(models.channels[static_cast<std::size_t>(index)].output,
+                  models.stuck);
     models.channels.erase(models.channels.begin() + index);
     for (Observer& observer : models.observers) {
       observer.channels.erase(observer.channels.begin() + index);

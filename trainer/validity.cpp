@@ -12,6 +12,9 @@ namespace {
 
 constexpr double kCommandMargin = 0.1;  // of the range
 constexpr double kLeastCommandMargin = 5.0;
+constexpr double kMeanCommandMargin = 0.25;  // of the range
+constexpr double kLeastMeanCommandMargin = 2.0;
+constexpr std::size_t kMeanSettling = 30;  // samples
 constexpr double kStepFactor = 2.0;
 constexpr double kLeastStep = 5.0;
 constexpr double kInputMargin = 0.5;  // of the range
@@ -57,6 +60,22 @@ double LargestStep(const std::vector<Stretch>& stretches) {
     }
   }
   return largest;
+}
+
+// Of the running mean of CV, once it has settled.
+SignalRange MeanCommands(const std::vector<Stretch>& stretches) {
+  SignalRange range = kEmpty;
+  for (const Stretch& stretch : stretches) {
+    double mean =
+        stretch.samples.empty() ? 0.0 : stretch.samples[0][Signal::kCv];
+    for (std::size_t k = 1; k < stretch.samples.size(); ++k) {
+      mean += kCvMeanGain * (stretch.samples[k][Signal::kCv] - mean);
+      if (k >= kMeanSettling) {
+        range = Joined(range, {mean, mean});
+      }
+    }
+  }
+  return range;
 }
 
 SignalRange Widened(SignalRange range, double least) {
@@ -107,10 +126,19 @@ ValidityRegion TrainedRegion(const std::vector<Condition>& conditions) {
   ValidityRegion region;
   if (first.Has(Signal::kCv)) {
     SignalRange cv = kEmpty;
+    SignalRange mean = kEmpty;
     double step = 0.0;
     for (const Condition& condition : conditions) {
       cv = Joined(cv, RangeOf(condition.training, of(Signal::kCv)));
+      mean = Joined(mean, MeanCommands(condition.training));
+      mean = Joined(mean, MeanCommands(condition.validation));
       step = std::max(step, LargestStep(condition.training));
+    }
+    if (mean.minimum <= mean.maximum) {
+      const double room =
+          std::max(kLeastMeanCommandMargin,
+                   kMeanCommandMargin * (mean.maximum - mean.minimum));
+      region.cv_mean = {mean.minimum - room, mean.maximum + room};
     }
     const double margin = std::max(kLeastCommandMargin,
                                    kCommandMargin * (cv.maximum - cv.minimum));

@@ -12,7 +12,8 @@ namespace fdi::trainer {
 /// operation, the first condition. Signals that the runs lack have no bounds.
 ///
 /// Margins: a command outside is a valve that is not judged, so a tenth of the
-/// range at least; twice the largest step of CV. dP, T1, P1 and P2 vary more
+/// range at least, a quarter of it for its running mean; twice the largest step
+/// of CV. dP, T1, P1 and P2 vary more
 /// from day to day than within the hours of a training: half the range on each
 /// side, at least 5 % of the largest pressure and 10 °C; still far from
 /// equal pressures and cold water. Less than 2 % of the largest flow is none.

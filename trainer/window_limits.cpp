@@ -14,10 +14,12 @@ namespace fdi::trainer {
 namespace {
 
 constexpr std::size_t kFewestValues = 100;
-constexpr int kFewClusters = 30;     // too few for a tail of their own
-constexpr double kSeenMean = 1.25;   // times what the record showed
-constexpr double kSeenLogRms = 0.1;  // more than what the record showed
-constexpr double kLeastMean = 0.5;   // deviations
+constexpr int kFewClusters = 30;          // too few for a tail of their own
+constexpr double kSeenMean = 1.5;         // times what the record showed
+constexpr double kSeenLogRms = 0.25;      // more than what the record showed
+constexpr double kMargin = 1.25;          // on what correlation makes plausible
+constexpr double kCommandedDrift = 0.75;  // deviations
+constexpr double kLeastMean = 0.5;        // deviations
 constexpr double kLeastDeviation = 1.4;
 constexpr double kCommandMargin = 0.5;           // of the range
 constexpr double kLeastCommandMargin = 2.0;      // %
@@ -116,8 +118,8 @@ Plausible ByCorrelation(const std::vector<double>& residuals, int length,
   const double z = NormalQuantile(share);
   const double samples = 2.0 * length;
   const double kappa = Variance(squares);
-  return {z * sd * std::sqrt(CorrelationTime(residuals) / samples),
-          std::log(sd) +
+  return {kMargin * z * sd * std::sqrt(CorrelationTime(residuals) / samples),
+          std::log(kMargin * sd) +
               0.5 * z * std::sqrt(kappa * CorrelationTime(squares) / samples)};
 }
 
@@ -125,15 +127,15 @@ Plausible ByCorrelation(const std::vector<double>& residuals, int length,
 double Level(const std::vector<double>& values, double share, int length,
              double bound) {
   const TailThreshold tail = FitTail(values, share, 2 * length);
-  return tail.clusters < kFewClusters ? std::min(tail.level, bound)
-                                      : tail.level;
+  return tail.clusters < kFewClusters ? bound : tail.level;
 }
 
 }  // namespace
 
 std::optional<WindowLimits> FitWindow(const ResidualSeries& residuals,
                                       const ResidualSeries& commands,
-                                      int length, double share) {
+                                      int length, double share,
+                                      bool commanded) {
   WindowHistory history = SlideWindow(residuals, commands, length);
   if (history.mean.size() < kFewestValues) {
     return std::nullopt;
@@ -147,8 +149,9 @@ std::optional<WindowLimits> FitWindow(const ResidualSeries& residuals,
   const auto mean_level = [&] {
     const double seen =
         *std::max_element(history.mean.begin(), history.mean.end());
+    const double drift = commanded ? kCommandedDrift * sd : 0.0;
     return std::max(Level(history.mean, share, length,
-                          std::max(plausible.mean, kSeenMean * seen)),
+                          std::max({plausible.mean, kSeenMean * seen, drift})),
                     kLeastMean * sd);
   };
   limits.upper_mean = mean_level();

@@ -1,6 +1,7 @@
 // What an operator does to a valve, by the scenarios of campaigns/operation,
 // judged by models of normal work.
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -11,7 +12,7 @@
 #include "diagnosis/quality_count.h"
 #include "simulator/app/scenario_toml.h"
 #include "trainer/evaluation.h"
-#include "trainer/training.h"
+#include "trainer/onboarding/onboarding.h"
 
 namespace fdi {
 namespace {
@@ -57,14 +58,17 @@ std::uint64_t Total(const QualityCount& seconds) {
 
 class OperationTest : public testing::Test {
  protected:
+  // Onboarded on two hours of normal work, without any fault.
   static void SetUpTestSuite() {
-    trainer::TrainingOptions options = trainer::PresetOptions("extended");
+    trainer::ValveType type;
+    type.name = "lublin-actuator-3";
+    type.parameters = simulator::ParameterSet(type.name);
+    const trainer::FaultSynthesizer synthesize(type);
+    trainer::TrainingOptions options = trainer::OnboardingPreset(kBasicSignals);
     options.name = "operation";
-    options.fit.rules.max_rules = 2;
-    models_ = std::make_shared<const ModelSet>(trainer::TrainModelSet(
-        {Simulate("normal"),
-         Simulate("normal", "f19:abrupt@0:strength=0.5", 900.0)},
-        options));
+    models_ = std::make_shared<const ModelSet>(trainer::TrainDifferenceSet(
+        {Simulate("normal")}, {{13, 0.25}, {19, 0.25}, {19, 0.5}},
+        std::ref(synthesize), type.parameters.instruments.flow.high, options));
   }
 
   static Outcome Replay(const trainer::TrainingRun& run) {
@@ -105,7 +109,9 @@ TEST_F(OperationTest, AllTimeIsAccountedForAndNormalWorkIsJudged) {
   for (const auto& [name, hours] : live_hours) {
     SCOPED_TRACE(name);
     const trainer::TrainingRun run = Simulate(name);
-    const QualityCount seconds = Replay(run).seconds;
+    const Outcome outcome = Replay(run);
+    const QualityCount& seconds = outcome.seconds;
+    EXPECT_EQ(outcome.episodes, 0);
     EXPECT_EQ(Total(seconds), run.samples.size());
     const double live = static_cast<double>(seconds[Quality::kLive]) / 3600.0;
     EXPECT_GT(live, hours.first);

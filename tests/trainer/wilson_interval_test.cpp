@@ -18,7 +18,7 @@ TEST(WilsonIntervalTest, HasAWidthWhereEveryTrialWentTheSameWay) {
   EXPECT_NEAR(WilsonInterval(0, 10).high, 0.2775, 5e-5);
   EXPECT_EQ(WilsonInterval(0, 10).low, 0.0);
   EXPECT_NEAR(WilsonInterval(10, 10).low, 0.7225, 5e-5);
-  EXPECT_EQ(WilsonInterval(10, 10).high, 1.0);
+  EXPECT_DOUBLE_EQ(WilsonInterval(10, 10).high, 1.0);
 }
 
 TEST(WilsonIntervalTest, NoTrialsSayNothing) {

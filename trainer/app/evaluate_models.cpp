@@ -48,7 +48,11 @@ EvaluatedRun EvaluateRun(const std::shared_ptr<const ModelSet>& models,
   if (trace != nullptr) {
     recorder.emplace(*models, DurationOf(scored.run));
   }
+  QualityCount samples;
   const VerdictSink sink = [&](const Sample&, const Verdict& verdict) {
+    if (CountsAsTime(verdict)) {
+      samples.Add(verdict.quality);
+    }
     if (vectors != nullptr) {
       vectors->Add(scored.name, verdict);
     }
@@ -60,7 +64,14 @@ EvaluatedRun EvaluateRun(const std::shared_ptr<const ModelSet>& models,
   if (recorder) {
     *trace = recorder->Finish(indications);
   }
-  return Evaluated(scored, indications, assume_normal);
+  EvaluatedRun evaluated = Evaluated(scored, indications, assume_normal);
+  evaluated.seconds.emplace();
+  for (std::size_t q = 0; q < kQualityCount; ++q) {
+    (*evaluated.seconds)[q] =
+        models->sample_period_s *
+        static_cast<double>(samples[static_cast<Quality>(q)]);
+  }
+  return evaluated;
 }
 
 Evaluation EvaluateRuns(const EvaluateOptions& options,

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "diagnosis/quality_count.h"
 #include "trainer/evaluation.h"
 
 namespace fdi::trainer {
@@ -13,6 +16,8 @@ struct EvaluatedRun {
   bool has_truth{true};
   double duration_s{0.0};
   std::vector<int> last_set;  ///< Last set isolated in the whole run.
+  /// Seconds by quality; empty where a detector gives none.
+  std::optional<std::array<double, kQualityCount>> seconds{};
 };
 
 /// Faults that count as one answer, ascending. {0} is normal operation.

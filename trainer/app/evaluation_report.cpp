@@ -80,6 +80,30 @@ void PrintSummary(std::ostream& out, const EvaluationFigures& figures) {
   table.Print(out);
 }
 
+// Hours that the valves were judged, and why not.
+void PrintTime(std::ostream& out, const std::vector<EvaluatedRun>& runs) {
+  std::array<double, kQualityCount> hours{};
+  double all = 0.0;
+  for (const EvaluatedRun& run : runs) {
+    for (std::size_t q = 0; run.seconds && q < kQualityCount; ++q) {
+      hours[q] += (*run.seconds)[q] / 3600.0;
+      all += (*run.seconds)[q] / 3600.0;
+    }
+  }
+  cli::TextTable table({{"time"}, {"[h]", Align::kRight}});
+  for (std::size_t q = 0; q < kQualityCount; ++q) {
+    if (hours[q] > 0.0) {
+      table.AddRow({std::string(QualityName(static_cast<Quality>(q))),
+                    FormatNumber(hours[q], 2)});
+    }
+  }
+  if (all > 0.0) {
+    table.AddRow({"in all", FormatNumber(all, 2)});
+    out << '\n';
+    table.Print(out);
+  }
+}
+
 void PrintConfusion(std::ostream& out, const char* heading,
                     const ConfusionMatrix& matrix) {
   std::vector<cli::TextTable::Column> columns{{heading}};
@@ -100,6 +124,16 @@ void PrintConfusion(std::ostream& out, const char* heading,
   table.Print(out);
 }
 
+cli::Json SecondsJson(const std::array<double, kQualityCount>& seconds) {
+  cli::Json json = cli::Json::object();
+  for (std::size_t q = 0; q < kQualityCount; ++q) {
+    if (seconds[q] > 0.0) {
+      json[std::string(QualityName(static_cast<Quality>(q)))] = seconds[q];
+    }
+  }
+  return json;
+}
+
 cli::Json RunJson(const EvaluatedRun& run) {
   cli::Json json;
   json["run_id"] = run.indices.run_id;
@@ -107,6 +141,10 @@ cli::Json RunJson(const EvaluatedRun& run) {
   json["strength"] =
       run.has_truth ? cli::Json(run.indices.strength) : cli::Json();
   json["detected"] = IsDetected(run);
+  if (run.seconds) {
+    json["seconds"] = SecondsJson(*run.seconds);
+  }
+  json["episodes"] = run.indices.episodes;
   for (const auto& [name, value] : IndexNumbers(run.indices)) {
     json[name] = value;
   }
@@ -187,6 +225,7 @@ void PrintEvaluation(std::ostream& out, const Detector& detector,
                      const std::vector<EvaluatedRun>& runs) {
   PrintRuns(out, runs);
   PrintSummary(out, FiguresOf(runs, detector.groups));
+  PrintTime(out, runs);
   PrintConfusion(out, "truth \\ outcome", BuildConfusion(runs));
   if (!detector.groups.empty()) {
     PrintConfusion(out, "truth \\ outcome by group",

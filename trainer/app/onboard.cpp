@@ -14,6 +14,7 @@
 #include "storage/models.h"
 #include "storage/runs.h"
 #include "trainer/app/campaign_runs.h"
+#include "trainer/app/file_runs.h"
 #include "trainer/app/onboarding_report.h"
 #include "trainer/app/run_input.h"
 #include "trainer/app/signal_list.h"
@@ -27,6 +28,7 @@ namespace {
 struct OnboardOptions {
   std::string valve;
   std::vector<std::string> runs;
+  std::vector<std::string> files;
   std::string type{"lublin-actuator-3"};
   std::string save_type;
   std::string name;
@@ -40,10 +42,24 @@ struct OnboardOptions {
 
 std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
                                   const storage::DataDirectory& directory) {
-  storage::RunStore store(directory.runs());
+  if (options.runs.empty() && options.files.empty()) {
+    throw ConfigError("healthy data are needed: --runs ID,... or --file CSV");
+  }
+  std::vector<storage::StoredRun> stored;
+  if (!options.runs.empty()) {
+    storage::RunStore store(directory.runs());
+    for (const std::string& selector : options.runs) {
+      stored.push_back(store.Load(selector));
+    }
+  }
+  for (const std::string& file : options.files) {
+    stored.push_back(ReadRunFile(
+        file, std::nullopt,
+        static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kX))));
+  }
   std::vector<TrainingRun> runs;
-  for (const std::string& selector : options.runs) {
-    runs.push_back(ToTrainingRun(store.Load(selector), true));
+  for (const storage::StoredRun& run : stored) {
+    runs.push_back(ToTrainingRun(run, true));
     if (!options.signals.empty()) {
       runs.back() =
           WithSignals(std::move(runs.back()), ParseSignals(options.signals));
@@ -129,9 +145,11 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
       ->required()
       ->type_name("ID");
   verb.add_option("--runs", options.runs, "Healthy runs, or stretches [s]")
-      ->required()
       ->delimiter(',')
       ->type_name("ID[@from:to],...");
+  verb.add_option("--file", options.files,
+                  "Healthy CSV file, not stored; repeatable")
+      ->type_name("FILE.csv[@from:to]");
   verb.add_option("--type", options.type,
                   "Valve type: a stored one, whose fault effects are taken as "
                   "they are, or parameters that are fitted to the valve")

@@ -10,7 +10,7 @@ namespace {
 constexpr std::array kStrengths{0.1, 0.25, 0.5, 0.75, 1.0};
 constexpr std::array kSignedStrengths{0.1, 0.25, 0.5, 0.75};
 // Of the span: faults of transmitters are steps.
-constexpr std::array kTransmitterStrengths{0.02, 0.1, 0.5};
+constexpr std::array kTransmitterStrengths{0.02, 0.1, 0.5, 1.0};
 
 void Add(int fault, const auto& strengths, bool both_ways,
          std::vector<FaultCondition>& faults) {

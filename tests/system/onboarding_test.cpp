@@ -1,0 +1,107 @@
+// Onboards valves that were never seen with a fault, and scores faults on them:
+// the plant's record, and the recordings of an independent valve model.
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tests/trainer/app_fixture.h"
+
+namespace fdi::trainer {
+namespace {
+
+class OnboardingTest : public TrainerProgram {
+ protected:
+  void SetUp() override {
+    const char* folder = std::getenv("FDI_REFERENCE_DATA");
+    if (folder == nullptr) {
+      GTEST_SKIP() << "FDI_REFERENCE_DATA is not set";
+    }
+    folder_ = folder;
+  }
+  std::string Plant() const {
+    return (folder_ / "plant/lublin_actuator3_2001-10-11_first40min.csv")
+        .string();
+  }
+  std::string Reference(const std::string& name) const {
+    return (folder_ / "valve-reference" / (name + ".csv")).string();
+  }
+  void Onboard(const std::string& name, const std::string& healthy) const {
+    const Outcome outcome = Run("onboard --valve " + name + " --file " +
+                                healthy + " --no-coverage --json");
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+  }
+
+  std::filesystem::path folder_;
+};
+
+bool Contains(const nlohmann::json& run) {
+  const auto& set = run["final_set"];
+  return run["detected"].get<bool>() &&
+         std::find(set.begin(), set.end(), run["fault"]) != set.end();
+}
+
+TEST_F(OnboardingTest, FaultsOnARealValveAreSeenAndNamedNarrowly) {
+  Onboard("PLANT", Plant() + "@20:1500");
+  const nlohmann::json healthy =
+      RunJson("evaluate --model-set PLANT --assume-normal --file " + Plant() +
+              "@1500:");
+  EXPECT_EQ(healthy["runs"][0]["episodes"], 0);
+  for (const std::string fault :
+       {"f19:abrupt@1800:strength=0.25", "f19:abrupt@1800:strength=-0.25",
+        "f18:abrupt@1800:strength=0.25", "f6:abrupt@1800:strength=0.3",
+        "t1:abrupt@1800:strength=0.1", "f5:abrupt@1510"}) {
+    SCOPED_TRACE(fault);
+    ASSERT_EQ(
+        Run("inject --file " + Plant() + " --fault " + fault + " -o faulty.csv")
+            .code,
+        0);
+    const nlohmann::json run = RunJson(
+        "evaluate --model-set PLANT --file faulty.csv@1500:")["runs"][0];
+    EXPECT_TRUE(run["detected"].get<bool>());
+    const bool small = run["fault"] == "f5";
+    EXPECT_LE(run["t_dt_first"].get<double>(), small ? 890.0 : 60.0);
+    if (!small) {
+      EXPECT_TRUE(Contains(run)) << run["final_set"];
+      EXPECT_LE(run["final_set"].size(), 2U) << run["final_set"];
+    }
+    std::filesystem::remove(Path("faulty.csv"));
+  }
+}
+
+// No fault run of this valve, nor its model, was used.
+TEST_F(OnboardingTest, FaultsOfAnotherModelAreSeenAndNamed) {
+  Onboard("REF", Reference("plant_faultfree_211") + "@20:");
+  std::string files;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(folder_ / "valve-reference")) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("plant_f") && name != "plant_faultfree_211.csv") {
+      files += " --file " + entry.path().string();
+    }
+  }
+  const nlohmann::json scored =
+      RunJson("evaluate --model-set REF" + files)["runs"];
+  ASSERT_EQ(scored.size(), 35U);
+  int detected = 0;
+  int contained = 0;
+  int exact = 0;
+  for (const auto& run : scored) {
+    SCOPED_TRACE(run["run_id"].get<std::string>());
+    if (run["fault"] == nullptr || run["fault"] == "normal") {
+      EXPECT_EQ(run["episodes"], 0);
+      continue;
+    }
+    EXPECT_EQ(run["r_fd"], 0.0);
+    detected += run["detected"].get<bool>();
+    contained += Contains(run);
+    exact += run["d_acc"] == 1.0;
+  }
+  EXPECT_GE(detected, 23);  // 27 move X or F.
+  EXPECT_GE(contained, 18);
+  EXPECT_GE(exact, 14);
+}
+
+}  // namespace
+}  // namespace fdi::trainer
