@@ -1,0 +1,145 @@
+#include "trainer/onboarding/onboarding.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "trainer/onboarding/signal_subset.h"
+
+namespace fdi::trainer {
+namespace {
+
+ValveType Lublin() {
+  ValveType type;
+  type.name = "lublin-actuator-3";
+  type.parameters = simulator::ParameterSet(type.name);
+  return type;
+}
+
+// A valve whose flow the simulation does not know: 20 % more, with a swell.
+Stretch Strange(double seconds) {
+  Stretch stretch{"strange", SimulateHealthy(Lublin(), seconds, 3)};
+  for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
+    Sample& sample = stretch.samples[k];
+    sample.Set(Signal::kF, 1.2 * sample[Signal::kF] +
+                               std::sin(0.01 * static_cast<double>(k)));
+  }
+  return stretch;
+}
+
+TrainingRun RunOf(const Stretch& stretch) {
+  TrainingRun run;
+  run.id = stretch.run_id;
+  run.flow_unit = FlowUnit::kTPerHour;
+  for (const Sample& sample : stretch.samples) {
+    run.samples.push_back({sample, FaultTruth{}});
+  }
+  return run;
+}
+
+TEST(FaultSynthesizerTest, MismatchOfTheSimulationStaysInTheReadings) {
+  const FaultSynthesizer synthesize(Lublin());
+  const Stretch healthy = Strange(200.0);
+  const std::vector<Sample> same = synthesize({0, 0.0}, healthy);
+  const std::vector<Sample> half = synthesize({19, 0.5}, healthy);
+  const std::vector<Sample> hot = synthesize({20, 0.1}, healthy);
+  for (std::size_t k = 0; k < same.size(); ++k) {
+    const Sample& sample = healthy.samples[k];
+    EXPECT_NEAR(same[k][Signal::kF], sample[Signal::kF], 1e-9);
+    EXPECT_NEAR(half[k][Signal::kF], 0.5 * sample[Signal::kF], 1e-9);
+    EXPECT_NEAR(half[k][Signal::kX], sample[Signal::kX], 1e-9);
+    EXPECT_EQ(half[k][Signal::kCv], sample[Signal::kCv]);
+    // 10 % of 200 degC.
+    EXPECT_NEAR(hot[k][Signal::kT1], sample[Signal::kT1] + 20.0, 1e-6);
+    EXPECT_NEAR(hot[k][Signal::kF], sample[Signal::kF], 1e-9);
+  }
+}
+
+TEST(FaultSynthesizerTest, GivesBackTheSignalsThatTheValveHas) {
+  const FaultSynthesizer synthesize(Lublin());
+  Stretch healthy{"x", SimulateHealthy(Lublin(), 60.0, 3)};
+  const auto cv_and_x =
+      static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kX));
+  for (Sample& sample : healthy.samples) {
+    sample.present = cv_and_x;
+  }
+  for (const Sample& sample : synthesize({13, 0.25}, healthy)) {
+    EXPECT_EQ(sample.present, cv_and_x);
+  }
+}
+
+TEST(OnboardingFaultsTest, FaultsOfMissingTransmittersAreLeftOut) {
+  const auto has = [](SignalMask signals, int fault) {
+    const std::vector<FaultCondition> faults = OnboardingFaults(signals);
+    return std::any_of(faults.begin(), faults.end(),
+                       [&](const auto& f) { return f.fault == fault; });
+  };
+  const auto cv_and_x =
+      static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kX));
+  EXPECT_TRUE(has(kBasicSignals, 19));
+  EXPECT_TRUE(has(kBasicSignals, kTemperatureTransmitterFault));
+  EXPECT_FALSE(has(kBasicSignals, 14));
+  EXPECT_FALSE(has(cv_and_x, 19));
+  EXPECT_FALSE(has(cv_and_x, kInletPressureTransmitterFault));
+  EXPECT_TRUE(has(cv_and_x, 13));
+  EXPECT_LT(OnboardingFaults(kBasicSignals).size(),
+            static_cast<std::size_t>(kMaxObservers));
+}
+
+// Models of a few faults; what a table says of a fault that is as plain as
+// half the flow, and of one that has no effect on X.
+TEST(CoverageTest, SaysFromWhichStrengthOnAFaultIsSeen) {
+  const FaultSynthesizer synthesize(Lublin());
+  const Stretch healthy = Strange(1500.0);
+  const std::vector<FaultCondition> faults{
+      {8, 0.5}, {8, 1.0}, {19, 0.005}, {19, 0.25}, {19, 0.5}};
+  TrainingOptions options = OnboardingPreset(kBasicSignals);
+  options.name = "few";
+  const auto models = std::make_shared<const ModelSet>(TrainDifferenceSet(
+      {RunOf(healthy)}, faults, std::ref(synthesize), 40.0, options));
+  const CoverageTable table =
+      AssessCoverage(models, faults, synthesize, healthy, 1);
+  ASSERT_EQ(table.faults.size(), 2U);
+  EXPECT_EQ(table.seconds, 900.0);
+  EXPECT_FALSE(table.faults[0].detectable.has_value());
+  EXPECT_EQ(table.faults[1].detectable, 0.25);
+  EXPECT_EQ(table.faults[1].isolable, 0.25);
+  EXPECT_TRUE(table.faults[1].look_alikes.empty());
+}
+
+TEST(CoverageTest, GainIsWhatBecomesVisible) {
+  CoverageTable less;
+  less.faults = {{6, false, {}, {}, {}}, {19, false, 0.5, {}, {}}};
+  CoverageTable more;
+  more.faults = {{6, false, 0.1, 0.5, {}}, {19, false, 0.1, 0.1, {}}};
+  const TransmitterGain gain = GainOf(Signal::kF, less, more);
+  EXPECT_EQ(gain.detectable, std::vector<int>{6});
+  EXPECT_EQ(gain.isolable, (std::vector<int>{6, 19}));
+}
+
+TEST(OnboardTest, RefusesWhatIsNotHealthyData) {
+  OnboardingOptions options;
+  options.name = "x";
+  options.type = Lublin();
+  options.fit = false;
+  TrainingRun run = RunOf(Strange(700.0));
+  run.samples[300].truth = FaultTruth{19, 0.5};
+  EXPECT_THROW(Onboard({run}, options), DataError);
+  EXPECT_THROW(Onboard({RunOf(Strange(300.0))}, options), DataError);
+  TrainingRun without_x = RunOf(Strange(700.0));
+  for (LabelledSample& labelled : without_x.samples) {
+    labelled.sample.present = kBasicSignals & ~MaskOf(Signal::kX);
+  }
+  EXPECT_THROW(Onboard({without_x}, options), DataError);
+  TrainingRun other_unit = RunOf(Strange(700.0));
+  other_unit.flow_unit = FlowUnit::kM3PerHour;
+  EXPECT_THROW(Onboard({other_unit}, options), DataError);
+}
+
+}  // namespace
+}  // namespace fdi::trainer
