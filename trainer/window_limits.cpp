@@ -14,10 +14,11 @@ namespace fdi::trainer {
 namespace {
 
 constexpr std::size_t kFewestValues = 100;
-constexpr int kFewClusters = 30;          // too few for a tail of their own
-constexpr double kSeenMean = 1.5;         // times what the record showed
-constexpr double kSeenLogRms = 0.25;      // more than what the record showed
-constexpr double kMargin = 1.25;          // on what correlation makes plausible
+constexpr int kFewClusters = 10;      // too few for a tail of their own
+constexpr int kSomeClusters = 30;     // too few for their tail to be trusted
+constexpr double kSeenMean = 1.5;     // times what the record showed
+constexpr double kSeenLogRms = 0.25;  // more than what the record showed
+constexpr double kMargin = 1.25;      // on what correlation makes plausible
 constexpr double kCommandedDrift = 0.75;  // deviations
 constexpr double kLeastMean = 0.5;        // deviations
 constexpr double kLeastDeviation = 1.4;
@@ -123,11 +124,15 @@ Plausible ByCorrelation(const std::vector<double>& residuals, int length,
               0.5 * z * std::sqrt(kappa * CorrelationTime(squares) / samples)};
 }
 
-// @param bound What to take instead if the tail is poorly known.
+// @param bound What to take if the tail is not known, or poorly.
 double Level(const std::vector<double>& values, double share, int length,
              double bound) {
   const TailThreshold tail = FitTail(values, share, 2 * length);
-  return tail.clusters < kFewClusters ? bound : tail.level;
+  if (tail.clusters < kFewClusters) {
+    return bound;
+  }
+  return tail.clusters < kSomeClusters ? std::min(tail.level, bound)
+                                       : tail.level;
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace fdi::trainer {
 /// They come from the tail of the windows (FitTail). Where the record holds
 /// fewer than 30 independent excesses, as some hours do of a window of minutes,
 /// that tail is mostly its own uncertainty; then what short-range correlation
-/// makes of a window is an upper bound,
+/// makes of a window is an upper bound, and stands alone below 10,
 ///
 ///     |mean| ≤ 1.25 z σ √(τ/2N),   log rms ≤ ln 1.25 σ + z/2 √(κ τ₂/2N),
 ///

@@ -26,9 +26,10 @@ struct CoverageOptions {
 
 int Assess(const CoverageOptions& options, const cli::Context& context) {
   const SignalMask signals = ParseSignals(options.signals);
-  storage::ModelStore store(
-      storage::DataDirectory{context.options.data_dir}.models(),
-      storage::Access::kOccasionalWriter);
+  const storage::DataDirectory directory{context.options.data_dir};
+  storage::EnsureExists(directory);
+  storage::ModelStore store(directory.models(),
+                            storage::Access::kOccasionalWriter);
   OnboardingOptions settings;
   settings.name = "coverage";
   settings.threads = options.threads;

@@ -12,6 +12,7 @@
 #include "trainer/app/rescore.h"
 #include "trainer/app/seed_study.h"
 #include "trainer/app/simulated_run.h"
+#include "trainer/event_rate.h"
 #include "trainer/parallel_for.h"
 #include "trainer/wilson_interval.h"
 
@@ -127,7 +128,15 @@ void Print(std::ostream& out, const SeedStudy& study) {
       << study.total.runs << " runs, largest r_fd "
       << FormatNumber(std::max(0.0, study.max_r_fd), 4)
       << "\nepisodes without fault: " << study.fault_free_episodes << " in "
-      << FormatNumber(study.fault_free_hours, 2) << " h\n";
+      << FormatNumber(study.fault_free_hours, 2) << " h";
+  if (study.fault_free_hours > 0.0) {
+    out << "; per valve-year below "
+        << FormatNumber(
+               RateOf(study.fault_free_episodes, study.fault_free_hours).upper,
+               1)
+        << " (95 %)";
+  }
+  out << '\n';
 }
 
 cli::Json ShareJson(int count, int runs) {

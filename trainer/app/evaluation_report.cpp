@@ -6,6 +6,7 @@
 
 #include "diagnosis/fault_catalogue.h"
 #include "storage/cli/text_table.h"
+#include "trainer/event_rate.h"
 
 namespace fdi::trainer {
 namespace {
@@ -72,6 +73,12 @@ void PrintSummary(std::ostream& out, const EvaluationFigures& figures) {
   table.AddRow({"episodes without fault",
                 std::to_string(s.fault_free_episodes) + " in " +
                     FormatNumber(s.fault_free_hours, 2) + " h"});
+  if (s.fault_free_hours > 0.0) {
+    const EventRate rate = RateOf(s.fault_free_episodes, s.fault_free_hours);
+    table.AddRow({"the same per valve-year, 95 % bound",
+                  FormatNumber(rate.per_year, 1) + ", below " +
+                      FormatNumber(rate.upper, 1)});
+  }
   if (figures.without_truth > 0) {
     table.AddRow({"runs without truth, not counted",
                   std::to_string(figures.without_truth)});

@@ -103,6 +103,7 @@ void Store(const OnboardOptions& options, Onboarding& onboarding,
 int OnboardValve(const OnboardOptions& options, const cli::Context& context) {
   const storage::DataDirectory directory{context.options.data_dir};
   const std::vector<TrainingRun> runs = LoadRuns(options, directory);
+  storage::EnsureExists(directory);
   storage::ModelStore store(directory.models(),
                             storage::Access::kOccasionalWriter);
   const FoundType found = FindType(options.type, store);
