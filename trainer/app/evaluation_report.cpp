@@ -88,20 +88,26 @@ void PrintSummary(std::ostream& out, const EvaluationFigures& figures) {
 }
 
 // Hours that the valves were judged, and why not.
-void PrintTime(std::ostream& out, const std::vector<EvaluatedRun>& runs) {
+std::array<double, kQualityCount> HoursOf(
+    const std::vector<EvaluatedRun>& runs) {
   std::array<double, kQualityCount> hours{};
-  double all = 0.0;
   for (const EvaluatedRun& run : runs) {
     for (std::size_t q = 0; run.seconds && q < kQualityCount; ++q) {
       hours[q] += (*run.seconds)[q] / 3600.0;
-      all += (*run.seconds)[q] / 3600.0;
     }
   }
+  return hours;
+}
+
+void PrintTime(std::ostream& out, const std::vector<EvaluatedRun>& runs) {
+  const std::array<double, kQualityCount> hours = HoursOf(runs);
   cli::TextTable table({{"time"}, {"[h]", Align::kRight}});
+  double all = 0.0;
   for (std::size_t q = 0; q < kQualityCount; ++q) {
     if (hours[q] > 0.0) {
       table.AddRow({std::string(QualityName(static_cast<Quality>(q))),
                     FormatNumber(hours[q], 2)});
+      all += hours[q];
     }
   }
   if (all > 0.0) {
@@ -109,6 +115,17 @@ void PrintTime(std::ostream& out, const std::vector<EvaluatedRun>& runs) {
     out << '\n';
     table.Print(out);
   }
+}
+
+cli::Json HoursJson(const std::vector<EvaluatedRun>& runs) {
+  const std::array<double, kQualityCount> hours = HoursOf(runs);
+  cli::Json json = cli::Json::object();
+  for (std::size_t q = 0; q < kQualityCount; ++q) {
+    if (hours[q] > 0.0) {
+      json[std::string(QualityName(static_cast<Quality>(q)))] = hours[q];
+    }
+  }
+  return json;
 }
 
 void PrintConfusion(std::ostream& out, const char* heading,
@@ -131,16 +148,6 @@ void PrintConfusion(std::ostream& out, const char* heading,
   table.Print(out);
 }
 
-cli::Json SecondsJson(const std::array<double, kQualityCount>& seconds) {
-  cli::Json json = cli::Json::object();
-  for (std::size_t q = 0; q < kQualityCount; ++q) {
-    if (seconds[q] > 0.0) {
-      json[std::string(QualityName(static_cast<Quality>(q)))] = seconds[q];
-    }
-  }
-  return json;
-}
-
 cli::Json RunJson(const EvaluatedRun& run) {
   cli::Json json;
   json["run_id"] = run.indices.run_id;
@@ -148,10 +155,6 @@ cli::Json RunJson(const EvaluatedRun& run) {
   json["strength"] =
       run.has_truth ? cli::Json(run.indices.strength) : cli::Json();
   json["detected"] = IsDetected(run);
-  if (run.seconds) {
-    json["seconds"] = SecondsJson(*run.seconds);
-  }
-  json["episodes"] = run.indices.episodes;
   for (const auto& [name, value] : IndexNumbers(run.indices)) {
     json[name] = value;
   }
@@ -282,6 +285,7 @@ cli::Json EvaluationJson(const Detector& detector,
                   {"fault_free_runs", s.fault_free_runs},
                   {"fault_free_hours", s.fault_free_hours},
                   {"fault_free_episodes", s.fault_free_episodes},
+                  {"hours_by_quality", HoursJson(runs)},
                   {"runs_without_truth", figures.without_truth},
                   {"confusion", ConfusionJson(BuildConfusion(runs))},
                   {"confusion_by_group",

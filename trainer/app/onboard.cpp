@@ -68,13 +68,22 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
   return runs;
 }
 
-std::uint32_t EpochOf(const std::string& valve, storage::ModelStore& store) {
+// The epoch of the valve; one that is not in the table yet is added.
+std::uint32_t EpochOf(const std::string& valve, const Onboarding& onboarding,
+                      storage::ModelStore& store) {
   for (const storage::ValveEntry& entry : store.Valves()) {
     if (entry.pattern == valve) {
       return entry.epoch;
     }
   }
-  return 0;
+  storage::ValveEntry entry;
+  entry.pattern = valve;
+  entry.type = onboarding.type.name;
+  entry.flow_unit = onboarding.models.flow_unit;
+  entry.signals = onboarding.signals;
+  entry.period_s = onboarding.models.sample_period_s;
+  store.PutValve(entry);
+  return entry.epoch;
 }
 
 // Stops the work where the user asked to.
@@ -91,13 +100,12 @@ void Store(const OnboardOptions& options, Onboarding& onboarding,
            storage::ModelStore& store) {
   onboarding.models =
       store.Save(onboarding.models, storage::Activation::kAlways);
-  store.SetBaseline(options.valve,
-                    BaselineOf(onboarding, EpochOf(options.valve, store)));
   if (!options.save_type.empty()) {
-    ValveType type = onboarding.type;
-    type.name = options.save_type;
-    SaveType(type, store);
+    onboarding.type.name = options.save_type;
+    SaveType(onboarding.type, store);
   }
+  const std::uint32_t epoch = EpochOf(options.valve, onboarding, store);
+  store.SetBaseline(options.valve, BaselineOf(onboarding, epoch));
 }
 
 int OnboardValve(const OnboardOptions& options, const cli::Context& context) {

@@ -1,6 +1,7 @@
 #include "trainer/app/onboarding_report.h"
 
-#include <cmath>
+#include <array>
+#include <cstdio>
 
 #include "diagnosis/fault_catalogue.h"
 #include "storage/cli/text_table.h"
@@ -28,6 +29,13 @@ std::string UnitOf(const ModelSet& models, Signal output) {
                                           : SignalUnit(output));
 }
 
+// Four significant digits: coefficients of a relay are small, pressures large.
+std::string Significant(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.4g", value);
+  return text.data();
+}
+
 void PrintFit(std::ostream& out, const simulator::ValveFit& fit) {
   cli::TextTable table({{"parameter"},
                         {"nominal", Align::kRight},
@@ -35,8 +43,8 @@ void PrintFit(std::ostream& out, const simulator::ValveFit& fit) {
                         {"sd [%]", Align::kRight},
                         {"identified"}});
   for (const simulator::FittedParameter& value : fit.values) {
-    table.AddRow({value.name, FormatNumber(value.nominal, 6),
-                  FormatNumber(value.value, 6),
+    table.AddRow({value.name, Significant(value.nominal),
+                  Significant(value.value),
                   FormatNumber(100.0 * value.relative_sd, 1),
                   value.identified ? "yes" : "no, stays nominal"});
   }

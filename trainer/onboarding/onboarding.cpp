@@ -181,6 +181,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& runs,
   RequireUnit(runs, options.type);
   Onboarding result;
   result.type = options.type;
+  result.signals = signals;
   if (options.fit) {
     Part(progress, 0.0, kFitShare)(0.0, "fitting the physical parameters");
     result.fit = FitType(runs, options);

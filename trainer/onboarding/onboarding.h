@@ -37,7 +37,8 @@ struct Onboarding {
   std::optional<simulator::ValveFit> fit;
   std::vector<ChannelFit> channels;
   std::optional<CoverageTable> coverage;
-  double hours{0.0};  ///< Of healthy data.
+  SignalMask signals{0};  ///< That the valve measures.
+  double hours{0.0};      ///< Of healthy data.
 };
 
 /// The `extended` preset for a valve that measures `signals`: channels that

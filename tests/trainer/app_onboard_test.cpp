@@ -1,0 +1,45 @@
+// What `onboard` and `coverage` refuse; what they do is tested at length with
+// the system.
+#include "tests/trainer/app_fixture.h"
+
+namespace fdi::trainer {
+namespace {
+
+class OnboardProgramTest : public TrainerProgram {};
+
+TEST_F(OnboardProgramTest, NeedsHealthyData) {
+  const Outcome outcome = Run("onboard --valve FV-101");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.err.find("--runs ID,... or --file CSV"), std::string::npos)
+      << outcome.err;
+}
+
+TEST_F(OnboardProgramTest, ShortRecordIsRefusedAndNothingIsStored) {
+  std::string csv = "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h\n";
+  for (int k = 0; k < 300; ++k) {
+    csv += std::to_string(k) + "," + std::to_string(50 + k % 7) +
+           ",3500,2600,100," + std::to_string(50 + k % 7) + ",17\n";
+  }
+  Write("short.csv", csv);
+  const Outcome outcome = Run("onboard --valve FV-101 --file short.csv");
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_NE(outcome.err.find("300 samples, onboarding takes at least 600"),
+            std::string::npos)
+      << outcome.err;
+  EXPECT_EQ(Run("show FV-101").code, 5);
+}
+
+TEST_F(OnboardProgramTest, UnknownTypesAndSignalsAreNamed) {
+  const Outcome signal = Run("coverage --signals CV,X,Q");
+  EXPECT_EQ(signal.code, 2);
+  EXPECT_NE(signal.err.find("'Q'"), std::string::npos) << signal.err;
+  const Outcome type = Run("coverage --signals CV,X --type nothing-like-it");
+  EXPECT_EQ(type.code, 2);
+  EXPECT_NE(type.err.find("nothing-like-it"), std::string::npos) << type.err;
+  const Outcome blind = Run("coverage --signals CV,F");
+  EXPECT_EQ(blind.code, 3);
+  EXPECT_NE(blind.err.find("no signal X"), std::string::npos) << blind.err;
+}
+
+}  // namespace
+}  // namespace fdi::trainer
