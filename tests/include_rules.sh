@@ -19,6 +19,8 @@ forbid '^diagnosis/' '(idl|storage|simulator|trainer|monitor)/' \
   'diagnosis is the bottom layer'
 forbid '^(simulator|trainer|monitor)/[^/]+$' '(idl|storage)/' \
   'a domain library includes no adapter'
+forbid '^trainer/(onboarding|baselines)/' '(idl|storage|monitor)/' \
+  'a domain library includes no adapter'
 forbid '^simulator/[^/]+$' '(trainer|monitor)/' 'domains stay apart'
 forbid '^trainer/[^/]+$' '(simulator|monitor)/' 'domains stay apart'
 forbid '^monitor/[^/]+$' '(simulator|trainer)/' 'domains stay apart'
