@@ -111,6 +111,78 @@ ModelSet Describe(const std::vector<TrainingRun>& healthy,
   return models;
 }
 
+// What the healthy runs give: the stretches that faults are put onto, and the
+// models of every channel.
+struct Healthy {
+  Condition normal;
+  std::vector<Stretch> stretches;
+  std::vector<NormalChannel> channels;
+};
+
+Healthy FitHealthy(const std::vector<TrainingRun>& runs, double flow_limit,
+                   const TrainingOptions& options) {
+  Healthy healthy;
+  healthy.normal = BuildConditions(runs, options.dataset).front();
+  healthy.stretches = Excerpt(WholeStretches(healthy.normal));
+  healthy.channels.resize(options.channels.size());
+  ParallelFor(
+      static_cast<int>(options.channels.size()), options.threads, [&](int c) {
+        const auto i = static_cast<std::size_t>(c);
+        const ChannelPlan& plan = options.channels[i];
+        healthy.channels[i] = FitNormalChannel(
+            plan, healthy.normal, healthy.stretches, options,
+            plan.saturates ? (1.0 - kLimitShare) * flow_limit : kNoSaturation);
+      });
+  return healthy;
+}
+
+// Calibrates the normal observer on residuals held out; returns them.
+NormalResiduals CalibrateHealthy(const Healthy& healthy,
+                                 const TrainingOptions& options,
+                                 Observer& observer) {
+  std::vector<ChannelPlan> plans;
+  for (std::size_t c = 0; c < healthy.channels.size(); ++c) {
+    plans.push_back(healthy.channels[c].plan);
+    observer.channels[c] =
+        CalibrateOn(healthy.channels[c].normal, healthy.normal,
+                    options.fit.settling, kLeastSd);
+  }
+  NormalResiduals held_out = CrossValidate(healthy.normal, observer, plans,
+                                           options.fit, options.threads);
+  CalibrateNormal(held_out.residuals, observer);
+  return held_out;
+}
+
+// Fits the observer of every fault. Returns the data on which faults are
+// compared, parallel to the observers.
+std::vector<Condition> FitFaults(const Healthy& healthy,
+                                 const std::vector<FaultCondition>& faults,
+                                 const FaultSynthesis& synthesize,
+                                 const TrainingOptions& options,
+                                 Reporter& reporter, ModelSet& models) {
+  std::vector<Condition> compared(faults.size() + 1);
+  compared.front() = healthy.normal;
+  std::atomic<int> done{0};
+  ParallelFor(static_cast<int>(faults.size()), options.threads, [&](int i) {
+    const FaultCondition& fault = faults[static_cast<std::size_t>(i)];
+    Observer& observer = models.observers[static_cast<std::size_t>(i) + 1];
+    const std::vector<Stretch> faulty =
+        Synthesize(fault, healthy.stretches, synthesize);
+    for (std::size_t c = 0; c < healthy.channels.size(); ++c) {
+      observer.channels[c] = FitDifference(
+          healthy.channels[c], models.observers.front().channels[c],
+          healthy.stretches, faulty, fault.fault, fault.strength,
+          options.fit.settling);
+    }
+    compared[static_cast<std::size_t>(i) + 1] =
+        ValidationPart(fault, faulty, options.dataset.validation_share);
+    reporter.Tell(kNormalShare + kObserverShare * ++done /
+                                     static_cast<double>(faults.size()),
+                  "fitting " + observer.name);
+  });
+  return compared;
+}
+
 }  // namespace
 
 ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
@@ -122,51 +194,17 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
   Require(faults.size() < kMaxObservers, "there are too many faults");
   Reporter reporter(progress);
   reporter.Tell(0.0, "fitting the normal observer");
-  const std::vector<Condition> conditions =
-      BuildConditions(healthy, options.dataset);
-  const Condition& normal = conditions.front();
-  const std::vector<Stretch> whole = Excerpt(WholeStretches(normal));
-  const std::size_t channel_count = options.channels.size();
-  ModelSet models = Describe(healthy, normal, faults, options);
-  std::vector<NormalChannel> channels(channel_count);
-  ParallelFor(static_cast<int>(channel_count), options.threads, [&](int c) {
-    const auto i = static_cast<std::size_t>(c);
-    const ChannelPlan& plan = options.channels[i];
-    channels[i] = FitNormalChannel(
-        plan, normal, whole, options,
-        plan.saturates ? (1.0 - kLimitShare) * flow_limit : kNoSaturation);
-  });
-  std::vector<ChannelPlan> plans;
-  std::vector<std::vector<int>> windows;
-  Observer& observer = models.observers.front();
-  for (std::size_t c = 0; c < channel_count; ++c) {
-    plans.push_back(channels[c].plan);
-    windows.push_back(channels[c].plan.windows);
-    observer.channels[c] =
-        CalibrateOn(channels[c].normal, normal, options.fit.settling, kLeastSd);
-  }
+  const Healthy fitted = FitHealthy(healthy, flow_limit, options);
+  ModelSet models = Describe(healthy, fitted.normal, faults, options);
   const NormalResiduals held_out =
-      CrossValidate(normal, observer, plans, options.fit, options.threads);
-  CalibrateNormal(held_out.residuals, observer);
-  std::vector<Condition> compared(faults.size() + 1);
-  compared.front() = normal;
-  std::atomic<int> done{0};
-  ParallelFor(static_cast<int>(faults.size()), options.threads, [&](int i) {
-    const FaultCondition& fault = faults[static_cast<std::size_t>(i)];
-    Observer& of_fault = models.observers[static_cast<std::size_t>(i) + 1];
-    const std::vector<Stretch> faulty = Synthesize(fault, whole, synthesize);
-    for (std::size_t c = 0; c < channel_count; ++c) {
-      of_fault.channels[c] = FitDifference(
-          channels[c], models.observers.front().channels[c], whole, faulty,
-          fault.fault, fault.strength, options.fit.settling);
-    }
-    compared[static_cast<std::size_t>(i) + 1] =
-        ValidationPart(fault, faulty, options.dataset.validation_share);
-    reporter.Tell(kNormalShare + kObserverShare * ++done /
-                                     static_cast<double>(faults.size()),
-                  "fitting " + of_fault.name);
-  });
+      CalibrateHealthy(fitted, options, models.observers.front());
+  const std::vector<Condition> compared =
+      FitFaults(fitted, faults, synthesize, options, reporter, models);
   reporter.Tell(kNormalShare + kObserverShare, "comparing faults");
+  std::vector<std::vector<int>> windows;
+  for (const NormalChannel& channel : fitted.channels) {
+    windows.push_back(channel.plan.windows);
+  }
   FitThresholds(held_out.residuals, windows, options.false_alarms_per_hour,
                 models, held_out.commands);
   BalanceThresholds(models);
