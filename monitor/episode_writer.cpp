@@ -96,6 +96,11 @@ bool EpisodeWriter::Enqueue(Record record) {
   return true;
 }
 
+EpisodeWriter::Backlog EpisodeWriter::backlog() const {
+  const std::lock_guard lock(mutex_);
+  return {records_.size(), trace_points_};
+}
+
 void EpisodeWriter::Stop() {
   {
     const std::lock_guard lock(mutex_);
@@ -253,6 +258,7 @@ bool EpisodeWriter::WriteRecord(const Record& record) {
 }
 
 bool EpisodeWriter::Attempt(const std::function<void()>& call) {
+  pulse_.Beat();
   try {
     call();
     return true;

@@ -14,6 +14,7 @@
 #include "monitor/counters.h"
 #include "monitor/episode_tracker.h"
 #include "monitor/event_outbox.h"
+#include "monitor/heartbeat.h"
 #include "monitor/sinks.h"
 #include "monitor/throttled_log.h"
 
@@ -60,6 +61,16 @@ class EpisodeWriter : public EpisodeOutlet {
   /// The history fails at present.
   bool degraded() const { return degraded_; }
 
+  /// Of the history thread.
+  const Pulse& pulse() const { return pulse_; }
+
+  /// What waits for the history.
+  struct Backlog {
+    std::size_t records{0};
+    std::size_t trace_points{0};
+  };
+  Backlog backlog() const;
+
  private:
   struct Resumption {
     std::uint64_t episode_id;
@@ -91,7 +102,8 @@ class EpisodeWriter : public EpisodeOutlet {
   std::int64_t degraded_since_ns_{0};
   std::chrono::steady_clock::time_point last_commit_;
 
-  std::mutex mutex_;
+  Pulse pulse_;
+  mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Record> records_;
   std::deque<EpisodeTrace> traces_;

@@ -8,6 +8,7 @@ namespace {
 constexpr std::size_t kMaxIdLength = 64;
 constexpr std::chrono::milliseconds kTick{100};
 constexpr std::chrono::milliseconds kTendPeriod{250};
+constexpr std::size_t kBeatItems = 64;
 
 // In the order of Intake.
 constexpr std::array<LogId, kIntakeCount> kRejectionIds{
@@ -105,6 +106,20 @@ bool Pipeline::OfferEnd(std::string_view valve_id, std::uint64_t writer) {
       Item{*entry, writer, std::chrono::steady_clock::now(), true, Sample{}});
 }
 
+Pipeline::Backlog Pipeline::backlog() const {
+  return {queue_.size(), recorder_ ? recorder_->waiting() : 0,
+          writer_.backlog()};
+}
+
+std::vector<Heartbeat::Member> Pipeline::threads() const {
+  std::vector<Heartbeat::Member> threads{{"diagnosis", &pulse_},
+                                         {"history", &writer_.pulse()}};
+  if (recorder_) {
+    threads.push_back({"recorder", &recorder_->pulse()});
+  }
+  return threads;
+}
+
 void Pipeline::Reassign(std::shared_ptr<const ModelResolver> resolver) {
   const std::lock_guard lock(resolver_mutex_);
   next_resolver_ = std::move(resolver);
@@ -141,9 +156,13 @@ void Pipeline::Run() {
 void Pipeline::Diagnose() {
   std::vector<Item> batch;
   while (queue_.PopAll(batch, kTick)) {
+    pulse_.Beat();
     AdoptPendingResolver();
-    for (const Item& item : batch) {
-      Handle(item);
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      Handle(batch[i]);
+      if (i % kBeatItems == 0) {
+        pulse_.Beat();
+      }
     }
     // While samples wait, silence is measured up to the newest one handled.
     const TimePoint now = batch.empty() ? std::chrono::steady_clock::now()

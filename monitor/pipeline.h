@@ -15,6 +15,7 @@
 #include "monitor/bounded_queue.h"
 #include "monitor/counters.h"
 #include "monitor/episode_writer.h"
+#include "monitor/heartbeat.h"
 #include "monitor/sample_recorder.h"
 #include "monitor/sinks.h"
 #include "monitor/throttled_log.h"
@@ -85,7 +86,17 @@ class Pipeline {
   std::vector<std::string> valve_names() const { return registry_.names(); }
   bool history_degraded() const { return writer_.degraded(); }
   bool recording_degraded() const { return recorder_ && recorder_->degraded(); }
-  std::size_t waiting() const { return queue_.size(); }
+
+  /// Items that wait for each thread.
+  struct Backlog {
+    std::size_t diagnosis{0};
+    std::size_t recorder{0};
+    EpisodeWriter::Backlog history;
+  };
+  Backlog backlog() const;
+
+  /// Diagnosis, history and, if there is one, recorder.
+  std::vector<Heartbeat::Member> threads() const;
 
  private:
   using TimePoint = ValveMonitor::TimePoint;
@@ -114,6 +125,7 @@ class Pipeline {
   ValveDirectory directory_;
   ValveRegistry registry_;
   BoundedQueue<Item> queue_;
+  Pulse pulse_;
   TimePoint last_tend_;
   TimePoint last_checkpoint_;
 

@@ -46,6 +46,7 @@ void SampleRecorder::Stop() {
 void SampleRecorder::Run() {
   std::vector<ReceivedSample> batch;
   while (queue_.PopAll(batch, kTick)) {
+    pulse_.Beat();
     for (const ReceivedSample& sample : batch) {
       Take(sample);
     }

@@ -8,6 +8,7 @@
 
 #include "monitor/bounded_queue.h"
 #include "monitor/counters.h"
+#include "monitor/heartbeat.h"
 #include "monitor/sinks.h"
 #include "monitor/throttled_log.h"
 
@@ -39,6 +40,10 @@ class SampleRecorder {
   void Stop();
 
   bool degraded() const { return degraded_; }
+  /// Of the recorder thread.
+  const Pulse& pulse() const { return pulse_; }
+  /// Samples that wait for it.
+  std::size_t waiting() const { return queue_.size(); }
 
  private:
   void Run();
@@ -53,6 +58,7 @@ class SampleRecorder {
   ThrottledLog& log_;
   SampleRecorderOptions options_;
   std::atomic<bool> degraded_{false};
+  Pulse pulse_;
   std::uint64_t pending_{0};
   std::uint64_t recorded_{0};  // counted so far
   std::chrono::steady_clock::time_point last_commit_;

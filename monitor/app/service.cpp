@@ -229,7 +229,7 @@ void Service::Reload(const char* cause) {
 void Service::PublishStatus() {
   idl::MonitorStatusMessage status =
       StatusOf({counters_, pipeline_.census(), samples_.status(),
-                decisions_.status(), pipeline_.waiting(),
+                decisions_.status(), pipeline_.backlog().diagnosis,
                 pipeline_.history_degraded(), pipeline_.recording_degraded()});
   status.monitor = MonitorName();
   status.software = context_.software;
@@ -242,7 +242,7 @@ void Service::WriteStatusLine() {
   context_.log(
       LogLevel::kInfo,
       StatusLine(StatusOf({counters_, pipeline_.census(), samples_.status(),
-                           decisions_.status(), pipeline_.waiting(),
+                           decisions_.status(), pipeline_.backlog().diagnosis,
                            pipeline_.history_degraded(),
                            pipeline_.recording_degraded()})));
 }

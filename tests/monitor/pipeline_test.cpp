@@ -138,7 +138,7 @@ TEST_F(PipelineTest, AFullQueueMakesTheIntakeWaitAndDropsNothing) {
 
   // One batch at the diagnosis, one in the queue, one at the door.
   ASSERT_TRUE(bus_.notice.Await(
-      [&] { return pipeline_->waiting() == 16 || offered > 33; }));
+      [&] { return pipeline_->backlog().diagnosis == 16 || offered > 33; }));
   EXPECT_LE(offered, 33);
   bus_.notice.Apply([&] { bus_.held = false; });
   intake.join();
