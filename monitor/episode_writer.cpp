@@ -1,5 +1,6 @@
 #include "monitor/episode_writer.h"
 
+#include <algorithm>
 #include <exception>
 #include <optional>
 #include <string>
@@ -12,12 +13,8 @@ namespace {
 // each of them.
 constexpr std::size_t kPointsPerCommit = 5'000;
 
-template <typename... Ts>
-struct Overload : Ts... {
-  using Ts::operator()...;
-};
-template <typename... Ts>
-Overload(Ts...) -> Overload<Ts...>;
+// Bounds how long a commit takes, and so how long later events wait for it.
+constexpr std::size_t kRecordsPerCommit = 1'000;
 
 }  // namespace
 
@@ -113,9 +110,7 @@ void EpisodeWriter::Stop() {
   }
   outbox_.Stop();
   // What the outbox published last is still to be marked.
-  while (!records_.empty() && WriteRecord(records_.front())) {
-    records_.pop_front();
-  }
+  WriteRecords();
   for (const Record& record : records_) {
     if (std::holds_alternative<std::shared_ptr<PendingEvent>>(record)) {
       counters_.Add(Counter::kEventsLost);
@@ -178,21 +173,56 @@ bool EpisodeWriter::Serve() {
 }
 
 bool EpisodeWriter::WriteRecords() {
+  std::vector<const Record*> batch;
   while (true) {
-    const Record* next = nullptr;
     {
       const std::lock_guard lock(mutex_);
-      if (records_.empty()) {
-        return true;
+      // Pointers stay: only this thread takes from the front.
+      const std::size_t count = std::min(records_.size(), kRecordsPerCommit);
+      batch.clear();
+      for (std::size_t i = 0; i < count; ++i) {
+        batch.push_back(&records_[i]);
       }
-      next = &records_.front();  // Only this thread takes from the front.
     }
-    if (!WriteRecord(*next)) {
+    if (batch.empty()) {
+      return true;
+    }
+    if (!WriteBatch(batch)) {
       return false;
     }
     const std::lock_guard lock(mutex_);
-    records_.pop_front();
+    records_.erase(
+        records_.begin(),
+        records_.begin() + static_cast<std::ptrdiff_t>(batch.size()));
   }
+}
+
+// Events and resumptions in one commit; gaps and marks are buffered once that
+// succeeded, so that a repetition buffers nothing twice.
+bool EpisodeWriter::WriteBatch(const std::vector<const Record*>& batch) {
+  const auto stored_on_disk = [](const Record* record) {
+    return std::holds_alternative<std::shared_ptr<PendingEvent>>(*record) ||
+           std::holds_alternative<Resumption>(*record);
+  };
+  const bool any = std::any_of(batch.begin(), batch.end(), stored_on_disk);
+  const bool stored = !any || Attempt([&] {
+    history_.Together([&] {
+      for (const Record* record : batch) {
+        WriteStep(*record);
+      }
+    });
+  });
+  for (const Record* record : batch) {
+    if (const auto* event =
+            std::get_if<std::shared_ptr<PendingEvent>>(record)) {
+      outbox_.Settle(**event, stored);
+    }
+  }
+  return stored && Attempt([&] {
+           for (const Record* record : batch) {
+             Buffer(*record);
+           }
+         });
 }
 
 // One that fails waits for the next, which is laid on top of it.
@@ -235,26 +265,20 @@ bool EpisodeWriter::WriteTraces() {
   return Commit();
 }
 
-bool EpisodeWriter::WriteRecord(const Record& record) {
-  return std::visit(
-      Overload{[this](const std::shared_ptr<PendingEvent>& pending) {
-                 const bool stored =
-                     Attempt([&] { history_.Record(pending->event); });
-                 outbox_.Settle(*pending, stored);
-                 return stored;
-               },
-               [this](const DataGap& gap) {
-                 return Attempt([&] { history_.AddGap(gap); });
-               },
-               [this](const Resumption& resumption) {
-                 return Attempt([&] {
-                   history_.Resume(resumption.episode_id, resumption.stamp_ns);
-                 });
-               },
-               [this](const Sent& sent) {
-                 return Attempt([&] { history_.MarkSent(sent.event); });
-               }},
-      record);
+void EpisodeWriter::WriteStep(const Record& record) {
+  if (const auto* event = std::get_if<std::shared_ptr<PendingEvent>>(&record)) {
+    history_.Record((*event)->event);
+  } else if (const auto* resumption = std::get_if<Resumption>(&record)) {
+    history_.Resume(resumption->episode_id, resumption->stamp_ns);
+  }
+}
+
+void EpisodeWriter::Buffer(const Record& record) {
+  if (const auto* gap = std::get_if<DataGap>(&record)) {
+    history_.AddGap(*gap);
+  } else if (const auto* sent = std::get_if<Sent>(&record)) {
+    history_.MarkSent(sent->event);
+  }
 }
 
 bool EpisodeWriter::Attempt(const std::function<void()>& call) {

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <thread>
 #include <variant>
+#include <vector>
 
 #include "monitor/counters.h"
 #include "monitor/episode_tracker.h"
@@ -32,7 +33,8 @@ struct EpisodeWriterOptions {
 };
 
 /// Stores episodes by a thread of its own, events before evidence, and gives
-/// each event to the bus once it is stored. Never blocks the diagnosis.
+/// each event to the bus once it is stored; events that wait together are
+/// stored in one commit. Never blocks the diagnosis.
 ///
 /// If the history fails, events are published as not persisted, and all is
 /// kept and tried again each second; what no longer fits is counted as lost,
@@ -86,9 +88,11 @@ class EpisodeWriter : public EpisodeOutlet {
   void Run();
   bool Serve();
   bool WriteRecords();
+  bool WriteBatch(const std::vector<const Record*>& batch);
   bool WriteTraces();
   bool WriteCheckpoint();
-  bool WriteRecord(const Record& record);
+  void WriteStep(const Record& record);
+  void Buffer(const Record& record);
   bool Attempt(const std::function<void()>& call);
   bool Commit();
   void FailWaitingEvents();

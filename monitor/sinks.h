@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -51,9 +52,12 @@ class EventSink {
 class HistorySink {
  public:
   virtual ~HistorySink() = default;
-  /// On the disk on return.
+  /// Makes the calls of Record() and Resume() in `records` one commit: all of
+  /// it is on the disk on return or, if it fails, nothing.
+  virtual void Together(const std::function<void()>& records) = 0;
+  /// Within Together().
   virtual void Record(const EpisodeEvent& event) = 0;
-  /// An episode left open by an earlier session goes on.
+  /// An episode left open by an earlier session goes on. Within Together().
   virtual void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) = 0;
   /// Buffers. Evidence of an episode that is not there is dropped.
   virtual void AddTrace(const EpisodeTrace& trace) = 0;

@@ -1,12 +1,10 @@
 #include "storage/history_writer.h"
 
-#include <cmath>
 #include <utility>
 
 #include "diagnosis/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "storage/history_event_rows.h"
 #include "storage/history_recovery.h"
-#include "storage/history_rows.h"
 #include "storage/history_schema.h"
 #include "storage/history_trace_writer.h"
 
@@ -14,39 +12,6 @@ namespace fdi::storage {
 namespace {
 
 constexpr std::int64_t kAliveEveryNs = 10'000'000'000;
-
-/// A transition on its way into the tables.
-struct Entry {
-  std::uint64_t episode_id{0};
-  Transition transition;
-  std::int64_t recorded_ns{0};
-  std::vector<std::string> names;  ///< Of the faults, by bit.
-};
-
-double Finite(double value) {
-  return std::isfinite(value) ? value : 0.0;
-}
-
-bool IsIsolation(TransitionKind kind) {
-  return kind == TransitionKind::kIsolated ||
-         kind == TransitionKind::kReisolated;
-}
-
-std::vector<std::string> FaultNames(const ModelSet& models) {
-  std::vector<std::string> names;
-  for (const int fault : models.faults) {
-    names.push_back(FaultName(fault));
-  }
-  return names;
-}
-
-std::vector<std::string> ChannelNames(const ModelSet& models) {
-  std::vector<std::string> names;
-  for (const ChannelSpec& channel : models.channels) {
-    names.push_back(channel.name);
-  }
-  return names;
-}
 
 }  // namespace
 
@@ -58,6 +23,7 @@ class HistoryWriter::Impl {
   SessionStart BeginSession(std::int64_t now_ns, const std::string& software,
                             const std::string& config);
   void EndSession(std::int64_t now_ns, bool clean);
+  void Together(const std::function<void()>& records);
   std::optional<std::int64_t> Record(const NewEvent& event);
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
               std::int64_t now_ns);
@@ -72,22 +38,19 @@ class HistoryWriter::Impl {
   Database& database() { return database_; }
 
  private:
-  std::optional<std::int64_t> Store(const Entry& entry);
-  void StoreIsolation(const Entry& entry, const std::string& id);
-  void StoreUnknown(const Transition& t, const std::string& id);
-  void InsertEpisode(const NewEvent& event, std::uint64_t episode_id);
-  void RequireEpisode(std::uint64_t episode_id);
   void StorePending();
   // Forgets what is in the file now.
   void Settle();
 
   Database database_;
   StatementCache cached_{database_};
+  HistoryEventRows rows_{database_, cached_};
   HistoryTraceWriter traces_{database_, cached_};
   std::optional<std::int64_t> session_id_;
   std::int64_t alive_ns_{0};
   std::vector<DataGap> gaps_;
   std::vector<std::int64_t> sent_;
+  bool together_{false};  // within Together()
 };
 
 SessionStart HistoryWriter::Impl::BeginSession(std::int64_t now_ns,
@@ -125,167 +88,51 @@ void HistoryWriter::Impl::EndSession(std::int64_t now_ns, bool clean) {
   database_.Checkpoint();
 }
 
-void HistoryWriter::Impl::InsertEpisode(const NewEvent& event,
-                                        std::uint64_t episode_id) {
-  const ModelSet& models = *event.models;
-  cached_(
-      "INSERT INTO episode (episode_id, session_id, valve_id, source_id, "
-      "detected_ns, peak_factor, strength, model_set, model_hash, flow_unit, "
-      "channels, faults) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) "
-      "ON CONFLICT (episode_id) DO NOTHING")
-      .Bind(EpisodeIdText(episode_id), session_id_, event.valve_id,
-            event.source_id, event.transition.detection_stamp_ns,
-            Finite(event.transition.factor), Finite(event.transition.strength),
-            models.name + "@" + std::to_string(models.version),
-            models.content_hash, FlowUnitName(models.flow_unit),
-            JoinNames(ChannelNames(models)), JoinNames(FaultNames(models)))
-      .Run();
+void HistoryWriter::Impl::Together(const std::function<void()>& records) {
+  if (together_) {
+    records();
+    return;
+  }
+  Transaction transaction(database_);
+  StorePending();
+  together_ = true;
+  try {
+    records();
+  } catch (...) {
+    together_ = false;
+    throw;
+  }
+  together_ = false;
+  transaction.Commit();
+  Settle();
 }
 
 std::optional<std::int64_t> HistoryWriter::Impl::Record(const NewEvent& event) {
   Require(event.models != nullptr, "HistoryWriter::Record: models is null");
   Require(!event.valve_id.empty(), "HistoryWriter::Record: no valve");
-  const Entry entry{EpisodeIdOf(event), event.transition, event.recorded_ns,
-                    FaultNames(*event.models)};
-  Transaction transaction(database_);
-  StorePending();
-  InsertEpisode(event, entry.episode_id);
-  const auto event_id = Store(entry);
-  transaction.Commit();
-  Settle();
-  if (IsIsolation(entry.transition.kind)) {
-    traces_.SetIsolated(entry.episode_id, entry.transition.faults);
+  std::optional<std::int64_t> event_id;
+  Together([&] { event_id = rows_.Add(event, session_id_); });
+  const Transition& t = event.transition;
+  if (t.kind == TransitionKind::kIsolated ||
+      t.kind == TransitionKind::kReisolated) {
+    traces_.SetIsolated(EpisodeIdOf(event), t.faults);
   }
   return event_id;
-}
-
-std::optional<std::int64_t> HistoryWriter::Impl::Store(const Entry& entry) {
-  const Transition& t = entry.transition;
-  const std::string id = EpisodeIdText(entry.episode_id);
-  const std::string faults = NamesOf(t.faults, entry.names);
-  const auto text = [](const std::string& s) {
-    return s.empty() ? std::nullopt : std::optional<std::string>(s);
-  };
-  const bool closed = t.kind == TransitionKind::kClosed;
-  cached_(
-      "INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns, "
-      "faults, fault_bits, factor, strength, reason) "
-      "SELECT episode_id, ?, ?, ?, ?, ?, ?, ?, ? FROM episode "
-      "WHERE episode_id = ? AND ended_ns IS NULL "
-      "ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING")
-      .Bind(TransitionName(t.kind), t.stamp_ns, entry.recorded_ns, text(faults),
-            t.faults, t.factor, t.strength,
-            text(closed ? std::string(EndReasonName(t.reason)) : ""), id)
-      .Run();
-  if (database_.Changes() == 0) {
-    return std::nullopt;
-  }
-  const std::int64_t event_id = database_.LastInsertRowid();
-  cached_("INSERT INTO event_outbox (event_id) VALUES (?)")
-      .Bind(event_id)
-      .Run();
-  StoreUnknown(t, id);
-  if (IsIsolation(t.kind)) {
-    StoreIsolation(entry, id);
-  } else if (t.kind == TransitionKind::kCleared) {
-    cached_("UPDATE episode SET cleared_ns = ? WHERE episode_id = ?")
-        .Bind(t.stamp_ns, id)
-        .Run();
-  } else if (closed) {
-    const bool cleared = t.reason == EndReason::kCleared;
-    cached_(
-        "UPDATE episode SET ended_ns = ?, end_reason = ?, "
-        "cleared_ns = coalesce(cleared_ns, ?) WHERE episode_id = ?")
-        .Bind(t.stamp_ns, EndReasonName(t.reason),
-              cleared ? std::optional(t.stamp_ns) : std::nullopt, id)
-        .Run();
-  }
-  return event_id;
-}
-
-// Why there is no name; none of an episode that got one.
-void HistoryWriter::Impl::StoreUnknown(const Transition& t,
-                                       const std::string& id) {
-  if (t.unknown == Unknown::kNone && !IsIsolation(t.kind)) {
-    return;
-  }
-  const auto kind = t.unknown == Unknown::kNone
-                        ? std::nullopt
-                        : std::optional<std::string>(UnknownName(t.unknown));
-  cached_("UPDATE episode SET unknown_kind = ? WHERE episode_id = ?")
-      .Bind(kind, id)
-      .Run();
-}
-
-void HistoryWriter::Impl::StoreIsolation(const Entry& entry,
-                                         const std::string& id) {
-  const Transition& t = entry.transition;
-  cached_(
-      "UPDATE episode SET isolated_ns = coalesce(isolated_ns, ?), "
-      "fault_bits = ?, peak_factor = ?, strength = ? WHERE episode_id = ?")
-      .Bind(t.stamp_ns, t.faults, Finite(t.factor), Finite(t.strength), id)
-      .Run();
-  cached_("UPDATE episode_fault SET held = 0 WHERE episode_id = ?")
-      .Bind(id)
-      .Run();
-  for (std::size_t bit = 0; bit < entry.names.size(); ++bit) {
-    if ((t.faults >> bit & 1U) != 0) {
-      cached_(
-          "INSERT INTO episode_fault (episode_id, fault, fault_bit, first_ns, "
-          "held) VALUES (?, ?, ?, ?, 1) "
-          "ON CONFLICT (episode_id, fault) DO UPDATE SET held = 1")
-          .Bind(id, entry.names[bit], bit, t.stamp_ns)
-          .Run();
-    }
-  }
-}
-
-void HistoryWriter::Impl::RequireEpisode(std::uint64_t episode_id) {
-  const std::string id = EpisodeIdText(episode_id);
-  if (!database_.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?", id)) {
-    throw NotFoundError("no episode " + id);
-  }
 }
 
 void HistoryWriter::Impl::Resume(std::uint64_t episode_id,
                                  std::int64_t stamp_ns, std::int64_t now_ns) {
-  RequireEpisode(episode_id);
-  Transaction transaction(database_);
-  StorePending();
-  cached_(
-      "INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns) "
-      "VALUES (?, 'RESUMED', ?, ?) "
-      "ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING")
-      .Bind(EpisodeIdText(episode_id), stamp_ns, now_ns)
-      .Run();
-  transaction.Commit();
-  Settle();
+  Together([&] { rows_.Resume(episode_id, stamp_ns, now_ns); });
 }
 
 std::optional<std::int64_t> HistoryWriter::Impl::Close(std::uint64_t episode_id,
                                                        std::int64_t stamp_ns,
                                                        EndReason reason,
                                                        std::int64_t now_ns) {
-  Statement row = database_.Prepare(
-      "SELECT detected_ns, fault_bits, peak_factor, strength, faults "
-      "FROM episode WHERE episode_id = ?");
-  if (!row.Bind(EpisodeIdText(episode_id)).Step()) {
-    throw NotFoundError("no episode " + EpisodeIdText(episode_id));
-  }
-  Entry entry;
-  entry.episode_id = episode_id;
-  entry.recorded_ns = now_ns;
-  entry.transition = {
-      TransitionKind::kClosed, stamp_ns,      row.Int64(0), row.Uint64(1),
-      row.Double(2),           row.Double(3), reason};
-  entry.names = SplitNames(row.Text(4));
-  row.Reset();
+  std::optional<std::int64_t> event_id;
   traces_.End(episode_id);
-  Transaction transaction(database_);
-  StorePending();
-  const auto event_id = Store(entry);
-  transaction.Commit();
-  Settle();
+  Together(
+      [&] { event_id = rows_.Close(episode_id, stamp_ns, reason, now_ns); });
   return event_id;
 }
 
@@ -346,6 +193,10 @@ SessionStart HistoryWriter::BeginSession(std::int64_t now_ns,
 
 void HistoryWriter::EndSession(std::int64_t now_ns, bool clean) {
   impl_->EndSession(now_ns, clean);
+}
+
+void HistoryWriter::Together(const std::function<void()>& records) {
+  impl_->Together(records);
 }
 
 std::optional<std::int64_t> HistoryWriter::Record(const NewEvent& event) {

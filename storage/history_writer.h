@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -49,6 +50,11 @@ class HistoryWriter {
                             const std::string& config);
   /// Commits all that is pending, and checkpoints.
   void EndSession(std::int64_t now_ns, bool clean);
+
+  /// Makes what `records` does, calls of Record(), Resume() and Close(), one
+  /// transaction with the trace, gaps and marks that are pending: on the disk
+  /// on return. If it throws, none of it is stored; do it all again.
+  void Together(const std::function<void()>& records);
 
   /// Records a transition, with the trace that is pending; it is on the disk
   /// on return. A transition without its DETECTED before makes the episode.

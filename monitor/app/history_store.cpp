@@ -114,6 +114,17 @@ HistoryStore::EventKey HistoryStore::KeyOf(const EpisodeEvent& event) {
   return {event.episode_id, event.transition.kind, event.transition.stamp_ns};
 }
 
+void HistoryStore::Together(const std::function<void()>& records) {
+  recorded_.clear();
+  writer_.Together(records);
+  if (unsent_.size() >= kMaxUnsent) {
+    unsent_.clear();  // They are sent again at the next start.
+  }
+  for (const auto& [key, event_id] : std::exchange(recorded_, {})) {
+    unsent_[key] = event_id;
+  }
+}
+
 void HistoryStore::Record(const EpisodeEvent& event) {
   Tolerate("record", [&] {
     const std::int64_t now_ns = utc_now_ns_();
@@ -124,10 +135,7 @@ void HistoryStore::Record(const EpisodeEvent& event) {
             : writer_.Close(event.episode_id, event.transition.stamp_ns,
                             event.transition.reason, now_ns);
     if (id) {
-      if (unsent_.size() >= kMaxUnsent) {
-        unsent_.clear();  // They are sent again at the next start.
-      }
-      unsent_[KeyOf(event)] = *id;
+      recorded_.emplace_back(KeyOf(event), *id);
     }
   });
 }

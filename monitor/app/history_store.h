@@ -34,6 +34,7 @@ class HistoryStore : public HistorySink {
   std::vector<storage::UnsentEvent> UnsentEvents();
   void MarkResent(const storage::UnsentEvent& event);
 
+  void Together(const std::function<void()>& records) override;
   void Record(const EpisodeEvent& event) override;
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) override;
   void AddTrace(const EpisodeTrace& trace) override;
@@ -54,6 +55,7 @@ class HistoryStore : public HistorySink {
   Clock utc_now_ns_;
   LogSink log_;
   std::map<EventKey, std::int64_t> unsent_;
+  std::vector<std::pair<EventKey, std::int64_t>> recorded_;  // By Together().
 };
 
 }  // namespace fdi::monitor

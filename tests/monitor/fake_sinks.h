@@ -7,6 +7,7 @@
 #include <mutex>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "monitor/episode_tracker.h"
@@ -95,6 +96,10 @@ class FakeBus : public DecisionSink, public EventSink {
 
 class FakeHistory : public HistorySink {
  public:
+  void Together(const std::function<void()>& records) override {
+    std::this_thread::sleep_for(commit_time);
+    records();
+  }
   void Record(const EpisodeEvent& event) override {
     notice.Await([this] { return !stuck; });
     notice.Apply([&] {
@@ -141,6 +146,7 @@ class FakeHistory : public HistorySink {
   Notice notice;
   bool broken{false};
   bool stuck{false};
+  std::chrono::milliseconds commit_time{0};
   int attempts{0};
   std::map<std::pair<std::uint64_t, TransitionKind>, int> recorded;
   std::vector<DataGap> gaps;

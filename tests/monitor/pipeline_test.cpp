@@ -13,6 +13,11 @@ namespace {
 
 using std::chrono::milliseconds;
 
+std::string ValveName(int v) {
+  std::string name("V");
+  return name += std::to_string(v);
+}
+
 class PipelineTest : public testing::Test {
  protected:
   PipelineTest() {
@@ -185,6 +190,48 @@ TEST_F(PipelineTest, AnEventIsStoredBeforeItIsPublished) {
   EXPECT_EQ(counters_[Counter::kEpisodes], 1U);
   // All evidence up to the stop is there, the episode stays open.
   EXPECT_EQ(history_.trace_points, 80U);
+}
+
+// Of valves that fail in the same sample none waits for the commits of others.
+TEST_F(PipelineTest, EventsThatWaitTogetherAreStoredInOneCommit) {
+  constexpr int kValves = 100;
+  history_.commit_time = milliseconds(40);
+  Start();
+  for (int v = 0; v < kValves; ++v) {
+    Offer(ValveName(v), 0, 50);
+  }
+  for (std::uint64_t k = 50; k < 80; ++k) {
+    for (int v = 0; v < kValves; ++v) {
+      Offer(ValveName(v), k, k + 1, kF7Offset);
+    }
+  }
+  ASSERT_TRUE(AwaitEvents(2 * kValves));
+  pipeline_->Stop();
+
+  EXPECT_EQ(counters_[Counter::kEventsUnpersisted], 0U);
+  EXPECT_EQ(history_.recorded.size(), 2U * kValves);
+  for (const auto& [key, count] : history_.recorded) {
+    EXPECT_EQ(count, 1);
+  }
+}
+
+// A commit that fails as a whole is repeated as a whole, and nothing doubled.
+TEST_F(PipelineTest, ACommitOfManyThatFailsIsRepeated) {
+  history_.broken = true;
+  Start();
+  for (int v = 0; v < 20; ++v) {
+    OfferEpisode(ValveName(v));
+  }
+  ASSERT_TRUE(AwaitEvents(40));
+  history_.notice.Apply([&] { history_.broken = false; });
+  ASSERT_TRUE(
+      history_.notice.Await([&] { return history_.recorded.size() == 40; }));
+  pipeline_->Stop();
+
+  for (const auto& [key, count] : history_.recorded) {
+    EXPECT_EQ(count, 1);
+  }
+  EXPECT_EQ(history_.gaps.size(), 1U);
 }
 
 TEST_F(PipelineTest, AStuckHistoryHoldsAnEventUpForItsPatienceOnly) {

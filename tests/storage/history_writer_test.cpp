@@ -215,6 +215,41 @@ TEST_F(HistoryWriterTest, IsolationWithoutItsDetectionStillMakesTheEpisode) {
             "2026-11-20T14:56:11.000Z f7");
 }
 
+TEST_F(HistoryWriterTest, WhatIsRecordedTogetherIsThereAsAWholeOrNotAtAll) {
+  HistoryWriter writer(path_);
+  writer.BeginSession(kDetected, "test", "");
+  const auto record_both = [&] {
+    writer.Record(Event(TransitionKind::kDetected, 0));
+    writer.Record(
+        Event(TransitionKind::kDetected, 0, 0, 0.0, EndReason::kNone, "LV-2"));
+  };
+
+  EXPECT_THROW(writer.Together([&] {
+    record_both();
+    throw std::runtime_error("the disk");
+  }),
+               std::runtime_error);
+  EXPECT_EQ(Sql("SELECT count(*) FROM episode"), "0");
+  writer.Together(record_both);
+  writer.Together(record_both);
+
+  EXPECT_EQ(Sql("SELECT count(*) FROM episode"), "2");
+  EXPECT_EQ(Sql("SELECT count(*) FROM episode_event"), "2");
+  EXPECT_EQ(writer.UnsentEvents().size(), 2U);
+}
+
+TEST_F(HistoryWriterTest, AnEpisodeThatIsNotThereSpoilsNothingBesideIt) {
+  HistoryWriter writer(path_);
+  writer.Together([&] {
+    writer.Record(Event(TransitionKind::kDetected, 0));
+    EXPECT_THROW(writer.Resume(1, kDetected, kDetected), NotFoundError);
+    EXPECT_THROW(writer.Close(1, kDetected, EndReason::kUnknown, kDetected),
+                 NotFoundError);
+  });
+
+  EXPECT_EQ(Sql("SELECT count(*) FROM episode"), "1");
+}
+
 TEST_F(HistoryWriterTest, SameGapTwiceIsOneGap) {
   HistoryWriter writer(path_);
   const DataGap all{"", kDetected, kDetected + kSecond, "monitor_down"};
