@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <random>
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/regression.h"
+#include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
@@ -19,12 +19,9 @@ constexpr double kPoolTolerance = 1.1;
 constexpr double kLimitShare = 0.005;
 constexpr double kSaturatedShare = 0.02;
 
-double MeanSquare(const std::vector<double>& values) {
-  if (values.empty()) {
-    return std::numeric_limits<double>::infinity();
-  }
-  return std::inner_product(values.begin(), values.end(), values.begin(), 0.0) /
-         static_cast<double>(values.size());
+double ErrorOf(const std::vector<double>& residuals) {
+  return residuals.empty() ? std::numeric_limits<double>::infinity()
+                           : MeanSquare(residuals);
 }
 
 // Regressors of the pool, without the antecedents, whose signals the samples
@@ -107,8 +104,8 @@ TsModel FitRows(const ChannelPlan& plan,
   const auto validation_error = [&](const std::vector<TsRule>& rules) {
     const TsModel model =
         MakeModel(rules, data, regressors, plan.output, plan.parallel);
-    return MeanSquare(RunResiduals(model, condition.validation,
-                                   options.settling, past_output));
+    return ErrorOf(RunResiduals(model, condition.validation, options.settling,
+                                past_output));
   };
   RuleSelectionOptions rules = options.rules;
   for (const Regressor& antecedent : plan.antecedents) {
@@ -186,8 +183,7 @@ std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
     const auto criterion = [&](const std::vector<int>& indices) {
       const TsModel model =
           FitChannel(plan, chosen(indices), normal, trial, saturation);
-      return MeanSquare(
-          RunResiduals(model, normal.validation, options.settling));
+      return ErrorOf(RunResiduals(model, normal.validation, options.settling));
     };
     const StructureSearchResult result = SearchStructure(
         static_cast<int>(candidates.size()), criterion, options.structure);
@@ -229,8 +225,8 @@ TsModel FitFaultChannel(const ChannelPlan& plan, const TsModel& normal_model,
       Thinned(rows_of(condition), options.max_rows);
   const double past_output = normal_rows.y.mean();
   const auto error = [&](const TsModel& model) {
-    return MeanSquare(RunResiduals(model, condition.validation,
-                                   options.settling, past_output));
+    return ErrorOf(RunResiduals(model, condition.validation, options.settling,
+                                past_output));
   };
   TsModel own =
       FitRows(plan, regressors, fault_rows, condition, options, past_output);

@@ -21,9 +21,7 @@ Fold MakeFold(const Condition& normal, int fold) {
   Fold result;
   const bool whole_stretches = normal.training.size() >= 2 * kFolds;
   for (std::size_t i = 0; i < normal.training.size(); ++i) {
-    std::vector<Sample> whole = normal.training[i].samples;
-    const auto& tail = normal.validation[i].samples;
-    whole.insert(whole.end(), tail.begin(), tail.end());
+    std::vector<Sample> whole = WholeStretch(normal, i).samples;
     const std::string& id = normal.training[i].run_id;
     if (whole_stretches) {
       const bool left_out = static_cast<int>(i % kFolds) == fold;

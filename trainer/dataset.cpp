@@ -94,6 +94,12 @@ std::vector<Key> KeysOf(const TrainingRun& run, const DatasetOptions& options) {
   return keys;
 }
 
+bool IsNext(const Sample& before, const Sample& sample, double period_s) {
+  const auto period_ns = std::llround(period_s * 1e9);
+  return std::abs(sample.stamp_ns - before.stamp_ns - period_ns) <=
+         period_ns / 2;
+}
+
 struct Pool {
   double strength_sum{0.0};
   std::int64_t strength_count{0};
@@ -129,13 +135,11 @@ void AddStretch(const TrainingRun& run, std::size_t begin, std::size_t end,
 void CutRun(const TrainingRun& run, const DatasetOptions& options,
             Pools& pools) {
   const std::vector<Key> keys = KeysOf(run, options);
-  const auto period_ns = std::llround(run.period_s * 1e9);
   std::size_t begin = 0;
   for (std::size_t k = 1; k <= keys.size(); ++k) {
-    const bool continues = k < keys.size() && keys[k] == keys[begin] &&
-                           std::abs(run.samples[k].sample.stamp_ns -
-                                    run.samples[k - 1].sample.stamp_ns -
-                                    period_ns) <= period_ns / 2;
+    const bool continues =
+        k < keys.size() && keys[k] == keys[begin] &&
+        IsNext(run.samples[k - 1].sample, run.samples[k].sample, run.period_s);
     if (!continues) {
       if (keys[begin].usable) {
         AddStretch(run, begin, k, keys[begin], options, pools);
@@ -268,6 +272,36 @@ std::vector<Condition> BuildConditions(const std::vector<TrainingRun>& runs,
                     " samples of normal operation in a row");
   }
   return conditions;
+}
+
+std::vector<Stretch> SplitAtGaps(const TrainingRun& run) {
+  std::vector<Stretch> stretches;
+  for (const LabelledSample& labelled : run.samples) {
+    if (stretches.empty() || !IsNext(stretches.back().samples.back(),
+                                     labelled.sample, run.period_s)) {
+      stretches.push_back({run.id, {}});
+    }
+    stretches.back().samples.push_back(labelled.sample);
+  }
+  return stretches;
+}
+
+Stretch WholeStretch(const Condition& condition, std::size_t i) {
+  Stretch whole = condition.training[i];
+  const Stretch& tail = condition.validation[i];
+  whole.samples.insert(whole.samples.end(), tail.samples.begin(),
+                       tail.samples.end());
+  whole.strengths.insert(whole.strengths.end(), tail.strengths.begin(),
+                         tail.strengths.end());
+  return whole;
+}
+
+std::vector<Stretch> WholeStretches(const Condition& condition) {
+  std::vector<Stretch> whole;
+  for (std::size_t i = 0; i < condition.training.size(); ++i) {
+    whole.push_back(WholeStretch(condition, i));
+  }
+  return whole;
 }
 
 std::int64_t CountSamples(const std::vector<Stretch>& stretches) {

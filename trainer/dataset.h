@@ -51,6 +51,14 @@ struct DatasetOptions {
 std::vector<Condition> BuildConditions(const std::vector<TrainingRun>& runs,
                                        const DatasetOptions& options = {});
 
+/// The run cut wherever its samples are not one period apart.
+std::vector<Stretch> SplitAtGaps(const TrainingRun& run);
+
+/// Stretch i of the condition, training and validation part in a row.
+Stretch WholeStretch(const Condition& condition, std::size_t i);
+/// All of them.
+std::vector<Stretch> WholeStretches(const Condition& condition);
+
 /// Number of samples in `stretches`.
 std::int64_t CountSamples(const std::vector<Stretch>& stretches);
 

@@ -6,22 +6,14 @@
 
 #include "trainer/observer_calibration.h"
 #include "trainer/regression.h"
+#include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
 
-constexpr double kLeastDeviation = 0.2;  // of the normal residual's
 constexpr double kWorthOwnPast = 0.98;   // of the error without
 constexpr double kLowestPosition = 0.0;  // ends of the position transmitter [%]
 constexpr double kHighestPosition = 100.0;
-
-double MeanSquare(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double value : values) {
-    sum += value * value;
-  }
-  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
-}
 
 // The plan of a normal model that runs on its own past.
 ChannelPlan OwnPastPlan(const ChannelPlan& plan) {
@@ -46,6 +38,15 @@ bool AtLimit(const TsModel& normal, double reading) {
           (reading <= kLowestPosition || reading >= kHighestPosition));
 }
 
+std::vector<std::vector<double>> PredictAll(
+    const TsModel& model, const std::vector<Stretch>& stretches) {
+  std::vector<std::vector<double>> predictions;
+  for (const Stretch& stretch : stretches) {
+    predictions.push_back(RunPredictions(model, stretch));
+  }
+  return predictions;
+}
+
 // What the fault makes of a reading without the background of the valve;
 // readings at a limit stay.
 double CleanReading(const TsModel& normal, double healthy, double predicted,
@@ -58,27 +59,32 @@ double CleanReading(const TsModel& normal, double healthy, double predicted,
                       : faulty + predicted - healthy;
 }
 
+// ŷ_0 over the readings with the fault in force, which δ_i adds to; empty where
+// the observer stands for itself.
+using Predictions = std::vector<std::vector<double>>;  // by stretch
+
+Predictions BaseOf(const NormalChannel& channel,
+                   const std::vector<Stretch>& faulty) {
+  return channel.difference ? PredictAll(channel.normal, faulty)
+                            : Predictions{};
+}
+
 // The targets of δ_i, or of ŷ_i where it is not a difference, in place of the
 // readings.
 Condition Targets(const NormalChannel& channel,
                   const std::vector<Stretch>& healthy,
-                  const std::vector<Stretch>& faulty, int fault,
-                  double strength) {
+                  const std::vector<Stretch>& faulty, const Predictions& base,
+                  const FaultCondition& fault) {
   const Signal output = channel.normal.output;
-  Condition targets{fault, strength, {}, {}};
+  Condition targets{fault.fault, fault.strength, {}, {}};
   for (std::size_t i = 0; i < faulty.size(); ++i) {
-    const std::vector<double> expected =
-        RunPredictions(channel.normal, healthy[i]);
-    std::vector<double> base(expected.size(), 0.0);
-    if (channel.difference) {
-      base = RunPredictions(channel.normal, faulty[i]);
-    }
     Stretch stretch = faulty[i];
     for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
       stretch.samples[k].Set(
-          output, CleanReading(channel.normal, healthy[i].samples[k][output],
-                               expected[k], faulty[i].samples[k][output]) -
-                      base[k]);
+          output,
+          CleanReading(channel.normal, healthy[i].samples[k][output],
+                       channel.expected[i][k], faulty[i].samples[k][output]) -
+              (base.empty() ? 0.0 : base[i][k]));
     }
     targets.training.push_back(std::move(stretch));
     targets.validation.push_back({faulty[i].run_id, {}});
@@ -105,15 +111,14 @@ struct Readings {
 
 // Runs ŷ_i over the faulty readings, as the engine does.
 Readings RunObserver(const NormalChannel& channel, const TsModel& model,
-                     const std::vector<Stretch>& faulty, int settling) {
+                     const std::vector<Stretch>& faulty,
+                     const Predictions& base, int settling) {
   Readings readings;
-  for (const Stretch& stretch : faulty) {
+  for (std::size_t i = 0; i < faulty.size(); ++i) {
+    const Stretch& stretch = faulty[i];
     std::vector<double> predictions = RunPredictions(model, stretch);
-    if (channel.difference) {
-      const std::vector<double> base = RunPredictions(channel.normal, stretch);
-      for (std::size_t k = 0; k < base.size(); ++k) {
-        predictions[k] += base[k];
-      }
+    for (std::size_t k = 0; !base.empty() && k < predictions.size(); ++k) {
+      predictions[k] += base[i][k];
     }
     for (auto k = static_cast<std::size_t>(settling);
          k < stretch.samples.size(); ++k) {
@@ -149,7 +154,7 @@ NormalChannel ChooseNormal(const ChannelPlan& plan, const Condition& normal,
         RunResiduals(model, normal.validation, options.fit.settling));
   };
   NormalChannel channel{
-      plan, FitPlan(plan, normal, options, saturation), {}, false};
+      plan, FitPlan(plan, normal, options, saturation), {}, false, {}};
   channel.inputs = channel.normal;
   if (plan.own_past_pool.empty()) {
     return channel;
@@ -171,6 +176,7 @@ NormalChannel FitNormalChannel(const ChannelPlan& plan, const Condition& normal,
                                const TrainingOptions& options,
                                double saturation) {
   NormalChannel channel = ChooseNormal(plan, normal, options, saturation);
+  channel.expected = PredictAll(channel.normal, healthy);
   channel.adaptation.emplace(Base(channel), Whole(healthy));
   return channel;
 }
@@ -178,13 +184,15 @@ NormalChannel FitNormalChannel(const ChannelPlan& plan, const Condition& normal,
 ChannelObserver FitDifference(const NormalChannel& channel,
                               const ChannelObserver& normal_observer,
                               const std::vector<Stretch>& healthy,
-                              const std::vector<Stretch>& faulty, int fault,
-                              double strength, int settling) {
-  const Condition targets = Targets(channel, healthy, faulty, fault, strength);
+                              const std::vector<Stretch>& faulty,
+                              const FaultCondition& fault, int settling) {
+  const Predictions base = BaseOf(channel, faulty);
+  const Condition targets = Targets(channel, healthy, faulty, base, fault);
   const AdaptedModel adapted = channel.adaptation->Serves(targets)
                                    ? channel.adaptation->Fit(targets)
                                    : AdaptModel(Base(channel), targets);
-  Readings readings = RunObserver(channel, adapted.model, faulty, settling);
+  Readings readings =
+      RunObserver(channel, adapted.model, faulty, base, settling);
   const double sd = normal_observer.residual_sd;
   const double held_out = sd * sd + MeanSquare(adapted.residuals);
   const double widening = std::max(

@@ -10,6 +10,14 @@
 
 namespace fdi::trainer {
 
+/// A fault at a signed strength.
+struct FaultCondition {
+  int fault{0};
+  double strength{0.0};
+
+  bool operator==(const FaultCondition&) const = default;
+};
+
 /// The models of one channel in normal operation that difference observers
 /// build upon.
 struct NormalChannel {
@@ -17,6 +25,8 @@ struct NormalChannel {
   TsModel normal;    ///< ŷ_0, maybe on its own past.
   TsModel inputs;    ///< Without the own past: its rules serve the faults.
   bool difference{false};  ///< The two differ: faults add to ŷ_0.
+  /// ŷ_0 over the healthy stretches, by stretch and sample.
+  std::vector<std::vector<double>> expected{};
   /// For faults that leave the regressors of `inputs` as they are.
   std::optional<Adaptation> adaptation{};
 };
@@ -43,12 +53,13 @@ NormalChannel FitNormalChannel(const ChannelPlan& plan, const Condition& normal,
 /// and by what δ_i errs on the folds left out.
 ///
 /// @param normal_observer Calibrated (residual_sd) on residuals held out.
-/// @param healthy Stretches; `faulty` are the same with the fault in force.
+/// @param healthy As FitNormalChannel() got them; `faulty` are the same with
+/// the fault in force.
 /// @throws DataError as AdaptModel().
 ChannelObserver FitDifference(const NormalChannel& channel,
                               const ChannelObserver& normal_observer,
                               const std::vector<Stretch>& healthy,
-                              const std::vector<Stretch>& faulty, int fault,
-                              double strength, int settling);
+                              const std::vector<Stretch>& faulty,
+                              const FaultCondition& fault, int settling);
 
 }  // namespace fdi::trainer

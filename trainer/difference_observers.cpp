@@ -16,22 +16,11 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr double kLeastSd = 1e-6;
 constexpr double kLimitShare = 0.005;  // of the range of the transmitter
 
 // Shares of the work, for the progress bar.
 constexpr double kNormalShare = 0.1;
 constexpr double kObserverShare = 0.75;
-
-// Every stretch with its validation part.
-std::vector<Stretch> WholeStretches(const Condition& condition) {
-  std::vector<Stretch> whole = condition.training;
-  for (std::size_t i = 0; i < whole.size(); ++i) {
-    const std::vector<Sample>& tail = condition.validation[i].samples;
-    whole[i].samples.insert(whole[i].samples.end(), tail.begin(), tail.end());
-  }
-  return whole;
-}
 
 // Blocks of 600 samples, evenly spread, where there are more than 3600 in all:
 // faults are exact, and more of the same tells nothing about them.
@@ -171,8 +160,7 @@ std::vector<Condition> FitFaults(const Healthy& healthy,
     for (std::size_t c = 0; c < healthy.channels.size(); ++c) {
       observer.channels[c] = FitDifference(
           healthy.channels[c], models.observers.front().channels[c],
-          healthy.stretches, faulty, fault.fault, fault.strength,
-          options.fit.settling);
+          healthy.stretches, faulty, fault, options.fit.settling);
     }
     compared[static_cast<std::size_t>(i) + 1] =
         ValidationPart(fault, faulty, options.dataset.validation_share);

@@ -4,17 +4,10 @@
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "trainer/difference_fit.h"
 #include "trainer/training.h"
 
 namespace fdi::trainer {
-
-/// A fault at a signed strength.
-struct FaultCondition {
-  int fault{0};
-  double strength{0.0};
-
-  bool operator==(const FaultCondition&) const = default;
-};
 
 /// The samples of a healthy stretch as the valve would have answered with the
 /// fault in force all the time. Called from several threads.

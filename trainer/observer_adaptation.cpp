@@ -12,6 +12,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/regression.h"
+#include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
@@ -41,14 +42,9 @@ Rows CollectRows(const TsModel& normal, const Condition& condition) {
   std::vector<RegressionData> parts;
   Index count = 0;
   for (std::size_t i = 0; i < condition.training.size(); ++i) {
-    Stretch whole = condition.training[i];
-    const auto& tail = condition.validation[i].samples;
-    whole.samples.insert(whole.samples.end(), tail.begin(), tail.end());
+    const Stretch whole = WholeStretch(condition, i);
     parts.push_back(
         BuildRegression({&whole, 1}, normal.regressors, normal.output));
-    whole.strengths.insert(whole.strengths.end(),
-                           condition.validation[i].strengths.begin(),
-                           condition.validation[i].strengths.end());
     const Index n = parts.back().y.size();
     const std::size_t lag = whole.samples.size() - static_cast<std::size_t>(n);
     for (Index k = 0; k < n; ++k) {
@@ -135,25 +131,15 @@ Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
 }
 
 // Residuals as the engine forms them; NaN where they say nothing.
-VectorXd Residuals(const TsModel& limits, const VectorXd& y,
-                   const VectorXd& predicted) {
-  VectorXd residuals(y.size());
+std::vector<double> Residuals(const TsModel& limits, const VectorXd& y,
+                              const VectorXd& predicted) {
+  std::vector<double> residuals;
   for (Index k = 0; k < y.size(); ++k) {
-    residuals(k) = Residual(
+    residuals.push_back(Residual(
         limits, y(k),
-        std::clamp(predicted(k), limits.output_min, limits.output_max));
+        std::clamp(predicted(k), limits.output_min, limits.output_max)));
   }
   return residuals;
-}
-
-double MeanSquare(const VectorXd& residuals) {
-  double sum = 0.0;
-  double count = 0.0;
-  for (const double r : residuals) {
-    sum += std::isnan(r) ? 0.0 : r * r;
-    count += std::isnan(r) ? 0.0 : 1.0;
-  }
-  return count > 0.0 ? sum / count : 0.0;
 }
 
 void AddTo(TsModel& model, const VectorXd& theta, const Scale& scale) {
@@ -280,16 +266,17 @@ AdaptedModel Adaptation::Fit(const Condition& condition) const {
   Require(y.size() == impl_->base.size(), "other rows than those prepared");
   AdaptedModel adapted;
   adapted.model = Widened(impl_->normal, y);
-  VectorXd best = Residuals(adapted.model, y, impl_->base);
+  std::vector<double> best = Residuals(adapted.model, y, impl_->base);
   double error = kWorthAdapting * MeanSquare(best);
   std::optional<std::size_t> chosen;
   std::vector<VectorXd> thetas(kFolds, VectorXd::Zero(impl_->design.cols()));
   for (std::size_t p = 0; p < kPenalties.size(); ++p) {
-    const VectorXd residuals =
+    std::vector<double> residuals =
         Residuals(adapted.model, y, impl_->CrossPredict(y, p, thetas));
-    if (MeanSquare(residuals) < error) {
-      error = MeanSquare(residuals);
-      best = residuals;
+    const double square = MeanSquare(residuals);
+    if (square < error) {
+      error = square;
+      best = std::move(residuals);
       chosen = p;
     }
   }
@@ -300,8 +287,9 @@ AdaptedModel Adaptation::Fit(const Condition& condition) const {
     adapted.model = impl_->normal;
   }
   for (Index k = 0; k < y.size(); ++k) {
-    if (!std::isnan(best(k))) {
-      adapted.residuals.push_back(best(k));
+    const double residual = best[static_cast<std::size_t>(k)];
+    if (!std::isnan(residual)) {
+      adapted.residuals.push_back(residual);
       adapted.outputs.push_back(y(k));
     }
   }

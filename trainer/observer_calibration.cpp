@@ -9,7 +9,6 @@ namespace fdi::trainer {
 namespace {
 
 constexpr std::size_t kFewResiduals = 20;
-constexpr double kLeastSd = 1e-6;
 
 }  // namespace
 

@@ -1,6 +1,7 @@
 #include "trainer/statistics.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace fdi::trainer {
 
@@ -19,6 +20,16 @@ double Variance(std::span<const double> values) {
     sum += (value - mean) * (value - mean);
   }
   return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
+}
+
+double MeanSquare(std::span<const double> values) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (const double value : values) {
+    sum += std::isnan(value) ? 0.0 : value * value;
+    count += std::isnan(value) ? 0.0 : 1.0;
+  }
+  return count > 0.0 ? sum / count : 0.0;
 }
 
 double SortedQuantile(const std::vector<double>& sorted, double q) {

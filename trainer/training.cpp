@@ -15,9 +15,6 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr double kLeastSd = 1e-6;
-constexpr double kLeastDeviation = 0.2;  // of the normal residual's
-
 // Shares of the work, for the progress bar.
 constexpr double kStructureShare = 0.3;
 constexpr double kObserverShare = 0.5;

@@ -54,6 +54,17 @@ TEST(DatasetTest, AbruptFaultIsCutWhereItBeginsAndTheStepIsLeftOut) {
   EXPECT_EQ(LastIndex(conditions[1].validation[0]), 399);
 }
 
+TEST(DatasetTest, GapsAndRepeatsCutARun) {
+  TrainingRun run = MakeRun("a", 10, Normal());
+  run.samples[4].sample.stamp_ns += 700'000'000;  // and back again
+  const std::vector<Stretch> parts = SplitAtGaps(run);
+  ASSERT_EQ(parts.size(), 3U);
+  EXPECT_EQ(LastIndex(parts[0]), 3);
+  EXPECT_EQ(FirstIndex(parts[1]), 4);
+  EXPECT_EQ(FirstIndex(parts[2]), 5);
+  EXPECT_EQ(LastIndex(parts[2]), 9);
+}
+
 TEST(DatasetTest, LastShareOfEveryStretchValidates) {
   const auto conditions = BuildConditions({MakeRun("a", 220, Normal())});
   EXPECT_EQ(CountSamples(conditions[0].training), 140);

@@ -131,6 +131,11 @@ TEST(OnboardTest, RefusesWhatIsNotHealthyData) {
   run.samples[300].truth = FaultTruth{19, 0.5};
   EXPECT_THROW(Onboard({run}, options), DataError);
   EXPECT_THROW(Onboard({RunOf(Strange(300.0))}, options), DataError);
+  TrainingRun gap = RunOf(Strange(1000.0));
+  for (std::size_t k = 500; k < gap.samples.size(); ++k) {
+    gap.samples[k].sample.stamp_ns += 60'000'000'000;
+  }
+  EXPECT_THROW(Onboard({gap}, options), DataError);
   TrainingRun without_x = RunOf(Strange(700.0));
   for (LabelledSample& labelled : without_x.samples) {
     labelled.sample.present = kBasicSignals & ~MaskOf(Signal::kX);

@@ -11,6 +11,7 @@
 #include "storage/models.h"
 #include "trainer/app/evaluate_options.h"
 #include "trainer/app/history_records.h"
+#include "trainer/event_rate.h"
 
 namespace fdi::trainer {
 namespace {
@@ -19,7 +20,6 @@ using cli::Align;
 using cli::FormatNumber;
 
 constexpr double kDayS = 86400.0;
-constexpr double kYearH = 8766.0;
 constexpr std::array kOutcomes{OrderOutcome::kExact,  OrderOutcome::kContained,
                                OrderOutcome::kWrong,  OrderOutcome::kUnknown,
                                OrderOutcome::kMissed, OrderOutcome::kSilent,
@@ -161,11 +161,11 @@ void Print(std::ostream& out, const BackTest& test, const Hours& hours,
       << " samples rejected; " << test.false_episodes.size()
       << " false episodes";
   if (hours.live > 0.0) {
-    out << ", "
-        << FormatNumber(static_cast<double>(test.false_episodes.size()) *
-                            kYearH / hours.live,
-                        2)
-        << " per valve-year";
+    const EventRate rate =
+        RateOf(static_cast<int>(test.false_episodes.size()), hours.live);
+    out << ", " << FormatNumber(rate.per_year, 2)
+        << " per valve-year (95 %: below " << FormatNumber(rate.upper, 2)
+        << ')';
   }
   out << '\n';
 }

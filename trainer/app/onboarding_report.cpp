@@ -6,6 +6,7 @@
 #include "diagnosis/fault_catalogue.h"
 #include "storage/cli/text_table.h"
 #include "trainer/app/model_report.h"
+#include "trainer/event_rate.h"
 
 namespace fdi::trainer {
 namespace {
@@ -151,7 +152,7 @@ void PrintOnboarding(std::ostream& out, const Onboarding& onboarding) {
   out << "model set " << models.name << '@' << models.version << ", hash "
       << HashText(models.content_hash) << ", " << models.observers.size()
       << " observers; thresholds for "
-      << FormatNumber(models.false_alarms_per_hour * 8766.0, 1)
+      << FormatNumber(models.false_alarms_per_hour * kHoursPerYear, 1)
       << " false alarms per valve-year from "
       << FormatNumber(models.threshold_hours, 2) << " h\n"
       << "not told apart: " << GroupsText(models)

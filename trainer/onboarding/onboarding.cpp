@@ -26,11 +26,22 @@ Progress Part(const Progress& progress, double from, double share) {
   };
 }
 
+// For the coverage table, too.
+Stretch LongestStretch(const std::vector<TrainingRun>& runs) {
+  Stretch longest;
+  for (const TrainingRun& run : runs) {
+    for (Stretch& stretch : SplitAtGaps(run)) {
+      if (stretch.samples.size() > longest.samples.size()) {
+        longest = std::move(stretch);
+      }
+    }
+  }
+  return longest;
+}
+
 void RequireHealthy(const std::vector<TrainingRun>& runs) {
   Require(!runs.empty(), "no run was given");
-  std::size_t samples = 0;
   for (const TrainingRun& run : runs) {
-    samples += run.samples.size();
     for (const LabelledSample& labelled : run.samples) {
       if (labelled.truth && labelled.truth->strength != 0.0) {
         throw DataError("run " + run.id +
@@ -39,9 +50,10 @@ void RequireHealthy(const std::vector<TrainingRun>& runs) {
       }
     }
   }
-  if (samples < kLeastSamples) {
-    throw DataError("the runs have " + std::to_string(samples) +
-                    " samples, onboarding takes at least " +
+  const std::size_t longest = LongestStretch(runs).samples.size();
+  if (longest < kLeastSamples) {
+    throw DataError("the runs have at most " + std::to_string(longest) +
+                    " samples in a row, onboarding takes at least " +
                     std::to_string(kLeastSamples));
   }
 }
@@ -62,17 +74,12 @@ std::vector<simulator::HealthyRecord> Records(
     const std::vector<TrainingRun>& runs, const simulator::InputRow& levels) {
   std::vector<simulator::HealthyRecord> records;
   for (const TrainingRun& run : runs) {
-    const auto period_ns = std::llround(run.period_s * 1e9);
-    std::int64_t last_ns = 0;
-    for (const LabelledSample& labelled : run.samples) {
-      const Sample& sample = labelled.sample;
-      if (&labelled == &run.samples.front() ||
-          sample.stamp_ns - last_ns > 3 * period_ns / 2) {
-        records.emplace_back();
+    for (const Stretch& stretch : SplitAtGaps(run)) {
+      records.emplace_back();
+      for (const Sample& sample : stretch.samples) {
+        records.back().rows.push_back(
+            {InputsOf(sample, levels), sample[Signal::kX], sample[Signal::kF]});
       }
-      last_ns = sample.stamp_ns;
-      records.back().rows.push_back(
-          {InputsOf(sample, levels), sample[Signal::kX], sample[Signal::kF]});
     }
   }
   return records;
@@ -121,27 +128,6 @@ std::vector<ChannelFit> FitsOf(const ModelSet& models,
                     NaiveError(runs, models.channels[c].output)});
   }
   return fits;
-}
-
-// The longest part without a gap, for the coverage table.
-Stretch LongestStretch(const std::vector<TrainingRun>& runs) {
-  Stretch longest;
-  for (const TrainingRun& run : runs) {
-    const auto period_ns = std::llround(run.period_s * 1e9);
-    Stretch stretch{run.id, {}};
-    for (const LabelledSample& labelled : run.samples) {
-      if (!stretch.samples.empty() &&
-          labelled.sample.stamp_ns - stretch.samples.back().stamp_ns >
-              3 * period_ns / 2) {
-        stretch.samples.clear();
-      }
-      stretch.samples.push_back(labelled.sample);
-      if (stretch.samples.size() > longest.samples.size()) {
-        longest = stretch;
-      }
-    }
-  }
-  return longest;
 }
 
 TrainingOptions TrainingOf(const OnboardingOptions& options,
@@ -213,7 +199,7 @@ CoverageTable AssessType(const ValveType& type, SignalMask signals,
                          bool with_gains, const OnboardingOptions& options,
                          const Progress& progress) {
   constexpr double kSeconds = 1800.0;
-  const TrainingRun full = SimulatedRun(type, kSeconds);
+  const TrainingRun full = SimulateHealthyRun(type, kSeconds);
   std::vector<Signal> missing;
   for (const Signal signal :
        {Signal::kF, Signal::kP1, Signal::kP2, Signal::kT1}) {

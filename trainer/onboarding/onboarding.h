@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "simulator/valve_identification.h"
-#include "trainer/onboarding/coverage.h"
+#include "trainer/onboarding/fault_coverage.h"
 
 namespace fdi::trainer {
 
@@ -40,11 +40,6 @@ struct Onboarding {
   SignalMask signals{0};  ///< That the valve measures.
   double hours{0.0};      ///< Of healthy data.
 };
-
-/// The `extended` preset for a valve that measures `signals`: channels that
-/// need others are left out, the normal observer of X may run on its past.
-/// @throws DataError if CV or X is not among them.
-TrainingOptions OnboardingPreset(SignalMask signals);
 
 /// Makes a model set for a valve from healthy runs alone: fits the physical
 /// parameters of the type to them, simulates every fault of OnboardingFaults()

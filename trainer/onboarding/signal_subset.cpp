@@ -1,7 +1,6 @@
 #include "trainer/onboarding/signal_subset.h"
 
 #include "diagnosis/error.h"
-#include "trainer/onboarding/onboarding.h"
 
 namespace fdi::trainer {
 namespace {
@@ -24,7 +23,7 @@ TrainingRun WithSignals(TrainingRun run, SignalMask signals) {
   return run;
 }
 
-TrainingRun SimulatedRun(const ValveType& type, double duration_s) {
+TrainingRun SimulateHealthyRun(const ValveType& type, double duration_s) {
   TrainingRun run;
   run.id = type.name;
   run.flow_unit = type.parameters.instruments.flow_unit;

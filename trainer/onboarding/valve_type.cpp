@@ -40,12 +40,8 @@ std::vector<FaultCondition> OnboardingFaults(SignalMask signals) {
       Add(fault, kStrengths, false, faults);
     }
   }
-  const std::array<std::pair<Signal, int>, 3> transmitters{
-      {{Signal::kT1, kTemperatureTransmitterFault},
-       {Signal::kP1, kInletPressureTransmitterFault},
-       {Signal::kP2, kOutletPressureTransmitterFault}}};
-  for (const auto& [signal, fault] : transmitters) {
-    if (measured(signal)) {
+  for (int fault = kFaultCount + 1; fault <= kLastFault; ++fault) {
+    if (measured(*TransmitterOf(fault))) {
       Add(fault, kTransmitterStrengths, true, faults);
     }
   }

@@ -1,4 +1,4 @@
-#include "trainer/onboarding/coverage.h"
+#include "trainer/onboarding/fault_coverage.h"
 
 #include <algorithm>
 #include <cmath>
