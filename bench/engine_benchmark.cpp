@@ -1,0 +1,94 @@
+// Cost of one sample in the diagnosis engine: time on one core, memory of an
+// engine, time to make many. The model sets are synthetic (synthetic_models.h).
+#include <memory>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+#include <malloc.h>
+
+#include "bench/synthetic_models.h"
+#include "diagnosis/valve_engine.h"
+
+namespace fdi::bench {
+namespace {
+
+constexpr int kSettled = 200;   // samples until the valve is judged
+constexpr int kSamples = 2000;  // measured in a row
+constexpr double kFault = 4.0;  // shift of F that is detected
+constexpr int kManyValves = 1000;
+
+using Models = std::shared_ptr<const ModelSet>;
+
+Models Paper(int observers) {
+  return std::make_shared<const ModelSet>(PaperSet(observers));
+}
+
+Models Extended(int observers) {
+  return std::make_shared<const ModelSet>(ExtendedSet(observers));
+}
+
+std::size_t HeapBytes() {
+  const struct mallinfo2 info = mallinfo2();
+  return info.uordblks + info.hblkhd;
+}
+
+// Moves `sample` on as if it came so many samples later.
+void Later(Sample& sample, std::uint64_t samples) {
+  sample.seq += samples;
+  sample.stamp_ns += static_cast<std::int64_t>(samples) * 1'000'000'000;
+}
+
+// One valve, in normal operation (argument 1 is 0) or in an episode.
+template <Models (*MakeModels)(int)>
+void StepOneValve(benchmark::State& state) {
+  const bool faulty = state.range(1) != 0;
+  ValveEngine engine(MakeModels(static_cast<int>(state.range(0))));
+  for (const Sample& sample : Samples(kSettled, 0, 0.0)) {
+    engine.Step(sample);
+  }
+  std::vector<Sample> samples =
+      Samples(kSamples, kSettled, faulty ? kFault : 0.0);
+  for (Sample& sample : samples) {
+    Later(sample, kSettled);
+    engine.Step(sample);
+  }
+  std::int64_t open = 0;
+  for ([[maybe_unused]] auto _ : state) {
+    for (Sample& sample : samples) {
+      Later(sample, kSamples);
+      benchmark::DoNotOptimize(engine.Step(sample));
+      open += engine.episode_open() ? 1 : 0;
+    }
+  }
+  const std::int64_t steps = state.iterations() * kSamples;
+  state.SetItemsProcessed(steps);
+  state.counters["in_episode"] =
+      static_cast<double>(open) / static_cast<double>(steps);
+  state.counters["per_sample"] = benchmark::Counter(
+      static_cast<double>(steps),
+      benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(StepOneValve<Paper>)->ArgsProduct({{11, 33}, {0, 1}});
+BENCHMARK(StepOneValve<Extended>)->ArgsProduct({{45, 98}, {0, 1}});
+
+// 1000 engines of one model set; what each needs beside it.
+template <Models (*MakeModels)(int)>
+void MakeEngines(benchmark::State& state) {
+  const Models models = MakeModels(static_cast<int>(state.range(0)));
+  double bytes = 0.0;
+  for ([[maybe_unused]] auto _ : state) {
+    std::vector<ValveEngine> engines;
+    engines.reserve(kManyValves);
+    const std::size_t before = HeapBytes();
+    for (int i = 0; i < kManyValves; ++i) {
+      engines.emplace_back(models);
+    }
+    bytes = static_cast<double>(HeapBytes() - before) / kManyValves;
+  }
+  state.counters["bytes_per_engine"] = bytes;
+}
+BENCHMARK(MakeEngines<Paper>)->Arg(33)->Unit(benchmark::kMillisecond);
+BENCHMARK(MakeEngines<Extended>)->Arg(98)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace fdi::bench
