@@ -5,10 +5,11 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 packages=(
-  g++ cmake ninja-build git ca-certificates
+  g++ cmake ninja-build pkg-config git ca-certificates
   libfastrtps-dev libfastcdr-dev fastddsgen
   libeigen3-dev libsundials-dev
   libsqlite3-dev libsqlitecpp-dev sqlite3 zlib1g-dev libssl-dev
+  libcpp-httplib-dev libsystemd-dev
   libcli11-dev libtomlplusplus-dev libspdlog-dev nlohmann-json3-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   gnuplot-nox

@@ -4,7 +4,6 @@
 #include <cctype>
 
 namespace fdi::monitor {
-
 namespace {
 
 std::string LowerCase(std::string_view name) {
@@ -15,34 +14,82 @@ std::string LowerCase(std::string_view name) {
   return lower;
 }
 
+struct CounterInfo {
+  std::string_view name;
+  CounterMetric metric;
+};
+
+constexpr std::string_view kExcluded = "fdi_samples_excluded_total";
+constexpr std::string_view kExcludedHelp =
+    "Samples that were not diagnosed, by reason";
+
+// In the order of Counter.
+constexpr std::array<CounterInfo, kCounterCount> kInfos{{
+    {"received",
+     {"fdi_samples_received_total", "Samples handed to the pipeline", "", ""}},
+    {"diagnosed",
+     {"fdi_samples_diagnosed_total", "Samples that went through an engine", "",
+      ""}},
+    {"unassigned", {kExcluded, kExcludedHelp, "reason", "unassigned"}},
+    {"refused_samples", {kExcluded, kExcludedHelp, "reason", "max_valves"}},
+    {"filtered_samples", {kExcluded, kExcludedHelp, "reason", "filtered"}},
+    {"bad_ids", {kExcluded, kExcludedHelp, "reason", "valve_id"}},
+    {"decisions",
+     {"fdi_decision_vectors_total", "Decision vectors handed to the bus", "",
+      ""}},
+    {"decisions_unsent",
+     {"fdi_decision_vectors_unsent_total",
+      "Decision vectors that the bus did not take", "", ""}},
+    {"events", {"fdi_fault_events_total", "Fault events published", "", ""}},
+    {"events_unpersisted",
+     {"fdi_fault_events_unpersisted_total",
+      "Fault events published before they were in the history", "", ""}},
+    {"events_unsent",
+     {"fdi_fault_events_unsent_total", "Fault events that the bus did not take",
+      "", ""}},
+    {"events_resent",
+     {"fdi_fault_events_resent_total",
+      "Fault events of an earlier session, sent again", "", ""}},
+    {"events_lost",
+     {"fdi_fault_events_lost_total",
+      "Fault events that will never be in the history", "", ""}},
+    {"persist_failures",
+     {"fdi_history_failures_total", "Failed transactions on history.db", "",
+      ""}},
+    {"trace_dropped",
+     {"fdi_trace_points_dropped_total",
+      "Points of evidence that were not stored", "", ""}},
+    {"recorded",
+     {"fdi_samples_recorded_total", "Samples committed to runs.db", "", ""}},
+    {"record_dropped",
+     {"fdi_samples_unrecorded_total", "Samples missing in runs.db", "", ""}},
+    {"record_failures",
+     {"fdi_record_failures_total", "Failed commits of runs.db", "", ""}},
+    {"gaps", {"fdi_gaps_total", "Gaps in the stream of a valve", "", ""}},
+    {"stale_events",
+     {"fdi_valve_silences_total", "Times a valve fell silent", "", ""}},
+    {"episodes", {"fdi_episodes_total", "Fault episodes begun", "", ""}},
+    {"model_swaps",
+     {"fdi_model_swaps_total", "Valves that changed to another model set", "",
+      ""}},
+    {"model_failures",
+     {"fdi_model_failures_total", "Model sets that could not be loaded", "",
+      ""}},
+}};
+static_assert(!kInfos.back().name.empty(), "a counter has no name");
+
+const CounterInfo& InfoOf(Counter counter) {
+  return kInfos[static_cast<std::size_t>(counter)];
+}
+
 }  // namespace
 
 std::string_view CounterName(Counter counter) {
-  static constexpr std::array<std::string_view, kCounterCount> kNames{
-      "received",
-      "diagnosed",
-      "unassigned",
-      "refused_samples",
-      "filtered_samples",
-      "bad_ids",
-      "decisions",
-      "decisions_unsent",
-      "events",
-      "events_unpersisted",
-      "events_unsent",
-      "events_resent",
-      "events_lost",
-      "persist_failures",
-      "trace_dropped",
-      "recorded",
-      "record_dropped",
-      "record_failures",
-      "gaps",
-      "stale_events",
-      "episodes",
-      "model_swaps",
-      "model_failures"};
-  return kNames[static_cast<std::size_t>(counter)];
+  return InfoOf(counter).name;
+}
+
+const CounterMetric& MetricOf(Counter counter) {
+  return InfoOf(counter).metric;
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> Counters::Snapshot() const {

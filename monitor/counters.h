@@ -45,6 +45,16 @@ inline constexpr std::size_t kCounterCount =
 
 std::string_view CounterName(Counter counter);  ///< "received", ...
 
+/// How a counter is exposed: counters of one family stand side by side and
+/// differ in a label.
+struct CounterMetric {
+  std::string_view family;  ///< "fdi_samples_received_total", ...
+  std::string_view help;
+  std::string_view label;  ///< Empty: the family has one value.
+  std::string_view value;
+};
+const CounterMetric& MetricOf(Counter counter);
+
 /// Totals by reason. Thread safe.
 class Counters {
  public:

@@ -35,6 +35,7 @@ enum class LogId : std::uint8_t {
   kRecordDropped,  ///< M131 record_dropped
   kRecordFailed,   ///< M132 record_failed
   kTransport,      ///< M141 transport_loss
+  kStalled,        ///< M151 threads_stalled
   kCount_
 };
 

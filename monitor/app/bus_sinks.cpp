@@ -53,7 +53,7 @@ std::string IsolatedNames(const idl::FaultEventMessage& message) {
   std::string names;
   for (const idl::FaultCandidate& candidate : message.candidates) {
     if (candidate.isolated) {
-      names += (names.empty() ? "" : "|") + FaultName(candidate.fault);
+      names.append(names.empty() ? "" : "|").append(FaultName(candidate.fault));
     }
   }
   return names.empty() ? "unknown" : names;

@@ -72,6 +72,11 @@ bool ModelAssignment::IsolationHeld(std::string_view valve_id) const {
   return entry && entry->baseline() == storage::BaselineState::kProvisional;
 }
 
+std::size_t ModelAssignment::loaded() const {
+  const std::lock_guard lock(mutex_);
+  return loaded_.size();
+}
+
 std::string ModelAssignment::DefaultName() const {
   return default_ ? default_->name + "@" + std::to_string(default_->version)
                   : "none";

@@ -38,6 +38,9 @@ class ModelAssignment : public ModelResolver {
   /// While the baseline of the valve is provisional.
   bool IsolationHeld(std::string_view valve_id) const override;
 
+  /// How many sets are in use or were, one at least unless none is assigned.
+  std::size_t loaded() const;
+
   /// "NAME@VERSION", or "none".
   std::string DefaultName() const;
 

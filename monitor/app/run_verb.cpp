@@ -14,6 +14,7 @@ namespace {
 struct RunArguments {
   std::string model_set;
   std::string record{"off"};
+  std::string http{"off"};
   ServiceOptions service;
 };
 
@@ -32,6 +33,14 @@ std::string ParseRecord(const std::string& word) {
   return word;
 }
 
+// As --record; what is an address is checked where it is used.
+std::string ParseHttp(const std::string& word) {
+  if (word == "true" || word == "on") {
+    return "127.0.0.1:9464";
+  }
+  return word == "false" ? "off" : word;
+}
+
 int Run(const RunArguments& arguments, const cli::Context& context) {
   ServiceOptions options = arguments.service;
   if (!arguments.model_set.empty()) {
@@ -40,6 +49,9 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
   if (arguments.record != "off") {
     options.recording =
         arguments.record == "lossless" ? Recording::kLossless : Recording::kOn;
+  }
+  if (arguments.http != "off") {
+    options.http = ParseHttpAddress(arguments.http);
   }
   cli::StopSignals signals;
   Service service(options, context);
@@ -85,6 +97,11 @@ void AddRunVerb(cli::Program& program) {
                  "samples")
       ->check(CLI::Range(0.0, 1800.0))
       ->capture_default_str();
+  run.add_flag("--http{127.0.0.1:9464}", arguments->http,
+               "Serve /metrics, /healthz and /readyz; port 0: any free one")
+      ->default_str("off")
+      ->transform(ParseHttp)
+      ->type_name("[=[ADDRESS:]PORT]");
   run.add_option("--status-period", service.status_period_s,
                  "Time between status lines in the log [s]")
       ->check(CLI::Range(1.0, 86400.0))

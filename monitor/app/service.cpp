@@ -14,6 +14,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kTakeTimeout{100};
+constexpr int kTakeLimit = 4096;  // Under full load Take() has no other end.
 constexpr milliseconds kTickPeriod{1000};
 constexpr milliseconds kDrainLimit{1000};
 constexpr milliseconds kSubscriberPatience{1000};  // at shutdown
@@ -52,6 +53,15 @@ PipelineOptions PipelineOptionsOf(const ServiceOptions& options) {
   return pipeline;
 }
 
+std::vector<Heartbeat::Member> Members(const Pipeline& pipeline,
+                                       const Pulse& intake,
+                                       const Pulse& service) {
+  std::vector<Heartbeat::Member> members = pipeline.threads();
+  members.push_back({"intake", &intake});
+  members.push_back({"service", &service});
+  return members;
+}
+
 std::filesystem::path LockOf(const storage::DataDirectory& data) {
   std::filesystem::path path = data.history();
   return path += ".lock";
@@ -62,6 +72,8 @@ std::filesystem::path LockOf(const storage::DataDirectory& data) {
 Service::Service(const ServiceOptions& options, const cli::Context& context)
     : options_(options),
       context_(context),
+      http_(options.http ? std::make_unique<HttpServer>(*options.http)
+                         : nullptr),
       data_(Prepared(context.options.data_dir)),
       lock_(LockOf(data_), "recording faults"),
       participant_(DdsOptionsOf(options, context.options), context.log,
@@ -71,6 +83,7 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
       assignment_(std::make_shared<const ModelAssignment>(
           data_.models(), options.model_set,
           [this](const ModelSet& models) { AnnounceModels(models); })),
+      model_sets_(assignment_->loaded()),
       history_(data_.history(), context.software, context.command_line,
                cli::NowNs, context.log),
       runs_(options.recording == Recording::kOff
@@ -88,14 +101,20 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
       pipeline_(PipelineOptionsOf(options),
                 {decisions_, events_, history_, runs_.get()}, assignment_,
                 counters_, log_),
+      heartbeat_(Members(pipeline_, intake_pulse_, service_pulse_)),
       started_ns_(cli::NowNs()),
       last_status_line_(std::chrono::steady_clock::now()) {
   ResendEvents();
   pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators());
   intake_ = std::jthread([this](const std::stop_token& stop) { Intake(stop); });
+  if (http_) {
+    ServeProbes();
+  }
 }
 
-Service::~Service() = default;
+Service::~Service() {
+  http_.reset();  // Its threads look at all the rest.
+}
 
 void Service::AnnounceModels(const ModelSet& models) {
   models_topic_.Write(idl::Describe(models));
@@ -127,11 +146,12 @@ void Service::Intake(const std::stop_token& stop) {
         }};
     const std::stop_callback wake(stop, [this] { samples_.Interrupt(); });
     while (!stop.stop_requested() && !pipeline_.failed()) {
-      samples_.Take(handlers, kTakeTimeout);
+      samples_.Take(handlers, kTakeTimeout, kTakeLimit);
+      intake_pulse_.Beat();
     }
     // What is there already; publishers that go on do not keep us.
     while (std::chrono::steady_clock::now() < drain_until_.load() &&
-           samples_.Take(handlers, milliseconds(0), 4096) > 0) {
+           samples_.Take(handlers, milliseconds(0), kTakeLimit) > 0) {
     }
   } catch (...) {
     intake_error_ = std::current_exception();
@@ -147,22 +167,29 @@ int Service::Run(cli::StopSignals& signals) {
       " max_valves=" + std::to_string(options_.max_valves) +
       " domain=" + std::to_string(context_.options.domain) + "\n";
   std::fputs(ready.c_str(), stderr);
+  manager_.Ready();
   auto next_tick = std::chrono::steady_clock::now();
+  if (manager_.watchdog_limit()) {
+    watchdog_.emplace(heartbeat_, *manager_.watchdog_limit() / 2, next_tick);
+  }
   while (!pipeline_.failed() && !intake_failed_) {
     const auto now = std::chrono::steady_clock::now();
+    service_pulse_.Beat();
     if (now >= next_tick) {
       Tick();
       next_tick = now + kTickPeriod;
     }
-    const cli::StopSignals::Event event =
-        signals.WaitFor(std::chrono::duration_cast<milliseconds>(
-                            next_tick - std::chrono::steady_clock::now()) +
-                        milliseconds(1));
+    const cli::StopSignals::Event event = signals.WaitFor(
+        std::chrono::duration_cast<milliseconds>(
+            FeedWatchdog(next_tick) - std::chrono::steady_clock::now()) +
+        milliseconds(1));
     if (event == cli::StopSignals::Event::kStop) {
       break;
     }
     if (event == cli::StopSignals::Event::kReload) {
+      manager_.Reloading();
       Reload("signal");
+      manager_.Ready();
     }
   }
   Shutdown();
@@ -175,6 +202,19 @@ int Service::Run(cli::StopSignals& signals) {
   return incomplete ? cli::kExitData : cli::kExitOk;
 }
 
+// @returns when to look again, `next_tick` at the latest.
+Service::TimePoint Service::FeedWatchdog(TimePoint next_tick) {
+  if (!watchdog_) {
+    return next_tick;
+  }
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (watchdog_->Tell(now)) {
+    manager_.Alive();
+  }
+  return watchdog_->next() > now ? std::min(watchdog_->next(), next_tick)
+                                 : next_tick;
+}
+
 void Service::Tick() {
   try {
     if (changes_.Changed()) {
@@ -185,18 +225,8 @@ void Service::Tick() {
     log_.Report(LogId::kModelFailure, "models_unreadable",
                 [&reason] { return "reason=\"" + reason + "\""; });
   }
-  const idl::SubscriberStatus dds = samples_.status();
-  const std::uint64_t loss =
-      dds.lost + dds.undecodable + dds.rejected_instances;
-  if (loss != reported_loss_) {
-    reported_loss_ = loss;
-    log_.Report(LogId::kTransport, "transport_loss", [&dds] {
-      return "lost=" + std::to_string(dds.lost) +
-             " undecodable=" + std::to_string(dds.undecodable) +
-             " rejected_instances=" + std::to_string(dds.rejected_instances) +
-             " refused_valves=" + std::to_string(dds.refused_valves);
-    });
-  }
+  ReportLoss();
+  ReportStall();
   PublishStatus();
   if (std::chrono::steady_clock::now() - last_status_line_ >=
       Milliseconds(options_.status_period_s)) {
@@ -216,6 +246,7 @@ void Service::Reload(const char* cause) {
       next->ModelsFor(valve);
     }
     assignment_ = next;
+    model_sets_ = next->loaded();
     pipeline_.Reassign(std::move(next));
   } catch (const std::exception& error) {
     counters_.Add(Counter::kModelFailures);
@@ -226,29 +257,12 @@ void Service::Reload(const char* cause) {
   }
 }
 
-void Service::PublishStatus() {
-  idl::MonitorStatusMessage status =
-      StatusOf({counters_, pipeline_.census(), samples_.status(),
-                decisions_.status(), pipeline_.backlog().diagnosis,
-                pipeline_.history_degraded(), pipeline_.recording_degraded()});
-  status.monitor = MonitorName();
-  status.software = context_.software;
-  status.started_ns = started_ns_;
-  status.stamp_ns = cli::NowNs();
-  status_topic_.Write(status);
-}
-
-void Service::WriteStatusLine() {
-  context_.log(
-      LogLevel::kInfo,
-      StatusLine(StatusOf({counters_, pipeline_.census(), samples_.status(),
-                           decisions_.status(), pipeline_.backlog().diagnosis,
-                           pipeline_.history_degraded(),
-                           pipeline_.recording_degraded()})));
-}
-
 void Service::Shutdown() {
   context_.log(LogLevel::kInfo, "monitor_stopping");
+  manager_.Stopping();
+  if (http_) {
+    http_->Stop();
+  }
   // A subscriber that does not read must not keep the service from ending.
   std::mutex mutex;
   std::condition_variable_any woken;

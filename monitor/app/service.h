@@ -14,8 +14,13 @@
 #include "idl/endpoint.h"
 #include "monitor/app/bus_sinks.h"
 #include "monitor/app/history_store.h"
+#include "monitor/app/http_server.h"
 #include "monitor/app/model_assignment.h"
+#include "monitor/app/probes.h"
 #include "monitor/app/run_store.h"
+#include "monitor/app/service_manager.h"
+#include "monitor/app/status.h"
+#include "monitor/heartbeat.h"
 #include "monitor/pipeline.h"
 #include "storage/cli/program.h"
 #include "storage/cli/stop_signals.h"
@@ -37,6 +42,8 @@ struct ServiceOptions {
   double stale_timeout_s{3600.0};
   double trace_before_s{1800.0};
   double status_period_s{60.0};  ///< Of the status line in the log.
+  /// Serve metrics and probes over HTTP.
+  std::optional<HttpAddress> http;
 };
 
 /// The monitor as a service: DDS on one side, the databases on the other, the
@@ -56,23 +63,35 @@ class Service {
   int Run(cli::StopSignals& signals);
 
  private:
+  using TimePoint = Heartbeat::TimePoint;
+
   void ResendEvents();
   void Intake(const std::stop_token& stop);
   void AnnounceModels(const ModelSet& models);
   void Reload(const char* cause);
+  void ServeProbes();
+  Readiness CurrentReadiness() const;
+  std::string Metrics() const;
+  StatusFacts Facts() const;
+  TimePoint FeedWatchdog(TimePoint next_tick);
   void Tick();
+  void ReportLoss();
+  void ReportStall();
   void PublishStatus();
   void WriteStatusLine();
   void Shutdown();
 
   ServiceOptions options_;
   const cli::Context& context_;
+  std::unique_ptr<HttpServer> http_;
+  ServiceManager manager_;
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
   idl::Participant participant_;
   idl::Publisher<idl::ModelSetInfoMessage> models_topic_;
   storage::ChangeCounter changes_;
   std::shared_ptr<const ModelAssignment> assignment_;
+  std::atomic<std::size_t> model_sets_;
   HistoryStore history_;
   std::unique_ptr<RunStore> runs_;
   std::stop_source publication_stop_;  // ends waits for slow subscribers
@@ -83,6 +102,10 @@ class Service {
   Counters counters_;
   ThrottledLog log_;
   Pipeline pipeline_;
+  Pulse intake_pulse_;
+  Pulse service_pulse_;  // of the thread that runs Run()
+  Heartbeat heartbeat_;
+  std::optional<Watchdog> watchdog_;
   std::int64_t started_ns_;
   std::uint64_t reported_loss_{0};
   std::chrono::steady_clock::time_point last_status_line_;

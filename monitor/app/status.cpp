@@ -1,6 +1,7 @@
 #include "monitor/app/status.h"
 
 #include <array>
+#include <map>
 
 #include <unistd.h>
 
@@ -33,7 +34,7 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   add("valves_ended", facts.census.ended);
   add("open_episodes", facts.census.open_episodes);
   add("trace_bytes", facts.census.trace_bytes);
-  add("waiting", facts.waiting);
+  add("waiting", facts.waiting.diagnosis);
   if (facts.history_degraded) {
     status.text = "persistence degraded: history";
   }
@@ -43,7 +44,30 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   }
   status.health =
       status.text.empty() ? idl::Health::kOk : idl::Health::kDegraded;
+  if (!facts.stalled.empty()) {
+    status.health = idl::Health::kFailing;
+    status.text += (status.text.empty() ? "stalled: " : "; stalled: ") +
+                   Joined(facts.stalled);
+  }
   return status;
+}
+
+std::string ManagerLine(const idl::MonitorStatusMessage& status) {
+  const std::map<std::string_view, std::uint64_t> counters(
+      status.counters.begin(), status.counters.end());
+  std::string line(idl::HealthName(status.health));
+  for (const char* name : {"valves", "valves_stale", "open_episodes"}) {
+    line += std::string(" ") + name + "=" + std::to_string(counters.at(name));
+  }
+  return status.text.empty() ? line : line + " (" + status.text + ")";
+}
+
+std::string Joined(const std::vector<std::string_view>& words) {
+  std::string text;
+  for (const std::string_view word : words) {
+    text.append(text.empty() ? "" : ",").append(word);
+  }
+  return text;
 }
 
 std::string StatusLine(const idl::MonitorStatusMessage& status) {

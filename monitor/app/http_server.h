@@ -1,0 +1,66 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+
+namespace httplib {
+class Server;
+}
+
+namespace fdi::monitor {
+
+/// Where a server listens.
+struct HttpAddress {
+  std::string host;
+  int port{0};  ///< 0: any that is free.
+};
+
+/// "PORT" (of 127.0.0.1), "HOST:PORT" or "[IPv6]:PORT".
+/// @throws ConfigError naming `text` and what is accepted.
+HttpAddress ParseHttpAddress(const std::string& text);
+
+/// "127.0.0.1:9464", "[::1]:9464"
+std::string ToString(const HttpAddress& address);
+
+struct HttpPage {
+  int status{200};
+  std::string type{"text/plain; charset=utf-8"};
+  std::string body;
+};
+
+/// Answers GET by two threads of its own. What they cannot take at once waits,
+/// a bounded number here and the rest in the backlog of the socket, so that no
+/// client costs more than that; a client that does not speak is cut off.
+class HttpServer {
+ public:
+  /// From path to what makes the page, called by any of the two threads.
+  using Pages = std::map<std::string, std::function<HttpPage()>>;
+
+  /// Binds the address; nothing is answered yet. A second server on the same
+  /// address is an error.
+  /// @throws std::runtime_error naming the address and the reason.
+  explicit HttpServer(const HttpAddress& address);
+  /// Answers what it is at, which may take a second, and no more.
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  /// Answers from now on. Once. `pages` may refer to what outlives this.
+  void Start(Pages pages);
+
+  /// Takes no further connections. Does not wait.
+  void Stop();
+
+  /// With the port that was found, if any was asked for.
+  const HttpAddress& address() const { return address_; }
+
+ private:
+  std::unique_ptr<httplib::Server> server_;
+  HttpAddress address_;
+  std::thread thread_;
+};
+
+}  // namespace fdi::monitor
