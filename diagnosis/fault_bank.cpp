@@ -26,34 +26,14 @@ std::vector<int> ObserversOf(const ModelSet& models, int fault, bool negative) {
   return found;
 }
 
-// μ of a residual, less what the extrapolation may have put there.
-double Membership(const ChannelObserver& channel, double residual,
-                  double extrapolation) {
-  const double uncertain =
-      kExtrapolationError * extrapolation / channel.residual_sd;
-  return channel.membership(residual / std::sqrt(1.0 + uncertain * uncertain));
-}
-
-double InstantFactor(const ObserverBank& bank, const Observer& observer,
-                     int index) {
-  double factor = 1.0;
-  bool voted = false;
-  for (std::size_t c = 0; c < observer.channels.size(); ++c) {
-    const int channel = static_cast<int>(c);
-    if (bank.active(channel) && !std::isnan(bank.residual(index, channel))) {
-      voted = true;
-      factor = std::min(factor, Membership(observer.channels[c],
-                                           bank.residual(index, channel),
-                                           bank.extrapolation(index, channel)));
-    }
-  }
-  return voted ? factor : 0.0;
-}
-
 }  // namespace
 
 FaultBank::FaultBank(const ModelSet& models)
     : models_(&models), normal_(models, {}) {
+  for (const Observer& observer : models.observers) {
+    fault_indices_.push_back(
+        static_cast<std::size_t>(FaultIndex(models, observer.fault)));
+  }
   for (std::size_t i = 0; i < models.faults.size(); ++i) {
     for (const bool negative : {false, true}) {
       const auto observers = ObserversOf(models, models.faults[i], negative);
@@ -66,16 +46,11 @@ FaultBank::FaultBank(const ModelSet& models)
 
 void FaultBank::Score(const ObserverBank& bank, Verdict& verdict) const {
   std::fill_n(verdict.fault_factors.begin(), models_->faults.size(), 0.0);
-  for (std::size_t i = 0; i < models_->observers.size(); ++i) {
-    const Observer& observer = models_->observers[i];
-    const double factor = InstantFactor(bank, observer, static_cast<int>(i));
-    verdict.observer_factors[i] = factor;
-    if (i > 0) {
-      const auto index =
-          static_cast<std::size_t>(FaultIndex(*models_, observer.fault));
-      verdict.fault_factors[index] =
-          std::max(verdict.fault_factors[index], factor);
-    }
+  const std::size_t observers = models_->observers.size();
+  bank.Score({verdict.observer_factors.data(), observers});
+  for (std::size_t i = 1; i < observers; ++i) {
+    double& factor = verdict.fault_factors[fault_indices_[i]];
+    factor = std::max(factor, verdict.observer_factors[i]);
   }
   verdict.normal_factor = verdict.observer_factors[0];
 }

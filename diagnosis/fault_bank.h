@@ -44,6 +44,7 @@ class FaultBank {
   double EvidenceMembership(double behind) const;
 
   const ModelSet* models_;
+  std::vector<std::size_t> fault_indices_;  // by observer; none of the first
   StrengthTracker normal_;
   std::vector<Family> families_;  // one per fault and direction
 };

@@ -1,9 +1,10 @@
 #pragma once
 
-#include <array>
-#include <vector>
+#include <memory>
+#include <span>
 
-#include "diagnosis/model_set.h"
+#include "diagnosis/observer_kernels.h"
+#include "diagnosis/observer_plan.h"
 #include "diagnosis/sample.h"
 
 namespace fdi {
@@ -13,11 +14,13 @@ namespace fdi {
 ///     r = y − ŷ   for every observer and channel,
 ///
 /// each parallel observer on its own past predictions. A channel whose signals
-/// the valve lacks abstains. Observers that share their antecedents are
-/// evaluated together: the rules are weighed once.
+/// the valve lacks abstains. Observers are evaluated four at a time; the bits
+/// of the results are those of one by one, Evaluate() in ts_model.h.
 class ObserverBank {
  public:
-  /// `models` must outlive the bank.
+  explicit ObserverBank(std::shared_ptr<const ObserverPlan> plan,
+                        InstructionSet instructions = BestInstructionSet());
+  /// With a plan of its own. `models` must be valid and outlive the bank.
   explicit ObserverBank(const ModelSet& models);
 
   /// Fills all lags with `sample`: past inputs and outputs as if it had been
@@ -28,63 +31,47 @@ class ObserverBank {
   /// Initialise(); the signals of active channels must be present.
   void Step(const Sample& sample);
 
+  /// The smallest membership of each observer's residuals over the channels
+  /// that vote, less what extrapolation may have put there; 0 where none does.
+  /// @param factors one per observer.
+  void Score(std::span<double> factors) const;
+
+  const ObserverPlan& plan() const { return *plan_; }
   bool active(int channel) const {
-    return active_[static_cast<std::size_t>(channel)] != 0;
+    return state_.active[static_cast<std::size_t>(channel)] != 0;
   }
   int active_channels() const { return active_count_; }
   double prediction(int observer, int channel) const {
-    return predictions_[Slot(observer, channel)];
+    return At(state_.predictions, observer, channel);
   }
   /// NaN where reading and prediction are both at the transmitter's limit.
   double residual(int observer, int channel) const {
-    return residuals_[Slot(observer, channel)];
+    return At(state_.residuals, observer, channel);
   }
   double reading(int channel) const {
-    return readings_[static_cast<std::size_t>(channel)];
+    return state_.readings[static_cast<std::size_t>(channel)];
   }
   /// True if the last reading of the channel is at its transmitter's limit.
   bool saturated(int channel) const {
-    return saturated_[static_cast<std::size_t>(channel)] != 0;
+    return state_.saturated[static_cast<std::size_t>(channel)] != 0;
   }
   /// What the prediction owes to regressors beyond their trained range,
   /// |ŷ(x) − ŷ(x kept within the range)|; 0 where the model is at home.
   double extrapolation(int observer, int channel) const {
-    return extrapolations_[Slot(observer, channel)];
+    return At(state_.extrapolations, observer, channel);
   }
 
  private:
-  struct Group {  // observers of one channel with the same antecedents
-    std::size_t channel;
-    std::vector<std::size_t> slots;
-  };
-
-  std::size_t Slot(int observer, int channel) const {
-    return static_cast<std::size_t>(observer * channel_count_ + channel);
+  double At(const std::vector<Quad>& quads, int observer, int channel) const {
+    const std::size_t slot = plan_->slot(static_cast<std::size_t>(observer),
+                                         static_cast<std::size_t>(channel));
+    return quads[slot / kLanes].lane[slot % kLanes];
   }
-  std::size_t Row(int lag) const {
-    return static_cast<std::size_t>((head_ + depth_ - lag) % depth_);
-  }
-  const TsModel& Model(std::size_t slot) const;
-  bool IsDifference(std::size_t slot) const;
-  void MakeGroups();
-  double RegressorValue(const TsModel& model, const Regressor& regressor,
-                        std::size_t slot) const;
-  void StepGroup(const Group& group, const Sample& sample);
 
-  const ModelSet* models_;
-  int channel_count_;
-  int depth_;  // longest lag + 1
-  int head_{0};
+  std::shared_ptr<const ObserverPlan> plan_;
+  const ObserverKernels* kernels_;
+  ObserverState state_;
   int active_count_{0};
-  std::vector<Group> groups_;
-  std::vector<char> active_;
-  std::vector<double> readings_;  // per channel
-  std::vector<char> saturated_;
-  std::vector<std::array<double, kSignalCount>> measured_;  // ring of depth_
-  std::vector<double> own_past_;  // ring of depth_ rows of all slots
-  std::vector<double> predictions_;
-  std::vector<double> residuals_;
-  std::vector<double> extrapolations_;
 };
 
 }  // namespace fdi

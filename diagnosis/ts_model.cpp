@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <string>
 #include <utility>
 
 #include "diagnosis/error.h"
+#include "diagnosis/exponential.h"
 
 namespace fdi {
 namespace {
@@ -19,45 +18,8 @@ namespace {
 constexpr double kCoveredExponent = -18.420680743952367;
 // A rule of less than 4e-18 of the strongest adds nothing to a double.
 constexpr double kFiringExponent = -40.0;
-// exp(t) is taken as 0 below this, far above the subnormal numbers.
-constexpr double kLowestExponent = -700.0;
 // Keeps the difference of two exponents a number however far x is.
 constexpr double kFarthestExponent = -1e300;
-
-// exp(t) for t ≤ 0: t = k ln 2 + r, |r| ≤ ln(2)/2, times the Taylor series of
-// exp(r) up to r¹³. Relative error below 3e-16. The library's exp differs in
-// the last bit between machines with and without fused multiply-add.
-double Exp(double t) {
-  if (!(t > kLowestExponent)) {
-    return 0.0;
-  }
-  constexpr double kLog2E = 1.4426950408889634;
-  constexpr double kLn2High = 6.93147180369123816490e-01;
-  constexpr double kLn2Low = 1.90821492927058770002e-10;
-  const auto k = static_cast<std::int64_t>(t * kLog2E - 0.5);
-  const auto k_real = static_cast<double>(k);
-  const double r = (t - k_real * kLn2High) - k_real * kLn2Low;
-  constexpr std::array<double, 14> kInverseFactorial = {1.0 / 6227020800.0,
-                                                        1.0 / 479001600.0,
-                                                        1.0 / 39916800.0,
-                                                        1.0 / 3628800.0,
-                                                        1.0 / 362880.0,
-                                                        1.0 / 40320.0,
-                                                        1.0 / 5040.0,
-                                                        1.0 / 720.0,
-                                                        1.0 / 120.0,
-                                                        1.0 / 24.0,
-                                                        1.0 / 6.0,
-                                                        0.5,
-                                                        1.0,
-                                                        1.0};
-  double series = kInverseFactorial[0];
-  for (std::size_t i = 1; i < kInverseFactorial.size(); ++i) {
-    series = series * r + kInverseFactorial[i];
-  }
-  const auto bits = static_cast<std::uint64_t>(k + 1023) << 52U;
-  return series * std::bit_cast<double>(bits);
-}
 
 // log μ(x) of one set; an infinite width gives 0 on its side.
 double LogMembership(const FuzzySet& set, double x) {

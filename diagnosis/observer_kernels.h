@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "diagnosis/observer_plan.h"
+#include "diagnosis/sample.h"
+
+namespace fdi {
+
+/// What the observers of one valve remember and said last; in blocks as in the
+/// plan.
+struct ObserverState {
+  explicit ObserverState(const ObserverPlan& plan);
+
+  std::size_t Row(int lag) const {
+    return static_cast<std::size_t>((head + depth - lag) % depth);
+  }
+
+  int depth;  ///< Of the rings.
+  int head{0};
+  std::vector<std::array<double, kSignalCount>> measured;  ///< A ring.
+  std::vector<Quad> own_past;  ///< Ring of rows of plan.own_blocks().
+  std::vector<char> active;    ///< By channel.
+  std::vector<char> saturated;
+  std::vector<double> readings;
+  std::vector<Quad> predictions;
+  std::vector<Quad> residuals;
+  std::vector<Quad> extrapolations;
+};
+
+/// The instructions that the kernels below are compiled for. The bits of the
+/// results are the same with all of them.
+enum class InstructionSet { kPortable, kAvx2 };
+
+/// The best one that this processor has.
+InstructionSet BestInstructionSet();
+
+/// Loops over observers, four at a time.
+struct ObserverKernels {
+  /// Predictions, extrapolations and residuals of the active channels for the
+  /// newest row of measurements.
+  void (*predict)(const ObserverPlan& plan, ObserverState& state);
+
+  /// μ of the residuals of blocks [first, last), less what extrapolation may
+  /// have put there; kAbstains where the residual is NaN. memberships[0] is
+  /// that of the first block.
+  void (*score)(const ObserverPlan& plan, const ObserverState& state,
+                std::size_t first, std::size_t last, Quad* memberships);
+};
+inline constexpr double kAbstains = 2.0;  ///< Beyond any membership.
+
+const ObserverKernels& KernelsFor(InstructionSet instructions);
+
+}  // namespace fdi

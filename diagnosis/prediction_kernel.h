@@ -1,0 +1,298 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <limits>
+
+#include "diagnosis/lanes.h"
+#include "diagnosis/observer_kernels.h"
+#include "diagnosis/observer_plan.h"
+#include "diagnosis/ts_model.h"
+
+/// ObserverKernels::predict, to be compiled for several instruction sets.
+namespace fdi::lanes {
+
+// A rule of less than 4e-18 of the strongest adds nothing to a double.
+inline constexpr double kFiringExponent = -40.0;
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+using Regressors = std::array<Lanes, kMaxRegressors>;
+using RuleLanes = std::array<Lanes, kMaxRules>;
+
+// log μ(x) of one set; an infinite width gives 0 on its side.
+[[gnu::always_inline]] inline Lanes LogMembership(const QuadSet& set,
+                                                  const Lanes& x) {
+  const auto left = x < Load(set.left_center);
+  const auto right = x > Load(set.right_center);
+  const Lanes distance =
+      left ? Load(set.left_center) - x : x - Load(set.right_center);
+  const Lanes width = left ? Load(set.left_width) : Load(set.right_width);
+  const Lanes z = (left | right) ? distance / width : All(0.0);
+  return -0.5 * z * z;
+}
+
+// −½ ‖L (x − v)‖².
+[[gnu::always_inline]] inline Lanes LogNearness(const Quad* entries,
+                                                std::size_t rows,
+                                                const Regressors& x) {
+  const Quad* entry = entries + rows;
+  Lanes squares = All(0.0);
+  for (std::size_t row = 0; row < rows; ++row) {
+    Lanes z = All(0.0);
+    for (std::size_t j = 0; j <= row; ++j) {
+      z += Load(*entry++) * (x[j] - Load(entries[j]));
+    }
+    squares += z * z;
+  }
+  return -0.5 * squares;
+}
+
+[[gnu::always_inline]] inline Lanes Exponent(const ObserverGroup& group,
+                                             const QuadPremise& premise,
+                                             const Regressors& x) {
+  Lanes exponent = Load(premise.start);
+  if (premise.nearness_rows > 0) {
+    exponent += LogNearness(&group.nearness[premise.first_nearness],
+                            premise.nearness_rows, x);
+  }
+  for (std::size_t s = premise.first_set;
+       s < premise.first_set + premise.set_count; ++s) {
+    exponent += LogMembership(group.sets[s], x[group.set_regressors[s]]);
+  }
+  return Max(Load(premise.least), exponent);
+}
+
+// exp(t) of the rules that fire, 0 of the others.
+[[gnu::always_inline]] inline Lanes Weight(const Lanes& exponent,
+                                           const Lanes& largest) {
+  const Lanes t = exponent - largest;
+  const auto fires = t > All(kFiringExponent);
+  return fires ? Exp(fires ? t : All(kFiringExponent)) : All(0.0);
+}
+
+// y_i = a_iᵀx + b_i; `consequent` holds b_i and a_i.
+[[gnu::always_inline]] inline Lanes Output(const Quad* consequent,
+                                           std::size_t regressors,
+                                           const Regressors& x) {
+  Lanes output = Load(consequent[0]);
+  for (std::size_t j = 0; j < regressors; ++j) {
+    output += Load(consequent[j + 1]) * x[j];
+  }
+  return output;
+}
+
+// ŷ of four observers, each with rules of its own.
+[[gnu::always_inline]] inline Lanes Evaluate(const ObserverGroup& group,
+                                             std::size_t block,
+                                             const ObserverBlock& limits,
+                                             const Regressors& x) {
+  const std::size_t rules = group.rules[block];
+  const std::size_t n = group.regressors.size();
+  const QuadPremise* premises = &group.premises[group.first_premise[block]];
+  const Quad* consequent = &group.consequents[group.first_consequent[block]];
+  RuleLanes weights;
+  Lanes sum = All(1.0);
+  weights[0] = All(1.0);
+  if (rules > 1) {
+    Lanes largest = All(-std::numeric_limits<double>::infinity());
+    for (std::size_t r = 0; r < rules; ++r) {
+      weights[r] = Exponent(group, premises[r], x);
+      largest = Max(largest, weights[r]);
+    }
+    sum = All(0.0);
+    for (std::size_t r = 0; r < rules; ++r) {
+      weights[r] = Weight(weights[r], largest);
+      sum += weights[r];
+    }
+  }
+  Lanes value = All(0.0);
+  for (std::size_t r = 0; r < rules; ++r) {
+    value += weights[r] / sum * Output(consequent + r * (n + 1), n, x);
+  }
+  return Clamp(value, Load(limits.output_min), Load(limits.output_max));
+}
+
+// The rules of a shared premise that fire.
+struct Firing {
+  std::size_t count{0};
+  std::array<std::size_t, kMaxRules> rules;
+  std::array<double, kMaxRules> weights;
+};
+
+[[gnu::always_inline]] inline void Weigh(const ObserverGroup& group,
+                                         const Regressors& x, Firing& firing) {
+  std::array<Lanes, kMaxRules / kLanes> exponents;
+  const std::size_t quads = group.premises.size();
+  Lanes most = All(-std::numeric_limits<double>::infinity());
+  for (std::size_t q = 0; q < quads; ++q) {
+    exponents[q] = Exponent(group, group.premises[q], x);
+    most = Max(most, exponents[q]);
+  }
+  const double largest =
+      std::max(std::max(most[0], most[1]), std::max(most[2], most[3]));
+  firing.count = 0;
+  double sum = 0.0;
+  for (std::size_t q = 0; q < quads; ++q) {
+    const auto fires = exponents[q] - largest > All(kFiringExponent);
+    if (!Any(fires)) {
+      continue;
+    }
+    const Lanes weights = Weight(exponents[q], All(largest));
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      if (fires[i] != 0) {
+        firing.rules[firing.count] = q * kLanes + i;
+        firing.weights[firing.count++] = weights[i];
+        sum += weights[i];
+      }
+    }
+  }
+  for (std::size_t i = 0; i < firing.count; ++i) {
+    firing.weights[i] /= sum;
+  }
+}
+
+// ŷ of four observers from the weights of the premise that they share.
+[[gnu::always_inline]] inline Lanes Blend(const ObserverGroup& group,
+                                          std::size_t block,
+                                          const ObserverBlock& limits,
+                                          const Firing& firing,
+                                          const Regressors& x) {
+  const std::size_t n = group.regressors.size();
+  const Quad* consequents = &group.consequents[group.first_consequent[block]];
+  Lanes value = All(0.0);
+  for (std::size_t i = 0; i < firing.count; ++i) {
+    value += firing.weights[i] *
+             Output(consequents + firing.rules[i] * (n + 1), n, x);
+  }
+  return Clamp(value, Load(limits.output_min), Load(limits.output_max));
+}
+
+// What the predictions of a group have in common.
+struct Common {
+  double reading;
+  double base;                // Normal prediction under a difference, or 0.
+  double base_extrapolation;  // Of that.
+};
+
+inline Common CommonOf(const ObserverPlan& plan, const ObserverState& state,
+                       const ObserverGroup& group) {
+  const std::size_t normal = plan.slot(0, group.channel);
+  const auto of_normal = [&](const std::vector<Quad>& quads) {
+    return group.difference ? quads[normal / kLanes].lane[normal % kLanes]
+                            : 0.0;
+  };
+  return {state.readings[group.channel], of_normal(state.predictions),
+          of_normal(state.extrapolations)};
+}
+
+// Keeps what four observers say: their own part of the prediction, and that
+// with all regressors within the trained range.
+[[gnu::always_inline]] inline void Keep(const ObserverBlock& limits,
+                                        const Common& common, const Lanes& own,
+                                        const Lanes& inside, std::size_t block,
+                                        ObserverState& state) {
+  const Lanes prediction = common.base + own;
+  const Lanes saturation = Load(limits.saturation);
+  const Lanes reading = All(common.reading);
+  const auto hidden = (reading >= saturation) & (prediction >= saturation);
+  const Lanes residual = reading - Min(prediction, saturation);
+  Store(prediction, state.predictions[block]);
+  Store(common.base_extrapolation + Abs(own - inside),
+        state.extrapolations[block]);
+  Store(hidden ? All(kNan) : residual, state.residuals[block]);
+}
+
+[[gnu::always_inline]] inline Lanes Regressor(const ObserverPlan& plan,
+                                              const ObserverState& state,
+                                              const ObserverGroup& group,
+                                              std::size_t block,
+                                              const RegressorSource& source) {
+  const std::size_t row = state.Row(source.lag);
+  return source.own ? Load(state.own_past[row * plan.own_blocks() +
+                                          group.own_block + block])
+                    : All(state.measured[row][source.signal]);
+}
+
+// Values of `x` kept within the trained range; true if some were not.
+[[gnu::always_inline]] inline bool Beyond(const Quad* minimum,
+                                          const Quad* maximum,
+                                          std::size_t count,
+                                          const Regressors& x,
+                                          Regressors& inside) {
+  auto beyond = x[0] != x[0];
+  for (std::size_t j = 0; j < count; ++j) {
+    inside[j] = Clamp(x[j], Load(minimum[j]), Load(maximum[j]));
+    beyond |= inside[j] != x[j];
+  }
+  return Any(beyond);
+}
+
+[[gnu::always_inline]] inline void PredictShared(const ObserverPlan& plan,
+                                                 const ObserverGroup& group,
+                                                 ObserverState& state) {
+  const Common common = CommonOf(plan, state, group);
+  const std::size_t n = group.regressors.size();
+  Regressors x;
+  Regressors inside;
+  for (std::size_t j = 0; j < n; ++j) {
+    x[j] = Regressor(plan, state, group, 0, group.regressors[j]);
+  }
+  Firing firing;
+  Firing firing_inside;
+  Weigh(group, x, firing);
+  const bool beyond =
+      Beyond(group.minimum.data(), group.maximum.data(), n, x, inside);
+  if (beyond) {
+    Weigh(group, inside, firing_inside);
+  }
+  for (std::size_t b = 0; b < group.blocks; ++b) {
+    const std::size_t block = group.first_block + b;
+    const ObserverBlock& limits = plan.blocks()[block];
+    const Lanes own = Blend(group, b, limits, firing, x);
+    Keep(limits, common, own,
+         beyond ? Blend(group, b, limits, firing_inside, inside) : own, block,
+         state);
+  }
+}
+
+[[gnu::always_inline]] inline void PredictApart(const ObserverPlan& plan,
+                                                const ObserverGroup& group,
+                                                ObserverState& state) {
+  const Common common = CommonOf(plan, state, group);
+  const std::size_t n = group.regressors.size();
+  const std::size_t now = state.Row(0) * plan.own_blocks() + group.own_block;
+  Regressors x;
+  Regressors inside;
+  for (std::size_t b = 0; b < group.blocks; ++b) {
+    for (std::size_t j = 0; j < n; ++j) {
+      x[j] = Regressor(plan, state, group, b, group.regressors[j]);
+    }
+    const std::size_t block = group.first_block + b;
+    const ObserverBlock& limits = plan.blocks()[block];
+    const Lanes own = Evaluate(group, b, limits, x);
+    const bool beyond =
+        Beyond(&group.minimum[b * n], &group.maximum[b * n], n, x, inside);
+    Keep(limits, common, own, beyond ? Evaluate(group, b, limits, inside) : own,
+         block, state);
+    if (group.runs_on_itself) {
+      state.own_past[now + b] = state.predictions[block];
+    }
+  }
+}
+
+[[gnu::always_inline]] inline void Predict(const ObserverPlan& plan,
+                                           ObserverState& state) {
+  for (const ObserverGroup& group : plan.groups()) {
+    if (state.active[group.channel] == 0) {
+      continue;
+    }
+    if (group.shared) {
+      PredictShared(plan, group, state);
+    } else {
+      PredictApart(plan, group, state);
+    }
+  }
+}
+
+}  // namespace fdi::lanes
