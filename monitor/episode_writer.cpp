@@ -145,24 +145,30 @@ void EpisodeWriter::Run() {
   }
 }
 
-// Stores what waits, the evidence in its turn. @returns false once the history
-// fails.
+// @returns false once the history fails.
 bool EpisodeWriter::Serve() {
-  if (degraded_ && !Commit()) {
+  if ((degraded_ && !Commit()) || !WriteWaiting()) {
     FailWaitingEvents();
     return false;
   }
+  if (degraded_) {
+    Recovered();
+  }
+  return true;
+}
+
+// Stores what waits, the evidence in its turn.
+bool EpisodeWriter::WriteWaiting() {
   while (true) {
     if (!WriteRecords() || !WriteCheckpoint()) {
-      FailWaitingEvents();
       return false;
     }
     {
       const std::lock_guard lock(mutex_);
       const bool due = std::chrono::steady_clock::now() - last_commit_ >=
                        options_.commit_period;
-      if (!due && trace_points_ < kPointsPerCommit &&
-          !(stopping_ && !traces_.empty())) {
+      const bool wanted = (stopping_ || degraded_) && !traces_.empty();
+      if (!due && !wanted && trace_points_ < kPointsPerCommit) {
         return true;
       }
     }
@@ -311,13 +317,7 @@ void EpisodeWriter::FailWaitingEvents() {
 }
 
 bool EpisodeWriter::Commit() {
-  if (!Attempt([this] { history_.Commit(); })) {
-    return false;
-  }
-  if (degraded_) {
-    Recovered();
-  }
-  return true;
+  return Attempt([this] { history_.Commit(); });
 }
 
 void EpisodeWriter::Recovered() {

@@ -87,6 +87,7 @@ class EpisodeWriter : public EpisodeOutlet {
   bool Enqueue(Record record);
   void Run();
   bool Serve();
+  bool WriteWaiting();
   bool WriteRecords();
   bool WriteBatch(const std::vector<const Record*>& batch);
   bool WriteTraces();

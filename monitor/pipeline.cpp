@@ -27,6 +27,12 @@ bool OutOfOrder(Intake intake) {
          intake == Intake::kSuperseded;
 }
 
+SampleRecorderOptions RecorderOptionsOf(const PipelineOptions& options) {
+  SampleRecorderOptions recorder = options.recorder;
+  recorder.utc_now_ns = options.history.utc_now_ns;
+  return recorder;
+}
+
 }  // namespace
 
 Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
@@ -38,8 +44,10 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
       log_(log),
       writer_(sinks.history, sinks.events, counters, log, options_.history),
       recorder_(sinks.samples != nullptr
-                    ? std::make_unique<SampleRecorder>(*sinks.samples, counters,
-                                                       log, options_.recorder)
+                    ? std::make_unique<SampleRecorder>(
+                          *sinks.samples, counters, log,
+                          RecorderOptionsOf(options_),
+                          [this](DataGap gap) { writer_.Gap(std::move(gap)); })
                     : nullptr),
       directory_(options_.max_valves, options_.valve_glob),
       registry_(options_.registry, std::move(resolver), writer_, counters, log),

@@ -12,14 +12,15 @@ constexpr std::chrono::milliseconds kTick{100};
 }  // namespace
 
 SampleRecorder::SampleRecorder(SampleSink& sink, Counters& counters,
-                               ThrottledLog& log,
-                               const SampleRecorderOptions& options)
+                               ThrottledLog& log, SampleRecorderOptions options,
+                               std::function<void(DataGap)> on_gap)
     : sink_(sink),
       counters_(counters),
       log_(log),
-      options_(options),
+      options_(std::move(options)),
+      on_gap_(std::move(on_gap)),
       last_commit_(std::chrono::steady_clock::now()),
-      queue_(options.queue_samples),
+      queue_(options_.queue_samples),
       thread_([this] { Run(); }) {}
 
 SampleRecorder::~SampleRecorder() {
@@ -30,7 +31,7 @@ void SampleRecorder::Record(ReceivedSample sample) {
   const bool taken = options_.lossless ? queue_.Push(std::move(sample))
                                        : queue_.TryPush(std::move(sample));
   if (!taken) {
-    counters_.Add(Counter::kRecordDropped);
+    CountDropped(1);
     log_.Report(LogId::kRecordDropped, "record_dropped",
                 [] { return std::string("reason=queue_full"); });
   }
@@ -63,23 +64,27 @@ void SampleRecorder::Take(const ReceivedSample& sample) {
     sink_.Append(sample);
     pending_ += sample.ended ? 0 : 1;
   } catch (const std::exception& error) {
-    counters_.Add(Counter::kRecordDropped);
+    CountDropped(1);
     Fail(error.what());
   }
   if (!degraded_ && pending_ >= options_.commit_samples) {
     Commit();
   }
   if (pending_ >= options_.max_pending) {
-    counters_.Add(Counter::kRecordDropped, sink_.DropPending());
+    CountDropped(sink_.DropPending());
     pending_ = 0;
   }
 }
 
 void SampleRecorder::Commit() {
   last_commit_ = std::chrono::steady_clock::now();
+  if (degraded_ && pending_ == 0) {
+    return;  // Storing nothing would tell nothing.
+  }
   try {
     sink_.Commit();
     CountRecorded();
+    ReportMissing();
     if (degraded_.exchange(false)) {
       log_.Line(LogLevel::kInfo, "recording_recovered");
     }
@@ -94,7 +99,37 @@ void SampleRecorder::Close() {
     CountRecorded();
   } catch (const std::exception& error) {
     Fail(error.what());
-    counters_.Add(Counter::kRecordDropped, std::exchange(pending_, 0));
+    CountDropped(std::exchange(pending_, 0));
+  }
+  missing_more_ = false;
+  ReportMissing();
+}
+
+void SampleRecorder::CountDropped(std::uint64_t samples) {
+  if (samples == 0) {
+    return;
+  }
+  counters_.Add(Counter::kRecordDropped, samples);
+  const std::int64_t now_ns = options_.utc_now_ns();
+  const std::lock_guard lock(missing_mutex_);
+  if (!missing_) {
+    missing_ = DataGap{"", now_ns, now_ns, "record_dropped"};
+  }
+  missing_->to_ns = now_ns;
+  missing_more_ = true;
+}
+
+// One gap for drops that go on, once none was added since the last commit.
+void SampleRecorder::ReportMissing() {
+  std::optional<DataGap> gap;
+  {
+    const std::lock_guard lock(missing_mutex_);
+    if (!std::exchange(missing_more_, false)) {
+      gap = std::exchange(missing_, std::nullopt);
+    }
+  }
+  if (gap) {
+    on_gap_(*std::move(gap));
   }
 }
 

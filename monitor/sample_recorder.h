@@ -3,6 +3,9 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -19,17 +22,21 @@ struct SampleRecorderOptions {
   bool lossless{false};  ///< Full: Record() waits instead of dropping.
   std::size_t queue_samples{16'384};
   std::chrono::milliseconds commit_period{1000};
-  std::uint64_t commit_samples{20'000};  ///< Commit earlier with so many.
-  std::uint64_t max_pending{200'000};    ///< Kept while commits fail.
+  std::uint64_t commit_samples{20'000};      ///< Commit earlier with so many.
+  std::uint64_t max_pending{200'000};        ///< Kept while commits fail.
+  std::function<std::int64_t()> utc_now_ns;  ///< Needed.
 };
 
 /// Stores samples as runs by a thread of its own. What is not stored is
 /// counted; while commits fail samples are kept up to a limit and then dropped,
-/// so that diagnosis goes on.
+/// so that diagnosis goes on. The time in which samples were dropped becomes a
+/// data gap of all valves, "record_dropped", once a commit succeeds again.
 class SampleRecorder {
  public:
+  /// @param on_gap called by the recorder thread.
   SampleRecorder(SampleSink& sink, Counters& counters, ThrottledLog& log,
-                 const SampleRecorderOptions& options);
+                 SampleRecorderOptions options,
+                 std::function<void(DataGap)> on_gap);
   ~SampleRecorder();
   SampleRecorder(const SampleRecorder&) = delete;
   SampleRecorder& operator=(const SampleRecorder&) = delete;
@@ -51,6 +58,8 @@ class SampleRecorder {
   void Commit();
   void Close();
   void CountRecorded();
+  void CountDropped(std::uint64_t samples);
+  void ReportMissing();
   void Fail(const char* reason);
 
   SampleSink& sink_;
@@ -59,6 +68,10 @@ class SampleRecorder {
   SampleRecorderOptions options_;
   std::atomic<bool> degraded_{false};
   Pulse pulse_;
+  std::function<void(DataGap)> on_gap_;
+  std::mutex missing_mutex_;
+  std::optional<DataGap> missing_;  // Not yet reported.
+  bool missing_more_{false};        // Since the last commit.
   std::uint64_t pending_{0};
   std::uint64_t recorded_{0};  // counted so far
   std::chrono::steady_clock::time_point last_commit_;

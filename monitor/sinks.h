@@ -67,7 +67,8 @@ class HistorySink {
   virtual void Keep(const Checkpoint& checkpoint) = 0;
   /// The event is on the bus. Buffers.
   virtual void MarkSent(const EpisodeEvent& event) = 0;
-  /// Stores what is buffered, and a sign of life; called each second.
+  /// Stores what is buffered, and a sign of life; called each second. After a
+  /// call that failed it writes in any case, so that success tells something.
   virtual void Commit() = 0;
 };
 

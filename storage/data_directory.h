@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 
 namespace fdi::storage {
@@ -12,6 +13,16 @@ struct DataDirectory {
   std::filesystem::path models() const { return path / "models.db"; }
   std::filesystem::path history() const { return path / "history.db"; }
 };
+
+/// Size of the write-ahead logs [byte]; 0 where there is none. A log grows
+/// without end while a reader keeps its transaction open.
+struct WalSizes {
+  std::uintmax_t runs{0};
+  std::uintmax_t models{0};
+  std::uintmax_t history{0};
+};
+/// From any thread, beside those that use the databases.
+WalSizes WalSizesOf(const DataDirectory& directory);
 
 /// Makes the folder if it is not there; for programs that write.
 /// @throws DataError naming the path and the reason.

@@ -234,9 +234,11 @@ bool Database::Checkpoint() {
                            " checkpoints");
   }
   const GateHolder holder(*gate_, path_);
-  const int code =
-      sqlite3_wal_checkpoint_v2(connection_->getHandle(), nullptr,
-                                SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+  sqlite3* handle = connection_->getHandle();
+  sqlite3_busy_timeout(handle, 0);  // A reader may stay for hours.
+  const int code = sqlite3_wal_checkpoint_v2(
+      handle, nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+  sqlite3_busy_timeout(handle, static_cast<int>(kWritePatience.count()));
   if (code == SQLITE_BUSY) {
     return false;
   }
@@ -282,16 +284,23 @@ void Database::BackupTo(const std::filesystem::path& target) {
 
 std::vector<std::string> Database::Check() {
   std::vector<std::string> findings;
-  Statement quick = Prepare("PRAGMA quick_check");
-  while (quick.Step()) {
-    if (quick.Text(0) != "ok") {
-      findings.push_back(quick.Text(0));
+  try {
+    Statement quick = Prepare("PRAGMA quick_check");
+    while (quick.Step()) {
+      if (quick.Text(0) != "ok") {
+        findings.push_back(quick.Text(0));
+      }
     }
-  }
-  Statement keys = Prepare("PRAGMA foreign_key_check");
-  while (keys.Step()) {
-    findings.push_back("row " + keys.Text(1) + " of table " + keys.Text(0) +
-                       " has no parent in " + keys.Text(2));
+    Statement keys = Prepare("PRAGMA foreign_key_check");
+    while (keys.Step()) {
+      findings.push_back("row " + keys.Text(1) + " of table " + keys.Text(0) +
+                         " has no parent in " + keys.Text(2));
+    }
+  } catch (const SqliteError& error) {
+    if ((error.code() & 0xFF) != SQLITE_CORRUPT) {
+      throw;
+    }
+    findings.emplace_back(error.what());
   }
   return findings;
 }

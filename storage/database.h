@@ -178,7 +178,8 @@ class Database {
   std::int64_t DataVersion();
 
   /// Folds the log into the file and truncates it. Readers may prevent that:
-  /// @returns false then. For a kWriter; @throws std::logic_error otherwise.
+  /// @returns false then, without waiting for them. For a kWriter;
+  /// @throws std::logic_error otherwise.
   bool Checkpoint();
   std::uintmax_t WalBytes() const;
   std::uintmax_t FileBytes() const;

@@ -38,6 +38,9 @@ class HistoryWriter::Impl {
   Database& database() { return database_; }
 
  private:
+  // What is pending and `work` in one transaction.
+  template <typename Work>
+  void Write(Work&& work);
   void StorePending();
   // Forgets what is in the file now.
   void Settle();
@@ -50,8 +53,20 @@ class HistoryWriter::Impl {
   std::int64_t alive_ns_{0};
   std::vector<DataGap> gaps_;
   std::vector<std::int64_t> sent_;
-  bool together_{false};  // within Together()
+  bool together_{false};  // Within Together().
+  bool failed_{false};    // The last transaction did.
 };
+
+template <typename Work>
+void HistoryWriter::Impl::Write(Work&& work) {
+  failed_ = true;
+  Transaction transaction(database_);
+  StorePending();
+  work();
+  transaction.Commit();
+  failed_ = false;
+  Settle();
+}
 
 SessionStart HistoryWriter::Impl::BeginSession(std::int64_t now_ns,
                                                const std::string& software,
@@ -76,14 +91,12 @@ SessionStart HistoryWriter::Impl::BeginSession(std::int64_t now_ns,
 
 void HistoryWriter::Impl::EndSession(std::int64_t now_ns, bool clean) {
   traces_.EndAll();
-  Transaction transaction(database_);
-  StorePending();
-  database_.Run(
-      "UPDATE monitor_session SET alive_ns = ?, stop_ns = ?, clean = ? "
-      "WHERE session_id = ?",
-      now_ns, now_ns, clean, session_id_);
-  transaction.Commit();
-  Settle();
+  Write([&] {
+    database_.Run(
+        "UPDATE monitor_session SET alive_ns = ?, stop_ns = ?, clean = ? "
+        "WHERE session_id = ?",
+        now_ns, now_ns, clean, session_id_);
+  });
   session_id_.reset();
   database_.Checkpoint();
 }
@@ -93,18 +106,14 @@ void HistoryWriter::Impl::Together(const std::function<void()>& records) {
     records();
     return;
   }
-  Transaction transaction(database_);
-  StorePending();
   together_ = true;
   try {
-    records();
+    Write(records);
   } catch (...) {
     together_ = false;
     throw;
   }
   together_ = false;
-  transaction.Commit();
-  Settle();
 }
 
 std::optional<std::int64_t> HistoryWriter::Impl::Record(const NewEvent& event) {
@@ -165,19 +174,17 @@ bool HistoryWriter::Impl::HasPending() const {
 
 void HistoryWriter::Impl::Commit(std::int64_t now_ns) {
   const bool alive = session_id_ && now_ns - alive_ns_ >= kAliveEveryNs;
-  if (!HasPending() && !alive) {
+  if (!HasPending() && !alive && !failed_) {
     return;
   }
-  Transaction transaction(database_);
-  StorePending();
-  if (session_id_) {
-    cached_("UPDATE monitor_session SET alive_ns = ? WHERE session_id = ?")
-        .Bind(now_ns, session_id_)
-        .Run();
-  }
-  transaction.Commit();
+  Write([&] {
+    if (session_id_) {
+      cached_("UPDATE monitor_session SET alive_ns = ? WHERE session_id = ?")
+          .Bind(now_ns, session_id_)
+          .Run();
+    }
+  });
   alive_ns_ = now_ns;
-  Settle();
 }
 
 HistoryWriter::HistoryWriter(const std::filesystem::path& path)
@@ -226,10 +233,10 @@ void HistoryWriter::EndTrace(std::uint64_t episode_id) {
 
 void HistoryWriter::Keep(std::span<const CoverageCount> counts,
                          std::span<const StoredAccumulator> accumulators) {
-  Transaction transaction(impl_->database());
-  StoreCoverage(impl_->database(), counts);
-  StoreAccumulators(impl_->database(), accumulators);
-  transaction.Commit();
+  impl_->Together([&] {
+    StoreCoverage(impl_->database(), counts);
+    StoreAccumulators(impl_->database(), accumulators);
+  });
 }
 
 std::vector<StoredAccumulator> HistoryWriter::Accumulators() {

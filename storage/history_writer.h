@@ -81,7 +81,8 @@ class HistoryWriter {
   void EndTrace(std::uint64_t episode_id);
 
   /// Adds `counts` to the time that is stored and replaces the accumulators of
-  /// those valves; on the disk on return. Twice counts twice.
+  /// those valves, with what is pending; on the disk on return. Twice counts
+  /// twice.
   void Keep(std::span<const CoverageCount> counts,
             std::span<const StoredAccumulator> accumulators);
 
@@ -95,7 +96,7 @@ class HistoryWriter {
   void MarkSent(std::int64_t event_id);
 
   /// Stores what is pending in one transaction, and a sign of life at least
-  /// every 10 s; nothing to store costs nothing.
+  /// every 10 s, and at once after an error; nothing to store costs nothing.
   void Commit(std::int64_t now_ns);
   bool HasPending() const;
 

@@ -1,6 +1,7 @@
 #include "storage/cli/program.h"
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <iostream>
 #include <stdexcept>
@@ -145,6 +146,8 @@ CLI::App& Program::AddVerb(CLI::App& group, const std::string& name,
 }
 
 int Program::Run(int argc, const char* const* argv) noexcept {
+  // At a limit of file size a write fails, as on a full disk.
+  std::signal(SIGXFSZ, SIG_IGN);
   try {
     const int code = ParseAndRun(argc, argv);
     std::cout.flush();

@@ -338,6 +338,26 @@ TEST_F(PipelineTest, RecordingThatFailsDropsAndCountsWhileDiagnosisGoesOn) {
   EXPECT_EQ(counters_[Counter::kRecordDropped], 1000U);
 }
 
+TEST_F(PipelineTest, RecordingThatResumesLeavesAGapWhereSamplesAreMissing) {
+  options_.recorder.max_pending = 100;
+  FakeRuns runs;
+  runs.broken = true;
+  Start(&runs);
+  Offer("V1", 0, 150);
+  ASSERT_TRUE(history_.notice.Await(
+      [&] { return counters_[Counter::kRecordDropped] == 100; }));
+  runs.notice.Apply([&] { runs.broken = false; });
+  ASSERT_TRUE(history_.notice.Await([&] { return history_.gaps.size() == 1; }));
+  Offer("V1", 150, 200);
+  pipeline_->Stop();
+
+  EXPECT_EQ(history_.gaps.size(), 1U);
+  EXPECT_EQ(history_.gaps[0].reason, "record_dropped");
+  EXPECT_EQ(history_.gaps[0].valve_id, "");
+  EXPECT_FALSE(pipeline_->recording_degraded());
+  EXPECT_EQ(runs.stored.size(), 100U);
+}
+
 TEST_F(PipelineTest, AnOpenEpisodeOfAValveThatStaysSilentIsClosedUnknown) {
   options_.registry.recovery_window = milliseconds(0);
   pipeline_ = std::make_unique<Pipeline>(

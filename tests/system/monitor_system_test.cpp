@@ -4,137 +4,24 @@
 #include <csignal>
 #include <fstream>
 #include <iterator>
-#include <map>
-#include <optional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include "idl/endpoint.h"
 #include "storage/history.h"
-#include "storage/models.h"
 #include "storage/runs.h"
-#include "tests/monitor/linear_models.h"
-#include "tests/storage/temporary_directory.h"
-#include "tests/system/monitor_process.h"
+#include "tests/system/monitor_fixture.h"
 
 namespace fdi::monitor {
 namespace {
 
 using std::chrono::milliseconds;
-using std::chrono::seconds;
-using Clock = std::chrono::steady_clock;
 
-constexpr seconds kPatience{30};
-
-class MonitorSystemTest : public testing::Test {
+class MonitorSystemTest : public MonitorFixture {
  protected:
-  MonitorSystemTest() {
-    idl::DdsOptions dds;
-    dds.domain = domain_;
-    participant_.emplace(dds);
-    samples_.emplace(*participant_,
-                     idl::PublisherOptions{idl::Profile::kLossless, 100});
-    decisions_.emplace(*participant_, idl::Profile::kLossless);
-    events_.emplace(*participant_);
-    status_.emplace(*participant_);
-  }
-
-  static std::filesystem::path StoreModels(const std::filesystem::path& data,
-                                           const ModelSet& models) {
-    storage::ModelStore store(data / "models.db",
-                              storage::Access::kOccasionalWriter);
-    store.Save(models, storage::Activation::kAlways);
-    return data / "models.db";
-  }
-
-  std::vector<std::string> Command(
-      const std::vector<std::string>& arguments) const {
-    std::vector<std::string> command{FDI_MONITOR_PROGRAM,
-                                     "--data",
-                                     directory_.path().string(),
-                                     "--domain",
-                                     std::to_string(domain_),
-                                     "--transport",
-                                     "udp",
-                                     "run",
-                                     "--lossless-decisions"};
-    command.insert(command.end(), arguments.begin(), arguments.end());
-    return command;
-  }
-
-  /// Starts a monitor and waits until samples reach it and vectors us.
-  std::unique_ptr<ChildProcess> StartMonitor(
-      const std::vector<std::string>& arguments = {}) {
-    auto monitor = std::make_unique<ChildProcess>(Command(arguments));
-    EXPECT_TRUE(monitor->AwaitLine("monitor_ready")) << monitor->errors();
-    EXPECT_TRUE(samples_->WaitForReaders(1, kPatience));
-    EXPECT_TRUE(decisions_->WaitForWriters(1, kPatience));
-    EXPECT_TRUE(events_->WaitForWriters(1, kPatience));
-    EXPECT_TRUE(status_->WaitForWriters(1, kPatience));
-    return monitor;
-  }
-
-  void Publish(const Sample& sample, const std::string& valve = "V1") {
-    ASSERT_EQ(samples_->Write({valve, sample}, {}, kPatience),
-              idl::WriteResult::kSent);
-  }
-  void Publish(std::uint64_t from, std::uint64_t to, double offset = 0.0) {
-    for (std::uint64_t k = from; k < to; ++k) {
-      Publish(PlantSample(k, offset));
-    }
-  }
-
-  /// Takes what is on the bus until `condition` holds.
-  template <typename Condition>
-  bool Await(Condition condition) {
-    const Clock::time_point deadline = Clock::now() + kPatience;
-    while (!condition()) {
-      if (Clock::now() > deadline) {
-        return false;
-      }
-      decisions_->Take({[this](const idl::DecisionMessage& m, const auto&) {
-                          vectors_.push_back(m);
-                        },
-                        {}},
-                       milliseconds(10));
-      events_->Take({[this](const idl::FaultEventMessage& m, const auto&) {
-                       faults_.push_back(m);
-                     },
-                     {}},
-                    milliseconds(0));
-      status_->Take({[this](const idl::MonitorStatusMessage& m, const auto&) {
-                       counters_ = {m.counters.begin(), m.counters.end()};
-                     },
-                     {}},
-                    milliseconds(0));
-    }
-    return true;
-  }
-  bool AwaitEvent(TransitionKind kind) {
-    return Await([this, kind] {
-      return !faults_.empty() && faults_.back().transition.kind == kind;
-    });
-  }
-  bool AwaitVectors(std::size_t count) {
-    return Await([this, count] { return vectors_.size() >= count; });
-  }
-
   storage::HistoryReader History() const {
-    return storage::HistoryReader(directory_.path() / "history.db");
+    return storage::HistoryReader(data_ / "history.db");
   }
-
-  const int domain_{20 + static_cast<int>(getpid() % 40)};
-  storage::TemporaryDirectory directory_;
-  std::optional<idl::Participant> participant_;
-  std::optional<idl::Publisher<idl::ValveSampleMessage>> samples_;
-  std::optional<idl::Subscriber<idl::DecisionMessage>> decisions_;
-  std::optional<idl::Subscriber<idl::FaultEventMessage>> events_;
-  std::optional<idl::Subscriber<idl::MonitorStatusMessage>> status_;
-  std::vector<idl::DecisionMessage> vectors_;
-  std::vector<idl::FaultEventMessage> faults_;
-  std::map<std::string, std::uint64_t> counters_;
 };
 
 TEST_F(MonitorSystemTest, AFaultOnTheBusIsOnTheBusAndInTheHistory) {

@@ -1,0 +1,128 @@
+// What may happen to a file while a service uses it.
+
+#include <chrono>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "diagnosis/error.h"
+#include "storage/data_directory.h"
+#include "storage/history.h"
+#include "storage/runs.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::storage {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::uintmax_t kMegabyte = 1'000'000;
+constexpr std::uintmax_t kJournalLimit = 67'108'864;
+
+class DatabaseStressTest : public testing::Test {
+ protected:
+  void Grow(Database& database, std::uintmax_t bytes) {
+    std::vector<std::byte> block(kMegabyte);
+    for (std::uintmax_t done = 0; done < bytes; done += block.size()) {
+      std::fill(block.begin(), block.end(), std::byte{++content_});
+      Transaction transaction(database);
+      database.Run(
+          "INSERT INTO accumulator (valve_id, source_id, model_hash, stamp_ns, "
+          "bytes) VALUES ('v', 1, 1, 1, ?1) "
+          "ON CONFLICT DO UPDATE SET bytes = ?1",
+          block);
+      transaction.Commit();
+    }
+  }
+
+  unsigned char content_{0};
+  TemporaryDirectory directory_;
+  const DataDirectory data_{directory_.path()};
+};
+
+TEST_F(DatabaseStressTest, TheLogShrinksOnceAReaderThatPinnedItIsGone) {
+  Database writer(data_.history(), HistorySchema(), Access::kWriter);
+  Database reader(data_.history(), HistorySchema(), Access::kReader);
+  {
+    const Snapshot pinned(reader);
+    reader.QueryInt64("SELECT count(*) FROM episode");
+    Grow(writer, 80 * kMegabyte);
+    EXPECT_GT(WalSizesOf(data_).history, 75 * kMegabyte);
+    EXPECT_EQ(WalSizesOf(data_).history, writer.WalBytes());
+    EXPECT_EQ(WalSizesOf(data_).runs, 0U);
+  }
+  // The first commit folds the log in, the next one begins it anew.
+  Grow(writer, 2 * kMegabyte);
+
+  EXPECT_LE(WalSizesOf(data_).history, kJournalLimit + 2 * kMegabyte);
+  EXPECT_LE(writer.FileBytes(), 10 * kMegabyte);
+}
+
+TEST_F(DatabaseStressTest, ACheckpointDoesNotWaitForAReader) {
+  Database writer(data_.history(), HistorySchema(), Access::kWriter);
+  Database reader(data_.history(), HistorySchema(), Access::kReader);
+  const Snapshot pinned(reader);
+  reader.QueryInt64("SELECT count(*) FROM episode");
+  Grow(writer, kMegabyte);
+  const auto start = steady_clock::now();
+
+  EXPECT_FALSE(writer.Checkpoint());
+  EXPECT_LT(steady_clock::now() - start, std::chrono::seconds(1));
+}
+
+TEST_F(DatabaseStressTest, ACorruptPageIsAFindingOrARefusalAndStaysAsItIs) {
+  {
+    Database writer(data_.history(), HistorySchema(), Access::kWriter);
+    Grow(writer, kMegabyte);
+    ASSERT_TRUE(writer.Checkpoint());
+  }
+  // The root page of a table of the monitor.
+  std::int64_t page = 0;
+  {
+    Database reader(data_.history(), HistorySchema(), Access::kReader);
+    page = reader
+               .QueryInt64(
+                   "SELECT rootpage FROM sqlite_schema "
+                   "WHERE name = 'monitor_session'")
+               .value_or(0);
+  }
+  ASSERT_GT(page, 1);
+  std::fstream file(data_.history(),
+                    std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp((page - 1) * 4096);
+  file << std::string(4096, '\x55');
+  file.close();
+  const auto bytes = std::filesystem::file_size(data_.history());
+
+  EXPECT_THROW(
+      {
+        HistoryWriter writer(data_.history());
+        writer.BeginSession(1, "test", "");
+      },
+      SqliteError);
+  Database reader(data_.history(), HistorySchema(), Access::kReader);
+  EXPECT_FALSE(reader.Check().empty());
+  EXPECT_EQ(std::filesystem::file_size(data_.history()), bytes);
+}
+
+TEST_F(DatabaseStressTest, AFolderThatCannotBeWrittenIsRefusedByName) {
+  if (geteuid() == 0) {
+    GTEST_SKIP() << "root may write everywhere";
+  }
+  std::filesystem::permissions(
+      directory_.path(),
+      std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+  try {
+    const RunRecorder recorder(data_.runs());
+    ADD_FAILURE() << "opened";
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr(data_.runs().string()));
+  }
+  std::filesystem::permissions(directory_.path(),
+                               std::filesystem::perms::owner_all);
+}
+
+}  // namespace
+}  // namespace fdi::storage
