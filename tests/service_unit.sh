@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# Checks the built unit file: known keys only, and an exposure of at most 2 of
+# 10. Usage: service_unit.sh UNIT PROGRAM      77 without systemd-analyze.
+set -euo pipefail
+unit=$1
+program=$2
+command -v systemd-analyze >/dev/null || exit 77
+
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+checked=$folder/fdi-monitor.service
+sed "s#^ExecStart=[^ ]*#ExecStart=$program#" "$unit" >"$checked"
+
+complaints=$(systemd-analyze verify --man=no "$checked" 2>&1 |
+  grep fdi-monitor || true)
+if [ -n "$complaints" ]; then
+  echo "$complaints"
+  exit 1
+fi
+systemd-analyze security --offline=true --threshold=20 --no-pager "$checked" |
+  tail -1
