@@ -75,13 +75,14 @@ BENCHMARK(StepOneValve<Extended>)->ArgsProduct({{45, 98}, {0, 1}});
 template <Models (*MakeModels)(int)>
 void MakeEngines(benchmark::State& state) {
   const Models models = MakeModels(static_cast<int>(state.range(0)));
+  EnginePlans plans;
   double bytes = 0.0;
   for ([[maybe_unused]] auto _ : state) {
     std::vector<ValveEngine> engines;
     engines.reserve(kManyValves);
     const std::size_t before = HeapBytes();
     for (int i = 0; i < kManyValves; ++i) {
-      engines.emplace_back(models);
+      engines.emplace_back(plans.For(models));
     }
     bytes = static_cast<double>(HeapBytes() - before) / kManyValves;
   }

@@ -17,11 +17,11 @@ void KnowStuck(FaultSet stuck, Verdict& verdict) {
 
 }  // namespace
 
-Episode::Episode(const ModelSet& models)
-    : models_(&models),
-      faults_(models),
-      isolation_(models.decision),
-      clearing_(models) {}
+Episode::Episode(std::shared_ptr<const FaultPlan> plan)
+    : models_(&plan->models()),
+      faults_(std::move(plan)),
+      isolation_(models_->decision),
+      clearing_(*models_) {}
 
 void Episode::Score(const ObserverBank& bank, Verdict& verdict) const {
   faults_.Score(bank, verdict);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "diagnosis/clearing.h"
@@ -24,8 +25,7 @@ struct Findings {
 /// the verdict that every call is given; its factors must have been scored.
 class Episode {
  public:
-  /// `models` must outlive the episode.
-  explicit Episode(const ModelSet& models);
+  explicit Episode(std::shared_ptr<const FaultPlan> plan);
 
   /// Instant factors of the observers.
   void Score(const ObserverBank& bank, Verdict& verdict) const;

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
+#include "diagnosis/observer_evidence.h"
 #include "diagnosis/strength_tracker.h"
 #include "diagnosis/verdict.h"
 
@@ -19,7 +21,8 @@ namespace fdi {
 /// not named for want of evidence.
 class FaultBank {
  public:
-  /// `models` must outlive the bank.
+  explicit FaultBank(std::shared_ptr<const FaultPlan> plan);
+  /// With a plan of its own. `models` must be valid and outlive the bank.
   explicit FaultBank(const ModelSet& models);
 
   /// Instant factors of all observers and faults from the residuals in `bank`.
@@ -36,17 +39,12 @@ class FaultBank {
   void Compete(Verdict& verdict) const;
 
  private:
-  struct Family {
-    std::size_t fault_index;
-    StrengthTracker tracker;
-  };
-
+  double BestEvidence() const;
   double EvidenceMembership(double behind) const;
 
-  const ModelSet* models_;
-  std::vector<std::size_t> fault_indices_;  // by observer; none of the first
-  StrengthTracker normal_;
-  std::vector<Family> families_;  // one per fault and direction
+  std::shared_ptr<const FaultPlan> plan_;
+  ObserverEvidence trained_;
+  std::vector<StrengthTracker> trackers_;  // one per fault and direction
 };
 
 }  // namespace fdi

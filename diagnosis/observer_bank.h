@@ -36,7 +36,8 @@ class ObserverBank {
   /// @param factors one per observer.
   void Score(std::span<double> factors) const;
 
-  const ObserverPlan& plan() const { return *plan_; }
+  const ObserverState& state() const { return state_; }
+  const ObserverKernels& kernels() const { return *kernels_; }
   bool active(int channel) const {
     return state_.active[static_cast<std::size_t>(channel)] != 0;
   }

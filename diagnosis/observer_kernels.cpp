@@ -1,5 +1,7 @@
 #include "diagnosis/observer_kernels.h"
 
+#include <cmath>
+
 #include "diagnosis/lanes.h"
 #include "diagnosis/prediction_kernel.h"
 
@@ -45,6 +47,37 @@ using lanes::Store;
   }
 }
 
+// ln S of four residuals.
+[[gnu::always_inline]] inline Lanes LogVariance(const Lanes& variance) {
+  return Lanes{std::log(variance[0]), std::log(variance[1]),
+               std::log(variance[2]), std::log(variance[3])};
+}
+
+[[gnu::always_inline]] inline void Gather(const ObserverPlan& plan,
+                                          const ObserverState& state,
+                                          std::size_t channel,
+                                          const GainTerms& terms, Quad* parts) {
+  const std::size_t last = plan.first_block(channel + 1);
+  for (std::size_t b = plan.first_block(channel); b < last; ++b) {
+    const ObserverBlock& block = plan.blocks()[b];
+    const Lanes residual = Load(state.residuals[b]);
+    const Lanes extrapolation = Load(state.extrapolations[b]);
+    Lanes variance = Load(block.variance);
+    Lanes density = Load(block.log_variance);
+    if (Any(extrapolation != All(0.0))) {
+      const Lanes uncertain = kExtrapolationError * extrapolation;
+      variance += uncertain * uncertain;
+      density = LogVariance(variance);
+    }
+    density = terms.counts_spread ? density : All(0.0);
+    const Lanes distance =
+        lanes::Min(residual * residual / variance, All(kMostSurprise));
+    const Lanes faded = Load(parts[b]) * terms.memory;
+    const Lanes gain = -0.5 * (distance + density) / terms.time;
+    Store(residual != residual ? faded : faded + gain, parts[b]);
+  }
+}
+
 void PredictPortable(const ObserverPlan& plan, ObserverState& state) {
   Predict(plan, state);
 }
@@ -52,6 +85,11 @@ void PredictPortable(const ObserverPlan& plan, ObserverState& state) {
 void ScorePortable(const ObserverPlan& plan, const ObserverState& state,
                    std::size_t first, std::size_t last, Quad* memberships) {
   Score(plan, state, first, last, memberships);
+}
+
+void GatherPortable(const ObserverPlan& plan, const ObserverState& state,
+                    std::size_t channel, const GainTerms& terms, Quad* parts) {
+  Gather(plan, state, channel, terms, parts);
 }
 
 #if defined(__x86_64__)
@@ -66,11 +104,19 @@ void ScorePortable(const ObserverPlan& plan, const ObserverState& state,
                                        Quad* memberships) {
   Score(plan, state, first, last, memberships);
 }
+
+[[gnu::target("avx2")]] void GatherAvx2(const ObserverPlan& plan,
+                                        const ObserverState& state,
+                                        std::size_t channel,
+                                        const GainTerms& terms, Quad* parts) {
+  Gather(plan, state, channel, terms, parts);
+}
 #endif
 
-constexpr ObserverKernels kPortable{PredictPortable, ScorePortable};
+constexpr ObserverKernels kPortable{PredictPortable, ScorePortable,
+                                    GatherPortable};
 #if defined(__x86_64__)
-constexpr ObserverKernels kAvx2{PredictAvx2, ScoreAvx2};
+constexpr ObserverKernels kAvx2{PredictAvx2, ScoreAvx2, GatherAvx2};
 #endif
 
 }  // namespace

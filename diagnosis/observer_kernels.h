@@ -38,6 +38,16 @@ enum class InstructionSet { kPortable, kAvx2 };
 /// The best one that this processor has.
 InstructionSet BestInstructionSet();
 
+/// How evidence is gathered on one channel; see ObserverEvidence.
+struct GainTerms {
+  double memory;       ///< λ
+  double time;         ///< τ_c [samples].
+  bool counts_spread;  ///< False where the reading has no density.
+};
+
+/// Outliers r²/S count up to this in evidence.
+inline constexpr double kMostSurprise = 25.0;
+
 /// Loops over observers, four at a time.
 struct ObserverKernels {
   /// Predictions, extrapolations and residuals of the active channels for the
@@ -49,6 +59,12 @@ struct ObserverKernels {
   /// that of the first block.
   void (*score)(const ObserverPlan& plan, const ObserverState& state,
                 std::size_t first, std::size_t last, Quad* memberships);
+
+  /// L_c ← λ L_c − ½ (r²/S + ln S)/τ_c for all observers of a channel; without
+  /// the gain where the residual is NaN.
+  /// @param parts L_c, by block of the plan.
+  void (*gather)(const ObserverPlan& plan, const ObserverState& state,
+                 std::size_t channel, const GainTerms& terms, Quad* parts);
 };
 inline constexpr double kAbstains = 2.0;  ///< Beyond any membership.
 

@@ -282,7 +282,10 @@ void ObserverPlan::AddSlots(const ObserverGroup& group,
     block.d.lane[i] = m.d;
     block.rise.lane[i] = m.b - m.a;
     block.fall.lane[i] = m.d - m.c;
+    const double variance = own.residual_sd * own.residual_sd;
     block.sd.lane[i] = own.residual_sd;
+    block.variance.lane[i] = variance;
+    block.log_variance.lane[i] = std::log(variance);
   }
 }
 

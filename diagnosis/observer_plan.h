@@ -80,6 +80,8 @@ struct ObserverBlock {
   Quad rise;  ///< b − a
   Quad fall;  ///< d − c
   Quad sd;    ///< Of the residual.
+  Quad variance;
+  Quad log_variance;
 };
 
 /// What ObserverBank needs of a model set, in the order in which it is read:

@@ -2,187 +2,140 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace fdi {
 namespace {
 
-// A fault may be this much weaker or stronger than those trained, and this
-// much if there is but one observer to tell what strength does.
-constexpr double kReachBelow = 0.5;
-constexpr double kReachAbove = 1.5;
-constexpr double kLoneReachBelow = 0.75;
-constexpr double kLoneReachAbove = 1.25;
+constexpr int kSearchSamples = 40;  // for so many samples strengths are tried
 // A fault rarely develops faster than to full strength in 10 minutes.
 constexpr double kRateDeviation = 1.0 / 1500.0;
 // What a fault does to a channel counts from this share of the deviation on.
 constexpr double kLeastEffect = 0.25;
 
-}  // namespace
-
-StrengthTracker::StrengthTracker(const ModelSet& models,
-                                 const std::vector<int>& observers)
-    : models_(&models),
-      memory_(1.0 - 1.0 / models.decision.evidence_window),
-      channel_times_(ChannelTimes(models)),
-      evidence_(models.channels.size()),
-      cells_(kCells, ChannelEvidence(models.channels.size())) {
-  nodes_.push_back({0, 0.0, ChannelEvidence(models.channels.size())});
-  for (const int index : observers) {
-    const double s = models.observers[static_cast<std::size_t>(index)].strength;
-    nodes_.push_back(
-        {index, std::abs(s), ChannelEvidence(models.channels.size())});
-    sign_ = s < 0.0 ? -1.0 : 1.0;
-    segments_.push_back(
-        ErrorsBetween(nodes_[nodes_.size() - 2], nodes_.back()));
-  }
-  SetReach();
-}
-
-const ChannelObserver& StrengthTracker::Channel(int observer,
-                                                int channel) const {
-  return models_->observers[static_cast<std::size_t>(observer)]
-      .channels[static_cast<std::size_t>(channel)];
-}
-
-StrengthTracker::Errors StrengthTracker::ErrorsBetween(const Node& low,
-                                                       const Node& high) const {
-  Errors errors;
-  for (int c = 0; c < static_cast<int>(models_->channels.size()); ++c) {
-    double error = Channel(high.observer, c).interpolation_error;
-    if (low.observer != 0) {
-      error = std::min(error, Channel(low.observer, c).interpolation_error);
-    }
-    errors.push_back(error);
-  }
-  return errors;
-}
-
-void StrengthTracker::SetReach() {
-  if (segments_.empty()) {
-    return;
-  }
-  const bool lone = segments_.size() == 1;
-  const double below = lone ? kLoneReachBelow : kReachBelow;
-  const double above = lone ? kLoneReachAbove : kReachAbove;
-  lowest_ = nodes_[1].strength * below;
-  highest_ = std::min(1.0, nodes_.back().strength * above);
-}
-
-void StrengthTracker::Restart() {
-  age_ = 0;
-  strength_ = lowest_;
-  rate_ = 0.0;
-  refutable_ = false;
-  evidence_.Clear();
-  factor_ = 0.0;
-  for (ChannelEvidence& cell : cells_) {
-    cell.Clear();
-  }
-  for (Node& node : nodes_) {
-    node.evidence.Clear();
-  }
-}
-
-const StrengthTracker::Node& StrengthTracker::BestNode() const {
-  return *std::max_element(nodes_.begin() + (segments_.empty() ? 0 : 1),
-                           nodes_.end(), [](const Node& a, const Node& b) {
-                             return a.evidence.total() < b.evidence.total();
-                           });
-}
-
-double StrengthTracker::evidence() const {
-  return std::max(evidence_.total(), BestNode().evidence.total());
-}
-
-double StrengthTracker::strength() const {
-  const Node& best = BestNode();
-  return sign_ * (best.evidence.total() > evidence_.total() ? best.strength
-                                                            : strength_);
-}
-
-void StrengthTracker::RaiseEvidence(double least) {
-  evidence_.RaiseTo(least);
-  for (Node& node : nodes_) {
-    node.evidence.RaiseTo(least);
-  }
-}
-
-// −½ (ν²/S + ln S)/τ of one channel; outliers count up to a bound.
-double StrengthTracker::Gain(const ObserverBank& bank, int channel,
-                             double residual, double variance) const {
-  const double distance = std::min(residual * residual / variance, kOutlier);
-  const double density = bank.saturated(channel) ? 0.0 : std::log(variance);
-  return -0.5 * (distance + density) /
-         channel_times_[static_cast<std::size_t>(channel)];
-}
-
-void StrengthTracker::GatherOfNodes(const ObserverBank& bank) {
-  const int channels = static_cast<int>(models_->channels.size());
-  for (Node& node : nodes_) {
-    node.evidence.Fade(bank, memory_);
-    for (int c = 0; c < channels; ++c) {
-      const double residual = bank.residual(node.observer, c);
-      if (bank.active(c) && !std::isnan(residual)) {
-        node.evidence.Add(
-            c, Gain(bank, c, residual, Variance(bank, node.observer, c)));
-      }
-    }
-  }
-}
-
-double StrengthTracker::Cell(int index) const {
-  return lowest_ + (highest_ - lowest_) * index / (kCells - 1);
-}
-
-StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
-                                                int channel,
-                                                double strength) const {
-  if (segments_.empty()) {
-    return {bank.residual(0, channel), 0.0, Variance(bank, 0, channel), 0};
-  }
-  std::size_t j = 0;
-  while (j + 1 < segments_.size() && strength >= nodes_[j + 1].strength) {
-    ++j;
-  }
-  const Node& low = nodes_[j];
-  const Node& high = nodes_[j + 1];
-  const bool high_nearer =
-      j == 0 || strength - low.strength > high.strength - strength;
-  const Node& nearest = high_nearer ? high : low;
-  const double slope = (bank.prediction(high.observer, channel) -
-                        bank.prediction(low.observer, channel)) /
-                       (high.strength - low.strength);
-  const double error = segments_[j][static_cast<std::size_t>(channel)] * slope *
-                       (strength - nearest.strength);
-  const double high_share = std::clamp(
-      (strength - low.strength) / (high.strength - low.strength), 0.0, 1.0);
-  const double low_share = 1.0 - high_share;
-  const double variance =
-      high_share * high_share * Variance(bank, high.observer, channel) +
-      low_share * low_share * Variance(bank, low.observer, channel) +
-      2.0 * high_share * low_share *
-          Channel(high.observer, channel).residual_sd *
-          Channel(low.observer, channel).residual_sd;
-  const TsModel& model = Channel(nearest.observer, channel).model;
-  const double prediction = bank.prediction(low.observer, channel) +
-                            slope * (strength - low.strength);
-  return {Residual(model, bank.reading(channel), prediction), slope,
-          variance + error * error, nearest.observer};
+double Lane(const std::vector<Quad>& quads, std::size_t slot) {
+  return quads[slot / kLanes].lane[slot % kLanes];
 }
 
 // Of a residual under its own condition, and of what is extrapolated.
-double StrengthTracker::Variance(const ObserverBank& bank, int observer,
-                                 int channel) const {
-  const double sd = Channel(observer, channel).residual_sd;
+double Variance(const ObserverBank& bank, const StrengthPath::Point& point) {
   const double extrapolated =
-      kExtrapolationError * bank.extrapolation(observer, channel);
-  return sd * sd + extrapolated * extrapolated;
+      kExtrapolationError * Lane(bank.state().extrapolations, point.slot);
+  return point.sd * point.sd + extrapolated * extrapolated;
+}
+
+// As Residual() in ts_model.h.
+double ResidualOf(double saturation, double reading, double prediction) {
+  return reading >= saturation && prediction >= saturation
+             ? std::numeric_limits<double>::quiet_NaN()
+             : reading - std::min(prediction, saturation);
+}
+
+}  // namespace
+
+StrengthTracker::StrengthTracker(const FaultPlan& plan,
+                                 const StrengthPath& path)
+    : plan_(&plan),
+      path_(&path),
+      channels_(plan.models().channels.size()),
+      cells_(kStrengthCells * channels_, 0.0) {}
+
+void StrengthTracker::Restart() {
+  age_ = 0;
+  strength_ = path_->lowest;
+  rate_ = 0.0;
+  refutable_ = false;
+  total_ = 0.0;
+  evidence_.fill(0.0);
+  factor_ = 0.0;
+  std::fill(cells_.begin(), cells_.end(), 0.0);
+}
+
+const StrengthPath::Node& StrengthTracker::BestNode(
+    const ObserverEvidence& trained) const {
+  return *std::max_element(path_->nodes.begin() + 1, path_->nodes.end(),
+                           [&](const auto& a, const auto& b) {
+                             return trained.total(a.observer) <
+                                    trained.total(b.observer);
+                           });
+}
+
+double StrengthTracker::evidence(const ObserverEvidence& trained) const {
+  return std::max(total_, trained.total(BestNode(trained).observer));
+}
+
+double StrengthTracker::strength(const ObserverEvidence& trained) const {
+  const StrengthPath::Node& best = BestNode(trained);
+  return path_->sign *
+         (trained.total(best.observer) > total_ ? best.strength : strength_);
+}
+
+void StrengthTracker::RaiseEvidence(double least) {
+  const double lacking = least - total_;
+  if (lacking > 0.0) {
+    const auto end = evidence_.begin() + static_cast<std::ptrdiff_t>(channels_);
+    *std::min_element(evidence_.begin(), end) += lacking;
+    total_ = Sum(evidence_.data());
+  }
+}
+
+double StrengthTracker::Sum(const double* parts) const {
+  double total = 0.0;
+  for (std::size_t c = 0; c < channels_; ++c) {
+    total += parts[c];
+  }
+  return total;
+}
+
+// −½ (ν²/S + ln S)/τ of one channel.
+double StrengthTracker::Gain(const ObserverBank& bank, std::size_t channel,
+                             double residual, double variance) const {
+  const double distance =
+      std::min(residual * residual / variance, kMostSurprise);
+  const double density =
+      bank.saturated(static_cast<int>(channel)) ? 0.0 : std::log(variance);
+  return -0.5 * (distance + density) / plan_->channel_time(channel);
+}
+
+StrengthTracker::Segment StrengthTracker::SegmentOf(const ObserverBank& bank,
+                                                    std::size_t channel,
+                                                    std::size_t segment) const {
+  const StrengthPath::Point& low = path_->points[segment * channels_ + channel];
+  const StrengthPath::Point& high =
+      path_->points[(segment + 1) * channels_ + channel];
+  const double from = Lane(bank.state().predictions, low.slot);
+  const double to = Lane(bank.state().predictions, high.slot);
+  return {from,
+          (to - from) / (path_->nodes[segment + 1].strength -
+                         path_->nodes[segment].strength),
+          Variance(bank, low),
+          Variance(bank, high),
+          low.sd,
+          high.sd};
+}
+
+StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
+                                                std::size_t channel,
+                                                const Segment& segment,
+                                                const PathPlace& place) const {
+  const double error = path_->errors[place.segment * channels_ + channel] *
+                       segment.slope * place.from_nearest;
+  const double high_share = place.high_share;
+  const double low_share = 1.0 - high_share;
+  const double variance =
+      high_share * high_share * segment.high_variance +
+      low_share * low_share * segment.low_variance +
+      2.0 * high_share * low_share * segment.high_sd * segment.low_sd;
+  const double saturation =
+      path_->points[place.nearest * channels_ + channel].saturation;
+  return {ResidualOf(saturation, bank.reading(static_cast<int>(channel)),
+                     segment.low + segment.slope * place.from_low),
+          segment.slope, variance + error * error};
 }
 
 void StrengthTracker::Step(const ObserverBank& bank) {
-  GatherOfNodes(bank);
   refutable_ = refutable_ || CouldBeRefuted(bank);
-  if (!segments_.empty() && age_ < kSearchSamples) {
+  if (age_ < kSearchSamples) {
     Search(bank);
   } else {
     Follow(bank);
@@ -195,16 +148,17 @@ void StrengthTracker::Step(const ObserverBank& bank) {
 // predicts another one, unless the limit of the transmitter hides both. A
 // reading at the limit that normal operation does not explain is a test passed.
 bool StrengthTracker::CouldBeRefuted(const ObserverBank& bank) const {
-  const int channels = static_cast<int>(models_->channels.size());
-  for (int c = 0; c < channels; ++c) {
-    if (!bank.active(c) || std::isnan(bank.residual(0, c))) {
+  for (std::size_t c = 0; c < channels_; ++c) {
+    const int channel = static_cast<int>(c);
+    if (!bank.active(channel) || std::isnan(bank.residual(0, channel))) {
       continue;
     }
-    for (std::size_t j = 1; j < nodes_.size(); ++j) {
-      const int observer = nodes_[j].observer;
+    for (std::size_t j = 1; j < path_->nodes.size(); ++j) {
+      const StrengthPath::Point& point = path_->points[j * channels_ + c];
       const double effect =
-          std::abs(bank.prediction(observer, c) - bank.prediction(0, c));
-      if (effect > kLeastEffect * Channel(observer, c).residual_sd) {
+          std::abs(Lane(bank.state().predictions, point.slot) -
+                   bank.prediction(0, channel));
+      if (effect > kLeastEffect * point.sd) {
         return true;
       }
     }
@@ -215,75 +169,96 @@ bool StrengthTracker::CouldBeRefuted(const ObserverBank& bank) const {
 // Most evidence over a grid of constant strengths: the filter is only locally
 // right, and a fault without effect at small strengths has no slope there.
 void StrengthTracker::Search(const ObserverBank& bank) {
-  const int channels = static_cast<int>(models_->channels.size());
-  for (int cell = 0; cell < kCells; ++cell) {
-    for (int c = 0; c < channels; ++c) {
-      if (!bank.active(c)) {
-        continue;
-      }
-      const Prediction p = At(bank, c, Cell(cell));
-      if (std::isnan(p.residual)) {
-        continue;
-      }
-      cells_[static_cast<std::size_t>(cell)].Add(
-          c, Gain(bank, c, p.residual, p.variance));
+  for (std::size_t c = 0; c < channels_; ++c) {
+    if (bank.active(static_cast<int>(c))) {
+      SearchChannel(bank, c);
     }
   }
-  const auto best =
-      std::max_element(cells_.begin(), cells_.end(),
-                       [](const ChannelEvidence& a, const ChannelEvidence& b) {
-                         return a.total() < b.total();
-                       });
-  strength_ = Cell(static_cast<int>(best - cells_.begin()));
-  evidence_ = *best;
-  const double width = (highest_ - lowest_) / (kCells - 1);
+  std::size_t best = 0;
+  total_ = Sum(cells_.data());
+  for (std::size_t cell = 1; cell < kStrengthCells; ++cell) {
+    const double total = Sum(&cells_[cell * channels_]);
+    best = total_ < total ? cell : best;
+    total_ = std::max(total_, total);
+  }
+  strength_ = path_->cells[best];
+  std::copy_n(&cells_[best * channels_], channels_, evidence_.begin());
+  const double width = (path_->highest - path_->lowest) / (kStrengthCells - 1);
   var_strength_ = width * width;
   var_rate_ = kRateDeviation * kRateDeviation;
   covariance_ = 0.0;
   rate_ = 0.0;
 }
 
+void StrengthTracker::SearchChannel(const ObserverBank& bank,
+                                    std::size_t channel) {
+  std::size_t index = path_->places[0].segment;
+  Segment segment = SegmentOf(bank, channel, index);
+  for (std::size_t cell = 0; cell < kStrengthCells; ++cell) {
+    const PathPlace& place = path_->places[cell];
+    if (place.segment != index) {
+      index = place.segment;
+      segment = SegmentOf(bank, channel, index);
+    }
+    const Prediction p = At(bank, channel, segment, place);
+    if (!std::isnan(p.residual)) {
+      cells_[cell * channels_ + channel] +=
+          Gain(bank, channel, p.residual, p.variance);
+    }
+  }
+}
+
 void StrengthTracker::Follow(const ObserverBank& bank) {
-  evidence_.Fade(bank, memory_);
+  const double memory = plan_->memory();
   // Prediction: s ← s + ṡ; the old information fades by λ.
   strength_ += rate_;
-  var_strength_ = (var_strength_ + 2.0 * covariance_ + var_rate_) / memory_;
-  covariance_ = (covariance_ + var_rate_) / memory_;
-  var_rate_ = std::min(var_rate_ / memory_, kRateDeviation * kRateDeviation);
+  var_strength_ = (var_strength_ + 2.0 * covariance_ + var_rate_) / memory;
+  covariance_ = (covariance_ + var_rate_) / memory;
+  var_rate_ = std::min(var_rate_ / memory, kRateDeviation * kRateDeviation);
   KeepBounded();
-  const int channels = static_cast<int>(models_->channels.size());
-  for (int c = 0; c < channels; ++c) {
-    if (!bank.active(c)) {
+  for (std::size_t c = 0; c < channels_; ++c) {
+    const int channel = static_cast<int>(c);
+    if (!bank.active(channel)) {
       continue;
     }
-    const double s = std::clamp(strength_, lowest_, highest_);
-    const Prediction p = At(bank, c, s);
+    evidence_[c] *= bank.saturated(channel) ? 1.0 : memory;
+    const double s = std::clamp(strength_, path_->lowest, path_->highest);
+    const PathPlace place = path_->PlaceOf(s);
+    const Prediction p = At(bank, c, SegmentOf(bank, c, place.segment), place);
     if (std::isnan(p.residual)) {
       continue;
     }
     const double spread =
         p.variance + p.slope * p.slope * std::min(var_strength_, 1.0);
-    const double distance = p.residual * p.residual / spread;
-    evidence_.Add(c, Gain(bank, c, p.residual, spread));
-    if (p.slope == 0.0 || segments_.empty()) {
-      continue;
+    evidence_[c] += Gain(bank, c, p.residual, spread);
+    if (p.slope != 0.0) {
+      Correct(p, s, spread);
     }
-    const double innovation =
-        p.residual *
-        (distance > kOutlier ? std::sqrt(kOutlier / distance) : 1.0);
-    const double gain_s = p.slope * var_strength_ / spread;
-    const double gain_r = p.slope * covariance_ / spread;
-    strength_ = s + gain_s * innovation;
-    rate_ += gain_r * innovation;
-    var_rate_ -= gain_r * p.slope * covariance_;
-    covariance_ -= gain_s * p.slope * covariance_;
-    var_strength_ -= gain_s * p.slope * var_strength_;
   }
+  total_ = Sum(evidence_.data());
   KeepBounded();
-  if (strength_ < lowest_ || strength_ > highest_) {
-    strength_ = std::clamp(strength_, lowest_, highest_);
+  if (strength_ < path_->lowest || strength_ > path_->highest) {
+    strength_ = std::clamp(strength_, path_->lowest, path_->highest);
     rate_ = 0.0;
   }
+}
+
+// Correction of the filter by one channel; outliers pull with a bounded force.
+void StrengthTracker::Correct(const Prediction& prediction, double strength,
+                              double spread) {
+  const double residual = prediction.residual;
+  const double slope = prediction.slope;
+  const double distance = residual * residual / spread;
+  const double innovation =
+      residual *
+      (distance > kMostSurprise ? std::sqrt(kMostSurprise / distance) : 1.0);
+  const double gain_s = slope * var_strength_ / spread;
+  const double gain_r = slope * covariance_ / spread;
+  strength_ = strength + gain_s * innovation;
+  rate_ += gain_r * innovation;
+  var_rate_ -= gain_r * slope * covariance_;
+  covariance_ -= gain_s * slope * covariance_;
+  var_strength_ -= gain_s * slope * var_strength_;
 }
 
 // A strength that the residuals say nothing of stays within [0, 1] all the
@@ -297,18 +272,18 @@ void StrengthTracker::KeepBounded() {
 
 void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
   factor_ = 1.0;
-  const int channels = static_cast<int>(models_->channels.size());
-  for (int c = 0; c < channels; ++c) {
-    if (!bank.active(c)) {
+  const PathPlace place = path_->PlaceOf(strength_);
+  for (std::size_t c = 0; c < channels_ && factor_ > 0.0; ++c) {
+    if (!bank.active(static_cast<int>(c))) {
       continue;
     }
-    const Prediction p = At(bank, c, strength_);
+    const Prediction p = At(bank, c, SegmentOf(bank, c, place.segment), place);
     if (std::isnan(p.residual)) {
       continue;
     }
-    const ChannelObserver& nearest = Channel(p.nearest, c);
-    const double shrunk =
-        p.residual * nearest.residual_sd / std::sqrt(p.variance);
+    const StrengthPath::Point& nearest =
+        path_->points[place.nearest * channels_ + c];
+    const double shrunk = p.residual * nearest.sd / std::sqrt(p.variance);
     factor_ = std::min(factor_, nearest.membership(shrunk));
   }
 }

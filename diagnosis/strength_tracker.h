@@ -1,10 +1,11 @@
 #pragma once
 
-#include <algorithm>
+#include <array>
 #include <vector>
 
-#include "diagnosis/channel_evidence.h"
+#include "diagnosis/fault_plan.h"
 #include "diagnosis/observer_bank.h"
+#include "diagnosis/observer_evidence.h"
 
 namespace fdi {
 
@@ -23,17 +24,16 @@ namespace fdi {
 ///
 ///     L ← λ L − ½ Σ_c (ν²/S + ln S) / τ_c,
 ///
-/// τ_c (ChannelTimes) the same for all faults: log-likelihoods of faults differ
+/// τ_c (FaultPlan) the same for all faults: log-likelihoods of faults differ
 /// long before single residuals do. A reading at the transmitter's limit has no
 /// density: it costs ν²/S of a prediction below the limit, and nothing of one
-/// beyond; what the channel said before is held (ChannelEvidence). Each
-/// observer gathers evidence of its own strength alike; the fault has that of
-/// the best, so that no interpolation can spoil a strength that was trained.
+/// beyond; what the channel said before is held. Each observer gathers evidence
+/// of its own strength alike (ObserverEvidence); the fault has that of the
+/// best, so that no interpolation can spoil a strength that was trained.
 class StrengthTracker {
  public:
-  /// `observers`: indices of one fault and direction by rising |strength|;
-  /// empty for normal operation, which has nothing to follow.
-  StrengthTracker(const ModelSet& models, const std::vector<int>& observers);
+  /// `plan` and `path` must outlive the tracker.
+  StrengthTracker(const FaultPlan& plan, const StrengthPath& path);
 
   /// Begins anew at a detection.
   void Restart();
@@ -41,12 +41,12 @@ class StrengthTracker {
   /// Takes the residuals of one sample.
   void Step(const ObserverBank& bank);
 
-  /// Lifts all evidence to `least` where it is below.
+  /// Lifts the evidence to `least` if it is below.
   void RaiseEvidence(double least);
 
   /// Of the best explanation, followed or trained.
-  double strength() const;
-  double evidence() const;
+  double strength(const ObserverEvidence& trained) const;
+  double evidence(const ObserverEvidence& trained) const;
 
   /// True once a reading since the detection could have refuted the fault: on a
   /// channel where it differs from normal operation and the transmitter's limit
@@ -57,48 +57,43 @@ class StrengthTracker {
   /// followed strength.
   double factor() const { return factor_; }
 
+  const StrengthPath& path() const { return *path_; }
+
  private:
-  struct Node {
-    int observer;
-    double strength;  // |s|
-    ChannelEvidence evidence;
+  struct Segment {  // of one channel
+    double low;     // prediction of the weaker node
+    double slope;   // dŷ/ds
+    double low_variance;
+    double high_variance;
+    double low_sd;
+    double high_sd;
   };
-  using Errors = std::vector<double>;  // κ per channel, between two nodes
   struct Prediction {
     double residual;
-    double slope;     // dŷ/ds
+    double slope;
     double variance;  // of the residual, interpolation error included
-    int nearest;      // observer at the nearer node
   };
+  using Parts = std::array<double, kMaxChannels>;  // evidence by channel
 
-  const ChannelObserver& Channel(int observer, int channel) const;
-  Errors ErrorsBetween(const Node& low, const Node& high) const;
-  void SetReach();
-  Prediction At(const ObserverBank& bank, int channel, double strength) const;
-  double Variance(const ObserverBank& bank, int observer, int channel) const;
-  const Node& BestNode() const;
-  double Gain(const ObserverBank& bank, int channel, double residual,
+  const StrengthPath::Node& BestNode(const ObserverEvidence& trained) const;
+  Segment SegmentOf(const ObserverBank& bank, std::size_t channel,
+                    std::size_t segment) const;
+  Prediction At(const ObserverBank& bank, std::size_t channel,
+                const Segment& segment, const PathPlace& place) const;
+  double Gain(const ObserverBank& bank, std::size_t channel, double residual,
               double variance) const;
-  void GatherOfNodes(const ObserverBank& bank);
+  double Sum(const double* parts) const;
   bool CouldBeRefuted(const ObserverBank& bank) const;
   void Search(const ObserverBank& bank);
+  void SearchChannel(const ObserverBank& bank, std::size_t channel);
   void Follow(const ObserverBank& bank);
+  void Correct(const Prediction& prediction, double strength, double spread);
   void KeepBounded();
   void UpdateFactor(const ObserverBank& bank);
-  double Cell(int index) const;
 
-  static constexpr int kCells = 33;          // strengths tried at the start
-  static constexpr int kSearchSamples = 40;  // for so many samples
-  static constexpr double kOutlier = 25.0;   // bound of ν²/S
-
-  const ModelSet* models_;
-  std::vector<Node> nodes_;       // the normal observer first
-  std::vector<Errors> segments_;  // between node j and j + 1
-  double sign_{1.0};
-  double lowest_{0.0};
-  double highest_{0.0};
-  double memory_;                      // λ
-  std::vector<double> channel_times_;  // τ_c
+  const FaultPlan* plan_;
+  const StrengthPath* path_;
+  std::size_t channels_;
 
   int age_{0};
   double strength_{0.0};
@@ -106,10 +101,11 @@ class StrengthTracker {
   double var_strength_{0.0};
   double var_rate_{0.0};
   double covariance_{0.0};
-  ChannelEvidence evidence_;
+  double total_{0.0};  // of the evidence
+  Parts evidence_{};
   double factor_{0.0};
   bool refutable_{false};
-  std::vector<ChannelEvidence> cells_;
+  std::vector<double> cells_;  // evidence by cell and channel
 };
 
 }  // namespace fdi

@@ -5,7 +5,6 @@
 #include "diagnosis/coverage.h"
 #include "diagnosis/detection.h"
 #include "diagnosis/episode.h"
-#include "diagnosis/error.h"
 #include "diagnosis/intake.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/snapshot.h"
@@ -17,28 +16,19 @@ namespace {
 
 constexpr std::uint32_t kSnapshotFormat = 1;
 
-std::shared_ptr<const ModelSet> Checked(
-    std::shared_ptr<const ModelSet> models) {
-  Require(models != nullptr, "the engine needs a model set");
-  Validate(*models);
-  return models;
-}
-
 }  // namespace
 
 // What depends on the model set; replaced as a whole by Adopt().
 struct Diagnosis {
-  explicit Diagnosis(std::shared_ptr<const ModelSet> set)
-      : models(Checked(std::move(set))),
-        required(RequiredSignals(*models)),
-        bank(*models),
-        coverage(*models),
-        detection(*models),
-        stuck(*models),
-        episode(*models) {}
+  explicit Diagnosis(std::shared_ptr<const EnginePlan> shared)
+      : plan(std::move(shared)),
+        bank(plan->observers()),
+        coverage(plan->models()),
+        detection(plan->models()),
+        stuck(plan->models()),
+        episode(plan->faults()) {}
 
-  std::shared_ptr<const ModelSet> models;
-  SignalMask required;
+  std::shared_ptr<const EnginePlan> plan;
   ObserverBank bank;
   Coverage coverage;
   Detection detection;
@@ -48,20 +38,20 @@ struct Diagnosis {
 
 class ValveEngine::Impl {
  public:
-  explicit Impl(std::shared_ptr<const ModelSet> models)
-      : diagnosis_(std::make_unique<Diagnosis>(std::move(models))),
-        order_(diagnosis_->models->sample_period_s) {
+  explicit Impl(std::shared_ptr<const EnginePlan> plan)
+      : diagnosis_(std::make_unique<Diagnosis>(std::move(plan))),
+        order_(models().sample_period_s) {
     ClearVerdict();
   }
 
   const Verdict& Step(const Sample& sample);
   std::optional<Transition> EndEpisode(EndReason reason);
-  std::optional<Transition> Adopt(std::shared_ptr<const ModelSet> models);
+  std::optional<Transition> Adopt(std::shared_ptr<const EnginePlan> plan);
   void HoldIsolation(bool hold);
   std::vector<std::byte> Save() const;
   bool Restore(std::span<const std::byte> bytes);
 
-  const ModelSet& models() const { return *diagnosis_->models; }
+  const ModelSet& models() const { return diagnosis_->plan->models(); }
   bool episode_open() const { return verdict_.state != State::kNormal; }
 
  private:
@@ -107,7 +97,8 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
     Reject(placement.intake);
     return verdict_;
   }
-  const Intake values = CheckValues(models(), diagnosis_->required, sample);
+  const Intake values =
+      CheckValues(models(), diagnosis_->plan->required(), sample);
   if (values != Intake::kAccepted) {
     Reject(values);
     return verdict_;
@@ -216,12 +207,12 @@ std::optional<Transition> ValveEngine::Impl::EndEpisode(EndReason reason) {
 }
 
 std::optional<Transition> ValveEngine::Impl::Adopt(
-    std::shared_ptr<const ModelSet> models) {
-  auto replacement = std::make_unique<Diagnosis>(std::move(models));
+    std::shared_ptr<const EnginePlan> plan) {
+  auto replacement = std::make_unique<Diagnosis>(std::move(plan));
   replacement->episode.HoldIsolation(isolation_held_);
   std::optional<Transition> closed = EndEpisode(EndReason::kModelChanged);
   diagnosis_ = std::move(replacement);
-  order_.SetPeriod(diagnosis_->models->sample_period_s);
+  order_.SetPeriod(models().sample_period_s);
   ClearVerdict();
   return closed;
 }
@@ -257,7 +248,9 @@ bool ValveEngine::Impl::Restore(std::span<const std::byte> bytes) {
 }
 
 ValveEngine::ValveEngine(std::shared_ptr<const ModelSet> models)
-    : impl_(std::make_unique<Impl>(std::move(models))) {}
+    : ValveEngine(std::make_shared<const EnginePlan>(std::move(models))) {}
+ValveEngine::ValveEngine(std::shared_ptr<const EnginePlan> plan)
+    : impl_(std::make_unique<Impl>(std::move(plan))) {}
 ValveEngine::~ValveEngine() = default;
 ValveEngine::ValveEngine(ValveEngine&&) noexcept = default;
 ValveEngine& ValveEngine::operator=(ValveEngine&&) noexcept = default;
@@ -272,7 +265,12 @@ std::optional<Transition> ValveEngine::EndEpisode(EndReason reason) {
 
 std::optional<Transition> ValveEngine::Adopt(
     std::shared_ptr<const ModelSet> models) {
-  return impl_->Adopt(std::move(models));
+  return Adopt(std::make_shared<const EnginePlan>(std::move(models)));
+}
+
+std::optional<Transition> ValveEngine::Adopt(
+    std::shared_ptr<const EnginePlan> plan) {
+  return impl_->Adopt(std::move(plan));
 }
 
 void ValveEngine::HoldIsolation(bool hold) {

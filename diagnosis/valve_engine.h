@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "diagnosis/engine_plan.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/sample.h"
 #include "diagnosis/verdict.h"
@@ -21,6 +22,8 @@ class ValveEngine {
  public:
   /// @throws DataError if `models` is not usable (Validate).
   explicit ValveEngine(std::shared_ptr<const ModelSet> models);
+  /// For many valves of one model set, which share its plan.
+  explicit ValveEngine(std::shared_ptr<const EnginePlan> plan);
   ~ValveEngine();
   ValveEngine(ValveEngine&&) noexcept;
   ValveEngine& operator=(ValveEngine&&) noexcept;
@@ -39,6 +42,7 @@ class ValveEngine {
   /// Continues with another model set from the next sample on; order and
   /// source of the samples stay known. As EndEpisode(kModelChanged).
   std::optional<Transition> Adopt(std::shared_ptr<const ModelSet> models);
+  std::optional<Transition> Adopt(std::shared_ptr<const EnginePlan> plan);
 
   /// While held, episodes are detected and stay unknown: for a valve whose
   /// baseline is not trusted. Stays over Adopt().

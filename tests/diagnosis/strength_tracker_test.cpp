@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -18,8 +19,34 @@ using testing::LinearPlant;
 using testing::Noise;
 using testing::PlantSample;
 
-constexpr int kF3First = 3;  // observers of LinearPlant()
-constexpr int kF6First = 5;
+constexpr std::size_t kF3First = 3;  // observers of LinearPlant()
+constexpr std::size_t kF6First = 5;
+
+// What FaultBank does for one fault.
+class Explanation {
+ public:
+  Explanation(const ModelSet& models, const std::vector<std::size_t>& observers)
+      : plan_(std::make_shared<const FaultPlan>(
+            std::make_shared<const ObserverPlan>(models))),
+        path_(MakeStrengthPath(plan_->observers(), observers)),
+        trained_(plan_),
+        tracker_(*plan_, path_) {
+    tracker_.Restart();
+  }
+
+  void Step(const ObserverBank& bank) {
+    trained_.Gather(bank);
+    tracker_.Step(bank);
+  }
+  double strength() const { return tracker_.strength(trained_); }
+  double evidence() const { return tracker_.evidence(trained_); }
+
+ private:
+  std::shared_ptr<const FaultPlan> plan_;
+  StrengthPath path_;
+  ObserverEvidence trained_;
+  StrengthTracker tracker_;
+};
 
 class StrengthTrackerTest : public ::testing::Test {
  protected:
@@ -30,8 +57,7 @@ TEST_F(StrengthTrackerTest, FollowsADevelopingFaultBetweenItsObservers) {
   const ModelSet models = LinearPlant();
   ObserverBank bank(models);
   Begin(bank);
-  StrengthTracker tracker(models, {kF6First, kF6First + 1});
-  tracker.Restart();
+  Explanation tracker(models, {kF6First, kF6First + 1});
   Noise noise(1);
   double worst = 0.0;
   for (std::uint64_t k = 0; k < 1000; ++k) {
@@ -53,10 +79,8 @@ TEST_F(StrengthTrackerTest, EvidenceTellsSlopeFromOffsetOnlyInMotion) {
   for (const double swing : {0.0, 20.0}) {
     ObserverBank bank(models);
     bank.Initialise(PlantSample(0, swing));
-    StrengthTracker f3(models, {kF3First, kF3First + 1});
-    StrengthTracker f6(models, {kF6First, kF6First + 1});
-    f3.Restart();
-    f6.Restart();
+    Explanation f3(models, {kF3First, kF3First + 1});
+    Explanation f6(models, {kF6First, kF6First + 1});
     Noise noise(2);
     for (std::uint64_t k = 0; k < 200; ++k) {
       Sample sample = PlantSample(k, swing);
@@ -81,16 +105,14 @@ TEST_F(StrengthTrackerTest, DoubtfulInterpolationGathersLessEvidence) {
   std::vector<double> evidence;
   for (const double error : {0.02, 1.0}) {
     ModelSet models = LinearPlant();
-    for (int i = kF6First; i < kF6First + 2; ++i) {
-      for (ChannelObserver& channel :
-           models.observers[static_cast<std::size_t>(i)].channels) {
+    for (std::size_t i = kF6First; i < kF6First + 2; ++i) {
+      for (ChannelObserver& channel : models.observers[i].channels) {
         channel.interpolation_error = error;
       }
     }
     ObserverBank bank(models);
     Begin(bank);
-    StrengthTracker tracker(models, {kF6First, kF6First + 1});
-    tracker.Restart();
+    Explanation tracker(models, {kF6First, kF6First + 1});
     for (std::uint64_t k = 0; k < 100; ++k) {
       Sample sample = PlantSample(k);
       AddF6(sample, 0.7);
@@ -110,10 +132,8 @@ TEST_F(StrengthTrackerTest, TrainedStrengthHasTheEvidenceOfItsObserver) {
   }
   ObserverBank bank(models);
   Begin(bank);
-  StrengthTracker f6(models, {kF6First, kF6First + 1});
-  StrengthTracker alone(models, {kF6First + 1});
-  f6.Restart();
-  alone.Restart();
+  Explanation f6(models, {kF6First, kF6First + 1});
+  Explanation alone(models, {kF6First + 1});
   for (std::uint64_t k = 0; k < 100; ++k) {
     Sample sample = PlantSample(k);
     AddF6(sample, 1.0);
@@ -129,8 +149,7 @@ TEST_F(StrengthTrackerTest, LoneObserverReachesAQuarterFurther) {
   const ModelSet models = LinearPlant();
   ObserverBank bank(models);
   Begin(bank);
-  StrengthTracker tracker(models, {kF6First});  // strength 0.5 alone
-  tracker.Restart();
+  Explanation tracker(models, {kF6First});  // strength 0.5 alone
   for (std::uint64_t k = 0; k < 100; ++k) {
     Sample sample = PlantSample(k);
     AddF6(sample, 0.65);
@@ -167,10 +186,8 @@ TEST_F(StrengthTrackerTest,
   const ModelSet models = SaturatingPlant();
   ObserverBank bank(models);
   bank.Initialise(PlantSample(0));
-  StrengthTracker f3(models, {kF3First, kF3First + 1});
-  StrengthTracker f6(models, {kF6First, kF6First + 1});
-  f3.Restart();
-  f6.Restart();
+  Explanation f3(models, {kF3First, kF3First + 1});
+  Explanation f6(models, {kF6First, kF6First + 1});
   Noise noise(4);
   const auto step = [&](std::uint64_t k, double cv) {
     bank.Step(SaturatingSample(k, cv, 0.6, noise));

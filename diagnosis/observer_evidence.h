@@ -1,0 +1,46 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "diagnosis/fault_plan.h"
+#include "diagnosis/observer_bank.h"
+
+namespace fdi {
+
+/// The evidence for one explanation, L = Σ_c L_c, gathered by channel so that
+/// each forgets for itself: a channel at its transmitter's limit, or without
+/// its signals, says next to nothing, and what it said before is held until it
+/// speaks again,
+///
+///     L_c ← λ L_c + gain,   λ = 1 meanwhile.
+///
+/// Here for every observer at the strength that it was trained for, with the
+/// gain −½ (r²/S + ln S)/τ_c of its residual r of variance S.
+class ObserverEvidence {
+ public:
+  explicit ObserverEvidence(std::shared_ptr<const FaultPlan> plan);
+
+  void Clear();
+
+  /// Takes the residuals of one sample.
+  void Gather(const ObserverBank& bank);
+
+  /// Lifts every sum to `least` if it is below, in the channel that speaks most
+  /// against.
+  void RaiseTo(double least);
+
+  double total(std::size_t observer) const { return totals_[observer]; }
+
+ private:
+  double& Part(std::size_t slot) {
+    return parts_[slot / kLanes].lane[slot % kLanes];
+  }
+  void Sum(std::size_t observer);
+
+  std::shared_ptr<const FaultPlan> plan_;
+  std::vector<Quad> parts_;     // by block
+  std::vector<double> totals_;  // by observer
+};
+
+}  // namespace fdi
