@@ -16,6 +16,7 @@ constexpr int kSettled = 200;   // samples until the valve is judged
 constexpr int kSamples = 2000;  // measured in a row
 constexpr double kFault = 4.0;  // shift of F that is detected
 constexpr int kManyValves = 1000;
+constexpr int kRound = 20;  // samples of each of many valves
 
 using Models = std::shared_ptr<const ModelSet>;
 
@@ -36,6 +37,12 @@ std::size_t HeapBytes() {
 void Later(Sample& sample, std::uint64_t samples) {
   sample.seq += samples;
   sample.stamp_ns += static_cast<std::int64_t>(samples) * 1'000'000'000;
+}
+
+void CountSamples(benchmark::State& state, std::int64_t samples) {
+  state.counters["per_sample"] = benchmark::Counter(
+      static_cast<double>(samples),
+      benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 // One valve, in normal operation (argument 1 is 0) or in an episode.
@@ -61,15 +68,43 @@ void StepOneValve(benchmark::State& state) {
     }
   }
   const std::int64_t steps = state.iterations() * kSamples;
-  state.SetItemsProcessed(steps);
   state.counters["in_episode"] =
       static_cast<double>(open) / static_cast<double>(steps);
-  state.counters["per_sample"] = benchmark::Counter(
-      static_cast<double>(steps),
-      benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  CountSamples(state, steps);
 }
 BENCHMARK(StepOneValve<Paper>)->ArgsProduct({{11, 33}, {0, 1}});
 BENCHMARK(StepOneValve<Extended>)->ArgsProduct({{45, 98}, {0, 1}});
+
+// Valves of one model set in turn, each somewhere else in its cycle; argument 1
+// is their number.
+template <Models (*MakeModels)(int)>
+void StepManyValves(benchmark::State& state) {
+  EnginePlans plans;
+  const auto plan = plans.For(MakeModels(static_cast<int>(state.range(0))));
+  const auto valves = static_cast<std::size_t>(state.range(1));
+  std::vector<ValveEngine> engines;
+  std::vector<std::vector<Sample>> samples;
+  for (std::size_t v = 0; v < valves; ++v) {
+    engines.emplace_back(plan);
+    samples.push_back(Samples(kRound, 7 * static_cast<int>(v), 0.0));
+  }
+  const auto round = [&] {
+    for (std::size_t k = 0; k < kRound; ++k) {
+      for (std::size_t v = 0; v < valves; ++v) {
+        benchmark::DoNotOptimize(engines[v].Step(samples[v][k]));
+        Later(samples[v][k], kRound);
+      }
+    }
+  };
+  round();
+  for ([[maybe_unused]] auto _ : state) {
+    round();
+  }
+  CountSamples(state,
+               state.iterations() * kRound * static_cast<std::int64_t>(valves));
+}
+BENCHMARK(StepManyValves<Paper>)->ArgsProduct({{11, 33}, {8, 1000}});
+BENCHMARK(StepManyValves<Extended>)->ArgsProduct({{45, 98}, {8, 1000}});
 
 // 1000 engines of one model set; what each needs beside it.
 template <Models (*MakeModels)(int)>
