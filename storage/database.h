@@ -183,6 +183,9 @@ class Database {
   bool Checkpoint();
   std::uintmax_t WalBytes() const;
   std::uintmax_t FileBytes() const;
+  /// Of the file, the pages that hold something: those that are free are used
+  /// again before it grows.
+  std::uintmax_t UsedBytes();
 
   /// A consistent copy (VACUUM INTO). @throws DataError if `target` exists.
   void BackupTo(const std::filesystem::path& target);

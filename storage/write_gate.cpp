@@ -6,10 +6,12 @@
 #include <thread>
 
 #include <fcntl.h>
+#include <sqlite3.h>
 #include <sys/file.h>
 #include <unistd.h>
 
 #include "diagnosis/error.h"
+#include "storage/database.h"
 
 namespace fdi::storage {
 
@@ -43,6 +45,18 @@ bool WriteGate::Enter(std::chrono::milliseconds patience) {
 
 void WriteGate::Leave() noexcept {
   flock(file_, LOCK_UN);
+}
+
+GateHolder::GateHolder(WriteGate& gate, const std::filesystem::path& database)
+    : gate_(gate) {
+  if (!gate_.Enter(kWritePatience)) {
+    throw SqliteError(SQLITE_BUSY,
+                      database.string() + ": another process keeps writing");
+  }
+}
+
+GateHolder::~GateHolder() {
+  gate_.Leave();
 }
 
 }  // namespace fdi::storage

@@ -27,4 +27,17 @@ class WriteGate {
   int file_{-1};
 };
 
+/// Is in the gate for its life.
+class GateHolder {
+ public:
+  /// @throws SqliteError (IsBusy) after kWritePatience, naming `database`.
+  GateHolder(WriteGate& gate, const std::filesystem::path& database);
+  ~GateHolder();
+  GateHolder(const GateHolder&) = delete;
+  GateHolder& operator=(const GateHolder&) = delete;
+
+ private:
+  WriteGate& gate_;
+};
+
 }  // namespace fdi::storage

@@ -12,5 +12,6 @@ int main(int argc, char** argv) {
   fdi::storage::AddHistoryVerbs(program);
   fdi::storage::AddEvidenceVerbs(program);
   fdi::storage::AddMaintenanceVerbs(program);
+  fdi::storage::AddPruneVerb(program);
   return program.Run(argc, argv);
 }

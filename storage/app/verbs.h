@@ -13,5 +13,6 @@ void AddHistoryVerbs(cli::Program& program);  ///< history list|show|ack|...
 /// history export|plot; after AddHistoryVerbs().
 void AddEvidenceVerbs(cli::Program& program);
 void AddMaintenanceVerbs(cli::Program& program);  ///< doctor, backup, migrate
+void AddPruneVerb(cli::Program& program);         ///< prune
 
 }  // namespace fdi::storage

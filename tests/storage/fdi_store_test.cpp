@@ -429,6 +429,19 @@ TEST_F(FdiStoreHistoryTest, DoctorExitsWithThreeOnADamagedFile) {
   EXPECT_EQ(json::parse(outcome.out)["sound"], false);
 }
 
+TEST_F(FdiStoreHistoryTest, PruneTellsWhatWentAndNeedsALimit) {
+  EXPECT_EQ(Store("prune").code, 2);
+  EXPECT_EQ(Store("prune --runs-age 90d").code, 5);
+
+  const json dry = StoreJson("prune --history-age 0s --dry-run");
+  EXPECT_EQ(dry["dry_run"], true);
+  const json done = StoreJson("prune --history-age 0s --history-size 1B");
+  EXPECT_EQ(done["databases"][0]["name"], "history.db");
+  EXPECT_EQ(done["databases"][0]["deleted"], 0);
+  EXPECT_EQ(done["databases"][0]["protected"], 1);
+  EXPECT_EQ(done["databases"][0]["fits"], false);
+}
+
 TEST_F(FdiStoreHistoryTest, BackupIsACompleteCopyAndNeverOverwrites) {
   EXPECT_EQ(Store("backup copy").code, 0);
 
