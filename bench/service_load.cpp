@@ -1,0 +1,251 @@
+// The processes that bench/service.sh sets beside the monitor: a publisher of
+// prepared samples, a bare reader of the same type and QoS, a subscriber of
+// decision vectors, and the two ends of a bare round trip.
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <sys/resource.h>
+
+#include "diagnosis/error.h"
+#include "idl/endpoint.h"
+#include "simulator/valve_simulation.h"
+
+namespace {
+
+using namespace fdi;
+using std::chrono::milliseconds;
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  int domain{61};
+  int valves{1000};
+  int samples{300};  // per valve
+  double idle_s{5.0};
+  int rounds{5000};
+  double rate_hz{1000.0};
+};
+
+// Healthy samples as the model set of service.toml knows them.
+std::vector<Sample> Healthy(int count) {
+  simulator::ValveSimulationConfig config;
+  config.parameters = simulator::ParameterSet("paper-operating-point");
+  simulator::OperatingPointExcitation excitation;
+  excitation.amplitude_pct = 12.0;
+  excitation.period_s = 60.0;
+  config.excitation = excitation;
+  config.duration_s = count;
+  config.seed = 7;
+  config.source_id = 1;
+  simulator::ValveSimulation simulation(config);
+  std::vector<Sample> samples;
+  while (!simulation.finished()) {
+    samples.push_back(simulation.Step().sample);
+  }
+  return samples;
+}
+
+std::string ValveName(int valve) {
+  return "V" + std::to_string(100000 + valve);
+}
+
+idl::DdsOptions DdsOf(const Options& options) {
+  idl::DdsOptions dds;
+  dds.domain = options.domain;
+  dds.max_valves = options.valves;
+  return dds;
+}
+
+double CpuSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) +
+           1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+double SecondsBetween(Clock::time_point from, Clock::time_point to) {
+  return std::chrono::duration<double>(to - from).count();
+}
+
+int Publish(const Options& options) {
+  const std::vector<Sample> samples = Healthy(options.samples);
+  idl::Participant participant(DdsOf(options), {}, "fdi-bench-publish");
+  idl::Publisher<idl::ValveSampleMessage> publisher(
+      participant, {idl::Profile::kLossless, options.valves});
+  if (!publisher.WaitForReaders(1, milliseconds(20000))) {
+    std::cerr << "publish: no reader came within 20 s\n";
+    return 1;
+  }
+  const double cpu_before = CpuSeconds();
+  const auto start = Clock::now();
+  std::vector<idl::ValveSampleMessage> messages;
+  for (int v = 0; v < options.valves; ++v) {
+    messages.push_back({ValveName(v), {}});
+  }
+  for (const Sample& sample : samples) {
+    for (idl::ValveSampleMessage& message : messages) {
+      message.sample = sample;
+      publisher.Write(message);
+    }
+  }
+  const bool all = publisher.WaitForAcknowledged(milliseconds(60000));
+  const double seconds = SecondsBetween(start, Clock::now());
+  const auto count = publisher.status().written;
+  std::printf(
+      "published %llu seconds %.3f rate %.0f cpu %.2f acknowledged %s\n",
+      static_cast<unsigned long long>(count), seconds,
+      static_cast<double>(count) / seconds, CpuSeconds() - cpu_before,
+      all ? "all" : "not all");
+  return all ? 0 : 1;
+}
+
+// Counts what comes until all is there or nothing came for a while.
+template <typename Message>
+int Count(const Options& options, idl::Profile profile, const char* word) {
+  idl::Participant participant(DdsOf(options), {}, "fdi-bench-read");
+  idl::Subscriber<Message> subscriber(participant, profile);
+  const auto expected = static_cast<std::uint64_t>(options.valves) *
+                        static_cast<std::uint64_t>(options.samples);
+  std::uint64_t count = 0;
+  Clock::time_point first;
+  Clock::time_point last = Clock::now();
+  const idl::Handlers<Message> handlers{
+      [&](const Message&, const idl::Reception&) { ++count; }, {}};
+  double cpu_before = 0.0;
+  while (count < expected &&
+         (count == 0 || SecondsBetween(last, Clock::now()) < options.idle_s)) {
+    const std::uint64_t before = count;
+    subscriber.Take(handlers, milliseconds(100));
+    if (before == 0 && count > 0) {
+      first = Clock::now();
+      cpu_before = CpuSeconds();
+    }
+    if (count > before) {
+      last = Clock::now();
+    }
+  }
+  const double seconds = SecondsBetween(first, last);
+  std::printf("%s %llu of %llu seconds %.3f rate %.0f cpu %.2f\n", word,
+              static_cast<unsigned long long>(count),
+              static_cast<unsigned long long>(expected), seconds,
+              static_cast<double>(count) / seconds, CpuSeconds() - cpu_before);
+  return count == expected ? 0 : 1;
+}
+
+// Answers every sample with an empty decision vector, and does nothing else.
+int Echo(const Options& options) {
+  idl::Participant participant(DdsOf(options), {}, "fdi-bench-echo");
+  idl::Publisher<idl::DecisionMessage> publisher(
+      participant, {idl::Profile::kLive, options.valves});
+  idl::Subscriber<idl::ValveSampleMessage> subscriber(participant,
+                                                      idl::Profile::kLive);
+  idl::DecisionMessage answer;
+  answer.channel_count = 2;
+  answer.fault_count = 5;
+  answer.observer_count = 11;
+  int count = 0;
+  const idl::Handlers<idl::ValveSampleMessage> handlers{
+      [&](const idl::ValveSampleMessage& message, const idl::Reception&) {
+        answer.valve_id = message.valve_id;
+        answer.verdict.seq = message.sample.seq;
+        publisher.Write(answer);
+        ++count;
+      },
+      {}};
+  while (count < options.rounds) {
+    if (subscriber.Take(handlers, milliseconds(20000)) == 0) {
+      return 1;
+    }
+  }
+  publisher.WaitForAcknowledged(milliseconds(2000));
+  return 0;
+}
+
+// Publishes at a fixed rate and takes the answers, by their number.
+int Ping(const Options& options) {
+  const std::vector<Sample> samples = Healthy(options.rounds);
+  idl::Participant participant(DdsOf(options), {}, "fdi-bench-ping");
+  idl::Publisher<idl::ValveSampleMessage> publisher(
+      participant, {idl::Profile::kLive, options.valves});
+  idl::Subscriber<idl::DecisionMessage> subscriber(participant,
+                                                   idl::Profile::kLive);
+  if (!publisher.WaitForReaders(1, milliseconds(20000)) ||
+      !subscriber.WaitForWriters(1, milliseconds(20000))) {
+    std::cerr << "ping: nobody answers\n";
+    return 1;
+  }
+  std::vector<std::atomic<std::int64_t>> sent(samples.size());
+  std::vector<double> round_trips;
+  std::jthread sender([&](const std::stop_token& stop) {
+    auto next = Clock::now();
+    for (const Sample& sample : samples) {
+      if (stop.stop_requested()) {
+        break;
+      }
+      std::this_thread::sleep_until(next);
+      next += std::chrono::microseconds(
+          static_cast<std::int64_t>(1e6 / options.rate_hz));
+      sent[sample.seq] = Clock::now().time_since_epoch().count();
+      publisher.Write({ValveName(0), sample});
+    }
+  });
+  const idl::Handlers<idl::DecisionMessage> handlers{
+      [&](const idl::DecisionMessage& message, const idl::Reception&) {
+        const std::int64_t now = Clock::now().time_since_epoch().count();
+        round_trips.push_back(
+            1e-3 * static_cast<double>(now - sent[message.verdict.seq]));
+      },
+      {}};
+  while (round_trips.size() < samples.size() &&
+         subscriber.Take(handlers, milliseconds(3000)) > 0) {
+  }
+  std::sort(round_trips.begin(), round_trips.end());
+  const auto quantile = [&](double q) {
+    return round_trips.empty()
+               ? 0.0
+               : round_trips[static_cast<std::size_t>(
+                     q * static_cast<double>(round_trips.size() - 1))];
+  };
+  std::printf("answers %zu of %zu p50 %.0f p99 %.0f\n", round_trips.size(),
+              samples.size(), quantile(0.5), quantile(0.99));
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app("Load and bare baselines for bench/service.sh");
+  app.require_subcommand(1);
+  app.add_option("--domain", options.domain, "DDS domain");
+  app.add_option("--valves", options.valves, "Valves of the publisher");
+  app.add_option("--samples", options.samples, "Samples of each valve");
+  app.add_option("--rounds", options.rounds, "Round trips");
+  int code = 0;
+  const auto add = [&](const char* name, const std::function<int()>& role) {
+    app.add_subcommand(name)->callback([&code, role] { code = role(); });
+  };
+  add("publish", [&] { return Publish(options); });
+  add("read", [&] {
+    return Count<idl::ValveSampleMessage>(options, idl::Profile::kLive, "read");
+  });
+  add("vectors", [&] {
+    return Count<idl::DecisionMessage>(options, idl::Profile::kLossless,
+                                       "vectors");
+  });
+  add("echo", [&] { return Echo(options); });
+  add("ping", [&] { return Ping(options); });
+  CLI11_PARSE(app, argc, argv);
+  return code;
+}
