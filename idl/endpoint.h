@@ -69,6 +69,8 @@ class Publisher {
   /// @returns whether all matched readers have all that was written in time.
   bool WaitForAcknowledged(std::chrono::milliseconds timeout);
   PublisherStatus status() const;
+  /// PublisherStatus::matched, at the cost of one load.
+  int matched() const;
 
  private:
   class Impl;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -15,26 +16,23 @@ class Matched {
   void Set(int count) {
     {
       const std::lock_guard lock(mutex_);
-      count_ = count;
+      count_.store(count);
     }
     changed_.notify_all();
   }
 
-  int count() const {
-    const std::lock_guard lock(mutex_);
-    return count_;
-  }
+  int count() const { return count_.load(); }
 
   bool WaitFor(int count, std::chrono::milliseconds timeout) const {
     std::unique_lock lock(mutex_);
     return changed_.wait_until(lock, DeadlineIn(timeout),
-                               [&] { return count_ >= count; });
+                               [&] { return count_.load() >= count; });
   }
 
  private:
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
-  int count_{0};
+  std::atomic<int> count_{0};
 };
 
 }  // namespace fdi::idl

@@ -54,11 +54,15 @@ class Publisher<Message>::Impl : private dds::DataWriterListener {
     dds::Topic* topic = participant_.TopicOf(
         Traits::kTopic,
         dds::TypeSupport(new CheckedType<typename Traits::Type>()));
-    publisher_ =
-        NotNull(participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT),
-                "create_publisher");
+    const EndpointQos ours = QosFor<Message>(options.profile, valves);
+    dds::PublisherQos publisher_qos;
+    if (!ours.partition.empty()) {
+      publisher_qos.partition().push_back(ours.partition.c_str());
+    }
+    publisher_ = NotNull(participant_->create_publisher(publisher_qos),
+                         "create_publisher");
     try {
-      const dds::DataWriterQos qos = MakeQos(options.profile, valves);
+      const dds::DataWriterQos qos = MakeQos(ours);
       policies_ = Describe(qos);
       writer_ = NotNull(publisher_->create_datawriter(
                             topic, qos, this,
@@ -73,6 +77,10 @@ class Publisher<Message>::Impl : private dds::DataWriterListener {
 
   ~Impl() override {
     writer_->set_listener(nullptr);
+    // Deleting a writer frees its changes while its heartbeat may still walk
+    // through them, for ever if a dead reader has not acknowledged them.
+    std::size_t removed = 0;
+    writer_->clear_history(&removed);
     publisher_->delete_datawriter(writer_);
     participant_->delete_publisher(publisher_);
   }
@@ -120,6 +128,8 @@ class Publisher<Message>::Impl : private dds::DataWriterListener {
            ReturnCode::RETCODE_OK;
   }
 
+  int matched() const { return matched_.count(); }
+
   PublisherStatus status() const {
     PublisherStatus status;
     status.written = written_.load(std::memory_order_relaxed);
@@ -131,8 +141,7 @@ class Publisher<Message>::Impl : private dds::DataWriterListener {
   }
 
  private:
-  dds::DataWriterQos MakeQos(Profile profile, int valves) const {
-    const EndpointQos ours = QosFor<Message>(profile, valves);
+  dds::DataWriterQos MakeQos(const EndpointQos& ours) const {
     dds::DataWriterQos qos = ours.writer;
     const std::string name = ours.name + "_writer";
     if (const auto* policies = participant_.profiles().Writer(name)) {
@@ -240,6 +249,11 @@ bool Publisher<Message>::WaitForAcknowledged(
 template <typename Message>
 PublisherStatus Publisher<Message>::status() const {
   return impl_->status();
+}
+
+template <typename Message>
+int Publisher<Message>::matched() const {
+  return impl_->matched();
 }
 
 template class Publisher<ValveSampleMessage>;

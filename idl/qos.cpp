@@ -174,9 +174,19 @@ EndpointQos QosFor<DecisionMessage>(Profile profile, int valves) {
   TransientLocal(qos);
   KeepLast(qos, valves, 1, 16);
   if (profile == Profile::kLossless) {
+    // In a partition of its own: with TRANSIENT_LOCAL and KEEP_ALL the library
+    // holds, and searches, what was acknowledged long ago.
     qos.name += "_lossless";
+    qos.partition = "lossless";
+    qos.writer.durability().kind = dds::VOLATILE_DURABILITY_QOS;
+    qos.reader.durability().kind = dds::VOLATILE_DURABILITY_QOS;
     WriterKeepsAll(qos, valves);
     ReaderKeepsAll(qos, valves);
+    // Samples that have waited come valve by valve, and so do their vectors.
+    SetLimits(qos.writer.resource_limits(), valves,
+              qos.reader.resource_limits().max_samples_per_instance,
+              kSamplesInFlight);
+    qos.writer.reliable_writer_qos().times.heartbeatPeriod = Milliseconds(10);
   }
   return qos;
 }

@@ -14,6 +14,7 @@ namespace fdi::idl {
 
 struct EndpointQos {
   std::string name;  ///< Profiles of --qos: name + "_writer", + "_reader".
+  std::string partition{};  ///< Empty: the default one.
   eprosima::fastdds::dds::DataWriterQos writer;
   eprosima::fastdds::dds::DataReaderQos reader;
 };

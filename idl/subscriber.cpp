@@ -52,11 +52,15 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
     // The reader is enabled once reader_ is set: callbacks use it.
     dds::SubscriberQos subscriber_qos;
     subscriber_qos.entity_factory().autoenable_created_entities = false;
+    const EndpointQos ours =
+        QosFor<Message>(profile, participant.options().max_valves);
+    if (!ours.partition.empty()) {
+      subscriber_qos.partition().push_back(ours.partition.c_str());
+    }
     subscriber_ = NotNull(participant_->create_subscriber(subscriber_qos),
                           "create_subscriber");
     try {
-      const dds::DataReaderQos qos =
-          MakeQos(profile, participant.options().max_valves);
+      const dds::DataReaderQos qos = MakeQos(ours);
       policies_ = Describe(qos);
       has_lease_ =
           qos.liveliness().lease_duration != eprosima::fastrtps::c_TimeInfinite;
@@ -136,8 +140,7 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
            << dds::StatusMask::liveliness_changed();
   }
 
-  dds::DataReaderQos MakeQos(Profile profile, int valves) const {
-    const EndpointQos ours = QosFor<Message>(profile, valves);
+  dds::DataReaderQos MakeQos(const EndpointQos& ours) const {
     dds::DataReaderQos qos = ours.reader;
     const std::string name = ours.name + "_reader";
     if (const auto* policies = participant_.profiles().Reader(name)) {

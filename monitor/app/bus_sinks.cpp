@@ -1,5 +1,6 @@
 #include "monitor/app/bus_sinks.h"
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -61,9 +62,14 @@ std::string IsolatedNames(const idl::FaultEventMessage& message) {
 
 }  // namespace
 
-BusDecisionSink::BusDecisionSink(idl::Participant& participant,
-                                 idl::Profile profile, std::stop_token stop)
-    : publisher_(participant, {profile, 0}), stop_(std::move(stop)) {}
+BusDecisionSink::BusDecisionSink(idl::Participant& participant, bool lossless,
+                                 std::stop_token stop)
+    : live_(participant, {idl::Profile::kLive, 0}), stop_(std::move(stop)) {
+  if (lossless) {
+    lossless_.emplace(participant,
+                      idl::PublisherOptions{idl::Profile::kLossless, 0});
+  }
+}
 
 bool BusDecisionSink::Publish(const std::string& valve_id,
                               const ModelSet* models, const Verdict& verdict) {
@@ -76,7 +82,43 @@ bool BusDecisionSink::Publish(const std::string& valve_id,
   message_.observer_count =
       models != nullptr ? static_cast<int>(models->observers.size()) : 0;
   message_.verdict = verdict;
-  return publisher_.Write(message_, stop_) == idl::WriteResult::kSent;
+  const bool heard =
+      !lossless_ || lossless_->matched() == 0 ||
+      lossless_->Write(message_, stop_) == idl::WriteResult::kSent;
+  return PublishLive(message_) && heard;
+}
+
+bool BusDecisionSink::PublishLive(const idl::DecisionMessage& message) {
+  if (live_.matched() == 0) {
+    unheard_[message.valve_id] = message;
+    return true;
+  }
+  if (!unheard_.empty()) {
+    unheard_.erase(message.valve_id);
+    for (const auto& [valve, last] : unheard_) {
+      live_.Write(last);
+    }
+    unheard_.clear();
+  }
+  return live_.Write(message) == idl::WriteResult::kSent;
+}
+
+bool BusDecisionSink::WaitForAcknowledged(std::chrono::milliseconds timeout) {
+  return live_.WaitForAcknowledged(timeout) &&
+         (!lossless_ || lossless_->WaitForAcknowledged(timeout));
+}
+
+idl::PublisherStatus BusDecisionSink::status() const {
+  idl::PublisherStatus status = live_.status();
+  if (lossless_) {
+    const idl::PublisherStatus other = lossless_->status();
+    status.written = std::max(status.written, other.written);
+    status.retries += other.retries;
+    status.refused = std::max(status.refused, other.refused);
+    status.incompatible += other.incompatible;
+    status.matched += other.matched;
+  }
+  return status;
 }
 
 BusEventSink::BusEventSink(idl::Participant& participant, LogSink log)

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <stop_token>
 #include <string>
+#include <unordered_map>
 
 #include "diagnosis/log.h"
 #include "idl/endpoint.h"
@@ -11,26 +13,31 @@
 
 namespace fdi::monitor {
 
-/// Decision vectors over DDS. With the lossless profile a slow subscriber makes
-/// Publish() wait, until `stop` is requested.
+/// Decision vectors over DDS. What nobody listens to is not sent; who comes
+/// gets the last vector of every valve first, with the next one of any valve.
+/// The lossless stream, if asked for, is a second one: a slow subscriber of it
+/// makes Publish() wait, until `stop` is requested.
 class BusDecisionSink : public DecisionSink {
  public:
-  BusDecisionSink(idl::Participant& participant, idl::Profile profile,
+  BusDecisionSink(idl::Participant& participant, bool lossless,
                   std::stop_token stop);
 
   bool Publish(const std::string& valve_id, const ModelSet* models,
                const Verdict& verdict) override;
 
   /// Waits until all readers have what was published.
-  bool WaitForAcknowledged(std::chrono::milliseconds timeout) {
-    return publisher_.WaitForAcknowledged(timeout);
-  }
-  idl::PublisherStatus status() const { return publisher_.status(); }
+  bool WaitForAcknowledged(std::chrono::milliseconds timeout);
+  /// Of both streams; `written` of the one that was written more to.
+  idl::PublisherStatus status() const;
 
  private:
-  idl::Publisher<idl::DecisionMessage> publisher_;
+  bool PublishLive(const idl::DecisionMessage& message);
+
+  idl::Publisher<idl::DecisionMessage> live_;
+  std::optional<idl::Publisher<idl::DecisionMessage>> lossless_;
   std::stop_token stop_;
   idl::DecisionMessage message_;
+  std::unordered_map<std::string, idl::DecisionMessage> unheard_;
 };
 
 /// Fault events over DDS, each also a line of the log.

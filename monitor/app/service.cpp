@@ -90,8 +90,7 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
                 ? nullptr
                 : std::make_unique<RunStore>(data_.runs(), context.software)),
       decisions_(participant_,
-                 options.lossless_decisions ? idl::Profile::kLossless
-                                            : idl::Profile::kLive,
+                 options.lossless_decisions,
                  publication_stop_.get_token()),
       events_(participant_, context.log),
       status_topic_(participant_),
