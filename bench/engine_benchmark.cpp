@@ -79,13 +79,12 @@ BENCHMARK(StepOneValve<Extended>)->ArgsProduct({{45, 98}, {0, 1}});
 // is their number.
 template <Models (*MakeModels)(int)>
 void StepManyValves(benchmark::State& state) {
-  EnginePlans plans;
-  const auto plan = plans.For(MakeModels(static_cast<int>(state.range(0))));
+  const EngineParts parts(MakeModels(static_cast<int>(state.range(0))));
   const auto valves = static_cast<std::size_t>(state.range(1));
   std::vector<ValveEngine> engines;
   std::vector<std::vector<Sample>> samples;
   for (std::size_t v = 0; v < valves; ++v) {
-    engines.emplace_back(plan);
+    engines.emplace_back(parts);
     samples.push_back(Samples(kRound, 7 * static_cast<int>(v), 0.0));
   }
   const auto round = [&] {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 namespace fdi {
 namespace {
@@ -68,7 +69,8 @@ void Detection::Count(std::size_t test, bool beyond, std::int64_t stamp_ns) {
 
 std::optional<std::int64_t> Detection::stamp_ns() const {
   std::optional<std::int64_t> stamp;
-  for (const Run& run : runs_) {
+  const std::size_t tests = models_->channels.size() * kTestsPerChannel;
+  for (const Run& run : std::span(runs_).first(tests)) {
     if (run.length >= models_->decision.detection_samples) {
       stamp = std::min(stamp.value_or(run.since_ns), run.since_ns);
     }

@@ -20,18 +20,28 @@ EnginePlan::EnginePlan(std::shared_ptr<const ModelSet> models)
       observers_(std::make_shared<const ObserverPlan>(*models_)),
       faults_(std::make_shared<const FaultPlan>(observers_)) {}
 
-std::shared_ptr<const EnginePlan> EnginePlans::For(
-    const std::shared_ptr<const ModelSet>& models) {
-  std::erase_if(plans_, [](const auto& plan) { return plan.expired(); });
-  for (const std::weak_ptr<const EnginePlan>& known : plans_) {
-    std::shared_ptr<const EnginePlan> plan = known.lock();
-    if (plan && plan->shared_models() == models) {
-      return plan;
+EngineParts::EngineParts(std::shared_ptr<const ModelSet> models)
+    : plan(std::make_shared<const EnginePlan>(std::move(models))),
+      outputs(std::make_shared<ObserverOutputs>(*plan->observers())) {}
+
+EngineParts::EngineParts(std::shared_ptr<const EnginePlan> shared_plan,
+                         std::shared_ptr<ObserverOutputs> place)
+    : plan(std::move(shared_plan)), outputs(std::move(place)) {}
+
+EngineParts EnginePlans::For(const std::shared_ptr<const ModelSet>& models) {
+  std::erase_if(known_, [](const Known& known) {
+    return known.plan.expired() || known.outputs.expired();
+  });
+  for (const Known& known : known_) {
+    auto plan = known.plan.lock();
+    auto outputs = known.outputs.lock();
+    if (plan && outputs && plan->shared_models() == models) {
+      return {std::move(plan), std::move(outputs)};
     }
   }
-  auto plan = std::make_shared<const EnginePlan>(models);
-  plans_.push_back(plan);
-  return plan;
+  EngineParts parts(models);
+  known_.push_back({parts.plan, parts.outputs});
+  return parts;
 }
 
 }  // namespace fdi

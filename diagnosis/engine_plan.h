@@ -5,6 +5,7 @@
 
 #include "diagnosis/fault_plan.h"
 #include "diagnosis/model_set.h"
+#include "diagnosis/observer_kernels.h"
 #include "diagnosis/observer_plan.h"
 
 namespace fdi {
@@ -35,18 +36,34 @@ class EnginePlan {
   std::shared_ptr<const FaultPlan> faults_;
 };
 
-/// The plans in use, one per model set, for those who are given model sets.
+/// What engines of one model set share: its plan, and the place where they put
+/// what observers say about a sample. It serves one engine after the other, so
+/// that it stays in the cache: engines that share it belong to one thread.
+struct EngineParts {
+  /// @throws DataError as EnginePlan.
+  explicit EngineParts(std::shared_ptr<const ModelSet> models);
+  EngineParts(std::shared_ptr<const EnginePlan> shared_plan,
+              std::shared_ptr<ObserverOutputs> place);
+
+  std::shared_ptr<const EnginePlan> plan;
+  std::shared_ptr<ObserverOutputs> outputs;
+};
+
+/// The parts in use, one per model set, for a thread that runs many engines.
 ///
-/// One thread at a time.
+/// One thread at a time: that of the engines.
 class EnginePlans {
  public:
-  /// The plan of this very object, made unless some engine still has it.
+  /// The parts of this very object, made unless some engine still has them.
   /// @throws DataError as EnginePlan.
-  std::shared_ptr<const EnginePlan> For(
-      const std::shared_ptr<const ModelSet>& models);
+  EngineParts For(const std::shared_ptr<const ModelSet>& models);
 
  private:
-  std::vector<std::weak_ptr<const EnginePlan>> plans_;
+  struct Known {
+    std::weak_ptr<const EnginePlan> plan;
+    std::weak_ptr<ObserverOutputs> outputs;
+  };
+  std::vector<Known> known_;
 };
 
 }  // namespace fdi

@@ -29,6 +29,10 @@ using Mask = decltype(Lanes{} < Lanes{});
   std::memcpy(&quad.lane, &lanes, sizeof lanes);
 }
 
+[[gnu::always_inline]] inline void Store(const Lanes& lanes, double* first) {
+  std::memcpy(first, &lanes, sizeof lanes);
+}
+
 [[gnu::always_inline]] inline Lanes All(double value) {
   return Lanes{value, value, value, value};
 }

@@ -5,10 +5,16 @@
 namespace fdi {
 
 ObserverBank::ObserverBank(std::shared_ptr<const ObserverPlan> plan,
+                           std::shared_ptr<ObserverOutputs> outputs,
                            InstructionSet instructions)
     : plan_(std::move(plan)),
       kernels_(&KernelsFor(instructions)),
-      state_(*plan_) {}
+      state_(*plan_, std::move(outputs)) {}
+
+ObserverBank::ObserverBank(std::shared_ptr<const ObserverPlan> plan,
+                           InstructionSet instructions)
+    : ObserverBank(plan, std::make_shared<ObserverOutputs>(*plan),
+                   instructions) {}
 
 ObserverBank::ObserverBank(const ModelSet& models)
     : ObserverBank(std::make_shared<const ObserverPlan>(models)) {}
@@ -41,15 +47,15 @@ void ObserverBank::Step(const Sample& sample) {
   for (std::size_t c = 0; c < state_.active.size(); ++c) {
     const TsModel& model = normal.channels[c].model;
     const double reading = sample[model.output];
-    state_.readings[c] = reading;
-    state_.saturated[c] =
+    state_.outputs->readings[c] = reading;
+    state_.outputs->saturated[c] =
         state_.active[c] != 0 && reading >= model.saturation ? 1 : 0;
   }
   kernels_->predict(*plan_, state_);
 }
 
 void ObserverBank::Score(std::span<double> factors) const {
-  std::array<Quad, kMaxObservers> memberships;  // of one channel
+  std::array<double, kMaxObservers * kLanes> memberships;  // of one channel
   std::fill(factors.begin(), factors.end(), kAbstains);
   for (std::size_t c = 0; c < state_.active.size(); ++c) {
     if (state_.active[c] == 0) {
@@ -58,10 +64,13 @@ void ObserverBank::Score(std::span<double> factors) const {
     const std::size_t first = plan_->first_block(c);
     kernels_->score(*plan_, state_, first, plan_->first_block(c + 1),
                     memberships.data());
-    for (std::size_t o = 0; o < factors.size(); ++o) {
-      const std::size_t slot = plan_->slot(o, c) - first * kLanes;
+    const bool in_order = plan_->in_order(c);
+    for (std::size_t o = 0; in_order && o < factors.size(); ++o) {
+      factors[o] = std::min(factors[o], memberships[o]);
+    }
+    for (std::size_t o = 0; !in_order && o < factors.size(); ++o) {
       factors[o] =
-          std::min(factors[o], memberships[slot / kLanes].lane[slot % kLanes]);
+          std::min(factors[o], memberships[plan_->slot(o, c) - first * kLanes]);
     }
   }
   std::replace(factors.begin(), factors.end(), kAbstains, 0.0);

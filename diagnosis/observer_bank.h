@@ -20,6 +20,12 @@ class ObserverBank {
  public:
   explicit ObserverBank(std::shared_ptr<const ObserverPlan> plan,
                         InstructionSet instructions = BestInstructionSet());
+  /// Puts what it computes into `outputs`, a place of this plan. Other banks of
+  /// the same thread may share it: then nothing but the past is left of a
+  /// Step() once another bank stepped.
+  ObserverBank(std::shared_ptr<const ObserverPlan> plan,
+               std::shared_ptr<ObserverOutputs> outputs,
+               InstructionSet instructions = BestInstructionSet());
   /// With a plan of its own. `models` must be valid and outlive the bank.
   explicit ObserverBank(const ModelSet& models);
 
@@ -43,23 +49,23 @@ class ObserverBank {
   }
   int active_channels() const { return active_count_; }
   double prediction(int observer, int channel) const {
-    return At(state_.predictions, observer, channel);
+    return At(state_.outputs->predictions, observer, channel);
   }
   /// NaN where reading and prediction are both at the transmitter's limit.
   double residual(int observer, int channel) const {
-    return At(state_.residuals, observer, channel);
+    return At(state_.outputs->residuals, observer, channel);
   }
   double reading(int channel) const {
-    return state_.readings[static_cast<std::size_t>(channel)];
+    return state_.outputs->readings[static_cast<std::size_t>(channel)];
   }
   /// True if the last reading of the channel is at its transmitter's limit.
   bool saturated(int channel) const {
-    return state_.saturated[static_cast<std::size_t>(channel)] != 0;
+    return state_.outputs->saturated[static_cast<std::size_t>(channel)] != 0;
   }
   /// What the prediction owes to regressors beyond their trained range,
   /// |ŷ(x) − ŷ(x kept within the range)|; 0 where the model is at home.
   double extrapolation(int observer, int channel) const {
-    return At(state_.extrapolations, observer, channel);
+    return At(state_.outputs->extrapolations, observer, channel);
   }
 
  private:

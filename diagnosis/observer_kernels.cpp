@@ -30,11 +30,11 @@ using lanes::Store;
 [[gnu::always_inline]] inline void Score(const ObserverPlan& plan,
                                          const ObserverState& state,
                                          std::size_t first, std::size_t last,
-                                         Quad* memberships) {
+                                         double* memberships) {
   for (std::size_t b = first; b < last; ++b) {
     const ObserverBlock& block = plan.blocks()[b];
-    const Lanes residual = Load(state.residuals[b]);
-    const Lanes extrapolation = Load(state.extrapolations[b]);
+    const Lanes residual = Load(state.outputs->residuals[b]);
+    const Lanes extrapolation = Load(state.outputs->extrapolations[b]);
     Lanes certain = residual;
     if (Any(extrapolation != All(0.0))) {
       const Lanes uncertain =
@@ -43,7 +43,7 @@ using lanes::Store;
     }
     const Lanes membership = Membership(block, certain);
     Store(residual != residual ? All(kAbstains) : membership,
-          memberships[b - first]);
+          memberships + (b - first) * kLanes);
   }
 }
 
@@ -60,8 +60,8 @@ using lanes::Store;
   const std::size_t last = plan.first_block(channel + 1);
   for (std::size_t b = plan.first_block(channel); b < last; ++b) {
     const ObserverBlock& block = plan.blocks()[b];
-    const Lanes residual = Load(state.residuals[b]);
-    const Lanes extrapolation = Load(state.extrapolations[b]);
+    const Lanes residual = Load(state.outputs->residuals[b]);
+    const Lanes extrapolation = Load(state.outputs->extrapolations[b]);
     Lanes variance = Load(block.variance);
     Lanes density = Load(block.log_variance);
     if (Any(extrapolation != All(0.0))) {
@@ -83,7 +83,7 @@ void PredictPortable(const ObserverPlan& plan, ObserverState& state) {
 }
 
 void ScorePortable(const ObserverPlan& plan, const ObserverState& state,
-                   std::size_t first, std::size_t last, Quad* memberships) {
+                   std::size_t first, std::size_t last, double* memberships) {
   Score(plan, state, first, last, memberships);
 }
 
@@ -101,7 +101,7 @@ void GatherPortable(const ObserverPlan& plan, const ObserverState& state,
 [[gnu::target("avx2")]] void ScoreAvx2(const ObserverPlan& plan,
                                        const ObserverState& state,
                                        std::size_t first, std::size_t last,
-                                       Quad* memberships) {
+                                       double* memberships) {
   Score(plan, state, first, last, memberships);
 }
 
@@ -121,16 +121,20 @@ constexpr ObserverKernels kAvx2{PredictAvx2, ScoreAvx2, GatherAvx2};
 
 }  // namespace
 
-ObserverState::ObserverState(const ObserverPlan& plan)
+ObserverOutputs::ObserverOutputs(const ObserverPlan& plan)
+    : readings(plan.models().channels.size(), 0.0),
+      saturated(readings.size(), 0),
+      predictions(plan.blocks().size()),
+      residuals(predictions.size()),
+      extrapolations(predictions.size()) {}
+
+ObserverState::ObserverState(const ObserverPlan& plan,
+                             std::shared_ptr<ObserverOutputs> place)
     : depth(plan.depth()),
       measured(static_cast<std::size_t>(depth)),
       own_past(static_cast<std::size_t>(depth) * plan.own_blocks()),
       active(plan.models().channels.size(), 0),
-      saturated(active.size(), 0),
-      readings(active.size(), 0.0),
-      predictions(plan.blocks().size()),
-      residuals(predictions.size()),
-      extrapolations(predictions.size()) {}
+      outputs(std::move(place)) {}
 
 InstructionSet BestInstructionSet() {
 #if defined(__x86_64__)

@@ -2,7 +2,7 @@
 
 #include <array>
 #include <cstddef>
-#include <span>
+#include <memory>
 #include <vector>
 
 #include "diagnosis/observer_plan.h"
@@ -10,10 +10,21 @@
 
 namespace fdi {
 
-/// What the observers of one valve remember and said last; in blocks as in the
-/// plan.
+/// What observers say about one sample, in blocks as in the plan.
+struct ObserverOutputs {
+  explicit ObserverOutputs(const ObserverPlan& plan);
+
+  std::vector<double> readings;  ///< By channel.
+  std::vector<char> saturated;
+  std::vector<Quad> predictions;
+  std::vector<Quad> residuals;
+  std::vector<Quad> extrapolations;
+};
+
+/// What the observers of one valve remember, and where they put what they say.
 struct ObserverState {
-  explicit ObserverState(const ObserverPlan& plan);
+  ObserverState(const ObserverPlan& plan,
+                std::shared_ptr<ObserverOutputs> place);
 
   std::size_t Row(int lag) const {
     return static_cast<std::size_t>((head + depth - lag) % depth);
@@ -24,11 +35,7 @@ struct ObserverState {
   std::vector<std::array<double, kSignalCount>> measured;  ///< A ring.
   std::vector<Quad> own_past;  ///< Ring of rows of plan.own_blocks().
   std::vector<char> active;    ///< By channel.
-  std::vector<char> saturated;
-  std::vector<double> readings;
-  std::vector<Quad> predictions;
-  std::vector<Quad> residuals;
-  std::vector<Quad> extrapolations;
+  std::shared_ptr<ObserverOutputs> outputs;
 };
 
 /// The instructions that the kernels below are compiled for. The bits of the
@@ -58,7 +65,7 @@ struct ObserverKernels {
   /// have put there; kAbstains where the residual is NaN. memberships[0] is
   /// that of the first block.
   void (*score)(const ObserverPlan& plan, const ObserverState& state,
-                std::size_t first, std::size_t last, Quad* memberships);
+                std::size_t first, std::size_t last, double* memberships);
 
   /// L_c ← λ L_c − ½ (r²/S + ln S)/τ_c for all observers of a channel; without
   /// the gain where the residual is NaN.

@@ -193,6 +193,11 @@ ObserverPlan::ObserverPlan(const ModelSet& models)
     signals_.push_back(static_cast<SignalMask>(mask));
     first_blocks_.push_back(blocks_.size());
     AddChannel(c);
+    bool in_order = true;
+    for (std::size_t o = 0; o < models.observers.size(); ++o) {
+      in_order = in_order && slot(o, c) == first_blocks_[c] * kLanes + o;
+    }
+    in_order_.push_back(in_order ? 1 : 0);
   }
   first_blocks_.push_back(blocks_.size());
 }

@@ -103,6 +103,8 @@ class ObserverPlan {
   std::size_t slot(std::size_t observer, std::size_t channel) const {
     return slots_[observer * channels_ + channel];
   }
+  /// True if the slots of channel c are in the order of the observers.
+  bool in_order(std::size_t c) const { return in_order_[c] != 0; }
   /// What some observer needs for channel c, its output included.
   SignalMask signals(std::size_t c) const { return signals_[c]; }
 
@@ -123,6 +125,7 @@ class ObserverPlan {
   std::vector<std::size_t> slots_;
   std::vector<std::size_t> first_blocks_;
   std::vector<SignalMask> signals_;
+  std::vector<char> in_order_;
   std::vector<ObserverGroup> groups_;
   std::vector<ObserverBlock> blocks_;
 };

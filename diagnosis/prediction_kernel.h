@@ -182,8 +182,9 @@ inline Common CommonOf(const ObserverPlan& plan, const ObserverState& state,
     return group.difference ? quads[normal / kLanes].lane[normal % kLanes]
                             : 0.0;
   };
-  return {state.readings[group.channel], of_normal(state.predictions),
-          of_normal(state.extrapolations)};
+  return {state.outputs->readings[group.channel],
+          of_normal(state.outputs->predictions),
+          of_normal(state.outputs->extrapolations)};
 }
 
 // Keeps what four observers say: their own part of the prediction, and that
@@ -197,10 +198,10 @@ inline Common CommonOf(const ObserverPlan& plan, const ObserverState& state,
   const Lanes reading = All(common.reading);
   const auto hidden = (reading >= saturation) & (prediction >= saturation);
   const Lanes residual = reading - Min(prediction, saturation);
-  Store(prediction, state.predictions[block]);
+  Store(prediction, state.outputs->predictions[block]);
   Store(common.base_extrapolation + Abs(own - inside),
-        state.extrapolations[block]);
-  Store(hidden ? All(kNan) : residual, state.residuals[block]);
+        state.outputs->extrapolations[block]);
+  Store(hidden ? All(kNan) : residual, state.outputs->residuals[block]);
 }
 
 [[gnu::always_inline]] inline Lanes Regressor(const ObserverPlan& plan,
@@ -276,7 +277,7 @@ inline Common CommonOf(const ObserverPlan& plan, const ObserverState& state,
     Keep(limits, common, own, beyond ? Evaluate(group, b, limits, inside) : own,
          block, state);
     if (group.runs_on_itself) {
-      state.own_past[now + b] = state.predictions[block];
+      state.own_past[now + b] = state.outputs->predictions[block];
     }
   }
 }

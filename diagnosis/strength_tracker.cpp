@@ -20,7 +20,8 @@ double Lane(const std::vector<Quad>& quads, std::size_t slot) {
 // Of a residual under its own condition, and of what is extrapolated.
 double Variance(const ObserverBank& bank, const StrengthPath::Point& point) {
   const double extrapolated =
-      kExtrapolationError * Lane(bank.state().extrapolations, point.slot);
+      kExtrapolationError *
+      Lane(bank.state().outputs->extrapolations, point.slot);
   return point.sd * point.sd + extrapolated * extrapolated;
 }
 
@@ -103,8 +104,8 @@ StrengthTracker::Segment StrengthTracker::SegmentOf(const ObserverBank& bank,
   const StrengthPath::Point& low = path_->points[segment * channels_ + channel];
   const StrengthPath::Point& high =
       path_->points[(segment + 1) * channels_ + channel];
-  const double from = Lane(bank.state().predictions, low.slot);
-  const double to = Lane(bank.state().predictions, high.slot);
+  const double from = Lane(bank.state().outputs->predictions, low.slot);
+  const double to = Lane(bank.state().outputs->predictions, high.slot);
   return {from,
           (to - from) / (path_->nodes[segment + 1].strength -
                          path_->nodes[segment].strength),
@@ -156,7 +157,7 @@ bool StrengthTracker::CouldBeRefuted(const ObserverBank& bank) const {
     for (std::size_t j = 1; j < path_->nodes.size(); ++j) {
       const StrengthPath::Point& point = path_->points[j * channels_ + c];
       const double effect =
-          std::abs(Lane(bank.state().predictions, point.slot) -
+          std::abs(Lane(bank.state().outputs->predictions, point.slot) -
                    bank.prediction(0, channel));
       if (effect > kLeastEffect * point.sd) {
         return true;

@@ -20,9 +20,9 @@ constexpr std::uint32_t kSnapshotFormat = 1;
 
 // What depends on the model set; replaced as a whole by Adopt().
 struct Diagnosis {
-  explicit Diagnosis(std::shared_ptr<const EnginePlan> shared)
-      : plan(std::move(shared)),
-        bank(plan->observers()),
+  explicit Diagnosis(EngineParts parts)
+      : plan(std::move(parts.plan)),
+        bank(plan->observers(), std::move(parts.outputs)),
         coverage(plan->models()),
         detection(plan->models()),
         stuck(plan->models()),
@@ -38,15 +38,15 @@ struct Diagnosis {
 
 class ValveEngine::Impl {
  public:
-  explicit Impl(std::shared_ptr<const EnginePlan> plan)
-      : diagnosis_(std::make_unique<Diagnosis>(std::move(plan))),
+  explicit Impl(EngineParts parts)
+      : diagnosis_(std::make_unique<Diagnosis>(std::move(parts))),
         order_(models().sample_period_s) {
     ClearVerdict();
   }
 
   const Verdict& Step(const Sample& sample);
   std::optional<Transition> EndEpisode(EndReason reason);
-  std::optional<Transition> Adopt(std::shared_ptr<const EnginePlan> plan);
+  std::optional<Transition> Adopt(EngineParts parts);
   void HoldIsolation(bool hold);
   std::vector<std::byte> Save() const;
   bool Restore(std::span<const std::byte> bytes);
@@ -206,9 +206,8 @@ std::optional<Transition> ValveEngine::Impl::EndEpisode(EndReason reason) {
   return diagnosis_->episode.Close(reason, verdict_.stamp_ns, verdict_);
 }
 
-std::optional<Transition> ValveEngine::Impl::Adopt(
-    std::shared_ptr<const EnginePlan> plan) {
-  auto replacement = std::make_unique<Diagnosis>(std::move(plan));
+std::optional<Transition> ValveEngine::Impl::Adopt(EngineParts parts) {
+  auto replacement = std::make_unique<Diagnosis>(std::move(parts));
   replacement->episode.HoldIsolation(isolation_held_);
   std::optional<Transition> closed = EndEpisode(EndReason::kModelChanged);
   diagnosis_ = std::move(replacement);
@@ -248,9 +247,9 @@ bool ValveEngine::Impl::Restore(std::span<const std::byte> bytes) {
 }
 
 ValveEngine::ValveEngine(std::shared_ptr<const ModelSet> models)
-    : ValveEngine(std::make_shared<const EnginePlan>(std::move(models))) {}
-ValveEngine::ValveEngine(std::shared_ptr<const EnginePlan> plan)
-    : impl_(std::make_unique<Impl>(std::move(plan))) {}
+    : ValveEngine(EngineParts(std::move(models))) {}
+ValveEngine::ValveEngine(EngineParts parts)
+    : impl_(std::make_unique<Impl>(std::move(parts))) {}
 ValveEngine::~ValveEngine() = default;
 ValveEngine::ValveEngine(ValveEngine&&) noexcept = default;
 ValveEngine& ValveEngine::operator=(ValveEngine&&) noexcept = default;
@@ -265,12 +264,11 @@ std::optional<Transition> ValveEngine::EndEpisode(EndReason reason) {
 
 std::optional<Transition> ValveEngine::Adopt(
     std::shared_ptr<const ModelSet> models) {
-  return Adopt(std::make_shared<const EnginePlan>(std::move(models)));
+  return Adopt(EngineParts(std::move(models)));
 }
 
-std::optional<Transition> ValveEngine::Adopt(
-    std::shared_ptr<const EnginePlan> plan) {
-  return impl_->Adopt(std::move(plan));
+std::optional<Transition> ValveEngine::Adopt(EngineParts parts) {
+  return impl_->Adopt(std::move(parts));
 }
 
 void ValveEngine::HoldIsolation(bool hold) {

@@ -17,13 +17,15 @@ namespace fdi {
 /// so far alone; no clock, no I/O, no allocation after construction. The
 /// monitor and `fdi-trainer evaluate` run this very class.
 ///
-/// Not thread safe: one thread at a time per engine. Model sets are shared.
+/// Not thread safe: one thread at a time per engine, and for all engines that
+/// share EngineParts. Model sets are shared.
 class ValveEngine {
  public:
   /// @throws DataError if `models` is not usable (Validate).
   explicit ValveEngine(std::shared_ptr<const ModelSet> models);
-  /// For many valves of one model set, which share its plan.
-  explicit ValveEngine(std::shared_ptr<const EnginePlan> plan);
+  /// For many valves of one model set, which share its parts: they belong to
+  /// one thread, all of them.
+  explicit ValveEngine(EngineParts parts);
   ~ValveEngine();
   ValveEngine(ValveEngine&&) noexcept;
   ValveEngine& operator=(ValveEngine&&) noexcept;
@@ -42,7 +44,7 @@ class ValveEngine {
   /// Continues with another model set from the next sample on; order and
   /// source of the samples stay known. As EndEpisode(kModelChanged).
   std::optional<Transition> Adopt(std::shared_ptr<const ModelSet> models);
-  std::optional<Transition> Adopt(std::shared_ptr<const EnginePlan> plan);
+  std::optional<Transition> Adopt(EngineParts parts);
 
   /// While held, episodes are detected and stay unknown: for a valve whose
   /// baseline is not trusted. Stays over Adopt().
