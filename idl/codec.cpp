@@ -23,6 +23,18 @@ static_assert(kMaxChannels == 16 && kMaxFaults == 64 && kMaxObservers == 128,
               "fdi_v1.idl cannot grow");
 static_assert(kSignalCount == 10, "fdi_v1.idl cannot grow");
 
+bool StampFits(std::int64_t stamp_ns) {
+  return stamp_ns >= kMinStampNs && stamp_ns <= kMaxStampNs;
+}
+
+std::int64_t CheckedStamp(std::int64_t stamp_ns) {
+  if (!StampFits(stamp_ns)) {
+    throw DataError("stamp_ns is " + std::to_string(stamp_ns) +
+                    ", accepted are the years 1900 to 2100");
+  }
+  return stamp_ns;
+}
+
 }  // namespace
 
 void Codec<ValveSampleMessage>::EncodeKey(const ValveSampleMessage& message,
@@ -36,7 +48,7 @@ void Codec<ValveSampleMessage>::Encode(const ValveSampleMessage& message,
   EncodeKey(message, wire);
   wire.source_id(sample.source_id);
   wire.seq(sample.seq);
-  wire.stamp_ns(sample.stamp_ns);
+  wire.stamp_ns(CheckedStamp(sample.stamp_ns));
   wire.cv(sample[Signal::kCv]);
   wire.p1(sample[Signal::kP1]);
   wire.p2(sample[Signal::kP2]);
@@ -72,7 +84,7 @@ bool Codec<ValveSampleMessage>::Decode(const Wire& wire,
     known =
         FromWire(wire.quality()[i], v1::SIGNAL_BAD, sample.quality[i]) && known;
   }
-  return known && !message.valve_id.empty() &&
+  return known && !message.valve_id.empty() && StampFits(sample.stamp_ns) &&
          wire.present() < (1U << kSignalCount) &&
          FromWire(wire.mode(), v1::MODE_CALIBRATING, sample.mode) &&
          FromWire(wire.flow_unit(), v1::FLOW_T_PER_H, sample.flow_unit);

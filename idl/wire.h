@@ -21,6 +21,10 @@ inline constexpr std::size_t kMaxTextLength = 255;
 inline constexpr std::size_t kMaxGroups = 64;
 inline constexpr std::size_t kMaxCounters = 64;
 
+/// Stamps of samples, 1900 to 2100: the time between any two has no overflow.
+inline constexpr std::int64_t kMinStampNs = -2'208'988'800'000'000'000;
+inline constexpr std::int64_t kMaxStampNs = 4'102'444'800'000'000'000;
+
 /// Topic fdi/v1/ValveSample, key valve_id.
 struct ValveSampleMessage {
   std::string valve_id;

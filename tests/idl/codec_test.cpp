@@ -271,6 +271,25 @@ TEST(CodecTest, EnumeratorsNobodyDefinedAreNotDecoded) {
   EXPECT_FALSE(Codec<ValveSampleMessage>::Decode(wrong, message));
 }
 
+// The difference of two stamps, less a period, must be an int64.
+TEST(CodecTest, StampsBeyondTheYears1900To2100AreRefused) {
+  for (const std::int64_t stamp_ns :
+       {kMinStampNs, kMinStampNs - 1, kMaxStampNs, kMaxStampNs + 1,
+        std::numeric_limits<std::int64_t>::min(),
+        std::numeric_limits<std::int64_t>::max()}) {
+    const bool fits = stamp_ns == kMinStampNs || stamp_ns == kMaxStampNs;
+    ValveSampleMessage message = SomeSample();
+    v1::ValveSample wire;
+    Codec<ValveSampleMessage>::Encode(message, wire);
+    wire.stamp_ns(stamp_ns);
+    EXPECT_EQ(Codec<ValveSampleMessage>::Decode(wire, message), fits);
+    message.sample.stamp_ns = stamp_ns;
+    if (!fits) {
+      EXPECT_THROW(Codec<ValveSampleMessage>::Encode(message, wire), DataError);
+    }
+  }
+}
+
 TEST(CodecTest, ArraysBeyondTheirBoundAreNotDecoded) {
   v1::DecisionVector wire;
   Codec<DecisionMessage>::Encode(FullDecision(), wire);

@@ -13,16 +13,33 @@ namespace {
 
 namespace dds = eprosima::fastdds::dds;
 
+// The type of a publisher that was built from another IDL: one field less, and
+// so fewer bytes, under the same name or one of its own.
+class OtherVersion : public v1::ValveSamplePubSubType {
+ public:
+  explicit OtherVersion(const char* name) { setName(name); }
+  bool serialize(
+      void* data,
+      eprosima::fastrtps::rtps::SerializedPayload_t* payload) override {
+    if (!v1::ValveSamplePubSubType::serialize(data, payload)) {
+      return false;
+    }
+    payload->length -= 4;  // epoch
+    return true;
+  }
+};
+
 // A publisher that uses the library as it is.
 class ForeignPublisher {
  public:
-  explicit ForeignPublisher(const DdsOptions& options)
+  explicit ForeignPublisher(
+      const DdsOptions& options,
+      dds::TopicDataType* type = new v1::ValveSamplePubSubType())
       : participant_(options),
         publisher_(
             participant_.impl()->create_publisher(dds::PUBLISHER_QOS_DEFAULT)) {
-    dds::Topic* topic = participant_.impl().TopicOf(
-        "fdi/v1/ValveSample",
-        dds::TypeSupport(new v1::ValveSamplePubSubType()));
+    dds::Topic* topic = participant_.impl().TopicOf("fdi/v1/ValveSample",
+                                                    dds::TypeSupport(type));
     writer_ = publisher_->create_datawriter(
         topic, QosFor<ValveSampleMessage>(Profile::kLossless, 10).writer);
   }
@@ -79,6 +96,52 @@ TEST(ForeignTest, WrongEnumeratorsAreCountedAndTheRestGoesOn) {
   EXPECT_EQ(seen, (std::vector<std::uint64_t>{0, 3}));
   EXPECT_EQ(subscriber.status().undecodable, 2U);
   EXPECT_EQ(subscriber.status().received, 2U);
+}
+
+TEST(ForeignTest, BytesOfAnotherVersionOfTheTypeAreCountedAndTheRestGoesOn) {
+  const TestDomain domain;
+  Participant participant(domain.Options());
+  Subscriber<ValveSampleMessage> subscriber(participant);
+  ForeignPublisher other(domain.Options(),
+                         new OtherVersion("fdi::v1::ValveSample"));
+  ForeignPublisher ours(domain.Options());
+  ASSERT_TRUE(TakeUntil<ValveSampleMessage>(
+      subscriber, {}, [&] { return other.Matched() && ours.Matched(); }));
+
+  for (std::uint64_t seq = 0; seq < 20; ++seq) {
+    other.Write(Valid(seq));
+    ours.Write(Valid(seq));
+  }
+  std::vector<std::uint64_t> seen;
+  const Handlers<ValveSampleMessage> handlers{
+      [&](const ValveSampleMessage& message, const Reception&) {
+        seen.push_back(message.sample.seq);
+      },
+      nullptr};
+  ASSERT_TRUE(TakeUntil(subscriber, handlers,
+                        [&] {
+                          return seen.size() >= 20 &&
+                                 subscriber.status().undecodable >= 20;
+                        }))
+      << seen.size() << " " << subscriber.status().undecodable;
+
+  EXPECT_EQ(seen.size(), 20U);
+  EXPECT_EQ(subscriber.status().undecodable, 20U);
+  EXPECT_EQ(subscriber.status().lost, 0U);
+}
+
+TEST(ForeignTest, ATypeOfAnotherNameIsNotMatched) {
+  const TestDomain domain;
+  Participant participant(domain.Options());
+  Subscriber<ValveSampleMessage> subscriber(participant);
+  ForeignPublisher other(domain.Options(),
+                         new OtherVersion("fdi::v2::ValveSample"));
+  ForeignPublisher ours(domain.Options());  // Found later than the other.
+  ASSERT_TRUE(TakeUntil<ValveSampleMessage>(subscriber, {},
+                                            [&] { return ours.Matched(); }));
+
+  EXPECT_FALSE(other.Matched());
+  EXPECT_EQ(subscriber.status().matched, 1);
 }
 
 }  // namespace
