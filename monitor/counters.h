@@ -33,7 +33,8 @@ enum class Counter : std::uint8_t {
   kRecorded,           ///< Samples committed to runs.
   kRecordDropped,      ///< Samples that are missing in runs.
   kRecordFailures,     ///< Failed commits of runs.
-  kGaps,               ///< Gaps in the stream of a valve.
+  kGaps,               ///< Gaps of more than 3 periods in the stream.
+  kInitialisations,    ///< Times an engine began anew: first sight, gap, swap.
   kStaleEvents,        ///< Times a valve fell silent.
   kEpisodes,           ///< Episodes begun.
   kModelSwaps,         ///< Valves that changed to another model set.

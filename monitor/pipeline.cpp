@@ -214,6 +214,9 @@ void Pipeline::Handle(const Item& item) {
   counters_.Add(outcome.models != nullptr ? Counter::kDiagnosed
                                           : Counter::kUnassigned);
   counters_.Add(verdict.intake);
+  if (verdict.initialised) {
+    counters_.Add(Counter::kInitialisations);
+  }
   if (CountsAsTime(verdict)) {
     counters_.Add(verdict.quality);
   }
