@@ -86,6 +86,7 @@ std::optional<std::int64_t> HistoryEventRows::Store(const Entry& entry) {
     const bool cleared = t.reason == EndReason::kCleared;
     statements_(
         "UPDATE episode SET ended_ns = ?, end_reason = ?, "
+        "fault = coalesce(fault, 'unknown'), "
         "cleared_ns = coalesce(cleared_ns, ?) WHERE episode_id = ?")
         .Bind(t.stamp_ns, EndReasonName(t.reason),
               cleared ? std::optional(t.stamp_ns) : std::nullopt, entry.id)
@@ -131,9 +132,11 @@ void HistoryEventRows::StoreIsolation(const Entry& entry) {
   const Transition& t = entry.transition;
   statements_(
       "UPDATE episode SET isolated_ns = coalesce(isolated_ns, ?), "
-      "fault_bits = ?, peak_factor = ?, strength = ? WHERE episode_id = ?")
-      .Bind(t.stamp_ns, t.faults, Finite(t.factor), Finite(t.strength),
-            entry.id)
+      "fault = ?, fault_bits = ?, peak_factor = ?, strength = ? "
+      "WHERE episode_id = ?")
+      .Bind(t.stamp_ns,
+            NullIfEmpty(NamesOf(t.faults, entry.names)).value_or("unknown"),
+            t.faults, Finite(t.factor), Finite(t.strength), entry.id)
       .Run();
   statements_("UPDATE episode_fault SET held = 0 WHERE episode_id = ?")
       .Bind(entry.id)
@@ -142,9 +145,10 @@ void HistoryEventRows::StoreIsolation(const Entry& entry) {
     if ((t.faults >> bit & 1U) != 0) {
       statements_(
           "INSERT INTO episode_fault (episode_id, fault, fault_bit, first_ns, "
-          "held) VALUES (?, ?, ?, ?, 1) "
+          "held, detected_ns) SELECT episode_id, ?, ?, ?, 1, detected_ns "
+          "FROM episode WHERE episode_id = ? "
           "ON CONFLICT (episode_id, fault) DO UPDATE SET held = 1")
-          .Bind(entry.id, entry.names[bit], bit, t.stamp_ns)
+          .Bind(entry.names[bit], bit, t.stamp_ns, entry.id)
           .Run();
     }
   }

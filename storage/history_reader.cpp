@@ -1,48 +1,13 @@
 #include "storage/history_reader.h"
 
 #include "diagnosis/error.h"
-#include "diagnosis/fault_catalogue.h"
+#include "storage/history_query.h"
 #include "storage/history_rows.h"
 #include "storage/history_schema.h"
 #include "storage/history_trace.h"
 
 namespace fdi::storage {
 namespace {
-
-/// Parameters 1..5: valve glob, since, until, fault ('' for any), state.
-constexpr const char* kMatches =
-    "e.valve_id GLOB ?1 AND e.detected_ns >= ?2 AND e.detected_ns < ?3 AND "
-    "(?4 = '' OR (?4 = 'unknown' AND v.fault = 'unknown') OR EXISTS (SELECT 1 "
-    "FROM episode_fault f WHERE f.episode_id = e.episode_id AND f.fault = ?4 "
-    "AND f.held = 1)) AND CASE ?5 "
-    "WHEN 1 THEN e.ended_ns IS NULL "
-    "WHEN 2 THEN e.ended_ns IS NULL AND e.isolated_ns IS NULL "
-    "WHEN 3 THEN e.ended_ns IS NULL AND e.isolated_ns IS NOT NULL "
-    "WHEN 4 THEN e.ended_ns IS NOT NULL "
-    "WHEN 5 THEN e.acked_by IS NULL ELSE 1 END";
-static_assert(static_cast<int>(EpisodeState::kOpen) == 1 &&
-              static_cast<int>(EpisodeState::kUnacked) == 5);
-
-constexpr const char* kFrom =
-    " FROM fault_history v JOIN episode e USING (episode_id) ";
-
-std::string FaultOf(const EpisodeFilter& filter) {
-  if (filter.fault.empty() || filter.fault == "unknown") {
-    return filter.fault;
-  }
-  return FaultName(RequireFault(filter.fault));
-}
-
-void BindFilter(Statement& statement, const EpisodeFilter& filter) {
-  const std::int64_t limit = filter.limit > 0 ? filter.limit : -1;
-  statement.Bind(filter.valve_glob, filter.since_ns, filter.until_ns,
-                 FaultOf(filter), filter.state, limit);
-}
-
-void BindStatistics(Statement& statement, const EpisodeFilter& filter) {
-  statement.Bind(filter.valve_glob, filter.since_ns, filter.until_ns,
-                 FaultOf(filter), filter.state);
-}
 
 TraceChunk ReadChunk(const Statement& row) {
   TraceChunk chunk;
@@ -61,14 +26,8 @@ HistoryReader::HistoryReader(const std::filesystem::path& path)
     : database_(path, HistorySchema(), Access::kReader) {}
 
 std::vector<Episode> HistoryReader::List(const EpisodeFilter& filter) {
-  // The newest `limit`, then oldest first.
-  Statement row = database_.Prepare(
-      std::string("SELECT ") + kEpisodeColumns + kFrom +
-      "WHERE e.episode_id IN (SELECT e.episode_id" + kFrom + "WHERE " +
-      kMatches +
-      " ORDER BY e.detected_ns DESC, e.valve_id DESC LIMIT ?6) "
-      "ORDER BY e.detected_ns, e.valve_id");
-  BindFilter(row, filter);
+  Statement row = database_.Prepare(ListQuery(filter));
+  BindListQuery(row, filter);
   std::vector<Episode> episodes;
   while (row.Step()) {
     episodes.push_back(ReadEpisode(row));
@@ -79,8 +38,10 @@ std::vector<Episode> HistoryReader::List(const EpisodeFilter& filter) {
 Episode HistoryReader::Show(std::string_view id) {
   const Snapshot snapshot(database_);
   const std::uint64_t episode_id = ResolveEpisode(database_, id);
-  Statement row = database_.Prepare(std::string("SELECT ") + kEpisodeColumns +
-                                    kFrom + "WHERE e.episode_id = ?");
+  Statement row = database_.Prepare(
+      std::string("SELECT ") + kEpisodeColumns +
+      " FROM episode e CROSS JOIN fault_history v USING (episode_id) "
+      "WHERE e.episode_id = ?");
   row.Bind(EpisodeIdText(episode_id)).Step();
   return ReadEpisode(row);
 }
@@ -120,19 +81,8 @@ std::vector<TraceInstant> HistoryReader::Trace(std::uint64_t episode_id) {
 
 std::vector<EpisodeStatistics> HistoryReader::Statistics(
     const EpisodeFilter& filter) {
-  Statement row = database_.Prepare(
-      std::string(
-          "SELECT e.valve_id, coalesce(v.fault, '') AS answer, count(*), "
-          "sum(e.ended_ns IS NULL), sum(e.acked_by IS NULL), "
-          "sum(e.label IS NOT NULL AND (e.label = 'true' OR e.label = "
-          "v.fault)), sum(e.label IS NOT NULL AND e.label <> 'true' AND "
-          "e.label IS NOT v.fault), "
-          "avg((e.isolated_ns - e.detected_ns) * 1e-9), "
-          "avg((e.ended_ns - e.detected_ns) * 1e-9), max(e.peak_factor), "
-          "max(e.detected_ns)") +
-      kFrom + "WHERE " + kMatches +
-      " GROUP BY e.valve_id, answer ORDER BY e.valve_id, answer");
-  BindStatistics(row, filter);
+  Statement row = database_.Prepare(StatisticsQuery(filter));
+  BindStatisticsQuery(row, filter);
   std::vector<EpisodeStatistics> statistics;
   while (row.Step()) {
     statistics.push_back({row.Text(0), row.Text(1), row.Int64(2), row.Int64(3),

@@ -69,7 +69,7 @@ std::vector<Episode> ReadOpenEpisodes(Database& database) {
   std::vector<Episode> episodes;
   Statement row = database.Prepare(
       std::string("SELECT ") + kEpisodeColumns +
-      " FROM fault_history v JOIN episode e USING (episode_id) "
+      " FROM episode e CROSS JOIN fault_history v USING (episode_id) "
       "WHERE e.ended_ns IS NULL ORDER BY e.detected_ns, e.valve_id");
   while (row.Step()) {
     episodes.push_back(ReadEpisode(row));

@@ -1,0 +1,201 @@
+// A year of 1000 valves in history.db: how long the filters and the statistics
+// of the public contract take, and what it costs to store many events at once.
+//
+//     fdi-bench-history [EPISODES]
+//
+// Prints name, time [ms] and rows; exits with 1 if a limit is exceeded.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include "storage/history.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::storage {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kNow = 1'795'186'571 * kSecond;
+constexpr std::int64_t kYear = 31'536'000;  // s
+
+double MillisecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start)
+      .count();
+}
+
+// Episodes at all times of the year, of 19 faults and unknown, nine in ten
+// acknowledged, one in ten labelled, the last hundred open; with their events
+// and a small trace, straight into the tables.
+constexpr const char* kEpisodes = R"sql(
+WITH RECURSIVE n(k) AS (VALUES (0) UNION ALL SELECT k + 1 FROM n
+                        WHERE k + 1 < ?1),
+  t AS (SELECT k, k * 7919 % 1000 AS valve, k * 31 % 20 AS fault,
+               ?2 + k * (?3 / ?1) * 1000000000 AS detected FROM n)
+INSERT INTO episode (episode_id, valve_id, source_id, detected_ns, isolated_ns,
+  cleared_ns, ended_ns, end_reason, fault_bits, peak_factor, strength,
+  model_set, model_hash, flow_unit, channels, faults, label, acked_by, acked_ns,
+  fault)
+SELECT printf('%016x', k), printf('V%04d', valve), 1, detected,
+  iif(fault = 0, NULL, detected + 20000000000),
+  iif(k < ?1 - 100, detected + 600000000000, NULL),
+  iif(k < ?1 - 100, detected + 601000000000, NULL),
+  iif(k < ?1 - 100, 'cleared', NULL), 1, 0.8, 0.5, 'paper@1', 1, 'm3/h', 'X|F',
+  'f1|f7', iif(k % 10 = 3, 'true', NULL), iif(k % 10 = 0, NULL, 'anna'), 1,
+  iif(fault = 0, iif(k < ?1 - 100, 'unknown', NULL), 'f' || fault)
+FROM t)sql";
+
+constexpr const char* kFaults = R"sql(
+INSERT INTO episode_fault (episode_id, fault, fault_bit, first_ns, held,
+  detected_ns)
+SELECT episode_id, fault, 0, isolated_ns, 1, detected_ns FROM episode
+WHERE isolated_ns IS NOT NULL)sql";
+
+constexpr const char* kEvents = R"sql(
+INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns)
+SELECT episode_id, kind, detected_ns + n, detected_ns FROM episode,
+  (SELECT 'DETECTED' AS kind, 0 AS n UNION SELECT 'ISOLATED', 1
+   UNION SELECT 'CLEARED', 2 UNION SELECT 'CLOSED', 3))sql";
+
+constexpr const char* kTraces = R"sql(
+INSERT INTO episode_trace (episode_id, chunk, first_ns, last_ns, instants,
+  sample_codec, sample_crc, samples, vector_crc, vectors)
+SELECT episode_id, 0, detected_ns, detected_ns, 1, 1, 0, zeroblob(600), 0,
+  zeroblob(600) FROM episode)sql";
+
+void Generate(const std::filesystem::path& path, std::int64_t episodes) {
+  Database database(path, HistorySchema(), Access::kWriter);
+  Transaction transaction(database);
+  database.Run(kEpisodes, episodes, kNow - kYear * kSecond, kYear);
+  database.Run(kFaults);
+  database.Run(kEvents);
+  database.Run(kTraces);
+  transaction.Commit();
+  database.Checkpoint();
+}
+
+struct Query {
+  const char* name;
+  EpisodeFilter filter;
+};
+
+std::vector<Query> Queries() {
+  std::vector<Query> queries;
+  const auto add = [&queries](const char* name, const char* valve,
+                              const char* fault,
+                              EpisodeState state = EpisodeState::kAny) {
+    EpisodeFilter filter;
+    filter.valve_glob = valve;
+    filter.fault = fault;
+    filter.state = state;
+    filter.limit = 200;
+    queries.push_back({name, filter});
+  };
+  add("newest", "*", "");
+  add("valve", "V0042", "");
+  add("valve prefix", "V004*", "");
+  add("valve glob, none", "X*", "");
+  add("fault", "*", "f7");
+  add("fault, none", "*", "t1");
+  add("unknown", "*", "unknown");
+  add("open", "*", "", EpisodeState::kOpen);
+  add("isolated", "*", "", EpisodeState::kIsolated);
+  add("closed", "*", "", EpisodeState::kClosed);
+  add("unacked", "*", "", EpisodeState::kUnacked);
+  add("valve, fault", "V0042", "f7");
+  add("glob, fault", "V004*", "f7");
+  add("glob, unknown", "V004*", "unknown");
+  add("glob, unacked", "V004*", "", EpisodeState::kUnacked);
+  add("glob, fault, unacked", "V004*", "f7", EpisodeState::kUnacked);
+  add("unknown, unacked", "*", "unknown", EpisodeState::kUnacked);
+  add("month of last winter", "*", "");
+  queries.back().filter.since_ns = kNow - kYear / 2 * kSecond;
+  queries.back().filter.until_ns = kNow - kYear * 5 / 12 * kSecond;
+  return queries;
+}
+
+// The median of five, each with a connection of its own as the program has.
+template <typename Ask>
+double MedianOf(Ask ask) {
+  std::vector<double> times;
+  for (int i = 0; i < 5; ++i) {
+    const auto start = Clock::now();
+    ask();
+    times.push_back(MillisecondsSince(start));
+  }
+  std::sort(times.begin(), times.end());
+  return times[2];
+}
+
+bool Report(const char* name, double ms, double limit_ms, std::size_t rows) {
+  std::printf("%-28s %8.1f ms  limit %4.0f ms  %6zu rows%s\n", name, ms,
+              limit_ms, rows, ms > limit_ms ? "  TOO SLOW" : "");
+  return ms <= limit_ms;
+}
+
+bool TimeQueries(const std::filesystem::path& path) {
+  bool good = true;
+  for (const Query& query : Queries()) {
+    std::size_t rows = 0;
+    const double ms =
+        MedianOf([&] { rows = HistoryReader(path).List(query.filter).size(); });
+    good &= Report(query.name, ms, 50.0, rows);
+  }
+  EpisodeFilter month;
+  month.since_ns = kNow - kYear / 12 * kSecond;
+  for (const auto& [name, filter] :
+       {Query{"statistics", {}}, Query{"statistics of a month", month}}) {
+    std::size_t rows = 0;
+    const double ms =
+        MedianOf([&] { rows = HistoryReader(path).Statistics(filter).size(); });
+    good &= Report(name, ms, 500.0, rows);
+  }
+  return good;
+}
+
+// 100 valves fail in the same sample: three hundred events.
+void TimeEvents(const std::filesystem::path& path) {
+  ModelSet models;
+  models.name = "demo";
+  models.faults = {1, 7};
+  HistoryWriter writer(path);
+  const auto record = [&](std::int64_t base) {
+    for (int v = 0; v < 300; ++v) {
+      Transition transition;
+      transition.kind = TransitionKind::kDetected;
+      transition.stamp_ns = base;
+      transition.detection_stamp_ns = base;
+      writer.Record({std::string("B").append(std::to_string(v)), 1, transition,
+                     &models, base, std::nullopt});
+    }
+  };
+  auto start = Clock::now();
+  record(kNow + kSecond);
+  const double alone = MillisecondsSince(start);
+  start = Clock::now();
+  writer.Together([&] { record(kNow + 2 * kSecond); });
+  std::printf("300 events, a commit each: %.1f ms; together: %.1f ms\n", alone,
+              MillisecondsSince(start));
+}
+
+int Main(std::int64_t episodes) {
+  const TemporaryDirectory directory;
+  const auto path = directory.path() / "history.db";
+  Generate(path, episodes);
+  std::printf("%lld episodes of 1000 valves, %.1f MB\n",
+              static_cast<long long>(episodes),
+              static_cast<double>(std::filesystem::file_size(path)) / 1e6);
+  const bool good = TimeQueries(path);
+  TimeEvents(path);
+  return good ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace fdi::storage
+
+int main(int argc, char** argv) {
+  return fdi::storage::Main(argc > 1 ? std::atoll(argv[1]) : 100'000);
+}

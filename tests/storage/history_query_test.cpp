@@ -1,0 +1,113 @@
+#include "storage/history_query.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/storage/history_fixture.h"
+
+namespace fdi::storage {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+class HistoryQueryTest : public HistoryFixture {
+ protected:
+  HistoryQueryTest() { RecordEpisode(writer_, 0b101, "LV-1"); }
+
+  std::string PlanOf(const std::string& sql) {
+    Database database(path_, HistorySchema(), Access::kReader);
+    Statement row = database.Prepare("EXPLAIN QUERY PLAN " + sql);
+    std::string plan;
+    while (row.Step()) {
+      plan += row.Text(3) + '\n';
+    }
+    return plan;
+  }
+
+  static std::vector<EpisodeFilter> AllFilters() {
+    std::vector<EpisodeFilter> filters;
+    for (const char* valve : {"*", "LV-1", "LV-*"}) {
+      for (const char* fault : {"", "unknown", "f7"}) {
+        for (int state = 0; state <= static_cast<int>(EpisodeState::kUnacked);
+             ++state) {
+          EpisodeFilter filter;
+          filter.valve_glob = valve;
+          filter.fault = fault;
+          filter.state = static_cast<EpisodeState>(state);
+          filter.limit = 200;
+          filters.push_back(filter);
+        }
+      }
+    }
+    return filters;
+  }
+
+  HistoryWriter writer_{path_};
+};
+
+TEST_F(HistoryQueryTest, EveryFilterWalksAnIndex) {
+  for (const EpisodeFilter& filter : AllFilters()) {
+    const std::string plan = PlanOf(ListQuery(filter));
+    EXPECT_THAT(plan, Not(HasSubstr("SCAN")))
+        << filter.valve_glob << ' ' << filter.fault << ' '
+        << static_cast<int>(filter.state);
+  }
+}
+
+// By other programs, through the view.
+TEST_F(HistoryQueryTest, TheViewUsesTheIndexesOfItsColumns) {
+  const std::string view = "SELECT * FROM fault_history WHERE ";
+  EXPECT_THAT(PlanOf(view + "valve_id = 'V1'"), HasSubstr("episode_by_valve"));
+  EXPECT_THAT(PlanOf(view + "fault = 'f7'"), HasSubstr("episode_by_fault"));
+  EXPECT_THAT(PlanOf(view + "label = 'true'"), HasSubstr("episode_labelled"));
+  EXPECT_THAT(PlanOf(view + "detected_utc >= '2026-11-01'"),
+              HasSubstr("episode_by_utc"));
+}
+
+TEST_F(HistoryQueryTest, StatisticsReadOneIndexAndNoTable) {
+  for (const char* valve : {"*", "LV-1", "LV-*"}) {
+    EpisodeFilter filter;
+    filter.valve_glob = valve;
+    EXPECT_THAT(PlanOf(StatisticsQuery(filter)),
+                HasSubstr("COVERING INDEX episode_statistics"));
+  }
+}
+
+TEST_F(HistoryQueryTest, AnOlderFileGetsItsAnswersAndIndexes) {
+  const DataDirectory old{directory_.path() / "old"};
+  EnsureExists(old);
+  Schema second = HistorySchema();
+  second.migrations.pop_back();
+  {
+    Database file(old.history(), second, Access::kWriter);
+    Transaction transaction(file);
+    const std::string columns =
+        "INSERT INTO episode (episode_id, valve_id, source_id, detected_ns, "
+        "isolated_ns, ended_ns, peak_factor, strength, model_set, model_hash, "
+        "flow_unit, channels, faults) VALUES ";
+    const std::string rest = ", 0.5, 0.5, 'm@1', 1, 'm3/h', 'X', 'f1|f7')";
+    file.Run(columns + "('000000000000000a', 'A', 1, 10, 20, 30" + rest);
+    file.Run(columns + "('000000000000000b', 'B', 1, 11, NULL, 30" + rest);
+    file.Run(columns + "('000000000000000c', 'C', 1, 12, NULL, NULL" + rest);
+    for (const char* fault : {"('000000000000000a', 'f7', 1, 20, 1)",
+                              "('000000000000000a', 'f1', 0, 20, 1)",
+                              "('000000000000000a', 'f2', 2, 15, 0)"}) {
+      file.Run(std::string("INSERT INTO episode_fault VALUES ") + fault);
+    }
+    transaction.Commit();
+  }
+  const HistoryWriter migrate(old.history());
+
+  HistoryReader reader(old.history());
+  const std::vector<Episode> episodes = reader.List();
+  ASSERT_EQ(episodes.size(), 3U);
+  EXPECT_EQ(episodes[0].fault, "f1|f7");
+  EXPECT_EQ(episodes[1].fault, "unknown");
+  EXPECT_EQ(episodes[2].fault, std::nullopt);
+  EpisodeFilter f7;
+  f7.fault = "f7";
+  EXPECT_EQ(reader.List(f7).size(), 1U);
+}
+
+}  // namespace
+}  // namespace fdi::storage
