@@ -12,7 +12,7 @@ using std::chrono::steady_clock;
 
 // At full speed, memory is the limit and not the clock.
 constexpr std::int64_t kMostPending = 50'000;
-constexpr std::chrono::seconds kCommitPeriod(1);
+constexpr std::chrono::milliseconds kCommitPeriod(750);  // Loses less than 1 s.
 
 std::filesystem::path Prepared(const storage::DataDirectory& directory) {
   storage::EnsureExists(directory);
