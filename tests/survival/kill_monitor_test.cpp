@@ -1,0 +1,304 @@
+// fdi-monitor killed while it diagnoses and records valves whose faults come
+// and go; the publisher and a subscriber live on.
+
+#include <algorithm>
+#include <csignal>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <set>
+#include <tuple>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "idl/endpoint.h"
+#include "storage/history.h"
+#include "storage/models.h"
+#include "storage/runs.h"
+#include "tests/monitor/linear_models.h"
+#include "tests/storage/temporary_directory.h"
+#include "tests/survival/faulty_plant.h"
+#include "tests/survival/kill_rounds.h"
+#include "tests/system/monitor_process.h"
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using Clock = std::chrono::steady_clock;
+
+constexpr milliseconds kCommitPeriod{1000};
+constexpr milliseconds kCommitTakes{1000};  // On a busy machine.
+constexpr milliseconds kStartLimit{2000};
+constexpr std::int64_t kDetectionNs = 3'000'000'000;  // n_d samples.
+
+// One transition of an episode.
+using Step = std::tuple<std::uint64_t, std::string, std::int64_t>;
+
+class KilledMonitor : public testing::Test {
+ protected:
+  KilledMonitor() {
+    storage::ModelStore(directory_.path() / "models.db",
+                        storage::Access::kOccasionalWriter)
+        .Save(LinearModels(), storage::Activation::kAlways);
+    idl::DdsOptions dds;
+    dds.domain = domain_;
+    participant_.emplace(dds);
+    decisions_.emplace(*participant_);
+    events_.emplace(*participant_);
+    plant_.emplace(*participant_);
+  }
+
+  std::unique_ptr<ChildProcess> Start(const std::string& record) {
+    answers_.clear();
+    started_ns_ = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                      std::chrono::system_clock::now().time_since_epoch())
+                      .count();
+    return std::make_unique<ChildProcess>(std::vector<std::string>{
+        FDI_MONITOR_PROGRAM, "--data", directory_.path().string(), "--domain",
+        std::to_string(domain_), "--transport", "udp", "--log-level", "warning",
+        "run", record});
+  }
+
+  void Take() {
+    decisions_->Take(
+        {[this](const idl::DecisionMessage& m, const idl::Reception& r) {
+           if (r.sent_ns > started_ns_) {
+             answers_[m.valve_id].push_back({m.verdict.seq, Clock::now()});
+           }
+         },
+         {}},
+        milliseconds(5));
+    events_->Take(
+        {[this](const idl::FaultEventMessage& m, const idl::Reception&) {
+           (m.persisted ? persisted_ : unpersisted_)
+               .emplace(m.episode_id,
+                        std::string(TransitionName(m.transition.kind)),
+                        m.transition.stamp_ns);
+         },
+         {}},
+        milliseconds(0));
+  }
+  void TakeFor(milliseconds time) {
+    for (const auto end = Clock::now() + time; Clock::now() < end;) {
+      Take();
+    }
+  }
+  // @returns the time until the valves had answered; nothing after 20 s.
+  std::optional<milliseconds> AwaitAnswers(std::size_t valves) {
+    const auto start = Clock::now();
+    while (answers_.size() < valves) {
+      if (Clock::now() - start > seconds(20)) {
+        return std::nullopt;
+      }
+      Take();
+    }
+    return std::chrono::duration_cast<milliseconds>(Clock::now() - start);
+  }
+
+  void ExpectPersistedOnce() const;
+  void ExpectRecorded(std::uint64_t from, Clock::time_point killed);
+  std::map<std::string, std::set<std::uint64_t>> RecordedSince(
+      std::uint64_t from);
+  void ExpectEpisodesInOrder() const;
+  void ExpectOutagesNoted(std::size_t outages) const;
+
+  const int domain_{60 + static_cast<int>(getpid() % 20)};
+  storage::TemporaryDirectory directory_;
+  std::optional<idl::Participant> participant_;
+  std::optional<idl::Subscriber<idl::DecisionMessage>> decisions_;
+  std::optional<idl::Subscriber<idl::FaultEventMessage>> events_;
+  std::optional<FaultyPlant> plant_;
+  std::int64_t started_ns_{0};
+  // Since the monitor was started: which sample it had answered when.
+  std::map<std::string,
+           std::vector<std::pair<std::uint64_t, Clock::time_point>>>
+      answers_;
+  std::set<Step> persisted_;
+  std::set<Step> unpersisted_;
+  std::vector<std::int64_t> killed_ns_;
+  std::uint64_t recorded_{0};
+  std::uint64_t lost_{0};
+  Clock::duration longest_loss_{0};
+};
+
+// What was published as persisted is in the history once, and nothing is
+// there twice.
+void KilledMonitor::ExpectPersistedOnce() const {
+  storage::HistoryReader history(directory_.path() / "history.db");
+  std::map<Step, int> stored;
+  for (const storage::Episode& episode : history.List()) {
+    for (const storage::EpisodeEvent& event : history.Events(episode.id)) {
+      ++stored[{episode.id, event.kind, event.stamp_ns}];
+    }
+  }
+  for (const Step& step : persisted_) {
+    EXPECT_TRUE(stored.contains(step))
+        << storage::EpisodeIdText(std::get<0>(step)) << ' '
+        << std::get<1>(step);
+  }
+  for (const auto& [step, count] : stored) {
+    EXPECT_EQ(count, 1) << storage::EpisodeIdText(std::get<0>(step)) << ' '
+                        << std::get<1>(step);
+  }
+}
+
+// The runs since instant `from` have every sample that was answered up to the
+// last commit.
+void KilledMonitor::ExpectRecorded(std::uint64_t from,
+                                   Clock::time_point killed) {
+  const std::map<std::string, std::set<std::uint64_t>> recorded =
+      RecordedSince(from);
+  int missing = 0;
+  for (const auto& [valve, answers] : answers_) {
+    const auto run = recorded.find(valve);
+    for (const auto& [seq, when] : answers) {
+      if (run == recorded.end() || seq > *run->second.rbegin()) {
+        ++lost_;
+        longest_loss_ = std::max(longest_loss_, killed - when);
+      } else {
+        missing += !run->second.contains(seq);
+      }
+    }
+  }
+  EXPECT_EQ(missing, 0) << "samples missing before the end of their run";
+  EXPECT_LE(longest_loss_, kCommitPeriod + kCommitTakes);
+}
+
+// What is in the runs that began at instant `from` or later, one of each valve.
+std::map<std::string, std::set<std::uint64_t>> KilledMonitor::RecordedSince(
+    std::uint64_t from) {
+  storage::RunStore runs(directory_.path() / "runs.db");
+  storage::RunFilter filter;
+  filter.since_ns = PlantSample(from).stamp_ns;
+  std::map<std::string, std::set<std::uint64_t>> recorded;
+  int wrong = 0;
+  for (const storage::RunInfo& info : runs.List(filter)) {
+    const int valve = std::stoi(info.run.valve_id.substr(1));
+    EXPECT_FALSE(recorded.contains(info.run.valve_id)) << info.run.valve_id;
+    std::set<std::uint64_t>& all = recorded[info.run.valve_id];
+    for (const auto& [sample, truth, intake, first, swapped] :
+         runs.Load(info.id).samples) {
+      wrong += !all.empty() && sample.seq <= *all.rbegin();
+      wrong += sample.values[Index(Signal::kX)] !=
+               50.0 + OffsetOf(valve, sample.seq);
+      all.insert(sample.seq);
+      ++recorded_;
+    }
+  }
+  EXPECT_EQ(wrong, 0) << "samples doubled, out of order or changed";
+  return recorded;
+}
+
+// No episode of a valve begins before the one before has ended; one that was
+// given up as unknown may have ended while the next was being detected.
+void KilledMonitor::ExpectEpisodesInOrder() const {
+  storage::HistoryReader history(directory_.path() / "history.db");
+  std::map<std::string, storage::Episode> last;
+  for (const storage::Episode& episode : history.List()) {
+    EXPECT_TRUE(episode.ended_ns.has_value()) << episode.episode_id;
+    const auto [before, first] = last.emplace(episode.valve_id, episode);
+    if (!first) {
+      const std::int64_t tolerated =
+          before->second.end_reason == "unknown" ? kDetectionNs : 0;
+      EXPECT_GE(episode.detected_ns + tolerated,
+                before->second.ended_ns.value_or(0))
+          << episode.valve_id << ' ' << episode.episode_id;
+      before->second = episode;
+    }
+  }
+}
+
+// Each outage is a gap of all valves; an episode that was open then is resumed
+// before anything else happens to it, or closed for a reason.
+void KilledMonitor::ExpectOutagesNoted(std::size_t outages) const {
+  storage::HistoryReader history(directory_.path() / "history.db");
+  const std::vector<storage::DataGap> gaps = history.Gaps();
+  for (const std::int64_t killed_ns : killed_ns_) {
+    EXPECT_TRUE(std::any_of(
+        gaps.begin(), gaps.end(), [killed_ns](const storage::DataGap& gap) {
+          return gap.valve_id.empty() && gap.reason == "monitor_down" &&
+                 gap.from_ns <= killed_ns && gap.to_ns >= killed_ns;
+        }));
+  }
+  EXPECT_EQ(killed_ns_.size(), outages);
+  int resumed = 0;
+  int unknown = 0;
+  for (const storage::Episode& episode : history.List()) {
+    std::size_t session = 0;
+    for (const storage::EpisodeEvent& event : history.Events(episode.id)) {
+      const auto died = std::lower_bound(killed_ns_.begin(), killed_ns_.end(),
+                                         event.recorded_ns);
+      const auto now = static_cast<std::size_t>(died - killed_ns_.begin());
+      const bool begins = event.kind == "DETECTED";
+      if (!begins && now != session) {
+        EXPECT_TRUE(event.kind == "RESUMED" || event.kind == "CLOSED")
+            << episode.episode_id << ' ' << event.kind;
+        resumed += event.kind == "RESUMED";
+        unknown += event.reason == "unknown";
+      }
+      session = now;
+    }
+  }
+  std::cout << "monitor: " << resumed << " episodes resumed, " << unknown
+            << " closed unknown after an outage\n";
+}
+
+TEST_F(KilledMonitor, LosesNoPersistedEventAndDiagnosesAgainAtOnce) {
+  RandomMoments moments(5);
+  const int rounds = KillRounds();
+  std::vector<milliseconds> starts;
+  for (int round = 0; round < rounds; ++round) {
+    SCOPED_TRACE("round " + std::to_string(round));
+    const int valves = round == 0
+                           ? FaultyPlant::kMostValves
+                           : moments.Choose({20, 20, 50, 100, 300, 1000});
+    plant_->SetValves(valves);
+    const std::uint64_t from = plant_->next() + 1;
+    const auto monitor =
+        Start(round % 2 == 0 ? "--record" : "--record=lossless");
+    const auto answered = AwaitAnswers(static_cast<std::size_t>(valves));
+    ASSERT_TRUE(answered.has_value()) << monitor->errors();
+    starts.push_back(*answered);
+    TakeFor(moments.Within(milliseconds(0), milliseconds(3500)));
+    monitor->Signal(SIGKILL);
+    const Clock::time_point killed = Clock::now();
+    killed_ns_.push_back(
+        std::chrono::duration_cast<std::chrono::nanoseconds>(
+            std::chrono::system_clock::now().time_since_epoch())
+            .count());
+    ASSERT_EQ(monitor->AwaitExit(), 128 + SIGKILL);
+    TakeFor(milliseconds(50));
+    EXPECT_EQ(Doctor(directory_.path()), "");
+    ExpectPersistedOnce();
+    ExpectRecorded(from, killed);
+  }
+
+  plant_->SetValves(FaultyPlant::kMostValves);
+  const auto monitor = Start("--record");
+  ASSERT_TRUE(AwaitAnswers(FaultyPlant::kMostValves).has_value())
+      << monitor->errors();
+  plant_->EndStreams();
+  TakeFor(seconds(2));
+  monitor->Signal(SIGTERM);
+  EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
+  EXPECT_EQ(Doctor(directory_.path()), "");
+  ExpectPersistedOnce();
+  ExpectEpisodesInOrder();
+  ExpectOutagesNoted(static_cast<std::size_t>(rounds));
+
+  std::sort(starts.begin(), starts.end());
+  EXPECT_LE(starts[starts.size() / 2], kStartLimit);
+  std::cout << "monitor: " << rounds << " rounds; all valves answered after "
+            << starts[starts.size() / 2].count() << " ms (median), "
+            << starts.back().count() << " ms (longest); " << persisted_.size()
+            << " events persisted, " << unpersisted_.size() << " not; "
+            << recorded_ << " samples recorded, " << lost_ << " of the last "
+            << std::chrono::duration_cast<milliseconds>(longest_loss_).count()
+            << " ms not\n";
+}
+
+}  // namespace
+}  // namespace fdi::monitor
