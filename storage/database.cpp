@@ -128,7 +128,12 @@ int Database::CheckIdentity(const Schema& schema) {
     Refuse(path_, error.what());
   }
   const bool blank = id == 0 && version == 0 && objects == 0;
-  if (id != schema.application_id && !(blank && access_ != Access::kReader)) {
+  if (blank && access_ == Access::kReader) {
+    Refuse(path_,
+           "is empty: who made it was stopped before it was done; the next "
+           "program that writes, or fdi-store migrate, goes on with it");
+  }
+  if (id != schema.application_id && !blank) {
     Refuse(path_, "is not a " + std::string(schema.kind) +
                       " database: application_id " + std::to_string(id) +
                       " instead of " + std::to_string(schema.application_id));

@@ -31,6 +31,8 @@ struct Limited {
   Vector& values;
   std::uint32_t max;
 };
+template <typename Vector>
+Limited(Vector&, std::uint32_t) -> Limited<Vector>;  // clang 14 needs it.
 
 // The fields of every struct, once for both directions. The bindings name all
 // of them: a field that is added does not compile until it stands here too.
