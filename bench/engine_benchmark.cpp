@@ -6,7 +6,9 @@
 #include <benchmark/benchmark.h>
 #include <malloc.h>
 
+#include "bench/scalar_observers.h"
 #include "bench/synthetic_models.h"
+#include "diagnosis/observer_bank.h"
 #include "diagnosis/valve_engine.h"
 
 namespace fdi::bench {
@@ -75,11 +77,50 @@ void StepOneValve(benchmark::State& state) {
 BENCHMARK(StepOneValve<Paper>)->ArgsProduct({{11, 33}, {0, 1}});
 BENCHMARK(StepOneValve<Extended>)->ArgsProduct({{45, 98}, {0, 1}});
 
-// Valves of one model set in turn, each somewhere else in its cycle; argument 1
-// is their number.
+// Predictions and residuals of all observers of a valve, one model after the
+// other in plain scalar code: what the kernels are to be compared with.
+template <Models (*MakeModels)(int)>
+void PredictOneByOne(benchmark::State& state) {
+  const Models models = MakeModels(static_cast<int>(state.range(0)));
+  ScalarObservers observers(*models);
+  const std::vector<Sample> samples = Samples(kSamples, 0, 0.0);
+  for ([[maybe_unused]] auto _ : state) {
+    for (const Sample& sample : samples) {
+      benchmark::DoNotOptimize(observers.Step(sample));
+    }
+  }
+  CountSamples(state, state.iterations() * kSamples);
+}
+BENCHMARK(PredictOneByOne<Paper>)->Arg(11)->Arg(33);
+BENCHMARK(PredictOneByOne<Extended>)->Arg(45)->Arg(98);
+
+// The same by the kernels; argument 1 is the InstructionSet.
+template <Models (*MakeModels)(int)>
+void PredictSideBySide(benchmark::State& state) {
+  const Models models = MakeModels(static_cast<int>(state.range(0)));
+  ObserverBank bank(std::make_shared<const ObserverPlan>(*models),
+                    static_cast<InstructionSet>(state.range(1)));
+  const std::vector<Sample> samples = Samples(kSamples, 0, 0.0);
+  bank.Initialise(samples.front());
+  std::vector<double> factors(models->observers.size());
+  for ([[maybe_unused]] auto _ : state) {
+    for (const Sample& sample : samples) {
+      bank.Step(sample);
+      bank.Score(factors);
+      benchmark::DoNotOptimize(factors.data());
+    }
+  }
+  CountSamples(state, state.iterations() * kSamples);
+}
+BENCHMARK(PredictSideBySide<Paper>)->ArgsProduct({{11, 33}, {0, 1}});
+BENCHMARK(PredictSideBySide<Extended>)->ArgsProduct({{45, 98}, {0, 1}});
+
+// Valves of one model set in turn, each somewhere else in its cycle. Arguments
+// 1 and 2: their number and the InstructionSet.
 template <Models (*MakeModels)(int)>
 void StepManyValves(benchmark::State& state) {
-  const EngineParts parts(MakeModels(static_cast<int>(state.range(0))));
+  EngineParts parts(MakeModels(static_cast<int>(state.range(0))));
+  parts.instructions = static_cast<InstructionSet>(state.range(2));
   const auto valves = static_cast<std::size_t>(state.range(1));
   std::vector<ValveEngine> engines;
   std::vector<std::vector<Sample>> samples;
@@ -102,8 +143,8 @@ void StepManyValves(benchmark::State& state) {
   CountSamples(state,
                state.iterations() * kRound * static_cast<std::int64_t>(valves));
 }
-BENCHMARK(StepManyValves<Paper>)->ArgsProduct({{11, 33}, {8, 1000}});
-BENCHMARK(StepManyValves<Extended>)->ArgsProduct({{45, 98}, {8, 1000}});
+BENCHMARK(StepManyValves<Paper>)->ArgsProduct({{11, 33}, {8, 1000}, {0, 1}});
+BENCHMARK(StepManyValves<Extended>)->ArgsProduct({{45, 98}, {8, 1000}, {0, 1}});
 
 // 1000 engines of one model set; what each needs beside it.
 template <Models (*MakeModels)(int)>

@@ -47,6 +47,7 @@ struct EngineParts {
 
   std::shared_ptr<const EnginePlan> plan;
   std::shared_ptr<ObserverOutputs> outputs;
+  InstructionSet instructions{BestInstructionSet()};  ///< Same bits with any.
 };
 
 /// The parts in use, one per model set, for a thread that runs many engines.

@@ -10,106 +10,108 @@ namespace {
 
 using lanes::All;
 using lanes::Any;
-using lanes::Lanes;
 using lanes::Load;
-using lanes::Predict;
+using lanes::Min;
+using lanes::Select;
 using lanes::Store;
 
 // Trapezoid::operator() of each lane.
-[[gnu::always_inline]] inline Lanes Membership(const ObserverBlock& block,
-                                               const Lanes& value) {
-  const auto low = value < Load(block.b);
-  const auto high = value > Load(block.c);
-  const Lanes inner = low ? value - Load(block.a) : Load(block.d) - value;
-  const Lanes width = low ? Load(block.rise) : Load(block.fall);
-  const auto outside = low ? value <= Load(block.a) : value >= Load(block.d);
-  const Lanes flank = outside ? All(0.0) : inner / width;
-  return (low | high) ? flank : All(1.0);
+template <typename Lanes>
+FDI_INLINE Lanes Membership(const ObserverBlock& block, const Lanes& value) {
+  const Lanes a = Load<Lanes>(block.a);
+  const Lanes d = Load<Lanes>(block.d);
+  const auto low = value < Load<Lanes>(block.b);
+  const auto high = value > Load<Lanes>(block.c);
+  const Lanes inner = Select(low, value - a, d - value);
+  const Lanes width =
+      Select(low, Load<Lanes>(block.rise), Load<Lanes>(block.fall));
+  const auto within = (low & (value > a)) | (high & (value < d));
+  return Select(low | high, Select(within, inner / width, All<Lanes>(0.0)),
+                All<Lanes>(1.0));
 }
 
-[[gnu::always_inline]] inline void Score(const ObserverPlan& plan,
-                                         const ObserverState& state,
-                                         std::size_t first, std::size_t last,
-                                         double* memberships) {
+template <typename Lanes>
+FDI_INLINE void Score(const ObserverPlan& plan, const ObserverState& state,
+                      std::size_t first, std::size_t last,
+                      double* memberships) {
+  const ObserverOutputs& outputs = *state.outputs;
   for (std::size_t b = first; b < last; ++b) {
     const ObserverBlock& block = plan.blocks()[b];
-    const Lanes residual = Load(state.outputs->residuals[b]);
-    const Lanes extrapolation = Load(state.outputs->extrapolations[b]);
+    const Lanes residual = Load<Lanes>(outputs.residuals[b]);
+    const Lanes extrapolation = Load<Lanes>(outputs.extrapolations[b]);
     Lanes certain = residual;
-    if (Any(extrapolation != All(0.0))) {
+    if (Any(extrapolation != All<Lanes>(0.0))) {
       const Lanes uncertain =
-          kExtrapolationError * extrapolation / Load(block.sd);
-      certain = residual / lanes::Sqrt(1.0 + uncertain * uncertain);
+          kExtrapolationError * extrapolation / Load<Lanes>(block.sd);
+      certain = residual / lanes::ByLane(1.0 + uncertain * uncertain,
+                                         [](double x) { return std::sqrt(x); });
     }
-    const Lanes membership = Membership(block, certain);
-    Store(residual != residual ? All(kAbstains) : membership,
+    Store(Select(residual != residual, All<Lanes>(kAbstains),
+                 Membership(block, certain)),
           memberships + (b - first) * kLanes);
   }
 }
 
-// ln S of four residuals.
-[[gnu::always_inline]] inline Lanes LogVariance(const Lanes& variance) {
-  return Lanes{std::log(variance[0]), std::log(variance[1]),
-               std::log(variance[2]), std::log(variance[3])};
-}
-
-[[gnu::always_inline]] inline void Gather(const ObserverPlan& plan,
-                                          const ObserverState& state,
-                                          std::size_t channel,
-                                          const GainTerms& terms, Quad* parts) {
+template <typename Lanes>
+FDI_INLINE void Gather(const ObserverPlan& plan, const ObserverState& state,
+                       std::size_t channel, const GainTerms& terms,
+                       Quad* parts) {
+  const ObserverOutputs& outputs = *state.outputs;
   const std::size_t last = plan.first_block(channel + 1);
   for (std::size_t b = plan.first_block(channel); b < last; ++b) {
     const ObserverBlock& block = plan.blocks()[b];
-    const Lanes residual = Load(state.outputs->residuals[b]);
-    const Lanes extrapolation = Load(state.outputs->extrapolations[b]);
-    Lanes variance = Load(block.variance);
-    Lanes density = Load(block.log_variance);
-    if (Any(extrapolation != All(0.0))) {
+    const Lanes residual = Load<Lanes>(outputs.residuals[b]);
+    const Lanes extrapolation = Load<Lanes>(outputs.extrapolations[b]);
+    Lanes variance = Load<Lanes>(block.variance);
+    Lanes density = Load<Lanes>(block.log_variance);
+    if (Any(extrapolation != All<Lanes>(0.0))) {
       const Lanes uncertain = kExtrapolationError * extrapolation;
       variance += uncertain * uncertain;
-      density = LogVariance(variance);
+      density = lanes::ByLane(variance, [](double x) { return std::log(x); });
     }
-    density = terms.counts_spread ? density : All(0.0);
+    density = terms.counts_spread ? density : All<Lanes>(0.0);
     const Lanes distance =
-        lanes::Min(residual * residual / variance, All(kMostSurprise));
-    const Lanes faded = Load(parts[b]) * terms.memory;
+        Min(residual * residual / variance, All<Lanes>(kMostSurprise));
+    const Lanes faded = Load<Lanes>(parts[b]) * terms.memory;
     const Lanes gain = -0.5 * (distance + density) / terms.time;
-    Store(residual != residual ? faded : faded + gain, parts[b]);
+    Store(Select(residual != residual, faded, faded + gain), parts[b]);
   }
 }
 
+using Portable = lanes::Pair;
+
 void PredictPortable(const ObserverPlan& plan, ObserverState& state) {
-  Predict(plan, state);
+  lanes::Prediction<Portable>::Run(plan, state);
 }
 
 void ScorePortable(const ObserverPlan& plan, const ObserverState& state,
                    std::size_t first, std::size_t last, double* memberships) {
-  Score(plan, state, first, last, memberships);
+  Score<Portable>(plan, state, first, last, memberships);
 }
 
 void GatherPortable(const ObserverPlan& plan, const ObserverState& state,
                     std::size_t channel, const GainTerms& terms, Quad* parts) {
-  Gather(plan, state, channel, terms, parts);
+  Gather<Portable>(plan, state, channel, terms, parts);
 }
 
 #if defined(__x86_64__)
 [[gnu::target("avx2")]] void PredictAvx2(const ObserverPlan& plan,
                                          ObserverState& state) {
-  Predict(plan, state);
+  lanes::Prediction<lanes::Wide>::Run(plan, state);
 }
 
 [[gnu::target("avx2")]] void ScoreAvx2(const ObserverPlan& plan,
                                        const ObserverState& state,
                                        std::size_t first, std::size_t last,
                                        double* memberships) {
-  Score(plan, state, first, last, memberships);
+  Score<lanes::Wide>(plan, state, first, last, memberships);
 }
 
 [[gnu::target("avx2")]] void GatherAvx2(const ObserverPlan& plan,
                                         const ObserverState& state,
                                         std::size_t channel,
                                         const GainTerms& terms, Quad* parts) {
-  Gather(plan, state, channel, terms, parts);
+  Gather<lanes::Wide>(plan, state, channel, terms, parts);
 }
 #endif
 

@@ -10,290 +10,290 @@
 #include "diagnosis/observer_plan.h"
 #include "diagnosis/ts_model.h"
 
-/// ObserverKernels::predict, to be compiled for several instruction sets.
 namespace fdi::lanes {
 
 // A rule of less than 4e-18 of the strongest adds nothing to a double.
 inline constexpr double kFiringExponent = -40.0;
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-using Regressors = std::array<Lanes, kMaxRegressors>;
-using RuleLanes = std::array<Lanes, kMaxRules>;
+/// ObserverKernels::predict, to be compiled for several instruction sets.
+template <typename Lanes>
+struct Prediction {
+  using Regressors = std::array<Lanes, kMaxRegressors>;
+  using RuleLanes = std::array<Lanes, kMaxRules>;
 
-// log μ(x) of one set; an infinite width gives 0 on its side.
-[[gnu::always_inline]] inline Lanes LogMembership(const QuadSet& set,
-                                                  const Lanes& x) {
-  const auto left = x < Load(set.left_center);
-  const auto right = x > Load(set.right_center);
-  const Lanes distance =
-      left ? Load(set.left_center) - x : x - Load(set.right_center);
-  const Lanes width = left ? Load(set.left_width) : Load(set.right_width);
-  const Lanes z = (left | right) ? distance / width : All(0.0);
-  return -0.5 * z * z;
-}
+  // log μ(x) of one set; an infinite width gives 0 on its side.
+  FDI_INLINE static Lanes LogMembership(const QuadSet& set, const Lanes& x) {
+    const auto left = x < Load<Lanes>(set.left_center);
+    const auto right = x > Load<Lanes>(set.right_center);
+    const Lanes distance = Select(left, Load<Lanes>(set.left_center) - x,
+                                  x - Load<Lanes>(set.right_center));
+    const Lanes width =
+        Select(left, Load<Lanes>(set.left_width), Load<Lanes>(set.right_width));
+    const Lanes z = Select(left | right, distance / width, All<Lanes>(0.0));
+    return -0.5 * z * z;
+  }
 
-// −½ ‖L (x − v)‖².
-[[gnu::always_inline]] inline Lanes LogNearness(const Quad* entries,
-                                                std::size_t rows,
-                                                const Regressors& x) {
-  const Quad* entry = entries + rows;
-  Lanes squares = All(0.0);
-  for (std::size_t row = 0; row < rows; ++row) {
-    Lanes z = All(0.0);
-    for (std::size_t j = 0; j <= row; ++j) {
-      z += Load(*entry++) * (x[j] - Load(entries[j]));
+  // −½ ‖L (x − v)‖².
+  FDI_INLINE static Lanes LogNearness(const Quad* entries, std::size_t rows,
+                                      const Regressors& x) {
+    const Quad* entry = entries + rows;
+    Lanes squares = All<Lanes>(0.0);
+    for (std::size_t row = 0; row < rows; ++row) {
+      Lanes z = All<Lanes>(0.0);
+      for (std::size_t j = 0; j <= row; ++j) {
+        z += Load<Lanes>(*entry++) * (x[j] - Load<Lanes>(entries[j]));
+      }
+      squares += z * z;
     }
-    squares += z * z;
+    return -0.5 * squares;
   }
-  return -0.5 * squares;
-}
 
-[[gnu::always_inline]] inline Lanes Exponent(const ObserverGroup& group,
-                                             const QuadPremise& premise,
-                                             const Regressors& x) {
-  Lanes exponent = Load(premise.start);
-  if (premise.nearness_rows > 0) {
-    exponent += LogNearness(&group.nearness[premise.first_nearness],
-                            premise.nearness_rows, x);
+  FDI_INLINE static Lanes Exponent(const ObserverGroup& group,
+                                   const QuadPremise& premise,
+                                   const Regressors& x) {
+    Lanes exponent = Load<Lanes>(premise.start);
+    if (premise.nearness_rows > 0) {
+      exponent += LogNearness(&group.nearness[premise.first_nearness],
+                              premise.nearness_rows, x);
+    }
+    for (std::size_t s = premise.first_set;
+         s < premise.first_set + premise.set_count; ++s) {
+      exponent += LogMembership(group.sets[s], x[group.set_regressors[s]]);
+    }
+    return Max(Load<Lanes>(premise.least), exponent);
   }
-  for (std::size_t s = premise.first_set;
-       s < premise.first_set + premise.set_count; ++s) {
-    exponent += LogMembership(group.sets[s], x[group.set_regressors[s]]);
+
+  // exp(t) of the rules that fire, 0 of the others.
+  FDI_INLINE static Lanes Weight(const Lanes& exponent, const Lanes& largest) {
+    const Lanes t = exponent - largest;
+    const auto fires = t > All<Lanes>(kFiringExponent);
+    const Lanes bounded = Select(fires, t, All<Lanes>(kFiringExponent));
+    return Select(fires, Exp(bounded), All<Lanes>(0.0));
   }
-  return Max(Load(premise.least), exponent);
-}
 
-// exp(t) of the rules that fire, 0 of the others.
-[[gnu::always_inline]] inline Lanes Weight(const Lanes& exponent,
-                                           const Lanes& largest) {
-  const Lanes t = exponent - largest;
-  const auto fires = t > All(kFiringExponent);
-  return fires ? Exp(fires ? t : All(kFiringExponent)) : All(0.0);
-}
-
-// y_i = a_iᵀx + b_i; `consequent` holds b_i and a_i.
-[[gnu::always_inline]] inline Lanes Output(const Quad* consequent,
-                                           std::size_t regressors,
-                                           const Regressors& x) {
-  Lanes output = Load(consequent[0]);
-  for (std::size_t j = 0; j < regressors; ++j) {
-    output += Load(consequent[j + 1]) * x[j];
+  // y_i = a_iᵀx + b_i; `consequent` holds b_i and a_i.
+  FDI_INLINE static Lanes Output(const Quad* consequent, std::size_t regressors,
+                                 const Regressors& x) {
+    Lanes output = Load<Lanes>(consequent[0]);
+    for (std::size_t j = 0; j < regressors; ++j) {
+      output += Load<Lanes>(consequent[j + 1]) * x[j];
+    }
+    return output;
   }
-  return output;
-}
 
-// ŷ of four observers, each with rules of its own.
-[[gnu::always_inline]] inline Lanes Evaluate(const ObserverGroup& group,
-                                             std::size_t block,
-                                             const ObserverBlock& limits,
-                                             const Regressors& x) {
-  const std::size_t rules = group.rules[block];
-  const std::size_t n = group.regressors.size();
-  const QuadPremise* premises = &group.premises[group.first_premise[block]];
-  const Quad* consequent = &group.consequents[group.first_consequent[block]];
-  RuleLanes weights;
-  Lanes sum = All(1.0);
-  weights[0] = All(1.0);
-  if (rules > 1) {
-    Lanes largest = All(-std::numeric_limits<double>::infinity());
+  // ŷ of four observers, each with rules of its own.
+  FDI_INLINE static Lanes Evaluate(const ObserverGroup& group,
+                                   std::size_t block,
+                                   const ObserverBlock& limits,
+                                   const Regressors& x) {
+    const std::size_t rules = group.rules[block];
+    const std::size_t n = group.regressors.size();
+    const QuadPremise* premises = &group.premises[group.first_premise[block]];
+    const Quad* consequent = &group.consequents[group.first_consequent[block]];
+    RuleLanes weights;
+    Lanes sum = All<Lanes>(1.0);
+    weights[0] = All<Lanes>(1.0);
+    if (rules > 1) {
+      Lanes largest = All<Lanes>(-std::numeric_limits<double>::infinity());
+      for (std::size_t r = 0; r < rules; ++r) {
+        weights[r] = Exponent(group, premises[r], x);
+        largest = Max(largest, weights[r]);
+      }
+      sum = All<Lanes>(0.0);
+      for (std::size_t r = 0; r < rules; ++r) {
+        weights[r] = Weight(weights[r], largest);
+        sum += weights[r];
+      }
+    }
+    Lanes value = All<Lanes>(0.0);
     for (std::size_t r = 0; r < rules; ++r) {
-      weights[r] = Exponent(group, premises[r], x);
-      largest = Max(largest, weights[r]);
+      value += weights[r] / sum * Output(consequent + r * (n + 1), n, x);
     }
-    sum = All(0.0);
-    for (std::size_t r = 0; r < rules; ++r) {
-      weights[r] = Weight(weights[r], largest);
-      sum += weights[r];
-    }
+    return Clamp(value, Load<Lanes>(limits.output_min),
+                 Load<Lanes>(limits.output_max));
   }
-  Lanes value = All(0.0);
-  for (std::size_t r = 0; r < rules; ++r) {
-    value += weights[r] / sum * Output(consequent + r * (n + 1), n, x);
-  }
-  return Clamp(value, Load(limits.output_min), Load(limits.output_max));
-}
 
-// The rules of a shared premise that fire.
-struct Firing {
-  std::size_t count{0};
-  std::array<std::size_t, kMaxRules> rules;
-  std::array<double, kMaxRules> weights;
-};
+  // The rules of a shared premise that fire.
+  struct Firing {
+    std::size_t count{0};
+    std::array<std::size_t, kMaxRules> rules;
+    std::array<double, kMaxRules> weights;
+  };
 
-[[gnu::always_inline]] inline void Weigh(const ObserverGroup& group,
-                                         const Regressors& x, Firing& firing) {
-  std::array<Lanes, kMaxRules / kLanes> exponents;
-  const std::size_t quads = group.premises.size();
-  Lanes most = All(-std::numeric_limits<double>::infinity());
-  for (std::size_t q = 0; q < quads; ++q) {
-    exponents[q] = Exponent(group, group.premises[q], x);
-    most = Max(most, exponents[q]);
-  }
-  const double largest =
-      std::max(std::max(most[0], most[1]), std::max(most[2], most[3]));
-  firing.count = 0;
-  double sum = 0.0;
-  for (std::size_t q = 0; q < quads; ++q) {
-    const auto fires = exponents[q] - largest > All(kFiringExponent);
-    if (!Any(fires)) {
-      continue;
+  FDI_INLINE static void Weigh(const ObserverGroup& group, const Regressors& x,
+                               Firing& firing) {
+    std::array<Lanes, kMaxRules / kLanes> exponents;
+    const std::size_t quads = group.premises.size();
+    Lanes most = All<Lanes>(-std::numeric_limits<double>::infinity());
+    for (std::size_t q = 0; q < quads; ++q) {
+      exponents[q] = Exponent(group, group.premises[q], x);
+      most = Max(most, exponents[q]);
     }
-    const Lanes weights = Weight(exponents[q], All(largest));
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      if (fires[i] != 0) {
-        firing.rules[firing.count] = q * kLanes + i;
-        firing.weights[firing.count++] = weights[i];
-        sum += weights[i];
+    const double largest =
+        std::max(std::max(most[0], most[1]), std::max(most[2], most[3]));
+    firing.count = 0;
+    double sum = 0.0;
+    for (std::size_t q = 0; q < quads; ++q) {
+      const auto fires = exponents[q] - largest > All<Lanes>(kFiringExponent);
+      if (!Any(fires)) {
+        continue;
+      }
+      const Lanes weights = Weight(exponents[q], All<Lanes>(largest));
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        if (fires[i] != 0) {
+          firing.rules[firing.count] = q * kLanes + i;
+          firing.weights[firing.count++] = weights[i];
+          sum += weights[i];
+        }
+      }
+    }
+    for (std::size_t i = 0; i < firing.count; ++i) {
+      firing.weights[i] /= sum;
+    }
+  }
+
+  // ŷ of four observers from the weights of the premise that they share.
+  FDI_INLINE static Lanes Blend(const ObserverGroup& group, std::size_t block,
+                                const ObserverBlock& limits,
+                                const Firing& firing, const Regressors& x) {
+    const std::size_t n = group.regressors.size();
+    const Quad* consequents = &group.consequents[group.first_consequent[block]];
+    Lanes value = All<Lanes>(0.0);
+    for (std::size_t i = 0; i < firing.count; ++i) {
+      value += firing.weights[i] *
+               Output(consequents + firing.rules[i] * (n + 1), n, x);
+    }
+    return Clamp(value, Load<Lanes>(limits.output_min),
+                 Load<Lanes>(limits.output_max));
+  }
+
+  // What the predictions of a group have in common.
+  struct Common {
+    double reading;
+    double base;                // Normal prediction under a difference, or 0.
+    double base_extrapolation;  // Of that.
+  };
+
+  static Common CommonOf(const ObserverPlan& plan, const ObserverState& state,
+                         const ObserverGroup& group) {
+    const std::size_t normal = plan.slot(0, group.channel);
+    const auto of_normal = [&](const std::vector<Quad>& quads) {
+      return group.difference ? quads[normal / kLanes].lane[normal % kLanes]
+                              : 0.0;
+    };
+    return {state.outputs->readings[group.channel],
+            of_normal(state.outputs->predictions),
+            of_normal(state.outputs->extrapolations)};
+  }
+
+  // Keeps what four observers say: their own part of the prediction, and that
+  // with all regressors within the trained range.
+  FDI_INLINE static void Keep(const ObserverBlock& limits, const Common& common,
+                              const Lanes& own, const Lanes& inside,
+                              std::size_t block, ObserverState& state) {
+    const Lanes prediction = common.base + own;
+    const Lanes saturation = Load<Lanes>(limits.saturation);
+    const Lanes reading = All<Lanes>(common.reading);
+    const auto hidden = (reading >= saturation) & (prediction >= saturation);
+    const Lanes residual = reading - Min(prediction, saturation);
+    ObserverOutputs& outputs = *state.outputs;
+    Store(prediction, outputs.predictions[block]);
+    Store(common.base_extrapolation + Magnitude(own - inside),
+          outputs.extrapolations[block]);
+    Store(Select(hidden, All<Lanes>(kNan), residual), outputs.residuals[block]);
+  }
+
+  FDI_INLINE static Lanes Regressor(const ObserverPlan& plan,
+                                    const ObserverState& state,
+                                    const ObserverGroup& group,
+                                    std::size_t block,
+                                    const RegressorSource& source) {
+    const std::size_t row = state.Row(source.lag);
+    if (source.own) {
+      return Load<Lanes>(
+          state.own_past[row * plan.own_blocks() + group.own_block + block]);
+    }
+    return All<Lanes>(state.measured[row][source.signal]);
+  }
+
+  // Values of `x` kept within the trained range; true if some were not.
+  FDI_INLINE static bool Beyond(const Quad* minimum, const Quad* maximum,
+                                std::size_t count, const Regressors& x,
+                                Regressors& inside) {
+    bool beyond = false;
+    for (std::size_t j = 0; j < count; ++j) {
+      inside[j] = Clamp(x[j], Load<Lanes>(minimum[j]), Load<Lanes>(maximum[j]));
+      beyond = beyond || Any(inside[j] != x[j]);
+    }
+    return beyond;
+  }
+
+  FDI_INLINE static void PredictShared(const ObserverPlan& plan,
+                                       const ObserverGroup& group,
+                                       ObserverState& state) {
+    const Common common = CommonOf(plan, state, group);
+    const std::size_t n = group.regressors.size();
+    Regressors x;
+    Regressors inside;
+    for (std::size_t j = 0; j < n; ++j) {
+      x[j] = Regressor(plan, state, group, 0, group.regressors[j]);
+    }
+    Firing firing;
+    Firing firing_inside;
+    Weigh(group, x, firing);
+    const bool beyond =
+        Beyond(group.minimum.data(), group.maximum.data(), n, x, inside);
+    if (beyond) {
+      Weigh(group, inside, firing_inside);
+    }
+    for (std::size_t b = 0; b < group.blocks; ++b) {
+      const std::size_t block = group.first_block + b;
+      const ObserverBlock& limits = plan.blocks()[block];
+      const Lanes own = Blend(group, b, limits, firing, x);
+      Keep(limits, common, own,
+           beyond ? Blend(group, b, limits, firing_inside, inside) : own, block,
+           state);
+    }
+  }
+
+  FDI_INLINE static void PredictApart(const ObserverPlan& plan,
+                                      const ObserverGroup& group,
+                                      ObserverState& state) {
+    const Common common = CommonOf(plan, state, group);
+    const std::size_t n = group.regressors.size();
+    const std::size_t now = state.Row(0) * plan.own_blocks() + group.own_block;
+    Regressors x;
+    Regressors inside;
+    for (std::size_t b = 0; b < group.blocks; ++b) {
+      for (std::size_t j = 0; j < n; ++j) {
+        x[j] = Regressor(plan, state, group, b, group.regressors[j]);
+      }
+      const std::size_t block = group.first_block + b;
+      const ObserverBlock& limits = plan.blocks()[block];
+      const Lanes own = Evaluate(group, b, limits, x);
+      const bool beyond =
+          Beyond(&group.minimum[b * n], &group.maximum[b * n], n, x, inside);
+      Keep(limits, common, own,
+           beyond ? Evaluate(group, b, limits, inside) : own, block, state);
+      if (group.runs_on_itself) {
+        state.own_past[now + b] = state.outputs->predictions[block];
       }
     }
   }
-  for (std::size_t i = 0; i < firing.count; ++i) {
-    firing.weights[i] /= sum;
-  }
-}
 
-// ŷ of four observers from the weights of the premise that they share.
-[[gnu::always_inline]] inline Lanes Blend(const ObserverGroup& group,
-                                          std::size_t block,
-                                          const ObserverBlock& limits,
-                                          const Firing& firing,
-                                          const Regressors& x) {
-  const std::size_t n = group.regressors.size();
-  const Quad* consequents = &group.consequents[group.first_consequent[block]];
-  Lanes value = All(0.0);
-  for (std::size_t i = 0; i < firing.count; ++i) {
-    value += firing.weights[i] *
-             Output(consequents + firing.rules[i] * (n + 1), n, x);
+  FDI_INLINE static void Run(const ObserverPlan& plan, ObserverState& state) {
+    for (const ObserverGroup& group : plan.groups()) {
+      if (state.active[group.channel] == 0) {
+        continue;
+      }
+      if (group.shared) {
+        PredictShared(plan, group, state);
+      } else {
+        PredictApart(plan, group, state);
+      }
+    }
   }
-  return Clamp(value, Load(limits.output_min), Load(limits.output_max));
-}
-
-// What the predictions of a group have in common.
-struct Common {
-  double reading;
-  double base;                // Normal prediction under a difference, or 0.
-  double base_extrapolation;  // Of that.
 };
-
-inline Common CommonOf(const ObserverPlan& plan, const ObserverState& state,
-                       const ObserverGroup& group) {
-  const std::size_t normal = plan.slot(0, group.channel);
-  const auto of_normal = [&](const std::vector<Quad>& quads) {
-    return group.difference ? quads[normal / kLanes].lane[normal % kLanes]
-                            : 0.0;
-  };
-  return {state.outputs->readings[group.channel],
-          of_normal(state.outputs->predictions),
-          of_normal(state.outputs->extrapolations)};
-}
-
-// Keeps what four observers say: their own part of the prediction, and that
-// with all regressors within the trained range.
-[[gnu::always_inline]] inline void Keep(const ObserverBlock& limits,
-                                        const Common& common, const Lanes& own,
-                                        const Lanes& inside, std::size_t block,
-                                        ObserverState& state) {
-  const Lanes prediction = common.base + own;
-  const Lanes saturation = Load(limits.saturation);
-  const Lanes reading = All(common.reading);
-  const auto hidden = (reading >= saturation) & (prediction >= saturation);
-  const Lanes residual = reading - Min(prediction, saturation);
-  Store(prediction, state.outputs->predictions[block]);
-  Store(common.base_extrapolation + Abs(own - inside),
-        state.outputs->extrapolations[block]);
-  Store(hidden ? All(kNan) : residual, state.outputs->residuals[block]);
-}
-
-[[gnu::always_inline]] inline Lanes Regressor(const ObserverPlan& plan,
-                                              const ObserverState& state,
-                                              const ObserverGroup& group,
-                                              std::size_t block,
-                                              const RegressorSource& source) {
-  const std::size_t row = state.Row(source.lag);
-  return source.own ? Load(state.own_past[row * plan.own_blocks() +
-                                          group.own_block + block])
-                    : All(state.measured[row][source.signal]);
-}
-
-// Values of `x` kept within the trained range; true if some were not.
-[[gnu::always_inline]] inline bool Beyond(const Quad* minimum,
-                                          const Quad* maximum,
-                                          std::size_t count,
-                                          const Regressors& x,
-                                          Regressors& inside) {
-  auto beyond = x[0] != x[0];
-  for (std::size_t j = 0; j < count; ++j) {
-    inside[j] = Clamp(x[j], Load(minimum[j]), Load(maximum[j]));
-    beyond |= inside[j] != x[j];
-  }
-  return Any(beyond);
-}
-
-[[gnu::always_inline]] inline void PredictShared(const ObserverPlan& plan,
-                                                 const ObserverGroup& group,
-                                                 ObserverState& state) {
-  const Common common = CommonOf(plan, state, group);
-  const std::size_t n = group.regressors.size();
-  Regressors x;
-  Regressors inside;
-  for (std::size_t j = 0; j < n; ++j) {
-    x[j] = Regressor(plan, state, group, 0, group.regressors[j]);
-  }
-  Firing firing;
-  Firing firing_inside;
-  Weigh(group, x, firing);
-  const bool beyond =
-      Beyond(group.minimum.data(), group.maximum.data(), n, x, inside);
-  if (beyond) {
-    Weigh(group, inside, firing_inside);
-  }
-  for (std::size_t b = 0; b < group.blocks; ++b) {
-    const std::size_t block = group.first_block + b;
-    const ObserverBlock& limits = plan.blocks()[block];
-    const Lanes own = Blend(group, b, limits, firing, x);
-    Keep(limits, common, own,
-         beyond ? Blend(group, b, limits, firing_inside, inside) : own, block,
-         state);
-  }
-}
-
-[[gnu::always_inline]] inline void PredictApart(const ObserverPlan& plan,
-                                                const ObserverGroup& group,
-                                                ObserverState& state) {
-  const Common common = CommonOf(plan, state, group);
-  const std::size_t n = group.regressors.size();
-  const std::size_t now = state.Row(0) * plan.own_blocks() + group.own_block;
-  Regressors x;
-  Regressors inside;
-  for (std::size_t b = 0; b < group.blocks; ++b) {
-    for (std::size_t j = 0; j < n; ++j) {
-      x[j] = Regressor(plan, state, group, b, group.regressors[j]);
-    }
-    const std::size_t block = group.first_block + b;
-    const ObserverBlock& limits = plan.blocks()[block];
-    const Lanes own = Evaluate(group, b, limits, x);
-    const bool beyond =
-        Beyond(&group.minimum[b * n], &group.maximum[b * n], n, x, inside);
-    Keep(limits, common, own, beyond ? Evaluate(group, b, limits, inside) : own,
-         block, state);
-    if (group.runs_on_itself) {
-      state.own_past[now + b] = state.outputs->predictions[block];
-    }
-  }
-}
-
-[[gnu::always_inline]] inline void Predict(const ObserverPlan& plan,
-                                           ObserverState& state) {
-  for (const ObserverGroup& group : plan.groups()) {
-    if (state.active[group.channel] == 0) {
-      continue;
-    }
-    if (group.shared) {
-      PredictShared(plan, group, state);
-    } else {
-      PredictApart(plan, group, state);
-    }
-  }
-}
 
 }  // namespace fdi::lanes

@@ -22,7 +22,7 @@ constexpr std::uint32_t kSnapshotFormat = 1;
 struct Diagnosis {
   explicit Diagnosis(EngineParts parts)
       : plan(std::move(parts.plan)),
-        bank(plan->observers(), std::move(parts.outputs)),
+        bank(plan->observers(), std::move(parts.outputs), parts.instructions),
         coverage(plan->models()),
         detection(plan->models()),
         stuck(plan->models()),
