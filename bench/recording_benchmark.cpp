@@ -4,7 +4,7 @@
 //     fdi-bench-recording [VALVES [SAMPLES_PER_VALVE]]
 //
 // Six noisy signals at the resolution of their transmitters: 16 bits of span,
-// or one decimal. Commits of 20 000 samples, as the monitor's under load.
+// or one decimal. Commits of 100 000 samples, as the monitor's under load.
 // Exits with 1 below half the speed of the bare insert or above 20 byte.
 #include <chrono>
 #include <cmath>
@@ -23,7 +23,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kCommit = 20'000;
+constexpr std::size_t kCommit = 100'000;
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kStart = 1'795'186'571 * kSecond;
 

@@ -23,7 +23,7 @@ struct SampleRecorderOptions {
   std::size_t queue_samples{16'384};
   /// So that less than 1 s is lost with the process, whatever a commit takes.
   std::chrono::milliseconds commit_period{750};
-  std::uint64_t commit_samples{20'000};      ///< Commit earlier with so many.
+  std::uint64_t commit_samples{100'000};     ///< Commit earlier with so many.
   std::uint64_t max_pending{200'000};        ///< Kept while commits fail.
   std::function<std::int64_t()> utc_now_ns;  ///< Needed.
 };

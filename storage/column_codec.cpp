@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <optional>
-
-#include "storage/value_predictor.h"
 
 namespace fdi::storage {
 namespace {
@@ -64,6 +61,13 @@ Residuals BestResiduals(std::span<const std::int64_t> x) {
     }
   }
   return best;
+}
+
+bool AllEqual(std::span<const double> values) {
+  return std::all_of(values.begin(), values.end(), [&](double value) {
+    return std::bit_cast<std::int64_t>(value) ==
+           std::bit_cast<std::int64_t>(values[0]);
+  });
 }
 
 ValuePredictor ReadPredictor(ByteReader& reader, std::uint8_t kind) {
@@ -142,9 +146,16 @@ std::vector<std::int64_t> ReadIntegers(ByteReader& reader, std::size_t count) {
   return values;
 }
 
-void WriteDoubles(ByteWriter& writer, std::span<const double> values) {
-  const std::optional<ValuePredictor> predictor = FindPredictor(values);
+void WriteDoubles(ByteWriter& writer, std::span<const double> values,
+                  std::optional<ValuePredictor>* hint) {
   std::vector<std::int64_t> numbers(values.size());
+  std::optional<ValuePredictor> predictor;
+  if (!AllEqual(values)) {
+    predictor = FindPredictor(values, hint != nullptr ? *hint : std::nullopt);
+    if (hint != nullptr) {
+      *hint = predictor;
+    }
+  }
   if (!predictor) {
     std::transform(values.begin(), values.end(), numbers.begin(), Ordered);
     writer.Put(kBits);
@@ -154,7 +165,7 @@ void WriteDoubles(ByteWriter& writer, std::span<const double> values) {
   std::vector<std::int64_t> corrections(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
     numbers[i] = predictor->Nearest(values[i]);
-    corrections[i] = predictor->Correction(values[i]);
+    corrections[i] = predictor->Correction(values[i], numbers[i]);
   }
   writer.Put(predictor->kind);
   if (predictor->kind == ValuePredictor::kGrid) {

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "storage/bytes.h"
+#include "storage/value_predictor.h"
 
 namespace fdi::storage {
 
@@ -21,7 +23,10 @@ std::vector<std::int64_t> ReadIntegers(ByteReader& reader, std::size_t count);
 ///
 /// where p(n) = n / 10^d for decimals, a + q·n for the grid of a converter, or
 /// none of them: the ordered bits themselves.
-void WriteDoubles(ByteWriter& writer, std::span<const double> values);
+/// A column of equal bits costs 10 bytes.
+/// @param hint p of the column before it, if any; is given that of this one.
+void WriteDoubles(ByteWriter& writer, std::span<const double> values,
+                  std::optional<ValuePredictor>* hint = nullptr);
 std::vector<double> ReadDoubles(ByteReader& reader, std::size_t count);
 
 }  // namespace fdi::storage

@@ -25,6 +25,7 @@ struct ActiveRun {
   std::string id;
   Committed committed;
   std::vector<StoredSample> pending;
+  ChunkHints hints;
   bool end_asked{false};
   bool dirty{false};
 };
@@ -155,7 +156,7 @@ class RunRecorder::Impl {
   }
 
   /// Writes what is pending of a run. @returns its state once committed.
-  ActiveRun::Committed Store(const ActiveRun& active) {
+  ActiveRun::Committed Store(ActiveRun& active) {
     ActiveRun::Committed after = active.committed;
     if (after.run_id == 0) {
       after.run_id = rows_.InsertRun(active.id, active.run, recorder_id_);
@@ -183,7 +184,7 @@ class RunRecorder::Impl {
   }
 
   /// Tail and pending samples become chunks; less than one stays a tail row.
-  void Compact(const ActiveRun& active, ActiveRun::Committed& after) {
+  void Compact(ActiveRun& active, ActiveRun::Committed& after) {
     std::vector<StoredSample> samples;
     if (after.tail > 0) {
       samples = rows_.TakeTail(after.run_id);
@@ -195,7 +196,7 @@ class RunRecorder::Impl {
     while (rest.size() >= after.threshold ||
            (active.end_asked && !rest.empty())) {
       const auto part = rest.first(std::min(rest.size(), chunk_samples_));
-      rows_.InsertChunk(after.run_id, first, part);
+      rows_.InsertChunk(after.run_id, first, part, &active.hints);
       first += static_cast<std::int64_t>(part.size());
       rest = rest.subspan(part.size());
       after.threshold = chunk_samples_;

@@ -37,13 +37,14 @@ constexpr std::string_view kInsertChunk =
     " VALUES (?, ?, ?, ?, ?, ?, ?, ?)";
 
 void InsertPacked(Statement& statement, std::int64_t run_id, std::int64_t first,
-                  std::span<const StoredSample> samples, ChunkCodec codec) {
+                  std::span<const StoredSample> samples, ChunkCodec codec,
+                  ChunkHints* hints = nullptr) {
   const auto [earliest, latest] =
       std::minmax_element(samples.begin(), samples.end(),
                           [](const StoredSample& a, const StoredSample& b) {
                             return a.sample.stamp_ns < b.sample.stamp_ns;
                           });
-  const Chunk chunk = EncodeChunk(samples, codec);
+  const Chunk chunk = EncodeChunk(samples, codec, hints);
   statement
       .Bind(run_id, first, earliest->sample.stamp_ns, latest->sample.stamp_ns,
             chunk.count, chunk.codec, chunk.crc, chunk.bytes)
@@ -122,8 +123,10 @@ void RunRows::InsertTail(std::int64_t run_id, std::int64_t first,
 }
 
 void RunRows::InsertChunk(std::int64_t run_id, std::int64_t first,
-                          std::span<const StoredSample> samples) {
-  InsertPacked(insert_chunk_, run_id, first, samples, ChunkCodec::kColumns);
+                          std::span<const StoredSample> samples,
+                          ChunkHints* hints) {
+  InsertPacked(insert_chunk_, run_id, first, samples, ChunkCodec::kColumns,
+               hints);
 }
 
 std::vector<StoredSample> RunRows::TakeTail(std::int64_t run_id) {
@@ -143,9 +146,10 @@ std::vector<StoredSample> RunRows::TakeTail(std::int64_t run_id) {
 void RunRows::InsertChunks(std::int64_t run_id, std::int64_t first,
                            std::span<const StoredSample> samples,
                            std::size_t chunk_samples) {
+  ChunkHints hints;
   while (!samples.empty()) {
     const auto part = samples.first(std::min(chunk_samples, samples.size()));
-    InsertChunk(run_id, first, part);
+    InsertChunk(run_id, first, part, &hints);
     first += static_cast<std::int64_t>(part.size());
     samples = samples.subspan(part.size());
   }

@@ -44,7 +44,8 @@ class RunRows {
   void InsertTail(std::int64_t run_id, std::int64_t first,
                   std::span<const StoredSample> samples);
   void InsertChunk(std::int64_t run_id, std::int64_t first,
-                   std::span<const StoredSample> samples);
+                   std::span<const StoredSample> samples,
+                   ChunkHints* hints = nullptr);
   /// Removes the tail rows. @returns their samples in order.
   std::vector<StoredSample> TakeTail(std::int64_t run_id);
   /// Cuts samples into chunks of at most `chunk_samples`.

@@ -149,7 +149,8 @@ std::vector<std::byte> Inflate(ByteReader& reader, std::size_t packed_size,
   return raw;
 }
 
-std::vector<std::byte> EncodeColumns(std::span<const StoredSample> samples) {
+std::vector<std::byte> EncodeColumns(std::span<const StoredSample> samples,
+                                     ChunkHints* hints) {
   std::vector<Row> rows;
   rows.reserve(samples.size());
   for (const StoredSample& sample : samples) {
@@ -168,7 +169,8 @@ std::vector<std::byte> EncodeColumns(std::span<const StoredSample> samples) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       doubles[i] = rows[i].doubles[c];
     }
-    WriteDoubles(writer, doubles);
+    WriteDoubles(writer, doubles,
+                 hints != nullptr ? &hints->columns[c] : nullptr);
   }
   return Deflate(writer.view());
 }
@@ -250,14 +252,15 @@ std::vector<StoredSample> DecodePlain(const Chunk& chunk,
 
 }  // namespace
 
-Chunk EncodeChunk(std::span<const StoredSample> samples, ChunkCodec codec) {
+Chunk EncodeChunk(std::span<const StoredSample> samples, ChunkCodec codec,
+                  ChunkHints* hints) {
   Require(!samples.empty() && samples.size() <= kMaxChunkSamples,
           "a chunk holds 1 to 65536 samples");
   Chunk chunk;
   chunk.codec = codec;
   chunk.count = static_cast<std::uint32_t>(samples.size());
   chunk.bytes = codec == ChunkCodec::kPlain ? EncodePlain(samples)
-                                            : EncodeColumns(samples);
+                                            : EncodeColumns(samples, hints);
   chunk.crc = ChecksumOf(chunk);
   return chunk;
 }

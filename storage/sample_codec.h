@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -9,6 +10,7 @@
 
 #include "diagnosis/sample.h"
 #include "diagnosis/verdict.h"
+#include "storage/value_predictor.h"
 
 namespace fdi::storage {
 
@@ -38,6 +40,12 @@ struct Chunk {
 
 inline constexpr std::uint32_t kMaxChunkSamples = 65536;
 
+/// What the last chunk of a run tells about the next one: the predictors of its
+/// columns of doubles, so that they need not be searched again.
+struct ChunkHints {
+  std::array<std::optional<ValuePredictor>, kSignalCount + 1> columns;
+};
+
 /// Packs samples without loss, whatever their bits are (NaN payloads, −0).
 ///
 /// kColumns: every field of the samples is a column of 64-bit integers. A
@@ -47,7 +55,8 @@ inline constexpr std::uint32_t kMaxChunkSamples = 65536;
 /// apart. Of each integer column the first or second differences are cut into
 /// planes of bytes, and all of it is deflated.
 /// @throws std::invalid_argument if there are none or too many.
-Chunk EncodeChunk(std::span<const StoredSample> samples, ChunkCodec codec);
+Chunk EncodeChunk(std::span<const StoredSample> samples, ChunkCodec codec,
+                  ChunkHints* hints = nullptr);
 
 /// @param where the chunk stands, for the message.
 /// @throws DataError if CRC, sizes or values are not what EncodeChunk() writes.

@@ -40,6 +40,18 @@ std::uint64_t CorrectionBits(const ValuePredictor& predictor,
   return bits;
 }
 
+/// As good as a search: no fewer decimals would do; a grid is met to one bit.
+bool MeetsAgain(const ValuePredictor& hint, std::span<const double> values) {
+  if (hint.kind == ValuePredictor::kGrid) {
+    return Fits(hint, values, 64) &&
+           CorrectionBits(hint, values) <= values.size();
+  }
+  ValuePredictor coarser = hint;
+  --coarser.kind;
+  return Fits(hint, values, 0) &&
+         (hint.kind == ValuePredictor::kDecimal || !Fits(coarser, values, 0));
+}
+
 /// Greatest common divisor of two lengths known up to `tolerance`.
 double CommonStep(double a, double b, double tolerance) {
   while (b > tolerance) {
@@ -158,14 +170,24 @@ std::int64_t ValuePredictor::Nearest(double value) const {
   const double x = kind == kGrid
                        ? (value - origin) / step
                        : value * kPowers[std::size_t{kind} - kDecimal];
-  return std::abs(x) < kMaxExact ? std::llround(x) : 0;  // NaN: 0
+  return std::abs(x) < kMaxExact  // NaN: 0
+             ? static_cast<std::int64_t>(x < 0.0 ? x - 0.5 : x + 0.5)
+             : 0;
 }
 
-std::int64_t ValuePredictor::Correction(double value) const {
-  return WrapSubtract(Ordered(value), Ordered((*this)(Nearest(value))));
+std::int64_t ValuePredictor::Correction(double value, std::int64_t n) const {
+  const double predicted = (*this)(n);
+  return std::bit_cast<std::int64_t>(predicted) ==
+                 std::bit_cast<std::int64_t>(value)
+             ? 0
+             : WrapSubtract(Ordered(value), Ordered(predicted));
 }
 
-std::optional<ValuePredictor> FindPredictor(std::span<const double> values) {
+std::optional<ValuePredictor> FindPredictor(
+    std::span<const double> values, const std::optional<ValuePredictor>& hint) {
+  if (hint && MeetsAgain(*hint, values)) {
+    return hint;
+  }
   for (int d = 0; d <= ValuePredictor::kMaxDecimals; ++d) {
     const ValuePredictor decimal{
         static_cast<std::uint8_t>(ValuePredictor::kDecimal + d), 0.0, 1.0};

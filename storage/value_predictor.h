@@ -46,14 +46,21 @@ struct ValuePredictor {
   double step{1.0};    ///< q
 
   double operator()(std::int64_t n) const;
-  /// The nearest n; 0 where there is none that is exact.
+  /// The nearest n, at most one beside it; 0 where there is none that is exact.
   std::int64_t Nearest(double value) const;
-  /// How many units in the last place `value` is above p(Nearest(value)).
-  std::int64_t Correction(double value) const;
+  /// How many units in the last place `value` is above p(n).
+  std::int64_t Correction(double value, std::int64_t n) const;
+  std::int64_t Correction(double value) const {
+    return Correction(value, Nearest(value));
+  }
 };
 
 /// The predictor that meets nearly all values (15 of 16: a few bad readings
 /// spoil no column), if there is one.
-std::optional<ValuePredictor> FindPredictor(std::span<const double> values);
+/// @param hint of the column before it, if there is one: taken at once if it
+///   meets these values too, which spares the search.
+std::optional<ValuePredictor> FindPredictor(
+    std::span<const double> values,
+    const std::optional<ValuePredictor>& hint = std::nullopt);
 
 }  // namespace fdi::storage
