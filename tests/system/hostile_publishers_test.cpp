@@ -1,0 +1,207 @@
+// Publishers that do what none should, against the built fdi-monitor over DDS.
+
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <limits>
+
+#include <gmock/gmock.h>
+
+#include "storage/history.h"
+#include "tests/system/monitor_fixture.h"
+
+namespace fdi::monitor {
+namespace {
+
+class HostilePublishersTest : public MonitorFixture {
+ protected:
+  HostilePublishersTest() { StoreModels(data_, LinearModels()); }
+
+  /// A publisher in a participant of its own, for so many valves.
+  struct Stranger {
+    Stranger(int domain, int valves) : participant(Options(domain, valves)) {
+      EXPECT_TRUE(samples.WaitForReaders(1, kMonitorPatience));
+    }
+    static idl::DdsOptions Options(int domain, int valves) {
+      idl::DdsOptions options;
+      options.domain = domain;
+      options.max_valves = valves;
+      return options;
+    }
+
+    idl::Participant participant;
+    idl::Publisher<idl::ValveSampleMessage> samples{
+        participant, {idl::Profile::kLossless, 0}};
+  };
+
+  static std::size_t ResidentBytes(const ChildProcess& process) {
+    std::ifstream file("/proc/" + std::to_string(process.pid()) + "/statm");
+    std::size_t total = 0;
+    std::size_t resident = 0;
+    file >> total >> resident;
+    return resident * 4096;
+  }
+
+  /// Waits until so many samples went through engines, whatever their verdict.
+  bool AwaitDiagnosed(std::uint64_t count) {
+    return Await([this, count] { return counters_["diagnosed"] >= count; });
+  }
+
+  static Sample Shifted(std::uint64_t k, std::int64_t shift_s) {
+    Sample sample = PlantSample(k);
+    sample.stamp_ns += shift_s * 1'000'000'000;
+    return sample;
+  }
+};
+
+TEST_F(HostilePublishersTest, TenThousandValveIdsAreCountedAndCostLittle) {
+  constexpr int kIds = 10'000;
+  constexpr int kRounds = 3;
+  const auto monitor = StartMonitor({"--max-valves", "50"});
+  Publish(0, 40);
+  ASSERT_TRUE(AwaitVectors(40));
+  const std::size_t before = ResidentBytes(*monitor);
+
+  Stranger stranger(domain_, kIds);
+  for (int round = 0; round < kRounds; ++round) {
+    for (int id = 0; id < kIds; ++id) {
+      ASSERT_EQ(stranger.samples.Write(
+                    {"hostile" + std::to_string(id),
+                     PlantSample(static_cast<std::uint64_t>(round), 0.0, 2)},
+                    {}, kMonitorPatience),
+                idl::WriteResult::kSent);
+    }
+  }
+  Publish(40, 80);
+  const auto of_v1 = [this] {
+    return std::ranges::count(vectors_, "V1", &idl::DecisionMessage::valve_id);
+  };
+  ASSERT_TRUE(Await([&] { return of_v1() == 80; })) << of_v1();
+  ASSERT_TRUE(Await([this] {
+    return counters_["dds_refused_valves"] >= kIds - 49 - 1 &&
+           counters_["valves"] == 50;
+  })) << counters_["dds_refused_valves"]
+      << " " << counters_["valves"];
+
+  EXPECT_EQ(counters_["dds_rejected_instances"] + counters_["refused_samples"] +
+                counters_["received"],
+            80U + kIds * kRounds);
+  EXPECT_LT(ResidentBytes(*monitor), before + (32U << 20U));
+  monitor->Signal(SIGTERM);
+  EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
+}
+
+TEST_F(HostilePublishersTest, OfTwoPublishersOfOneValveTheNewerIsDiagnosed) {
+  const auto monitor = StartMonitor();
+  Publish(0, 40);
+  ASSERT_TRUE(AwaitVectors(40));
+  Stranger second(domain_, 100);
+  for (std::uint64_t k = 40; k < 100; ++k) {
+    // One at a time: only so is it known who is first.
+    ASSERT_EQ(second.samples.Write({"V1", PlantSample(k, kF7Offset, 2)}),
+              idl::WriteResult::kSent);
+    ASSERT_TRUE(AwaitVectors(k + 1));
+    Publish(PlantSample(k));
+  }
+  ASSERT_TRUE(AwaitDiagnosed(160));
+
+  EXPECT_EQ(counters_["superseded"], 60U);
+  ASSERT_EQ(vectors_.size(), 100U);
+  for (std::size_t k = 0; k < 100; ++k) {
+    EXPECT_EQ(vectors_[k].verdict.source_id, k < 40 ? 1U : 2U) << k;
+    EXPECT_EQ(vectors_[k].verdict.seq, k);
+  }
+  EXPECT_EQ(vectors_[40].verdict.quality, Quality::kSettling);
+  EXPECT_EQ(vectors_[99].verdict.state, State::kIsolated);
+}
+
+// A second, a minute and an hour are missing.
+TEST_F(HostilePublishersTest, GapsOfAnyLengthSettleAndLongOnesAreKept) {
+  const auto monitor = StartMonitor();
+  const std::vector<std::uint64_t> starts{0, 41, 141, 3'781};
+  for (const std::uint64_t start : starts) {
+    Publish(start, start + 40);
+  }
+  ASSERT_TRUE(AwaitVectors(160));
+  ASSERT_TRUE(AwaitDiagnosed(160));
+  monitor->Signal(SIGTERM);
+  ASSERT_EQ(monitor->AwaitExit(), 0);
+
+  EXPECT_EQ(counters_["gaps"], 2U);  // Of more than three periods.
+  EXPECT_EQ(counters_["initialisations"], 4U);
+  EXPECT_EQ(counters_["episodes"], 0U);
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const idl::DecisionMessage& first = vectors_[40 * i];
+    EXPECT_EQ(first.verdict.seq, starts[i]);
+    EXPECT_EQ(first.verdict.quality, Quality::kSettling);
+    EXPECT_EQ(vectors_[40 * i + 39].verdict.quality, Quality::kLive);
+  }
+  std::vector<std::int64_t> lengths_s;
+  for (const storage::DataGap& gap :
+       storage::HistoryReader(data_ / "history.db").Gaps()) {
+    if (gap.valve_id == "V1") {
+      lengths_s.push_back((gap.to_ns - gap.from_ns) / 1'000'000'000);
+    }
+  }
+  EXPECT_THAT(lengths_s, testing::UnorderedElementsAre(61, 3'601));
+}
+
+TEST_F(HostilePublishersTest, AClockThatStepsByAnHourIsAGapEachTime) {
+  const auto monitor = StartMonitor();
+  constexpr std::int64_t kHour = 3'600;
+  const std::vector<std::int64_t> shifts{0, -kHour, 0, kHour, 0};
+  std::uint64_t seq = 0;
+  for (const std::int64_t shift : shifts) {
+    for (int i = 0; i < 40; ++i) {
+      Publish(Shifted(seq++, shift));
+    }
+  }
+  ASSERT_TRUE(AwaitVectors(200)) << vectors_.size();
+  ASSERT_TRUE(AwaitDiagnosed(200));
+
+  EXPECT_EQ(counters_["initialisations"], 5U);
+  EXPECT_EQ(counters_["episodes"], 0U);
+  EXPECT_EQ(counters_["accepted"], 200U);
+  EXPECT_EQ(vectors_[199].verdict.quality, Quality::kLive);
+}
+
+// All at once, in disorder and twice; then the fault must still be found.
+TEST_F(HostilePublishersTest, DisorderAndNonsenseAreCountedByReason) {
+  const auto monitor = StartMonitor();
+  Publish(0, 40);
+  const auto with = [](std::uint64_t k, double value) {
+    Sample sample = PlantSample(k);
+    sample.Set(Signal::kX, value);
+    return sample;
+  };
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Publish(with(40, kInfinity));
+  Publish(with(41, -kInfinity));
+  Publish(with(42, std::nan("")));
+  Publish(with(43, std::numeric_limits<double>::max()));
+  Publish(with(44, std::numeric_limits<double>::denorm_min()));
+  for (const std::uint64_t k : {46, 45, 46, 45, 3, 47}) {
+    Publish(PlantSample(k));
+  }
+  Sample extreme = PlantSample(48);
+  extreme.stamp_ns = idl::kMaxStampNs;
+  Publish(extreme);
+  extreme.stamp_ns = idl::kMinStampNs;
+  extreme.seq = 49;
+  Publish(extreme);
+  Publish(50, 100);
+  Publish(100, 130, kF7Offset);
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kIsolated)) << monitor->errors();
+  ASSERT_TRUE(AwaitDiagnosed(133));
+
+  EXPECT_EQ(counters_["not_finite"], 3U);
+  EXPECT_EQ(counters_["range"], 1U);
+  EXPECT_EQ(counters_["late"], 3U);
+  EXPECT_EQ(counters_["repeat"], 1U);
+  EXPECT_EQ(counters_["received"],
+            counters_["accepted"] + 8U + counters_["period"]);
+  EXPECT_EQ(faults_.back().candidates.at(0).fault, 7);
+}
+
+}  // namespace
+}  // namespace fdi::monitor
