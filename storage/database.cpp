@@ -166,6 +166,10 @@ void Database::Configure(const Schema& schema) {
   }
   if (access_ == Access::kOccasionalWriter) {
     Execute("PRAGMA wal_autocheckpoint = 0");
+  } else {
+    // What a busy recorder touches in a few commits [KiB, pages of 4 KiB].
+    Execute("PRAGMA cache_size = -32768");
+    Execute("PRAGMA wal_autocheckpoint = 4000");
   }
 }
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include <unistd.h>
@@ -22,7 +23,6 @@ struct ActiveRun {
   };
 
   NewRun run;
-  std::string id;
   Committed committed;
   std::vector<StoredSample> pending;
   ChunkHints hints;
@@ -79,9 +79,9 @@ class RunRecorder::Impl {
 
   Key Begin(const NewRun& run) {
     const Key key = runs_.size();
-    ActiveRun& active = runs_.emplace_back();
+    ids_.push_back(NewRunId());
+    ActiveRun& active = *runs_.emplace_back(std::make_unique<ActiveRun>());
     active.run = run;
-    active.id = NewRunId();
     // Of many valves that start at once not all shall fill a chunk at once.
     active.committed.threshold =
         chunk_samples_ / 2 + key * 37 % (chunk_samples_ / 2 + 1);
@@ -90,16 +90,18 @@ class RunRecorder::Impl {
   }
 
   void Append(Key key, const StoredSample& sample) {
-    ActiveRun& active = runs_.at(key);
-    Require(!active.end_asked, "a run that has ended takes no more samples");
-    active.pending.push_back(sample);
+    Require(runs_.at(key) != nullptr && !runs_[key]->end_asked,
+            "a run that has ended takes no more samples");
+    runs_[key]->pending.push_back(sample);
     ++pending_;
     Touch(key);
   }
 
   void End(Key key) {
-    runs_.at(key).end_asked = true;
-    Touch(key);
+    if (runs_.at(key) != nullptr) {
+      runs_[key]->end_asked = true;
+      Touch(key);
+    }
   }
 
   void Commit() {
@@ -110,11 +112,11 @@ class RunRecorder::Impl {
     after.reserve(dirty_.size());
     Transaction transaction(database_);
     for (const Key key : dirty_) {
-      after.push_back(Store(runs_[key]));
+      after.push_back(Store(ids_[key], *runs_[key]));
     }
     transaction.Commit();
     for (std::size_t i = 0; i < dirty_.size(); ++i) {
-      Adopt(runs_[dirty_[i]], after[i]);
+      Adopt(dirty_[i], after[i]);
     }
     recorded_ += std::exchange(pending_, 0);
     dirty_.clear();
@@ -122,16 +124,14 @@ class RunRecorder::Impl {
 
   std::int64_t DropPending() {
     for (const Key key : dirty_) {
-      runs_[key].pending.clear();
+      runs_[key]->pending.clear();
     }
     return std::exchange(pending_, 0);
   }
 
   void Close() {
     for (Key key = 0; key < runs_.size(); ++key) {
-      if (!runs_[key].end_asked) {
-        End(key);
-      }
+      End(key);
     }
     Commit();
     if (recorder_id_ != 0) {
@@ -143,23 +143,23 @@ class RunRecorder::Impl {
     }
   }
 
-  const std::string& Id(Key key) const { return runs_.at(key).id; }
+  const std::string& Id(Key key) const { return ids_.at(key); }
   std::int64_t pending() const { return pending_; }
   std::int64_t recorded() const { return recorded_; }
   Database& database() { return database_; }
 
  private:
   void Touch(Key key) {
-    if (!std::exchange(runs_[key].dirty, true)) {
+    if (!std::exchange(runs_[key]->dirty, true)) {
       dirty_.push_back(key);
     }
   }
 
   /// Writes what is pending of a run. @returns its state once committed.
-  ActiveRun::Committed Store(ActiveRun& active) {
+  ActiveRun::Committed Store(const std::string& id, ActiveRun& active) {
     ActiveRun::Committed after = active.committed;
     if (after.run_id == 0) {
-      after.run_id = rows_.InsertRun(active.id, active.run, recorder_id_);
+      after.run_id = rows_.InsertRun(id, active.run, recorder_id_);
     }
     if (!active.pending.empty()) {
       RunCounters counters;
@@ -207,15 +207,14 @@ class RunRecorder::Impl {
     after.tail = rest.size();
   }
 
-  void Adopt(ActiveRun& active, const ActiveRun::Committed& after) {
-    active.committed = after;
-    active.dirty = false;
+  void Adopt(Key key, const ActiveRun::Committed& after) {
     if (after.ended) {
-      std::vector<StoredSample>().swap(active.pending);
-      active.run = {};
-    } else {
-      active.pending.clear();
+      runs_[key].reset();
+      return;
     }
+    runs_[key]->committed = after;
+    runs_[key]->dirty = false;
+    runs_[key]->pending.clear();
   }
 
   std::size_t chunk_samples_;
@@ -223,8 +222,9 @@ class RunRecorder::Impl {
   RunRows rows_;
   RecorderLiveness liveness_;
   std::int64_t recorder_id_{0};
-  std::vector<ActiveRun> runs_;  // by Key
-  std::vector<Key> dirty_;       // runs with something to commit
+  std::vector<std::string> ids_;                  // by Key
+  std::vector<std::unique_ptr<ActiveRun>> runs_;  // by Key; null once it ended
+  std::vector<Key> dirty_;  // runs with something to commit
   std::int64_t pending_{0};
   std::int64_t recorded_{0};
 };

@@ -7,6 +7,7 @@ namespace fdi::monitor {
 namespace {
 
 constexpr std::size_t kStreamsOfAValve = 2;
+constexpr std::int64_t kRunLengthNs = 86'400'000'000'000;
 
 storage::StoredSample ToStored(const ReceivedSample& received) {
   storage::StoredSample stored;
@@ -65,6 +66,13 @@ void RunStore::AppendTo(const std::string& valve_id, Stream& stream,
   if (!stream.run) {
     Begin(valve_id, stream, PeriodBetween(stream.first.sample, sample.sample));
   }
+  if (sample.intake == Intake::kAccepted &&
+      sample.sample.stamp_ns - stream.start_ns >= kRunLengthNs) {
+    recorder_.End(*stream.run);
+    stream.first = sample;
+    Begin(valve_id, stream, stream.period_s);
+    return;
+  }
   recorder_.Append(*stream.run, sample);
 }
 
@@ -78,6 +86,8 @@ void RunStore::Begin(const std::string& valve_id, Stream& stream,
   run.flow_unit = stream.first.sample.flow_unit;
   run.origin = storage::RunOrigin::kRecorded;
   run.software = software_;
+  stream.start_ns = run.start_ns;
+  stream.period_s = period_s;
   stream.run = recorder_.Begin(run);
   recorder_.Append(*stream.run, stream.first);
 }

@@ -12,8 +12,9 @@
 
 namespace fdi::monitor {
 
-/// runs.db as the monitor's recorder: a run for each source of a valve, whose
-/// sample period is what its first two samples are apart.
+/// runs.db as the monitor's recorder: runs for each source of a valve, whose
+/// sample period is what its first two samples are apart. A run that is a day
+/// long is followed by the next one, so that retention can take it.
 class RunStore : public SampleSink {
  public:
   /// @throws DataError, storage::SqliteError
@@ -31,6 +32,8 @@ class RunStore : public SampleSink {
     std::uint64_t source_id{0};
     std::optional<Key> run;
     storage::StoredSample first;  // waits for the second while there is no run
+    std::int64_t start_ns{0};     // of that run
+    double period_s{1.0};
   };
   using Streams = std::vector<Stream>;  // of one valve, the newest at the end
 

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "diagnosis/error.h"
@@ -107,21 +108,36 @@ TEST_F(DatabaseStressTest, ACorruptPageIsAFindingOrARefusalAndStaysAsItIs) {
   EXPECT_EQ(std::filesystem::file_size(data_.history()), bytes);
 }
 
+// In a child process that is not root.
 TEST_F(DatabaseStressTest, AFolderThatCannotBeWrittenIsRefusedByName) {
-  if (geteuid() == 0) {
-    GTEST_SKIP() << "root may write everywhere";
-  }
-  std::filesystem::permissions(
-      directory_.path(),
-      std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
-  try {
-    const RunRecorder recorder(data_.runs());
-    ADD_FAILURE() << "opened";
-  } catch (const DataError& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr(data_.runs().string()));
-  }
+  using std::filesystem::perms;
   std::filesystem::permissions(directory_.path(),
-                               std::filesystem::perms::owner_all);
+                               perms::owner_read | perms::owner_exec |
+                                   perms::others_read | perms::others_exec);
+  const pid_t child = fork();
+  if (child == 0) {
+    constexpr uid_t kNobody = 65534;
+    if (geteuid() == 0 && setuid(kNobody) != 0) {
+      _exit(2);
+    }
+    try {
+      const RunRecorder recorder(data_.runs());
+    } catch (const DataError& error) {
+      const std::string_view text = error.what();
+      _exit(text.find(data_.runs().string()) != text.npos &&
+                    text.find("Permission denied") != text.npos
+                ? 0
+                : 3);
+    }
+    _exit(1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  std::filesystem::permissions(directory_.path(), perms::owner_all);
+
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_FALSE(std::filesystem::exists(data_.runs()));
 }
 
 }  // namespace

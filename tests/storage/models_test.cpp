@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <fstream>
+#include <set>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -92,6 +94,24 @@ TEST_F(ModelsTest, UnknownSetsAreNotFoundAndTheStoredOnesNamed) {
        {"", "@1", "a@", "a@0", "a@x", "a b", "a@1@2"}) {
     EXPECT_THROW(store_.Load(text), ConfigError) << text;
   }
+}
+
+TEST_F(ModelsTest, TwoTrainersGetVersionsOfTheirOwn) {
+  const auto save_five = [this](unsigned seed) {
+    ModelStore store(file_, Access::kOccasionalWriter);
+    for (unsigned i = 0; i < 5; ++i) {
+      store.Save(RandomModelSet("pump", 3, seed + i));
+    }
+  };
+  std::thread other(save_five, 10U);
+  save_five(20);
+  other.join();
+
+  std::set<int> versions;
+  for (const ModelSummary& summary : store_.List()) {
+    versions.insert(summary.version);
+  }
+  EXPECT_THAT(versions, ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9, 10));
 }
 
 TEST_F(ModelsTest, AnUnusableSetIsNotStored) {
