@@ -20,7 +20,7 @@ void KnowStuck(FaultSet stuck, Verdict& verdict) {
 Episode::Episode(std::shared_ptr<const FaultPlan> plan)
     : models_(&plan->models()),
       faults_(std::move(plan)),
-      isolation_(models_->decision),
+      isolation_(models_->decision, models_->faults.size()),
       clearing_(*models_) {}
 
 void Episode::Score(const ObserverBank& bank, Verdict& verdict) const {

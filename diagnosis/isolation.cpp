@@ -12,12 +12,13 @@ int CountOf(double fraction, int samples) {
 
 }  // namespace
 
-IsolationWindow::IsolationWindow(const DecisionParameters& parameters)
+IsolationWindow::IsolationWindow(const DecisionParameters& parameters,
+                                 std::size_t faults)
     : length_(parameters.isolation_samples),
       needed_(CountOf(parameters.isolation_fraction, length_)),
       joining_(CountOf(parameters.join_fraction, length_)),
       ring_(static_cast<std::size_t>(length_), 0),
-      counts_(kMaxFaults, 0) {}
+      counts_(faults, 0) {}
 
 void IsolationWindow::Restart() {
   filled_ = 0;
@@ -27,8 +28,8 @@ void IsolationWindow::Restart() {
 
 void IsolationWindow::Push(FaultSet above_threshold) {
   FaultSet& slot = ring_[static_cast<std::size_t>(next_)];
-  for (int i = 0; i < kMaxFaults; ++i) {
-    int& count = counts_[static_cast<std::size_t>(i)];
+  for (std::size_t i = 0; i < counts_.size(); ++i) {
+    int& count = counts_[i];
     if (filled_ == length_) {
       count -= static_cast<int>(slot >> i & 1U);
     }
@@ -45,8 +46,8 @@ FaultSet IsolationWindow::Supported() const {
   if (filled_ < length_) {
     return 0;
   }
-  for (int i = 0; i < kMaxFaults; ++i) {
-    const int count = counts_[static_cast<std::size_t>(i)];
+  for (std::size_t i = 0; i < counts_.size(); ++i) {
+    const int count = counts_[i];
     supporting |= count >= needed_ ? FaultSet{1} << i : 0;
     joining |= count >= joining_ ? FaultSet{1} << i : 0;
   }

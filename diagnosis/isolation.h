@@ -13,7 +13,8 @@ namespace fdi {
 /// alone.
 class IsolationWindow {
  public:
-  explicit IsolationWindow(const DecisionParameters& parameters);
+  /// @param faults number of faults in the model set.
+  IsolationWindow(const DecisionParameters& parameters, std::size_t faults);
 
   void Restart();
   void Push(FaultSet above_threshold);
@@ -28,7 +29,7 @@ class IsolationWindow {
   int filled_{0};
   int next_{0};
   std::vector<FaultSet> ring_;
-  std::vector<int> counts_;  // one per fault bit
+  std::vector<int> counts_;  // by bit of a fault
 };
 
 }  // namespace fdi

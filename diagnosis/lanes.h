@@ -1,9 +1,7 @@
 #pragma once
 
-#if defined(__GNUC__) && !defined(__clang__)
 // No vector is passed to a function that is not inlined.
 #pragma GCC diagnostic ignored "-Wpsabi"
-#endif
 
 #include <cstddef>
 #include <cstdint>

@@ -217,14 +217,14 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
   covariance_ = (covariance_ + var_rate_) / memory;
   var_rate_ = std::min(var_rate_ / memory, kRateDeviation * kRateDeviation);
   KeepBounded();
+  double s = std::clamp(strength_, path_->lowest, path_->highest);
+  PathPlace place = path_->PlaceOf(s);
   for (std::size_t c = 0; c < channels_; ++c) {
     const int channel = static_cast<int>(c);
     if (!bank.active(channel)) {
       continue;
     }
     evidence_[c] *= bank.saturated(channel) ? 1.0 : memory;
-    const double s = std::clamp(strength_, path_->lowest, path_->highest);
-    const PathPlace place = path_->PlaceOf(s);
     const Prediction p = At(bank, c, SegmentOf(bank, c, place.segment), place);
     if (std::isnan(p.residual)) {
       continue;
@@ -234,6 +234,8 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
     evidence_[c] += Gain(bank, c, p.residual, spread);
     if (p.slope != 0.0) {
       Correct(p, s, spread);
+      s = std::clamp(strength_, path_->lowest, path_->highest);
+      place = path_->PlaceOf(s);
     }
   }
   total_ = Sum(evidence_.data());

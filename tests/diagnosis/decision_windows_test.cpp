@@ -20,7 +20,7 @@ DecisionParameters TenSamples() {
 // Pushes ten samples in which fault 0 is above T `first` times, fault 1
 // `second` times.
 FaultSet SupportedAfter(int first, int second) {
-  IsolationWindow window(TenSamples());
+  IsolationWindow window(TenSamples(), kMaxFaults);
   for (int k = 0; k < 10; ++k) {
     window.Push((k < first ? 1U : 0U) | (k < second ? 2U : 0U));
   }
@@ -28,7 +28,7 @@ FaultSet SupportedAfter(int first, int second) {
 }
 
 TEST(IsolationWindowTest, NeedsTkSamples) {
-  IsolationWindow window(TenSamples());
+  IsolationWindow window(TenSamples(), kMaxFaults);
   for (int k = 0; k < 9; ++k) {
     window.Push(1);
   }
@@ -46,7 +46,7 @@ TEST(IsolationWindowTest, NinetyPerCentSupportAndThreeQuartersJoin) {
 }
 
 TEST(IsolationWindowTest, OldSamplesLeave) {
-  IsolationWindow window(TenSamples());
+  IsolationWindow window(TenSamples(), kMaxFaults);
   for (int k = 0; k < 10; ++k) {
     window.Push(1);
   }
