@@ -161,6 +161,43 @@ TEST(ColumnCodecTest, DecimalsWithThreeDigitsTakeLittleMoreThanTheirDigits) {
   EXPECT_LE(writer.size(), 2 * values.size() + 64);
 }
 
+// Hints save time; the bits must be the same with those of another valve.
+TEST(SampleCodecTest, HintsOfOtherDataChangeNoSample) {
+  ChunkHints hints;
+  EncodeChunk(NoisyValve(300, true), ChunkCodec::kColumns, &hints);
+  EXPECT_TRUE(hints.columns[Index(Signal::kCv)].has_value());
+  std::vector<StoredSample> other = NoisyValve(300, true);
+  for (StoredSample& stored : other) {
+    for (double& value : stored.sample.values) {
+      value = value * 1.7 + 3.0;
+    }
+  }
+  other[7].sample.values[0] = std::numeric_limits<double>::quiet_NaN();
+
+  for (const auto& samples : {other, NoisyValve(300, false), other}) {
+    const Chunk chunk = EncodeChunk(samples, ChunkCodec::kColumns, &hints);
+    const auto back = DecodeChunk(chunk, "test");
+    ASSERT_EQ(back.size(), samples.size());
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+      ASSERT_EQ(FieldsOf(back[k]), FieldsOf(samples[k])) << "sample " << k;
+    }
+  }
+}
+
+TEST(SampleCodecTest, HintsOfTheSameValveCostNoBytes) {
+  const std::vector<StoredSample> samples = NoisyValve(1200, true);
+  const std::span<const StoredSample> all(samples);
+  ChunkHints hints;
+  EncodeChunk(all.first(600), ChunkCodec::kColumns, &hints);
+
+  const auto hinted =
+      EncodeChunk(all.last(600), ChunkCodec::kColumns, &hints).bytes.size();
+  const auto searched =
+      EncodeChunk(all.last(600), ChunkCodec::kColumns).bytes.size();
+
+  EXPECT_LE(static_cast<double>(hinted), 1.05 * static_cast<double>(searched));
+}
+
 TEST(SampleCodecTest, RandomSamplesReadBackBitForBit) {
   std::mt19937_64 random(4);
   for (const std::size_t count : {1UL, 2UL, 3UL, 17UL, 600UL}) {
