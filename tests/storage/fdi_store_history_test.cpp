@@ -1,0 +1,149 @@
+// Runs the built program on a history: list, show, ack, export, doctor, backup.
+#include <gmock/gmock.h>
+
+#include "tests/storage/store_program_fixture.h"
+
+namespace fdi::storage {
+namespace {
+
+using testing::HasSubstr;
+
+class FdiStoreHistoryTest : public FdiStoreTest {
+ protected:
+  FdiStoreHistoryTest() {
+    HistoryWriter writer(path_);
+    writer.Record(Event(TransitionKind::kDetected, 0, 0, 0.3));
+    writer.AppendTrace(Id(), Instants(100, -20));
+    writer.Record(Event(TransitionKind::kIsolated, 20, 0b010, 0.8));
+    writer.EndSession(kDetected, true);
+  }
+};
+
+TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
+  const json listed = StoreJson("history list");
+
+  ASSERT_EQ(listed["episodes"].size(), 1U);
+  const json& episode = listed["episodes"][0];
+  EXPECT_THAT(KeysOf(episode),
+              testing::UnorderedElementsAre(
+                  "episode_id", "valve_id", "detected_utc", "isolated_utc",
+                  "cleared_utc", "fault", "peak_factor", "model_set",
+                  "end_reason", "label", "acked_by"));
+  EXPECT_EQ(episode["fault"], "f7");
+  EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
+  EXPECT_TRUE(episode["cleared_utc"].is_null());
+}
+
+TEST_F(FdiStoreHistoryTest, FiltersReachTheQuery) {
+  const auto count = [this](const std::string& arguments) {
+    return StoreJson("history list " + arguments)["episodes"].size();
+  };
+
+  EXPECT_EQ(count("--fault f7"), 1U);
+  EXPECT_EQ(count("--fault paper5"), 0U);
+  EXPECT_EQ(count("--valve 'PV*'"), 0U);
+  EXPECT_EQ(count("--since 2026-11-20T14:56:12Z"), 0U);
+  EXPECT_EQ(count("--until 2026-11-20T14:56:12Z"), 1U);
+  EXPECT_EQ(count("--state isolated"), 1U);
+  EXPECT_EQ(Store("history list --state odd").code, 2);
+  EXPECT_EQ(Store("history list --fault f20").code, 2);
+}
+
+TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
+  EXPECT_EQ(Store("history ack last --by anna --comment 'seat worn'").code, 0);
+  EXPECT_EQ(Store("history label last f1 --by jan").code, 0);
+
+  const json shown = StoreJson("history show last");
+  EXPECT_EQ(shown["acked_by"], "anna");
+  EXPECT_EQ(shown["label"], "f1");
+  EXPECT_EQ(shown["events"].back()["kind"], "LABEL");
+  EXPECT_EQ(shown["trace_instants"], 100);
+  {
+    HistoryWriter writer(path_);
+    CoverageCount count{"LV-1", 20'000, 1.0, {}};
+    count.samples.Add(Quality::kLive, 7200);
+    writer.Keep(std::vector{count}, {});
+  }
+  EXPECT_EQ(StoreJson("history stats")["hours"]["LV-1"]["LIVE"], 2.0);
+  EXPECT_THAT(Store("history stats").out,
+              testing::ContainsRegex("LV-1 +LIVE +2.00 +7200"));
+  const json statistics = StoreJson("history stats")["statistics"];
+  EXPECT_EQ(statistics[0]["labelled_false"], 1);
+  EXPECT_EQ(Store("history label last perhaps").code, 2);
+}
+
+TEST_F(FdiStoreHistoryTest, TraceIsExportedWithAColumnPerChannelAndFault) {
+  const Outcome outcome = Store("history export last");
+
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out,
+              testing::StartsWith("t_s,stamp_ns,seq,intake,quality,state,"
+                                  "CV_pct,X_pct,F_m3_h,r_X,r_F,d_0,d_f1,d_f7,"
+                                  "d_f19\n-20,"));
+  EXPECT_EQ(std::count(outcome.out.begin(), outcome.out.end(), '\n'), 101);
+}
+
+TEST_F(FdiStoreHistoryTest, PlotIsAPictureOrAClearError) {
+  const Outcome missing =
+      Store("history plot last --output a.png", "PATH=/nowhere");
+  EXPECT_EQ(missing.code, 1);
+  EXPECT_THAT(missing.err, HasSubstr("gnuplot cannot run"));
+  EXPECT_EQ(Store("history plot last --output a.bmp").code, 2);
+  if (std::system("gnuplot --version >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "gnuplot is not installed";
+  }
+
+  EXPECT_EQ(Store("history plot last --output a.png").code, 0);
+
+  EXPECT_EQ(Slurp(directory_.path() / "a.png").substr(1, 3), "PNG");
+}
+
+TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
+  const json report = StoreJson("doctor");
+
+  EXPECT_EQ(report["sound"], true);
+  ASSERT_EQ(report["databases"].size(), 3U);
+  EXPECT_EQ(report["databases"][0]["present"], false);
+  EXPECT_EQ(report["databases"][2]["version"], 3);
+  EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
+  EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
+}
+
+TEST_F(FdiStoreHistoryTest, DoctorExitsWithThreeOnADamagedFile) {
+  const auto size = std::filesystem::file_size(path_);
+  std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(4096 * 2);
+  for (std::uintmax_t at = 4096 * 2; at < size; ++at) {
+    file.put('\x5A');
+  }
+  file.close();
+
+  const Outcome outcome = Store("doctor --json");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(json::parse(outcome.out)["sound"], false);
+}
+
+TEST_F(FdiStoreHistoryTest, PruneTellsWhatWentAndNeedsALimit) {
+  EXPECT_EQ(Store("prune").code, 2);
+  EXPECT_EQ(Store("prune --runs-age 90d").code, 5);
+
+  const json dry = StoreJson("prune --history-age 0s --dry-run");
+  EXPECT_EQ(dry["dry_run"], true);
+  const json done = StoreJson("prune --history-age 0s --history-size 1B");
+  EXPECT_EQ(done["databases"][0]["name"], "history.db");
+  EXPECT_EQ(done["databases"][0]["deleted"], 0);
+  EXPECT_EQ(done["databases"][0]["protected"], 1);
+  EXPECT_EQ(done["databases"][0]["fits"], false);
+}
+
+TEST_F(FdiStoreHistoryTest, BackupIsACompleteCopyAndNeverOverwrites) {
+  EXPECT_EQ(Store("backup copy").code, 0);
+
+  EXPECT_EQ(HistoryReader(directory_.path() / "copy/history.db").List().size(),
+            1U);
+  EXPECT_EQ(Store("backup copy").code, 3);
+}
+
+}  // namespace
+}  // namespace fdi::storage
