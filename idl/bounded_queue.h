@@ -23,6 +23,22 @@ class BoundedQueue {
     return open_;
   }
 
+  /// Waits until the gate is open. @returns false once closed for good.
+  bool WaitUntilOpen() {
+    std::unique_lock lock(mutex_);
+    emptied_.wait(lock, [&] { return open_ || closed_; });
+    return !closed_;
+  }
+
+  /// Nobody waits for the gate any more.
+  void Close() {
+    {
+      const std::lock_guard lock(mutex_);
+      closed_ = true;
+    }
+    emptied_.notify_all();
+  }
+
   void Push(Item&& item) {
     bool was_empty = false;
     {
@@ -44,15 +60,20 @@ class BoundedQueue {
   };
 
   Popped Pop() {
-    const std::lock_guard lock(mutex_);
     Popped popped;
-    if (!items_.empty()) {
-      popped.item = std::move(items_.front());
-      items_.pop_front();
+    {
+      const std::lock_guard lock(mutex_);
+      if (!items_.empty()) {
+        popped.item = std::move(items_.front());
+        items_.pop_front();
+      }
+      if (!open_ && items_.size() <= capacity_ - capacity_ / 8) {
+        open_ = true;
+        popped.opened = true;
+      }
     }
-    if (!open_ && items_.size() <= capacity_ - capacity_ / 8) {
-      open_ = true;
-      popped.opened = true;
+    if (popped.opened) {
+      emptied_.notify_all();
     }
     return popped;
   }
@@ -77,9 +98,11 @@ class BoundedQueue {
   const std::size_t capacity_;
   mutable std::mutex mutex_;
   std::condition_variable filled_;
+  std::condition_variable emptied_;
   std::deque<Item> items_;
   bool open_{true};
   bool interrupted_{false};
+  bool closed_{false};
 };
 
 }  // namespace fdi::idl

@@ -104,6 +104,17 @@ struct SubscriberStatus {
   int alive{0};                   ///< Of these, writers that show life.
 };
 
+/// Where messages are that Take() is behind with, once 16 MB wait for it.
+enum class Overflow {
+  /// In the history of the library, which it searches from the front with every
+  /// message that comes: slow beyond some thousand.
+  kLibrary,
+  /// On the way: nothing is received until there is room, and lossless writers
+  /// wait. For a participant with this endpoint alone: no other one of it
+  /// receives meanwhile, acknowledgements included.
+  kOnTheWay,
+};
+
 template <typename Message>
 struct Handlers {
   std::function<void(const Message&, const Reception&)> on_message;
@@ -120,7 +131,8 @@ class Subscriber {
  public:
   /// @throws TransportError if the library refuses the endpoint.
   explicit Subscriber(Participant& participant,
-                      Profile profile = Profile::kLive);
+                      Profile profile = Profile::kLive,
+                      Overflow overflow = Overflow::kLibrary);
   ~Subscriber();
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;

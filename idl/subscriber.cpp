@@ -41,8 +41,9 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
   using Traits = Codec<Message>;
   using Type = CheckedType<typename Traits::Type>;
 
-  Impl(Participant& participant, Profile profile)
+  Impl(Participant& participant, Profile profile, Overflow overflow)
       : participant_(participant.impl()),
+        holds_receipt_(overflow == Overflow::kOnTheWay),
         max_keys_(
             4 * static_cast<std::size_t>(participant.options().max_valves) +
             1024) {
@@ -75,6 +76,7 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
   }
 
   ~Impl() override {
+    queue_.Close();
     reader_->set_listener(nullptr);
     subscriber_->delete_datareader(reader_);
     participant_->delete_subscriber(subscriber_);
@@ -157,7 +159,7 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
     while (handed < limit) {
       auto [item, opened] = queue_.Pop();
       if (opened) {
-        Drain();
+        Drain(false);
       }
       if (!item) {
         break;
@@ -179,9 +181,9 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
 
   // Moves from the library to queue_ while its gate is open. Called by the
   // thread that receives, which holds locks of the library and so must not
-  // wait, and by the thread that opens the gate: who comes second leaves the
-  // work to the first.
-  void Drain() noexcept {
+  // wait for the thread that takes but with holds_receipt_, and by the thread
+  // that opens the gate: who comes second leaves the work to the first.
+  void Drain(bool waits) noexcept {
     pending_.store(true);
     while (pending_.load()) {
       const std::unique_lock lock(drain_mutex_, std::try_to_lock);
@@ -189,13 +191,13 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
         return;
       }
       pending_.store(false);
-      DrainLocked();
+      DrainLocked(waits);
     }
   }
 
-  void DrainLocked() noexcept {
+  void DrainLocked(bool waits) noexcept {
     dds::SampleInfo info;
-    while (queue_.open()) {
+    while (waits ? queue_.WaitUntilOpen() : queue_.open()) {
       if (reader_->take_next_sample(&wire_, &info) != ReturnCode::RETCODE_OK) {
         missing_.store(gaps_.missing(), std::memory_order_relaxed);
         return;
@@ -235,7 +237,9 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
     queue_.Push(std::move(item));
   }
 
-  void on_data_available(dds::DataReader* /*reader*/) override { Drain(); }
+  void on_data_available(dds::DataReader* /*reader*/) override {
+    Drain(holds_receipt_);
+  }
 
   void on_subscription_matched(
       dds::DataReader* /*reader*/,
@@ -279,6 +283,7 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
   }
 
   Participant::Impl& participant_;
+  const bool holds_receipt_;
   const std::size_t max_keys_;
   dds::TypeSupport type_;
   dds::Subscriber* subscriber_{nullptr};
@@ -307,8 +312,9 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
 };
 
 template <typename Message>
-Subscriber<Message>::Subscriber(Participant& participant, Profile profile)
-    : impl_(std::make_unique<Impl>(participant, profile)) {}
+Subscriber<Message>::Subscriber(Participant& participant, Profile profile,
+                                Overflow overflow)
+    : impl_(std::make_unique<Impl>(participant, profile, overflow)) {}
 
 template <typename Message>
 Subscriber<Message>::~Subscriber() = default;

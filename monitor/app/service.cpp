@@ -78,6 +78,8 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
       lock_(LockOf(data_), "recording faults"),
       participant_(DdsOptionsOf(options, context.options), context.log,
                    "fdi-monitor"),
+      intake_participant_(DdsOptionsOf(options, context.options), context.log,
+                          "fdi-monitor intake"),
       models_topic_(participant_),
       changes_(data_.models()),
       assignment_(std::make_shared<const ModelAssignment>(
@@ -89,13 +91,14 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
       runs_(options.recording == Recording::kOff
                 ? nullptr
                 : std::make_unique<RunStore>(data_.runs(), context.software)),
-      decisions_(participant_,
-                 options.lossless_decisions,
+      decisions_(participant_, options.lossless_decisions,
                  publication_stop_.get_token()),
       events_(participant_, context.log),
       status_topic_(participant_),
-      samples_(participant_, options.best_effort ? idl::Profile::kBestEffort
-                                                 : idl::Profile::kLive),
+      samples_(
+          intake_participant_,
+          options.best_effort ? idl::Profile::kBestEffort : idl::Profile::kLive,
+          idl::Overflow::kOnTheWay),
       log_(context.log),
       pipeline_(PipelineOptionsOf(options),
                 {decisions_, events_, history_, runs_.get()}, assignment_,

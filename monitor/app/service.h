@@ -88,6 +88,7 @@ class Service {
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
   idl::Participant participant_;
+  idl::Participant intake_participant_;  // See idl::Overflow.
   idl::Publisher<idl::ModelSetInfoMessage> models_topic_;
   storage::ChangeCounter changes_;
   std::shared_ptr<const ModelAssignment> assignment_;

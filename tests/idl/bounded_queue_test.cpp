@@ -47,6 +47,17 @@ TEST(BoundedQueueTest, InterruptEndsOneWait) {
   EXPECT_GE(steady_clock::now(), deadline);
 }
 
+TEST(BoundedQueueTest, WhoWaitsForTheGateIsWokenByPopOrClose) {
+  BoundedQueue<int> queue(1);
+  queue.Push(7);
+  std::jthread reader([&] { queue.Pop(); });
+  EXPECT_TRUE(queue.WaitUntilOpen());
+
+  queue.Push(8);
+  std::jthread owner([&] { queue.Close(); });
+  EXPECT_FALSE(queue.WaitUntilOpen());
+}
+
 TEST(BoundedQueueTest, PushWakesAWaiter) {
   BoundedQueue<int> queue(10);
   std::jthread writer([&] { queue.Push(7); });

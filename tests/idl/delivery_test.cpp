@@ -1,5 +1,6 @@
 #include <fstream>
 #include <map>
+#include <memory>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -104,16 +105,20 @@ TEST_F(DeliveryTest, APublisherRefusesValvesBeyondItsNumber) {
 }
 
 // The consumer takes nothing until the writer has had to wait; then all comes.
-TEST_F(DeliveryTest, ASlowReaderPacesALosslessWriter) {
+class SlowReaderTest : public DeliveryTest,
+                       public testing::WithParamInterface<Overflow> {};
+
+TEST_P(SlowReaderTest, PacesALosslessWriter) {
   constexpr std::uint64_t kSamples = 120000;
   Participant here(domain_.Options(), log_.Sink());
   Participant there(domain_.Options(), log_.Sink());
-  Subscriber<ValveSampleMessage> subscriber(here, Profile::kLossless);
+  Subscriber<ValveSampleMessage> subscriber(here, Profile::kLossless,
+                                            GetParam());
   Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless, 1});
   ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
 
   std::uint64_t sent = 0;
-  while (publisher.Write(SampleOf("v", sent), {}, milliseconds(300)) ==
+  while (publisher.Write(SampleOf("v", sent), {}, milliseconds(2000)) ==
          WriteResult::kSent) {
     ++sent;
     ASSERT_LT(sent, kSamples) << "nothing held the writer up";
@@ -133,6 +138,31 @@ TEST_F(DeliveryTest, ASlowReaderPacesALosslessWriter) {
   EXPECT_EQ(subscriber.status().lost, 0U);
   EXPECT_EQ(subscriber.status().received, kSamples);
 }
+
+TEST_P(SlowReaderTest, EndsWhileNothingIsTaken) {
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  auto subscriber = std::make_unique<Subscriber<ValveSampleMessage>>(
+      here, Profile::kLossless, GetParam());
+  Publisher<ValveSampleMessage> publisher(there, {Profile::kLossless, 1});
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+  for (std::uint64_t k = 0;
+       publisher.Write(SampleOf("v", k), {}, milliseconds(300)) ==
+       WriteResult::kSent;
+       ++k) {
+  }
+  const auto start = steady_clock::now();
+  subscriber.reset();
+  EXPECT_LT(steady_clock::now() - start, seconds(5));
+}
+
+INSTANTIATE_TEST_SUITE_P(Overflow, SlowReaderTest,
+                         testing::Values(Overflow::kLibrary,
+                                         Overflow::kOnTheWay),
+                         [](const auto& info) {
+                           return info.param == Overflow::kLibrary ? "Library"
+                                                                   : "OnTheWay";
+                         });
 
 // Behind the queue of the subscriber the library keeps samples valve by valve.
 TEST_F(DeliveryTest, ABacklogOfManyValvesIsNoLoss) {
