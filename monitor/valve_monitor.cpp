@@ -9,14 +9,19 @@ namespace {
 
 constexpr double kStalePeriods = 3.0;
 
+std::shared_ptr<const ModelSet> ModelsOf(
+    const std::optional<EngineParts>& parts) {
+  return parts ? parts->plan->shared_models() : nullptr;
+}
+
 }  // namespace
 
 ValveMonitor::ValveMonitor(const std::string& id,
-                           std::shared_ptr<const ModelSet> models,
+                           const std::optional<EngineParts>& parts,
                            const TraceOptions& options)
-    : id_(id), models_(std::move(models)), tracker_(id, options) {
-  if (models_) {
-    engine_.emplace(models_);
+    : id_(id), models_(ModelsOf(parts)), tracker_(id, options) {
+  if (parts) {
+    engine_.emplace(*parts);
   }
   unassigned_.quality = Quality::kUnassigned;
   unassigned_.residuals.fill(std::numeric_limits<double>::quiet_NaN());
@@ -94,19 +99,20 @@ bool ValveMonitor::EndStream(std::uint64_t writer, EpisodeOutlet& outlet) {
   return true;
 }
 
-bool ValveMonitor::Adopt(std::shared_ptr<const ModelSet> models,
+bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
                          EpisodeOutlet& outlet) {
+  std::shared_ptr<const ModelSet> models = ModelsOf(parts);
   if (models == models_ || (models && models_ && models->content_hash != 0 &&
                             models->content_hash == models_->content_hash)) {
     return false;
   }
-  if (models && engine_) {
-    const std::optional<Transition> closed = engine_->Adopt(models);
+  if (parts && engine_) {
+    const std::optional<Transition> closed = engine_->Adopt(*parts);
     if (closed) {
       tracker_.End(*closed, models_, outlet);
     }
-  } else if (models) {
-    engine_.emplace(models);
+  } else if (parts) {
+    engine_.emplace(*parts);
     engine_->HoldIsolation(isolation_held_);
   } else {
     Close(EndReason::kModelChanged, outlet);

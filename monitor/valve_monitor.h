@@ -27,9 +27,8 @@ class ValveMonitor {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  /// @param models null: none assigned.
-  /// @throws DataError if `models` is not usable.
-  ValveMonitor(const std::string& id, std::shared_ptr<const ModelSet> models,
+  /// @param parts of the model set; nothing: none assigned.
+  ValveMonitor(const std::string& id, const std::optional<EngineParts>& parts,
                const TraceOptions& options);
 
   /// Before the first Step().
@@ -55,9 +54,8 @@ class ValveMonitor {
   bool EndStream(std::uint64_t writer, EpisodeOutlet& outlet);
 
   /// Continues with another model set, or none, from the next sample on.
-  /// @returns whether it is another one. @throws DataError as the constructor;
-  ///   then the valve goes on as before.
-  bool Adopt(std::shared_ptr<const ModelSet> models, EpisodeOutlet& outlet);
+  /// @returns whether it is another one.
+  bool Adopt(const std::optional<EngineParts>& parts, EpisodeOutlet& outlet);
 
   /// Labels the valve STALE if it was silent for three periods.
   /// @returns whether it became so by this call.

@@ -41,14 +41,13 @@ void ValveRegistry::Recover(const std::vector<OpenEpisode>& episodes,
 
 // @returns false if the model set of the valve cannot be had.
 bool ValveRegistry::Resolve(const std::string& valve_id,
-                            std::shared_ptr<const ModelSet>& models) {
+                            std::optional<EngineParts>& parts) {
+  parts.reset();
   try {
-    models = resolver_->ModelsFor(valve_id);
-    if (models) {
-      Validate(*models);
+    if (const auto models = resolver_->ModelsFor(valve_id)) {
+      parts = plans_.For(models);
     }
   } catch (const std::exception& error) {
-    models = nullptr;
     counters_.Add(Counter::kModelFailures);
     const std::string reason = error.what();
     log_.Report(
@@ -57,7 +56,7 @@ bool ValveRegistry::Resolve(const std::string& valve_id,
         LogLevel::kError);
     return false;
   }
-  if (!models) {
+  if (!parts) {
     log_.Report(LogId::kUnassigned, "valve_unassigned",
                 [&valve_id] { return "valve=" + valve_id; });
   }
@@ -71,14 +70,14 @@ ValveMonitor& ValveRegistry::At(const ValveDirectory::Entry& valve) {
   std::unique_ptr<ValveMonitor>& place = valves_[valve.index];
   if (!place) {
     const std::string& id = *valve.name;
-    std::shared_ptr<const ModelSet> models;
-    Resolve(id, models);
+    std::optional<EngineParts> parts;
+    Resolve(id, parts);
+    const ModelSet* models = parts ? &parts->plan->models() : nullptr;
     log_.Line(LogLevel::kDebug,
               "valve_seen valve=" + id + " model_set=" +
                   (models ? models->name + "@" + std::to_string(models->version)
                           : "none"));
-    place =
-        std::make_unique<ValveMonitor>(id, std::move(models), options_.trace);
+    place = std::make_unique<ValveMonitor>(id, parts, options_.trace);
     if (const auto open = recovered_.find(id); open != recovered_.end()) {
       place->Recover(open->second);
       recovered_.erase(open);
@@ -108,12 +107,15 @@ bool ValveRegistry::EndStream(const ValveDirectory::Entry& valve,
 void ValveRegistry::Reassign(std::shared_ptr<const ModelResolver> resolver) {
   resolver_ = std::move(resolver);
   std::uint64_t swapped = 0;
+  std::vector<EngineParts> alive;  // A plan is made once, adopted or not.
   for (const std::unique_ptr<ValveMonitor>& valve : valves_) {
-    std::shared_ptr<const ModelSet> models;
+    std::optional<EngineParts> parts;
     // A valve whose new set cannot be had goes on with the one it has.
-    if (valve && Resolve(valve->id(), models) &&
-        valve->Adopt(std::move(models), outlet_)) {
+    if (valve && Resolve(valve->id(), parts) && valve->Adopt(parts, outlet_)) {
       ++swapped;
+    }
+    if (parts) {
+      alive.push_back(*parts);
     }
     if (valve) {
       valve->HoldIsolation(resolver_->IsolationHeld(valve->id()));

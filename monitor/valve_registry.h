@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -75,12 +76,12 @@ class ValveRegistry {
 
  private:
   ValveMonitor& At(const ValveDirectory::Entry& valve);
-  bool Resolve(const std::string& valve_id,
-               std::shared_ptr<const ModelSet>& models);
+  bool Resolve(const std::string& valve_id, std::optional<EngineParts>& parts);
   void TakeCensus();
 
   RegistryOptions options_;
   std::shared_ptr<const ModelResolver> resolver_;
+  EnginePlans plans_;
   EpisodeOutlet& outlet_;
   Counters& counters_;
   ThrottledLog& log_;

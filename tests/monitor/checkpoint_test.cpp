@@ -203,7 +203,7 @@ TEST_F(RestartTest, AProvisionalBaselineIsDetectedAndNotNamed) {
 }
 
 TEST(ValveMonitorCheckpointTest, SilenceOfAStaleValveIsTimeToo) {
-  ValveMonitor valve("V1", SharedLinearModels(), {});
+  ValveMonitor valve("V1", EngineParts(SharedLinearModels()), {});
   FakeOutlet outlet;
   const auto start = ValveMonitor::TimePoint{};
   valve.Step(PlantSample(0), 1, start, outlet);

@@ -74,7 +74,7 @@ class ValveMonitorTest : public testing::Test {
 
   ValveMonitor::TimePoint now_{};
   Notebook notebook_;
-  ValveMonitor valve_{"V1", SharedLinearModels(), {}};
+  ValveMonitor valve_{"V1", EngineParts(SharedLinearModels()), {}};
 };
 
 TEST_F(ValveMonitorTest, AFaultIsDetectedIsolatedAndClearedAsOneEpisode) {
@@ -204,7 +204,7 @@ TEST_F(ValveMonitorTest, AnotherModelSetClosesTheEpisodeAndSettles) {
   Feed(0, 100);
   Feed(100, 120, kF7Offset);
 
-  ASSERT_TRUE(valve_.Adopt(SharedLinearModels(0x99), notebook_));
+  ASSERT_TRUE(valve_.Adopt(EngineParts(SharedLinearModels(0x99)), notebook_));
   const ValveOutcome first = Feed(PlantSample(120, kF7Offset));
 
   EXPECT_EQ(notebook_.events.back().transition.reason,
@@ -221,19 +221,19 @@ TEST_F(ValveMonitorTest, TheSameModelSetAgainChangesNothing) {
   Feed(0, 100);
   Feed(100, 120, kF7Offset);
 
-  EXPECT_FALSE(valve_.Adopt(SharedLinearModels(), notebook_));
+  EXPECT_FALSE(valve_.Adopt(EngineParts(SharedLinearModels()), notebook_));
   EXPECT_TRUE(valve_.episode_open());
 }
 
 TEST_F(ValveMonitorTest, WithoutAModelSetAValveIsListedAndNotDiagnosed) {
-  ValveMonitor bare("V2", nullptr, {});
+  ValveMonitor bare("V2", std::nullopt, {});
   const ValveOutcome outcome =
       bare.Step(PlantSample(5, kF7Offset), 1, now_, notebook_);
 
   EXPECT_EQ(outcome.models, nullptr);
   EXPECT_EQ(outcome.verdict.quality, Quality::kUnassigned);
   EXPECT_EQ(outcome.verdict.seq, 5U);
-  ASSERT_TRUE(bare.Adopt(SharedLinearModels(), notebook_));
+  ASSERT_TRUE(bare.Adopt(EngineParts(SharedLinearModels()), notebook_));
   EXPECT_NE(bare.Step(PlantSample(6), 1, now_, notebook_).models, nullptr);
 }
 
