@@ -29,9 +29,11 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using Clock = std::chrono::steady_clock;
 
-constexpr milliseconds kCommitPeriod{1000};
-constexpr milliseconds kCommitTakes{1000};  // On a busy machine.
+// Of half of the rounds; a machine that does other things besides may keep any
+// of them waiting.
+constexpr milliseconds kLossLimit{1000};
 constexpr milliseconds kStartLimit{2000};
+constexpr milliseconds kBusyLimit{6000};
 constexpr std::int64_t kDetectionNs = 3'000'000'000;  // n_d samples.
 
 // One transition of an episode.
@@ -121,7 +123,7 @@ class KilledMonitor : public testing::Test {
   std::vector<std::int64_t> killed_ns_;
   std::uint64_t recorded_{0};
   std::uint64_t lost_{0};
-  Clock::duration longest_loss_{0};
+  std::vector<milliseconds> losses_;  // The age of the oldest sample lost.
 };
 
 // What was published as persisted is in the history once, and nothing is
@@ -152,19 +154,20 @@ void KilledMonitor::ExpectRecorded(std::uint64_t from,
   const std::map<std::string, std::set<std::uint64_t>> recorded =
       RecordedSince(from);
   int missing = 0;
+  Clock::duration longest{0};
   for (const auto& [valve, answers] : answers_) {
     const auto run = recorded.find(valve);
     for (const auto& [seq, when] : answers) {
       if (run == recorded.end() || seq > *run->second.rbegin()) {
         ++lost_;
-        longest_loss_ = std::max(longest_loss_, killed - when);
+        longest = std::max(longest, killed - when);
       } else {
         missing += !run->second.contains(seq);
       }
     }
   }
   EXPECT_EQ(missing, 0) << "samples missing before the end of their run";
-  EXPECT_LE(longest_loss_, kCommitPeriod + kCommitTakes);
+  losses_.push_back(std::chrono::duration_cast<milliseconds>(longest));
 }
 
 // What is in the runs that began at instant `from` or later, one of each valve.
@@ -246,6 +249,16 @@ void KilledMonitor::ExpectOutagesNoted(std::size_t outages) const {
             << " closed unknown after an outage\n";
 }
 
+void ExpectWithin(const char* what, std::vector<milliseconds> times,
+                  milliseconds limit) {
+  std::sort(times.begin(), times.end());
+  const milliseconds median = times[times.size() / 2];
+  EXPECT_LE(median, limit) << what;
+  EXPECT_LE(times.back(), kBusyLimit) << what;
+  std::cout << "monitor: " << what << " after " << median.count()
+            << " ms (median), " << times.back().count() << " ms (longest)\n";
+}
+
 TEST_F(KilledMonitor, LosesNoPersistedEventAndDiagnosesAgainAtOnce) {
   RandomMoments moments(5);
   const int rounds = KillRounds();
@@ -289,15 +302,12 @@ TEST_F(KilledMonitor, LosesNoPersistedEventAndDiagnosesAgainAtOnce) {
   ExpectEpisodesInOrder();
   ExpectOutagesNoted(static_cast<std::size_t>(rounds));
 
-  std::sort(starts.begin(), starts.end());
-  EXPECT_LE(starts[starts.size() / 2], kStartLimit);
-  std::cout << "monitor: " << rounds << " rounds; all valves answered after "
-            << starts[starts.size() / 2].count() << " ms (median), "
-            << starts.back().count() << " ms (longest); " << persisted_.size()
-            << " events persisted, " << unpersisted_.size() << " not; "
-            << recorded_ << " samples recorded, " << lost_ << " of the last "
-            << std::chrono::duration_cast<milliseconds>(longest_loss_).count()
-            << " ms not\n";
+  ExpectWithin("all valves answered", starts, kStartLimit);
+  ExpectWithin("oldest sample lost", losses_, kLossLimit);
+  std::cout << "monitor: " << rounds << " rounds, " << persisted_.size()
+            << " events persisted, " << unpersisted_.size() << " not, "
+            << recorded_ << " samples recorded, " << lost_
+            << " answered but not recorded\n";
 }
 
 }  // namespace
