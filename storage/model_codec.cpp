@@ -1,13 +1,10 @@
 #include "storage/model_codec.h"
 
-#include <array>
 #include <limits>
-#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
 
-#include <openssl/evp.h>
 #include <zlib.h>
 
 #include "storage/bytes.h"
@@ -285,27 +282,6 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
   Fields(decoder, models);
   payload.ExpectEnd();
   return models;
-}
-
-std::uint64_t ContentHash(const ModelSet& models) {
-  ModelSet content = models;
-  content.created_ns = 0;
-  content.software.clear();
-  content.training_runs.clear();
-  return Sha256Start(EncodeModelSet(content));
-}
-
-std::uint64_t Sha256Start(std::span<const std::byte> bytes) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), nullptr,
-                 EVP_sha256(), nullptr) != 1) {
-    throw std::runtime_error("OpenSSL cannot compute SHA-256");
-  }
-  std::uint64_t hash = 0;
-  for (int i = 0; i < 8; ++i) {
-    hash = hash << 8U | digest[static_cast<std::size_t>(i)];
-  }
-  return hash;
 }
 
 }  // namespace fdi::storage

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "diagnosis/error.h"
+#include "storage/cli/signal_list.h"
 #include "storage/cli/text_table.h"
 #include "storage/cli/time_text.h"
 
@@ -36,26 +37,9 @@ cli::Json SignalsJson(SignalMask signals) {
   return names;
 }
 
-std::string SignalsText(SignalMask signals) {
-  std::string text;
-  for (const auto& name : SignalsJson(signals)) {
-    text += (text.empty() ? "" : ",") + name.get<std::string>();
-  }
-  return text;
-}
-
 SignalMask ParseSignals(std::string_view list) {
-  SignalMask signals = 0;
-  for (const std::string& name : CLI::detail::split(std::string(list), ',')) {
-    const auto signal = ParseSignal(name);
-    if (!signal) {
-      constexpr SignalMask kAll = (1U << kSignalCount) - 1U;
-      throw ConfigError("unknown signal '" + name + "'; there are " +
-                        SignalsText(kAll));
-    }
-    signals = static_cast<SignalMask>(signals | MaskOf(*signal));
-  }
-  return signals;
+  constexpr SignalMask kAll = (1U << kSignalCount) - 1U;
+  return cli::ParseSignals(CLI::detail::split(std::string(list), ','), kAll);
 }
 
 cli::Json TimeJson(const std::optional<std::int64_t>& stamp_ns) {

@@ -29,9 +29,8 @@ DataDirectory DataOf(const cli::Context& context);
 /// --data, made if it is not there; for verbs that write.
 DataDirectory WritableDataOf(const cli::Context& context);
 
-/// {"CV", "P1"} and "CV,P1".
+/// {"CV", "P1"}
 cli::Json SignalsJson(SignalMask signals);
-std::string SignalsText(SignalMask signals);
 /// "CV,X,F" in any case. @throws ConfigError naming the signals there are.
 SignalMask ParseSignals(std::string_view list);
 

@@ -9,6 +9,7 @@
 #include "storage/app/common.h"
 #include "storage/app/runs_json.h"
 #include "storage/app/verbs.h"
+#include "storage/cli/signal_list.h"
 #include "storage/cli/text_table.h"
 #include "storage/cli/time_text.h"
 #include "storage/runs.h"
@@ -118,7 +119,7 @@ int Show(const std::string& id, const Context& context) {
       {"start", TimeText(run.start_ns, context)},
       {"samples", std::to_string(info.samples) + " (" + intake + ")"},
       {"sample period", cli::FormatNumber(run.period_s, 3) + " s"},
-      {"signals", SignalsText(info.signals)},
+      {"signals", cli::SignalsText(info.signals)},
       {"flow in", std::string(FlowUnitName(run.flow_unit))},
       {"truth", info.has_truth ? "stored beside every sample" : "-"},
       {"stored", std::to_string(info.stored_bytes) + " bytes"},

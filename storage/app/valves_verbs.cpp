@@ -8,6 +8,7 @@
 #include "storage/app/common.h"
 #include "storage/app/valve_baselines.h"
 #include "storage/app/verbs.h"
+#include "storage/cli/signal_list.h"
 #include "storage/cli/text_table.h"
 #include "storage/cli/time_text.h"
 #include "storage/history.h"
@@ -68,7 +69,7 @@ int List(const Context& context) {
   for (const ValveEntry& valve : valves) {
     table.AddRow(
         {valve.pattern, valve.type, std::string(FlowUnitName(valve.flow_unit)),
-         SenseText(valve.sense), SignalsText(valve.signals),
+         SenseText(valve.sense), cli::SignalsText(valve.signals),
          cli::FormatNumber(valve.period_s, 3), std::to_string(valve.epoch),
          std::string(BaselineStateName(valve.baseline())),
          SetText(valve.model_set)});
@@ -119,7 +120,7 @@ int Show(const std::string& valve_id, const Context& context) {
          {"type", entry->type},
          {"flow in", std::string(FlowUnitName(entry->flow_unit))},
          {"% of", SenseText(entry->sense)},
-         {"signals", SignalsText(entry->signals)},
+         {"signals", cli::SignalsText(entry->signals)},
          {"sample period", cli::FormatNumber(entry->period_s, 3) + " s"},
          {"epoch", std::to_string(entry->epoch)},
          {"baseline", std::string(BaselineStateName(entry->baseline()))}});

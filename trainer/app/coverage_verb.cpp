@@ -5,12 +5,12 @@
 
 #include "storage/cli/program.h"
 #include "storage/cli/progress.h"
+#include "storage/cli/signal_list.h"
 #include "storage/cli/stop_signals.h"
 #include "storage/data_directory.h"
 #include "storage/models.h"
 #include "trainer/app/campaign_runs.h"
 #include "trainer/app/onboarding_report.h"
-#include "trainer/app/signal_list.h"
 #include "trainer/app/valve_types.h"
 #include "trainer/app/verbs.h"
 
@@ -25,7 +25,7 @@ struct CoverageOptions {
 };
 
 int Assess(const CoverageOptions& options, const cli::Context& context) {
-  const SignalMask signals = ParseSignals(options.signals);
+  const SignalMask signals = cli::ParseSignals(options.signals, kBasicSignals);
   const storage::DataDirectory directory{context.options.data_dir};
   storage::EnsureExists(directory);
   storage::ModelStore store(directory.models(),

@@ -8,6 +8,7 @@
 #include "diagnosis/error.h"
 #include "storage/cli/program.h"
 #include "storage/cli/progress.h"
+#include "storage/cli/signal_list.h"
 #include "storage/cli/stop_signals.h"
 #include "storage/cli/time_text.h"
 #include "storage/data_directory.h"
@@ -17,7 +18,6 @@
 #include "trainer/app/file_runs.h"
 #include "trainer/app/onboarding_report.h"
 #include "trainer/app/run_input.h"
-#include "trainer/app/signal_list.h"
 #include "trainer/app/valve_types.h"
 #include "trainer/app/verbs.h"
 #include "trainer/onboarding/signal_subset.h"
@@ -62,7 +62,8 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
     runs.push_back(ToTrainingRun(run, true));
     if (!options.signals.empty()) {
       runs.back() =
-          WithSignals(std::move(runs.back()), ParseSignals(options.signals));
+          WithSignals(std::move(runs.back()),
+                      cli::ParseSignals(options.signals, kBasicSignals));
     }
   }
   return runs;
