@@ -45,15 +45,15 @@ template <typename T>
 }  // namespace exponential
 
 inline double Exp(double t) {
-  using namespace exponential;
-  if (!(t > kLowest)) {
+  if (!(t > exponential::kLowest)) {
     return 0.0;
   }
-  const auto k = static_cast<std::int64_t>(t * kLog2E - 0.5);
+  const auto k = static_cast<std::int64_t>(t * exponential::kLog2E - 0.5);
   const auto k_real = static_cast<double>(k);
-  const double r = (t - k_real * kLn2High) - k_real * kLn2Low;
+  const double r =
+      (t - k_real * exponential::kLn2High) - k_real * exponential::kLn2Low;
   const auto bits = static_cast<std::uint64_t>(k + 1023) << 52U;
-  return Series(r) * std::bit_cast<double>(bits);
+  return exponential::Series(r) * std::bit_cast<double>(bits);
 }
 
 }  // namespace fdi

@@ -30,9 +30,9 @@ struct StrengthPath {
   };
   /// One channel of one node.
   struct Point {
-    std::size_t slot;
-    double sd;
-    double saturation;
+    std::size_t slot{0};
+    double sd{1.0};
+    double saturation{0.0};
     Trapezoid membership;
   };
 

@@ -43,7 +43,7 @@ struct PairMask {
 
 template <typename Lanes>
 FDI_INLINE Lanes Load(const Quad& quad) {
-  Lanes lanes;
+  Lanes lanes{};
   std::memcpy(&lanes, &quad.lane, sizeof lanes);
   return lanes;
 }
@@ -190,11 +190,12 @@ FDI_INLINE void PowerOfTwo(const Pair& scaled, Pair& k_real, Pair& power) {
 /// Exp(t) of each lane; −700 < t ≤ 0.
 template <typename Lanes>
 FDI_INLINE Lanes Exp(const Lanes& t) {
-  using namespace exponential;
-  Lanes k_real;
-  Lanes power;
-  PowerOfTwo(t * kLog2E - 0.5, k_real, power);
-  return Series((t - k_real * kLn2High) - k_real * kLn2Low) * power;
+  Lanes k_real{};
+  Lanes power{};
+  PowerOfTwo(t * exponential::kLog2E - 0.5, k_real, power);
+  return exponential::Series((t - k_real * exponential::kLn2High) -
+                             k_real * exponential::kLn2Low) *
+         power;
 }
 
 }  // namespace fdi::lanes

@@ -11,7 +11,7 @@ ObserverBank::ObserverBank(std::shared_ptr<const ObserverPlan> plan,
       kernels_(&KernelsFor(instructions)),
       state_(*plan_, std::move(outputs)) {}
 
-ObserverBank::ObserverBank(std::shared_ptr<const ObserverPlan> plan,
+ObserverBank::ObserverBank(const std::shared_ptr<const ObserverPlan>& plan,
                            InstructionSet instructions)
     : ObserverBank(plan, std::make_shared<ObserverOutputs>(*plan),
                    instructions) {}

@@ -18,7 +18,7 @@ namespace fdi {
 /// of the results are those of one by one, Evaluate() in ts_model.h.
 class ObserverBank {
  public:
-  explicit ObserverBank(std::shared_ptr<const ObserverPlan> plan,
+  explicit ObserverBank(const std::shared_ptr<const ObserverPlan>& plan,
                         InstructionSet instructions = BestInstructionSet());
   /// Puts what it computes into `outputs`, a place of this plan. Other banks of
   /// the same thread may share it: then nothing but the past is left of a

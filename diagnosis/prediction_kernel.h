@@ -170,6 +170,7 @@ struct Prediction {
 
   // What the predictions of a group have in common.
   struct Common {
+    const ObserverPlan& plan;
     double reading;
     double base;                // Normal prediction under a difference, or 0.
     double base_extrapolation;  // Of that.
@@ -182,18 +183,19 @@ struct Prediction {
       return group.difference ? quads[normal / kLanes].lane[normal % kLanes]
                               : 0.0;
     };
-    return {state.outputs->readings[group.channel],
+    return {plan, state.outputs->readings[group.channel],
             of_normal(state.outputs->predictions),
             of_normal(state.outputs->extrapolations)};
   }
 
   // Keeps what four observers say: their own part of the prediction, and that
   // with all regressors within the trained range.
-  FDI_INLINE static void Keep(const ObserverBlock& limits, const Common& common,
-                              const Lanes& own, const Lanes& inside,
-                              std::size_t block, ObserverState& state) {
+  FDI_INLINE static void Keep(const Common& common, const Lanes& own,
+                              const Lanes& inside, std::size_t block,
+                              ObserverState& state) {
     const Lanes prediction = common.base + own;
-    const Lanes saturation = Load<Lanes>(limits.saturation);
+    const Lanes saturation =
+        Load<Lanes>(common.plan.blocks()[block].saturation);
     const Lanes reading = All<Lanes>(common.reading);
     const auto hidden = (reading >= saturation) & (prediction >= saturation);
     const Lanes residual = reading - Min(prediction, saturation);
@@ -251,7 +253,7 @@ struct Prediction {
       const std::size_t block = group.first_block + b;
       const ObserverBlock& limits = plan.blocks()[block];
       const Lanes own = Blend(group, b, limits, firing, x);
-      Keep(limits, common, own,
+      Keep(common, own,
            beyond ? Blend(group, b, limits, firing_inside, inside) : own, block,
            state);
     }
@@ -274,8 +276,8 @@ struct Prediction {
       const Lanes own = Evaluate(group, b, limits, x);
       const bool beyond =
           Beyond(&group.minimum[b * n], &group.maximum[b * n], n, x, inside);
-      Keep(limits, common, own,
-           beyond ? Evaluate(group, b, limits, inside) : own, block, state);
+      Keep(common, own, beyond ? Evaluate(group, b, limits, inside) : own,
+           block, state);
       if (group.runs_on_itself) {
         state.own_past[now + b] = state.outputs->predictions[block];
       }
