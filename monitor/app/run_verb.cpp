@@ -5,6 +5,7 @@
 
 #include "monitor/app/service.h"
 #include "monitor/app/verbs.h"
+#include "monitor/log_limit.h"
 #include "storage/cli/program.h"
 #include "storage/cli/stop_signals.h"
 
@@ -54,7 +55,9 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
     options.http = ParseHttpAddress(arguments.http);
   }
   cli::StopSignals signals;
-  Service service(options, context);
+  const cli::Context limited{context.options, LimitLog(context.log),
+                             context.software, context.command_line};
+  Service service(options, limited);
   return service.Run(signals);
 }
 
