@@ -77,15 +77,14 @@ TEST_F(HostilePublishersTest, TenThousandValveIdsAreCountedAndCostLittle) {
     return std::ranges::count(vectors_, "V1", &idl::DecisionMessage::valve_id);
   };
   ASSERT_TRUE(Await([&] { return of_v1() == 80; })) << of_v1();
-  ASSERT_TRUE(Await([this] {
-    return counters_["dds_refused_valves"] >= kIds - 49 - 1 &&
-           counters_["valves"] == 50;
-  })) << counters_["dds_refused_valves"]
-      << " " << counters_["valves"];
-
-  EXPECT_EQ(counters_["dds_rejected_instances"] + counters_["refused_samples"] +
-                counters_["received"],
-            80U + kIds * kRounds);
+  const auto accounted = [this] {
+    return counters_["dds_rejected_instances"] + counters_["refused_samples"] +
+           counters_["received"];
+  };
+  Await([&] { return accounted() >= 80U + kIds * kRounds; });
+  EXPECT_EQ(accounted(), 80U + kIds * kRounds);
+  EXPECT_GE(counters_["dds_refused_valves"], kIds - 49U - 1U);
+  EXPECT_EQ(counters_["valves"], 50U);
   EXPECT_LT(ResidentBytes(*monitor), before + (32U << 20U));
   monitor->Signal(SIGTERM);
   EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
