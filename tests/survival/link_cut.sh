@@ -27,10 +27,10 @@ fail() {
 }
 now_ms() { date +%s%3N; }
 
-command -v ip >/dev/null && ip netns add "$near" 2>/dev/null || {
+if ! command -v ip >/dev/null || ! ip netns add "$near" 2>/dev/null; then
   echo "link_cut: skipped, network namespaces are not permitted here"
   exit 77
-}
+fi
 trap finish EXIT
 ip netns add "$far"
 ip link add "fa$tag" netns "$near" type veth peer name "fb$tag" netns "$far"
@@ -49,7 +49,7 @@ ip netns exec "$near" "$bin/fdi-monitor" --interface 10.77.0.1 \
   run --record --model-set quick >"$out/monitor.out" 2>"$out/monitor.log" &
 monitor=$!
 ip netns exec "$far" "$bin/fdi-simulator" --interface 10.77.0.2 \
-  run --valves $valves --keep-alive --wait-reader 20 \
+  run --valves $valves --keep-alive \
   --duration $((cut + 30)) --parameters paper-operating-point \
   >"$out/publisher.out" 2>"$out/publisher.log" &
 publisher=$!
@@ -87,7 +87,8 @@ wait "$publisher" || fail "the publisher ended with $?"
 sleep 1.5
 kill -TERM "$monitor"
 wait "$monitor" || fail "the monitor ended with $?"
-monitor= publisher=
+monitor=
+publisher=
 
 # Samples that a run lacks between its first and last, in stretches.
 missing=0
