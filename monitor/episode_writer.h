@@ -74,6 +74,10 @@ class EpisodeWriter : public EpisodeOutlet {
   Backlog backlog() const;
 
  private:
+  // Few and large transactions: the newest chunk of a trace is packed anew in
+  // each of them.
+  static constexpr std::size_t kPointsPerCommit = 5'000;
+
   struct Resumption {
     std::uint64_t episode_id;
     std::int64_t stamp_ns;
