@@ -28,6 +28,23 @@ class BoundedQueue {
     return PushLocked(std::forward<U>(item));
   }
 
+  /// As Push(), but leaves a reader that waits asleep, for Announce(), until
+  /// there are kManyItems.
+  template <typename U>
+  bool PushQuietly(U&& item) {
+    std::unique_lock lock(mutex_);
+    room_.wait(lock, [this] { return closed_ || items_.size() < capacity_; });
+    return PushLocked(std::forward<U>(item), kManyItems);
+  }
+
+  /// Wakes the reader if there is something for it.
+  void Announce() {
+    const std::lock_guard lock(mutex_);
+    if (waiting_ && !items_.empty()) {
+      arrival_.notify_one();
+    }
+  }
+
   /// @returns false, without the item, if the queue is full or closed.
   template <typename U>
   bool TryPush(U&& item) {
@@ -73,16 +90,18 @@ class BoundedQueue {
 
  private:
   template <typename U>
-  bool PushLocked(U&& item) {
+  bool PushLocked(U&& item, std::size_t enough = 1) {
     if (closed_) {
       return false;
     }
     items_.push_back(std::forward<U>(item));
-    if (waiting_) {
+    if (waiting_ && items_.size() >= std::min(enough, capacity_)) {
       arrival_.notify_one();
     }
     return true;
   }
+
+  static constexpr std::size_t kManyItems = 64;
 
   const std::size_t capacity_;
   mutable std::mutex mutex_;

@@ -101,7 +101,7 @@ bool Pipeline::Offer(std::string_view valve_id, const Sample& sample,
   if (!entry) {
     return !failed_;
   }
-  return queue_.Push(
+  return queue_.PushQuietly(
       Item{*entry, writer, std::chrono::steady_clock::now(), false, sample});
 }
 
@@ -110,7 +110,7 @@ bool Pipeline::OfferEnd(std::string_view valve_id, std::uint64_t writer) {
   if (!entry) {
     return !failed_;
   }
-  return queue_.Push(
+  return queue_.PushQuietly(
       Item{*entry, writer, std::chrono::steady_clock::now(), true, Sample{}});
 }
 

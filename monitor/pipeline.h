@@ -64,11 +64,15 @@ class Pipeline {
              std::vector<Accumulator> accumulators = {});
 
   /// A sample that was received. One intake thread. Waits while the queue is
-  /// full. @param writer who sent it. @returns false once stopped.
+  /// full. @param writer who sent it. @returns false once stopped. The
+  /// diagnosis may sleep on, for at most 100 ms, until AnnounceOffers(): waking
+  /// it for each of many samples costs more than diagnosing them.
   bool Offer(std::string_view valve_id, const Sample& sample,
              std::uint64_t writer);
   /// The publisher ended the stream of the valve. As Offer().
   bool OfferEnd(std::string_view valve_id, std::uint64_t writer);
+  /// No sample follows at once. Intake thread.
+  void AnnounceOffers() { queue_.Announce(); }
 
   /// Asks `resolver` for the models of all valves from now on. Between two
   /// samples: none is lost or diagnosed twice. Thread safe.

@@ -149,6 +149,7 @@ void Service::Intake(const std::stop_token& stop) {
     const std::stop_callback wake(stop, [this] { samples_.Interrupt(); });
     while (!stop.stop_requested() && !pipeline_.failed()) {
       samples_.Take(handlers, kTakeTimeout, kTakeLimit);
+      pipeline_.AnnounceOffers();
       intake_pulse_.Beat();
     }
     // What is there already; publishers that go on do not keep us.
