@@ -34,6 +34,6 @@ forbid '^(diagnosis|idl|simulator|trainer|monitor)/' '(sqlite3\.h|SQLiteCpp/)' \
   'SQLite belongs to storage'
 forbid '^(diagnosis|idl|storage|trainer|monitor)/' '(cvode|nvector|sun[a-z]+)/' \
   'SUNDIALS belongs to simulator'
-forbid '^([a-z]+/[^/]+)$' '(CLI/|toml\+\+|spdlog/|nlohmann/)' \
+forbid '^(diagnosis|idl|simulator|trainer|monitor|storage)/[^/]+$' '(CLI/|toml\+\+|spdlog/|nlohmann/)' \
   'command line, TOML, logging and JSON belong to the programs'
 exit "$failed"
