@@ -288,6 +288,7 @@ void Service::Shutdown() {
     decisions_.WaitForAcknowledged(kAcknowledgeLimit);
   }
   events_.WaitForAcknowledged(kAcknowledgeLimit);
+  status_topic_.WaitForAcknowledged(kAcknowledgeLimit);
   WriteStatusLine();
   context_.log(LogLevel::kInfo, "monitor_stopped");
 }
