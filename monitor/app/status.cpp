@@ -28,6 +28,8 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   add("dds_rejected_samples", facts.samples.rejected_samples);
   add("dds_incompatible", facts.samples.incompatible);
   add("dds_decision_retries", facts.decisions.retries);
+  add("dds_decision_readers",
+      static_cast<std::uint64_t>(facts.decisions.matched));
   add("valves", facts.census.valves);
   add("valves_unassigned", facts.census.unassigned);
   add("valves_stale", facts.census.stale);

@@ -63,6 +63,10 @@ class MonitorFixture : public testing::Test {
     EXPECT_TRUE(decisions_->WaitForWriters(1, kMonitorPatience));
     EXPECT_TRUE(events_->WaitForWriters(1, kMonitorPatience));
     EXPECT_TRUE(status_->WaitForWriters(1, kMonitorPatience));
+    // The writer may know of us later than we of it, and sends nothing before.
+    counters_.clear();
+    EXPECT_TRUE(
+        Await([this] { return counters_["dds_decision_readers"] > 0; }));
     return monitor;
   }
 
