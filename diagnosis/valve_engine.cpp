@@ -52,6 +52,7 @@ class ValveEngine::Impl {
   bool Restore(std::span<const std::byte> bytes);
 
   const ModelSet& models() const { return diagnosis_->plan->models(); }
+  const Verdict& verdict() const { return verdict_; }
   bool episode_open() const { return verdict_.state != State::kNormal; }
 
  private:
@@ -281,6 +282,10 @@ std::vector<std::byte> ValveEngine::Save() const {
 
 bool ValveEngine::Restore(std::span<const std::byte> bytes) {
   return impl_->Restore(bytes);
+}
+
+const Verdict& ValveEngine::verdict() const {
+  return impl_->verdict();
 }
 
 const ModelSet& ValveEngine::models() const {

@@ -62,6 +62,8 @@ class ValveEngine {
   ///   format or of another model set.
   bool Restore(std::span<const std::byte> bytes);
 
+  /// What Step() gave last.
+  const Verdict& verdict() const;
   const ModelSet& models() const;
   bool episode_open() const;
 

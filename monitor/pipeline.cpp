@@ -166,6 +166,9 @@ void Pipeline::Diagnose() {
   while (queue_.PopAll(batch, kTick)) {
     pulse_.Beat();
     AdoptPendingResolver();
+    if (decisions_.WantsLast()) {
+      registry_.PublishLast(decisions_);
+    }
     for (std::size_t i = 0; i < batch.size(); ++i) {
       Handle(batch[i]);
       if (i % kBeatItems == 0) {

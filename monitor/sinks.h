@@ -37,6 +37,14 @@ class DecisionSink {
   /// @returns false if it was not sent.
   virtual bool Publish(const std::string& valve_id, const ModelSet* models,
                        const Verdict& verdict) = 0;
+
+  /// True once somebody listens where nobody did: PublishLast() is due for
+  /// every valve. Nothing is sent to newcomers before.
+  virtual bool WantsLast() { return false; }
+  /// A vector that Publish() took while nobody listened.
+  virtual void PublishLast(const std::string& /*valve_id*/,
+                           const ModelSet* /*models*/,
+                           const Verdict& /*verdict*/) {}
 };
 
 /// Takes fault events to the bus. Outbox thread.

@@ -76,6 +76,12 @@ class ValveMonitor {
 
   const std::string& id() const { return id_; }
   const ModelSet* models() const { return models_.get(); }
+  /// A sample came.
+  bool seen() const { return seen_; }
+  /// The last one.
+  const Verdict& verdict() const {
+    return engine_ ? engine_->verdict() : unassigned_;
+  }
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
   bool episode_open() const { return engine_ && engine_->episode_open(); }

@@ -3,6 +3,8 @@
 #include <exception>
 #include <utility>
 
+#include "diagnosis/quality_count.h"
+
 namespace fdi::monitor {
 
 ValveRegistry::ValveRegistry(const RegistryOptions& options,
@@ -171,6 +173,16 @@ void ValveRegistry::TakeCensus() {
   }
   const std::lock_guard lock(mutex_);
   census_ = census;
+}
+
+void ValveRegistry::PublishLast(DecisionSink& decisions) const {
+  for (const std::unique_ptr<ValveMonitor>& valve : valves_) {
+    // No stamp: a model set was adopted since.
+    if (valve && valve->seen() && CountsAsTime(valve->verdict()) &&
+        valve->verdict().stamp_ns != 0) {
+      decisions.PublishLast(valve->id(), valve->models(), valve->verdict());
+    }
+  }
 }
 
 void ValveRegistry::Flush() {

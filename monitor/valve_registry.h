@@ -63,6 +63,9 @@ class ValveRegistry {
   /// Looks after silent valves. @param now_ns the same in UTC.
   void Tend(TimePoint now, std::int64_t now_ns);
 
+  /// The last vector of every valve.
+  void PublishLast(DecisionSink& decisions) const;
+
   /// Hands over evidence that is not written yet.
   void Flush();
 

@@ -71,8 +71,8 @@ BusDecisionSink::BusDecisionSink(idl::Participant& participant, bool lossless,
   }
 }
 
-bool BusDecisionSink::Publish(const std::string& valve_id,
-                              const ModelSet* models, const Verdict& verdict) {
+void BusDecisionSink::Fill(const std::string& valve_id, const ModelSet* models,
+                           const Verdict& verdict) {
   message_.valve_id = valve_id;
   message_.model_hash = models != nullptr ? models->content_hash : 0;
   message_.channel_count =
@@ -82,25 +82,39 @@ bool BusDecisionSink::Publish(const std::string& valve_id,
   message_.observer_count =
       models != nullptr ? static_cast<int>(models->observers.size()) : 0;
   message_.verdict = verdict;
-  const bool heard =
-      !lossless_ || lossless_->matched() == 0 ||
-      lossless_->Write(message_, stop_) == idl::WriteResult::kSent;
-  return PublishLive(message_) && heard;
 }
 
-bool BusDecisionSink::PublishLive(const idl::DecisionMessage& message) {
-  if (live_.matched() == 0) {
-    unheard_[message.valve_id] = message;
+bool BusDecisionSink::Publish(const std::string& valve_id,
+                              const ModelSet* models, const Verdict& verdict) {
+  unheard_ = unheard_ || live_.matched() == 0;
+  const bool to_lossless = lossless_ && lossless_->matched() > 0;
+  if (unheard_ && !to_lossless) {
     return true;
   }
-  if (!unheard_.empty()) {
-    unheard_.erase(message.valve_id);
-    for (const auto& [valve, last] : unheard_) {
-      live_.Write(last);
-    }
-    unheard_.clear();
+  Fill(valve_id, models, verdict);
+  bool sent = true;
+  if (to_lossless) {
+    sent = lossless_->Write(message_, stop_) == idl::WriteResult::kSent;
   }
-  return live_.Write(message) == idl::WriteResult::kSent;
+  if (!unheard_) {
+    sent = live_.Write(message_) == idl::WriteResult::kSent && sent;
+  }
+  return sent;
+}
+
+bool BusDecisionSink::WantsLast() {
+  if (!unheard_ || live_.matched() == 0) {
+    return false;
+  }
+  unheard_ = false;
+  return true;
+}
+
+void BusDecisionSink::PublishLast(const std::string& valve_id,
+                                  const ModelSet* models,
+                                  const Verdict& verdict) {
+  Fill(valve_id, models, verdict);
+  live_.Write(message_);
 }
 
 bool BusDecisionSink::WaitForAcknowledged(std::chrono::milliseconds timeout) {

@@ -4,7 +4,6 @@
 #include <optional>
 #include <stop_token>
 #include <string>
-#include <unordered_map>
 
 #include "diagnosis/log.h"
 #include "idl/endpoint.h"
@@ -14,7 +13,7 @@
 namespace fdi::monitor {
 
 /// Decision vectors over DDS. What nobody listens to is not sent; who comes
-/// gets the last vector of every valve first, with the next one of any valve.
+/// gets the last vector of every valve first.
 /// The lossless stream, if asked for, is a second one: a slow subscriber of it
 /// makes Publish() wait, until `stop` is requested.
 class BusDecisionSink : public DecisionSink {
@@ -24,6 +23,9 @@ class BusDecisionSink : public DecisionSink {
 
   bool Publish(const std::string& valve_id, const ModelSet* models,
                const Verdict& verdict) override;
+  bool WantsLast() override;
+  void PublishLast(const std::string& valve_id, const ModelSet* models,
+                   const Verdict& verdict) override;
 
   /// Waits until all readers have what was published.
   bool WaitForAcknowledged(std::chrono::milliseconds timeout);
@@ -31,13 +33,14 @@ class BusDecisionSink : public DecisionSink {
   idl::PublisherStatus status() const;
 
  private:
-  bool PublishLive(const idl::DecisionMessage& message);
+  void Fill(const std::string& valve_id, const ModelSet* models,
+            const Verdict& verdict);
 
   idl::Publisher<idl::DecisionMessage> live_;
   std::optional<idl::Publisher<idl::DecisionMessage>> lossless_;
   std::stop_token stop_;
   idl::DecisionMessage message_;
-  std::unordered_map<std::string, idl::DecisionMessage> unheard_;
+  bool unheard_{false};  // Vectors of some valve were not sent.
 };
 
 /// Fault events over DDS, each also a line of the log.
