@@ -97,6 +97,7 @@ TEST_F(PipelineHeartbeatTest, IdleThreadsBeat) {
 TEST_F(PipelineHeartbeatTest, ABusThatHoldsTheDiagnosisUpIsSeen) {
   bus_.notice.Apply([this] { bus_.held = true; });
   pipeline_->Offer("V1", PlantSample(0), 1);
+  pipeline_->AnnounceOffers();
 
   EXPECT_THAT(Stalled(Heartbeat(pipeline_->threads())),
               ElementsAre("diagnosis"));
@@ -116,6 +117,7 @@ TEST_F(PipelineHeartbeatTest, AHistoryThatDoesNotReturnIsSeen) {
 TEST_F(PipelineHeartbeatTest, ARecorderThatDoesNotReturnIsSeen) {
   runs_.notice.Apply([this] { runs_.held = true; });
   pipeline_->Offer("V1", PlantSample(0), 1);
+  pipeline_->AnnounceOffers();
 
   EXPECT_THAT(Stalled(Heartbeat(pipeline_->threads())),
               ElementsAre("recorder"));
