@@ -38,7 +38,7 @@ void AddTransport(CLI::App& app, GlobalOptions& options) {
   app.add_option("--interface", options.interface,
                  "Network interfaces: ADDR[,ADDR] or all")
       ->type_name("ADDR");
-  app.add_option("--transport", options.transport, "udp, shm or default")
+  app.add_option("--transport", options.transport, "udp, shm or default (both)")
       ->check(CLI::IsMember({"udp", "shm", "default"}))
       ->type_name("NAME");
   app.add_option("--qos", options.qos_file, "XML file overriding QoS profiles")

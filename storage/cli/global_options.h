@@ -16,9 +16,11 @@ struct GlobalOptions {
   std::filesystem::path data_dir{"./fdi-data"};  ///< --data, env FDI_DATA
   int domain{0};                                 ///< --domain 0..232
   std::string interface { "127.0.0.1" };  ///< --interface ADDR[,ADDR]|all
-  std::string transport{"default"};       ///< --transport udp|shm|default
-  std::filesystem::path qos_file;         ///< --qos FILE.xml, or empty
-  std::filesystem::path config_file;      ///< --config FILE.toml, or empty
+  /// --transport udp|shm|default (both). Shared memory starts slower, and a
+  /// peer that was killed is in the way of the next for seconds.
+  std::string transport{"udp"};
+  std::filesystem::path qos_file;     ///< --qos FILE.xml, or empty
+  std::filesystem::path config_file;  ///< --config FILE.toml, or empty
   LogLevel log_level{LogLevel::kInfo};
   bool json{false};
   bool utc{false};  ///< Times for people in UTC instead of the local zone.

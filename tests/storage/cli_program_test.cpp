@@ -92,7 +92,7 @@ TEST(ProgramTest, LoopbackAndLocalDataAreTheDefaults) {
 
   EXPECT_EQ(outcome.options.interface, "127.0.0.1");
   EXPECT_EQ(outcome.options.data_dir, "./fdi-data");
-  EXPECT_EQ(outcome.options.transport, "default");
+  EXPECT_EQ(outcome.options.transport, "udp");
   EXPECT_EQ(outcome.options.domain, 0);
 }
 
