@@ -6,12 +6,7 @@
 namespace fdi {
 namespace {
 
-constexpr int kMeanSettling = 30;     // samples until the mean of CV counts
 constexpr double kEndOfTravel = 2.0;  // from 0 or 100 [% of CV]
-
-bool Within(const SignalRange& range, double value) {
-  return value >= range.minimum && value <= range.maximum;
-}
 
 std::optional<int> ChannelOf(const ModelSet& models, Signal output) {
   for (std::size_t c = 0; c < models.channels.size(); ++c) {
@@ -88,12 +83,12 @@ CoverageReasons Coverage::Operation(const Sample& sample) {
   const ValidityRegion& region = models_->validity;
   const double cv = sample[Signal::kCv];
   const bool steps = last_cv_ && std::abs(cv - *last_cv_) > region.cv_step;
-  averaged_ = last_cv_ ? std::min(averaged_ + 1, kMeanSettling) : 0;
+  averaged_ = last_cv_ ? std::min(averaged_ + 1, kCvMeanSettling) : 0;
   mean_cv_ = last_cv_ ? mean_cv_ + kCvMeanGain * (cv - mean_cv_) : cv;
   last_cv_ = cv;
   const bool within =
-      Within(region.cv, cv) &&
-      (averaged_ < kMeanSettling || Within(region.cv_mean, mean_cv_));
+      region.cv.Contains(cv) &&
+      (averaged_ < kCvMeanSettling || region.cv_mean.Contains(mean_cv_));
   reasons |= If(!within, CoverageReason::kCv);
   reasons |= If(steps, CoverageReason::kCvStep);
   reasons |= If(Parked(sample), CoverageReason::kParked);
@@ -105,7 +100,7 @@ CoverageReasons Coverage::Inputs(const Sample& sample,
   CoverageReasons reasons = 0;
   if (sample.Has(Signal::kP1) && sample.Has(Signal::kP2)) {
     const double dp = sample[Signal::kP1] - sample[Signal::kP2];
-    reasons |= If(!Within(models_->validity.dp, dp), CoverageReason::kDp);
+    reasons |= If(!models_->validity.dp.Contains(dp), CoverageReason::kDp);
   }
   for (const Input& input : inputs_) {
     if (input.channel && bank.active(*input.channel)) {
@@ -115,7 +110,7 @@ CoverageReasons Coverage::Inputs(const Sample& sample,
                         r > models_->channels[c].upper_threshold,
                     input.reason);
     } else if (sample.Has(input.signal)) {
-      reasons |= If(!Within(input.range, sample[input.signal]), input.reason);
+      reasons |= If(!input.range.Contains(sample[input.signal]), input.reason);
     }
   }
   return reasons;

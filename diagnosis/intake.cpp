@@ -21,8 +21,7 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
     if (!std::isfinite(sample.values[i])) {
       return Intake::kNotFinite;
     }
-    const SignalRange range = PlausibleRange(signal);
-    if (sample.values[i] < range.minimum || sample.values[i] > range.maximum) {
+    if (!PlausibleRange(signal).Contains(sample.values[i])) {
       return Intake::kRange;
     }
   }

@@ -65,7 +65,7 @@ void ValidateObserver(const ModelSet& models, const Observer& observer) {
   Check(observer.channels.size() == models.channels.size(), models,
         where + "not one model per channel");
   Check(observer.fault >= 0 && observer.fault <= kLastFault, models,
-        where + "fault beyond f1..f19");
+        where + "fault beyond " + std::string(kFaultNames));
   Check(std::abs(observer.strength) <= 1.0, models,
         where + "strength beyond [-1, 1]");
   Check(observer.fault != 0 ||
@@ -93,8 +93,8 @@ void ValidateObserver(const ModelSet& models, const Observer& observer) {
 
 void ValidateRegion(const ModelSet& models) {
   const ValidityRegion& region = models.validity;
-  for (const SignalRange& range :
-       {region.cv, region.dp, region.t1, region.p1, region.p2}) {
+  for (const SignalRange& range : {region.cv, region.cv_mean, region.dp,
+                                   region.t1, region.p1, region.p2}) {
     Check(range.minimum < range.maximum, models,
           "ranges of validity must not be empty");
   }

@@ -46,8 +46,7 @@ double UpperLogRms(const WindowLimits& limits, const ResidualWindow& command) {
 bool Applies(const WindowLimits& limits, const ResidualWindow& window,
              const ResidualWindow& command) {
   return window.full() &&
-         (!command.full() || (command.mean() >= limits.command.minimum &&
-                              command.mean() <= limits.command.maximum));
+         (!command.full() || limits.command.Contains(command.mean()));
 }
 
 bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window,

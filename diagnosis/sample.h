@@ -43,6 +43,10 @@ inline constexpr SignalMask kBasicSignals = 0x3F;
 struct SignalRange {
   double minimum;
   double maximum;
+
+  bool Contains(double value) const {
+    return value >= minimum && value <= maximum;
+  }
 };
 
 /// "CV", "P1", ...

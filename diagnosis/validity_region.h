@@ -13,6 +13,8 @@ inline constexpr SignalRange kUnbounded{
 
 /// Gain of the running mean of CV that ValidityRegion::cv_mean bounds.
 inline constexpr double kCvMeanGain = 0.1;
+/// Samples until that mean counts.
+inline constexpr int kCvMeanSettling = 30;
 
 /// Where the observers of a model set were trained, margins included; see
 /// Coverage for what becomes of a valve outside.
@@ -23,8 +25,8 @@ struct ValidityRegion {
   SignalRange cv_mean{kUnbounded};
   double cv_step{200.0};  ///< Largest change of CV from sample to sample [%].
   SignalRange dp{kUnbounded};  ///< P1 − P2 in normal operation [kPa].
-  SignalRange t1{kUnbounded};  ///< T1 likewise [°C]; of a model set that has
-                               ///< a channel T1 its thresholds hold instead.
+  SignalRange t1{kUnbounded};  ///< T1 likewise [°C]; the thresholds of a
+                               ///< channel T1, if there is one, hold instead.
   SignalRange p1{kUnbounded};  ///< P1 alike [kPa].
   SignalRange p2{kUnbounded};  ///< P2 alike [kPa].
   double flow_cutoff{0.0};     ///< A flow below is none [unit of the flow].

@@ -14,7 +14,6 @@ constexpr double kCommandMargin = 0.1;  // of the range
 constexpr double kLeastCommandMargin = 5.0;
 constexpr double kMeanCommandMargin = 0.25;  // of the range
 constexpr double kLeastMeanCommandMargin = 2.0;
-constexpr std::size_t kMeanSettling = 30;  // samples
 constexpr double kStepFactor = 2.0;
 constexpr double kLeastStep = 5.0;
 constexpr double kInputMargin = 0.5;  // of the range
@@ -70,7 +69,7 @@ SignalRange MeanCommands(const std::vector<Stretch>& stretches) {
         stretch.samples.empty() ? 0.0 : stretch.samples[0][Signal::kCv];
     for (std::size_t k = 1; k < stretch.samples.size(); ++k) {
       mean += kCvMeanGain * (stretch.samples[k][Signal::kCv] - mean);
-      if (k >= kMeanSettling) {
+      if (k >= static_cast<std::size_t>(kCvMeanSettling)) {
         range = Joined(range, {mean, mean});
       }
     }

@@ -37,10 +37,8 @@ bool IsUsable(const Sample& sample, SignalMask signals) {
     if ((signals & MaskOf(signal)) == 0) {
       continue;
     }
-    const SignalRange range = PlausibleRange(signal);
-    const double value = sample.values[i];
     if (sample.quality[i] == SignalQuality::kBad ||
-        !(value >= range.minimum && value <= range.maximum)) {
+        !PlausibleRange(signal).Contains(sample.values[i])) {
       return false;
     }
   }
