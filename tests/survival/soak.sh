@@ -1,15 +1,16 @@
 #!/usr/bin/env bash
 # 100 valves at 100 times real time with --record for FDI_SOAK_SECONDS (default
-# 60, long form 1200): resident memory of the monitor flat after the first
-# minute (or two thirds of a shorter run), runs.db growing by what a sample takes, the
-# WAL bounded, nothing lost. Prints the figures.
+# 60, long form 1200): resident memory of the monitor flat once the page cache
+# of runs.db (32 MB, filled at 6 MB a minute) is full, taken as six minutes; a
+# shorter run may fill it. runs.db growing by what a sample takes, the WAL
+# bounded, nothing lost. Prints the figures.
 # Usage: soak.sh BIN_DIRECTORY
 set -euo pipefail
 bin=$1
 seconds=${FDI_SOAK_SECONDS:-60}
 valves=${FDI_SOAK_VALVES:-100}
 speed=${FDI_SOAK_SPEED:-100}
-max_slope_kb_min=${FDI_SOAK_SLOPE:-1024}
+max_slope_kb_min=${FDI_SOAK_SLOPE:-$((seconds > 480 ? 1024 : 10240))}
 max_wal_mb=80
 max_bytes_per_sample=30
 domain=${FDI_DOMAIN:-94}
@@ -59,7 +60,7 @@ wait "$monitor" || fail "the monitor ended with $?"
 monitor=
 
 lasted=$((SECONDS - begin))
-warm=$((seconds > 120 ? lasted * 60 / seconds : lasted * 2 / 3))
+warm=$((seconds > 480 ? 360 : lasted * 2 / 3))
 slope=$(awk -v warm=$warm '$1 >= warm {n++; x += $1; y += $2; xx += $1 * $1; xy += $1 * $2}
   END {printf "%.0f", (n > 1 ? 60 * (n * xy - x * y) / (n * xx - x * x) : 0)}' "$out/figures")
 peak=$(awk '$2 > m {m = $2} END {print m}' "$out/figures")
