@@ -23,8 +23,9 @@ TEST_F(OnboardProgramTest, ShortRecordIsRefusedAndNothingIsStored) {
   Write("short.csv", csv);
   const Outcome outcome = Run("onboard --valve FV-101 --file short.csv");
   EXPECT_EQ(outcome.code, 3);
-  EXPECT_NE(outcome.err.find("300 samples, onboarding takes at least 600"),
-            std::string::npos)
+  EXPECT_NE(
+      outcome.err.find("300 samples in a row, onboarding takes at least 600"),
+      std::string::npos)
       << outcome.err;
   EXPECT_EQ(Run("show FV-101").code, 5);
 }
