@@ -1,5 +1,7 @@
 #include "storage/history_schema.h"
 
+#include "storage/history_migrations.h"
+
 namespace fdi::storage {
 namespace {
 
@@ -231,7 +233,8 @@ const Schema& HistorySchema() {
   static const Schema schema{"history",
                              0x46444948 /* FDIH */,
                              Synchronous::kFull,
-                             {kVersion1, kVersion2, kVersion3}};
+                             {kVersion1, kVersion2, kVersion3, kOperatorSchema,
+                              kHealthSchema, kShadowSchema}};
   return schema;
 }
 
