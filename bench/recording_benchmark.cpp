@@ -13,8 +13,7 @@
 #include <random>
 #include <vector>
 
-#include <sys/resource.h>
-
+#include "bench/cpu_seconds.h"
 #include "storage/runs.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -80,16 +79,6 @@ class Plant {
   std::mt19937_64 random_{7};
   std::normal_distribution<double> noise_;
 };
-
-double CpuSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) +
-           1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
 
 struct Outcome {
   double seconds{0.0};

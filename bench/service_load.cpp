@@ -13,8 +13,8 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <sys/resource.h>
 
+#include "bench/cpu_seconds.h"
 #include "diagnosis/error.h"
 #include "idl/endpoint.h"
 #include "simulator/valve_simulation.h"
@@ -62,16 +62,6 @@ idl::DdsOptions DdsOf(const Options& options) {
   dds.domain = options.domain;
   dds.max_valves = options.valves;
   return dds;
-}
-
-double CpuSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) +
-           1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
 double SecondsBetween(Clock::time_point from, Clock::time_point to) {

@@ -33,8 +33,7 @@ class QualityCount {
 
 /// Whether `verdict` counts: repeated, late and superseded samples do not.
 inline bool CountsAsTime(const Verdict& verdict) {
-  return verdict.intake != Intake::kRepeat && verdict.intake != Intake::kLate &&
-         verdict.intake != Intake::kSuperseded;
+  return !OutOfOrder(verdict.intake);
 }
 
 }  // namespace fdi

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace fdi {
 namespace {
@@ -23,13 +22,6 @@ double Variance(const ObserverBank& bank, const StrengthPath::Point& point) {
       kExtrapolationError *
       Lane(bank.state().outputs->extrapolations, point.slot);
   return point.sd * point.sd + extrapolated * extrapolated;
-}
-
-// As Residual() in ts_model.h.
-double ResidualOf(double saturation, double reading, double prediction) {
-  return reading >= saturation && prediction >= saturation
-             ? std::numeric_limits<double>::quiet_NaN()
-             : reading - std::min(prediction, saturation);
 }
 
 }  // namespace
@@ -129,8 +121,8 @@ StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
       2.0 * high_share * low_share * segment.high_sd * segment.low_sd;
   const double saturation =
       path_->points[place.nearest * channels_ + channel].saturation;
-  return {ResidualOf(saturation, bank.reading(static_cast<int>(channel)),
-                     segment.low + segment.slope * place.from_low),
+  return {Residual(saturation, bank.reading(static_cast<int>(channel)),
+                   segment.low + segment.slope * place.from_low),
           segment.slope, variance + error * error};
 }
 

@@ -213,10 +213,14 @@ bool SharesAntecedents(const TsModel& a, const TsModel& b) {
                     b.rules.end(), SamePremise);
 }
 
-double Residual(const TsModel& model, double reading, double prediction) {
-  return reading >= model.saturation && prediction >= model.saturation
+double Residual(double saturation, double reading, double prediction) {
+  return reading >= saturation && prediction >= saturation
              ? std::numeric_limits<double>::quiet_NaN()
-             : reading - std::min(prediction, model.saturation);
+             : reading - std::min(prediction, saturation);
+}
+
+double Residual(const TsModel& model, double reading, double prediction) {
+  return Residual(model.saturation, reading, prediction);
 }
 
 bool RunsOnItself(const TsModel& model) {

@@ -101,6 +101,7 @@ bool SharesAntecedents(const TsModel& a, const TsModel& b);
 
 /// r = y − min(ŷ, saturation); NaN if reading and prediction are both at the
 /// limit of the transmitter, where they say nothing about each other.
+double Residual(double saturation, double reading, double prediction);
 double Residual(const TsModel& model, double reading, double prediction);
 
 /// True if the model is parallel and has its own output among its regressors.

@@ -86,9 +86,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
   verdict_.transition_count = 0;
   const SourceOrder::Placement placement = order_.Place(sample);
   verdict_.intake = placement.intake;
-  if (placement.intake == Intake::kRepeat ||
-      placement.intake == Intake::kLate ||
-      placement.intake == Intake::kSuperseded) {
+  if (OutOfOrder(placement.intake)) {
     return verdict_;
   }
   if (placement.new_source) {

@@ -24,6 +24,13 @@ enum class Intake : std::uint8_t {
 };
 inline constexpr int kIntakeCount = 9;
 
+/// True if the sample left the engine as it was: repeated, late, or of a source
+/// that a newer one superseded.
+constexpr bool OutOfOrder(Intake intake) {
+  return intake == Intake::kRepeat || intake == Intake::kLate ||
+         intake == Intake::kSuperseded;
+}
+
 /// Beside the state: may the diagnosis be relied upon?
 enum class Quality : std::uint8_t {
   kLive,

@@ -13,9 +13,9 @@ namespace fdi::idl {
 /// A generated type that survives foreign bytes: what cannot be deserialized,
 /// for whatever reason, is refused and counted, once: the library deserializes
 /// a message into an object of its own first, for its key, and then into that
-/// of the reader. And one that the endpoints of a
-/// participant can share: generated types compute keys in a buffer of their
-/// own, from which two threads got each other's keys.
+/// of the reader. And one that the endpoints of a participant can share:
+/// generated types compute keys in a buffer of their own, from which two
+/// threads got each other's keys.
 template <typename Generated>
 class CheckedType : public Generated {
  public:

@@ -6,14 +6,6 @@
 namespace fdi::monitor {
 namespace {
 
-std::string LowerCase(std::string_view name) {
-  std::string lower(name);
-  std::ranges::transform(lower, lower.begin(), [](char c) {
-    return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  });
-  return lower;
-}
-
 struct CounterInfo {
   std::string_view name;
   CounterMetric metric;
@@ -90,6 +82,14 @@ const CounterInfo& InfoOf(Counter counter) {
 
 }  // namespace
 
+std::string QualityLabel(Quality quality) {
+  std::string lower(QualityName(quality));
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) {
+    return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  });
+  return lower;
+}
+
 std::string_view CounterName(Counter counter) {
   return InfoOf(counter).name;
 }
@@ -111,8 +111,7 @@ std::vector<std::pair<std::string, std::uint64_t>> Counters::Snapshot() const {
   }
   for (std::size_t i = 0; i < kQualityCount; ++i) {
     const auto quality = static_cast<Quality>(i);
-    totals.emplace_back("samples_" + LowerCase(QualityName(quality)),
-                        (*this)[quality]);
+    totals.emplace_back("samples_" + QualityLabel(quality), (*this)[quality]);
   }
   return totals;
 }

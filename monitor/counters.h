@@ -45,6 +45,7 @@ inline constexpr std::size_t kCounterCount =
     static_cast<std::size_t>(Counter::kCount_);
 
 std::string_view CounterName(Counter counter);  ///< "received", ...
+std::string QualityLabel(Quality quality);      ///< "live", ...
 
 /// How a counter is exposed: counters of one family stand side by side and
 /// differ in a label.

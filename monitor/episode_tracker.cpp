@@ -14,11 +14,6 @@ std::int64_t Ns(double seconds) {
   return std::llround(seconds * 1e9);
 }
 
-bool OutOfOrder(Intake intake) {
-  return intake == Intake::kRepeat || intake == Intake::kLate ||
-         intake == Intake::kSuperseded;
-}
-
 }  // namespace
 
 std::vector<Candidate> CandidatesOf(const ModelSet& models,

@@ -22,11 +22,6 @@ constexpr std::array<LogId, kIntakeCount> kRejectionIds{
     LogId::kUnit,
     LogId::kPeriod};
 
-bool OutOfOrder(Intake intake) {
-  return intake == Intake::kRepeat || intake == Intake::kLate ||
-         intake == Intake::kSuperseded;
-}
-
 SampleRecorderOptions RecorderOptionsOf(const PipelineOptions& options) {
   SampleRecorderOptions recorder = options.recorder;
   recorder.utc_now_ns = options.history.utc_now_ns;

@@ -5,20 +5,15 @@
 #include "diagnosis/error.h"
 
 namespace fdi::storage {
-namespace {
 
-std::uintmax_t WalSize(std::filesystem::path database) {
+std::uintmax_t FileBytes(const std::filesystem::path& database) {
   std::error_code error;
-  const std::uintmax_t bytes =
-      std::filesystem::file_size(database += "-wal", error);
+  const std::uintmax_t bytes = std::filesystem::file_size(database, error);
   return error ? 0 : bytes;
 }
 
-}  // namespace
-
-WalSizes WalSizesOf(const DataDirectory& directory) {
-  return {WalSize(directory.runs()), WalSize(directory.models()),
-          WalSize(directory.history())};
+std::uintmax_t WalBytes(const std::filesystem::path& database) {
+  return FileBytes(database.string() + "-wal");
 }
 
 void EnsureExists(const DataDirectory& directory) {

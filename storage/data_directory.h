@@ -14,15 +14,11 @@ struct DataDirectory {
   std::filesystem::path history() const { return path / "history.db"; }
 };
 
-/// Size of the write-ahead logs [byte]; 0 where there is none. A log grows
-/// without end while a reader keeps its transaction open.
-struct WalSizes {
-  std::uintmax_t runs{0};
-  std::uintmax_t models{0};
-  std::uintmax_t history{0};
-};
-/// From any thread, beside those that use the databases.
-WalSizes WalSizesOf(const DataDirectory& directory);
+/// Sizes of a database and of its write-ahead log [byte], 0 where there is
+/// none; from any thread, beside those that use it. A log grows without end
+/// while a reader keeps its transaction open.
+std::uintmax_t FileBytes(const std::filesystem::path& database);
+std::uintmax_t WalBytes(const std::filesystem::path& database);
 
 /// Makes the folder if it is not there; for programs that write.
 /// @throws DataError naming the path and the reason.

@@ -2,20 +2,12 @@
 #include <sqlite3.h>
 
 #include "diagnosis/error.h"
+#include "storage/data_directory.h"
 #include "storage/database.h"
 #include "storage/sqlite_call.h"
 #include "storage/write_gate.h"
 
 namespace fdi::storage {
-namespace {
-
-std::uintmax_t SizeOf(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::uintmax_t bytes = std::filesystem::file_size(path, error);
-  return error ? 0 : bytes;
-}
-
-}  // namespace
 
 bool Database::Checkpoint() {
   if (access_ != Access::kWriter) {
@@ -39,11 +31,11 @@ bool Database::Checkpoint() {
 }
 
 std::uintmax_t Database::WalBytes() const {
-  return SizeOf(path_.string() + "-wal");
+  return storage::WalBytes(path_);
 }
 
 std::uintmax_t Database::FileBytes() const {
-  return SizeOf(path_);
+  return storage::FileBytes(path_);
 }
 
 std::uintmax_t Database::UsedBytes() {

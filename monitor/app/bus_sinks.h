@@ -13,9 +13,9 @@
 namespace fdi::monitor {
 
 /// Decision vectors over DDS. What nobody listens to is not sent; who comes
-/// gets the last vector of every valve first.
-/// The lossless stream, if asked for, is a second one: a slow subscriber of it
-/// makes Publish() wait, until `stop` is requested.
+/// gets the last vector of every valve first. The lossless stream, if asked
+/// for, is a second one: a slow subscriber of it makes Publish() wait, until
+/// `stop` is requested.
 class BusDecisionSink : public DecisionSink {
  public:
   BusDecisionSink(idl::Participant& participant, bool lossless,

@@ -1,25 +1,16 @@
 #include "monitor/app/metrics_page.h"
 
 #include <algorithm>
-#include <cctype>
 #include <chrono>
-#include <system_error>
 
 #include "monitor/app/process_facts.h"
 #include "monitor/exposition.h"
+#include "storage/data_directory.h"
 
 namespace fdi::monitor {
 namespace {
 
 using Type = Exposition::Type;
-
-std::string LowerCase(std::string_view name) {
-  std::string lower(name);
-  std::ranges::transform(lower, lower.begin(), [](char c) {
-    return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  });
-  return lower;
-}
 
 void AddCounters(const Counters& counters, Exposition& page) {
   std::string_view family;
@@ -42,7 +33,7 @@ void AddCounters(const Counters& counters, Exposition& page) {
               "Sample periods by quality, with or without a sample");
   for (std::size_t i = 0; i < kQualityCount; ++i) {
     const auto quality = static_cast<Quality>(i);
-    page.Value(counters[quality], {"quality", LowerCase(QualityName(quality))});
+    page.Value(counters[quality], {"quality", QualityLabel(quality)});
   }
 }
 
@@ -142,14 +133,7 @@ void AddProcess(const MetricsFacts& facts, Exposition& page) {
 
 DatabaseFacts FactsOf(std::string_view database,
                       const std::filesystem::path& path) {
-  const auto size = [](const std::filesystem::path& file) {
-    std::error_code error;
-    const std::uintmax_t bytes = std::filesystem::file_size(file, error);
-    return error ? 0 : static_cast<std::uint64_t>(bytes);
-  };
-  std::filesystem::path wal = path;
-  wal += "-wal";
-  return {database, size(path), size(wal)};
+  return {database, storage::FileBytes(path), storage::WalBytes(path)};
 }
 
 std::string MetricsPage(const StatusFacts& status, const MetricsFacts& facts) {

@@ -103,4 +103,35 @@ inline std::string ValveName(int i) {
   return "valve-" + std::to_string(i);
 }
 
+class DeliveryTest : public ::testing::Test {
+ protected:
+  const TestDomain domain_;
+  LogCapture log_;
+};
+
+/// Checks that each valve's samples come as 0, 1, 2, ...
+struct OrderCheck {
+  std::map<std::string, std::uint64_t> next;
+  std::uint64_t count{0};
+  std::uint64_t out_of_order{0};
+
+  Handlers<ValveSampleMessage> AsHandlers() {
+    return {[this](const ValveSampleMessage& message, const Reception&) {
+              std::uint64_t& expected = next[message.valve_id];
+              out_of_order += message.sample.seq != expected ? 1 : 0;
+              expected = message.sample.seq + 1;
+              ++count;
+            },
+            nullptr};
+  }
+};
+
+inline DecisionMessage DecisionOf(const std::string& valve, std::uint64_t seq) {
+  DecisionMessage message;
+  message.valve_id = valve;
+  message.fault_count = 5;
+  message.verdict.seq = seq;
+  return message;
+}
+
 }  // namespace fdi::idl

@@ -50,14 +50,14 @@ TEST_F(DatabaseStressTest, TheLogShrinksOnceAReaderThatPinnedItIsGone) {
     const Snapshot pinned(reader);
     reader.QueryInt64("SELECT count(*) FROM episode");
     Grow(writer, 80 * kMegabyte);
-    EXPECT_GT(WalSizesOf(data_).history, 75 * kMegabyte);
-    EXPECT_EQ(WalSizesOf(data_).history, writer.WalBytes());
-    EXPECT_EQ(WalSizesOf(data_).runs, 0U);
+    EXPECT_GT(WalBytes(data_.history()), 75 * kMegabyte);
+    EXPECT_EQ(WalBytes(data_.history()), writer.WalBytes());
+    EXPECT_EQ(WalBytes(data_.runs()), 0U);
   }
   // The first commit folds the log in, the next one begins it anew.
   Grow(writer, 2 * kMegabyte);
 
-  EXPECT_LE(WalSizesOf(data_).history, kJournalLimit + 2 * kMegabyte);
+  EXPECT_LE(WalBytes(data_.history()), kJournalLimit + 2 * kMegabyte);
   EXPECT_LE(writer.FileBytes(), 10 * kMegabyte);
 }
 

@@ -266,64 +266,6 @@ TEST_F(HistoryWriterTest, SameGapTwiceIsOneGap) {
   EXPECT_EQ(Sql("SELECT count(*) FROM data_gap"), "2");
 }
 
-TEST_F(HistoryWriterTest, TraceReadsBackBitForBitAcrossChunks) {
-  const auto before = Instants(1800, -1800);
-  {
-    HistoryWriter writer(path_);
-    writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
-    ASSERT_TRUE(writer.AppendTrace(Id(), before));
-    for (int k = 0; k < 310; ++k) {  // As it goes: one instant per commit.
-      ASSERT_TRUE(writer.AppendTrace(Id(), std::vector{Instant(k)}));
-      writer.Commit(kDetected);
-    }
-    writer.EndTrace(Id());
-    writer.EndSession(kDetected, true);
-  }
-
-  const auto trace = HistoryReader(path_).Trace(Id());
-
-  ASSERT_EQ(trace.size(), 2110U);
-  for (int i = 0; i < 2110; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const TraceInstant expected = i < 1800 ? before[at] : Instant(i - 1800);
-    ASSERT_EQ(trace[at].received.sample.stamp_ns,
-              expected.received.sample.stamp_ns);
-    ASSERT_EQ(trace[at].received.sample.values,
-              expected.received.sample.values);
-    ASSERT_EQ(trace[at].residuals, expected.residuals);
-    ASSERT_EQ(trace[at].fault_factors, expected.fault_factors);
-    ASSERT_EQ(trace[at].normal_factor, expected.normal_factor);
-    ASSERT_EQ(trace[at].state, expected.state);
-  }
-  EXPECT_EQ(Sql("SELECT count(*) FROM episode_trace"), "8");  // 6 + 1 + 1
-}
-
-TEST_F(HistoryWriterTest, TraceOfAnotherModelSetIsNotTaken) {
-  HistoryWriter writer(path_);
-  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
-  TraceInstant other = Instant(0);
-  other.fault_factors.push_back(0.5);
-
-  EXPECT_FALSE(writer.AppendTrace(Id(), std::vector{other}));
-  EXPECT_THROW(writer.AppendTrace(7, {}), NotFoundError);
-}
-
-TEST_F(HistoryWriterTest, PeakFactorIsTheLargestOfTheIsolatedSetInTheTrace) {
-  HistoryWriter writer(path_);
-  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
-  writer.Record(Event(Kind::kIsolated, 20, 0b010, 0.8));
-  TraceInstant high = Instant(30);
-  high.isolated = 0b010;
-  high.fault_factors = {0.99, 0.93, 0.1};  // f1 is higher, but not isolated.
-  TraceInstant early = Instant(10);  // Before isolation: another question.
-  early.fault_factors = {0.0, 0.97, 0.0};
-
-  writer.AppendTrace(Id(), std::vector{early, high});
-  writer.Commit(kDetected);
-
-  EXPECT_EQ(Sql("SELECT peak_factor FROM fault_history"), "0.93");
-}
-
 TEST_F(HistoryWriterTest, FailedCommitKeepsWhatIsPending) {
   HistoryWriter writer(path_);
   writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
@@ -340,25 +282,6 @@ TEST_F(HistoryWriterTest, FailedCommitKeepsWhatIsPending) {
   writer.Commit(kDetected);
 
   EXPECT_EQ(HistoryReader(path_).Trace(Id()).size(), 700U);
-}
-
-TEST_F(HistoryWriterTest, DamagedTraceIsRefusedByName) {
-  {
-    HistoryWriter writer(path_);
-    writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
-    writer.AppendTrace(Id(), Instants(10, 0));
-    writer.Commit(kDetected);
-  }
-  {
-    Database database(path_, HistorySchema(), Access::kOccasionalWriter);
-    Transaction transaction(database);
-    database.Run(
-        "UPDATE episode_trace SET vectors = CAST(substr(vectors, 1, 20) || "
-        "x'00' AS BLOB)");
-    transaction.Commit();
-  }
-
-  EXPECT_THROW(HistoryReader(path_).Trace(Id()), DataError);
 }
 
 TEST_F(HistoryWriterTest, TimeAddsUpByDayAndQuality) {

@@ -10,6 +10,7 @@
 
 #include "diagnosis/error.h"
 #include "storage/model_codec.h"
+#include "tests/storage/message_of.h"
 #include "tests/storage/model_set_fixture.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -20,16 +21,6 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-template <typename Error, typename Call>
-std::string MessageOf(Call&& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "not thrown";
-}
 
 class ModelsTest : public ::testing::Test {
  protected:

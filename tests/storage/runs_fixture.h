@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "storage/runs.h"
+#include "tests/storage/message_of.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::storage {
@@ -32,16 +33,6 @@ inline StoredSample SampleAt(std::int64_t k, int valve = 0) {
   stored.sample.Set(Signal::kCv, 50.0 + valve);
   stored.sample.Set(Signal::kX, std::sin(0.1 * static_cast<double>(k)));
   return stored;
-}
-
-template <typename Error, typename Call>
-std::string MessageOf(Call&& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "not thrown";
 }
 
 /// A runs.db of its own.

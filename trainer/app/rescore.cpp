@@ -82,11 +82,6 @@ void BackdateDetections(const Verdict& verdict, std::int64_t start_ns,
 
 }  // namespace
 
-bool OutOfOrder(Intake intake) {
-  return intake == Intake::kRepeat || intake == Intake::kLate ||
-         intake == Intake::kSuperseded;
-}
-
 FaultTruth TruthOf(const storage::StoredSample& stored) {
   FaultTruth truth = stored.truth.value_or(FaultTruth{});
   if (truth.strength == 0.0) {

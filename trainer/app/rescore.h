@@ -8,10 +8,6 @@
 
 namespace fdi::trainer {
 
-/// Repeats, late samples and those of a superseded source, which no engine
-/// answers.
-bool OutOfOrder(Intake intake);
-
 /// The truth beside a sample; {0, 0} while no fault acts or none is known.
 FaultTruth TruthOf(const storage::StoredSample& stored);
 

@@ -1,0 +1,108 @@
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/error.h"
+#include "diagnosis/valve_engine.h"
+#include "tests/diagnosis/allocation_count.h"
+#include "tests/diagnosis/engine_run.h"
+#include "tests/diagnosis/linear_plant.h"
+
+namespace fdi {
+namespace {
+
+using testing::AddF3;
+using testing::AddF6;
+using testing::Noise;
+using testing::PlantSample;
+using testing::Seen;
+using testing::SharedPlant;
+using testing::StampOf;
+using testing::StepRange;
+
+constexpr int kSettled = kMaxLag;  // samples before LIVE
+
+void FullF6(Sample& sample) {
+  AddF6(sample, 1.0);
+}
+
+TEST(ValveEngineIntakeTest, RepeatedAndLateSamplesChangeNothing) {
+  ValveEngine engine(SharedPlant());
+  StepRange(engine, 0, 60);
+  ValveEngine twin(SharedPlant());
+  StepRange(twin, 0, 60);
+  Sample repeat = PlantSample(59);
+  AddF6(repeat, 1.0);
+  EXPECT_EQ(engine.Step(repeat).intake, Intake::kRepeat);
+  EXPECT_EQ(engine.Step(PlantSample(10)).intake, Intake::kLate);
+  const Verdict after = engine.Step(PlantSample(60));
+  const Verdict expected = twin.Step(PlantSample(60));
+  EXPECT_EQ(after.residuals[1], expected.residuals[1]);
+  EXPECT_EQ(after.quality, Quality::kLive);
+}
+
+TEST(ValveEngineIntakeTest, GapSettlesAnewAndTakesNoDecision) {
+  ValveEngine engine(SharedPlant());
+  StepRange(engine, 0, 50);
+  const Seen gap = StepRange(engine, 53, 54, FullF6);
+  EXPECT_TRUE(gap.last.initialised);
+  EXPECT_EQ(gap.last.quality, Quality::kSettling);
+  const Seen settling = StepRange(engine, 54, 53 + kSettled, FullF6);
+  EXPECT_TRUE(settling.transitions.empty());
+  const Seen live = StepRange(engine, 53 + kSettled, 60 + kSettled, FullF6);
+  ASSERT_EQ(live.transitions.size(), 1U);
+}
+
+TEST(ValveEngineIntakeTest, BadValuesNeverReachAnObserver) {
+  const struct {
+    double value;
+    Intake intake;
+  } cases[] = {{std::nan(""), Intake::kNotFinite},
+               {std::numeric_limits<double>::infinity(), Intake::kNotFinite},
+               {-100.0, Intake::kRange}};
+  for (const auto& bad : cases) {
+    ValveEngine engine(SharedPlant());
+    StepRange(engine, 0, 50);
+    Sample sample = PlantSample(50);
+    sample.Set(Signal::kF, bad.value);
+    const Verdict verdict = engine.Step(sample);
+    EXPECT_EQ(verdict.intake, bad.intake);
+    EXPECT_EQ(verdict.quality, Quality::kBadInput);
+    EXPECT_TRUE(engine.Step(PlantSample(51)).initialised);
+  }
+}
+
+TEST(ValveEngineIntakeTest, BadQualityIsRefused) {
+  ValveEngine engine(SharedPlant());
+  Sample sample = PlantSample(0);
+  sample.quality[Index(Signal::kF)] = SignalQuality::kBad;
+  EXPECT_EQ(engine.Step(sample).intake, Intake::kBadQuality);
+}
+
+TEST(ValveEngineIntakeTest, AnotherFlowUnitIsRefused) {
+  ValveEngine engine(SharedPlant());
+  Sample sample = PlantSample(0);
+  sample.flow_unit = FlowUnit::kTPerHour;
+  EXPECT_EQ(engine.Step(sample).intake, Intake::kUnit);
+}
+
+TEST(ValveEngineIntakeTest, ChannelWithoutItsSignalAbstains) {
+  ValveEngine engine(SharedPlant());
+  const auto without_flow = [](Sample& s) {
+    s.present = static_cast<SignalMask>(s.present & ~MaskOf(Signal::kF));
+  };
+  StepRange(engine, 0, 50, without_flow);
+  const Seen seen = StepRange(engine, 50, 80, [&](Sample& s) {
+    without_flow(s);
+    s.values[Index(Signal::kX)] -= 20.0;
+  });
+  EXPECT_EQ(seen.last.confidence, 0.5);
+  EXPECT_TRUE(std::isnan(seen.last.residuals[1]));
+  EXPECT_EQ(FaultSetName(engine.models(), seen.last.isolated), "f1");
+}
+
+}  // namespace
+}  // namespace fdi

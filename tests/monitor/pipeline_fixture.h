@@ -1,0 +1,64 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "monitor/pipeline.h"
+#include "tests/monitor/fake_sinks.h"
+#include "tests/monitor/linear_models.h"
+
+namespace fdi::monitor {
+
+inline std::string ValveName(int v) {
+  std::string name("V");
+  return name += std::to_string(v);
+}
+
+/// A pipeline between sinks that a test holds up or breaks.
+class PipelineTest : public testing::Test {
+ protected:
+  PipelineTest() {
+    options_.history.utc_now_ns = [] { return std::int64_t{1'000}; };
+    options_.history.retry_period = std::chrono::milliseconds(20);
+    options_.history.commit_period = std::chrono::milliseconds(20);
+    options_.recorder.commit_period = std::chrono::milliseconds(20);
+  }
+
+  void Start(SampleSink* samples = nullptr) {
+    pipeline_ = std::make_unique<Pipeline>(
+        options_, PipelineSinks{bus_, bus_, history_, samples},
+        std::make_shared<FixedResolver>(SharedLinearModels()), counters_, log_);
+    pipeline_->Start({});
+  }
+  void Offer(const std::string& valve, std::uint64_t from, std::uint64_t to,
+             double offset = 0.0) {
+    for (std::uint64_t k = from; k < to; ++k) {
+      ASSERT_TRUE(pipeline_->Offer(valve, PlantSample(k, offset), 1));
+    }
+  }
+  void OfferEpisode(const std::string& valve) {
+    Offer(valve, 0, 50);
+    Offer(valve, 50, 80, kF7Offset);
+  }
+  bool AwaitEvents(std::size_t count) {
+    return bus_.notice.Await([&] { return bus_.events.size() >= count; });
+  }
+
+  PipelineOptions options_;
+  FakeBus bus_;
+  FakeHistory history_;
+  Counters counters_;
+  std::vector<std::string> lines_;
+  ThrottledLog log_{[this](LogLevel, std::string_view line) {
+    static std::mutex mutex;
+    const std::lock_guard lock(mutex);
+    lines_.emplace_back(line);
+  }};
+  std::unique_ptr<Pipeline> pipeline_;
+};
+
+}  // namespace fdi::monitor

@@ -1,0 +1,202 @@
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "monitor/pipeline.h"
+#include "tests/monitor/pipeline_fixture.h"
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::milliseconds;
+
+// What is stored, and what becomes of it while storage fails.
+using PipelineStorageTest = PipelineTest;
+
+TEST_F(PipelineStorageTest, AnEventIsStoredBeforeItIsPublished) {
+  Start();
+  OfferEpisode("V1");
+  ASSERT_TRUE(AwaitEvents(2));
+  pipeline_->Stop();
+
+  EXPECT_THAT(bus_.events,
+              testing::ElementsAre(std::pair(TransitionKind::kDetected, true),
+                                   std::pair(TransitionKind::kIsolated, true)));
+  EXPECT_EQ(history_.recorded.size(), 2U);
+  EXPECT_EQ(history_.sent, 2);
+  EXPECT_EQ(counters_[Counter::kEpisodes], 1U);
+  // All evidence up to the stop is there, the episode stays open.
+  EXPECT_EQ(history_.trace_points, 80U);
+}
+
+// Of valves that fail in the same sample none waits for the commits of others.
+TEST_F(PipelineStorageTest, EventsThatWaitTogetherAreStoredInOneCommit) {
+  constexpr int kValves = 100;
+  history_.commit_time = milliseconds(40);
+  Start();
+  for (int v = 0; v < kValves; ++v) {
+    Offer(ValveName(v), 0, 50);
+  }
+  for (std::uint64_t k = 50; k < 80; ++k) {
+    for (int v = 0; v < kValves; ++v) {
+      Offer(ValveName(v), k, k + 1, kF7Offset);
+    }
+  }
+  ASSERT_TRUE(AwaitEvents(2 * kValves));
+  pipeline_->Stop();
+
+  EXPECT_EQ(counters_[Counter::kEventsUnpersisted], 0U);
+  EXPECT_EQ(history_.recorded.size(), 2U * kValves);
+  for (const auto& [key, count] : history_.recorded) {
+    EXPECT_EQ(count, 1);
+  }
+}
+
+// A commit that fails as a whole is repeated as a whole, and nothing doubled.
+TEST_F(PipelineStorageTest, ACommitOfManyThatFailsIsRepeated) {
+  history_.broken = true;
+  Start();
+  for (int v = 0; v < 20; ++v) {
+    OfferEpisode(ValveName(v));
+  }
+  ASSERT_TRUE(AwaitEvents(40));
+  history_.notice.Apply([&] { history_.broken = false; });
+  ASSERT_TRUE(
+      history_.notice.Await([&] { return history_.recorded.size() == 40; }));
+  pipeline_->Stop();
+
+  for (const auto& [key, count] : history_.recorded) {
+    EXPECT_EQ(count, 1);
+  }
+  EXPECT_EQ(history_.gaps.size(), 1U);
+}
+
+TEST_F(PipelineStorageTest, AStuckHistoryHoldsAnEventUpForItsPatienceOnly) {
+  options_.history.patience = milliseconds(50);
+  history_.stuck = true;
+  Start();
+  const auto start = std::chrono::steady_clock::now();
+  OfferEpisode("V1");
+  ASSERT_TRUE(AwaitEvents(2));
+
+  EXPECT_GE(bus_.event_times[0] - start, milliseconds(50));
+  EXPECT_FALSE(bus_.events[0].second);
+  history_.notice.Apply([&] { history_.stuck = false; });
+  pipeline_->Stop();
+  EXPECT_EQ(counters_[Counter::kEventsUnpersisted], 2U);
+  for (const auto& [key, count] : history_.recorded) {
+    EXPECT_EQ(count, 1);
+  }
+  EXPECT_EQ(history_.recorded.size(), 2U);
+}
+
+TEST_F(PipelineStorageTest, ABrokenHistoryStopsNothingAndIsMadeGoodLater) {
+  history_.broken = true;
+  Start();
+  OfferEpisode("V1");
+  ASSERT_TRUE(AwaitEvents(2));
+  EXPECT_FALSE(bus_.events[0].second);
+  EXPECT_TRUE(pipeline_->history_degraded());
+  ASSERT_TRUE(bus_.notice.Await([&] { return bus_.decisions.size() == 80; }));
+
+  history_.notice.Apply([&] { history_.broken = false; });
+  ASSERT_TRUE(history_.notice.Await([&] { return history_.gaps.size() == 1; }));
+  pipeline_->Stop();
+
+  EXPECT_FALSE(pipeline_->history_degraded());
+  EXPECT_EQ(history_.gaps[0].reason, "persistence_degraded");
+  ASSERT_EQ(history_.recorded.size(), 2U);
+  for (const auto& [key, count] : history_.recorded) {
+    EXPECT_EQ(count, 1);
+  }
+}
+
+TEST_F(PipelineStorageTest, StoppingWithABrokenHistoryCountsWhatIsLost) {
+  history_.broken = true;
+  Start();
+  OfferEpisode("V1");
+  pipeline_->Stop();
+
+  EXPECT_TRUE(pipeline_->history_degraded());
+  EXPECT_EQ(bus_.events.size(), 2U);
+  EXPECT_EQ(counters_[Counter::kEventsLost], 2U);
+}
+
+TEST_F(PipelineStorageTest, ALosslessRecorderHoldsEverySampleInOrder) {
+  options_.recorder.lossless = true;
+  options_.recorder.queue_samples = 8;
+  FakeRuns runs;
+  Start(&runs);
+  Offer("V1", 0, 3000);
+  pipeline_->Offer("V1", BadSample(3000), 1);
+  pipeline_->Offer("V1", PlantSample(5), 1);
+  pipeline_->OfferEnd("V1", 1);
+  pipeline_->Stop();
+
+  ASSERT_EQ(runs.stored.size(), 3002U);
+  for (std::size_t k = 0; k < 3000; ++k) {
+    EXPECT_EQ(runs.stored[k].sample.seq, k);
+  }
+  EXPECT_TRUE(runs.stored[0].initialised);
+  EXPECT_EQ(runs.stored[3000].intake, Intake::kNotFinite);
+  EXPECT_EQ(runs.stored[3001].intake, Intake::kLate);
+  EXPECT_EQ(runs.ends, 1);
+  EXPECT_EQ(counters_[Counter::kRecorded], 3002U);
+  EXPECT_EQ(counters_[Counter::kRecordDropped], 0U);
+}
+
+TEST_F(PipelineStorageTest, ARecorderThatFallsBehindCountsWhatIsMissing) {
+  options_.recorder.queue_samples = 8;
+  FakeRuns runs;
+  runs.held = true;
+  Start(&runs);
+  Offer("V1", 0, 1000);
+  ASSERT_TRUE(bus_.notice.Await([&] { return bus_.decisions.size() == 1000; }));
+  runs.notice.Apply([&] { runs.held = false; });
+  pipeline_->Stop();
+
+  EXPECT_GT(counters_[Counter::kRecordDropped], 0U);
+  EXPECT_EQ(counters_[Counter::kRecorded], runs.stored.size());
+  EXPECT_EQ(counters_[Counter::kRecorded] + counters_[Counter::kRecordDropped],
+            1000U);
+}
+
+TEST_F(PipelineStorageTest,
+       RecordingThatFailsDropsAndCountsWhileDiagnosisGoesOn) {
+  options_.recorder.lossless = true;
+  options_.recorder.max_pending = 100;
+  FakeRuns runs;
+  runs.broken = true;
+  Start(&runs);
+  Offer("V1", 0, 1000);
+  pipeline_->Stop();
+
+  EXPECT_EQ(bus_.decisions.size(), 1000U);
+  EXPECT_TRUE(pipeline_->recording_degraded());
+  EXPECT_EQ(counters_[Counter::kRecordDropped], 1000U);
+}
+
+TEST_F(PipelineStorageTest,
+       RecordingThatResumesLeavesAGapWhereSamplesAreMissing) {
+  options_.recorder.max_pending = 100;
+  FakeRuns runs;
+  runs.broken = true;
+  Start(&runs);
+  Offer("V1", 0, 150);
+  ASSERT_TRUE(history_.notice.Await(
+      [&] { return counters_[Counter::kRecordDropped] == 100; }));
+  runs.notice.Apply([&] { runs.broken = false; });
+  ASSERT_TRUE(history_.notice.Await([&] { return history_.gaps.size() == 1; }));
+  Offer("V1", 150, 200);
+  pipeline_->Stop();
+
+  EXPECT_EQ(history_.gaps.size(), 1U);
+  EXPECT_EQ(history_.gaps[0].reason, "record_dropped");
+  EXPECT_EQ(history_.gaps[0].valve_id, "");
+  EXPECT_FALSE(pipeline_->recording_degraded());
+  EXPECT_EQ(runs.stored.size(), 100U);
+}
+
+}  // namespace
+}  // namespace fdi::monitor
