@@ -77,7 +77,7 @@ TEST_F(HistoryQueryTest, AnOlderFileGetsItsAnswersAndIndexes) {
   const DataDirectory old{directory_.path() / "old"};
   EnsureExists(old);
   Schema second = HistorySchema();
-  second.migrations.pop_back();
+  second.migrations.resize(2);
   {
     Database file(old.history(), second, Access::kWriter);
     Transaction transaction(file);
