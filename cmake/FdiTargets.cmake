@@ -36,12 +36,23 @@ function(fdi_settings target)
   endif()
 endfunction()
 
+# Tests and command lines under sanitizers: twice as fast to build without
+# optimisation, and nothing in them takes long.
+function(fdi_quick_build target)
+  if(FDI_SANITIZE AND NOT FDI_FUZZ)
+    target_compile_options(${target} PRIVATE -O0)
+  endif()
+endfunction()
+
 # fdi_library(name SOURCES a.cpp ... [PUBLIC lib ...] [PRIVATE lib ...])
 function(fdi_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
   target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   fdi_settings(${name})
+  if(name MATCHES "_(app|cli|console)$")
+    fdi_quick_build(${name})
+  endif()
 endfunction()
 
 # fdi_program(name SOURCES main.cpp ... LIBRARIES lib ...)
@@ -52,6 +63,7 @@ function(fdi_program name)
   set_target_properties(${name} PROPERTIES
                         RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
   fdi_settings(${name})
+  fdi_quick_build(${name})
   install(TARGETS ${name} RUNTIME)
 endfunction()
 
@@ -62,6 +74,7 @@ function(fdi_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} GTest::gtest
                         GTest::gmock GTest::gtest_main)
   fdi_settings(${name})
+  fdi_quick_build(${name})
   if(NOT TARGET ${ARG_LABEL}_tests)
     add_custom_target(${ARG_LABEL}_tests)  # unit_tests, system_tests
   endif()
