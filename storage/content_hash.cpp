@@ -1,4 +1,6 @@
 #include <array>
+#include <charconv>
+#include <cstdio>
 #include <stdexcept>
 
 #include <openssl/evp.h>
@@ -25,6 +27,19 @@ std::uint64_t Sha256Start(std::span<const std::byte> bytes) {
   for (int i = 0; i < 8; ++i) {
     hash = hash << 8U | digest[static_cast<std::size_t>(i)];
   }
+  return hash;
+}
+
+std::string HashHex(std::uint64_t hash) {
+  std::array<char, 17> text{};
+  std::snprintf(text.data(), text.size(), "%016llx",
+                static_cast<unsigned long long>(hash));
+  return text.data();
+}
+
+std::uint64_t HashOfHex(std::string_view text) {
+  std::uint64_t hash = 0;
+  std::from_chars(text.data(), text.data() + text.size(), hash, 16);
   return hash;
 }
 

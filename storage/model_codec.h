@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -30,5 +31,10 @@ std::uint64_t ContentHash(const ModelSet& models);
 
 /// First 8 bytes of the SHA-256 of `bytes`, big endian.
 std::uint64_t Sha256Start(std::span<const std::byte> bytes);
+
+/// A hash as it is stored: 16 hex digits.
+std::string HashHex(std::uint64_t hash);
+/// The inverse; 0 for what is none.
+std::uint64_t HashOfHex(std::string_view text);
 
 }  // namespace fdi::storage

@@ -3,7 +3,6 @@
 #include <cerrno>
 #include <charconv>
 #include <chrono>
-#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -15,19 +14,6 @@ namespace fdi::storage {
 namespace {
 
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{64} << 20U;
-
-std::string HexOf(std::uint64_t hash) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx",
-                static_cast<unsigned long long>(hash));
-  return text;
-}
-
-std::uint64_t HashOf(const std::string& hex) {
-  std::uint64_t hash = 0;
-  std::from_chars(hex.data(), hex.data() + hex.size(), hash, 16);
-  return hash;
-}
 
 bool IsName(std::string_view name) {
   return !name.empty() && name.size() <= 64 &&
@@ -109,7 +95,7 @@ ModelSummary ReadSummary(const Statement& row) {
   ModelSummary summary;
   summary.name = row.Text(0);
   summary.version = row.Int(1);
-  summary.content_hash = HashOf(row.Text(2));
+  summary.content_hash = HashOfHex(row.Text(2));
   summary.created_ns = row.Int64(3);
   summary.active = row.Bool(4);
   summary.preset = row.Text(5);
@@ -158,7 +144,8 @@ std::string ToString(const ModelReference& reference) {
 ModelStore::ModelStore(const std::filesystem::path& path, Access access)
     : database_(path, ModelsSchema(), access) {}
 
-ModelSet ModelStore::Save(const ModelSet& models, Activation activation) {
+ModelSet ModelStore::Save(const ModelSet& models, Activation activation,
+                          const Lineage& lineage) {
   Validate(models);
   ParseModelReference(models.name);
   ModelSet saved = models;
@@ -186,10 +173,12 @@ ModelSet ModelStore::Save(const ModelSet& models, Activation activation) {
       "INSERT INTO model_set (name, version, content_hash, created_ns,"
       " software, preset, period_s, flow_unit, active, bytes)"
       " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-      saved.name, saved.version, HexOf(saved.content_hash), saved.created_ns,
+      saved.name, saved.version, HashHex(saved.content_hash), saved.created_ns,
       saved.software, saved.preset, saved.sample_period_s,
       FlowUnitName(saved.flow_unit), activate, bytes);
-  InsertParts(database_, database_.LastInsertRowid(), saved);
+  const std::int64_t id = database_.LastInsertRowid();
+  InsertParts(database_, id, saved);
+  InsertLineage(database_, id, lineage);
   if (activate) {
     BumpGeneration();
   }
@@ -213,7 +202,8 @@ ModelSet ModelStore::Load(const ModelReference& reference) {
   ModelSet models = DecodeModelSet(bytes, where);
   models.version = row.Int(1);
   models.content_hash = ContentHash(models);
-  if (HexOf(models.content_hash) != row.Text(2) || models.name != row.Text(0)) {
+  if (HashHex(models.content_hash) != row.Text(2) ||
+      models.name != row.Text(0)) {
     throw DataError(where + " is damaged: its content hash differs");
   }
   Validate(models);
@@ -236,6 +226,11 @@ ModelSummary ModelStore::Summary(const ModelReference& reference) {
                                     " WHERE m.model_set_id = ?");
   row.Bind(RequireId(reference)).Step();
   return ReadSummary(row);
+}
+
+Lineage ModelStore::LineageOf(const ModelReference& reference) {
+  const Snapshot snapshot(database_);
+  return ReadLineage(database_, RequireId(reference));
 }
 
 void ModelStore::Activate(const ModelReference& reference) {

@@ -12,12 +12,13 @@
 #include "storage/baseline.h"
 #include "storage/csv.h"
 #include "storage/database.h"
+#include "storage/lineage.h"
 
 namespace fdi::storage {
 
 /// Schema of models.db: tables model_set, observer, channel, training_run,
-/// valve, valve_event, baseline, valve_type, generation and the view
-/// model_summary; see docs/data.md.
+/// valve, valve_event, baseline, valve_type, lineage, training_episode,
+/// generation and the view model_summary; see docs/data.md.
 const Schema& ModelsSchema();
 
 /// `NAME`, which means its active version, or `NAME@VERSION`.
@@ -90,7 +91,11 @@ class ModelStore {
   /// Stores the set as the next version of its name, in one transaction.
   /// @returns it as Load() gives it: with version and content_hash.
   ModelSet Save(const ModelSet& models,
-                Activation activation = Activation::kIfFirst);
+                Activation activation = Activation::kIfFirst,
+                const Lineage& lineage = {});
+
+  /// Where the set comes from; empty if that is not known.
+  Lineage LineageOf(const ModelReference& reference);
 
   /// "NAME" (the active version) or "NAME@VERSION".
   /// @throws NotFoundError naming what is there.
