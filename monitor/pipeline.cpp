@@ -35,6 +35,7 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
                    Counters& counters, ThrottledLog& log)
     : options_(std::move(options)),
       decisions_(sinks.decisions),
+      live_(sinks.live),
       counters_(counters),
       log_(log),
       writer_(sinks.history, sinks.events, counters, log, options_.history),
@@ -45,7 +46,8 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
                           [this](DataGap gap) { writer_.Gap(std::move(gap)); })
                     : nullptr),
       directory_(options_.max_valves, options_.valve_glob),
-      registry_(options_.registry, std::move(resolver), writer_, counters, log),
+      registry_(options_.registry, std::move(resolver), writer_, counters, log,
+                sinks.live),
       queue_(options_.queue_samples),
       last_tend_(std::chrono::steady_clock::now()),
       last_checkpoint_(last_tend_) {}
@@ -201,9 +203,7 @@ void Pipeline::AdoptPendingResolver() {
 
 void Pipeline::Handle(const Item& item) {
   if (item.ended) {
-    if (registry_.EndStream(item.valve, item.writer) && recorder_) {
-      recorder_->Record({*item.valve.name, {}, {}, false, false, true});
-    }
+    HandleEnd(item);
     return;
   }
   const ValveOutcome outcome =
@@ -223,10 +223,26 @@ void Pipeline::Handle(const Item& item) {
   }
   if (!OutOfOrder(verdict.intake)) {
     Publish(item, outcome);
+    if (live_ != nullptr) {
+      live_->Show(*item.valve.name, item.sample, outcome.models, verdict,
+                  outcome.model_swapped);
+    }
   }
   if (recorder_) {
     recorder_->Record({*item.valve.name, item.sample, verdict.intake,
                        verdict.initialised, outcome.model_swapped, false});
+  }
+}
+
+void Pipeline::HandleEnd(const Item& item) {
+  if (!registry_.EndStream(item.valve, item.writer)) {
+    return;
+  }
+  if (recorder_) {
+    recorder_->Record({*item.valve.name, {}, {}, false, false, true});
+  }
+  if (live_ != nullptr) {
+    live_->ShowSilence(*item.valve.name, Silence::kEnded);
   }
 }
 

@@ -40,6 +40,7 @@ struct PipelineSinks {
   EventSink& events;
   HistorySink& history;
   SampleSink* samples{nullptr};  ///< Null: samples are not recorded.
+  LiveSink* live{nullptr};       ///< Null: nobody looks.
 };
 
 /// From samples to decisions, events and records, on threads of its own:
@@ -116,12 +117,14 @@ class Pipeline {
   void Run();
   void Diagnose();
   void Handle(const Item& item);
+  void HandleEnd(const Item& item);
   void Publish(const Item& item, const ValveOutcome& outcome);
   void CountRejection(const Item& item, Intake intake);
   void AdoptPendingResolver();
 
   PipelineOptions options_;
   DecisionSink& decisions_;
+  LiveSink* live_;
   Counters& counters_;
   ThrottledLog& log_;
   EpisodeWriter writer_;

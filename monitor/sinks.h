@@ -80,6 +80,27 @@ class HistorySink {
   virtual void Commit() = 0;
 };
 
+/// Why nothing comes from a valve.
+enum class Silence : std::uint8_t {
+  kNone,
+  kStale,  ///< No sample for three periods.
+  kEnded,  ///< Its publisher ended the stream.
+};
+
+/// Shows people how the valves are. Diagnosis thread, which must not wait.
+class LiveSink {
+ public:
+  virtual ~LiveSink() = default;
+  /// A sample in its order and what the engine said about it.
+  /// @param models null for a valve without a model set.
+  /// @param model_swapped another set answers from here on.
+  virtual void Show(const std::string& valve_id, const Sample& sample,
+                    const ModelSet* models, const Verdict& verdict,
+                    bool model_swapped) = 0;
+  /// The valve fell silent; its next sample ends that.
+  virtual void ShowSilence(const std::string& valve_id, Silence silence) = 0;
+};
+
 /// Keeps samples as runs. Recorder thread.
 class SampleSink {
  public:

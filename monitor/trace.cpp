@@ -45,19 +45,19 @@ bool Trace::Continues(const Sample& sample, const Verdict& verdict,
          sample.epoch == layout_.epoch &&
          sample.flow_unit == layout_.flow_unit &&
          (sample.present & ~layout_.signals) == 0 &&
-         verdict.isolated == layout_.isolated &&
+         (!keeps_isolated_ || verdict.isolated == layout_.isolated) &&
          static_cast<std::size_t>(channels) == layout_.channels &&
          static_cast<std::size_t>(faults) == layout_.faults;
 }
 
 void Trace::Begin(const Sample& sample, const Verdict& verdict, int channels,
                   int faults) {
-  *this = Trace(capacity_, span_ns_);
+  *this = Trace(capacity_, span_ns_, keeps_isolated_);
   layout_.source_id = sample.source_id;
   layout_.epoch = sample.epoch;
   layout_.flow_unit = sample.flow_unit;
   layout_.signals = sample.present;
-  layout_.isolated = verdict.isolated;
+  layout_.isolated = keeps_isolated_ ? verdict.isolated : 0;
   layout_.signal_count =
       static_cast<std::size_t>(std::popcount(sample.present));
   layout_.channels = static_cast<std::size_t>(channels);
@@ -150,17 +150,17 @@ TracePoint Trace::PointAt(std::size_t row) const {
   return point;
 }
 
-std::vector<TracePoint> Trace::Unpack() const {
+std::vector<TracePoint> Trace::Unpack(std::size_t count) const {
   std::vector<TracePoint> points;
-  points.reserve(size_);
-  for (std::size_t i = 0; i < size_; ++i) {
+  points.reserve(std::min(count, size_));
+  for (std::size_t i = size_ - std::min(count, size_); i < size_; ++i) {
     points.push_back(PointAt(Row(i)));
   }
   return points;
 }
 
 Trace Trace::Take() {
-  return std::exchange(*this, Trace(capacity_, span_ns_));
+  return std::exchange(*this, Trace(capacity_, span_ns_, keeps_isolated_));
 }
 
 std::size_t Trace::bytes() const {

@@ -29,8 +29,12 @@ struct TracePoint {
 /// grows with what is in it.
 class Trace {
  public:
-  Trace(std::size_t capacity, std::int64_t span_ns)
-      : capacity_(capacity), span_ns_(span_ns) {}
+  /// @param keeps_isolated a change of the isolated set begins it anew;
+  ///   otherwise its points do not tell the set.
+  Trace(std::size_t capacity, std::int64_t span_ns, bool keeps_isolated = true)
+      : capacity_(capacity),
+        span_ns_(span_ns),
+        keeps_isolated_(keeps_isolated) {}
 
   /// Appends an instant. Where Continues() is false the trace begins anew.
   void Push(const Sample& sample, const Verdict& verdict, int channels,
@@ -40,8 +44,8 @@ class Trace {
   bool Continues(const Sample& sample, const Verdict& verdict, int channels,
                  int faults) const;
 
-  /// The instants, oldest first.
-  std::vector<TracePoint> Unpack() const;
+  /// The newest `count` instants, oldest first.
+  std::vector<TracePoint> Unpack(std::size_t count = SIZE_MAX) const;
 
   /// Hands over what is in it and is empty afterwards.
   Trace Take();
@@ -82,6 +86,7 @@ class Trace {
 
   std::size_t capacity_;
   std::int64_t span_ns_;
+  bool keeps_isolated_;
   Layout layout_;
   std::size_t first_{0};
   std::size_t size_{0};

@@ -10,12 +10,13 @@ namespace fdi::monitor {
 ValveRegistry::ValveRegistry(const RegistryOptions& options,
                              std::shared_ptr<const ModelResolver> resolver,
                              EpisodeOutlet& outlet, Counters& counters,
-                             ThrottledLog& log)
+                             ThrottledLog& log, LiveSink* live)
     : options_(options),
       resolver_(std::move(resolver)),
       outlet_(outlet),
       counters_(counters),
-      log_(log) {}
+      log_(log),
+      live_(live) {}
 
 void ValveRegistry::Recover(const std::vector<OpenEpisode>& episodes,
                             std::vector<Accumulator> accumulators,
@@ -137,6 +138,9 @@ void ValveRegistry::Tend(TimePoint now, std::int64_t now_ns) {
       counters_.Add(Counter::kStaleEvents);
       log_.Report(LogId::kStale, "valve_stale",
                   [&valve] { return "valve=" + valve->id(); });
+      if (live_ != nullptr) {
+        live_->ShowSilence(valve->id(), Silence::kStale);
+      }
     }
     counters_.Add(Quality::kStale, valve->CountStale(now));
     valve->CheckTimeout(now, options_.stale_timeout, outlet_);

@@ -42,9 +42,11 @@ class ValveRegistry {
  public:
   using TimePoint = ValveMonitor::TimePoint;
 
+  /// @param live is told which valves fall silent; may be null.
   ValveRegistry(const RegistryOptions& options,
                 std::shared_ptr<const ModelResolver> resolver,
-                EpisodeOutlet& outlet, Counters& counters, ThrottledLog& log);
+                EpisodeOutlet& outlet, Counters& counters, ThrottledLog& log,
+                LiveSink* live = nullptr);
 
   /// Episodes that the last session left open, and accumulators that it kept.
   /// Before the first Step().
@@ -88,6 +90,7 @@ class ValveRegistry {
   EpisodeOutlet& outlet_;
   Counters& counters_;
   ThrottledLog& log_;
+  LiveSink* live_;
   std::vector<std::unique_ptr<ValveMonitor>> valves_;
   std::unordered_map<std::string, OpenEpisode> recovered_;
   std::unordered_map<std::string, Accumulator> accumulators_;

@@ -3,7 +3,7 @@
 #include <functional>
 #include <string>
 
-#include "monitor/app/http_server.h"
+#include "monitor/http/http_server.h"
 #include "monitor/app/metrics_page.h"
 
 namespace fdi::monitor {

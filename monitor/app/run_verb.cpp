@@ -52,7 +52,7 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
         arguments.record == "lossless" ? Recording::kLossless : Recording::kOn;
   }
   if (arguments.http != "off") {
-    options.http = ParseHttpAddress(arguments.http);
+    options.http = ParseHttpAddress(arguments.http, "--http");
   }
   cli::StopSignals signals;
   const cli::Context limited{context.options, LimitLog(context.log),

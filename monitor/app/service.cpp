@@ -72,7 +72,8 @@ std::filesystem::path LockOf(const storage::DataDirectory& data) {
 Service::Service(const ServiceOptions& options, const cli::Context& context)
     : options_(options),
       context_(context),
-      http_(options.http ? std::make_unique<HttpServer>(*options.http)
+      http_(options.http ? std::make_unique<HttpServer>(
+                               HttpServerOptions{.address = *options.http})
                          : nullptr),
       data_(Prepared(context.options.data_dir)),
       lock_(LockOf(data_), "recording faults"),

@@ -14,7 +14,7 @@
 #include "idl/endpoint.h"
 #include "monitor/app/bus_sinks.h"
 #include "monitor/app/history_store.h"
-#include "monitor/app/http_server.h"
+#include "monitor/http/http_server.h"
 #include "monitor/app/model_assignment.h"
 #include "monitor/app/probes.h"
 #include "monitor/app/run_store.h"

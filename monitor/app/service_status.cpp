@@ -7,8 +7,9 @@
 namespace fdi::monitor {
 
 void Service::ServeProbes() {
-  http_->Start(ProbePages(heartbeat_, {[this] { return Metrics(); },
-                                       [this] { return CurrentReadiness(); }}));
+  http_->Add(ProbePages(heartbeat_, {[this] { return Metrics(); },
+                                     [this] { return CurrentReadiness(); }}));
+  http_->Start();
   context_.log(LogLevel::kInfo,
                "http_listening address=" + ToString(http_->address()));
 }

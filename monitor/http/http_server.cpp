@@ -1,4 +1,4 @@
-#include "monitor/app/http_server.h"
+#include "monitor/http/http_server.h"
 
 #include <cerrno>
 #include <charconv>
@@ -18,15 +18,14 @@
 namespace fdi::monitor {
 namespace {
 
-constexpr std::size_t kThreads = 2;
 constexpr std::size_t kWaitingConnections = 64;
 constexpr std::chrono::milliseconds kClientPatience{500};
 
 // Takes a bounded number of connections, then makes the accepting thread wait.
 class BoundedPool : public httplib::TaskQueue {
  public:
-  BoundedPool() {
-    for (std::size_t i = 0; i < kThreads; ++i) {
+  explicit BoundedPool(std::size_t threads) {
+    for (std::size_t i = 0; i < threads; ++i) {
       threads_.emplace_back([this] { Work(); });
     }
   }
@@ -81,15 +80,17 @@ void ForbidSharing(int socket) {
   setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
 }
 
-[[noreturn]] void RefuseAddress(const std::string& text) {
-  throw ConfigError("--http " + text +
+[[noreturn]] void RefuseAddress(const std::string& text,
+                                const std::string& option) {
+  throw ConfigError(option + " " + text +
                     ": expected PORT, ADDRESS:PORT or [IPv6]:PORT with a port "
                     "of 0..65535, e.g. 127.0.0.1:9464");
 }
 
 }  // namespace
 
-HttpAddress ParseHttpAddress(const std::string& text) {
+HttpAddress ParseHttpAddress(const std::string& text,
+                             const std::string& option) {
   HttpAddress address{"127.0.0.1", 0};
   const std::size_t colon = text.rfind(':');
   std::string port = text;
@@ -103,14 +104,14 @@ HttpAddress ParseHttpAddress(const std::string& text) {
       address.host = address.host.substr(1, address.host.size() - 2);
     } else if (address.host.empty() ||
                address.host.find_first_of(":[]") != std::string::npos) {
-      RefuseAddress(text);
+      RefuseAddress(text, option);
     }
   }
   const char* const end = port.data() + port.size();
   const auto [stop, error] = std::from_chars(port.data(), end, address.port);
   if (error != std::errc{} || stop != end || port.empty() || address.port < 0 ||
       address.port > 65535) {
-    RefuseAddress(text);
+    RefuseAddress(text, option);
   }
   return address;
 }
@@ -122,15 +123,18 @@ std::string ToString(const HttpAddress& address) {
   return text.append(std::to_string(address.port));
 }
 
-HttpServer::HttpServer(const HttpAddress& address)
-    : server_(std::make_unique<httplib::Server>()), address_(address) {
+HttpServer::HttpServer(const HttpServerOptions& options)
+    : server_(std::make_unique<httplib::Server>()), address_(options.address) {
+  const HttpAddress& address = options.address;
   server_->set_socket_options([](socket_t socket) { ForbidSharing(socket); });
-  server_->new_task_queue = [] { return new BoundedPool(); };
+  server_->new_task_queue = [threads = options.threads] {
+    return new BoundedPool(threads);
+  };
   server_->set_keep_alive_max_count(1);
   server_->set_keep_alive_timeout(1);
   server_->set_read_timeout(kClientPatience);
   server_->set_write_timeout(kClientPatience);
-  server_->set_payload_max_length(1024);
+  server_->set_payload_max_length(options.max_body);
   errno = 0;
   const int port =
       address.port == 0
@@ -140,7 +144,7 @@ HttpServer::HttpServer(const HttpAddress& address)
   if (port < 0) {
     const std::string reason =
         errno == 0 ? "unknown address" : std::generic_category().message(errno);
-    throw std::runtime_error("--http " + ToString(address) +
+    throw std::runtime_error(options.option + " " + ToString(address) +
                              ": cannot listen: " + reason);
   }
   address_.port = port;
@@ -157,7 +161,7 @@ void HttpServer::Stop() {
   server_->stop();
 }
 
-void HttpServer::Start(Pages pages) {
+void HttpServer::Add(Pages pages) {
   for (auto& [path, make] : pages) {
     server_->Get(path, [make = std::move(make)](const httplib::Request&,
                                                 httplib::Response& response) {
@@ -166,6 +170,9 @@ void HttpServer::Start(Pages pages) {
       response.set_content(std::move(page.body), page.type.c_str());
     });
   }
+}
+
+void HttpServer::Start() {
   thread_ = std::thread([this] { server_->listen_after_bind(); });
   while (!server_->is_running()) {  // stop() before that would be forgotten.
     std::this_thread::yield();
