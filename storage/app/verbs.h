@@ -12,6 +12,7 @@ void AddTypesVerbs(cli::Program& program);    ///< types list|show|delete
 void AddHistoryVerbs(cli::Program& program);  ///< history list|show|ack|...
 /// history export|plot; after AddHistoryVerbs().
 void AddEvidenceVerbs(cli::Program& program);
+void AddFaultsVerb(cli::Program& program);        ///< faults
 void AddMaintenanceVerbs(cli::Program& program);  ///< doctor, backup, migrate
 void AddPruneVerb(cli::Program& program);         ///< prune
 

@@ -56,6 +56,11 @@ void AddGlobalOptions(CLI::App& app, GlobalOptions& options) {
       ->envname("FDI_DATA")
       ->type_name("DIR");
   AddTransport(app, options);
+  app.add_option("--fault-catalogue", options.fault_catalogue,
+                 "TOML file with words for faults that differ from the "
+                 "catalogue's; DATA/faults.toml alike")
+      ->check(CLI::ExistingFile)
+      ->type_name("FILE.toml");
   app.add_flag("--json", options.json, "One JSON object on stdout");
   app.add_flag("--utc", options.utc, "Times in UTC, not in the local zone");
   AddLogLevel(app, options);

@@ -21,6 +21,8 @@ struct GlobalOptions {
   std::string transport{"udp"};
   std::filesystem::path qos_file;     ///< --qos FILE.xml, or empty
   std::filesystem::path config_file;  ///< --config FILE.toml, or empty
+  /// --fault-catalogue FILE.toml, or empty; see FaultTexts.
+  std::filesystem::path fault_catalogue;
   LogLevel log_level{LogLevel::kInfo};
   bool json{false};
   bool utc{false};  ///< Times for people in UTC instead of the local zone.
@@ -30,8 +32,8 @@ struct GlobalOptions {
 struct PrintConfigRequest {};
 
 /// Adds --help --version --data --domain --interface --transport --qos
-/// --config --print-config --json --utc --log-level to the root `app`;
-/// `options` must outlive it.
+/// --config --print-config --fault-catalogue --json --utc --log-level to the
+/// root `app`; `options` must outlive it.
 void AddGlobalOptions(CLI::App& app, GlobalOptions& options);
 
 }  // namespace fdi::cli
