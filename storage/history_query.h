@@ -17,8 +17,17 @@ std::string ListQuery(const EpisodeFilter& filter);
 /// that covers them.
 std::string StatisticsQuery(const EpisodeFilter& filter);
 
-/// Binds the parameters of both: ?1 valve, ?2 since, ?3 until, ?4 fault, and of
-/// ListQuery() ?5 limit. @throws ConfigError for a fault that is none.
+/// SQL for the columns of AlarmSpan, by detection, from the same index: the
+/// episodes that touch the filter's time.
+std::string AlarmSpanQuery(const EpisodeFilter& filter);
+
+/// SQL for kEpisodeColumns of open episodes and ended ones that nobody has
+/// acknowledged, newest first; the newest ?1, open ones before others.
+std::string AlarmListQuery();
+
+/// Binds the parameters of all: ?1 valve, ?2 since, ?3 until, ?4 fault, ?5 now,
+/// and of ListQuery() ?6 limit; AlarmSpanQuery() takes no ?5.
+/// @throws ConfigError for a fault that is none.
 void BindListQuery(Statement& statement, const EpisodeFilter& filter);
 void BindStatisticsQuery(Statement& statement, const EpisodeFilter& filter);
 

@@ -4,6 +4,7 @@
 #include "storage/history_query.h"
 #include "storage/history_rows.h"
 #include "storage/history_schema.h"
+#include "storage/history_shelf.h"
 #include "storage/history_trace.h"
 
 namespace fdi::storage {
@@ -50,14 +51,15 @@ std::vector<EpisodeEvent> HistoryReader::Events(std::uint64_t episode_id) {
   Statement row = database_.Prepare(
       "SELECT event_id, kind, stamp_ns, recorded_ns, faults, fault_bits, "
       "coalesce(factor, 0.0), coalesce(strength, 0.0), reason, value, who, "
-      "comment FROM episode_event WHERE episode_id = ? ORDER BY event_id");
+      "comment, origin FROM episode_event WHERE episode_id = ? ORDER BY "
+      "event_id");
   row.Bind(EpisodeIdText(episode_id));
   std::vector<EpisodeEvent> events;
   while (row.Step()) {
     events.push_back({row.Int64(0), episode_id, row.Text(1), row.Int64(2),
                       row.Int64(3), row.Text(4), row.Uint64(5), row.Double(6),
                       row.Double(7), row.Text(8), row.Text(9), row.Text(10),
-                      row.Text(11)});
+                      row.Text(11), row.Text(12)});
   }
   return events;
 }
@@ -121,6 +123,36 @@ std::vector<MonitorSession> HistoryReader::Sessions() {
                         row.Text(6)});
   }
   return sessions;
+}
+
+std::vector<Alarm> HistoryReader::AlarmList(std::int64_t now_ns,
+                                            std::int64_t limit) {
+  const Snapshot snapshot(database_);
+  Statement row = database_.Prepare(AlarmListQuery());
+  row.Bind(limit);
+  std::vector<Episode> episodes;
+  while (row.Step()) {
+    episodes.push_back(ReadEpisode(row));
+  }
+  return Alarms(std::move(episodes), now_ns);
+}
+
+std::vector<Alarm> HistoryReader::Alarms(std::vector<Episode> episodes,
+                                         std::int64_t now_ns) {
+  return AsAlarms(std::move(episodes), Shelves(now_ns), now_ns);
+}
+
+AlarmStatistics HistoryReader::AlarmFigures(const EpisodeFilter& filter,
+                                            std::int64_t now_ns,
+                                            const AlarmCriteria& criteria) {
+  return ComputeAlarmStatistics(ReadAlarmSpans(database_, filter),
+                                filter.since_ns, filter.until_ns, now_ns,
+                                criteria);
+}
+
+std::vector<Shelf> HistoryReader::Shelves(
+    std::optional<std::int64_t> in_force_at_ns) {
+  return ReadShelves(database_, in_force_at_ns);
 }
 
 }  // namespace fdi::storage

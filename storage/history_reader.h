@@ -2,10 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "storage/alarm.h"
+#include "storage/alarm_statistics.h"
 #include "storage/database.h"
 #include "storage/history_coverage.h"
 #include "storage/history_types.h"
@@ -41,27 +44,20 @@ class HistoryReader {
   /// Time by valve and quality; the filter's fault and state do not count.
   std::vector<CoverageTime> Coverage(const EpisodeFilter& filter = {});
 
+  /// Open episodes, and ended ones that nobody has acknowledged, newest first:
+  /// `limit` of them, open ones before others. Shelved ones are among them.
+  std::vector<Alarm> AlarmList(std::int64_t now_ns, std::int64_t limit = 500);
+  /// `episodes` with what is shelved now.
+  std::vector<Alarm> Alarms(std::vector<Episode> episodes, std::int64_t now_ns);
+
+  /// ComputeAlarmStatistics() of the filter's valves, fault and time.
+  AlarmStatistics AlarmFigures(const EpisodeFilter& filter, std::int64_t now_ns,
+                               const AlarmCriteria& criteria = {});
+
+  /// By beginning: those in force at a time, or all there ever were.
+  std::vector<Shelf> Shelves(std::optional<std::int64_t> in_force_at_ns = {});
+
   Database& database() { return database_; }
-
- private:
-  Database database_;
-};
-
-/// Acknowledges and labels beside a running monitor, as an occasional writer.
-/// Every change is also an event of the episode.
-class HistoryEditor {
- public:
-  explicit HistoryEditor(const std::filesystem::path& path);
-
-  /// @throws NotFoundError as HistoryReader::Show().
-  void Acknowledge(std::string_view id, std::string_view who,
-                   std::string_view comment, std::int64_t now_ns);
-
-  /// @param label true (the answer was right), false (there was no fault), or
-  ///   the name of the fault that it was.
-  /// @throws ConfigError for another label; NotFoundError.
-  void Label(std::string_view id, std::string_view label, std::string_view who,
-             std::string_view comment, std::int64_t now_ns);
 
  private:
   Database database_;

@@ -11,7 +11,8 @@ const char* const kEpisodeColumns =
     "v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc, v.cleared_utc, "
     "v.fault, v.peak_factor, v.model_set, v.end_reason, v.label, v.acked_by, "
     "e.source_id, e.model_hash, e.detected_ns, e.isolated_ns, e.cleared_ns, "
-    "e.ended_ns, (SELECT max(last_ns) FROM episode_trace t WHERE t.episode_id "
+    "e.ended_ns, e.acked_ns, (SELECT max(last_ns) FROM episode_trace t WHERE "
+    "t.episode_id "
     "= e.episode_id), e.session_id, e.fault_bits, e.strength, "
     "e.unknown_kind, e.flow_unit, "
     "e.channels, e.faults";
@@ -36,6 +37,7 @@ Episode ReadEpisode(const Statement& row) {
   episode.isolated_ns = row.OptionalInt64(c++);
   episode.cleared_ns = row.OptionalInt64(c++);
   episode.ended_ns = row.OptionalInt64(c++);
+  episode.acked_ns = row.OptionalInt64(c++);
   episode.trace_end_ns = row.OptionalInt64(c++);
   episode.session_id = row.OptionalInt64(c++);
   episode.fault_bits = row.Uint64(c++);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstdio>
 #include <utility>
 
@@ -10,13 +11,18 @@
 namespace fdi::storage {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, EpisodeState>, 6> kStates = {{
+constexpr std::array<std::pair<std::string_view, EpisodeState>, 11> kStates = {{
     {"any", EpisodeState::kAny},
     {"open", EpisodeState::kOpen},
     {"detected", EpisodeState::kDetected},
     {"isolated", EpisodeState::kIsolated},
     {"closed", EpisodeState::kClosed},
     {"unacked", EpisodeState::kUnacked},
+    {"unack", EpisodeState::kAlarmUnacked},
+    {"acked", EpisodeState::kAlarmAcked},
+    {"rtn_unack", EpisodeState::kAlarmReturnedUnacked},
+    {"normal", EpisodeState::kAlarmNormal},
+    {"shelved", EpisodeState::kAlarmShelved},
 }};
 
 }  // namespace
@@ -52,14 +58,31 @@ std::uint64_t EpisodeIdOf(const NewEvent& event) {
       event.valve_id, event.source_id, event.transition.detection_stamp_ns));
 }
 
+std::vector<std::string> EpisodeStateNames() {
+  std::vector<std::string> names;
+  for (const auto& [name, state] : kStates) {
+    names.emplace_back(name);
+  }
+  return names;
+}
+
 EpisodeState ParseEpisodeState(std::string_view name) {
   const auto* found =
-      std::find_if(kStates.begin(), kStates.end(),
-                   [name](const auto& state) { return state.first == name; });
+      std::find_if(kStates.begin(), kStates.end(), [name](const auto& state) {
+        return std::equal(
+            name.begin(), name.end(), state.first.begin(), state.first.end(),
+            [](char a, char b) {
+              return std::tolower(static_cast<unsigned char>(a)) == b;
+            });
+      });
   if (found == kStates.end()) {
-    throw ConfigError("unknown state '" + std::string(name) +
-                      "'; there are any, open, detected, isolated, closed, "
-                      "unacked");
+    std::string message =
+        "unknown state '" + std::string(name) + "'; there are";
+    for (const auto& state : kStates) {
+      message += (&state == kStates.begin() ? " " : ", ");
+      message += state.first;
+    }
+    throw ConfigError(message);
   }
   return found->second;
 }

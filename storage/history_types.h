@@ -46,7 +46,8 @@ struct NewEvent {
 /// The id under which `event` is recorded.
 std::uint64_t EpisodeIdOf(const NewEvent& event);
 
-/// A recorded event. Of the transitions, all but `who`, `value`, `comment`.
+/// A recorded event. Of the transitions, all but `who`, `value`,
+/// `comment`, `origin`.
 struct EpisodeEvent {
   std::int64_t event_id{0};
   std::uint64_t episode_id{0};
@@ -61,6 +62,7 @@ struct EpisodeEvent {
   std::string value;
   std::string who;
   std::string comment;
+  std::string origin;  ///< Of what people did: from where.
 };
 
 /// An event that was committed but perhaps not handed to DDS.
@@ -96,6 +98,7 @@ struct Episode {
   std::optional<std::int64_t> isolated_ns;
   std::optional<std::int64_t> cleared_ns;
   std::optional<std::int64_t> ended_ns;
+  std::optional<std::int64_t> acked_ns;
   std::optional<std::int64_t> trace_end_ns;  ///< Last instant of the trace.
   std::optional<std::int64_t> session_id;
   FaultSet fault_bits{0};
@@ -133,10 +136,17 @@ enum class EpisodeState {
   kDetected,  ///< Open and not isolated.
   kIsolated,  ///< Open and isolated.
   kClosed,
-  kUnacked,
+  kUnacked,  ///< Active or not.
+  // AlarmState; shelved ones are also in the state below.
+  kAlarmUnacked,
+  kAlarmAcked,
+  kAlarmReturnedUnacked,
+  kAlarmNormal,
+  kAlarmShelved,
 };
 
-/// "any", "open", ... @throws ConfigError naming the accepted names.
+/// "any", "open", ... "UNACK", ..., in any case. @throws ConfigError naming the
+/// accepted names.
 EpisodeState ParseEpisodeState(std::string_view name);
 
 /// Settings of HistoryReader::List().
@@ -146,8 +156,12 @@ struct EpisodeFilter {
   std::int64_t since_ns{std::numeric_limits<std::int64_t>::min()};
   std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
   EpisodeState state{EpisodeState::kAny};
-  std::int64_t limit{0};  ///< The newest so many; 0: all.
+  std::int64_t limit{0};   ///< The newest so many; 0: all.
+  std::int64_t now_ns{0};  ///< At which kAlarmShelved holds.
 };
+
+/// The words of ParseEpisodeState().
+std::vector<std::string> EpisodeStateNames();
 
 /// Episodes of one valve with one answer.
 struct EpisodeStatistics {
@@ -156,7 +170,7 @@ struct EpisodeStatistics {
   std::int64_t episodes{0};
   std::int64_t open{0};
   std::int64_t unacked{0};
-  std::int64_t labelled_true{0};           ///< Label true, or this very fault.
+  std::int64_t labelled_true{0};           ///< Label true, or of the answer.
   std::int64_t labelled_false{0};          ///< Label false, or another fault.
   std::optional<double> mean_isolation_s;  ///< From detection.
   std::optional<double> mean_duration_s;   ///< Of the ended ones.

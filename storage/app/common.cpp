@@ -1,6 +1,7 @@
 #include "storage/app/common.h"
 
 #include <algorithm>
+#include <climits>
 #include <fstream>
 #include <iostream>
 #include <limits>
@@ -132,6 +133,12 @@ std::string UserName() {
   const passwd* entry = getpwuid(geteuid());
   return entry != nullptr && entry->pw_name != nullptr ? entry->pw_name
                                                        : "unknown";
+}
+
+std::string Origin() {
+  char host[HOST_NAME_MAX + 1] = {};
+  const bool known = gethostname(host, sizeof host - 1) == 0;
+  return "fdi-store " + UserName() + "@" + (known ? host : "localhost");
 }
 
 }  // namespace fdi::storage

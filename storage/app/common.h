@@ -68,5 +68,7 @@ void PrintHours(std::ostream& out, const std::vector<CoverageTime>& coverage);
 
 /// --by, the user's name by default.
 std::string UserName();
+/// "fdi-store anna@host": where what is typed comes from.
+std::string Origin();
 
 }  // namespace fdi::storage

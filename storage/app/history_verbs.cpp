@@ -233,11 +233,11 @@ int Note(const NoteOptions& options, const Context& context) {
   const auto path = DataOf(context).history();
   HistoryReader reader(path);  // It must be there: an editor would make it.
   HistoryEditor editor(path);
+  const OperatorNote note{options.who, options.comment, Origin(), cli::NowNs()};
   if (options.label.empty()) {
-    editor.Acknowledge(options.id, options.who, options.comment, cli::NowNs());
+    editor.Acknowledge(options.id, note);
   } else {
-    editor.Label(options.id, options.label, options.who, options.comment,
-                 cli::NowNs());
+    editor.Label(options.id, options.label, note);
   }
   const Episode episode = reader.Show(options.id);
   if (context.options.json) {

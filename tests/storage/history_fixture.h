@@ -46,6 +46,11 @@ class HistoryFixture : public testing::Test {
             std::nullopt};
   }
 
+  static OperatorNote By(const std::string& who, std::int64_t now_ns,
+                         const std::string& comment = "") {
+    return {who, comment, "test", now_ns};
+  }
+
   std::uint64_t Id(const std::string& valve = "LV-1") const {
     return EpisodeId(valve, kSource, kDetected);
   }

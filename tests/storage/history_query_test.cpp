@@ -28,8 +28,8 @@ class HistoryQueryTest : public HistoryFixture {
     std::vector<EpisodeFilter> filters;
     for (const char* valve : {"*", "LV-1", "LV-*"}) {
       for (const char* fault : {"", "unknown", "f7"}) {
-        for (int state = 0; state <= static_cast<int>(EpisodeState::kUnacked);
-             ++state) {
+        for (int state = 0;
+             state <= static_cast<int>(EpisodeState::kAlarmShelved); ++state) {
           EpisodeFilter filter;
           filter.valve_glob = valve;
           filter.fault = fault;
@@ -71,6 +71,15 @@ TEST_F(HistoryQueryTest, StatisticsReadOneIndexAndNoTable) {
     EXPECT_THAT(PlanOf(StatisticsQuery(filter)),
                 HasSubstr("COVERING INDEX episode_statistics"));
   }
+}
+
+TEST_F(HistoryQueryTest, AlarmsAndTheirFiguresWalkIndexes) {
+  EXPECT_THAT(PlanOf(AlarmSpanQuery({})),
+              HasSubstr("COVERING INDEX episode_statistics"));
+  const std::string plan = PlanOf(AlarmListQuery());
+  EXPECT_THAT(plan, HasSubstr("episode_open"));
+  EXPECT_THAT(plan, HasSubstr("episode_unacked"));
+  EXPECT_THAT(plan, Not(HasSubstr("SCAN e\n")));
 }
 
 TEST_F(HistoryQueryTest, AnOlderFileGetsItsAnswersAndIndexes) {

@@ -73,7 +73,7 @@ TEST_F(HistoryReaderTest, StatesNarrowTheList) {
     filter.state = state;
     return Valves(filter);
   };
-  HistoryEditor(path_).Acknowledge(EpisodeIdText(Id("LV-2")), "anna", "", 1);
+  HistoryEditor(path_).Acknowledge(EpisodeIdText(Id("LV-2")), By("anna", 1));
 
   EXPECT_THAT(valves(EpisodeState::kOpen), ElementsAre("PV-2"));
   EXPECT_THAT(valves(EpisodeState::kDetected), ElementsAre("PV-2"));
@@ -114,8 +114,8 @@ TEST_F(HistoryReaderTest, BeginningThatSeveralIdsShareIsRefused) {
 TEST_F(HistoryReaderTest, AcknowledgementAndLabelAreInTheViewAndInTheEvents) {
   const std::string id = EpisodeIdText(Id("LV-1"));
   HistoryEditor editor(path_);
-  editor.Acknowledge(id, "anna", "valve opened", kDetected + 1);
-  editor.Label(id, "F7", "jan", "seat worn", kDetected + 2);
+  editor.Acknowledge(id, By("anna", kDetected + 1, "valve opened"));
+  editor.Label(id, "F7", By("jan", kDetected + 2, "seat worn"));
 
   EXPECT_EQ(Sql("SELECT acked_by || ' ' || label FROM fault_history "
                 "WHERE valve_id = 'LV-1'"),
@@ -133,17 +133,17 @@ TEST_F(HistoryReaderTest, AcknowledgementAndLabelAreInTheViewAndInTheEvents) {
 TEST_F(HistoryReaderTest, UnknownLabelChangesNothing) {
   const std::string id = EpisodeIdText(Id("LV-1"));
 
-  EXPECT_THROW(HistoryEditor(path_).Label(id, "maybe", "jan", "", 1),
+  EXPECT_THROW(HistoryEditor(path_).Label(id, "maybe", By("jan", 1)),
                ConfigError);
-  EXPECT_THROW(HistoryEditor(path_).Label("ffff", "true", "jan", "", 1),
+  EXPECT_THROW(HistoryEditor(path_).Label("ffff", "true", By("jan", 1)),
                NotFoundError);
   EXPECT_EQ(Sql("SELECT count(*) FROM episode WHERE label IS NOT NULL"), "0");
 }
 
 TEST_F(HistoryReaderTest, StatisticsCountByValveAndAnswer) {
   HistoryEditor editor(path_);
-  editor.Label(EpisodeIdText(Id("LV-1")), "f7", "a", "", 1);
-  editor.Label(EpisodeIdText(Id("LV-2")), "false", "a", "", 1);
+  editor.Label(EpisodeIdText(Id("LV-1")), "f7", By("a", 1));
+  editor.Label(EpisodeIdText(Id("LV-2")), "false", By("a", 1));
 
   const auto statistics = HistoryReader(path_).Statistics();
 

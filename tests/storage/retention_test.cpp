@@ -23,9 +23,9 @@ class HistoryRetentionTest : public HistoryFixture {
     MarkAllSent();
     HistoryEditor editor(path_);
     for (const char* valve : {"acked", "labelled", "late", "open"}) {
-      editor.Acknowledge(EpisodeIdText(Id(valve)), "anna", "", 1);
+      editor.Acknowledge(EpisodeIdText(Id(valve)), By("anna", 1));
     }
-    editor.Label(EpisodeIdText(Id("labelled")), "true", "anna", "", 1);
+    editor.Label(EpisodeIdText(Id("labelled")), "true", By("anna", 1));
   }
 
   void MarkAllSent() {
@@ -82,7 +82,7 @@ TEST_F(HistoryRetentionTest, ADryRunTellsTheSameAndDeletesNothing) {
 
 TEST_F(HistoryRetentionTest, AnEventThatWasNotSentKeepsItsEpisode) {
   RecordEpisode(writer_, 0b010, "unsent");
-  HistoryEditor(path_).Acknowledge(EpisodeIdText(Id("unsent")), "anna", "", 1);
+  HistoryEditor(path_).Acknowledge(EpisodeIdText(Id("unsent")), By("anna", 1));
 
   PruneHistory(path_, Before(kEnded + 1));
 

@@ -1,0 +1,145 @@
+#include "storage/alarm_statistics.h"
+
+#include <algorithm>
+
+#include "storage/history_query.h"
+#include "storage/history_rows.h"
+
+namespace fdi::storage {
+namespace {
+
+constexpr std::int64_t kDayNs = 86'400'000'000'000;
+
+std::int64_t Nanoseconds(double seconds) {
+  return static_cast<std::int64_t>(seconds * 1e9);
+}
+
+// What falls into the time [from, to).
+struct Stretch {
+  std::int64_t from_ns;
+  std::int64_t to_ns;
+  double seconds() const {
+    return std::max(0.0, static_cast<double>(to_ns - from_ns) * 1e-9);
+  }
+};
+
+void AddDays(const Stretch& stretch, std::map<std::int64_t, DayAlarms>& days) {
+  for (std::int64_t from = stretch.from_ns; from < stretch.to_ns;) {
+    const std::int64_t day = from / kDayNs;
+    const std::int64_t to = std::min(stretch.to_ns, (day + 1) * kDayNs);
+    days[day].alarm_s += static_cast<double>(to - from) * 1e-9;
+    from = to;
+  }
+}
+
+void AddLabel(const AlarmSpan& span, AlarmStatistics& statistics) {
+  FaultAlarms& fault = statistics.faults[span.fault];
+  ++fault.episodes;
+  if (!span.label) {
+    ++statistics.unlabelled;
+    return;
+  }
+  const std::vector<std::string> answer = SplitNames(span.fault);
+  const bool right =
+      *span.label == "true" ||
+      std::find(answer.begin(), answer.end(), *span.label) != answer.end();
+  ++(right ? fault.right : fault.wrong);
+  ++(*span.label == "false" ? statistics.labelled_false
+                            : statistics.labelled_true);
+}
+
+// Episodes of one valve, detected at `stamps`, that came in a row of at least
+// `criteria.chattering_episodes` within the window.
+std::int64_t Chattering(const std::vector<std::int64_t>& stamps,
+                        const AlarmCriteria& criteria) {
+  const auto row = static_cast<std::size_t>(criteria.chattering_episodes);
+  const std::int64_t window_ns = Nanoseconds(criteria.chattering_window_s);
+  std::int64_t count = 0;
+  std::size_t counted = 0;  // Those before are counted.
+  for (std::size_t last = row - 1; row > 0 && last < stamps.size(); ++last) {
+    const std::size_t first = last + 1 - row;
+    if (stamps[last] - stamps[first] <= window_ns) {
+      const std::size_t fresh = std::max(first, counted);
+      count += static_cast<std::int64_t>(last + 1 - fresh);
+      counted = last + 1;
+    }
+  }
+  return count;
+}
+
+// The most stamps, which are in order, in any window.
+std::int64_t MostWithin(const std::vector<std::int64_t>& stamps,
+                        std::int64_t window_ns) {
+  std::size_t most = 0;
+  std::size_t first = 0;
+  for (std::size_t last = 0; last < stamps.size(); ++last) {
+    while (stamps[last] - stamps[first] >= window_ns) {
+      ++first;
+    }
+    most = std::max(most, last + 1 - first);
+  }
+  return static_cast<std::int64_t>(most);
+}
+
+}  // namespace
+
+AlarmStatistics ComputeAlarmStatistics(const std::vector<AlarmSpan>& spans,
+                                       std::int64_t since_ns,
+                                       std::int64_t until_ns,
+                                       std::int64_t now_ns,
+                                       const AlarmCriteria& criteria) {
+  AlarmStatistics statistics;
+  std::map<std::int64_t, DayAlarms> days;
+  std::map<std::string, std::vector<std::int64_t>> by_valve;
+  std::vector<std::int64_t> all;
+  for (const AlarmSpan& span : spans) {
+    const std::int64_t end_ns =
+        std::max(span.detected_ns, span.ended_ns.value_or(now_ns));
+    if (end_ns < since_ns || span.detected_ns >= until_ns) {
+      continue;
+    }
+    const Stretch stretch{std::max(span.detected_ns, since_ns),
+                          std::min(end_ns, until_ns)};
+    ValveAlarms& valve = statistics.valves[span.valve_id];
+    valve.alarm_s += stretch.seconds();
+    AddDays(stretch, days);
+    valve.open += span.ended_ns ? 0 : 1;
+    valve.standing +=
+        end_ns - span.detected_ns > Nanoseconds(criteria.standing_s) ? 1 : 0;
+    if (span.detected_ns < since_ns) {
+      continue;
+    }
+    ++valve.episodes;
+    valve.last_detected_ns = std::max(valve.last_detected_ns, span.detected_ns);
+    ++days[span.detected_ns / kDayNs].episodes;
+    AddLabel(span, statistics);
+    by_valve[span.valve_id].push_back(span.detected_ns);
+    all.push_back(span.detected_ns);
+  }
+  for (auto& [day, alarms] : days) {
+    alarms.day = day;
+    statistics.days.push_back(alarms);
+  }
+  for (const auto& [valve, stamps] : by_valve) {
+    statistics.valves[valve].chattering = Chattering(stamps, criteria);
+  }
+  statistics.most_in_flood_window =
+      MostWithin(all, Nanoseconds(criteria.flood_window_s));
+  return statistics;
+}
+
+std::vector<AlarmSpan> ReadAlarmSpans(Database& database,
+                                      const EpisodeFilter& filter) {
+  EpisodeFilter any_state = filter;
+  any_state.state = EpisodeState::kAny;
+  Statement row = database.Prepare(AlarmSpanQuery(any_state));
+  BindStatisticsQuery(row, any_state);
+  std::vector<AlarmSpan> spans;
+  while (row.Step()) {
+    spans.push_back({row.Text(0), row.Text(1), row.Int64(2),
+                     row.OptionalInt64(3), row.OptionalText(4)});
+  }
+  return spans;
+}
+
+}  // namespace fdi::storage

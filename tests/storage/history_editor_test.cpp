@@ -1,0 +1,192 @@
+#include "storage/history_editor.h"
+
+#include <gmock/gmock.h>
+
+#include "diagnosis/error.h"
+#include "tests/storage/history_fixture.h"
+#include "tests/storage/message_of.h"
+
+namespace fdi::storage {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class HistoryEditorTest : public HistoryFixture {
+ protected:
+  HistoryEditorTest() {
+    RecordEpisode(writer_, 0b010, "LV-1");
+    RecordEpisode(writer_, 0b101, "LV-2");
+    writer_.Record(
+        Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "open"));
+  }
+
+  std::vector<EpisodeEvent> Notes(const std::string& valve) {
+    auto events = HistoryReader(path_).Events(Id(valve));
+    std::erase_if(events,
+                  [](const EpisodeEvent& event) { return event.who.empty(); });
+    return events;
+  }
+  std::string IdText(const std::string& valve) const {
+    return EpisodeIdText(Id(valve));
+  }
+  // Valves of the list, in order.
+  std::vector<std::string> Listed(std::int64_t limit = 500) {
+    std::vector<std::string> valves;
+    for (const Alarm& alarm : HistoryReader(path_).AlarmList(now_, limit)) {
+      valves.push_back(alarm.episode.valve_id);
+    }
+    return valves;
+  }
+  std::size_t CountOf(EpisodeState state) {
+    EpisodeFilter filter;
+    filter.state = state;
+    filter.now_ns = now_;
+    return HistoryReader(path_).List(filter).size();
+  }
+
+  const std::int64_t now_ = kDetected + 1000 * kSecond;
+  HistoryWriter writer_{path_};
+  HistoryEditor editor_{path_};
+};
+
+TEST_F(HistoryEditorTest, EveryAcknowledgementAndLabelStaysOnRecord) {
+  const OperatorNote anna{"anna", "seen", "console 10.0.0.7", now_};
+  const OperatorNote jan{"jan", "", "fdi-store jan@rig", now_};
+  editor_.Acknowledge(IdText("LV-1"), anna);
+  editor_.Acknowledge(IdText("LV-1"), jan);  // At the same instant.
+  editor_.Label(IdText("LV-1"), "true", anna);
+  editor_.Label(IdText("LV-1"), "f1", jan);
+  editor_.Label(IdText("LV-1"), "f1", jan);
+
+  const auto notes = Notes("LV-1");
+  ASSERT_EQ(notes.size(), 5U);
+  EXPECT_EQ(notes[0].origin, "console 10.0.0.7");
+  EXPECT_EQ(notes[0].comment, "seen");
+  EXPECT_EQ(notes[1].who, "jan");
+  EXPECT_EQ(notes[1].recorded_ns, now_);
+  EXPECT_EQ(notes[4].value, "f1");
+  const Episode episode = HistoryReader(path_).Show(IdText("LV-1"));
+  EXPECT_EQ(episode.acked_by, "anna");
+  EXPECT_EQ(episode.acked_ns, now_);
+  EXPECT_EQ(episode.label, "f1");
+}
+
+TEST_F(HistoryEditorTest, TextsCannotMoveTheCursorOfATerminal) {
+  editor_.Acknowledge(IdText("LV-1"), By("anna", now_, "a\n\x1B[2Jb"));
+
+  EXPECT_EQ(Notes("LV-1").front().comment, "a  [2Jb");
+}
+
+TEST_F(HistoryEditorTest, NobodyAndNovelsAreRefused) {
+  EXPECT_THAT(MessageOf<ConfigError>(
+                  [&] { editor_.Acknowledge("last", By("", now_)); }),
+              HasSubstr("who has 0 bytes; accepted are 1 to 128"));
+  EXPECT_THROW(
+      editor_.Acknowledge("last", By("a", now_, std::string(2001, 'x'))),
+      ConfigError);
+}
+
+TEST_F(HistoryEditorTest, AnAlarmLeavesTheListEndedAndAcknowledged) {
+  EXPECT_THAT(Listed(), ElementsAre("open", "LV-2", "LV-1"));
+
+  editor_.Acknowledge(IdText("LV-1"), By("anna", now_));
+  editor_.Acknowledge(IdText("open"), By("anna", now_));
+
+  EXPECT_THAT(Listed(), ElementsAre("open", "LV-2"));
+  EXPECT_THAT(Listed(1), ElementsAre("open"));
+  const auto alarms = HistoryReader(path_).AlarmList(now_);
+  EXPECT_EQ(alarms[0].state, AlarmState::kAcked);
+  EXPECT_EQ(alarms[1].state, AlarmState::kReturnedUnacked);
+}
+
+TEST_F(HistoryEditorTest, StatesOfTheStandardCanBeAskedFor) {
+  editor_.Acknowledge(IdText("LV-1"), By("anna", now_));
+  editor_.Shelve("LV-2", std::nullopt, now_ + kSecond, By("anna", now_));
+
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmUnacked), 1U);
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmAcked), 0U);
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmReturnedUnacked), 1U);
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmNormal), 1U);
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmShelved), 1U);
+  EXPECT_EQ(CountOf(ParseEpisodeState("RTN_UNACK")), 1U);
+}
+
+TEST_F(HistoryEditorTest, AShelfOutlivesTheProgramAndEndsByItself) {
+  const std::int64_t until = now_ + 3600 * kSecond;
+  const Shelf shelf =
+      editor_.Shelve("LV-1", "F7", until, By("anna", now_, "seat ordered"));
+
+  HistoryReader reader(path_);
+  const auto in_force = reader.Shelves(until - 1);
+  ASSERT_EQ(in_force.size(), 1U);
+  EXPECT_EQ(in_force[0].shelf_id, shelf.shelf_id);
+  EXPECT_EQ(in_force[0].fault, "f7");
+  EXPECT_EQ(in_force[0].comment, "seat ordered");
+  EXPECT_TRUE(reader.Shelves(until).empty());
+  EXPECT_EQ(reader.Shelves().size(), 1U);
+  const auto alarms = reader.Alarms(reader.List(), now_);
+  EXPECT_TRUE(alarms[0].shelf);
+  EXPECT_FALSE(alarms[1].shelf);
+}
+
+TEST_F(HistoryEditorTest, ShelvingAgainReplacesAndEndingIsRecordedOnce) {
+  const auto first =
+      editor_.Shelve("LV-1", "f19|f1", now_ + 100, By("anna", now_));
+  const auto second =
+      editor_.Shelve("LV-1", "f1|f19", now_ + 900, By("jan", now_ + 10));
+  EXPECT_EQ(HistoryReader(path_).Shelves(now_ + 20).size(), 1U);
+
+  const auto ended = editor_.EndShelf(second.shelf_id, By("eva", now_ + 30));
+
+  EXPECT_EQ(ended.ended_ns, now_ + 30);
+  EXPECT_EQ(ended.ended_by, "eva");
+  EXPECT_EQ(ended.ended_origin, "test");
+  EXPECT_TRUE(HistoryReader(path_).Shelves(now_ + 30).empty());
+  EXPECT_THROW(editor_.EndShelf(second.shelf_id, By("eva", now_ + 40)),
+               DataError);
+  EXPECT_THROW(editor_.EndShelf(99, By("eva", now_)), NotFoundError);
+  EXPECT_EQ(HistoryReader(path_).Shelves()[0].ended_by, "jan");
+  EXPECT_EQ(first.fault, "f1|f19");
+}
+
+TEST_F(HistoryEditorTest, ShelvingHasItsLimits) {
+  EXPECT_THROW(editor_.Shelve("LV-1", "f99", now_ + 1, By("a", now_)),
+               ConfigError);
+  EXPECT_THROW(editor_.Shelve("", std::nullopt, now_ + 1, By("a", now_)),
+               ConfigError);
+  EXPECT_THROW(editor_.Shelve("LV-1", std::nullopt, now_, By("a", now_)),
+               ConfigError);
+  EXPECT_THROW(editor_.Shelve("LV-1", std::nullopt, now_ + kLongestShelfNs + 1,
+                              By("a", now_)),
+               ConfigError);
+  EXPECT_EQ(HistoryReader(path_).Shelves().size(), 0U);
+}
+
+TEST_F(HistoryEditorTest, TheShelfIsAppendOnly) {
+  editor_.Shelve("LV-1", std::nullopt, now_ + kSecond, By("anna", now_));
+  Database file(path_, HistorySchema(), Access::kOccasionalWriter);
+  Transaction transaction(file);
+
+  EXPECT_THROW(file.Run("DELETE FROM shelf"), SqliteError);
+  EXPECT_THROW(file.Run("UPDATE shelf SET who = 'nobody'"), SqliteError);
+}
+
+TEST_F(HistoryEditorTest, FiguresComeFromTheFilterAndTheFile) {
+  editor_.Label(IdText("LV-1"), "false", By("anna", now_));
+  EpisodeFilter filter;
+  filter.valve_glob = "LV-*";
+
+  const auto figures = HistoryReader(path_).AlarmFigures(filter, now_);
+
+  EXPECT_EQ(figures.valves.size(), 2U);
+  EXPECT_NEAR(figures.valves.at("LV-1").alarm_s, 91.0, 1e-6);
+  EXPECT_EQ(figures.labelled_false, 1);
+  filter.fault = "f19";
+  EXPECT_EQ(HistoryReader(path_).AlarmFigures(filter, now_).valves.size(), 1U);
+  filter.since_ns = kDetected + 92 * kSecond;
+  EXPECT_TRUE(HistoryReader(path_).AlarmFigures(filter, now_).valves.empty());
+}
+
+}  // namespace
+}  // namespace fdi::storage
