@@ -10,8 +10,9 @@
 #include <CLI/CLI.hpp>
 
 #include "diagnosis/error.h"
+#include "diagnosis/suggestion.h"
+#include "storage/cli/documentation_options.h"
 #include "storage/cli/logging.h"
-#include "storage/cli/suggestion.h"
 #include "storage/cli/toml_config.h"
 #include "storage/cli/version.h"
 #include "storage/database.h"
@@ -114,6 +115,7 @@ std::string CommandLine(int argc, const char* const* argv) {
 Program::Program(std::string name, std::string description)
     : app_(std::make_unique<CLI::App>(std::move(description), name)) {
   AddGlobalOptions(*app_, options_);
+  AddDocumentationOptions(*app_);
   app_->fallthrough();
   app_->require_subcommand(1);
   app_->failure_message({});
