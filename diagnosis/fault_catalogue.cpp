@@ -6,6 +6,7 @@
 #include <charconv>
 
 #include "diagnosis/error.h"
+#include "diagnosis/suggestion.h"
 
 namespace fdi {
 namespace {
@@ -51,6 +52,14 @@ std::optional<int> NumberAfter(std::string_view text, std::string_view prefix) {
   return number;
 }
 
+std::string Lower(std::string_view text) {
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) {
+    return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  });
+  return lower;
+}
+
 }  // namespace
 
 const FaultFacts& FaultFactsOf(int fault) {
@@ -69,10 +78,7 @@ std::string FaultName(int fault) {
 }
 
 std::optional<int> ParseFault(std::string_view name) {
-  std::string lower(name);
-  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) {
-    return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  });
+  const std::string lower = Lower(name);
   if (const auto paper = NumberAfter(lower, "paper")) {
     if (*paper >= 1 && *paper <= 5) {
       return kPaperFaults[static_cast<std::size_t>(*paper - 1)];
@@ -89,6 +95,19 @@ std::optional<int> ParseFault(std::string_view name) {
     }
   }
   return std::nullopt;
+}
+
+std::string DidYouMeanFault(std::string_view name,
+                            std::vector<std::string> others) {
+  const std::string lower = Lower(name);
+  if (NumberAfter(lower, "f") || NumberAfter(lower, "paper")) {
+    return "";  // Well written, but there is no such number.
+  }
+  for (int fault = 1; fault <= kLastFault; ++fault) {
+    others.push_back(FaultName(fault));
+  }
+  const auto meant = Suggest(lower, others);
+  return meant ? " (did you mean '" + *meant + "'?)" : "";
 }
 
 std::optional<Signal> TransmitterOf(int fault) {
@@ -108,7 +127,8 @@ int RequireFault(std::string_view name) {
   if (const auto fault = ParseFault(name)) {
     return *fault;
   }
-  throw ConfigError("unknown fault '" + std::string(name) + "': expected " +
+  throw ConfigError("unknown fault '" + std::string(name) + "'" +
+                    DidYouMeanFault(name) + ": expected " +
                     std::string(kFaultNames) + " or paper1..paper5");
 }
 

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "diagnosis/sample.h"
 
@@ -40,6 +41,11 @@ std::optional<int> ParseFault(std::string_view name);
 
 /// The signal whose transmitter is at fault: T1, P1 or P2 for 20, 21, 22.
 std::optional<Signal> TransmitterOf(int fault);
+
+/// For messages: " (did you mean 'f19'?)", or "" if `name` is not nearly the
+/// name of a fault or one of `others`.
+std::string DidYouMeanFault(std::string_view name,
+                            std::vector<std::string> others = {});
 
 /// As ParseFault(). @throws ConfigError naming the accepted names.
 int RequireFault(std::string_view name);

@@ -47,8 +47,9 @@ std::string CheckedLabel(std::string_view label) {
   }
   const auto fault = ParseFault(label);
   if (!fault) {
-    throw ConfigError("unknown label '" + std::string(label) +
-                      "'; accepted are true, false and " +
+    throw ConfigError("unknown label '" + std::string(label) + "'" +
+                      DidYouMeanFault(label, {"true", "false"}) +
+                      "; accepted are true, false and " +
                       std::string(kFaultNames));
   }
   return FaultName(*fault);

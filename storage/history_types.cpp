@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "diagnosis/error.h"
+#include "diagnosis/suggestion.h"
 
 namespace fdi::storage {
 namespace {
@@ -76,8 +77,11 @@ EpisodeState ParseEpisodeState(std::string_view name) {
             });
       });
   if (found == kStates.end()) {
-    std::string message =
-        "unknown state '" + std::string(name) + "'; there are";
+    std::string message = "unknown state '" + std::string(name) + "'";
+    if (const auto meant = Suggest(std::string(name), EpisodeStateNames())) {
+      message += " (did you mean '" + *meant + "'?)";
+    }
+    message += "; there are";
     for (const auto& state : kStates) {
       message += (&state == kStates.begin() ? " " : ", ");
       message += state.first;

@@ -6,8 +6,8 @@
 #include <span>
 
 #include "diagnosis/error.h"
+#include "diagnosis/suggestion.h"
 #include "storage/cli/shared_files.h"
-#include "storage/cli/suggestion.h"
 #include "storage/cli/toml_reader.h"
 
 namespace fdi::cli {

@@ -9,7 +9,7 @@
 #include <toml++/toml.h>
 
 #include "diagnosis/error.h"
-#include "storage/cli/suggestion.h"
+#include "diagnosis/suggestion.h"
 
 namespace fdi::cli {
 

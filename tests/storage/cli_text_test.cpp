@@ -7,8 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/suggestion.h"
 #include "storage/cli/logging.h"
-#include "storage/cli/suggestion.h"
 #include "storage/cli/text_table.h"
 #include "storage/cli/toml_reader.h"
 
@@ -43,6 +44,36 @@ TEST(TextTableTest, ColumnsAlignAlsoBehindMultiByteLetters) {
             "a         100.00\n");
 }
 
+// For people in front of it; the first to go is the one most spare.
+TEST(TextTableTest, SpareColumnsGoUntilTheTableFits) {
+  TextTable table({{"valve"}, {"note", Align::kLeft, 1}, {"set", {}, 2}});
+  table.AddRow({"LV-1", "long note", "demo@1"});
+  const auto printed = [&table](std::size_t width) {
+    std::ostringstream out;
+    table.Print(out, {false, width});
+    return out.str();
+  };
+
+  EXPECT_EQ(printed(24), "valve  note       set\nLV-1   long note  demo@1\n");
+  EXPECT_EQ(printed(23),
+            "valve  note\nLV-1   long note\n(too narrow for: set)\n");
+  EXPECT_EQ(printed(3), "valve\nLV-1\n(too narrow for: note, set)\n");
+}
+
+TEST(TextTableTest, ColourIsAskedForAndMovesNoColumn) {
+  TextTable table({{"a"}, {"b"}});
+  table.AddRow({"x", "y"});
+  table.SetTone(0, Tone::kAlarm);
+  std::ostringstream plain;
+  std::ostringstream coloured;
+
+  table.Print(plain);
+  table.Print(coloured, {true, 0});
+
+  EXPECT_EQ(plain.str(), "a  b\nx  y\n");
+  EXPECT_THAT(coloured.str(), HasSubstr("\x1b[1;31mx\x1b[0m  y\n"));
+}
+
 TEST(TextTableTest, RowOfAnotherLengthIsRefused) {
   TextTable table({{"a", Align::kLeft}});
 
@@ -52,6 +83,14 @@ TEST(TextTableTest, RowOfAnotherLengthIsRefused) {
 TEST(FormatNumberTest, NotFiniteIsADash) {
   EXPECT_EQ(FormatNumber(1.0 / 3.0, 3), "0.333");
   EXPECT_EQ(FormatNumber(std::numeric_limits<double>::quiet_NaN(), 3), "-");
+}
+
+TEST(SuggestTest, AFaultIsSuggestedUnlessItsNumberIsWrong) {
+  EXPECT_EQ(DidYouMeanFault("ff7"), " (did you mean 'f7'?)");
+  EXPECT_EQ(DidYouMeanFault("F_19"), " (did you mean 'f19'?)");
+  EXPECT_EQ(DidYouMeanFault("ture", {"true"}), " (did you mean 'true'?)");
+  EXPECT_EQ(DidYouMeanFault("f20"), "");
+  EXPECT_EQ(DidYouMeanFault("seat"), "");
 }
 
 TEST(SuggestTest, NearWordsAreMeantAndFarOnesAreNot) {

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-namespace fdi::cli {
+namespace fdi {
 
 /// The candidate that `word` was probably meant to be: at most a third of its
 /// letters (one at least) changed, added, left out or swapped with a neighbour.
 std::optional<std::string> Suggest(const std::string& word,
                                    const std::vector<std::string>& candidates);
 
-}  // namespace fdi::cli
+}  // namespace fdi

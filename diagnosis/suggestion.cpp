@@ -1,9 +1,9 @@
-#include "storage/cli/suggestion.h"
+#include "diagnosis/suggestion.h"
 
 #include <algorithm>
 #include <cstddef>
 
-namespace fdi::cli {
+namespace fdi {
 namespace {
 
 // Optimal string alignment distance: insert, delete, change, swap neighbours.
@@ -42,4 +42,4 @@ std::optional<std::string> Suggest(const std::string& word,
   return best;
 }
 
-}  // namespace fdi::cli
+}  // namespace fdi
