@@ -7,6 +7,7 @@
 #include "diagnosis/fault_catalogue.h"
 #include "storage/app/common.h"
 #include "storage/app/verbs.h"
+#include "storage/cli/lineage_text.h"
 #include "storage/cli/text_table.h"
 #include "storage/models.h"
 
@@ -88,7 +89,8 @@ Json ObserverJson(const ModelSet& models, const Observer& observer) {
           {"channels", channels}};
 }
 
-Json ModelJson(const ModelSet& models, const ModelSummary& summary) {
+Json ModelJson(const ModelSet& models, const ModelSummary& summary,
+               const Lineage& lineage) {
   Json object = SummaryJson(summary);
   Json observers = Json::array();
   for (const Observer& observer : models.observers) {
@@ -107,6 +109,7 @@ Json ModelJson(const ModelSet& models, const ModelSummary& summary) {
     object["undetectable"].push_back(FaultName(fault));
   }
   object["training_runs"] = models.training_runs;
+  object["lineage"] = cli::LineageJson(lineage);
   object["t"] = models.decision.isolation_threshold;
   object["n_d"] = models.decision.detection_samples;
   object["t_k"] = models.decision.isolation_samples;
@@ -115,7 +118,7 @@ Json ModelJson(const ModelSet& models, const ModelSummary& summary) {
 }
 
 void PrintModel(const ModelSet& models, const ModelSummary& summary,
-                const Context& context) {
+                const Lineage& lineage, const Context& context) {
   const DecisionParameters& d = models.decision;
   std::string runs;
   for (const std::string& run : models.training_runs) {
@@ -135,7 +138,9 @@ void PrintModel(const ModelSet& models, const ModelSummary& summary,
                         std::to_string(d.detection_samples) + ", t_k " +
                         std::to_string(d.isolation_samples) + ", t_c " +
                         std::to_string(d.clearing_samples) + " samples"},
+       {"built on", cli::ParentText(lineage)},
        {"training runs", runs}});
+  cli::PrintEpisodes(std::cout, lineage, context.options.utc);
   for (const ChannelSpec& channel : models.channels) {
     std::cout << "abnormal where r_" << channel.name << " < "
               << FormatNumber(channel.lower_threshold, 4) << " or > "
@@ -170,10 +175,11 @@ int Show(const std::string& reference, const Context& context) {
   ModelStore store(DataOf(context).models());
   const ModelSet models = store.Load(reference);
   const ModelSummary summary = store.Summary({models.name, models.version});
+  const Lineage lineage = store.LineageOf({models.name, models.version});
   if (context.options.json) {
-    cli::PrintJson(std::cout, ModelJson(models, summary));
+    cli::PrintJson(std::cout, ModelJson(models, summary, lineage));
   } else {
-    PrintModel(models, summary, context);
+    PrintModel(models, summary, lineage, context);
   }
   return cli::kExitOk;
 }

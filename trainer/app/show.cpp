@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "storage/cli/lineage_text.h"
 #include "storage/cli/logging.h"
 #include "storage/cli/output_folder.h"
 #include "storage/cli/program.h"
@@ -52,8 +53,8 @@ std::string TrainingRunsText(const ModelSet& models) {
   return text;
 }
 
-void PrintSummary(std::ostream& out, const ModelSet& models, bool active,
-                  bool utc) {
+void PrintSummary(std::ostream& out, const ModelSet& models,
+                  const storage::Lineage& lineage, bool active, bool utc) {
   cli::TextTable table({{"model set"},
                         {models.name + "@" + std::to_string(models.version) +
                          (active ? " (active)" : "")}});
@@ -73,9 +74,14 @@ void PrintSummary(std::ostream& out, const ModelSet& models, bool active,
                         " false alarms per hour, from " +
                         Text(models.threshold_hours) + " h without fault");
   add("decision", DecisionText(models.decision));
+  add("built on", cli::ParentText(lineage));
   add("training runs", TrainingRunsText(models));
   table.Print(out);
   out << '\n';
+  if (!lineage.episodes.empty()) {
+    cli::PrintEpisodes(out, lineage, utc);
+    out << '\n';
+  }
 }
 
 void PrintRules(std::ostream& out, const ModelSet& models) {
@@ -198,11 +204,15 @@ int Show(const ShowOptions& options, const cli::Context& context) {
   if (!options.pictures.empty()) {
     DrawPictures(models, options.pictures, directory, context);
   }
+  const storage::Lineage lineage =
+      store.LineageOf({models.name, models.version});
   if (context.options.json) {
-    cli::PrintJson(std::cout, SetJson(models, active, options.rules));
+    cli::Json json = SetJson(models, active, options.rules);
+    json["lineage"] = cli::LineageJson(lineage);
+    cli::PrintJson(std::cout, json);
     return cli::kExitOk;
   }
-  PrintSummary(std::cout, models, active, context.options.utc);
+  PrintSummary(std::cout, models, lineage, active, context.options.utc);
   PrintModels(std::cout, models);
   if (options.rules) {
     PrintRules(std::cout, models);
