@@ -1,0 +1,86 @@
+#!/usr/bin/env bash
+# Makes the Debian package, looks at what is in it and runs the programs from
+# where it unpacks. With FDI_PACKAGE_CHROOT=1 also installs, upgrades, removes
+# and purges it in a fresh Debian 12 (needs root, debootstrap and the network).
+# Usage: package.sh BUILD_DIRECTORY
+set -euo pipefail
+build=$(cd "$1" && pwd)
+folder=$(mktemp -d)
+trap 'rm -rf --one-file-system "$folder"' EXIT
+fail() {
+  echo "package: $*" >&2
+  exit 1
+}
+
+cpack --config "$build/CPackConfig.cmake" -B "$folder" \
+  >"$folder/cpack.log" 2>&1 ||
+  fail "$(cat "$folder/cpack.log")"
+package=$(ls "$folder"/fdi_*.deb)
+root=$folder/root
+dpkg-deb --extract "$package" "$root"
+dpkg-deb --control "$package" "$folder/control"
+
+for field in Package Version Maintainer Depends Recommends Description; do
+  [ -n "$(dpkg-deb --field "$package" $field)" ] || fail "no $field"
+done
+dpkg-deb --field "$package" Depends | grep -q libfastrtps ||
+  fail "no dependencies on libraries"
+for script in postinst prerm postrm; do
+  sh -n "$folder/control/$script"
+done
+[ "$(cat "$folder/control/conffiles")" = /etc/default/fdi-monitor ] ||
+  fail "conffiles: $(cat "$folder/control/conffiles")"
+dpkg-deb --contents "$package" | awk '$2 != "root/root" {bad = 1; print}
+  END {exit bad}' || fail "files that are not root's"
+
+for file in etc/default/fdi-monitor usr/lib/systemd/system/fdi-monitor.service \
+  usr/lib/sysusers.d/fdi.conf usr/share/fdi/campaigns/paper.toml \
+  usr/share/fdi/faults.toml usr/share/fdi/idl/fdi_v1.idl \
+  usr/share/doc/fdi/{copyright,changelog.gz,changelog.Debian.gz,README.md}; do
+  [ -s "$root/$file" ] || fail "$file is missing"
+done
+grep -q '^ExecStart=/usr/bin/fdi-monitor run' \
+  "$root/usr/lib/systemd/system/fdi-monitor.service" || fail "ExecStart"
+grep -q '^EnvironmentFile=-/etc/default/fdi-monitor$' \
+  "$root/usr/lib/systemd/system/fdi-monitor.service" || fail "EnvironmentFile"
+
+# A page for the program, its groups and their verbs: every word that --help
+# lists has one.
+pages() {  # PROGRAM WORDS...
+  local page name
+  name=$(IFS=-; echo "$*")
+  page=$root/usr/share/man/man1/$name.1.gz
+  gzip -dc "$page" | grep -q '^\.SH SYNOPSIS' || fail "no page $name(1)"
+  if command -v man >/dev/null; then
+    man --local-file "$page" >"$folder/page" 2>&1 || fail "$name(1) is no page"
+  fi
+  "$root/usr/bin/$1" "${@:2}" --help >"$folder/help"
+  local verb
+  for verb in $(sed -n '/^Subcommands:/,$ s/^  \([a-z][a-z-]*\).*/\1/p' \
+    "$folder/help"); do
+    pages "$@" "$verb"
+  done
+}
+version=$(dpkg-deb --field "$package" Version)
+for program in fdi-monitor fdi-simulator fdi-store fdi-trainer; do
+  "$root/usr/bin/$program" --version | grep -q "^$program ${version%-*}+" ||
+    fail "$program has another version than $version"
+  bash -n "$root/usr/share/bash-completion/completions/$program"
+  pages "$program"
+done
+export FDI_DATA=$folder/data
+"$root/usr/bin/fdi-store" faults >/dev/null
+"$root/usr/bin/fdi-simulator" run --no-publish --record --duration 60 \
+  --log-level error >/dev/null
+"$root/usr/bin/fdi-store" runs list >/dev/null
+"$root/usr/bin/fdi-trainer" train --print-campaign \
+  --campaign "$root/usr/share/fdi/campaigns/paper.toml" >/dev/null
+
+if command -v lintian >/dev/null; then
+  errors=$(lintian --fail-on none "$package" 2>/dev/null | grep '^E:' || true)
+  [ -z "$errors" ] || fail "$errors"
+fi
+echo "package: $(basename "$package"), $(stat -c %s "$package") bytes," \
+  "$(find "$root" -name '*.1.gz' | wc -l) manual pages"
+[ -n "${FDI_PACKAGE_CHROOT:-}" ] || exit 0
+"$(dirname "$0")/package_chroot.sh" "$package"
