@@ -1,0 +1,149 @@
+// What an operator does to alarms: acknowledge, shelve, label. Each is a dialog
+// that asks who and why; the token is asked for once a session.
+
+import {path, post, token} from './api.js';
+import {h, replace} from './dom.js';
+import {faultTitle, members} from './faults.js';
+import {settings} from './settings.js';
+import {store} from './store.js';
+
+/** Whether the monitor takes actions at all. */
+export const canAct = () => store.status?.write === true;
+
+function field(text, input) {
+  return h('label', {class: 'field'}, h('span', {}, text), input);
+}
+
+/**
+ * A dialog with who and comment; `send` gets both and may throw.
+ * @returns a promise of whether it was sent.
+ */
+function ask({title, subject, fields, verb, commentNeeded, send}) {
+  const who = h('input', {'value': settings.get('who'), 'required': true,
+    'autocomplete': 'name', 'maxlength': 100});
+  const comment = h('textarea', {rows: 2, maxlength: 1000,
+    required: commentNeeded});
+  const secret = token.get() ? null :
+    h('input', {type: 'password', required: true, autocomplete: 'off'});
+  const wrong = h('p', {class: 'wrong', role: 'alert', hidden: true});
+  const submit = h('button', {class: 'primary'}, verb);
+  const form = h('form', {method: 'dialog'}, h('p', {}, subject), fields,
+      field('Your name', who),
+      field(commentNeeded ? 'Reason' : 'Comment', comment),
+      secret ? field('Token of the monitor (file of --console-write)',
+          secret) : null, wrong,
+      h('div', {class: 'buttons'}, h('button', {type: 'button',
+        onclick: () => dialog.close()}, 'Cancel'), submit));
+  const dialog = h('dialog', {'aria-labelledby': 'dialog-title'},
+      h('h2', {id: 'dialog-title'}, title), form);
+  return new Promise((resolve) => {
+    let sent = false;
+    form.addEventListener('submit', async (event) => {
+      event.preventDefault();
+      submit.disabled = true;
+      if (secret) token.set(secret.value);
+      settings.set('who', who.value);
+      try {
+        await send({who: who.value, comment: comment.value});
+        sent = true;
+        dialog.close();
+      } catch (error) {
+        if (error.status === 401) token.clear();
+        wrong.hidden = false;
+        replace(wrong, error.status === 401 && !secret ?
+          'The token is no longer valid: close this and try again.' :
+          error.message);
+        submit.disabled = false;
+      }
+    });
+    dialog.addEventListener('close', () => {
+      dialog.remove();
+      resolve(sent);
+    });
+    document.body.append(dialog);
+    dialog.showModal();
+    (who.value ? comment : who).focus();
+  });
+}
+
+function describe(rows) {
+  return rows.length === 1 ?
+    `${rows[0].valve}: ${faultTitle(rows[0].fault)}` : `${rows.length} alarms`;
+}
+
+export function acknowledge(rows) {
+  return ask({
+    title: 'Acknowledge', verb: 'Acknowledge', subject: describe(rows),
+    fields: [],
+    send: async (body) => {
+      for (const row of rows) {
+        store.applyAlarm(await post(path('episodes', row.episode, 'ack'), body));
+      }
+    },
+  });
+}
+
+const kShelfTimes = [
+  [30, '30 minutes'], [60, '1 hour'], [240, '4 hours'], [480, '8 hours'],
+  [1440, '1 day'], [10080, '7 days'],
+];
+
+export function shelve(row) {
+  const minutes = h('select', {}, kShelfTimes.map(([value, text]) =>
+    h('option', {value}, text)));
+  minutes.value = '480';
+  const scope = h('select', {},
+      row.fault && row.fault !== 'unknown' ?
+        h('option', {value: row.fault}, `Only ${faultTitle(row.fault)}`) : null,
+      h('option', {value: ''}, 'Every alarm of this valve'));
+  return ask({
+    title: 'Shelve', verb: 'Shelve', subject: row.valve, commentNeeded: true,
+    fields: [field('For', minutes), field('What', scope)],
+    send: (body) => post('/shelf', {
+      valve: row.valve, fault: scope.value || null,
+      minutes: Number(minutes.value), ...body,
+    }),
+  });
+}
+
+export function unshelve(row) {
+  return ask({
+    title: 'Take off the shelf', verb: 'Unshelve', subject: describe([row]),
+    fields: [], send: (body) =>
+      post(path('shelf', row.shelved.shelf_id, 'end'), body),
+  });
+}
+
+export function label(row) {
+  const own = members(row.fault);
+  const choice = h('select', {},
+      h('option', {value: 'true'}, own.length > 0 ?
+        `True: it was ${faultTitle(row.fault)}` : 'True: there was a fault'),
+      h('option', {value: 'false'}, 'False alarm'),
+      [...store.faults.keys()].map((fault) => h('option', {value: fault},
+          `It was ${faultTitle(fault)}`)));
+  if (row.label) choice.value = row.label;
+  return ask({
+    title: 'Label', verb: 'Label', subject: describe([row]),
+    fields: [field('What was it?', choice)],
+    send: async (body) => store.applyAlarm(await post(
+        path('episodes', row.episode, 'label'),
+        {label: choice.value, ...body})),
+  });
+}
+
+/** Buttons for what can be done to an alarm now; `done` after each. */
+export function actionButtons(row, done) {
+  if (!canAct()) return [];
+  const button = (text, action, target) => h('button', {
+    'type': 'button', 'aria-label': `${text} ${row.valve}`,
+    'onclick': async () => await action(target) && done?.(),
+  }, text);
+  const open = row.isa === 'UNACK' || row.isa === 'RTN_UNACK';
+  return [
+    open ? button('Acknowledge', acknowledge, [row]) : null,
+    row.shelved ? button('Unshelve', unshelve, row) :
+      row.state !== 'CLOSED' ? button('Shelve', shelve, row) : null,
+    button('Label', label, row),
+  ];
+}

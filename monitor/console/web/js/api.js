@@ -1,0 +1,88 @@
+// The monitor's HTTP interface.
+
+const kBase = 'api/v1';
+const kTokenKey = 'fdi.token';
+
+export class ApiError extends Error {
+  constructor(status, message, retryAfterS = null) {
+    super(message);
+    this.status = status;
+    this.retryAfterS = retryAfterS;
+  }
+}
+
+export function url(path, query = {}) {
+  const parameters = new URLSearchParams();
+  for (const [name, value] of Object.entries(query)) {
+    if (value !== null && value !== undefined && value !== '') {
+      parameters.set(name, value);
+    }
+  }
+  const text = parameters.toString();
+  return kBase + path + (text ? '?' + text : '');
+}
+
+/** "/valves/FV%2F1/trend" from ['valves', 'FV/1', 'trend'] */
+export function path(...words) {
+  return words.map((word) => '/' + encodeURIComponent(word)).join('');
+}
+
+export async function errorOf(response) {
+  let message = `the monitor answered ${response.status}`;
+  try {
+    message = (await response.json()).error ?? message;
+  } catch {
+    // Not ours: the status has to do.
+  }
+  const retry = Number(response.headers.get('Retry-After'));
+  return new ApiError(response.status, message, retry || null);
+}
+
+async function request(address, options) {
+  let response;
+  try {
+    response = await fetch(address, {cache: 'no-store', ...options});
+  } catch (error) {
+    if (error.name === 'AbortError') throw error;
+    throw new ApiError(0, 'the monitor does not answer');
+  }
+  if (!response.ok) throw await errorOf(response);
+  return response;
+}
+
+export async function get(where, query, signal) {
+  const timeout = AbortSignal.timeout(15000);
+  const response = await request(url(where, query), {
+    signal: signal && AbortSignal.any ? AbortSignal.any([signal, timeout]) :
+      timeout,
+  });
+  return response.json();
+}
+
+/** Null instead of an error where there is nothing of that name. */
+export async function getOptional(where, query) {
+  try {
+    return await get(where, query);
+  } catch (error) {
+    if (error.status === 404) return null;
+    throw error;
+  }
+}
+
+export const token = {
+  get: () => sessionStorage.getItem(kTokenKey),
+  set: (text) => sessionStorage.setItem(kTokenKey, text),
+  clear: () => sessionStorage.removeItem(kTokenKey),
+};
+
+export async function post(where, body) {
+  const response = await request(url(where), {
+    method: 'POST',
+    headers: {
+      'Content-Type': 'application/json',
+      'Authorization': `Bearer ${token.get() ?? ''}`,
+    },
+    body: JSON.stringify(body),
+  });
+  return response.json();
+}

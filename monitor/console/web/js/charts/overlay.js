@@ -1,0 +1,134 @@
+// What is drawn below and above the lines of a panel: gaps, bands of
+// thresholds, the state of the valve, marks of an episode.
+
+import {cssColor} from '../dom.js';
+import {markWord} from '../faults.js';
+import {durationText} from '../format.js';
+
+let hatchTile = null;
+let hatchColor = '';
+
+function hatch(context, color) {
+  if (hatchColor !== color) {
+    hatchTile = document.createElement('canvas');
+    hatchTile.width = hatchTile.height = 8;
+    const tile = hatchTile.getContext('2d');
+    tile.strokeStyle = color;
+    tile.lineWidth = 2;
+    tile.beginPath();
+    for (const shift of [-8, 0, 8]) {
+      tile.moveTo(shift - 1, 9);
+      tile.lineTo(shift + 9, -1);
+    }
+    tile.stroke();
+    hatchColor = color;
+  }
+  return context.createPattern(hatchTile, 'repeat');
+}
+
+function clipped(u, draw) {
+  const {ctx, bbox} = u;
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
+  draw(ctx, bbox);
+  ctx.restore();
+}
+
+const xOf = (u, ms) => u.valToPos(ms, 'x', true);
+
+function drawBand(u, ctx, {left, width}, {low, high}) {
+  const top = u.valToPos(high, 'y', true);
+  const bottom = u.valToPos(low, 'y', true);
+  ctx.fillStyle = cssColor('--band');
+  ctx.fillRect(left, top, width, bottom - top);
+  drawLevel(u, ctx, left, width, high);
+  drawLevel(u, ctx, left, width, low);
+}
+
+function drawLevel(u, ctx, left, width, value) {
+  const y = u.valToPos(value, 'y', true);
+  ctx.strokeStyle = cssColor('--ink-soft');
+  ctx.lineWidth = devicePixelRatio;
+  ctx.setLineDash([5 * devicePixelRatio, 4 * devicePixelRatio]);
+  ctx.beginPath();
+  ctx.moveTo(left, y);
+  ctx.lineTo(left + width, y);
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+function drawGaps(u, ctx, {left, top, width, height}, gaps, first) {
+  ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+  for (const gap of gaps) {
+    const from = Math.max(left, xOf(u, gap.from_ms));
+    const to = Math.min(left + width,
+        gap.to_ms === null ? left + width : xOf(u, gap.to_ms));
+    if (to <= from) continue;
+    ctx.fillStyle = hatch(ctx, cssColor('--hatch'));
+    ctx.fillRect(from, top, Math.max(to - from, 2), height);
+    const text = gap.reason +
+      (gap.to_ms === null ? '' : ` ${durationText(gap.to_ms - gap.from_ms)}`);
+    if (first && ctx.measureText(text).width < to - from - 4) {
+      ctx.fillStyle = cssColor('--ink-soft');
+      ctx.textAlign = 'center';
+      ctx.fillText(text, (from + to) / 2, top + height - 6 * devicePixelRatio);
+    }
+  }
+}
+
+// Detected: a thin strip along the upper edge; isolated: a thick one.
+function drawRibbon(u, ctx, {top}, table) {
+  const {t, state} = table;
+  ctx.fillStyle = cssColor('--p2');
+  for (let i = 1; i < t.length; ++i) {
+    if (!state[i] || state[i] === 'NORMAL') continue;
+    const from = xOf(u, t[i - 1]);
+    const size = (state[i] === 'ISOLATED' ? 7 : 3) * devicePixelRatio;
+    ctx.fillRect(from, top, Math.ceil(xOf(u, t[i]) - from), size);
+  }
+}
+
+function drawMarks(u, ctx, {left, top, width, height}, marks, first) {
+  const ratio = devicePixelRatio;
+  ctx.font = `600 ${11 * ratio}px system-ui, sans-serif`;
+  let lastX = -Infinity;
+  let row = 0;
+  for (const mark of [...marks].sort((a, b) => a.t_ms - b.t_ms)) {
+    const x = xOf(u, mark.t_ms);
+    if (x < left || x > left + width) continue;
+    ctx.strokeStyle = ctx.fillStyle = cssColor('--ink');
+    ctx.lineWidth = 1.5 * ratio;
+    ctx.setLineDash(mark.kind === 'DETECTED' ? [4 * ratio, 3 * ratio] : []);
+    ctx.beginPath();
+    ctx.moveTo(x, top);
+    ctx.lineTo(x, top + height);
+    ctx.stroke();
+    ctx.setLineDash([]);
+    if (!first) continue;
+    const text = markWord(mark.kind);
+    const room = ctx.measureText(text).width + 8 * ratio;
+    row = x - lastX < room ? row + 1 : 0;
+    lastX = x;
+    ctx.textAlign = x + room > left + width ? 'right' : 'left';
+    ctx.fillText(text, x + (ctx.textAlign === 'left' ? 4 : -4) * ratio,
+        top + (13 + 13 * row) * ratio);
+  }
+}
+
+/** Hooks of uPlot for a panel; `scene` holds table, gaps and marks. */
+export function overlayHooks(panel, scene, isFirst) {
+  return {
+    drawClear: [(u) => clipped(u, (ctx, box) => {
+      if (panel.band) drawBand(u, ctx, box, panel.band);
+      if (panel.threshold) drawLevel(u, ctx, box.left, box.width,
+          panel.threshold);
+      drawGaps(u, ctx, box, scene.gaps, isFirst);
+    })],
+    draw: [(u) => clipped(u, (ctx, box) => {
+      if (panel.ribbon) drawRibbon(u, ctx, box, scene.table);
+      drawMarks(u, ctx, box, scene.marks, isFirst);
+    })],
+  };
+}

@@ -1,0 +1,84 @@
+// Which lines stand in which panel of a trend, and how they look.
+
+import {faultTitle} from '../faults.js';
+
+const kDashes = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
+const kFaultColors = ['--s2', '--s3', '--s4', '--s5', '--s6'];
+const kTallestResidualRows = 3;
+
+export function unitText(unit) {
+  return (unit ?? '').replace('m3', 'm³').replace('degC', '°C')
+      .replace('_', ' ').replace('m³ per h', 'm³/h');
+}
+
+function signalPanel(data) {
+  const flow = unitText(data.meta.flow_unit);
+  const lines = [
+    {column: 'sp', label: 'SP', unit: '%', color: '--s5', dash: [2, 3]},
+    {column: 'cv', label: 'CV', unit: '%', color: '--s5', dash: [6, 3]},
+    {column: 'x', label: 'X', unit: '%', color: '--s1'},
+    {column: 'x_hat', label: 'X expected', unit: '%', color: '--s1',
+      dash: [2, 3]},
+    {column: 'f', label: 'F', unit: flow, color: '--s2', scale: 'right'},
+    {column: 'f_hat', label: 'F expected', unit: flow, color: '--s2',
+      dash: [2, 3], scale: 'right'},
+  ];
+  return {
+    key: 'signals', title: `Signals: CV, X [%] left, F [${flow}] right`,
+    height: 230, lines,
+  };
+}
+
+function processPanel() {
+  return {
+    key: 'process', title: 'Process: P1, P2 [kPa] left, T1 [°C] right',
+    height: 150,
+    lines: [
+      {column: 'p1', label: 'P1', unit: 'kPa', color: '--s4'},
+      {column: 'p2', label: 'P2', unit: 'kPa', color: '--s3', dash: [6, 3]},
+      {column: 't1', label: 'T1', unit: '°C', color: '--s6', scale: 'right',
+        dash: [2, 3]},
+    ],
+  };
+}
+
+function residualPanel({name, unit, low, high}, c, tall) {
+  const text = unitText(unit);
+  return {
+    key: `r${c}`, height: tall ? 120 : 92,
+    title: `Residual of ${name} [${text || '-'}], measured minus expected`,
+    lines: [{column: `r${c}`, label: `r ${name}`, unit: text, color: '--s1'}],
+    band: {low, high},
+  };
+}
+
+function decisionPanel({faults, T}) {
+  const lines = [{column: 'd0', label: 'normal', unit: '', color: '--s1'}];
+  faults.forEach((fault, f) => lines.push({
+    column: `d${f + 1}`, label: faultTitle(fault), fault, unit: '',
+    color: kFaultColors[f % kFaultColors.length],
+    dash: kDashes[Math.floor(f / kFaultColors.length) % kDashes.length],
+  }));
+  return {
+    key: 'decision', title: 'Decision factors d and threshold T',
+    height: 220, lines, range: [-0.03, 1.05], threshold: T, ribbon: true,
+  };
+}
+
+/** Panels from top to bottom; lines without any value are left out. */
+export function panelsOf(data, table) {
+  const {channels} = data.meta;
+  const tall = channels.length <= kTallestResidualRows;
+  const panels = [
+    signalPanel(data), processPanel(),
+    ...channels.map((channel, c) => residualPanel(channel, c, tall)),
+    decisionPanel(data.meta),
+  ];
+  for (const panel of panels) {
+    panel.lines = panel.lines.filter(({column}) =>
+      table[column]?.some((value) => value !== null) ||
+      panel.key === 'decision' || column === 'x' || column === 'f' ||
+      panel.band);
+  }
+  return panels.filter((panel) => panel.lines.length > 0);
+}

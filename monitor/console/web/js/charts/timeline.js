@@ -1,0 +1,241 @@
+// Panels of a trend on one axis of time: zoom by dragging, pan by Shift and
+// dragging, both by keys and buttons; follows the newest until told otherwise.
+
+import {h, replace} from '../dom.js';
+import {Panel} from './panel.js';
+import {panelsOf} from './panels.js';
+
+const kLeastSpanMs = 5000;
+const kFreshMs = 3600000;
+let count = 0;
+
+export class Timeline {
+  element;
+  #panels = [];
+  #scene = {table: {t: []}, gaps: [], marks: []};
+  #panelBox = h('div', {class: 'panels'});
+  #buttons;
+  #spanMs;  // Of the window that follows; null: all.
+  #window = null;  // What the user looks at; null: follow.
+  #setting = false;
+  #syncKey = `trend${++count}`;
+  #hidden = new Set(['process']);
+  #resize = new ResizeObserver(() => this.#fit());
+  #data;
+
+  /** `live`: the newest is where it goes on; else all of it is shown. */
+  constructor(data, {live, nowMs, describe}) {
+    this.#data = data;
+    this.#spanMs = live ? 15 * 60000 : null;
+    this.live = live;
+    this.nowMs = nowMs;
+    this.#buttons = h('div', {
+      'class': 'chart-tools', 'role': 'group', 'aria-label': 'Time shown'});
+    this.#panelBox.tabIndex = 0;
+    this.#panelBox.setAttribute('role', 'application');
+    this.#panelBox.setAttribute('aria-roledescription', 'trend');
+    this.#panelBox.setAttribute('aria-label', describe);
+    this.#panelBox.addEventListener('keydown', (event) => this.#key(event));
+    this.#panelBox.addEventListener('wheel', (event) => this.#wheel(event),
+        {passive: false});
+    this.element = h('div', {class: 'timeline'}, this.#buttons, this.#panelBox);
+    this.#makeButtons();
+    this.#resize.observe(this.#panelBox);
+  }
+
+  destroy() {
+    this.#resize.disconnect();
+    this.#panels.forEach((panel) => panel.destroy());
+  }
+
+  /** Channels or faults are others: panels anew. */
+  rebuild() {
+    this.#panels.forEach((panel) => panel.destroy());
+    this.#panels = [];
+    this.#readScene();
+    const all = panelsOf(this.#data, this.#scene.table);
+    const shown = all.filter((panel) => !this.#hidden.has(panel.key));
+    this.hasProcess = all.some((panel) => panel.key === 'process');
+    const width = Math.max(280, this.#panelBox.clientWidth || 800);
+    this.#panels = shown.map((panel, i) => new Panel(panel, this.#scene, {
+      isFirst: i === 0, isLast: i === shown.length - 1, width,
+      syncKey: this.#syncKey, handlers: {
+        mousedown: (u, event) => this.#pan(u, event),
+        zoomed: (u) => this.#zoomed(u),
+        reset: () => this.showAll(),
+      },
+    }));
+    replace(this.#panelBox, this.#panels.map((panel) => panel.element));
+    this.#makeButtons();
+    this.update();
+  }
+
+  /** Instants, gaps or marks have changed. */
+  update() {
+    if (this.#panels.length === 0) return;
+    this.#readScene();
+    this.#panels.forEach((panel) => panel.update());
+    this.#apply(this.#window ?? this.#following());
+  }
+
+  get panels() {
+    return this.#panels;
+  }
+
+  showAll() {
+    this.#spanMs = null;
+    this.#window = null;
+    this.update();
+    this.#makeButtons();
+  }
+
+  follow(spanMs) {
+    this.#spanMs = spanMs;
+    this.#window = null;
+    this.update();
+    this.#makeButtons();
+  }
+
+  #readScene() {
+    const gaps = this.#data.allGaps();
+    Object.assign(this.#scene, {
+      gaps, table: this.#data.columns ? this.#data.table(gaps) : {t: []},
+      marks: this.#data.marks,
+    });
+  }
+
+  // While nothing comes the window goes on, so that the gap is seen to grow.
+  #following() {
+    const {t} = this.#scene.table;
+    const first = t[0] ?? this.nowMs() - 60000;
+    const last = t.at(-1) ?? this.nowMs();
+    const now = this.nowMs();
+    const end = this.live && this.#data.openGapFromMs !== null &&
+        now > last && now - last < kFreshMs ? now : last;
+    const begin = this.#spanMs === null ? first : end - this.#spanMs;
+    return [begin, Math.max(end, begin + kLeastSpanMs)];
+  }
+
+  #apply([min, max]) {
+    this.#setting = true;
+    for (const {u} of this.#panels) u.setScale('x', {min, max});
+    // Scales are set at the end of the task.
+    queueMicrotask(() => this.#setting = false);
+  }
+
+  #zoomed(u) {
+    const {min, max} = u.scales.x;
+    if (this.#setting || this.#panels.length === 0 || min === null) return;
+    this.#look([min, max]);
+  }
+
+  #look([min, max]) {
+    if (max - min < kLeastSpanMs) {
+      const middle = (min + max) / 2;
+      [min, max] = [middle - kLeastSpanMs / 2, middle + kLeastSpanMs / 2];
+    }
+    this.#window = [min, max];
+    this.#apply(this.#window);
+    this.#makeButtons();
+  }
+
+  #shown() {
+    return this.#window ?? this.#following();
+  }
+
+  shift(share) {
+    const [min, max] = this.#shown();
+    const step = share * (max - min);
+    this.#look([min + step, max + step]);
+  }
+
+  /** Around `at` (ms), by default the middle. */
+  zoom(factor, at = null) {
+    const [min, max] = this.#shown();
+    const centre = at ?? (min + max) / 2;
+    this.#look([centre + (min - centre) * factor,
+      centre + (max - centre) * factor]);
+  }
+
+  #pan(u, event) {
+    event.preventDefault();
+    const [min, max] = this.#shown();
+    const perPixel = (max - min) / u.over.clientWidth;
+    const move = ({clientX}) => {
+      const step = (event.clientX - clientX) * perPixel;
+      this.#look([min + step, max + step]);
+    };
+    addEventListener('pointermove', move);
+    addEventListener('pointerup', () =>
+      removeEventListener('pointermove', move), {once: true});
+  }
+
+  #wheel(event) {
+    if (!event.ctrlKey && !event.shiftKey) return;
+    event.preventDefault();
+    if (event.shiftKey) {
+      this.shift(Math.sign(event.deltaY || event.deltaX) * 0.1);
+      return;
+    }
+    const u = this.#panels[0]?.u;
+    if (!u) return;
+    const {left} = u.over.getBoundingClientRect();
+    this.zoom(event.deltaY > 0 ? 1.25 : 0.8,
+        u.posToVal(event.clientX - left, 'x'));
+  }
+
+  #key(event) {
+    if (event.target !== this.#panelBox) return;
+    const actions = {
+      'ArrowLeft': () => this.shift(-0.2), 'ArrowRight': () => this.shift(0.2),
+      '+': () => this.zoom(0.5), '-': () => this.zoom(2),
+      'Home': () => this.showAll(), 'End': () => this.follow(this.#spanMs),
+    };
+    if (!actions[event.key]) return;
+    event.preventDefault();
+    event.stopPropagation();
+    actions[event.key]();
+  }
+
+  #makeButtons() {
+    const focused = this.#buttons.contains(document.activeElement) ?
+      document.activeElement.title : null;
+    const button = (text, action, title, pressed) => h('button', {
+      'type': 'button', title, 'onclick': action, 'aria-label': title,
+      'aria-pressed': pressed === undefined ? null : String(pressed)}, text);
+    const following = this.#window === null;
+    const minutes = this.live ? [5, 15, 60] : [];
+    replace(this.#buttons,
+        minutes.map((m) => button(`${m} min`, () => this.follow(m * 60000),
+            `Follow the last ${m} minutes`,
+            following && this.#spanMs === m * 60000)),
+        button('All', () => this.showAll(), 'Show all there is',
+            following && this.#spanMs === null),
+        button('◀', () => this.shift(-0.2), 'Earlier (key ←)'),
+        button('▶', () => this.shift(0.2), 'Later (key →)'),
+        button('+', () => this.zoom(0.5), 'Zoom in (key +, Ctrl and wheel)'),
+        button('−', () => this.zoom(2), 'Zoom out (key −, Ctrl and wheel)'),
+        this.hasProcess ? button('P1 P2 T1', () => this.#toggleProcess(),
+            'Show pressures and temperature',
+            !this.#hidden.has('process')) : null,
+        following || !this.live ? null :
+          h('span', {class: 'paused'}, 'Paused: not following'));
+    if (focused) {
+      [...this.#buttons.children].find((b) => b.title === focused)?.focus();
+    }
+  }
+
+  #toggleProcess() {
+    if (!this.#hidden.delete('process')) this.#hidden.add('process');
+    this.rebuild();
+  }
+
+  #fit() {
+    const width = this.#panelBox.clientWidth;
+    for (const {u} of this.#panels) {
+      if (Math.abs(u.width - width) > 1) {
+        u.setSize({width, height: u.height});
+      }
+    }
+  }
+}

@@ -1,0 +1,50 @@
+// Starts the page: what is on top, which view a link means.
+
+import {startAnnouncements} from './announce.js';
+import {replace} from './dom.js';
+import {parseRoute} from './route.js';
+import {applyTheme, settings} from './settings.js';
+import {createShell} from './shell.js';
+import {startShortcuts} from './shortcuts.js';
+import {store} from './store.js';
+import {alarmsView} from './views/alarms.js';
+import {episodeView} from './views/episode.js';
+import {historyView} from './views/history.js';
+import {plantView} from './views/plant.js';
+import {valveView} from './views/valve.js';
+import {worklistView} from './views/worklist.js';
+
+const kViews = {
+  '': plantView, 'valve': valveView, 'alarms': alarmsView,
+  'episode': episodeView, 'history': historyView, 'worklist': worklistView,
+};
+
+const main = document.getElementById('main');
+let current = null;
+
+/** Shows what the address says; `byUser` moves the focus there, too. */
+function show(byUser) {
+  const route = parseRoute(location.hash);
+  if (current?.stays?.(route)) return;
+  current?.destroy?.();
+  const view = kViews[route.name] ?? plantView;
+  store.watch(view === valveView ? route.id : null);
+  current = view(route);
+  replace(main, current.element);
+  scrollTo(0, 0);
+  shell.showRoute(route.name, current.title);
+  if (byUser) main.focus({preventScroll: true});
+}
+
+applyTheme();
+const shell = createShell(document.getElementById('top'),
+    document.getElementById('banner'));
+startAnnouncements(document.getElementById('announcer'));
+startShortcuts();
+settings.addEventListener('change', ({detail}) => {
+  if (detail === 'theme') applyTheme();
+  if (detail === 'theme' || detail === 'utc') show(false);
+});
+addEventListener('hashchange', () => show(true));
+store.start();
+show(false);

@@ -1,0 +1,131 @@
+// What stands above every view: where one is, how many alarms, whether the data
+// are fresh, the clock.
+
+import {h, replace, setText} from './dom.js';
+import {groups, groupOf, priorityOf, priorityNames} from './faults.js';
+import {clockText, dateText, durationText, timeText, zoneName}
+  from './format.js';
+import {nextTheme, settings} from './settings.js';
+import {showHelp} from './shortcuts.js';
+import {store} from './store.js';
+import {prioritySign} from './symbols.js';
+
+const kEntries = [
+  {name: '', text: 'Plant', key: '1'},
+  {name: 'alarms', text: 'Alarms', key: '2'},
+  {name: 'history', text: 'History', key: '3'},
+  {name: 'worklist', text: 'Work list', key: '4'},
+];
+const kGraceMs = 2000;  // A change of view reconnects; that is no news.
+
+function countAlarms() {
+  const counts = {};
+  const priorities = [0, 0, 0, 0, 0];
+  for (const row of store.alarms.values()) {
+    const group = groupOf(row);
+    counts[group] = (counts[group] ?? 0) + 1;
+    if (group === 'UNACK') ++priorities[priorityOf(row)];
+  }
+  return {counts, priorities};
+}
+
+function alarmSummary() {
+  const {counts, priorities} = countAlarms();
+  const open = counts.UNACK ?? 0;
+  return {
+    open,
+    text: groups.map((g) => `${counts[g.key] ?? 0} ${g.name.toLowerCase()}`)
+        .join(', '),
+    nodes: open === 0 ? [h('span', {class: 'calm'}, 'no new alarm')] :
+      priorities.map((count, p) => count === 0 ? null :
+        h('span', {class: 'count', title: priorityNames[p]},
+            prioritySign(p), String(count))),
+  };
+}
+
+function bannerText() {
+  const {stream} = store;
+  if (stream.connected) return '';
+  if (stream.heardMs === null) {
+    return stream.retryMs ? `No connection: ${stream.reason}.` : '';
+  }
+  if (Date.now() - stream.heardMs < kGraceMs) return '';
+  return `Data stale since ${timeText(stream.heardMs)}` +
+      ` (${stream.reason}). Trying again by itself.`;
+}
+
+export function createShell(top, banner) {
+  const links = kEntries.map(({name, text, key}) => h('a', {
+    'href': `#/${name}`, 'data-name': name, 'aria-keyshortcuts': key,
+    'title': `${text} (key ${key})`,
+  }, text));
+  const summary = h('a', {class: 'summary', href: '#/alarms'});
+  const health = h('span', {class: 'health'});
+  const clock = h('span', {class: 'clock'});
+  const theme = h('button', {type: 'button', title: 'Light or dark (key T)',
+    onclick: () => nextTheme()});
+  const utc = h('button', {type: 'button', title: 'Local time or UTC (key U)',
+    onclick: () => settings.set('utc', !settings.get('utc'))});
+  const help = h('button', {type: 'button', title: 'Keys (key ?)',
+    onclick: showHelp}, 'Keys');
+  replace(top, h('span', {class: 'brand'}, 'Valves'),
+      h('nav', {'aria-label': 'Views'}, links), summary,
+      h('div', {class: 'tools'}, health, clock, utc, theme, help));
+
+  let title = '';
+  const showSummary = () => {
+    const {open, text, nodes} = alarmSummary();
+    replace(summary, nodes);
+    summary.setAttribute('aria-label', `Alarms: ${text}`);
+    summary.title = text;
+    document.title = (open > 0 ? `(${open}) ` : '') + title;
+  };
+  const showStatus = () => {
+    const {status} = store;
+    links[3].hidden = !store.hasWorklist;
+    const bad = status && status.health !== 'OK';
+    setText(health, !status ? '' :
+      (bad ? 'Monitor degraded' : 'Monitor OK') +
+      (status.write ? '' : ', read-only'));
+    health.classList.toggle('bad', Boolean(bad));
+    health.title = !status ? '' :
+      `${status.software}, running for ` +
+      durationText(store.nowMs() - status.started_ms);
+  };
+  const showSettings = () => {
+    setText(theme, `Theme: ${settings.get('theme')}`);
+    setText(utc, `Time: ${settings.get('utc') ? 'UTC' : 'local'}`);
+  };
+  const tick = () => {
+    const now = store.nowMs();
+    setText(clock, `${dateText(now)} ${clockText(now)} ${zoneName()}`);
+    const text = bannerText();
+    banner.hidden = text === '';
+    setText(banner, text);
+    document.body.classList.toggle('stale', text !== '');
+  };
+  store.addEventListener('alarms', showSummary);
+  store.addEventListener('status', showStatus);
+  store.addEventListener('connection', tick);
+  settings.addEventListener('change', () => {
+    showSettings();
+    tick();
+  });
+  setInterval(tick, 1000);
+  showSettings();
+  showStatus();
+  tick();
+  return {
+    showRoute(name, viewTitle) {
+      title = `${viewTitle} – Valves`;
+      for (const node of links) {
+        const here = node.dataset.name === name ||
+            (node.dataset.name === '' && name === 'valve') ||
+            (node.dataset.name === 'alarms' && name === 'episode');
+        if (here) node.setAttribute('aria-current', 'page');
+        else node.removeAttribute('aria-current');
+      }
+      showSummary();
+    },
+  };
+}

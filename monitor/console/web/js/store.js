@@ -1,0 +1,151 @@
+// What the page knows of the plant, kept up to date by the stream. Emits
+// 'tiles' (detail: ids or null for all), 'alarms' (detail: the row or null),
+// 'samples', 'gap', 'resync' (the connection is back; `gapFromMs`, and whether
+// the monitor was restarted), 'connection' and 'status'.
+
+import {get, getOptional} from './api.js';
+import {Stream} from './stream.js';
+
+const kSparkLength = 60;
+const kStatusPeriodMs = 10000;
+
+class Store extends EventTarget {
+  tiles = new Map();
+  alarms = new Map();
+  faults = new Map();
+  status = null;
+  hasWorklist = false;
+  offsetMs = 0;  // Clock of the monitor minus ours.
+  stream = new Stream();
+  #instance = null;
+  #lostMs = null;
+
+  start() {
+    this.stream.addEventListener('message', ({detail}) => this.#take(detail));
+    this.stream.addEventListener('state', () => this.#connection());
+    this.stream.open(null);
+    setInterval(() => this.refreshStatus(), kStatusPeriodMs);
+    return Promise.all([this.refreshStatus(), this.#loadCatalogue(),
+      this.#resync(), this.#probeWorklist()]);
+  }
+
+  /** Samples of this valve come with the stream from now on; null: none. */
+  watch(valve) {
+    this.stream.open(valve);
+  }
+
+  nowMs() {
+    return Date.now() + this.offsetMs;
+  }
+
+  /** The model set of that name, or null. */
+  modelSet(name) {
+    return this.status?.model_sets?.find((m) => m.model_set === name) ?? null;
+  }
+
+  async refreshStatus() {
+    try {
+      this.status = await get('/status');
+      this.offsetMs = this.status.now_ms - Date.now();
+      this.#emit('status');
+    } catch {
+      // The stream says so already.
+    }
+  }
+
+  async #loadCatalogue() {
+    try {
+      const {faults} = await get('/faults');
+      this.faults = new Map(faults.map((fault) => [fault.fault, fault]));
+      this.#emit('tiles', null);
+    } catch {
+      // Fault numbers have to do until the next start.
+    }
+  }
+
+  async #probeWorklist() {
+    try {
+      this.hasWorklist = await getOptional('/worklist') !== null;
+      this.#emit('status');
+    } catch {
+      // Asked again at the next connection.
+    }
+  }
+
+  async #resync() {
+    try {
+      const [valves, alarms] =
+          await Promise.all([get('/valves'), get('/alarms')]);
+      this.tiles = new Map(valves.valves.map((tile) => [tile.id, tile]));
+      this.alarms = new Map(alarms.alarms.map((row) => [row.episode, row]));
+      this.#emit('tiles', null);
+      this.#emit('alarms', null);
+    } catch {
+      // Comes again with the next connection.
+    }
+  }
+
+  #connection() {
+    if (!this.stream.connected && this.#lostMs === null) {
+      this.#lostMs = this.stream.heardMs ?? Date.now();
+    }
+    this.#emit('connection');
+  }
+
+  async #take({type, data}) {
+    switch (type) {
+      case 'hello': return this.#hello(data);
+      case 'tiles': return this.#updateTiles(data.tiles);
+      case 'alarm': return this.#updateAlarm(data);
+      case 'sample': return this.#emit('samples', data);
+      case 'gap': return this.#emit('gap', data);
+    }
+  }
+
+  async #hello({now_ms: nowMs, instance}) {
+    this.offsetMs = nowMs - Date.now();
+    const restarted = this.#instance !== null && this.#instance !== instance;
+    this.#instance = instance;
+    if (this.#lostMs === null && !restarted) return;
+    const gapFromMs = this.#lostMs;
+    this.#lostMs = null;
+    await Promise.all([this.#resync(), this.refreshStatus()]);
+    if (this.faults.size === 0) this.#loadCatalogue();
+    this.#probeWorklist();
+    this.#emit('resync', {gapFromMs, restarted});
+  }
+
+  #updateTiles(tiles) {
+    for (const {v, ...tile} of tiles) {
+      const old = this.tiles.get(tile.id);
+      const spark = old?.spark ?? [];
+      if (v !== undefined && tile.stamp_ms !== old?.stamp_ms) {
+        spark.push(v);
+        if (spark.length > kSparkLength) spark.shift();
+      }
+      this.tiles.set(tile.id, {...tile, spark});
+    }
+    this.#emit('tiles', tiles.map((tile) => tile.id));
+  }
+
+  #updateAlarm(row) {
+    const known = this.alarms.has(row.episode);
+    if (row.isa === 'NORMAL') {
+      this.alarms.delete(row.episode);
+    } else {
+      this.alarms.set(row.episode, row);
+    }
+    this.#emit('alarms', {row, isNew: !known});
+  }
+
+  /** What an action answered; the stream will say the same again. */
+  applyAlarm(row) {
+    if (row?.episode) this.#updateAlarm(row);
+  }
+
+  #emit(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, {detail}));
+  }
+}
+
+export const store = new Store();

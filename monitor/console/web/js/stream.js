@@ -1,0 +1,141 @@
+// Server-sent events that reconnect by themselves. Over fetch and not
+// EventSource, which tells neither the pings nor the reason of a refusal.
+
+import {errorOf, url} from './api.js';
+
+const kSilenceMs = 12000;
+const kFirstDelayMs = 500;
+const kLongestDelayMs = 10000;
+
+/** Cuts "event: a\ndata: b\n\n" into {type, data}; text may come in pieces. */
+export class EventParser {
+  #rest = '';
+
+  push(text) {
+    const blocks = (this.#rest + text).replaceAll('\r\n', '\n').split('\n\n');
+    this.#rest = blocks.pop();
+    return blocks.map((block) => this.#parse(block))
+        .filter((event) => event.data !== '');
+  }
+
+  #parse(block) {
+    let type = 'message';
+    const data = [];
+    for (const line of block.split('\n')) {
+      if (line.startsWith('event:')) type = line.slice(6).trim();
+      if (line.startsWith('data:')) data.push(line.slice(5).trim());
+    }
+    return {type, data: data.join('\n')};
+  }
+}
+
+/**
+ * Emits 'message' {type, data} and 'state': connected, reason, heardMs (when
+ * anything was heard last) and retryMs (when it tries again).
+ */
+export class Stream extends EventTarget {
+  connected = false;
+  heardMs = null;
+  reason = '';
+  retryMs = null;
+  #valve = null;
+  #abort = null;
+  #previous = null;  // Is listened to until the next one speaks.
+  #delayMs = kFirstDelayMs;
+  #timer = null;
+  #watchdog = null;
+
+  constructor() {
+    super();
+    addEventListener('online', () => this.retryNow());
+    document.addEventListener('visibilitychange', () => {
+      if (!document.hidden) this.retryNow();
+    });
+  }
+
+  /** Listens from now on; with the samples of `valve` unless null. */
+  open(valve) {
+    if (this.#abort && valve === this.#valve) return;
+    this.#valve = valve;
+    this.#connect();
+  }
+
+  retryNow() {
+    if (this.#timer) this.#connect();
+  }
+
+  async #connect() {
+    clearTimeout(this.#timer);
+    this.#timer = null;
+    this.#previous?.abort();
+    this.#previous = this.#abort;
+    const abort = this.#abort = new AbortController();
+    try {
+      await this.#listen(abort);
+      throw new Error('the monitor closed the connection');
+    } catch (error) {
+      if (abort !== this.#abort) return;  // A newer connection is at work.
+      this.#lost(error);
+    }
+  }
+
+  async #listen(abort) {
+    this.#watch();
+    const response = await fetch(
+        url('/stream', {valve: this.#valve}),
+        {signal: abort.signal, cache: 'no-store',
+          headers: {Accept: 'text/event-stream'}});
+    if (!response.ok) throw await errorOf(response);
+    const reader = response.body.pipeThrough(new TextDecoderStream())
+        .getReader();
+    const parser = new EventParser();
+    for (;;) {
+      const {value, done} = await reader.read();
+      if (done) return;
+      this.#heard(abort);
+      for (const {type, data} of parser.push(value)) {
+        this.dispatchEvent(new CustomEvent(
+            'message', {detail: {type, data: JSON.parse(data)}}));
+      }
+    }
+  }
+
+  #heard(abort) {
+    if (abort === this.#abort) {
+      this.#previous?.abort();
+      this.#previous = null;
+    }
+    this.heardMs = Date.now();
+    this.#watch();
+    if (this.connected) return;
+    this.connected = true;
+    this.#delayMs = kFirstDelayMs;
+    this.retryMs = null;
+    this.dispatchEvent(new Event('state'));
+  }
+
+  #watch() {
+    clearTimeout(this.#watchdog);
+    this.#watchdog = setTimeout(() => {
+      this.reason = 'nothing was heard for 12 s';
+      this.#abort.abort();
+    }, kSilenceMs);
+  }
+
+  #lost(error) {
+    clearTimeout(this.#watchdog);
+    this.#previous?.abort();
+    this.#previous = null;
+    this.connected = false;
+    if (error.name !== 'AbortError') {
+      this.reason = error.status ? error.message :
+        'the monitor does not answer';
+    }
+    const delay = error.retryAfterS ? 1000 * error.retryAfterS :
+      this.#delayMs * (0.8 + 0.4 * Math.random());
+    this.#delayMs = Math.min(2 * this.#delayMs, kLongestDelayMs);
+    this.retryMs = Date.now() + delay;
+    this.#timer = setTimeout(() => this.#connect(), delay);
+    this.dispatchEvent(new Event('state'));
+  }
+}

@@ -1,0 +1,208 @@
+// The alarm list as ISA-18.2 has it: unacknowledged, returned, acknowledged,
+// shelved; worst first in each.
+
+import {acknowledge, actionButtons, canAct, label, shelve}
+  from '../actions.js';
+import {h, replace, setText} from '../dom.js';
+import {compareAlarms, groupOf, groups} from '../faults.js';
+import {link, rememberQuery} from '../route.js';
+import {onKey} from '../shortcuts.js';
+import {store} from '../store.js';
+import {bodyRow, columns, headRow, scrollable} from './table.js';
+
+const kColumns = [
+  columns.priority, columns.detected, columns.valve, columns.fault,
+  columns.group, columns.lasted, columns.factor, columns.strength,
+  columns.discipline, columns.namur,
+];
+
+class Alarms {
+  title = 'Alarms';
+  #abort = new AbortController();
+  #selected = new Set();
+  #current = null;  // Episode that the keys act upon.
+  #group;
+  #body = h('tbody', {});
+  #head = h('thead', {});
+  #chips = new Map();
+  #nothing = h('p', {class: 'nothing', hidden: true});
+  #bulk = h('button', {'type': 'button', 'class': 'primary', 'hidden': true,
+    'onclick': () => this.#acknowledgeSelected()});
+  #readOnly = h('p', {class: 'note', hidden: true}, 'Read-only: the monitor ' +
+    'was started without --console-write.');
+  #removeKeys;
+  #timer;
+  #frame = 0;
+
+  constructor({query}) {
+    this.#group = query.get('group') ?? '';
+    const table = h('table', {class: 'alarms'},
+        h('caption', {class: 'sr-only'}, 'Alarms, worst first'),
+        this.#head, this.#body);
+    this.element = h('section', {'class': 'live', 'aria-label': 'Alarms'},
+        h('div', {class: 'controls'}, h('h1', {}, 'Alarms'), this.#makeChips(),
+            this.#bulk), this.#readOnly, this.#nothing,
+        scrollable('Alarms', table));
+    const {signal} = this.#abort;
+    for (const type of ['alarms', 'status']) {
+      store.addEventListener(type, () => this.#later(), {signal});
+    }
+    this.#timer = setInterval(() => this.#showLasted(), 1000);
+    this.#removeKeys = [
+      onKey('j', 'Next alarm', () => this.#move(1)),
+      onKey('k', 'Alarm before', () => this.#move(-1)),
+      onKey('a', 'Acknowledge the alarm', () => this.#act((row) =>
+        row.isa !== 'ACKED' && acknowledge([row]))),
+      onKey('s', 'Shelve the alarm', () => this.#act((row) =>
+        !row.shelved && shelve(row))),
+      onKey('l', 'Label the alarm', () => this.#act(label)),
+      onKey('x', 'Select the alarm', () => this.#toggle(this.#current)),
+    ];
+    this.#show();
+  }
+
+  destroy() {
+    this.#abort.abort();
+    clearInterval(this.#timer);
+    cancelAnimationFrame(this.#frame);
+    this.#removeKeys.forEach((remove) => remove());
+  }
+
+  #makeChips() {
+    const all = [{key: '', name: 'All', text: 'every group'}, ...groups];
+    return h('div', {'class': 'chips', 'role': 'group', 'aria-label': 'Group'},
+        all.map(({key, name, text}) => {
+          const count = h('span', {class: 'chip-count'});
+          const button = h('button', {'type': 'button', 'class': 'chip',
+            'title': text, 'onclick': () => {
+              this.#group = key;
+              rememberQuery('alarms', '', {group: key});
+              this.#show();
+            }}, name, ' ', count);
+          this.#chips.set(key, {button, count});
+          return button;
+        }));
+  }
+
+  // A flood of alarms costs one table a frame.
+  #later() {
+    this.#frame ||= requestAnimationFrame(() => {
+      this.#frame = 0;
+      this.#show();
+    });
+  }
+
+  #rows() {
+    return [...store.alarms.values()].sort(compareAlarms)
+        .filter((row) => !this.#group || groupOf(row) === this.#group);
+  }
+
+  #show() {
+    const rows = this.#rows();
+    const focused = this.#focusedPlace();
+    for (const episode of this.#selected) {
+      if (!store.alarms.has(episode)) this.#selected.delete(episode);
+    }
+    this.#readOnly.hidden = !store.status || canAct();
+    replace(this.#head, headRow([
+      ...(canAct() ? [{text: h('span', {class: 'sr-only'}, 'Selected')}] : []),
+      ...kColumns, ...(canAct() ? [{text: 'Actions'}] : [])]));
+    replace(this.#body, rows.map((row) => this.#row(row)));
+    this.#showCounts(rows);
+    this.#restoreFocus(focused);
+  }
+
+  #row(row) {
+    const box = h('input', {'type': 'checkbox',
+      'checked': this.#selected.has(row.episode),
+      'aria-label': `Select ${row.valve}`,
+      'onchange': () => this.#toggle(row.episode)});
+    const acting = canAct();
+    return bodyRow([
+      ...(acting ? [{cell: () => box}] : []), ...kColumns,
+      ...(acting ? [{cell: () =>
+        h('div', {class: 'row-actions'}, actionButtons(row))}] : []),
+    ], row, {
+      'class': `group-${groupOf(row)}` +
+        (row.episode === this.#current ? ' current' : ''),
+      'data-episode': row.episode,
+    });
+  }
+
+  #showCounts(rows) {
+    const all = [...store.alarms.values()];
+    for (const [key, {button, count}] of this.#chips) {
+      setText(count, String(all.filter((row) =>
+        !key || groupOf(row) === key).length));
+      button.setAttribute('aria-pressed', String(this.#group === key));
+    }
+    this.#nothing.hidden = rows.length > 0;
+    setText(this.#nothing, all.length === 0 ?
+      'No alarm is open or waits for somebody.' : 'No alarm in this group.');
+    this.#bulk.hidden = this.#selected.size === 0;
+    setText(this.#bulk, `Acknowledge ${this.#selected.size} selected`);
+  }
+
+  // Only the times run on; the rows stay as they are.
+  #showLasted() {
+    for (const node of this.#body.rows) {
+      const row = store.alarms.get(node.dataset.episode);
+      if (!row || row.ended_ms !== null) continue;
+      const at = kColumns.indexOf(columns.lasted) + (canAct() ? 1 : 0);
+      setText(node.cells[at], columns.lasted.cell(row));
+    }
+  }
+
+  #toggle(episode) {
+    if (!episode || !canAct()) return;
+    if (!this.#selected.delete(episode)) this.#selected.add(episode);
+    this.#show();
+  }
+
+  #acknowledgeSelected() {
+    const rows = this.#rows().filter((row) =>
+      this.#selected.has(row.episode) && row.isa !== 'ACKED');
+    if (rows.length > 0) {
+      acknowledge(rows).then((sent) => sent && this.#selected.clear());
+    }
+  }
+
+  #move(step) {
+    const rows = this.#rows();
+    const at = rows.findIndex((row) => row.episode === this.#current);
+    const next = rows[Math.min(rows.length - 1, Math.max(0, at + step))];
+    if (!next) return;
+    this.#current = next.episode;
+    this.#show();
+    const node = this.#nodeOf(next.episode);
+    node?.scrollIntoView({block: 'nearest'});
+    node?.querySelector(`a[href="${link('episode', next.episode)}"]`)?.focus();
+  }
+
+  #act(action) {
+    const row = store.alarms.get(this.#current);
+    if (row && canAct()) action(row);
+  }
+
+  #nodeOf(episode) {
+    return [...this.#body.rows].find((r) => r.dataset.episode === episode);
+  }
+
+  // The list is made anew; who works by keys stays where he was.
+  #focusedPlace() {
+    const node = document.activeElement?.closest?.('tr[data-episode]');
+    if (!node || !this.#body.contains(node)) return null;
+    const controls = [...node.querySelectorAll('a, button, input')];
+    return {episode: node.dataset.episode,
+      index: controls.indexOf(document.activeElement)};
+  }
+
+  #restoreFocus(place) {
+    if (!place) return;
+    const node = this.#nodeOf(place.episode);
+    node?.querySelectorAll('a, button, input')[place.index]
+        ?.focus({preventScroll: true});
+  }
+}
+
+export const alarmsView = (route) => new Alarms(route);

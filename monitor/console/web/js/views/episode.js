@@ -1,0 +1,169 @@
+// The evidence of one episode: what was read and decided from before detection
+// to the clearing, what people did, what the models were.
+
+import {actionButtons} from '../actions.js';
+import {get, path, url} from '../api.js';
+import {exportPng} from '../charts/export.js';
+import {Timeline} from '../charts/timeline.js';
+import {TrendData} from '../charts/trend_data.js';
+import {h, replace, setText} from '../dom.js';
+import {faultTitle, groupName, markWord, members, namurText, priorityNames,
+  priorityOf, stateWord} from '../faults.js';
+import {durationText, factorText, percentText, zoneName} from '../format.js';
+import {link} from '../route.js';
+import {store} from '../store.js';
+import {prioritySign} from '../symbols.js';
+import {labelText, lastedText, scrollable, timeCell} from './table.js';
+
+const kEndWords = {
+  cleared: 'normal again', stream_ended: 'the publisher ended its stream',
+  stale_timeout: 'no samples for too long', model_changed: 'model set changed',
+  superseded: 'superseded', unknown: 'the monitor died in it',
+};
+
+function facts({episode: row, model_hash: hash}) {
+  return [
+    ['Valve', h('a', {href: link('valve', row.valve)}, row.valve)],
+    ['Fault', h('span', {class: 'with-sign'},
+        prioritySign(priorityOf(row), members(row.fault).length > 0),
+        faultTitle(row.fault))],
+    ['Priority', priorityNames[priorityOf(row)]],
+    ['State', `${stateWord(row.state)}; ${groupName(row).toLowerCase()}`],
+    ['Detected', timeCell(row.detected_ms)],
+    ['Isolated', row.isolated_ms === null ? '–' : h('span', {},
+        timeCell(row.isolated_ms), `, ${durationText(
+            row.isolated_ms - row.detected_ms)} after detection`)],
+    ['Cleared', timeCell(row.cleared_ms)],
+    ['Lasted', lastedText(row)],
+    ['End', row.end_reason ? kEndWords[row.end_reason] ?? row.end_reason :
+      'still open'],
+    ['Peak factor', factorText(row.peak_factor)],
+    ['Strength', percentText(row.strength)],
+    ['For', row.discipline ?? '–'],
+    ['NE 107', namurText(row.namur)],
+    ['Label', labelText(row.label)],
+    ['Acknowledged', row.acked_by ?
+      h('span', {}, row.acked_by, ', ', timeCell(row.acked_ms)) : '–'],
+    ['Model set', h('span', {}, row.model_set, ' ',
+        h('code', {}, hash ?? ''))],
+    ['Episode', h('code', {}, row.episode)],
+  ];
+}
+
+function eventText(event) {
+  return [
+    event.faults ? faultTitle(event.faults) : null,
+    event.factor === null || event.factor === undefined ? null :
+      `factor ${factorText(event.factor)}`,
+    event.strength === null || event.strength === undefined ? null :
+      `strength ${percentText(event.strength)}`,
+    event.value, event.reason && (kEndWords[event.reason] ?? event.reason),
+    event.comment,
+  ].filter(Boolean).join(', ');
+}
+
+function eventTable(events) {
+  const head = ['Time', 'What', '', 'Who', 'From where'];
+  return h('table', {class: 'small'}, h('caption', {}, 'What happened'),
+      h('thead', {}, h('tr', {}, head.map((text) =>
+        h('th', {scope: 'col'}, text)))),
+      h('tbody', {}, events.map((event) => h('tr', {},
+          h('td', {}, timeCell(event.at_ms)),
+          h('th', {scope: 'row'}, markWord(event.kind)),
+          h('td', {class: 'remark'}, eventText(event)),
+          h('td', {}, event.who ?? ''), h('td', {}, event.origin ?? '')))));
+}
+
+class EpisodePage {
+  title = 'Episode';
+  #abort = new AbortController();
+  #content = h('div', {});
+  #timeline = null;
+  #data = new TrendData();
+  #row = null;
+
+  constructor({id}) {
+    this.id = id;
+    this.element = h('article', {class: 'episode'}, this.#content);
+    replace(this.#content, h('h1', {}, 'Episode'), h('p', {}, 'Loading …'));
+    store.addEventListener('alarms', ({detail}) => {
+      if (detail?.row.episode === this.id) this.#load();
+    }, {signal: this.#abort.signal});
+    store.addEventListener('status', () => this.#showActions(),
+        {signal: this.#abort.signal});
+    this.#load();
+  }
+  #actions = h('div', {class: 'actions'});
+
+  destroy() {
+    this.#abort.abort();
+    this.#timeline?.destroy();
+  }
+
+  async #load() {
+    try {
+      const found = await get(path('episodes', this.id));
+      if (!this.#abort.signal.aborted) this.#show(found);
+    } catch (error) {
+      if (this.#abort.signal.aborted) return;
+      replace(this.#content, h('h1', {}, 'Episode'),
+          h('p', {class: 'note', role: 'alert'}, error.message));
+    }
+  }
+
+  #showActions() {
+    if (this.#row) {
+      replace(this.#actions, actionButtons(this.#row, () => this.#load()));
+    }
+  }
+
+  #show(found) {
+    this.#row = found.episode;
+    this.title = `${this.#row.valve}: ${faultTitle(this.#row.fault)}`;
+    this.#showActions();
+    const checks = members(this.#row.fault)
+        .map((fault) => store.faults.get(fault)).filter((f) => f?.check);
+    this.#showTrend(found.trace);
+    const copied = h('span', {role: 'status'});
+    replace(this.#content,
+        h('div', {class: 'controls'}, h('h1', {}, this.title), this.#actions),
+        h('div', {class: 'row-end'},
+            h('button', {type: 'button', onclick: () => this.#copy(copied)},
+                'Copy the link'), copied,
+            h('button', {type: 'button', onclick: () => exportPng(
+                this.#timeline, `${this.title}, episode ${this.id}`)},
+            'Save as PNG'),
+            h('a', {'class': 'button', 'download': `${this.id}.csv`,
+              'href': url(path('episodes', `${this.id}.csv`))},
+            'Save as CSV')),
+        h('dl', {class: 'facts'}, facts(found).map(([name, value]) =>
+          h('div', {}, h('dt', {}, name), h('dd', {}, value)))),
+        checks.map(({name, check}) => h('p', {class: 'checks'},
+            h('strong', {}, `Check for ${name}: `), check)),
+        this.#timeline ? this.#timeline.element :
+          h('p', {class: 'note'}, 'There is no recording of this episode.'),
+        scrollable('What happened', eventTable(found.events)),
+        h('p', {class: 'hint'}, `Times are ${zoneName()}.`));
+    if (this.#timeline) this.#timeline.rebuild();
+  }
+
+  #showTrend(trace) {
+    if (!trace || trace.t_ms.length === 0) return;
+    this.#data.load(trace, false);
+    this.#timeline ??= new Timeline(this.#data, {
+      live: false, nowMs: () => store.nowMs(),
+      describe: 'Trend of the episode; arrows move, plus and minus zoom',
+    });
+  }
+
+  async #copy(said) {
+    try {
+      await navigator.clipboard.writeText(location.href);
+      setText(said, 'copied');
+    } catch {
+      setText(said, location.href);
+    }
+  }
+}
+
+export const episodeView = (route) => new EpisodePage(route);

@@ -1,0 +1,174 @@
+// Questions to the history: by valve, fault, time and state; the figures of
+// the alarms of that time. The question is in the address: it can be sent.
+
+import {get} from '../api.js';
+import {download, h, replace, setText} from '../dom.js';
+import {faultTitle} from '../faults.js';
+import {fromInput, toInput, zoneName} from '../format.js';
+import {link} from '../route.js';
+import {store} from '../store.js';
+import {statisticsSection} from './statistics.js';
+import {bodyRow, columns, headRow, scrollable} from './table.js';
+
+const kPage = 100;
+const kDayMs = 86400000;
+const kDefaultDays = 30;
+const kStates = ['DETECTED', 'ISOLATED', 'CLEARED', 'CLOSED'];
+const kColumns = [
+  columns.priority, columns.detected, columns.valve, columns.fault,
+  columns.group, columns.lasted, columns.factor, columns.strength,
+  columns.label,
+];
+
+function field(text, input) {
+  return h('label', {class: 'field'}, h('span', {}, text), input);
+}
+
+function csvOf(rows) {
+  const names = ['episode', 'valve', 'fault', 'name', 'state', 'isa',
+    'detected_ms', 'isolated_ms', 'cleared_ms', 'ended_ms', 'end_reason',
+    'peak_factor', 'strength', 'label', 'acked_by', 'model_set'];
+  const quote = (value) => {
+    const text = value === null || value === undefined ? '' : String(value);
+    return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  };
+  return [names.join(','), ...rows.map((row) =>
+    names.map((name) => quote(row[name])).join(','))].join('\n') + '\n';
+}
+
+class History {
+  title = 'History';
+  #abort = new AbortController();
+  #rows = [];
+  #inputs;
+  #body = h('tbody', {});
+  #found = h('p', {class: 'note', role: 'status'});
+  #more = h('button', {type: 'button', hidden: true,
+    onclick: () => this.#fetchRows(true)}, 'Older ones');
+  #statistics = h('div', {});
+
+  constructor({query}) {
+    this.#makeInputs(query);
+    this.element = h('section', {class: 'history', 'aria-label': 'History'},
+        h('div', {class: 'controls'}, h('h1', {}, 'History')), this.#form(),
+        this.#statistics,
+        h('div', {class: 'controls'}, h('h2', {}, 'Episodes'), this.#found,
+            h('button', {type: 'button', onclick: () => download(
+                'episodes.csv', new Blob([csvOf(this.#rows)],
+                    {type: 'text/csv'}))}, 'Save as CSV')),
+        scrollable('Episodes', h('table', {},
+            h('caption', {class: 'sr-only'}, 'Episodes, newest first'),
+            h('thead', {}, headRow(kColumns)), this.#body)),
+        this.#more);
+    store.addEventListener('tiles', ({detail}) => {
+      if (detail === null) this.#fillFaults(query.get('fault') ?? '');
+    }, {signal: this.#abort.signal});
+    this.#fetch();
+  }
+
+  destroy() {
+    this.#abort.abort();
+  }
+
+  #makeInputs(query) {
+    const time = (name) => h('input', {type: 'datetime-local',
+      value: toInput(query.has(name) ? Number(query.get(name)) : null)});
+    this.#inputs = {
+      valve: h('input', {value: query.get('valve') ?? '',
+        placeholder: 'all, or FV-1*', list: 'valve-names'}),
+      fault: h('select', {}),
+      state: h('select', {}, h('option', {value: ''}, 'any'),
+          kStates.map((state) => h('option', {value: state},
+              state.toLowerCase()))),
+      since: time('since'), until: time('until'),
+    };
+    this.#inputs.state.value = query.get('state') ?? '';
+    this.#fillFaults(query.get('fault') ?? '');
+  }
+
+  #fillFaults(chosen) {
+    const {fault} = this.#inputs;
+    const value = fault.value || chosen;
+    replace(fault, h('option', {value: ''}, 'any'),
+        [...store.faults.keys()].map((key) =>
+          h('option', {value: key}, faultTitle(key))));
+    if (value && !store.faults.has(value)) {
+      fault.append(h('option', {value}, faultTitle(value)));
+    }
+    fault.value = value;
+  }
+
+  #form() {
+    const {valve, fault, state, since, until} = this.#inputs;
+    return h('form', {'class': 'query', 'aria-label': 'Question',
+      'onsubmit': (event) => {
+        event.preventDefault();
+        this.#ask();
+      }},
+    field('Valve', valve), field('Fault', fault), field('State', state),
+    field(`From (${zoneName()}; empty: ${kDefaultDays} days)`, since),
+    field(`Until (${zoneName()})`, until),
+    h('button', {class: 'primary'}, 'Show'),
+    h('datalist', {id: 'valve-names'}, [...store.tiles.keys()].map((id) =>
+      h('option', {value: id}))));
+  }
+
+  // The address changes, and with it the view.
+  #ask() {
+    const {valve, fault, state, since, until} = this.#inputs;
+    const hash = link('history', '', {
+      valve: valve.value.trim(), fault: fault.value, state: state.value,
+      since: fromInput(since.value), until: fromInput(until.value),
+    });
+    if (location.hash === hash) this.#fetch();
+    else location.hash = hash;
+  }
+
+  #time() {
+    const since = fromInput(this.#inputs.since.value);
+    return {
+      since_ms: since ?? Date.now() - kDefaultDays * kDayMs,
+      until_ms: fromInput(this.#inputs.until.value),
+    };
+  }
+
+  async #fetch() {
+    this.#rows = [];
+    replace(this.#body);
+    const rows = this.#fetchRows(false);
+    try {
+      const {valve, fault} = this.#inputs;
+      const time = this.#time();
+      const figures = await get('/statistics', {
+        ...time, valve: valve.value.trim(), fault: fault.value});
+      if (this.#abort.signal.aborted) return;
+      replace(this.#statistics, statisticsSection(figures, time));
+    } catch (error) {
+      replace(this.#statistics, h('p', {class: 'note', role: 'alert'},
+          error.message));
+    }
+    await rows;
+  }
+
+  async #fetchRows(older) {
+    const {valve, fault, state} = this.#inputs;
+    try {
+      const {episodes, more} = await get('/history', {
+        ...this.#time(), valve: valve.value.trim(), fault: fault.value,
+        state: state.value, limit: kPage,
+        before_ms: older ? this.#rows.at(-1)?.detected_ms : null,
+      });
+      if (this.#abort.signal.aborted) return;
+      this.#rows.push(...episodes);
+      this.#body.append(...episodes.map((row) => bodyRow(kColumns, row)));
+      this.#more.hidden = !more;
+      setText(this.#found, this.#rows.length === 0 ?
+        'No episode fits the question.' :
+        `${this.#rows.length}${more ? ' newest' : ''}`);
+    } catch (error) {
+      setText(this.#found, error.message);
+    }
+  }
+}
+
+export const historyView = (route) => new History(route);

@@ -1,0 +1,89 @@
+// Tables of alarms, as the alarm list and the history show them.
+
+import {h} from '../dom.js';
+import {faultName, faultTitle, groupName, members, namurText, priorityOf,
+  priorityNames} from '../faults.js';
+import {durationText, factorText, percentText, timeText} from '../format.js';
+import {link} from '../route.js';
+import {store} from '../store.js';
+import {prioritySign} from '../symbols.js';
+
+/** A cell of time that machines can read, too. */
+export function timeCell(ms) {
+  return ms === null || ms === undefined ? '–' :
+    h('time', {datetime: new Date(ms).toISOString()}, timeText(ms));
+}
+
+export function priorityCell(row) {
+  const priority = priorityOf(row);
+  return h('span', {class: 'with-sign'},
+      prioritySign(priority, members(row.fault).length > 0),
+      h('span', {class: 'sr-only'}, priorityNames[priority]));
+}
+
+export function faultCell(row) {
+  const name = faultName(row.fault);
+  const numbers = members(row.fault).join(', ');
+  return h('a', {href: link('episode', row.episode), title: faultTitle(
+      row.fault)}, name, numbers && numbers !== name ?
+    h('span', {class: 'number'}, ` ${numbers}`) : null);
+}
+
+/** How long it lasted, or lasts. */
+export function lastedText(row) {
+  return durationText(
+      (row.cleared_ms ?? row.ended_ms ?? store.nowMs()) - row.detected_ms);
+}
+
+export function labelText(label) {
+  if (!label) return '–';
+  if (label === 'true') return 'true';
+  return label === 'false' ? 'false alarm' : `was ${faultTitle(label)}`;
+}
+
+// Who has acknowledged or shelved it, and when.
+function personText(row) {
+  if (row.shelved) {
+    const {until_ms: until, who, comment} = row.shelved;
+    return `until ${timeText(until)} by ${who}` +
+        (comment ? `: ${comment}` : '');
+  }
+  return row.acked_by ? `${row.acked_by}, ${timeText(row.acked_ms)}` : '';
+}
+
+/** {text, cell(row), class} of what both lists show. */
+export const columns = {
+  priority: {text: 'Priority', short: 'P', cell: priorityCell},
+  detected: {text: 'Detected', cell: (row) => timeCell(row.detected_ms)},
+  valve: {text: 'Valve', header: true, cell: (row) =>
+    h('a', {href: link('valve', row.valve)}, row.valve)},
+  fault: {text: 'Fault', class: 'fault', cell: faultCell},
+  group: {text: 'State', class: 'remark', cell: (row) => [
+    groupName(row), h('div', {class: 'number'}, personText(row))]},
+  lasted: {text: 'Lasted', class: 'num', cell: lastedText},
+  factor: {text: 'Factor', class: 'num wide', cell: (row) =>
+    factorText(row.peak_factor)},
+  strength: {text: 'Strength', class: 'num wide', cell: (row) =>
+    percentText(row.strength)},
+  discipline: {text: 'For', class: 'wide', cell: (row) =>
+    row.discipline ?? '–'},
+  namur: {text: 'NE 107', class: 'wide', cell: (row) => namurText(row.namur)},
+  label: {text: 'Label', class: 'wide', cell: (row) => labelText(row.label)},
+};
+
+export function headRow(list) {
+  return h('tr', {}, list.map(({text, class: name}) =>
+    h('th', {scope: 'col', class: name}, text)));
+}
+
+export function bodyRow(list, row, attributes = {}) {
+  return h('tr', attributes, list.map(({header, cell, class: name}) =>
+    h(header ? 'th' : 'td', {class: name, scope: header ? 'row' : null},
+        cell(row))));
+}
+
+/** Tables wider than the window scroll by themselves. */
+export function scrollable(name, table) {
+  return h('div', {'class': 'table-box', 'role': 'region', 'aria-label': name,
+    'tabindex': 0}, table);
+}

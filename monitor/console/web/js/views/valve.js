@@ -1,0 +1,246 @@
+// One valve: what the observers say now, in words and numbers, and the trend.
+
+import {getOptional, path} from '../api.js';
+import {barCell} from '../charts/bars.js';
+import {Timeline} from '../charts/timeline.js';
+import {TrendData} from '../charts/trend_data.js';
+import {h, replace, setText} from '../dom.js';
+import {faultName, faultTitle, priorityNames, priorityOf, qualityWord,
+  stateWord} from '../faults.js';
+import {durationText, factorText, numberText, percentText, timeText}
+  from '../format.js';
+import {link} from '../route.js';
+import {store} from '../store.js';
+import {prioritySign} from '../symbols.js';
+import {actionButtons} from '../actions.js';
+import {unitText} from '../charts/panels.js';
+import {exportPng} from '../charts/export.js';
+import {healthSection} from './health.js';
+
+const kTrendSeconds = 900;  // What the monitor keeps.
+
+function stateLine(tile) {
+  if (!tile) return ['not heard of yet'];
+  const inAlarm = tile.state !== 'NORMAL';
+  const quality = tile.quality === 'LIVE' ? null :
+    h('span', {class: 'tag dashed'}, qualityWord(tile.quality) +
+      (tile.quality === 'STALE' ? ` since ${timeText(tile.stamp_ms)}` : '') +
+      (tile.reasons ? `: ${tile.reasons.replaceAll('|', ', ')}` : ''));
+  if (!inAlarm) return [h('span', {class: 'tag'}, 'normal'), quality];
+  const priority = priorityOf(tile);
+  return [
+    h('span', {class: 'tag strong'},
+        prioritySign(priority, tile.state === 'ISOLATED'),
+        `${stateWord(tile.state)}: ${faultTitle(tile.faults.join('|'))}`),
+    h('span', {class: 'tag'}, priorityNames[priority]),
+    tile.factor === null ? null :
+      h('span', {class: 'tag'}, `factor ${factorText(tile.factor)}`),
+    tile.strength === null || tile.strength === undefined ? null :
+      h('span', {class: 'tag'}, `strength ${percentText(tile.strength)}`),
+    h('span', {class: 'tag'},
+        `for ${durationText(store.nowMs() - tile.since_ms)}`),
+    quality,
+    tile.episode ? h('a', {href: link('episode', tile.episode)},
+        'Open the episode') : null,
+  ];
+}
+
+/** Residuals against their thresholds, factors of the faults: the numbers. */
+function nowTables(data) {
+  const {channels, faults, T} = data.meta;
+  const last = (name) => data.columns[name].at(-1);
+  const ranked = faults.map((fault, f) => ({fault, d: last(`d${f + 1}`)}))
+      .filter(({d}) => d !== null && d !== undefined)
+      .sort((a, b) => b.d - a.d).slice(0, 6);
+  const residuals = channels.map(({name, unit, low, high}, c) => {
+    const r = last(`r${c}`);
+    const text = r === null || r === undefined ? 'abstains' :
+      r > high ? 'above' : r < low ? 'below' : 'within';
+    return h('tr', {class: text === 'above' || text === 'below' ? 'out' : ''},
+        h('th', {scope: 'row'}, name), h('td', {class: 'num'},
+            numberText(r)), h('td', {class: 'num'},
+            `${numberText(low)} … ${numberText(high)}`),
+        h('td', {}, unitText(unit)), h('td', {}, text));
+  });
+  return [
+    h('table', {class: 'small'}, h('caption', {}, 'Residuals now'),
+        h('thead', {}, h('tr', {}, ['Channel', 'Residual', 'Thresholds',
+          'Unit', ''].map((text) => h('th', {scope: 'col'}, text)))),
+        h('tbody', {}, residuals)),
+    h('table', {class: 'small'},
+        h('caption', {}, `What explains the data now (T = ${T})`),
+        h('thead', {}, h('tr', {}, ['Condition', 'Factor']
+            .map((text) => h('th', {scope: 'col'}, text)))),
+        h('tbody', {}, [{fault: null, d: last('d0')}, ...ranked].map(
+            ({fault, d}) => h('tr', {class: d >= T && fault ? 'out' : ''},
+                h('th', {scope: 'row'}, fault ? faultTitle(fault) : 'normal'),
+                h('td', {}, barCell(d ?? 0, 1, factorText(d))))))),
+  ];
+}
+
+class ValvePage {
+  #data = new TrendData();
+  #abort = new AbortController();
+  #state = h('div', {class: 'state-line'});
+  #words = h('p', {class: 'words'});
+  #now = h('div', {class: 'now-tables'});
+  #actions = h('div', {class: 'actions'});
+  #note = h('p', {class: 'note', role: 'status'});
+  #checks = h('p', {class: 'checks'});
+  #health = h('div', {});
+  #queue = [];  // Samples that come while the trend is being fetched.
+  #loading = true;
+  #retry = 0;
+
+  constructor({id}) {
+    this.id = id;
+    this.title = id;
+    this.#timeline = new Timeline(this.#data, {
+      live: true, nowMs: () => store.nowMs(),
+      describe: `Trend of ${id}; arrows move, plus and minus zoom`,
+    });
+    this.element = h('article', {class: 'valve'},
+        h('div', {class: 'controls'}, h('h1', {}, id), this.#state,
+            this.#actions),
+        h('div', {class: 'live'}, this.#words, this.#checks, this.#now),
+        this.#note,
+        h('div', {class: 'row-end'}, h('button', {type: 'button',
+          onclick: () => exportPng(this.#timeline, id)}, 'Save as PNG'),
+        h('a', {href: link('history', '', {valve: id})},
+            'Episodes of this valve')),
+        this.#timeline.element,
+        h('p', {class: 'hint'}, 'Drag to zoom, Shift and drag to pan, double ' +
+          'click for all; Ctrl and wheel zoom, Shift and wheel pan.'),
+        this.#health);
+    this.#listen();
+    this.#load(false);
+    healthSection(id).then((node) => replace(this.#health, node));
+  }
+  #timeline;
+
+  #listen() {
+    const {signal} = this.#abort;
+    const on = (type, action) =>
+      store.addEventListener(type, ({detail}) => action(detail), {signal});
+    on('tiles', (ids) => {
+      if (ids === null || ids.includes(this.id)) this.#showState();
+    });
+    on('alarms', () => this.#showState());
+    on('status', () => this.#showState());
+    on('samples', (samples) => this.#take(samples));
+    on('gap', (gap) => {
+      if (gap.valve === null || gap.valve === this.id) this.#data.addGap(gap);
+    });
+    on('connection', () => this.#connection());
+    on('resync', (detail) => this.#resync(detail));
+    this.#timer = setInterval(() => {
+      this.#showState();
+      if (this.#data.openGapFromMs !== null) this.#timeline.update();
+    }, 1000);
+    this.#showState();
+  }
+  #timer;
+
+  destroy() {
+    this.#abort.abort();
+    clearInterval(this.#timer);
+    clearTimeout(this.#retry);
+    this.#timeline.destroy();
+  }
+
+  async #load(keep) {
+    this.#loading = true;
+    try {
+      const trend = await getOptional(path('valves', this.id, 'trend'),
+          {seconds: kTrendSeconds});
+      if (this.#abort.signal.aborted) return;
+      this.#loading = false;
+      if (trend === null) {
+        this.#wait(keep, `Nothing is known of ${this.id} now.`);
+        return;
+      }
+      setText(this.#note, '');
+      this.#show(trend, keep);
+    } catch (error) {
+      if (!this.#abort.signal.aborted) this.#wait(keep, error.message);
+    }
+  }
+
+  // A valve that the monitor has not heard of yet may come.
+  #wait(keep, text) {
+    setText(this.#note, text);
+    this.#retry = setTimeout(() => this.#load(keep), 2000);
+  }
+
+  #show(trend, keep) {
+    const same = this.#data.load(trend, keep);
+    this.#data.openGapFromMs = null;
+    this.#data.append(this.#queue.splice(0));
+    if (same && this.#timeline.panels.length > 0) this.#timeline.update();
+    else this.#timeline.rebuild();
+    this.#showNow();
+  }
+
+  #take(samples) {
+    const own = samples.filter((sample) => sample.valve === this.id);
+    if (own.length === 0) return;
+    if (this.#loading) {
+      this.#queue.push(...own);
+      return;
+    }
+    this.#markTransitions(own);
+    this.#data.append(own);
+    this.#timeline.update();
+    this.#showNow();
+  }
+
+  // Marks come with the trend; those of now are seen in the samples.
+  #markTransitions(samples) {
+    let before = this.#data.columns?.state.at(-1) ?? null;
+    for (const {state, t_ms: t} of samples) {
+      if (before && state !== before) {
+        this.#data.addMark({t_ms: t,
+          kind: state === 'NORMAL' ? 'CLEARED' : state, text: ''});
+      }
+      before = state;
+    }
+  }
+
+  #connection() {
+    if (store.stream.connected) return;
+    this.#data.openGapFromMs ??= this.#data.lastMs;
+  }
+
+  #resync({gapFromMs, restarted}) {
+    if (restarted) {
+      setText(this.#note, 'The monitor was started again; ' +
+        `nothing was heard from ${timeText(gapFromMs)} on.`);
+    }
+    this.#load(true);
+  }
+
+  #showNow() {
+    const words = this.#data.words;
+    setText(this.#words, words);
+    if (this.#data.size > 0) replace(this.#now, nowTables(this.#data));
+  }
+
+  #shownState = '';
+
+  #showState() {
+    const tile = store.tiles.get(this.id);
+    replace(this.#state, stateLine(tile));
+    const row = tile?.episode ? store.alarms.get(tile.episode) : null;
+    const key = JSON.stringify([row, store.status?.write]);
+    if (key === this.#shownState) return;
+    this.#shownState = key;
+    replace(this.#actions, row ? actionButtons(row) : null);
+    const checks = (tile?.faults ?? [])
+        .map((fault) => store.faults.get(fault)).filter((f) => f?.check);
+    this.#checks.hidden = checks.length === 0;
+    replace(this.#checks, checks.map(({fault, check}) => [
+      h('strong', {}, `Check for ${faultName(fault)}: `), check, ' ']));
+  }
+}
+
+export const valveView = (route) => new ValvePage(route);
