@@ -1,5 +1,3 @@
-#include <charconv>
-#include <cmath>
 #include <iostream>
 #include <memory>
 
@@ -7,6 +5,7 @@
 
 #include "storage/app/common.h"
 #include "storage/app/episode_plot.h"
+#include "storage/app/episode_text.h"
 #include "storage/app/history_options.h"
 #include "storage/app/verbs.h"
 #include "storage/history.h"
@@ -15,41 +14,6 @@ namespace fdi::storage {
 namespace {
 
 using cli::Context;
-
-// Quoted if it must be (RFC 4180).
-std::string Cell(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) {
-    return text;
-  }
-  std::string cell = "\"";
-  for (const char c : text) {
-    cell += c == '"' ? "\"\"" : std::string(1, c);
-  }
-  return cell + '"';
-}
-
-// Reads back as the same bits.
-std::string Cell(double value) {
-  if (std::isnan(value)) {
-    return "nan";
-  }
-  char text[64];
-  const auto end = std::to_chars(text, text + sizeof text, value);
-  return {text, end.ptr};
-}
-
-void WriteEpisodes(const std::vector<Episode>& episodes, std::ostream& out) {
-  out << "episode_id,valve_id,detected_utc,isolated_utc,cleared_utc,fault,"
-         "peak_factor,model_set,end_reason,label,acked_by\n";
-  for (const Episode& e : episodes) {
-    out << e.episode_id << ',' << Cell(e.valve_id) << ',' << e.detected_utc
-        << ',' << e.isolated_utc.value_or("") << ','
-        << e.cleared_utc.value_or("") << ',' << e.fault.value_or("") << ','
-        << Cell(e.peak_factor) << ',' << Cell(e.model_set) << ','
-        << e.end_reason.value_or("") << ',' << e.label.value_or("") << ','
-        << Cell(e.acked_by.value_or("")) << '\n';
-  }
-}
 
 // Heading of a signal, as in the CSV contract.
 std::string Heading(Signal signal, FlowUnit flow_unit) {
@@ -84,24 +48,24 @@ void WriteTrace(const Episode& episode, const std::vector<TraceInstant>& trace,
   out << '\n';
   for (const TraceInstant& instant : trace) {
     const Sample& sample = instant.received.sample;
-    out << Cell(static_cast<double>(sample.stamp_ns - episode.detected_ns) /
-                1e9)
+    out << CsvCell(static_cast<double>(sample.stamp_ns - episode.detected_ns) /
+                   1e9)
         << ',' << sample.stamp_ns << ',' << sample.seq << ','
         << IntakeName(instant.received.intake) << ','
         << QualityName(instant.quality) << ',' << StateName(instant.state);
     for (std::size_t i = 0; i < kSignalCount; ++i) {
       if ((present >> i & 1U) != 0) {
         out << ','
-            << (sample.Has(static_cast<Signal>(i)) ? Cell(sample.values[i])
+            << (sample.Has(static_cast<Signal>(i)) ? CsvCell(sample.values[i])
                                                    : "nan");
       }
     }
     for (const double residual : instant.residuals) {
-      out << ',' << Cell(residual);
+      out << ',' << CsvCell(residual);
     }
-    out << ',' << Cell(instant.normal_factor);
+    out << ',' << CsvCell(instant.normal_factor);
     for (const double factor : instant.fault_factors) {
-      out << ',' << Cell(factor);
+      out << ',' << CsvCell(factor);
     }
     out << '\n';
   }

@@ -72,6 +72,103 @@ TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
   EXPECT_EQ(Store("history label last perhaps").code, 2);
 }
 
+TEST_F(FdiStoreHistoryTest, EveryOneNoticedStandsInTheRecord) {
+  EXPECT_EQ(Store("history ack last --by anna --comment 'on it'").code, 0);
+  EXPECT_EQ(Store("history ack last --by jan").code, 0);
+
+  const json shown = StoreJson("history show last");
+  EXPECT_EQ(shown["acked_by"], "anna");
+  EXPECT_EQ(shown["alarm_state"], "ACKED");
+  EXPECT_EQ(shown["events"].size(), 4U);
+  EXPECT_EQ(shown["events"].back()["who"], "jan");
+  EXPECT_THAT(shown["events"].back()["origin"].get<std::string>(),
+              testing::MatchesRegex("fdi-store .+@.+"));
+}
+
+TEST_F(FdiStoreHistoryTest, AFilterAcknowledgesAllItFindsIfAskedTo) {
+  {
+    HistoryWriter writer(path_);
+    RecordEpisode(writer, 0b001, "PV-1");
+    RecordEpisode(writer, 0b001, "PV-2");
+  }
+  EXPECT_EQ(Store("history ack").code, 2);
+  EXPECT_EQ(Store("history ack last --all").code, 2);
+
+  const json first = StoreJson("history ack --all --valve 'PV-*'");
+  const json again = StoreJson("history ack --all --valve 'PV-*'");
+
+  EXPECT_EQ(first["episodes"].size(), 2U);
+  EXPECT_EQ(again["episodes"].size(), 0U);
+  EXPECT_EQ(StoreJson("history list --state unack")["episodes"].size(), 1U);
+  EXPECT_EQ(StoreJson("history list --state NORMAL")["episodes"].size(), 2U);
+  EXPECT_EQ(Store("history ack last ffff").code, 5);
+}
+
+TEST_F(FdiStoreHistoryTest, AShelvedAlarmSaysSoUntilItIsTakenOff) {
+  const json shelf =
+      StoreJson("history shelve LV-1 --for 1h --by anna --comment ordered");
+  EXPECT_EQ(shelf["shelf"][0]["valve_id"], "LV-1");
+  EXPECT_EQ(StoreJson("history list --state shelved")["episodes"].size(), 1U);
+  EXPECT_THAT(Store("history list").out, HasSubstr("SHELVED"));
+  EXPECT_EQ(StoreJson("history show last")["shelf"]["who"], "anna");
+
+  EXPECT_EQ(StoreJson("history unshelve --valve LV-1")["shelf"].size(), 1U);
+
+  EXPECT_EQ(StoreJson("history shelf")["shelf"].size(), 0U);
+  EXPECT_EQ(StoreJson("history shelf --all")["shelf"].size(), 1U);
+  EXPECT_EQ(Store("history unshelve 1").code, 3);
+  EXPECT_EQ(Store("history unshelve --valve LV-1").code, 5);
+  EXPECT_EQ(Store("history shelve LV-1 --for 91d").code, 2);
+  EXPECT_THAT(Store("history shelve LV-11").err,
+              HasSubstr("shelf.valve_unknown valve=LV-11 did_you_mean=LV-1"));
+}
+
+TEST_F(FdiStoreHistoryTest, SlipsOfThePenAreSuggested) {
+  EXPECT_THAT(Store("history lsit").err, HasSubstr("did you mean 'list'"));
+  EXPECT_THAT(Store("hsitory list").err, HasSubstr("did you mean 'history'"));
+  EXPECT_THAT(Store("history list --valv x").err,
+              HasSubstr("did you mean '--valve'"));
+  EXPECT_THAT(Store("history list --fault unknwon").err,
+              HasSubstr("did you mean 'unknown'"));
+  EXPECT_THAT(Store("history list --state isolatd").err,
+              HasSubstr("did you mean 'isolated'"));
+  EXPECT_THAT(Store("history label last ff7").err,
+              HasSubstr("did you mean 'f7'"));
+}
+
+TEST_F(FdiStoreHistoryTest, ListIsCsvIfAskedForAndTextWithoutColour) {
+  const std::string csv = Store("history list --csv").out;
+  EXPECT_THAT(csv, testing::StartsWith("episode_id,valve_id,detected_utc,"));
+  EXPECT_EQ(csv, Store("history export").out);
+  EXPECT_EQ(Store("history list --csv --json").code, 2);
+  const std::string text = Store("history list").out;
+  EXPECT_THAT(text, HasSubstr("UNACK"));
+  EXPECT_EQ(text.find('\x1b'), std::string::npos);
+  EXPECT_THAT(Store("history list --valve none").out,
+              HasSubstr("no episode matches"));
+}
+
+TEST_F(FdiStoreHistoryTest, StatisticsHaveDaysValvesFaultsAndLabels) {
+  {
+    HistoryWriter writer(path_);
+    RecordEpisode(writer, 0b001, "PV-1");
+  }
+  Store("history label last false");
+
+  const json stats = StoreJson("history stats");
+
+  EXPECT_EQ(stats["days"][0]["day_utc"], "2026-11-20");
+  EXPECT_EQ(stats["days"][0]["episodes"], 2);
+  EXPECT_EQ(stats["valves"][1]["valve_id"], "PV-1");
+  EXPECT_EQ(stats["valves"][1]["alarm_s"], 91.0);
+  EXPECT_EQ(stats["faults"][0]["fault"], "f1");
+  EXPECT_EQ(stats["faults"][0]["wrong"], 1);
+  EXPECT_EQ(stats["labelled"]["false"], 1);
+  EXPECT_EQ(stats["labelled"]["none"], 1);
+  EXPECT_EQ(stats["most_in_10_min"], 2);
+  EXPECT_THAT(Store("history stats").out, HasSubstr("1 false alarms"));
+}
+
 TEST_F(FdiStoreHistoryTest, TraceIsExportedWithAColumnPerChannelAndFault) {
   const Outcome outcome = Store("history export last");
 
