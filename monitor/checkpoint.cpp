@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <tuple>
 #include <utility>
 
 namespace fdi::monitor {
@@ -11,6 +12,27 @@ constexpr std::int64_t kDayNs = 86'400'000'000'000;
 
 std::int64_t DayOf(std::int64_t stamp_ns) {
   return stamp_ns / kDayNs - (stamp_ns % kDayNs < 0 ? 1 : 0);
+}
+
+void MergeHealth(std::vector<HealthHour>& older,
+                 std::vector<HealthHour> newer) {
+  using Key =
+      std::tuple<std::string, std::int64_t, std::uint64_t, std::uint32_t>;
+  const auto key_of = [](const HealthHour& h) {
+    return Key(h.valve_id, h.hour, h.model_hash, h.epoch);
+  };
+  std::map<Key, std::size_t> places;
+  for (std::size_t i = 0; i < older.size(); ++i) {
+    places[key_of(older[i])] = i;
+  }
+  for (HealthHour& hour : newer) {
+    const auto [place, added] = places.try_emplace(key_of(hour), older.size());
+    if (added || older[place->second].channels != hour.channels) {
+      older.push_back(std::move(hour));
+    } else {
+      older[place->second].Add(hour);
+    }
+  }
 }
 
 }  // namespace
@@ -39,6 +61,7 @@ Checkpoint Merged(Checkpoint older, Checkpoint newer) {
   for (auto& [valve, accumulator] : latest) {
     older.accumulators.push_back(std::move(accumulator));
   }
+  MergeHealth(older.health, std::move(newer.health));
   return older;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/health_hour.h"
 #include "diagnosis/quality_count.h"
 
 namespace fdi::monitor {
@@ -30,11 +31,15 @@ struct Accumulator {
 struct Checkpoint {
   std::vector<CoverageDay> coverage;      ///< Since the one before.
   std::vector<Accumulator> accumulators;  ///< Of the live valves.
+  std::vector<HealthHour> health;         ///< Since the one before.
 
-  bool empty() const { return coverage.empty() && accumulators.empty(); }
+  bool empty() const {
+    return coverage.empty() && accumulators.empty() && health.empty();
+  }
 };
 
-/// `newer` on top of `older`: time adds up, accumulators are replaced.
+/// `newer` on top of `older`: time and health add up, accumulators are
+/// replaced.
 Checkpoint Merged(Checkpoint older, Checkpoint newer);
 
 /// The time of one valve by quality and day, until it is taken.

@@ -45,6 +45,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     unassigned_.seq = sample.seq;
     stamp_ns_ = sample.stamp_ns;
     coverage_.Add(sample.stamp_ns, Quality::kUnassigned);
+    health_.Add(sample, unassigned_, nullptr, period_s());
     return {unassigned_, nullptr, swapped};
   }
   RestoreOnce(sample.source_id);
@@ -53,6 +54,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     source_id_ = sample.source_id;
     stamp_ns_ = sample.stamp_ns;
     coverage_.Add(sample.stamp_ns, verdict.quality);
+    health_.Add(sample, verdict, models_.get(), period_s());
   }
   if (verdict.intake != Intake::kSuperseded) {
     writer_ = writer;
@@ -77,6 +79,7 @@ void ValveMonitor::HoldIsolation(bool hold) {
 
 void ValveMonitor::TakeCheckpoint(Checkpoint& checkpoint) {
   coverage_.TakeTo(id_, period_s(), checkpoint.coverage);
+  health_.TakeTo(id_, checkpoint.health);
   if (engine_ && seen_ && !stale_ && !ended_) {
     checkpoint.accumulators.push_back(
         {id_, source_id_, models_->content_hash, stamp_ns_, engine_->Save()});

@@ -9,6 +9,7 @@
 #include "diagnosis/valve_engine.h"
 #include "monitor/checkpoint.h"
 #include "monitor/episode_tracker.h"
+#include "monitor/health_book.h"
 
 namespace fdi::monitor {
 
@@ -98,6 +99,7 @@ class ValveMonitor {
   EpisodeTracker tracker_;
   Verdict unassigned_;
   CoverageBook coverage_;
+  HealthBook health_;
   std::optional<Accumulator> saved_;
   std::uint64_t source_id_{0};
   std::int64_t stamp_ns_{0};

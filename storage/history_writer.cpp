@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "diagnosis/error.h"
+#include "storage/health_rows.h"
 #include "storage/history_event_rows.h"
 #include "storage/history_recovery.h"
 #include "storage/history_schema.h"
@@ -232,10 +233,12 @@ void HistoryWriter::EndTrace(std::uint64_t episode_id) {
 }
 
 void HistoryWriter::Keep(std::span<const CoverageCount> counts,
-                         std::span<const StoredAccumulator> accumulators) {
+                         std::span<const StoredAccumulator> accumulators,
+                         std::span<const HealthHour> health) {
   impl_->Together([&] {
     StoreCoverage(impl_->database(), counts);
     StoreAccumulators(impl_->database(), accumulators);
+    StoreHealth(impl_->database(), health);
   });
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/health_hour.h"
 #include "storage/database.h"
 #include "storage/history_coverage.h"
 #include "storage/history_types.h"
@@ -80,11 +81,12 @@ class HistoryWriter {
   /// The trace of the episode is complete; frees its buffer after writing.
   void EndTrace(std::uint64_t episode_id);
 
-  /// Adds `counts` to the time that is stored and replaces the accumulators of
-  /// those valves, with what is pending; on the disk on return. Twice counts
+  /// Adds `counts` and `health` to what is stored and replaces the accumulators
+  /// of those valves, with what is pending; on the disk on return. Twice counts
   /// twice.
   void Keep(std::span<const CoverageCount> counts,
-            std::span<const StoredAccumulator> accumulators);
+            std::span<const StoredAccumulator> accumulators,
+            std::span<const HealthHour> health = {});
 
   /// As they were kept last.
   std::vector<StoredAccumulator> Accumulators();

@@ -99,7 +99,7 @@ void HistoryStore::Keep(const Checkpoint& checkpoint) {
     accumulators.push_back(
         {a.valve_id, a.source_id, a.model_hash, a.stamp_ns, a.bytes});
   }
-  writer_.Keep(counts, accumulators);
+  writer_.Keep(counts, accumulators, checkpoint.health);
 }
 
 std::vector<storage::UnsentEvent> HistoryStore::UnsentEvents() {

@@ -8,6 +8,7 @@
 #include "storage/app/verbs.h"
 #include "storage/cli/text_table.h"
 #include "storage/cli/time_text.h"
+#include "storage/health_retention.h"
 #include "storage/retention.h"
 
 namespace fdi::storage {
@@ -36,6 +37,7 @@ struct FileOptions {
 struct PruneOptions {
   FileOptions runs;
   FileOptions history;
+  FileOptions health;
   bool dry_run{false};
 };
 
@@ -65,15 +67,26 @@ std::vector<Pruned> PruneAll(const PruneOptions& options,
                       PruneHistory(data.history(),
                                    options.history.Limits(options.dry_run))});
   }
+  if (options.health.Asked()) {
+    require(data.history());
+    pruned.push_back(
+        {"history.db", "hours of health",
+         PruneHealth(data.history(), options.health.Limits(options.dry_run))});
+  }
   return pruned;
 }
 
 Json PrunedJson(const Pruned& pruned) {
   const PruneResult& r = pruned.result;
-  return {{"name", pruned.file},          {"deleted", r.deleted},
-          {"protected", r.kept},          {"from_utc", TimeJson(r.from_ns)},
-          {"to_utc", TimeJson(r.to_ns)},  {"bytes_before", r.bytes_before},
-          {"bytes_after", r.bytes_after}, {"fits", r.fits}};
+  return {{"name", pruned.file},
+          {"items", pruned.items},
+          {"deleted", r.deleted},
+          {"protected", r.kept},
+          {"from_utc", TimeJson(r.from_ns)},
+          {"to_utc", TimeJson(r.to_ns)},
+          {"bytes_before", r.bytes_before},
+          {"bytes_after", r.bytes_after},
+          {"fits", r.fits}};
 }
 
 void PrintPruned(const std::vector<Pruned>& pruned, const Context& context) {
@@ -96,10 +109,11 @@ void PrintPruned(const std::vector<Pruned>& pruned, const Context& context) {
 }
 
 int Prune(const PruneOptions& options, const Context& context) {
-  if (!options.runs.Asked() && !options.history.Asked()) {
+  if (!options.runs.Asked() && !options.history.Asked() &&
+      !options.health.Asked()) {
     throw ConfigError(
-        "prune: say what may go: --runs-age, --runs-size, --history-age or "
-        "--history-size");
+        "prune: say what may go: --runs-age, --runs-size, --history-age, "
+        "--history-size or --health-age");
   }
   const std::vector<Pruned> pruned = PruneAll(options, DataOf(context));
   if (context.options.json) {
@@ -140,11 +154,13 @@ void AddPruneVerb(cli::Program& program) {
   auto options = std::make_shared<PruneOptions>();
   CLI::App& verb = program.AddVerb(
       "prune",
-      "Delete old recorded runs, and old episodes that are closed, "
-      "acknowledged and not labelled",
+      "Delete old recorded runs, old episodes that are closed, acknowledged "
+      "and not labelled, and old hours of health",
       [options](const Context& c) { return Prune(*options, c); });
   AddLimits(verb, "runs", options->runs);
   AddLimits(verb, "history", options->history);
+  verb.add_option("--health-age", options->health.age,
+                  "Delete hours of health that are older: 1000d, ...");
   verb.add_flag("--dry-run", options->dry_run, "Only say what would go");
 }
 

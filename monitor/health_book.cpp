@@ -1,0 +1,163 @@
+#include "monitor/health_book.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace fdi::monitor {
+namespace {
+
+constexpr std::int64_t kHourNs = 3'600'000'000'000;
+// A threshold band is cut into so many quanta, noise into some tens: rounding
+// does not show in a mean. The limits keep the sums of an hour from overflow.
+constexpr double kQuantaPerBand = 512.0;
+constexpr double kMaxResidual = 1'048'576.0;        // [quanta]
+constexpr double kMaxOutput = 1'099'511'627'776.0;  // [quanta]
+
+std::int64_t HourOf(std::int64_t stamp_ns) {
+  return stamp_ns / kHourNs - (stamp_ns % kHourNs < 0 ? 1 : 0);
+}
+
+std::int64_t Quanta(double value, double quantum, double limit) {
+  return std::llround(std::clamp(value / quantum, -limit, limit));
+}
+
+HealthChannel ChannelOf(const ChannelSpec& channel) {
+  const double band = channel.upper_threshold - channel.lower_threshold;
+  const double exponent =
+      band > 0.0 ? std::floor(std::log2(band / kQuantaPerBand)) : -10.0;
+  return {channel.output, static_cast<int>(std::clamp(exponent, -30.0, 20.0))};
+}
+
+// A reading to be relied upon, else NaN.
+double Reading(const Sample& sample, Signal signal) {
+  const bool good = sample.Has(signal) &&
+                    sample.quality[Index(signal)] != SignalQuality::kBad &&
+                    PlausibleRange(signal).Contains(sample[signal]);
+  return good ? sample[signal] : std::nan("");
+}
+
+void AddResiduals(const Sample& sample, const Verdict& verdict,
+                  HealthHour& hour) {
+  auto& bin = hour.bins[static_cast<std::size_t>(
+      CommandBin(sample.Has(Signal::kCv) ? sample[Signal::kCv] : 0.0))];
+  bin.resize(hour.channels.size());
+  for (std::size_t c = 0; c < bin.size(); ++c) {
+    if (std::isfinite(verdict.residuals[c])) {
+      const double quantum = hour.channels[c].quantum();
+      const std::int64_t r =
+          Quanta(verdict.residuals[c], quantum, kMaxResidual);
+      bin[c].Add(
+          {1, r, r * r,
+           Quanta(sample[hour.channels[c].output], quantum, kMaxOutput)});
+    }
+  }
+}
+
+void AddDecision(const Verdict& verdict, const ModelSet& models,
+                 std::int64_t period_ms, HealthHour& hour) {
+  hour.live_ms += period_ms;
+  ++hour.live_samples;
+  hour.normal_factor +=
+      std::llround(verdict.normal_factor / HealthHour::kShare);
+  if (verdict.detected) {
+    hour.alarm_ms += period_ms;
+  }
+  for (std::size_t i = 0; i < models.faults.size(); ++i) {
+    if ((verdict.isolated >> i & 1U) != 0) {
+      hour.AddStrength(
+          models.faults[i], 1,
+          Quanta(verdict.strengths[i], HealthHour::kShare, kMaxResidual));
+    }
+  }
+}
+
+}  // namespace
+
+StrokeCount::Step StrokeCount::Push(double position) {
+  if (!std::exchange(started_, true)) {
+    direction_ = 0;
+    extreme_ = position;
+    return {};
+  }
+  const double moved = position - extreme_;
+  const bool onward = moved * direction_ > 0.0;
+  const bool turned = !onward && std::abs(moved) >= kDeadBand;
+  if (!onward && !turned) {
+    return {};
+  }
+  const bool reversal = turned && direction_ != 0;
+  direction_ = moved > 0.0 ? 1 : -1;
+  extreme_ = position;
+  return {std::abs(moved), reversal};
+}
+
+void HealthBook::Add(const Sample& sample, const Verdict& verdict,
+                     const ModelSet* models, double period_s) {
+  HealthHour& hour = At(sample, models);
+  const std::int64_t period_ms = std::llround(period_s * 1e3);
+  hour.seen_ms += period_ms;
+  AddStroke(sample, period_ms, hour);
+  if (models != nullptr && verdict.quality == Quality::kLive) {
+    AddDecision(verdict, *models, period_ms, hour);
+    AddResiduals(sample, verdict, hour);
+  }
+}
+
+void HealthBook::TakeTo(const std::string& valve_id,
+                        std::vector<HealthHour>& hours) {
+  if (hour_) {
+    done_.push_back(std::move(*hour_));
+    hour_.reset();
+  }
+  for (HealthHour& hour : done_) {
+    hour.valve_id = valve_id;
+    hours.push_back(std::move(hour));
+  }
+  done_.clear();
+}
+
+HealthHour& HealthBook::At(const Sample& sample, const ModelSet* models) {
+  HealthHour begun;
+  begun.hour = HourOf(sample.stamp_ns);
+  begun.model_hash = models != nullptr ? models->content_hash : 0;
+  begun.epoch = sample.epoch;
+  if (hour_ && hour_->SameKey(begun)) {
+    return *hour_;
+  }
+  if (hour_) {
+    done_.push_back(std::move(*hour_));
+  }
+  begun.flow_unit = sample.flow_unit;
+  if (models != nullptr) {
+    for (const ChannelSpec& channel : models->channels) {
+      begun.channels.push_back(ChannelOf(channel));
+    }
+  }
+  return hour_.emplace(std::move(begun));
+}
+
+void HealthBook::AddStroke(const Sample& sample, std::int64_t period_ms,
+                           HealthHour& hour) {
+  const double x = Reading(sample, Signal::kX);
+  const bool by_command = !std::isfinite(x);
+  const double position = by_command ? Reading(sample, Signal::kCv) : x;
+  if (!std::isfinite(position)) {
+    return;
+  }
+  const bool other_source =
+      std::exchange(source_id_, sample.source_id) != sample.source_id;
+  if (std::exchange(by_command_, by_command) != by_command || other_source) {
+    stroke_.Restart();
+  }
+  const StrokeCount::Step step = stroke_.Push(position);
+  hour.travel += std::llround(step.travel / HealthHour::kTravel);
+  hour.reversals += step.reversal ? 1 : 0;
+  if (position <= HealthHour::kStopPercent) {
+    hour.open_ms += period_ms;
+  } else if (position >= 100.0 - HealthHour::kStopPercent) {
+    hour.shut_ms += period_ms;
+  }
+}
+
+}  // namespace fdi::monitor

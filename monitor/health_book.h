@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diagnosis/health_hour.h"
+#include "diagnosis/model_set.h"
+#include "diagnosis/verdict.h"
+
+namespace fdi::monitor {
+
+/// Travel of a stem and its changes of direction. A turn counts once it is as
+/// long as the dead band, so that noise does not; what goes on in the same
+/// direction counts as it comes.
+class StrokeCount {
+ public:
+  static constexpr double kDeadBand = 1.0;  ///< [% of stroke]
+
+  struct Step {
+    double travel{0.0};  ///< [% of stroke]
+    bool reversal{false};
+  };
+
+  /// @param position [%]
+  Step Push(double position);
+  /// What follows does not belong to what was.
+  void Restart() { started_ = false; }
+
+ private:
+  bool started_{false};
+  int direction_{0};  // 0: not yet known
+  double extreme_{0.0};
+};
+
+/// Gathers the health of one valve by hours until it is taken.
+///
+/// One thread at a time.
+class HealthBook {
+ public:
+  /// @param models null while the valve is UNASSIGNED.
+  /// @param period_s the time that the sample stands for.
+  void Add(const Sample& sample, const Verdict& verdict, const ModelSet* models,
+           double period_s);
+
+  /// Appends what was added since the last call.
+  void TakeTo(const std::string& valve_id, std::vector<HealthHour>& hours);
+
+ private:
+  HealthHour& At(const Sample& sample, const ModelSet* models);
+  void AddStroke(const Sample& sample, std::int64_t period_ms,
+                 HealthHour& hour);
+
+  std::vector<HealthHour> done_;
+  std::optional<HealthHour> hour_;
+  StrokeCount stroke_;
+  std::uint64_t source_id_{0};
+  bool by_command_{false};  // The position is CV for want of X.
+};
+
+}  // namespace fdi::monitor
