@@ -36,4 +36,8 @@ forbid '^(diagnosis|idl|storage|trainer|monitor)/' '(cvode|nvector|sun[a-z]+)/' 
   'SUNDIALS belongs to simulator'
 forbid '^(diagnosis|idl|simulator|trainer|monitor|storage)/[^/]+$' '(CLI/|toml\+\+|spdlog/|nlohmann/)' \
   'command line, TOML, logging and JSON belong to the programs'
+forbid '^monitor/(console|http)/' '(idl|simulator|trainer)/' \
+  'the console knows monitor and storage only'
+forbid '^(diagnosis|idl|simulator|trainer|storage|monitor/app)/' 'httplib\.h' \
+  'HTTP belongs to monitor/http and monitor/console'
 exit "$failed"

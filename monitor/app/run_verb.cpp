@@ -1,8 +1,11 @@
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
+#include "diagnosis/error.h"
 #include "monitor/app/service.h"
 #include "monitor/app/verbs.h"
 #include "monitor/log_limit.h"
@@ -16,6 +19,9 @@ struct RunArguments {
   std::string model_set;
   std::string record{"off"};
   std::string http{"off"};
+  std::string console{"off"};
+  console::ConsoleOptions console_options;
+  std::string console_token;
   ServiceOptions service;
 };
 
@@ -35,11 +41,47 @@ std::string ParseRecord(const std::string& word) {
 }
 
 // As --record; what is an address is checked where it is used.
-std::string ParseHttp(const std::string& word) {
-  if (word == "true" || word == "on") {
-    return "127.0.0.1:9464";
+std::function<std::string(std::string)> AddressOr(const std::string& usual) {
+  return [usual](const std::string& word) {
+    if (word == "true" || word == "on") {
+      return usual;
+    }
+    return word == "false" ? "off" : word;
+  };
+}
+
+std::optional<console::ConsoleOptions> ConsoleOf(
+    const RunArguments& arguments) {
+  const bool writable = !arguments.console_token.empty();
+  if (arguments.console == "off") {
+    if (writable || !arguments.console_options.files.empty()) {
+      throw ConfigError(
+          "--console-write and --console-files need "
+          "--console[=[ADDRESS:]PORT]");
+    }
+    return std::nullopt;
   }
-  return word == "false" ? "off" : word;
+  console::ConsoleOptions options = arguments.console_options;
+  options.address = ParseHttpAddress(arguments.console, "--console");
+  if (writable) {
+    options.token_file = arguments.console_token;
+  }
+  return options;
+}
+
+void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
+  run.add_flag("--console{127.0.0.1:8080}", arguments.console,
+               "Serve the live page and its API; port 0: any free one")
+      ->default_str("off")
+      ->transform(AddressOr("127.0.0.1:8080"))
+      ->type_name("[=[ADDRESS:]PORT]");
+  run.add_option("--console-write", arguments.console_token,
+                 "Let who has the token in FILE acknowledge, shelve and label; "
+                 "made with a random one if it is not there")
+      ->type_name("FILE");
+  run.add_option("--console-files", arguments.console_options.files,
+                 "Folder of the page instead of the installed one")
+      ->type_name("DIR");
 }
 
 int Run(const RunArguments& arguments, const cli::Context& context) {
@@ -54,6 +96,7 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
   if (arguments.http != "off") {
     options.http = ParseHttpAddress(arguments.http, "--http");
   }
+  options.console = ConsoleOf(arguments);
   cli::StopSignals signals;
   const cli::Context limited{context.options, LimitLog(context.log),
                              context.software, context.command_line};
@@ -103,8 +146,9 @@ void AddRunVerb(cli::Program& program) {
   run.add_flag("--http{127.0.0.1:9464}", arguments->http,
                "Serve /metrics, /healthz and /readyz; port 0: any free one")
       ->default_str("off")
-      ->transform(ParseHttp)
+      ->transform(AddressOr("127.0.0.1:9464"))
       ->type_name("[=[ADDRESS:]PORT]");
+  AddConsoleOptions(run, *arguments);
   run.add_option("--status-period", service.status_period_s,
                  "Time between status lines in the log [s]")
       ->check(CLI::Range(1.0, 86400.0))

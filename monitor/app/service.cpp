@@ -75,6 +75,10 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
       http_(options.http ? std::make_unique<HttpServer>(
                                HttpServerOptions{.address = *options.http})
                          : nullptr),
+      console_(options.console
+                   ? std::make_unique<console::Console>(
+                         *options.console, context.options, context.log)
+                   : nullptr),
       data_(Prepared(context.options.data_dir)),
       lock_(LockOf(data_), "recording faults"),
       participant_(DdsOptionsOf(options, context.options), context.log,
@@ -102,12 +106,16 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
           idl::Overflow::kOnTheWay),
       log_(context.log),
       pipeline_(PipelineOptionsOf(options),
-                {decisions_, events_, history_, runs_.get()}, assignment_,
-                counters_, log_),
+                {decisions_, console_ ? console_->Before(events_) : events_,
+                 history_, runs_.get(), console_ ? &console_->live() : nullptr},
+                assignment_, counters_, log_),
       heartbeat_(Members(pipeline_, intake_pulse_, service_pulse_)),
       started_ns_(cli::NowNs()),
       last_status_line_(std::chrono::steady_clock::now()) {
   ResendEvents();
+  if (console_) {
+    ServeConsole();
+  }
   pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators());
   intake_ = std::jthread([this](const std::stop_token& stop) { Intake(stop); });
   if (http_) {
@@ -116,7 +124,11 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
 }
 
 Service::~Service() {
-  http_.reset();  // Its threads look at all the rest.
+  // Their threads look at all the rest.
+  http_.reset();
+  if (console_) {
+    console_->Close();
+  }
 }
 
 void Service::AnnounceModels(const ModelSet& models) {
@@ -266,6 +278,9 @@ void Service::Shutdown() {
   manager_.Stopping();
   if (http_) {
     http_->Stop();
+  }
+  if (console_) {
+    console_->Stop();
   }
   // A subscriber that does not read must not keep the service from ending.
   std::mutex mutex;

@@ -14,13 +14,14 @@
 #include "idl/endpoint.h"
 #include "monitor/app/bus_sinks.h"
 #include "monitor/app/history_store.h"
-#include "monitor/http/http_server.h"
 #include "monitor/app/model_assignment.h"
 #include "monitor/app/probes.h"
 #include "monitor/app/run_store.h"
 #include "monitor/app/service_manager.h"
 #include "monitor/app/status.h"
+#include "monitor/console/console.h"
 #include "monitor/heartbeat.h"
+#include "monitor/http/http_server.h"
 #include "monitor/pipeline.h"
 #include "storage/cli/program.h"
 #include "storage/cli/stop_signals.h"
@@ -44,6 +45,8 @@ struct ServiceOptions {
   double status_period_s{60.0};  ///< Of the status line in the log.
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
+  /// Serve the live page.
+  std::optional<console::ConsoleOptions> console;
 };
 
 /// The monitor as a service: DDS on one side, the databases on the other, the
@@ -70,6 +73,7 @@ class Service {
   void AnnounceModels(const ModelSet& models);
   void Reload(const char* cause);
   void ServeProbes();
+  void ServeConsole();
   Readiness CurrentReadiness() const;
   std::string Metrics() const;
   StatusFacts Facts() const;
@@ -84,6 +88,7 @@ class Service {
   ServiceOptions options_;
   const cli::Context& context_;
   std::unique_ptr<HttpServer> http_;
+  std::unique_ptr<console::Console> console_;
   ServiceManager manager_;
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;

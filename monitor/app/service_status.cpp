@@ -14,6 +14,17 @@ void Service::ServeProbes() {
                "http_listening address=" + ToString(http_->address()));
 }
 
+void Service::ServeConsole() {
+  const auto facts = [this] {
+    const idl::MonitorStatusMessage status = StatusOf(Facts());
+    return console::MonitorFacts{idl::HealthName(status.health),
+                                 status.counters,
+                                 pipeline_.census().open_episodes};
+  };
+  console_->Start({data_.history(), data_.models(), context_.software,
+                   started_ns_, facts, cli::NowNs});
+}
+
 Readiness Service::CurrentReadiness() const {
   return {model_sets_,
           !pipeline_.history_degraded() && !pipeline_.recording_degraded(),

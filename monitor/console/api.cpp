@@ -1,0 +1,112 @@
+#include "monitor/console/api.h"
+
+#include <cctype>
+#include <charconv>
+#include <exception>
+
+#include <httplib.h>
+
+#include "diagnosis/error.h"
+
+namespace fdi::console {
+namespace {
+
+constexpr std::int64_t kNsPerMs = 1'000'000;
+constexpr std::int64_t kLastMs = 9'000'000'000'000;  // year 2255
+
+// What `send` throws becomes the answer.
+template <typename Send>
+void Guarded(httplib::Response& response, Send send) {
+  response.set_header("Cache-Control", "no-store");
+  try {
+    send();
+  } catch (const ConfigError& error) {
+    SendError(response, 400, error.what());
+  } catch (const std::invalid_argument& error) {
+    SendError(response, 400, error.what());
+  } catch (const NotFoundError& error) {
+    SendError(response, 404, error.what());
+  } catch (const storage::SqliteError& error) {
+    SendError(response, error.IsBusy() ? 503 : 500, error.what());
+  } catch (const std::exception& error) {
+    SendError(response, 500, error.what());
+  }
+}
+
+}  // namespace
+
+std::string Api::PlainName(std::string_view fault) const {
+  std::string name = texts.Words(fault, 0.0).name;
+  // "Flow transmitter ..." but "CV ..."
+  if (name.size() > 1 &&
+      std::islower(static_cast<unsigned char>(name[1])) != 0) {
+    name[0] =
+        static_cast<char>(std::tolower(static_cast<unsigned char>(name[0])));
+  }
+  return name;
+}
+
+void SendJson(httplib::Response& response, const Json& json) {
+  response.set_content(Dump(json), "application/json");
+}
+
+void SendError(httplib::Response& response, int status,
+               const std::string& what) {
+  response.status = status;
+  SendJson(response, {{"error", what}});
+}
+
+Handler Answering(Answer answer) {
+  return [answer = std::move(answer)](const httplib::Request& request,
+                                      httplib::Response& response) {
+    Guarded(response, [&] { SendJson(response, answer(request, response)); });
+  };
+}
+
+Handler AnsweringFile(
+    std::function<FileAnswer(const httplib::Request&)> answer) {
+  return [answer = std::move(answer)](const httplib::Request& request,
+                                      httplib::Response& response) {
+    Guarded(response, [&] {
+      const FileAnswer file = answer(request);
+      response.set_header("Content-Disposition",
+                          "attachment; filename=\"" + file.name + "\"");
+      response.set_content(file.body, file.type.c_str());
+    });
+  };
+}
+
+std::optional<std::string> Parameter(const httplib::Request& request,
+                                     const char* name) {
+  std::string value = request.get_param_value(name);
+  return value.empty() ? std::nullopt
+                       : std::optional<std::string>(std::move(value));
+}
+
+std::int64_t IntegerParameter(const httplib::Request& request, const char* name,
+                              std::int64_t otherwise, std::int64_t minimum,
+                              std::int64_t maximum) {
+  const std::optional<std::string> text = Parameter(request, name);
+  if (!text) {
+    return otherwise;
+  }
+  std::int64_t value = 0;
+  const char* const end = text->data() + text->size();
+  const auto [stop, error] = std::from_chars(text->data(), end, value);
+  if (error != std::errc{} || stop != end || value < minimum ||
+      value > maximum) {
+    throw ConfigError(std::string(name) + "=" + *text +
+                      ": expected a whole number of " +
+                      std::to_string(minimum) + ".." + std::to_string(maximum));
+  }
+  return value;
+}
+
+std::int64_t TimeParameter(const httplib::Request& request, const char* name,
+                           std::int64_t otherwise_ns) {
+  return Parameter(request, name)
+             ? kNsPerMs * IntegerParameter(request, name, 0, 0, kLastMs)
+             : otherwise_ns;
+}
+
+}  // namespace fdi::console

@@ -1,0 +1,168 @@
+#include "monitor/console/console.h"
+
+#include <random>
+
+#include <httplib.h>
+
+#include "diagnosis/error.h"
+#include "monitor/console/access.h"
+#include "storage/cli/shared_files.h"
+
+namespace fdi::console {
+namespace {
+
+// Streams take a thread each; what is left answers all the rest.
+constexpr std::size_t kAnsweringThreads = 4;
+constexpr std::size_t kMaxBody = 16 * 1024;
+constexpr const char* kPolicy =
+    "default-src 'self'; img-src 'self' data:; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'";
+
+monitor::HttpServerOptions ServerOptionsOf(const ConsoleOptions& options) {
+  return {options.address, "--console",
+          StreamOptions{}.max_clients + kAnsweringThreads, kMaxBody};
+}
+
+std::string NewInstance() {
+  std::random_device random;
+  char text[17];
+  std::snprintf(text, sizeof text, "%08x%08x", random(), random());
+  return text;
+}
+
+}  // namespace
+
+// Shows events that went to the bus.
+class Console::Events : public monitor::EventSink {
+ public:
+  Events(monitor::EventSink& bus, Console& console)
+      : bus_(bus), console_(console) {}
+
+  bool Publish(const monitor::EpisodeEvent& event, bool persisted) override {
+    const bool sent = bus_.Publish(event, persisted);
+    console_.board_.Mark(event);
+    if (persisted) {
+      console_.feed_->Wake();
+    } else {
+      console_.feed_->TellUnstored(event);
+    }
+    return sent;
+  }
+
+ private:
+  monitor::EventSink& bus_;
+  Console& console_;
+};
+
+std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked) {
+  const std::filesystem::path folder =
+      asked.empty() ? cli::SharedFile("console") : asked;
+  if (!std::filesystem::is_regular_file(folder / "index.html")) {
+    const std::string what = folder.string() +
+                             ": no index.html there; expected the folder of "
+                             "the page, PREFIX/share/fdi/console";
+    if (asked.empty()) {
+      throw DataError("console files " + what);
+    }
+    throw ConfigError("--console-files " + what);
+  }
+  return folder;
+}
+
+Console::Console(const ConsoleOptions& options,
+                 const cli::GlobalOptions& global, LogSink log)
+    : server_(std::make_unique<monitor::HttpServer>(ServerOptionsOf(options))),
+      files_(FindConsoleFiles(options.files)),
+      token_(options.token_file ? LoadToken(*options.token_file) : ""),
+      texts_(cli::LoadFaultTexts(global)),
+      log_(std::move(log)) {
+  if (options.token_file) {
+    log_(LogLevel::kInfo, "console_token file=" + options.token_file->string());
+  }
+}
+
+Console::~Console() {
+  Close();
+}
+
+monitor::EventSink& Console::Before(monitor::EventSink& bus) {
+  events_ = std::make_unique<Events>(bus, *this);
+  return *events_;
+}
+
+void Console::Start(ConsoleSources sources) {
+  models_ = std::make_unique<StoredModels>(sources.models);
+  alarms_ = std::make_unique<AlarmBook>(sources.history, texts_);
+  feed_ = std::make_unique<LiveFeed>(
+      FeedParts{board_, hub_, *alarms_, texts_, sources.utc_now_ns, log_});
+  api_ = std::make_unique<Api>(Api{std::move(sources), board_, hub_, *feed_,
+                                   *alarms_, *models_, texts_, token_,
+                                   NewInstance()});
+  httplib::Server& routes = server_->routes();
+  Guard();
+  AddLiveRoutes(routes, *api_);
+  AddStreamRoute(routes, *api_);
+  AddHistoryRoutes(routes, *api_);
+  AddEpisodeRoutes(routes, *api_);
+  AddActionRoutes(routes, *api_);
+  AddFiles();
+  feed_->Start();
+  server_->Start();
+  const std::string& host = server_->address().host;
+  log_(IsLoopback(host) ? LogLevel::kInfo : LogLevel::kWarning,
+       "console_listening address=" + ToString(server_->address()) +
+           " write=" + (token_.empty() ? "off" : "on") +
+           (IsLoopback(host) ? "" : " open_to_network=yes"));
+}
+
+void Console::Stop() {
+  hub_.Close();
+  server_->Stop();
+}
+
+void Console::Close() {
+  if (server_) {
+    Stop();
+    server_.reset();
+  }
+  if (feed_) {
+    feed_->Stop();
+  }
+}
+
+void Console::AddFiles() {
+  httplib::Server& routes = server_->routes();
+  routes.set_file_extension_and_mimetype_mapping("webmanifest",
+                                                 "application/manifest+json");
+  routes.set_mount_point("/", files_.string(), {{"Cache-Control", "no-cache"}});
+}
+
+// What holds for every answer.
+void Console::Guard() {
+  httplib::Server& routes = server_->routes();
+  routes.set_tcp_nodelay(true);
+  routes.set_default_headers({{"Content-Security-Policy", kPolicy},
+                              {"X-Content-Type-Options", "nosniff"},
+                              {"Referrer-Policy", "no-referrer"}});
+  routes.set_pre_routing_handler([host = server_->address().host](
+                                     const httplib::Request& request,
+                                     httplib::Response& response) {
+    if (HostAllowed(request.get_header_value("Host"), host)) {
+      return httplib::Server::HandlerResponse::Unhandled;
+    }
+    SendError(response, 403, "Host: expected localhost or a loopback address");
+    return httplib::Server::HandlerResponse::Handled;
+  });
+  routes.set_error_handler(httplib::Server::HandlerWithResponse(
+      [](const httplib::Request& request, httplib::Response& response) {
+        if (response.body.empty()) {
+          SendError(response, response.status,
+                    response.status == 404
+                        ? request.path + ": there is no such page"
+                        : "this request cannot be answered");
+        }
+        return httplib::Server::HandlerResponse::Handled;
+      }));
+}
+
+}  // namespace fdi::console

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "diagnosis/log.h"
+#include "monitor/console/api.h"
+#include "monitor/http/http_server.h"
+#include "monitor/sinks.h"
+
+namespace fdi::console {
+
+/// Settings of Console.
+struct ConsoleOptions {
+  monitor::HttpAddress address;
+  /// Of the page; empty: those installed with the program.
+  std::filesystem::path files;
+  /// Holds the token of who may act on alarms; none: read-only.
+  std::optional<std::filesystem::path> token_file;
+};
+
+/// Folder with index.html. @throws ConfigError naming `asked`, or DataError if
+///   nothing was asked for and none is installed.
+std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked);
+
+/// The live page of a monitor and its API (docs/console.md): shows what the
+/// pipeline tells it, reads the history, and lets those act who have the token.
+/// Threads of its own; neither diagnosis nor bus waits for any of them.
+class Console {
+ public:
+  /// Binds the address and finds its files; nothing is answered yet.
+  /// @throws ConfigError, DataError, NotFoundError, std::runtime_error
+  Console(const ConsoleOptions& options, const cli::GlobalOptions& global,
+          LogSink log);
+  ~Console();
+  Console(const Console&) = delete;
+  Console& operator=(const Console&) = delete;
+
+  /// For the pipeline.
+  monitor::LiveSink& live() { return board_; }
+  /// For the pipeline, in front of `bus`: events are shown once they are sent,
+  /// and so stored, if the history takes them.
+  monitor::EventSink& Before(monitor::EventSink& bus);
+
+  /// Answers from now on. Once, with a history, before the pipeline starts.
+  void Start(ConsoleSources sources);
+  /// Ends all streams and takes no further connections. Does not wait.
+  void Stop();
+  /// Stops and waits for all threads: sources are not called any more.
+  void Close();
+
+  StreamCounts streams() const { return hub_.counts(); }
+  std::size_t board_bytes() const { return board_.bytes(); }
+
+ private:
+  class Events;
+  void AddFiles();
+  void Guard();
+
+  std::unique_ptr<monitor::HttpServer> server_;
+  std::filesystem::path files_;
+  std::string token_;
+  cli::FaultTexts texts_;
+  LogSink log_;
+  LiveBoard board_;
+  StreamHub hub_;
+  std::unique_ptr<Events> events_;
+  std::unique_ptr<StoredModels> models_;
+  std::unique_ptr<AlarmBook> alarms_;
+  std::unique_ptr<LiveFeed> feed_;
+  std::unique_ptr<Api> api_;
+};
+
+}  // namespace fdi::console

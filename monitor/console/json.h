@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "monitor/console/live_board.h"
+#include "monitor/console/words.h"
+#include "storage/alarm.h"
+#include "storage/cli/fault_texts.h"
+#include "storage/cli/json_output.h"
+
+/// What the console answers, as JSON; the keys are those of docs/console.md.
+namespace fdi::console {
+
+using cli::Json;
+
+/// Compact; bytes that are not UTF-8 become the replacement character.
+std::string Dump(const Json& json);
+
+/// ns to ms since 1970.
+Json Ms(std::int64_t stamp_ns);
+Json Ms(const std::optional<std::int64_t>& stamp_ns);
+/// Rounded to `decimals`; null if it is not finite.
+Json Rounded(double value, int decimals);
+/// Null for an empty text.
+Json TextOrNull(const std::string& text);
+
+/// What the alarms say of a valve.
+struct ValveAlarm {
+  std::optional<std::int64_t> since_ns;
+  std::string episode;  ///< Empty: none is open.
+  bool unacked{false};
+  std::optional<std::int64_t> shelved_until_ns;
+
+  bool operator==(const ValveAlarm&) const = default;
+};
+
+/// @param newest_only with "v", the newest point of the sparkline, instead of
+///   "spark".
+Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
+              bool newest_only = false);
+
+Json ModelFactsJson(const ModelFacts& models);
+
+/// @param models null: no residuals, thresholds or factors.
+Json TrendJson(const ModelFacts* models, const std::string& valve_id,
+               const std::vector<monitor::TracePoint>& points);
+Json MarksJson(const std::vector<Mark>& marks);
+Json GapJson(const monitor::DataGap& gap);
+
+/// One instant of a valve, for the stream.
+Json SampleJson(const std::string& valve_id, const monitor::TracePoint& point);
+
+Json AlarmJson(const storage::Alarm& alarm, const cli::FaultTexts& texts);
+Json ShelfJson(const storage::Shelf& shelf);
+
+/// An event that is not in the history, or not yet, as the alarm it is.
+storage::Alarm AlarmOf(const monitor::EpisodeEvent& event);
+
+}  // namespace fdi::console
