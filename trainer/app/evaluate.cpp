@@ -34,27 +34,6 @@ int Evaluate(const EvaluateOptions& options, const cli::Context& context) {
   return EvaluateModels(options, context);
 }
 
-void AddSelection(CLI::App& verb, RunSelection& selection) {
-  verb.add_option("--runs", selection.runs, "Runs, or stretches of them [s]")
-      ->delimiter(',')
-      ->type_name("ID[@from:to],...");
-  verb.add_option("--file", selection.files,
-                  "CSV file scored without storing it; repeatable")
-      ->expected(1)
-      ->take_all()
-      ->type_name("FILE.csv[@from:to]");
-  verb.add_option("--campaign", selection.campaign,
-                  "Its validation runs; simulates or imports what is missing")
-      ->type_name("FILE.toml");
-  verb.add_option("--seed-offset", selection.seed_offset,
-                  "Added to the seeds of simulated validation runs")
-      ->check(CLI::Range(0, 1000000000))
-      ->type_name("N");
-  verb.add_option("--map", selection.map,
-                  "TOML file: names, units, scale, offset, sense of columns")
-      ->type_name("FILE.toml");
-}
-
 void AddModels(CLI::App& verb, EvaluateOptions& options) {
   verb.add_option("--model-set", options.model_set, "NAME (its active version)")
       ->type_name("NAME[@VERSION]");
@@ -173,7 +152,7 @@ void AddEvaluateVerb(cli::Program& program) {
         return Evaluate(*options, context);
       });
   AddModels(verb, *options);
-  AddSelection(verb, options->selection);
+  AddRunSelection(verb, options->selection);
   AddOutputs(verb, *options);
   AddWays(verb, *options);
 }

@@ -7,6 +7,7 @@ int main(int argc, char** argv) {
       "Builds model sets from stored or simulated runs and scores them");
   fdi::trainer::AddTrainVerb(program);
   fdi::trainer::AddEvaluateVerb(program);
+  fdi::trainer::AddCompareVerb(program);
   fdi::trainer::AddShowVerb(program);
   fdi::trainer::AddInjectVerb(program);
   fdi::trainer::AddOnboardVerb(program);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <optional>
 
+#include <CLI/CLI.hpp>
+
 #include "diagnosis/error.h"
 #include "storage/cli/progress.h"
 #include "storage/cli/stop_signals.h"
@@ -32,6 +34,27 @@ void AddValidation(const RunSelection& selection, const cli::Context& context,
 }
 
 }  // namespace
+
+void AddRunSelection(CLI::App& verb, RunSelection& selection) {
+  verb.add_option("--runs", selection.runs, "Runs, or stretches of them [s]")
+      ->delimiter(',')
+      ->type_name("ID[@from:to],...");
+  verb.add_option("--file", selection.files,
+                  "CSV file scored without storing it; repeatable")
+      ->expected(1)
+      ->take_all()
+      ->type_name("FILE.csv[@from:to]");
+  verb.add_option("--campaign", selection.campaign,
+                  "Its validation runs; simulates or imports what is missing")
+      ->type_name("FILE.toml");
+  verb.add_option("--seed-offset", selection.seed_offset,
+                  "Added to the seeds of simulated validation runs")
+      ->check(CLI::Range(0, 1000000000))
+      ->type_name("N");
+  verb.add_option("--map", selection.map,
+                  "TOML file: names, units, scale, offset, sense of columns")
+      ->type_name("FILE.toml");
+}
 
 std::vector<storage::StoredRun> LoadCampaignRuns(
     const std::vector<CampaignRun>& runs, const cli::Context& context) {

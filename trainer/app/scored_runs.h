@@ -11,6 +11,10 @@
 #include "trainer/app/campaign.h"
 #include "trainer/app/evaluated_run.h"
 
+namespace CLI {
+class App;
+}
+
 namespace fdi::trainer {
 
 /// Which runs are scored, as the options of `evaluate` name them.
@@ -21,6 +25,9 @@ struct RunSelection {
   std::uint64_t seed_offset{0};    ///< Added to the seeds of the campaign.
   std::filesystem::path map;       ///< Of the columns of files.
 };
+
+/// --runs, --file, --campaign, --seed-offset, --map.
+void AddRunSelection(CLI::App& verb, RunSelection& selection);
 
 /// A run to score, under the name it is listed by.
 struct ScoredRun {
