@@ -13,6 +13,7 @@ packages=(
   libcli11-dev libtomlplusplus-dev libspdlog-dev nlohmann-json3-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   gnuplot-nox
+  cyclonedds-dev cyclonedds-tools
 )
 
 missing=()
