@@ -114,6 +114,20 @@ void AddThreads(const std::vector<Heartbeat::Member>& threads,
   }
 }
 
+void AddConsole(const ConsoleLoad& console, Exposition& page) {
+  page.Single("fdi_console_streams", Type::kGauge, "Live streams now",
+              console.streams.clients);
+  page.Family("fdi_console_streams_total", Type::kCounter,
+              "Live streams that were begun, refused for want of a place, or "
+              "dropped because the client did not keep up");
+  page.Value(console.streams.admitted, {"outcome", "admitted"});
+  page.Value(console.streams.refused, {"outcome", "refused"});
+  page.Value(console.streams.dropped, {"outcome", "dropped"});
+  page.Single("fdi_console_bytes", Type::kGauge,
+              "Memory of the trends that the console shows",
+              console.board_bytes);
+}
+
 void AddProcess(const MetricsFacts& facts, Exposition& page) {
   const ProcessFacts process = ReadProcessFacts();
   page.Family("fdi_build_info", Type::kGauge, "1; the label says which build");
@@ -143,6 +157,9 @@ std::string MetricsPage(const StatusFacts& status, const MetricsFacts& facts) {
   AddValves(status.census, page);
   AddStorage(status, facts, page);
   AddThreads(facts.threads, page);
+  if (facts.console) {
+    AddConsole(*facts.console, page);
+  }
   AddProcess(facts, page);
   return page.text();
 }

@@ -1,8 +1,6 @@
 #include "monitor/app/service.h"
 
-#include <condition_variable>
 #include <cstdio>
-#include <mutex>
 #include <utility>
 
 #include "monitor/app/status.h"
@@ -16,9 +14,6 @@ using std::chrono::milliseconds;
 constexpr milliseconds kTakeTimeout{100};
 constexpr int kTakeLimit = 4096;  // Under full load Take() has no other end.
 constexpr milliseconds kTickPeriod{1000};
-constexpr milliseconds kDrainLimit{1000};
-constexpr milliseconds kSubscriberPatience{1000};  // at shutdown
-constexpr milliseconds kAcknowledgeLimit{300};
 
 std::chrono::milliseconds Milliseconds(double seconds) {
   return milliseconds(static_cast<std::int64_t>(seconds * 1e3));
@@ -271,42 +266,6 @@ void Service::Reload(const char* cause) {
         LogId::kModelFailure, "reload_failed",
         [&reason] { return "reason=\"" + reason + "\""; }, LogLevel::kError);
   }
-}
-
-void Service::Shutdown() {
-  context_.log(LogLevel::kInfo, "monitor_stopping");
-  manager_.Stopping();
-  if (http_) {
-    http_->Stop();
-  }
-  if (console_) {
-    console_->Stop();
-  }
-  // A subscriber that does not read must not keep the service from ending.
-  std::mutex mutex;
-  std::condition_variable_any woken;
-  const std::jthread watchdog([&](const std::stop_token& done) {
-    std::unique_lock lock(mutex);
-    if (!woken.wait_for(lock, done, kSubscriberPatience,
-                        [&done] { return done.stop_requested(); })) {
-      publication_stop_.request_stop();
-    }
-  });
-  drain_until_ = std::chrono::steady_clock::now() + kDrainLimit;
-  intake_.request_stop();
-  if (intake_.joinable()) {
-    intake_.join();
-  }
-  pipeline_.Stop();
-  history_.EndSession();
-  PublishStatus();
-  if (!publication_stop_.stop_requested()) {
-    decisions_.WaitForAcknowledged(kAcknowledgeLimit);
-  }
-  events_.WaitForAcknowledged(kAcknowledgeLimit);
-  status_topic_.WaitForAcknowledged(kAcknowledgeLimit);
-  WriteStatusLine();
-  context_.log(LogLevel::kInfo, "monitor_stopped");
 }
 
 }  // namespace fdi::monitor

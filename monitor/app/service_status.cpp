@@ -32,12 +32,17 @@ Readiness Service::CurrentReadiness() const {
 }
 
 std::string Service::Metrics() const {
-  return MetricsPage(Facts(), {context_.software,
-                               started_ns_,
-                               {FactsOf("history", data_.history()),
-                                FactsOf("models", data_.models()),
-                                FactsOf("runs", data_.runs())},
-                               heartbeat_.members()});
+  MetricsFacts facts{
+      context_.software,
+      started_ns_,
+      {FactsOf("history", data_.history()), FactsOf("models", data_.models()),
+       FactsOf("runs", data_.runs())},
+      heartbeat_.members(),
+      std::nullopt};
+  if (console_) {
+    facts.console = {console_->streams(), console_->board_bytes()};
+  }
+  return MetricsPage(Facts(), facts);
 }
 
 StatusFacts Service::Facts() const {
