@@ -96,8 +96,8 @@ export const qualityWord = (quality) =>
   kQualityWords[quality] ?? String(quality).toLowerCase().replaceAll('_', ' ');
 
 const kMarkWords = {
-  DETECTED: 'detected', ISOLATED: 'isolated', REISOLATED: 'isolated anew',
-  CLEARED: 'cleared', CLOSED: 'closed', START: 'start',
+  REISOLATED: 'isolated anew', ACK: 'acknowledged', LABEL: 'labelled',
 };
 export const markWord = (kind) =>
-  kMarkWords[kind] ?? String(kind).toLowerCase().replaceAll('_', ' ');
+  kMarkWords[String(kind).toUpperCase()] ??
+    String(kind).toLowerCase().replaceAll('_', ' ');

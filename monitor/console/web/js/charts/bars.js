@@ -20,7 +20,7 @@ function gridLines(max, step, yOf) {
     lines.push(svg('line', {'class': 'grid', 'x1': kLeft, 'x2': kWidth,
       'y1': yOf(value), 'y2': yOf(value)}),
     svg('text', {'x': kLeft - 6, 'y': yOf(value) + 4, 'text-anchor': 'end'},
-        numberText(value, 2)));
+        String(Number(value.toPrecision(3)))));
   }
   return lines;
 }
@@ -43,7 +43,7 @@ export function barChart(title, unit, bars, whole = false) {
     svg('title', {}, `${name}: ${numberText(value)} ${unit}`)),
     i % every === 0 ? svg('text', {'x': kLeft + (i + 0.5) * wide,
       'y': kHeight - 5, 'text-anchor': 'middle'}, name.slice(5)) : null]));
-  return h('figure', {}, h('figcaption', {}, `${title} [${unit}]`), chart,
+  return h('figure', {}, h('figcaption', {}, title), chart,
       h('details', {}, h('summary', {}, 'As a table'),
           h('table', {class: 'small'},
               h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Day'),

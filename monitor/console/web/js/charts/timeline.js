@@ -1,7 +1,9 @@
 // Panels of a trend on one axis of time: zoom by dragging, pan by Shift and
 // dragging, both by keys and buttons; follows the newest until told otherwise.
 
-import {h, replace} from '../dom.js';
+import {h, replace, setText} from '../dom.js';
+import {markWord} from '../faults.js';
+import {durationText, timeText} from '../format.js';
 import {Panel} from './panel.js';
 import {panelsOf} from './panels.js';
 
@@ -15,6 +17,7 @@ export class Timeline {
   #scene = {table: {t: []}, gaps: [], marks: []};
   #panelBox = h('div', {class: 'panels'});
   #buttons;
+  #summary = h('p', {class: 'hint trend-summary'});
   #spanMs;  // Of the window that follows; null: all.
   #window = null;  // What the user looks at; null: follow.
   #setting = false;
@@ -38,7 +41,8 @@ export class Timeline {
     this.#panelBox.addEventListener('keydown', (event) => this.#key(event));
     this.#panelBox.addEventListener('wheel', (event) => this.#wheel(event),
         {passive: false});
-    this.element = h('div', {class: 'timeline'}, this.#buttons, this.#panelBox);
+    this.element = h('div', {class: 'timeline'}, this.#buttons, this.#panelBox,
+        this.#summary);
     this.#makeButtons();
     this.#resize.observe(this.#panelBox);
   }
@@ -74,6 +78,7 @@ export class Timeline {
   update() {
     if (this.#panels.length === 0) return;
     this.#readScene();
+    this.#summarise();
     this.#panels.forEach((panel) => panel.update());
     this.#apply(this.#window ?? this.#following());
   }
@@ -102,6 +107,22 @@ export class Timeline {
       gaps, table: this.#data.columns ? this.#data.table(gaps) : {t: []},
       marks: this.#data.marks,
     });
+  }
+
+  // The picture in words.
+  #summarise() {
+    const {size, columns, marks} = this.#data;
+    const {gaps} = this.#scene;
+    const list = (items, text) => items.slice(-5).map(text).join('; ');
+    setText(this.#summary, size === 0 ? 'No samples yet.' :
+      `${size} instants from ${timeText(columns.t[0])} to ` +
+      `${timeText(columns.t.at(-1))}. ` + (gaps.length === 0 ? 'No gaps. ' :
+        `${gaps.length} ${gaps.length === 1 ? 'gap' : 'gaps'}: ` +
+        list(gaps, (gap) => `${timeText(gap.from_ms)} ${gap.reason}` +
+          (gap.to_ms === null ? '' :
+            `, ${durationText(gap.to_ms - gap.from_ms)}`)) + '. ') +
+      (marks.length === 0 ? '' : 'Marks: ' + list(marks, (mark) =>
+        `${timeText(mark.t_ms)} ${markWord(mark.kind)}`) + '.'));
   }
 
   // While nothing comes the window goes on, so that the gap is seen to grow.

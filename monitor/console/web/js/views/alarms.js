@@ -8,7 +8,7 @@ import {compareAlarms, groupOf, groups} from '../faults.js';
 import {link, rememberQuery} from '../route.js';
 import {onKey} from '../shortcuts.js';
 import {store} from '../store.js';
-import {bodyRow, columns, headRow, scrollable} from './table.js';
+import {bodyRow, cardTable, columns, headRow, scrollable} from './table.js';
 
 const kColumns = [
   columns.priority, columns.detected, columns.valve, columns.fault,
@@ -22,8 +22,8 @@ class Alarms {
   #selected = new Set();
   #current = null;  // Episode that the keys act upon.
   #group;
-  #body = h('tbody', {});
-  #head = h('thead', {});
+  #body = h('tbody', {role: 'rowgroup'});
+  #head = h('thead', {role: 'rowgroup'});
   #chips = new Map();
   #nothing = h('p', {class: 'nothing', hidden: true});
   #bulk = h('button', {'type': 'button', 'class': 'primary', 'hidden': true,
@@ -36,13 +36,11 @@ class Alarms {
 
   constructor({query}) {
     this.#group = query.get('group') ?? '';
-    const table = h('table', {class: 'alarms'},
-        h('caption', {class: 'sr-only'}, 'Alarms, worst first'),
-        this.#head, this.#body);
     this.element = h('section', {'class': 'live', 'aria-label': 'Alarms'},
         h('div', {class: 'controls'}, h('h1', {}, 'Alarms'), this.#makeChips(),
             this.#bulk), this.#readOnly, this.#nothing,
-        scrollable('Alarms', table));
+        scrollable('Alarms', cardTable('Alarms, worst first',
+            this.#head, this.#body)));
     const {signal} = this.#abort;
     for (const type of ['alarms', 'status']) {
       store.addEventListener(type, () => this.#later(), {signal});

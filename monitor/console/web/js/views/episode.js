@@ -103,7 +103,9 @@ class EpisodePage {
   async #load() {
     try {
       const found = await get(path('episodes', this.id));
-      if (!this.#abort.signal.aborted) this.#show(found);
+      if (this.#abort.signal.aborted) return;
+      this.id = found.episode.episode;  // It may be asked for as the last one.
+      this.#show(found);
     } catch (error) {
       if (this.#abort.signal.aborted) return;
       replace(this.#content, h('h1', {}, 'Episode'),
@@ -157,11 +159,12 @@ class EpisodePage {
   }
 
   async #copy(said) {
+    const address = new URL(link('episode', this.id), location.href).href;
     try {
-      await navigator.clipboard.writeText(location.href);
+      await navigator.clipboard.writeText(address);
       setText(said, 'copied');
     } catch {
-      setText(said, location.href);
+      setText(said, address);
     }
   }
 }

@@ -8,12 +8,17 @@ import {fromInput, toInput, zoneName} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {statisticsSection} from './statistics.js';
-import {bodyRow, columns, headRow, scrollable} from './table.js';
+import {bodyRow, cardTable, columns, headRow, scrollable} from './table.js';
 
 const kPage = 100;
 const kDayMs = 86400000;
 const kDefaultDays = 30;
-const kStates = ['DETECTED', 'ISOLATED', 'CLEARED', 'CLOSED'];
+const kStates = [
+  ['', 'any'], ['open', 'open'], ['detected', 'detected, not isolated'],
+  ['isolated', 'isolated'], ['closed', 'ended'], ['unack', 'unacknowledged'],
+  ['rtn_unack', 'returned, unacknowledged'], ['acked', 'acknowledged, active'],
+  ['shelved', 'shelved'],
+];
 const kColumns = [
   columns.priority, columns.detected, columns.valve, columns.fault,
   columns.group, columns.lasted, columns.factor, columns.strength,
@@ -41,7 +46,7 @@ class History {
   #abort = new AbortController();
   #rows = [];
   #inputs;
-  #body = h('tbody', {});
+  #body = h('tbody', {role: 'rowgroup'});
   #found = h('p', {class: 'note', role: 'status'});
   #more = h('button', {type: 'button', hidden: true,
     onclick: () => this.#fetchRows(true)}, 'Older ones');
@@ -56,9 +61,8 @@ class History {
             h('button', {type: 'button', onclick: () => download(
                 'episodes.csv', new Blob([csvOf(this.#rows)],
                     {type: 'text/csv'}))}, 'Save as CSV')),
-        scrollable('Episodes', h('table', {},
-            h('caption', {class: 'sr-only'}, 'Episodes, newest first'),
-            h('thead', {}, headRow(kColumns)), this.#body)),
+        scrollable('Episodes', cardTable('Episodes, newest first',
+            h('thead', {role: 'rowgroup'}, headRow(kColumns)), this.#body)),
         this.#more);
     store.addEventListener('tiles', ({detail}) => {
       if (detail === null) this.#fillFaults(query.get('fault') ?? '');
@@ -77,9 +81,8 @@ class History {
       valve: h('input', {value: query.get('valve') ?? '',
         placeholder: 'all, or FV-1*', list: 'valve-names'}),
       fault: h('select', {}),
-      state: h('select', {}, h('option', {value: ''}, 'any'),
-          kStates.map((state) => h('option', {value: state},
-              state.toLowerCase()))),
+      state: h('select', {}, kStates.map(([value, text]) =>
+        h('option', {value}, text))),
       since: time('since'), until: time('until'),
     };
     this.#inputs.state.value = query.get('state') ?? '';

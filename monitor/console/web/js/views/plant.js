@@ -1,5 +1,5 @@
-// Every valve as a tile. Thousands of them: only what changed is touched, a few
-// milliseconds of it a frame, and sparklines only where they can be seen.
+// Every valve as a tile. Thousands of them: only the rows in sight are in the
+// document, only what changed is touched, a few milliseconds of it a frame.
 
 import {cssColor, h, setText} from '../dom.js';
 import {faultTitle} from '../faults.js';
@@ -11,7 +11,8 @@ import {store} from '../store.js';
 import {rankOf, Tile} from './tile.js';
 
 const kFrameBudgetMs = 4;
-const kReorderPeriodMs = 2000;
+const kReorderPeriodMs = 500;
+const kRowsBeyond = 3;  // Above and below what is in sight.
 
 const kFilters = [
   {key: 'all', text: 'All', test: () => true},
@@ -30,18 +31,27 @@ function matches(tile, words) {
 
 class Plant {
   title = 'Plant';
-  #tiles = new Map();  // id -> Tile
+  #ids = [];  // By name.
+  #ranks = new Map();  // id -> number; smaller is worse.
+  #shown = [];  // Ids that pass the filter, in their order.
+  #tiles = new Map();  // id -> Tile, of those that were in sight.
+  #inDocument = new Set();
   #dirty = new Set();
+  #needsOrder = true;
   #frame = 0;
+  #placeFrame = 0;
   #color = cssColor('--ink-soft');
   #filter;
   #words;
   #order;
+  #search;
+  #buttons = new Map();
   #abort = new AbortController();
-  #grid = h('ul', {class: 'tiles'});
+  #grid = h('ul', {class: 'tiles', role: 'list'});
   #nothing = h('p', {class: 'nothing', hidden: true});
-  #observer = new IntersectionObserver((entries) => this.#seen(entries),
-      {rootMargin: '100px'});
+  #timer = setInterval(() => this.#needsOrder && this.#reorder(),
+      kReorderPeriodMs);
+  #removeKey = onKey('/', 'Search the valves', () => this.#search.focus());
 
   constructor({query}) {
     this.#filter = query.get('show') ?? 'all';
@@ -49,26 +59,21 @@ class Plant {
     this.#setWords(query.get('q') ?? '');
     this.element = h('section', {'class': 'plant', 'aria-label': 'Plant'},
         this.#controls(query.get('q') ?? ''), this.#nothing, this.#grid);
-    this.#showDensity();
     const {signal} = this.#abort;
     store.addEventListener('tiles', ({detail}) => this.#changed(detail),
         {signal});
     settings.addEventListener('change', () => this.#showDensity(), {signal});
-    this.#timer = setInterval(() => this.#reorder(), kReorderPeriodMs);
-    this.#removeKey = onKey('/', 'Search the valves', () =>
-      this.#search.focus());
+    addEventListener('scroll', this.#placeSoon, {signal, passive: true});
+    addEventListener('resize', this.#placeSoon, {signal});
+    this.#showDensity();
     this.#changed(null);
   }
-  #timer;
-  #removeKey;
-  #search;
-  #buttons = new Map();
 
   destroy() {
     this.#abort.abort();
-    this.#observer.disconnect();
     clearInterval(this.#timer);
     cancelAnimationFrame(this.#frame);
+    cancelAnimationFrame(this.#placeFrame);
     this.#removeKey();
   }
 
@@ -111,57 +116,37 @@ class Plant {
   #showDensity() {
     this.#grid.classList.toggle('compact',
         settings.get('density') === 'compact');
+    this.#placeSoon();
   }
 
   #changed(ids) {
-    if (ids === null) {
-      for (const [id, tile] of this.#tiles) {
-        if (store.tiles.has(id)) continue;
-        tile.element.remove();
-        this.#tiles.delete(id);
-      }
+    if (ids === null || ids.some((id) => !this.#ranks.has(id))) {
+      this.#ids = [...store.tiles.keys()].sort(compareNames);
+      this.#ranks.clear();
     }
-    for (const id of ids ?? store.tiles.keys()) this.#dirty.add(id);
-    if (!this.#frame) {
-      this.#frame = requestAnimationFrame(() => this.#work());
+    for (const id of ids ?? this.#ids) {
+      const [group, priority] = rankOf(store.tiles.get(id));
+      const rank = 10 * group + priority;
+      if (this.#ranks.get(id) !== rank) this.#needsOrder = true;
+      this.#ranks.set(id, rank);
+      if (this.#inDocument.has(id)) this.#dirty.add(id);
     }
+    if (ids === null) this.#reorder();
+    this.#frame ||= requestAnimationFrame(() => this.#work());
   }
 
   // As much as the budget of one frame allows; the rest in the next ones.
   #work() {
     const end = performance.now() + kFrameBudgetMs;
-    let isNew = false;
     for (const id of this.#dirty) {
       this.#dirty.delete(id);
       const data = store.tiles.get(id);
-      if (!data) continue;
-      isNew = !this.#tiles.has(id) || isNew;
-      const tile = this.#tiles.get(id) ?? this.#add(id);
-      tile.update(data);
-      tile.element.hidden = !this.#shows(data);
+      if (data && this.#inDocument.has(id)) this.#tiles.get(id).update(data);
       if (performance.now() > end) break;
     }
-    this.#frame = this.#dirty.size > 0 ?
-      requestAnimationFrame(() => this.#work()) : 0;
-    if (this.#dirty.size > 0) return;
-    if (isNew) this.#reorder();
-    this.#count();
-  }
-
-  #add(id) {
-    const tile = new Tile(id, this.#color);
-    this.#tiles.set(id, tile);
-    this.#grid.append(tile.element);
-    this.#observer.observe(tile.element);
-    return tile;
-  }
-
-  #seen(entries) {
-    for (const {target, isIntersecting} of entries) {
-      target.tile.visible = isIntersecting;
-      const data = store.tiles.get(target.tile.id);
-      if (isIntersecting && data) target.tile.draw(data);
-    }
+    const done = this.#dirty.size === 0;
+    this.#frame = done ? 0 : requestAnimationFrame(() => this.#work());
+    if (done) this.#count();
   }
 
   #shows(tile) {
@@ -170,9 +155,6 @@ class Plant {
   }
 
   #refilter() {
-    for (const [id, tile] of this.#tiles) {
-      tile.element.hidden = !this.#shows(store.tiles.get(id));
-    }
     this.#reorder();
     this.#count();
     rememberQuery('', '', {
@@ -189,29 +171,71 @@ class Plant {
       setText(count, String(tiles.filter(test).length));
       button.setAttribute('aria-pressed', String(this.#filter === key));
     }
-    const none = !tiles.some((tile) => this.#shows(tile));
-    this.#nothing.hidden = !none;
+    this.#nothing.hidden = this.#shown.length > 0;
     setText(this.#nothing, tiles.length === 0 ?
       'No valve has been heard of yet.' : 'No valve fits the search.');
   }
 
-  // Few tiles move at a time: only those are touched.
   #reorder() {
-    const sorted = [...this.#tiles.keys()].sort(this.#order === 'name' ?
-      compareNames : this.#compareWorst);
-    let next = null;
-    for (let i = sorted.length - 1; i >= 0; --i) {
-      const {element} = this.#tiles.get(sorted[i]);
-      if (element.nextSibling !== next) this.#grid.insertBefore(element, next);
-      next = element;
+    this.#needsOrder = false;
+    this.#shown = this.#ids.filter((id) => this.#shows(store.tiles.get(id)));
+    if (this.#order !== 'name') {
+      this.#shown.sort((a, b) => this.#ranks.get(a) - this.#ranks.get(b));
     }
+    this.#placeSoon();
   }
 
-  #compareWorst = (a, b) => {
-    const [groupA, priorityA] = rankOf(store.tiles.get(a));
-    const [groupB, priorityB] = rankOf(store.tiles.get(b));
-    return groupA - groupB || priorityA - priorityB || compareNames(a, b);
+  #placeSoon = () => {
+    this.#placeFrame ||= requestAnimationFrame(() => this.#place());
   };
+
+  // All tiles are of one size: which are in sight follows from where the grid
+  // stands. Those elsewhere are room above and below.
+  #place() {
+    this.#placeFrame = 0;
+    const {top} = this.#grid.getBoundingClientRect();
+    const style = getComputedStyle(this.#grid);
+    const pitch = parseFloat(style.gridAutoRows) + parseFloat(style.rowGap);
+    const columns = style.gridTemplateColumns.split(' ').length;
+    const rows = Math.ceil(this.#shown.length / columns);
+    const first = Math.min(rows, Math.max(0,
+        Math.floor(-top / pitch) - kRowsBeyond));
+    const last = Math.min(rows,
+        Math.ceil((innerHeight - top) / pitch) + kRowsBeyond);
+    this.#grid.style.paddingTop = `${first * pitch}px`;
+    this.#grid.style.paddingBottom = `${Math.max(0, rows - last) * pitch}px`;
+    this.#fill(this.#shown.slice(first * columns, last * columns),
+        first * columns);
+  }
+
+  // Few tiles move at a time: only those are touched.
+  #fill(ids, before) {
+    const wanted = new Set(ids);
+    for (const id of this.#inDocument) {
+      if (!wanted.has(id)) this.#tiles.get(id).element.remove();
+    }
+    let next = null;
+    for (let i = ids.length - 1; i >= 0; --i) {
+      const tile = this.#tileOf(ids[i]);
+      if (!this.#inDocument.has(ids[i])) tile.update(store.tiles.get(ids[i]));
+      tile.place(before + i + 1, this.#shown.length);
+      if (tile.element.nextSibling !== next ||
+          tile.element.parentNode !== this.#grid) {
+        this.#grid.insertBefore(tile.element, next);
+      }
+      next = tile.element;
+    }
+    this.#inDocument = wanted;
+  }
+
+  #tileOf(id) {
+    let tile = this.#tiles.get(id);
+    if (!tile) {
+      tile = new Tile(id, this.#color);
+      this.#tiles.set(id, tile);
+    }
+    return tile;
+  }
 }
 
 export const plantView = (route) => new Plant(route);

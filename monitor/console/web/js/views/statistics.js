@@ -3,9 +3,9 @@
 import {barCell, barChart} from '../charts/bars.js';
 import {h} from '../dom.js';
 import {faultTitle} from '../faults.js';
-import {dateText, durationText, timeText} from '../format.js';
+import {dateText, durationText} from '../format.js';
 import {link} from '../route.js';
-import {scrollable} from './table.js';
+import {scrollable, timeCell} from './table.js';
 
 const kDayMs = 86400000;
 const kMostDays = 120;
@@ -45,7 +45,7 @@ function valveTable(valves) {
           durationText(1000 * v.alarm_s))),
       h('td', {class: 'num'}, countText(v.chattering)),
       h('td', {class: 'num'}, countText(v.standing)),
-      h('td', {}, timeText(v.last_ms)))));
+      h('td', {}, timeCell(v.last_ms)))));
 }
 
 const countText = (n) => Number(n) > 0 ? String(Number(n)) : '–';
@@ -93,9 +93,9 @@ export function statisticsSection(figures, time) {
         (time.until_ms ? dateText(time.until_ms) : 'now')),
       keyFigures(figures, days),
       h('div', {class: 'figures'},
-          barChart('Episodes per day', 'episodes', days.map((day) =>
+          barChart('Episodes per day', '', days.map((day) =>
             ({name: day.day, value: day.episodes})), true),
-          barChart('Time in alarm per day', 'h', days.map((day) =>
+          barChart('Time in alarm per day [h]', 'h', days.map((day) =>
             ({name: day.day, value: day.alarm_s / 3600}))),
           valveTable(figures.valves), faultTable(figures.faults)),
       h('p', {class: 'hint'}, 'Days are UTC. Chattering: episodes that came ' +

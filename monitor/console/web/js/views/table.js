@@ -72,14 +72,21 @@ export const columns = {
 };
 
 export function headRow(list) {
-  return h('tr', {}, list.map(({text, class: name}) =>
-    h('th', {scope: 'col', class: name}, text)));
+  return h('tr', {role: 'row'}, list.map(({text, class: name}) =>
+    h('th', {scope: 'col', role: 'columnheader', class: name}, text)));
 }
 
 export function bodyRow(list, row, attributes = {}) {
-  return h('tr', attributes, list.map(({header, cell, class: name}) =>
-    h(header ? 'th' : 'td', {class: name, scope: header ? 'row' : null},
-        cell(row))));
+  return h('tr', {role: 'row', ...attributes}, list.map(
+      ({header, cell, class: name}) => h(header ? 'th' : 'td', {
+        class: name, scope: header ? 'row' : null,
+        role: header ? 'rowheader' : 'cell'}, cell(row))));
+}
+
+/** A table of rows that become cards where there is no room for columns. */
+export function cardTable(caption, head, body) {
+  return h('table', {class: 'cards', role: 'table'},
+      h('caption', {class: 'sr-only'}, caption), head, body);
 }
 
 /** Tables wider than the window scroll by themselves. */

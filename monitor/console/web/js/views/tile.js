@@ -36,7 +36,8 @@ function qualityText(tile) {
 }
 
 export class Tile {
-  visible = false;
+  #position = 0;
+  #count = 0;
   #sign = '';
   #signBox = h('span', {class: 'sign-box'});
   #id = h('span', {class: 'tile-id'});
@@ -54,7 +55,6 @@ export class Tile {
     this.id = id;
     setText(this.#id, id);
     this.#link.href = link('valve', id);
-    this.element.tile = this;
   }
 
   update(tile) {
@@ -78,11 +78,16 @@ export class Tile {
       this.#link.setAttribute('aria-label', label);
       this.#link.title = label;
     }
-    if (this.visible) this.draw(tile);
+    drawSparkline(this.#canvas, tile.spark ?? [], this.color);
   }
 
-  draw(tile) {
-    drawSparkline(this.#canvas, tile.spark ?? [], this.color);
+  /** Which of how many it is, for who cannot see the room around. */
+  place(position, count) {
+    if (this.#position === position && this.#count === count) return;
+    this.#position = position;
+    this.#count = count;
+    this.element.setAttribute('aria-posinset', position);
+    this.element.setAttribute('aria-setsize', count);
   }
 
   #showSign(priority, isolated) {

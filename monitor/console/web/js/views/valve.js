@@ -18,6 +18,7 @@ import {exportPng} from '../charts/export.js';
 import {healthSection} from './health.js';
 
 const kTrendSeconds = 900;  // What the monitor keeps.
+const kWordsPeriodMs = 5000;
 
 function stateLine(tile) {
   if (!tile) return ['not heard of yet'];
@@ -91,6 +92,7 @@ class ValvePage {
   #queue = [];  // Samples that come while the trend is being fetched.
   #loading = true;
   #retry = 0;
+  #news = '';
 
   constructor({id}) {
     this.id = id;
@@ -137,29 +139,48 @@ class ValvePage {
       this.#showState();
       if (this.#data.openGapFromMs !== null) this.#timeline.update();
     }, 1000);
+    this.#wordsTimer = setInterval(() => this.#refreshWords(), kWordsPeriodMs);
     this.#showState();
   }
   #timer;
+  #wordsTimer;
+
+  // The stream has numbers; the words are the monitor's.
+  async #refreshWords() {
+    if (this.#loading || !store.stream.connected) return;
+    try {
+      const trend = await getOptional(path('valves', this.id, 'trend'),
+          {seconds: 1});
+      if (trend && !this.#abort.signal.aborted) {
+        this.#data.words = trend.words ?? '';
+        setText(this.#words, this.#data.words);
+      }
+    } catch {
+      // Asked again soon.
+    }
+  }
 
   destroy() {
     this.#abort.abort();
     clearInterval(this.#timer);
+    clearInterval(this.#wordsTimer);
     clearTimeout(this.#retry);
     this.#timeline.destroy();
   }
 
   async #load(keep) {
     this.#loading = true;
+    clearTimeout(this.#retry);
     try {
       const trend = await getOptional(path('valves', this.id, 'trend'),
           {seconds: kTrendSeconds});
       if (this.#abort.signal.aborted) return;
-      this.#loading = false;
       if (trend === null) {
-        this.#wait(keep, `Nothing is known of ${this.id} now.`);
+        this.#wait(keep, `${this.id} has sent nothing to this monitor yet.`);
         return;
       }
-      setText(this.#note, '');
+      this.#loading = false;
+      setText(this.#note, this.#news);
       this.#show(trend, keep);
     } catch (error) {
       if (!this.#abort.signal.aborted) this.#wait(keep, error.message);
@@ -213,8 +234,8 @@ class ValvePage {
 
   #resync({gapFromMs, restarted}) {
     if (restarted) {
-      setText(this.#note, 'The monitor was started again; ' +
-        `nothing was heard from ${timeText(gapFromMs)} on.`);
+      this.#news = 'The monitor was started again; ' +
+        `nothing was heard from ${timeText(gapFromMs)} on.`;
     }
     this.#load(true);
   }
