@@ -15,6 +15,8 @@ packages=(
   gnuplot-nox
   cyclonedds-dev cyclonedds-tools
 )
+# The plot library of the live page comes by npm, whose own package or not.
+command -v npm >/dev/null || packages+=(nodejs npm)
 
 missing=()
 for package in "${packages[@]}"; do
