@@ -50,8 +50,7 @@ std::function<std::string(std::string)> AddressOr(const std::string& usual) {
   };
 }
 
-std::optional<console::ConsoleOptions> ConsoleOf(
-    const RunArguments& arguments) {
+void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
   const bool writable = !arguments.console_token.empty();
   if (arguments.console == "off") {
     if (writable || !arguments.console_options.files.empty()) {
@@ -59,14 +58,14 @@ std::optional<console::ConsoleOptions> ConsoleOf(
           "--console-write and --console-files need "
           "--console[=[ADDRESS:]PORT]");
     }
-    return std::nullopt;
+    return;
   }
-  console::ConsoleOptions options = arguments.console_options;
-  options.address = ParseHttpAddress(arguments.console, "--console");
+  console::ConsoleOptions& console =
+      options.console.emplace(arguments.console_options);
+  console.address = ParseHttpAddress(arguments.console, "--console");
   if (writable) {
-    options.token_file = arguments.console_token;
+    console.token_file = arguments.console_token;
   }
-  return options;
 }
 
 void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
@@ -96,7 +95,7 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
   if (arguments.http != "off") {
     options.http = ParseHttpAddress(arguments.http, "--http");
   }
-  options.console = ConsoleOf(arguments);
+  TakeConsole(arguments, options);
   cli::StopSignals signals;
   const cli::Context limited{context.options, LimitLog(context.log),
                              context.software, context.command_line};
