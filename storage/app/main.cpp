@@ -12,6 +12,8 @@ int main(int argc, char** argv) {
   fdi::storage::AddHistoryVerbs(program);
   fdi::storage::AddEvidenceVerbs(program);
   fdi::storage::AddFaultsVerb(program);
+  fdi::storage::AddHealthVerbs(program);
+  fdi::storage::AddWorkListVerb(program);
   fdi::storage::AddMaintenanceVerbs(program);
   fdi::storage::AddPruneVerb(program);
   return program.Run(argc, argv);

@@ -13,6 +13,8 @@ void AddHistoryVerbs(cli::Program& program);  ///< history list|show|ack|...
 /// history export|plot; after AddHistoryVerbs().
 void AddEvidenceVerbs(cli::Program& program);
 void AddFaultsVerb(cli::Program& program);        ///< faults
+void AddHealthVerbs(cli::Program& program);       ///< health show|trend
+void AddWorkListVerb(cli::Program& program);      ///< worklist
 void AddMaintenanceVerbs(cli::Program& program);  ///< doctor, backup, migrate
 void AddPruneVerb(cli::Program& program);         ///< prune
 

@@ -1,0 +1,258 @@
+#include "monitor/health_series.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace fdi::monitor {
+namespace {
+
+constexpr double kMsPerHour = 3.6e6;
+constexpr double kLeastLiveHours = 1.0;  // of a day that counts
+constexpr double kCoveredShare = 0.2;
+constexpr double kFullStroke = 100.0;  // [%]
+
+using Kind = HealthLimit::Kind;
+
+std::int64_t DayOf(const HealthHour& hour) {
+  return hour.hour / 24 - (hour.hour % 24 < 0 ? 1 : 0);
+}
+
+// A mean within a day: of all, or of one bin of CV.
+struct Cell {
+  std::int64_t day{0};
+  int bin{0};
+  double numerator{0.0};
+  double denominator{0.0};
+  double weight{0.0};  // samples
+
+  double mean() const { return numerator / denominator; }
+};
+
+// Sums of cells by day and bin.
+class Cells {
+ public:
+  void Add(std::int64_t day, int bin, double numerator, double denominator,
+           double weight) {
+    Cell& cell = cells_[{day, bin}];
+    cell.day = day;
+    cell.bin = bin;
+    cell.numerator += numerator;
+    cell.denominator += denominator;
+    cell.weight += weight;
+  }
+  std::vector<Cell> Usable() const {
+    std::vector<Cell> usable;
+    for (const auto& [key, cell] : cells_) {
+      if (cell.weight > 0.0 && cell.denominator != 0.0) {
+        usable.push_back(cell);
+      }
+    }
+    return usable;
+  }
+
+ private:
+  std::map<std::pair<std::int64_t, int>, Cell> cells_;
+};
+
+void AddResiduals(const HealthHour& hour, const HealthLimit& limit,
+                  Cells& cells) {
+  for (std::size_t b = 0; b < hour.bins.size(); ++b) {
+    for (std::size_t c = 0; c < hour.bins[b].size(); ++c) {
+      const ResidualSums& sums = hour.bins[b][c];
+      if (hour.channels[c].output != limit.signal || sums.samples == 0) {
+        continue;
+      }
+      const auto n = static_cast<double>(sums.samples);
+      const auto r = static_cast<double>(sums.residual);
+      const double quantum = hour.channels[c].quantum();
+      const double expected = static_cast<double>(sums.output) - r;
+      if (limit.kind == Kind::kDeviation) {
+        cells.Add(DayOf(hour), static_cast<int>(b), 100.0 * r, expected, n);
+      } else {
+        cells.Add(DayOf(hour), static_cast<int>(b), r * quantum, n, n);
+      }
+    }
+  }
+}
+
+void AddStrengths(const HealthHour& hour, int fault, Cells& cells) {
+  for (const StrengthSums& sums : hour.strengths) {
+    if (sums.fault == fault) {
+      const auto n = static_cast<double>(sums.samples);
+      cells.Add(DayOf(hour), 0,
+                static_cast<double>(sums.strength) * HealthHour::kShare, n, n);
+    }
+  }
+}
+
+// a_b of m_db = a_b + slope t, weighted by samples.
+std::map<int, double> Intercepts(const std::vector<Cell>& cells) {
+  struct Bin {
+    double w{0.0}, wt{0.0}, wm{0.0}, wtt{0.0}, wtm{0.0};
+  };
+  std::map<int, Bin> bins;
+  const auto origin = static_cast<double>(cells.front().day);
+  for (const Cell& cell : cells) {
+    Bin& bin = bins[cell.bin];
+    const double t = static_cast<double>(cell.day) - origin;
+    bin.w += cell.weight;
+    bin.wt += cell.weight * t;
+    bin.wm += cell.weight * cell.mean();
+    bin.wtt += cell.weight * t * t;
+    bin.wtm += cell.weight * t * cell.mean();
+  }
+  double spread = 0.0;
+  double product = 0.0;
+  for (const auto& [index, bin] : bins) {
+    spread += bin.wtt - bin.wt * bin.wt / bin.w;
+    product += bin.wtm - bin.wt * bin.wm / bin.w;
+  }
+  const double slope = spread > 0.0 ? product / spread : 0.0;
+  std::map<int, double> intercepts;
+  for (const auto& [index, bin] : bins) {
+    intercepts[index] = (bin.wm - slope * bin.wt) / bin.w;
+  }
+  return intercepts;
+}
+
+std::vector<DailyValue> Adjusted(const std::vector<Cell>& cells) {
+  std::vector<DailyValue> days;
+  if (cells.empty()) {
+    return days;
+  }
+  const std::map<int, double> intercepts = Intercepts(cells);
+  double weight = 0.0;
+  double mean = 0.0;
+  for (const Cell& cell : cells) {
+    weight += cell.weight;
+    mean += cell.weight * intercepts.at(cell.bin);
+  }
+  mean /= weight;
+  for (std::size_t i = 0; i < cells.size();) {
+    const std::int64_t day = cells[i].day;
+    double w = 0.0;
+    double sum = 0.0;
+    for (; i < cells.size() && cells[i].day == day; ++i) {
+      w += cells[i].weight;
+      sum += cells[i].weight * (cells[i].mean() - intercepts.at(cells[i].bin));
+    }
+    days.push_back({static_cast<double>(day), mean + sum / w});
+  }
+  return days;
+}
+
+// Per day that was seen.
+std::vector<DailyValue> Totals(std::span<const HealthHour> hours, Kind kind) {
+  std::map<std::int64_t, double> days;
+  for (const HealthHour& hour : hours) {
+    days[DayOf(hour)] += kind == Kind::kTravel
+                             ? static_cast<double>(hour.travel) *
+                                   HealthHour::kTravel / kFullStroke
+                             : static_cast<double>(hour.reversals);
+  }
+  std::vector<DailyValue> values;
+  for (const auto& [day, value] : days) {
+    values.push_back({static_cast<double>(day), value});
+  }
+  return values;
+}
+
+// Of the last epoch and, unless `any_models`, of the last model set.
+std::vector<HealthHour> Comparable(std::span<const HealthHour> hours,
+                                   bool any_models) {
+  std::vector<HealthHour> comparable;
+  if (hours.empty()) {
+    return comparable;
+  }
+  const auto last = std::find_if(
+      hours.rbegin(), hours.rend(),
+      [&](const HealthHour& h) { return any_models || h.model_hash != 0; });
+  const HealthHour& key = last != hours.rend() ? *last : hours.back();
+  for (const HealthHour& hour : hours) {
+    if (hour.epoch == key.epoch &&
+        (any_models || hour.model_hash == key.model_hash)) {
+      comparable.push_back(hour);
+    }
+  }
+  return comparable;
+}
+
+}  // namespace
+
+HealthSeries SeriesOf(std::span<const HealthHour> all,
+                      const HealthLimit& limit) {
+  HealthSeries series;
+  const std::vector<HealthHour> hours = Comparable(all, limit.cumulative());
+  std::map<std::int64_t, double> live;
+  Cells cells;
+  for (const HealthHour& hour : hours) {
+    series.flow_unit = hour.flow_unit;
+    series.seen_hours += static_cast<double>(hour.seen_ms) / kMsPerHour;
+    series.live_hours += static_cast<double>(hour.live_ms) / kMsPerHour;
+    live[DayOf(hour)] += static_cast<double>(hour.live_ms) / kMsPerHour;
+    if (limit.kind == Kind::kStrength) {
+      AddStrengths(hour, limit.fault, cells);
+    } else if (!limit.cumulative()) {
+      AddResiduals(hour, limit, cells);
+    }
+  }
+  if (limit.cumulative()) {
+    series.days = Totals(hours, limit.kind);
+    return series;
+  }
+  std::vector<Cell> usable = cells.Usable();
+  std::erase_if(usable, [&live](const Cell& cell) {
+    return live[cell.day] < kLeastLiveHours;
+  });
+  series.days = Adjusted(usable);
+  return series;
+}
+
+HealthForecast Forecast(const HealthSeries& series, const HealthLimit& limit) {
+  using Answer = HealthForecast::Answer;
+  HealthForecast forecast;
+  forecast.days = static_cast<int>(series.days.size());
+  if (forecast.days > 0) {
+    forecast.first_day = series.days.front().day;
+    forecast.last_day = series.days.back().day;
+  }
+  if (limit.cumulative()) {
+    double total = 0.0;
+    for (const DailyValue& day : series.days) {
+      total += day.value;
+    }
+    forecast.now = total;
+    if (forecast.days > 0) {
+      forecast.slope = total / forecast.days;
+    }
+    forecast.time = ToTotal(series.days, limit.value - total);
+    forecast.answer = total >= limit.value         ? Answer::kReached
+                      : forecast.time              ? Answer::kTime
+                      : forecast.days < kTrendDays ? Answer::kTooFew
+                                                   : Answer::kNoTrend;
+    return forecast;
+  }
+  const std::optional<TrendLine> line = FitTrend(series.days);
+  if (!line) {
+    forecast.answer =
+        series.seen_hours > 24.0 * kTrendDays * kCoveredShare &&
+                series.live_hours < kCoveredShare * series.seen_hours
+            ? Answer::kOutside
+            : Answer::kTooFew;
+    return forecast;
+  }
+  forecast.now = line->At(line->last_day);
+  forecast.slope = line->slope;
+  const bool reached = limit.value < 0.0 ? *forecast.now <= limit.value
+                                         : *forecast.now >= limit.value;
+  forecast.time = ToLimit(*line, limit.value, line->last_day);
+  forecast.answer = reached                ? Answer::kReached
+                    : !line->significant() ? Answer::kNoTrend
+                    : forecast.time        ? Answer::kTime
+                                           : Answer::kAway;
+  return forecast;
+}
+
+}  // namespace fdi::monitor
