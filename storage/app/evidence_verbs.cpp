@@ -4,7 +4,6 @@
 #include <CLI/CLI.hpp>
 
 #include "storage/app/common.h"
-#include "storage/app/episode_plot.h"
 #include "storage/app/episode_text.h"
 #include "storage/app/history_options.h"
 #include "storage/app/verbs.h"
@@ -92,27 +91,6 @@ int Export(const ExportOptions& options, const Context& context) {
   return cli::kExitOk;
 }
 
-struct PlotArguments {
-  std::string id;
-  std::string output;
-  PlotOptions options;
-};
-
-int Plot(const PlotArguments& arguments, const Context& context) {
-  HistoryReader reader(DataOf(context).history());
-  const Episode episode = reader.Show(arguments.id);
-  const std::filesystem::path path =
-      arguments.output.empty() ? episode.episode_id + ".png" : arguments.output;
-  PlotEpisode(episode, reader.Trace(episode.id), path, arguments.options);
-  if (context.options.json) {
-    cli::PrintJson(std::cout, {{"episode_id", episode.episode_id},
-                               {"file", path.string()}});
-  } else {
-    std::cout << "drawn to " << path.string() << '\n';
-  }
-  return cli::kExitOk;
-}
-
 }  // namespace
 
 void AddEvidenceVerbs(cli::Program& program) {
@@ -124,22 +102,8 @@ void AddEvidenceVerbs(cli::Program& program) {
       [options](const Context& c) { return Export(*options, c); });
   exporting.add_option("episode", options->id,
                        "ID, a unique beginning of it, or last");
-  exporting.add_option("--output", options->output, "File, or - for stdout");
+  exporting.add_option("-o,--output", options->output, "File, or - for stdout");
   options->filter.AddTo(exporting);
-
-  auto arguments = std::make_shared<PlotArguments>();
-  CLI::App& plot = program.AddVerb(
-      group, "plot", "Draw the evidence of an episode with gnuplot",
-      [arguments](const Context& c) { return Plot(*arguments, c); });
-  plot.add_option("episode", arguments->id,
-                  "ID, a unique beginning of it, or last")
-      ->required();
-  plot.add_option("--output", arguments->output,
-                  "FILE.png or FILE.svg (ID.png)");
-  plot.add_option("--from", arguments->options.from_s,
-                  "From so many s after detection on");
-  plot.add_option("--to", arguments->options.to_s,
-                  "Up to so many s after detection");
 }
 
 }  // namespace fdi::storage

@@ -10,8 +10,10 @@ void AddModelsVerbs(cli::Program& program);   ///< models list|show|...
 void AddValvesVerbs(cli::Program& program);   ///< valves list|show|add|...
 void AddTypesVerbs(cli::Program& program);    ///< types list|show|delete
 void AddHistoryVerbs(cli::Program& program);  ///< history list|show|ack|...
-/// history export|plot; after AddHistoryVerbs().
+/// history export; after AddHistoryVerbs().
 void AddEvidenceVerbs(cli::Program& program);
+/// history plot, runs plot; after AddHistoryVerbs() and AddRunsVerbs().
+void AddPlotVerbs(cli::Program& program);
 void AddFaultsVerb(cli::Program& program);        ///< faults
 void AddHealthVerbs(cli::Program& program);       ///< health show|trend
 void AddWorkListVerb(cli::Program& program);      ///< worklist

@@ -193,6 +193,8 @@ TEST_F(FdiStoreHistoryTest, PlotIsAPictureOrAClearError) {
   EXPECT_EQ(Store("history plot last --output a.png").code, 0);
 
   EXPECT_EQ(Slurp(directory_.path() / "a.png").substr(1, 3), "PNG");
+  EXPECT_EQ(Store("history plot last -o a.svg --from -10").code, 0);
+  EXPECT_THAT(Slurp(directory_.path() / "a.svg"), HasSubstr("isolated f7"));
 }
 
 TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {

@@ -26,8 +26,8 @@ class HistoryFixture : public testing::Test {
     models_.version = 3;
     models_.content_hash = 0xFEDC'BA98'7654'3210ULL;
     models_.channels.resize(2);
-    models_.channels[0].name = "X";
-    models_.channels[1].name = "F";
+    models_.channels[0].name = std::string("X");
+    models_.channels[1].name = std::string("F");
     models_.faults = {1, 7, 19};
   }
 
