@@ -35,6 +35,20 @@ void MergeHealth(std::vector<HealthHour>& older,
   }
 }
 
+void MergeAccumulators(std::vector<Accumulator>& older,
+                       std::vector<Accumulator> newer) {
+  std::map<std::string, Accumulator> latest;
+  for (auto* list : {&older, &newer}) {
+    for (Accumulator& accumulator : *list) {
+      latest[accumulator.valve_id] = std::move(accumulator);
+    }
+  }
+  older.clear();
+  for (auto& [valve, accumulator] : latest) {
+    older.push_back(std::move(accumulator));
+  }
+}
+
 }  // namespace
 
 Checkpoint Merged(Checkpoint older, Checkpoint newer) {
@@ -51,17 +65,11 @@ Checkpoint Merged(Checkpoint older, Checkpoint newer) {
       older.coverage[place->second].samples.Add(day.samples);
     }
   }
-  std::map<std::string, Accumulator> latest;
-  for (auto* list : {&older.accumulators, &newer.accumulators}) {
-    for (Accumulator& accumulator : *list) {
-      latest[accumulator.valve_id] = std::move(accumulator);
-    }
-  }
-  older.accumulators.clear();
-  for (auto& [valve, accumulator] : latest) {
-    older.accumulators.push_back(std::move(accumulator));
-  }
+  MergeAccumulators(older.accumulators, std::move(newer.accumulators));
+  MergeAccumulators(older.shadow_accumulators,
+                    std::move(newer.shadow_accumulators));
   MergeHealth(older.health, std::move(newer.health));
+  older.shadow = Merged(std::move(older.shadow), std::move(newer.shadow));
   return older;
 }
 

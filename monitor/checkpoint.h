@@ -7,6 +7,7 @@
 
 #include "diagnosis/health_hour.h"
 #include "diagnosis/quality_count.h"
+#include "monitor/shadow_difference.h"
 
 namespace fdi::monitor {
 
@@ -29,17 +30,20 @@ struct Accumulator {
 
 /// What is kept of all valves each minute.
 struct Checkpoint {
-  std::vector<CoverageDay> coverage;      ///< Since the one before.
-  std::vector<Accumulator> accumulators;  ///< Of the live valves.
-  std::vector<HealthHour> health;         ///< Since the one before.
+  std::vector<CoverageDay> coverage;             ///< Since the one before.
+  std::vector<Accumulator> accumulators;         ///< Of the live valves.
+  std::vector<HealthHour> health;                ///< Since the one before.
+  std::vector<ShadowDifference> shadow;          ///< New or longer since then.
+  std::vector<Accumulator> shadow_accumulators;  ///< Of the candidate.
 
   bool empty() const {
-    return coverage.empty() && accumulators.empty() && health.empty();
+    return coverage.empty() && accumulators.empty() && health.empty() &&
+           shadow.empty() && shadow_accumulators.empty();
   }
 };
 
-/// `newer` on top of `older`: time and health add up, accumulators are
-/// replaced.
+/// `newer` on top of `older`: time and health add up, accumulators and
+/// stretches that grew are replaced.
 Checkpoint Merged(Checkpoint older, Checkpoint newer);
 
 /// The time of one valve by quality and day, until it is taken.

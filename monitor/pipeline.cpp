@@ -48,6 +48,9 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
       directory_(options_.max_valves, options_.valve_glob),
       registry_(options_.registry, std::move(resolver), writer_, counters, log,
                 sinks.live),
+      shadow_(options_.shadow.candidate
+                  ? std::make_unique<ShadowBank>(options_.shadow, log)
+                  : nullptr),
       queue_(options_.queue_samples),
       last_tend_(std::chrono::steady_clock::now()),
       last_checkpoint_(last_tend_) {}
@@ -57,7 +60,11 @@ Pipeline::~Pipeline() {
 }
 
 void Pipeline::Start(const std::vector<OpenEpisode>& open,
-                     std::vector<Accumulator> accumulators) {
+                     std::vector<Accumulator> accumulators,
+                     std::vector<Accumulator> shadow_accumulators) {
+  if (shadow_) {
+    shadow_->Restore(std::move(shadow_accumulators));
+  }
   registry_.Recover(open, std::move(accumulators),
                     std::chrono::steady_clock::now());
   thread_ = std::thread([this] { Run(); });
@@ -181,13 +188,21 @@ void Pipeline::Diagnose() {
     }
     if (now - last_checkpoint_ >= options_.checkpoint_period) {
       last_checkpoint_ = now;
-      writer_.Keep(registry_.TakeCheckpoint());
+      TakeCheckpoint();
     }
   }
   registry_.Tend(std::chrono::steady_clock::now(),
                  options_.history.utc_now_ns());
   registry_.Flush();
-  writer_.Keep(registry_.TakeCheckpoint());
+  TakeCheckpoint();
+}
+
+void Pipeline::TakeCheckpoint() {
+  Checkpoint checkpoint = registry_.TakeCheckpoint();
+  if (shadow_) {
+    shadow_->TakeTo(checkpoint);
+  }
+  writer_.Keep(std::move(checkpoint));
 }
 
 void Pipeline::AdoptPendingResolver() {
@@ -209,6 +224,9 @@ void Pipeline::Handle(const Item& item) {
   const ValveOutcome outcome =
       registry_.Step(item.valve, item.sample, item.writer, item.received);
   const Verdict& verdict = outcome.verdict;
+  if (shadow_) {
+    shadow_->Step(item.valve, item.sample, outcome);
+  }
   counters_.Add(outcome.models != nullptr ? Counter::kDiagnosed
                                           : Counter::kUnassigned);
   counters_.Add(verdict.intake);
@@ -237,6 +255,9 @@ void Pipeline::Handle(const Item& item) {
 void Pipeline::HandleEnd(const Item& item) {
   if (!registry_.EndStream(item.valve, item.writer)) {
     return;
+  }
+  if (shadow_) {
+    shadow_->EndStream(item.valve);
   }
   if (recorder_) {
     recorder_->Record({*item.valve.name, {}, {}, false, false, true});

@@ -17,6 +17,7 @@
 #include "monitor/episode_writer.h"
 #include "monitor/heartbeat.h"
 #include "monitor/sample_recorder.h"
+#include "monitor/shadow_bank.h"
 #include "monitor/sinks.h"
 #include "monitor/throttled_log.h"
 #include "monitor/valve_registry.h"
@@ -32,6 +33,7 @@ struct PipelineOptions {
   RegistryOptions registry;
   EpisodeWriterOptions history;  ///< utc_now_ns is needed.
   SampleRecorderOptions recorder;
+  ShadowOptions shadow;  ///< Without a candidate: none runs.
 };
 
 /// Where the results go; all outlive the pipeline.
@@ -61,8 +63,10 @@ class Pipeline {
 
   /// Begins to diagnose. @param open episodes that the last session left open.
   /// @param accumulators of valves, as the last session kept them.
+  /// @param shadow_accumulators the same of the candidate.
   void Start(const std::vector<OpenEpisode>& open,
-             std::vector<Accumulator> accumulators = {});
+             std::vector<Accumulator> accumulators = {},
+             std::vector<Accumulator> shadow_accumulators = {});
 
   /// A sample that was received. One intake thread. Waits while the queue is
   /// full. @param writer who sent it. @returns false once stopped. The
@@ -88,6 +92,10 @@ class Pipeline {
   void Rethrow() const;
 
   ValveCensus census() const { return registry_.census(); }
+  /// Of the candidate; null if none runs.
+  const ShadowCounts* shadow_counts() const {
+    return shadow_ ? &shadow_->counts() : nullptr;
+  }
   std::vector<std::string> valve_names() const { return registry_.names(); }
   bool history_degraded() const { return writer_.degraded(); }
   bool recording_degraded() const { return recorder_ && recorder_->degraded(); }
@@ -121,6 +129,7 @@ class Pipeline {
   void Publish(const Item& item, const ValveOutcome& outcome);
   void CountRejection(const Item& item, Intake intake);
   void AdoptPendingResolver();
+  void TakeCheckpoint();
 
   PipelineOptions options_;
   DecisionSink& decisions_;
@@ -131,6 +140,7 @@ class Pipeline {
   std::unique_ptr<SampleRecorder> recorder_;
   ValveDirectory directory_;
   ValveRegistry registry_;
+  std::unique_ptr<ShadowBank> shadow_;
   BoundedQueue<Item> queue_;
   Pulse pulse_;
   TimePoint last_tend_;

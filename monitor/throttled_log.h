@@ -28,6 +28,7 @@ enum class LogId : std::uint8_t {
   kModelFailure,   ///< M112 model_set_unusable
   kGap,            ///< M113 data_gap
   kStale,          ///< M114 valve_stale
+  kShadow,         ///< M115 shadow_not_compared
   kUnsent,         ///< M121 publication_failed
   kUnpersisted,    ///< M122 event_unpersisted
   kPersistence,    ///< M123 persistence_degraded

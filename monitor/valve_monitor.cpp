@@ -46,7 +46,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     stamp_ns_ = sample.stamp_ns;
     coverage_.Add(sample.stamp_ns, Quality::kUnassigned);
     health_.Add(sample, unassigned_, nullptr, period_s());
-    return {unassigned_, nullptr, swapped};
+    return {unassigned_, nullptr, swapped, isolation_held_};
   }
   RestoreOnce(sample.source_id);
   const Verdict& verdict = engine_->Step(sample);
@@ -60,7 +60,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     writer_ = writer;
   }
   tracker_.Step(sample, verdict, models_, outlet);
-  return {verdict, models_.get(), swapped};
+  return {verdict, models_.get(), swapped, isolation_held_};
 }
 
 void ValveMonitor::RestoreOnce(std::uint64_t source_id) {

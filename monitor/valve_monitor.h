@@ -18,6 +18,7 @@ struct ValveOutcome {
   const Verdict& verdict;  ///< Stands until the next call.
   const ModelSet* models;  ///< Null while the valve is UNASSIGNED.
   bool model_swapped;      ///< Another model set answers from here on.
+  bool isolation_held;     ///< See ModelResolver::IsolationHeld().
 };
 
 /// One valve of the plant: its engine, its episodes, its clock. A valve

@@ -22,6 +22,16 @@ CREATE TABLE shadow_difference (
 ) STRICT;
 CREATE UNIQUE INDEX shadow_difference_once ON shadow_difference
   (valve_id, source_id, from_ns, candidate_hash);
+CREATE INDEX shadow_difference_by_time ON shadow_difference (from_ns);
+
+-- Of the candidate on each valve, as of its last minute; for the next session.
+CREATE TABLE shadow_accumulator (
+  valve_id TEXT PRIMARY KEY,
+  source_id INTEGER NOT NULL,
+  model_hash INTEGER NOT NULL,
+  stamp_ns INTEGER NOT NULL,   -- Of the last sample.
+  bytes BLOB NOT NULL
+) STRICT;
 )sql";
 
 }  // namespace fdi::storage

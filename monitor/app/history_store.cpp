@@ -5,6 +5,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "monitor/app/shadow.h"
 #include "storage/cli/logging.h"
 #include "storage/models.h"
 
@@ -99,7 +100,12 @@ void HistoryStore::Keep(const Checkpoint& checkpoint) {
     accumulators.push_back(
         {a.valve_id, a.source_id, a.model_hash, a.stamp_ns, a.bytes});
   }
+  KeepShadow(writer_.database(), checkpoint);  // First: it may come twice.
   writer_.Keep(counts, accumulators, checkpoint.health);
+}
+
+std::vector<Accumulator> HistoryStore::ShadowAccumulators() {
+  return monitor::ShadowAccumulators(writer_.database());
 }
 
 std::vector<storage::UnsentEvent> HistoryStore::UnsentEvents() {

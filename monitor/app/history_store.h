@@ -31,6 +31,8 @@ class HistoryStore : public HistorySink {
   std::vector<OpenEpisode> OpenEpisodes();
   /// What the last session kept of its valves.
   std::vector<Accumulator> Accumulators();
+  /// The same of the candidate of --shadow.
+  std::vector<Accumulator> ShadowAccumulators();
   std::vector<storage::UnsentEvent> UnsentEvents();
   void MarkResent(const storage::UnsentEvent& event);
 

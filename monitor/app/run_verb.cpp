@@ -17,6 +17,7 @@ namespace {
 
 struct RunArguments {
   std::string model_set;
+  std::string shadow;
   std::string record{"off"};
   std::string http{"off"};
   std::string console{"off"};
@@ -88,6 +89,11 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
   if (!arguments.model_set.empty()) {
     options.model_set = storage::ParseModelReference(arguments.model_set);
   }
+  if (!arguments.shadow.empty()) {
+    options.shadow = storage::ParseModelReference(arguments.shadow);
+  } else if (options.shadow_valves != "*") {
+    throw ConfigError("--shadow-valves needs --shadow NAME[@VERSION]");
+  }
   if (arguments.record != "off") {
     options.recording =
         arguments.record == "lossless" ? Recording::kLossless : Recording::kOn;
@@ -115,6 +121,13 @@ void AddRunVerb(cli::Program& program) {
   run.add_option("--model-set", arguments->model_set,
                  "NAME[@VERSION] for valves that none is assigned to; without "
                  "it the only active one, if no valve is assigned any");
+  run.add_option("--shadow", arguments->shadow,
+                 "Run a candidate beside the active sets and record where they "
+                 "differ; without VERSION the newest one")
+      ->type_name("NAME[@VERSION]");
+  run.add_option("--shadow-valves", arguments->service.shadow_valves,
+                 "Compare only on ids that match GLOB")
+      ->capture_default_str();
   run.add_flag("--record{on}", arguments->record,
                "Store the samples as runs; =lossless waits for the disk "
                "instead of counting what it could not take")

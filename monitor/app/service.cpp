@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "monitor/app/shadow.h"
 #include "monitor/app/status.h"
 #include "storage/cli/time_text.h"
 
@@ -37,8 +38,13 @@ idl::DdsOptions DdsOptionsOf(const ServiceOptions& options,
   return dds;
 }
 
-PipelineOptions PipelineOptionsOf(const ServiceOptions& options) {
+PipelineOptions PipelineOptionsOf(const ServiceOptions& options,
+                                  const storage::DataDirectory& data) {
   PipelineOptions pipeline;
+  if (options.shadow) {
+    pipeline.shadow.candidate = LoadCandidate(data.models(), *options.shadow);
+    pipeline.shadow.valve_glob = options.shadow_valves;
+  }
   pipeline.max_valves = options.max_valves;
   pipeline.valve_glob = options.valves;
   pipeline.registry.stale_timeout = Milliseconds(options.stale_timeout_s);
@@ -100,7 +106,7 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
           options.best_effort ? idl::Profile::kBestEffort : idl::Profile::kLive,
           idl::Overflow::kOnTheWay),
       log_(context.log),
-      pipeline_(PipelineOptionsOf(options),
+      pipeline_(PipelineOptionsOf(options, data_),
                 {decisions_, console_ ? console_->Before(events_) : events_,
                  history_, runs_.get(), console_ ? &console_->live() : nullptr},
                 assignment_, counters_, log_),
@@ -111,7 +117,8 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
   if (console_) {
     ServeConsole();
   }
-  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators());
+  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators(),
+                  history_.ShadowAccumulators());
   intake_ = std::jthread([this](const std::stop_token& stop) { Intake(stop); });
   if (http_) {
     ServeProbes();

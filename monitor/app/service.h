@@ -43,6 +43,9 @@ struct ServiceOptions {
   double stale_timeout_s{3600.0};
   double trace_before_s{1800.0};
   double status_period_s{60.0};  ///< Of the status line in the log.
+  /// Runs beside the active sets; without a version the newest one.
+  std::optional<storage::ModelReference> shadow;
+  std::string shadow_valves{"*"};
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
   /// Serve the live page.

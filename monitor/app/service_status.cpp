@@ -1,6 +1,7 @@
 // How the service is: on the bus, over HTTP, in the log, to its manager.
 #include "monitor/app/probes.h"
 #include "monitor/app/service.h"
+#include "monitor/app/shadow.h"
 #include "monitor/app/status.h"
 #include "storage/cli/time_text.h"
 
@@ -42,7 +43,11 @@ std::string Service::Metrics() const {
   if (console_) {
     facts.console = {console_->streams(), console_->board_bytes()};
   }
-  return MetricsPage(Facts(), facts);
+  std::string page = MetricsPage(Facts(), facts);
+  if (const ShadowCounts* counts = pipeline_.shadow_counts()) {
+    page += ShadowMetrics(*counts);
+  }
+  return page;
 }
 
 StatusFacts Service::Facts() const {

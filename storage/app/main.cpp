@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   fdi::storage::AddFaultsVerb(program);
   fdi::storage::AddHealthVerbs(program);
   fdi::storage::AddWorkListVerb(program);
+  fdi::storage::AddShadowVerb(program);
   fdi::storage::AddMaintenanceVerbs(program);
   fdi::storage::AddPruneVerb(program);
   return program.Run(argc, argv);

@@ -17,6 +17,7 @@ void AddPlotVerbs(cli::Program& program);
 void AddFaultsVerb(cli::Program& program);        ///< faults
 void AddHealthVerbs(cli::Program& program);       ///< health show|trend
 void AddWorkListVerb(cli::Program& program);      ///< worklist
+void AddShadowVerb(cli::Program& program);        ///< history shadow; likewise
 void AddMaintenanceVerbs(cli::Program& program);  ///< doctor, backup, migrate
 void AddPruneVerb(cli::Program& program);         ///< prune
 
