@@ -66,6 +66,7 @@ void AddHistoryRoutes(httplib::Server& server, const Api& api);
 void AddEpisodeRoutes(httplib::Server& server, const Api& api);
 /// What changes the history, for who has the token.
 void AddActionRoutes(httplib::Server& server, const Api& api);
+void AddPlannerRoutes(httplib::Server& server, const Api& api);
 
 using Handler =
     std::function<void(const httplib::Request&, httplib::Response&)>;

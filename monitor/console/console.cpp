@@ -105,6 +105,7 @@ void Console::Start(ConsoleSources sources) {
   AddHistoryRoutes(routes, *api_);
   AddEpisodeRoutes(routes, *api_);
   AddActionRoutes(routes, *api_);
+  AddPlannerRoutes(routes, *api_);
   AddFiles();
   feed_->Start();
   server_->Start();

@@ -1,0 +1,107 @@
+// The planner's part of the console over real HTTP.
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <httplib.h>
+
+#include "monitor/console/console.h"
+#include "storage/cli/time_text.h"
+#include "tests/storage/history_fixture.h"
+
+namespace fdi::console {
+namespace {
+
+using testing::HasSubstr;
+
+class PlannerRoutesTest : public storage::HistoryFixture {
+ protected:
+  PlannerRoutesTest() : writer_(path_) {
+    std::ofstream(directory_.path() / "index.html") << "page";
+    ConsoleOptions options;
+    options.address.host = "127.0.0.1";
+    options.files = directory_.path();
+    std::string listening;
+    console_.emplace(options, cli::GlobalOptions{},
+                     [&listening](LogLevel, std::string_view line) {
+                       if (line.starts_with("console_listening")) {
+                         listening = line;
+                       }
+                     });
+    RecordEpisode(writer_, 4, "V/1 a");  // f19
+    AddHealth(40);
+    console_->Start({path_, directory_.path() / "models.db", "0.0", kDetected,
+                     [] {
+                       return MonitorFacts{"OK", {}, 0};
+                     },
+                     [] { return kDetected + 3600 * kSecond; }});
+    client_.emplace("127.0.0.1",
+                    std::stoi(listening.substr(listening.find(':') + 1)));
+  }
+
+  void AddHealth(int days) {
+    std::vector<HealthHour> hours;
+    for (int i = 0; i < 24 * days; ++i) {
+      HealthHour hour;
+      hour.valve_id = "V/1 a";
+      hour.hour = kDetected / (3600 * kSecond) - 24 * days + i;
+      hour.model_hash = 1;
+      hour.seen_ms = hour.live_ms = 3'600'000;
+      hour.channels = {{Signal::kX, -7}, {Signal::kF, -7}};
+      hour.bins[5] = {{3600, 0, 0, 3600 * 9000},
+                      {3600, 3600 * (i % 7), 3600 * 64, 3600 * 5000}};
+      hours.push_back(hour);
+    }
+    writer_.Keep({}, {}, hours);
+  }
+  Json Get(const std::string& path, int status = 200) {
+    const httplib::Result answer = client_->Get(path);
+    EXPECT_TRUE(answer && answer->status == status) << path;
+    return answer ? Json::parse(answer->body) : Json();
+  }
+
+  storage::HistoryWriter writer_;
+  std::optional<Console> console_;
+  std::optional<httplib::Client> client_;
+};
+
+TEST_F(PlannerRoutesTest, WorkListNamesValveAndReason) {
+  const Json rows = Get("/api/v1/worklist")["rows"];
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0]["valve"], "V/1 a");
+  EXPECT_EQ(rows[0]["fault"], "f19");
+  EXPECT_THAT(rows[0]["why"].get<std::string>(),
+              HasSubstr("Flow transmitter wrong"));
+  EXPECT_TRUE(Get("/api/v1/worklist?discipline=air")["rows"].empty());
+}
+
+TEST_F(PlannerRoutesTest, WhatCannotBeIsRefused) {
+  Get("/api/v1/worklist?top=0", 400);
+  Get("/api/v1/worklist?discipline=plumber", 400);
+  Get("/api/v1/worklist?limit=Q%3D1", 400);
+}
+
+TEST_F(PlannerRoutesTest, WorkListIsAFileToo) {
+  const httplib::Result answer = client_->Get("/api/v1/worklist.csv");
+  ASSERT_TRUE(answer);
+  EXPECT_THAT(answer->get_header_value("Content-Type"), HasSubstr("text/csv"));
+  EXPECT_THAT(answer->body, HasSubstr("\r\n1,V/1 a,"));
+}
+
+TEST_F(PlannerRoutesTest, MonthsOfAValveAreColumnsOfOneLength) {
+  const Json months = Get("/api/v1/valves/V%2F1%20a/health");
+  EXPECT_EQ(months["step"], "day");
+  const std::size_t days = months["t_ms"].size();
+  EXPECT_GE(days, 40u);
+  EXPECT_EQ(months["d0"].size(), days);
+  ASSERT_EQ(months["channels"].size(), 2u);
+  for (const Json& channel : months["channels"]) {
+    EXPECT_EQ(channel["mean"].size(), days);
+  }
+  EXPECT_EQ(months["trends"].size(), 2u);
+  EXPECT_EQ(Get("/api/v1/valves/V%2F1%20a/health?hourly=1")["t_ms"].size(),
+            24u * 40u);
+  EXPECT_TRUE(Get("/api/v1/valves/none/health")["t_ms"].empty());
+}
+
+}  // namespace
+}  // namespace fdi::console
