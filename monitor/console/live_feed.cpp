@@ -22,6 +22,7 @@ LiveFeed::~LiveFeed() {
 }
 
 void LiveFeed::Start() {
+  parts_.alarms.Refresh(parts_.utc_now_ns());  // What changes from here on.
   thread_ = std::thread([this] { Run(); });
 }
 

@@ -38,6 +38,8 @@ class LiveFeed {
   LiveFeed(const LiveFeed&) = delete;
   LiveFeed& operator=(const LiveFeed&) = delete;
 
+  /// What happens from now on is told.
+  /// @throws storage::SqliteError, DataError
   void Start();
   void Stop();
 

@@ -44,8 +44,9 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
   }
 
   void Start(bool writable = true) {
-    ConsoleOptions options{
-        {"127.0.0.1", 0}, directory_.path() / "page", std::nullopt};
+    ConsoleOptions options;
+    options.address.host = "127.0.0.1";
+    options.files = directory_.path() / "page";
     if (writable) {
       options.token_file = directory_.path() / "token";
     }

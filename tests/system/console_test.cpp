@@ -1,0 +1,239 @@
+// The console of the built fdi-monitor, over real HTTP and DDS.
+
+#include <atomic>
+#include <condition_variable>
+#include <csignal>
+#include <fstream>
+#include <mutex>
+#include <regex>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <httplib.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/system/monitor_fixture.h"
+
+namespace fdi::monitor {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using Clock = std::chrono::steady_clock;
+
+/// One who listens to the stream, by a thread of its own.
+class Listener {
+ public:
+  Listener(int port, const std::string& query = "")
+      : client_("127.0.0.1", port), thread_([this, query] { Run(query); }) {}
+  ~Listener() {
+    leaving_ = true;
+    thread_.join();
+  }
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+  /// When a text that `pattern` matches had come; nothing within 20 s.
+  std::optional<Clock::time_point> Await(const std::string& pattern) {
+    const std::regex wanted(pattern);
+    std::unique_lock lock(mutex_);
+    const bool came = changed_.wait_for(lock, std::chrono::seconds(20), [&] {
+      return std::any_of(events_.begin(), events_.end(), [&](const auto& e) {
+        return std::regex_search(e.second, wanted);
+      });
+    });
+    if (!came) {
+      return std::nullopt;
+    }
+    return std::find_if(events_.begin(), events_.end(),
+                        [&](const auto& e) {
+                          return std::regex_search(e.second, wanted);
+                        })
+        ->first;
+  }
+  /// The server ended the stream.
+  bool AwaitEnd() {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, std::chrono::seconds(20),
+                             [this] { return ended_; });
+  }
+
+ private:
+  void Run(const std::string& query) {
+    client_.set_read_timeout(20);
+    client_.Get("/api/v1/stream" + query,
+                [this](const char* data, std::size_t size) {
+                  Take({data, size});
+                  return !leaving_;
+                });
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+    changed_.notify_all();
+  }
+  void Take(std::string_view bytes) {
+    const std::lock_guard lock(mutex_);
+    partial_ += bytes;
+    std::size_t end = 0;
+    while ((end = partial_.find("\n\n")) != std::string::npos) {
+      events_.emplace_back(Clock::now(), partial_.substr(0, end));
+      partial_.erase(0, end + 2);
+    }
+    changed_.notify_all();
+  }
+
+  httplib::Client client_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::string partial_;
+  std::vector<std::pair<Clock::time_point, std::string>> events_;
+  bool ended_{false};
+  std::atomic<bool> leaving_{false};
+  std::thread thread_;
+};
+
+class ConsoleTest : public MonitorFixture {
+ protected:
+  ConsoleTest() {
+    std::filesystem::create_directory(page());
+    std::ofstream(page() / "index.html") << "<title>page</title>";
+    std::ofstream(directory_.path() / "token") << "0123456789abcdef\n";
+  }
+  std::filesystem::path page() const { return directory_.path() / "page"; }
+
+  std::unique_ptr<ChildProcess> StartWithConsole() {
+    auto monitor = StartMonitor({"--console=127.0.0.1:0", "--console-files",
+                                 page().string(), "--console-write",
+                                 (directory_.path() / "token").string(),
+                                 "--http=127.0.0.1:0"});
+    port_ = PortOf(monitor->errors(), "console_listening");
+    metrics_port_ = PortOf(monitor->errors(), "http_listening");
+    return monitor;
+  }
+
+  static int PortOf(const std::string& log, const std::string& event) {
+    std::smatch address;
+    const std::regex pattern(event + " address=127.0.0.1:([0-9]+)");
+    EXPECT_TRUE(std::regex_search(log, address, pattern)) << log;
+    return std::stoi(address[1]);
+  }
+
+  json Get(const std::string& path) const {
+    httplib::Client client("127.0.0.1", port_);
+    const httplib::Result answer = client.Get(path);
+    EXPECT_TRUE(answer && answer->status == 200) << path;
+    return answer ? json::parse(answer->body) : json();
+  }
+  std::string Metrics() const {
+    return httplib::Client("127.0.0.1", metrics_port_).Get("/metrics")->body;
+  }
+  httplib::Result Acknowledge(const std::string& episode) const {
+    httplib::Client client("127.0.0.1", port_);
+    return client.Post("/api/v1/episodes/" + episode + "/ack",
+                       {{"Authorization", "Bearer 0123456789abcdef"}},
+                       R"({"who": "anna", "comment": "on my way"})",
+                       "application/json");
+  }
+
+  int port_{0};
+  int metrics_port_{0};
+};
+
+TEST_F(ConsoleTest, AFaultIsOnTheStreamWithinTwoSecondsOfItsEvent) {
+  StoreModels(data_, LinearModels());
+  const auto monitor = StartWithConsole();
+  Listener listener(port_, "?valve=V1");
+  ASSERT_TRUE(listener.Await("event: hello"));
+  Publish(0, 50);
+  Publish(50, 80, kF7Offset);
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kIsolated)) << monitor->errors();
+  const Clock::time_point on_bus = Clock::now();
+
+  const auto shown = listener.Await(
+      R"re(event: alarm\ndata: .*"valve":"V1","fault":"f7","state":"ISOLATED")re");
+  ASSERT_TRUE(shown);
+  EXPECT_LT(*shown - on_bus, std::chrono::seconds(2));
+  EXPECT_TRUE(listener.Await(
+      R"re(event: tiles\n.*"id":"V1","state":"ISOLATED".*"unacked":true)re"));
+  EXPECT_TRUE(listener.Await(R"re(event: sample\n.*"x":30.0)re"));
+  EXPECT_EQ(Get("/api/v1/valves/V1/trend")["t_ms"].size(), 80U);
+}
+
+TEST_F(ConsoleTest, AnAcknowledgementIsToldToAllAndSurvivesARestart) {
+  StoreModels(data_, LinearModels());
+  auto monitor = StartWithConsole();
+  Publish(0, 50);
+  Publish(50, 80, kF7Offset);
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kIsolated));
+  const json before = Get("/api/v1/alarms")["alarms"];
+  ASSERT_EQ(before.size(), 1U);
+  EXPECT_EQ(before[0]["isa"], "UNACK");
+  const std::string episode = before[0]["episode"];
+  Listener other(port_);
+  ASSERT_TRUE(other.Await("event: hello"));
+
+  ASSERT_EQ(Acknowledge(episode)->status, 200);
+  EXPECT_TRUE(other.Await(R"(event: alarm\n.*"isa":"ACKED".*"anna")"));
+  const std::string instance = Get("/api/v1/status")["instance"];
+  monitor->Signal(SIGKILL);
+  monitor->AwaitExit();
+  monitor = StartWithConsole();
+
+  EXPECT_NE(Get("/api/v1/status")["instance"], instance);
+  const json after = Get("/api/v1/alarms")["alarms"];
+  ASSERT_EQ(after.size(), 1U);
+  EXPECT_EQ(after[0]["isa"], "ACKED");
+  EXPECT_EQ(after[0]["acked_by"], "anna");
+  EXPECT_EQ(Get("/api/v1/episodes/" + episode)["events"].back()["origin"],
+            "console 127.0.0.1");
+}
+
+TEST_F(ConsoleTest, SixteenStreamsLeaveTheRestFreeAndEndWithTheService) {
+  StoreModels(data_, LinearModels());
+  const auto monitor = StartWithConsole();
+  std::vector<std::unique_ptr<Listener>> listeners;
+  for (int i = 0; i < 16; ++i) {
+    listeners.push_back(std::make_unique<Listener>(port_));
+    ASSERT_TRUE(listeners.back()->Await("event: hello"));
+  }
+
+  httplib::Client client("127.0.0.1", port_);
+  const httplib::Result refused = client.Get("/api/v1/stream");
+  EXPECT_EQ(refused->status, 503);
+  EXPECT_EQ(refused->get_header_value("Retry-After"), "5");
+  EXPECT_EQ(Get("/api/v1/status")["health"], "OK");
+  EXPECT_THAT(Metrics(), HasSubstr("fdi_console_streams 16\n"));
+  EXPECT_THAT(Metrics(), HasSubstr("{outcome=\"refused\"} 1\n"));
+  Publish(0, 20);
+  for (const auto& listener : listeners) {
+    EXPECT_TRUE(listener->Await("event: tiles"));
+  }
+  const Clock::time_point stop = Clock::now();
+  monitor->Signal(SIGTERM);
+  EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
+  EXPECT_LT(Clock::now() - stop, std::chrono::seconds(2));
+  for (const auto& listener : listeners) {
+    EXPECT_TRUE(listener->AwaitEnd());
+  }
+}
+
+TEST_F(ConsoleTest, WhatTheConsoleCannotUseIsRefusedAtTheStart) {
+  const std::string nowhere = (directory_.path() / "nowhere").string();
+  ChildProcess no_page(
+      Command({"--console=127.0.0.1:0", "--console-files", nowhere}));
+  EXPECT_EQ(no_page.AwaitExit(), 2);
+  EXPECT_THAT(no_page.errors(), HasSubstr(nowhere + ": no index.html"));
+
+  std::ofstream(directory_.path() / "short") << "too short\n";
+  ChildProcess no_token(
+      Command({"--console=127.0.0.1:0", "--console-files", page().string(),
+               "--console-write", (directory_.path() / "short").string()}));
+  EXPECT_EQ(no_token.AwaitExit(), 2);
+  EXPECT_THAT(no_token.errors(), HasSubstr("expected 16 or more"));
+
+  ChildProcess no_console(Command({"--console-write", nowhere}));
+  EXPECT_EQ(no_console.AwaitExit(), 2);
+  EXPECT_THAT(no_console.errors(), HasSubstr("need --console"));
+}
+
+}  // namespace
+}  // namespace fdi::monitor
