@@ -75,8 +75,7 @@ export function createShell(top, banner) {
   let title = '';
   const showSummary = () => {
     const {open, text, nodes} = alarmSummary();
-    replace(summary, nodes);
-    summary.setAttribute('aria-label', `Alarms: ${text}`);
+    replace(summary, nodes, h('span', {class: 'sr-only'}, ` alarms: ${text}`));
     summary.title = text;
     document.title = (open > 0 ? `(${open}) ` : '') + title;
   };

@@ -9,6 +9,7 @@ import {overlayHooks} from './overlay.js';
 
 const kAxisWidth = 58;
 const kTimeAxisHeight = 34;
+const kDayLabelsMs = 3 * 86400000;  // From here on days, not hours.
 const kFont = '11px system-ui, sans-serif';
 
 function timeLabels(u, splits) {
@@ -20,6 +21,7 @@ function timeLabels(u, splits) {
     const label = span < 600000 ? text : text.slice(0, 5);
     const isNew = date !== day;
     day = date;
+    if (span > kDayLabelsMs) return date.slice(5);
     return isNew ? `${label}\n${date}` : label;
   });
 }
@@ -69,7 +71,7 @@ export class Panel {
     this.panel = panel;
     this.scene = scene;
     this.element = h('section', {'class': 'panel', 'aria-label': panel.title},
-        h('h3', {}, panel.title), this.legend, this.plotBox);
+        h('h2', {}, panel.title), this.legend, this.plotBox);
     const hasRight = panel.lines.some((line) => line.scale === 'right');
     this.#makeLegend();
     this.u = new uPlot({
@@ -96,7 +98,7 @@ export class Panel {
     return {
       label: line.label, scale: line.scale ?? 'y',
       stroke: cssColor(line.color), dash: line.dash, width: 1.25,
-      points: {show: false}, spanGaps: false,
+      points: {show: this.panel.points === true, size: 5}, spanGaps: false,
     };
   }
 

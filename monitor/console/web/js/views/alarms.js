@@ -36,7 +36,7 @@ class Alarms {
 
   constructor({query}) {
     this.#group = query.get('group') ?? '';
-    this.element = h('section', {'class': 'live', 'aria-label': 'Alarms'},
+    this.element = h('section', {class: 'live'},
         h('div', {class: 'controls'}, h('h1', {}, 'Alarms'), this.#makeChips(),
             this.#bulk), this.#readOnly, this.#nothing,
         scrollable('Alarms', cardTable('Alarms, worst first',

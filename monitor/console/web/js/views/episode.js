@@ -63,7 +63,7 @@ function eventText(event) {
 }
 
 function eventTable(events) {
-  const head = ['Time', 'What', '', 'Who', 'From where'];
+  const head = ['Time', 'What', 'Details', 'Who', 'From where'];
   return h('table', {class: 'small'}, h('caption', {}, 'What happened'),
       h('thead', {}, h('tr', {}, head.map((text) =>
         h('th', {scope: 'col'}, text)))),

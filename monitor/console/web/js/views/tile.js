@@ -43,10 +43,11 @@ export class Tile {
   #id = h('span', {class: 'tile-id'});
   #what = h('span', {class: 'tile-what'});
   #factor = h('span', {class: 'tile-factor'});
+  #spoken = h('span', {class: 'sr-only'});  // What shape and colour say.
   #quality = h('span', {class: 'tile-quality'});
   #canvas = h('canvas', {'class': 'spark', 'aria-hidden': 'true'});
   #link = h('a', {}, h('span', {class: 'tile-head'}, this.#signBox, this.#id,
-      this.#factor), this.#what, h('span', {class: 'tile-foot'},
+      this.#spoken, this.#factor), this.#what, h('span', {class: 'tile-foot'},
       this.#canvas, this.#quality));
   element = h('li', {}, this.#link);
 
@@ -70,14 +71,10 @@ export class Tile {
       factorText(tile.factor) : '');
     setText(this.#quality, tile.shelved_until_ms === null ? quality :
       `shelved until ${clockText(tile.shelved_until_ms)}`);
-    const label = `${tile.id}: ` + (inAlarm ? `${priorityNames[priority]}, ` +
-      `${stateWord(tile.state)}, ${faultTitle(tile.faults.join('|'))}` +
-      (tile.unacked ? ', unacknowledged' : '') : what || 'normal') +
-      (quality ? `, ${quality}` : '');
-    if (this.#link.getAttribute('aria-label') !== label) {
-      this.#link.setAttribute('aria-label', label);
-      this.#link.title = label;
-    }
+    setText(this.#spoken, inAlarm ? `, ${priorityNames[priority]}, ` +
+      stateWord(tile.state) + (tile.unacked ? ', unacknowledged' : '') :
+      what ? '' : ', normal');
+    this.#what.title = inAlarm ? faultTitle(tile.faults.join('|')) : '';
     drawSparkline(this.#canvas, tile.spark ?? [], this.color);
   }
 

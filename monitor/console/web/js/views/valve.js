@@ -15,7 +15,7 @@ import {prioritySign} from '../symbols.js';
 import {actionButtons} from '../actions.js';
 import {unitText} from '../charts/panels.js';
 import {exportPng} from '../charts/export.js';
-import {healthSection} from './health.js';
+import {HealthSection} from './health.js';
 
 const kTrendSeconds = 900;  // What the monitor keeps.
 const kWordsPeriodMs = 5000;
@@ -66,7 +66,7 @@ function nowTables(data) {
   return [
     h('table', {class: 'small'}, h('caption', {}, 'Residuals now'),
         h('thead', {}, h('tr', {}, ['Channel', 'Residual', 'Thresholds',
-          'Unit', ''].map((text) => h('th', {scope: 'col'}, text)))),
+          'Unit', 'Judged'].map((text) => h('th', {scope: 'col'}, text)))),
         h('tbody', {}, residuals)),
     h('table', {class: 'small'},
         h('caption', {}, `What explains the data now (T = ${T})`),
@@ -88,7 +88,6 @@ class ValvePage {
   #actions = h('div', {class: 'actions'});
   #note = h('p', {class: 'note', role: 'status'});
   #checks = h('p', {class: 'checks'});
-  #health = h('div', {});
   #queue = [];  // Samples that come while the trend is being fetched.
   #loading = true;
   #retry = 0;
@@ -97,6 +96,7 @@ class ValvePage {
   constructor({id}) {
     this.id = id;
     this.title = id;
+    this.#health = new HealthSection(id);
     this.#timeline = new Timeline(this.#data, {
       live: true, nowMs: () => store.nowMs(),
       describe: `Trend of ${id}; arrows move, plus and minus zoom`,
@@ -113,12 +113,12 @@ class ValvePage {
         this.#timeline.element,
         h('p', {class: 'hint'}, 'Drag to zoom, Shift and drag to pan, double ' +
           'click for all; Ctrl and wheel zoom, Shift and wheel pan.'),
-        this.#health);
+        this.#health.element);
     this.#listen();
     this.#load(false);
-    healthSection(id).then((node) => replace(this.#health, node));
   }
   #timeline;
+  #health;
 
   #listen() {
     const {signal} = this.#abort;
@@ -166,6 +166,7 @@ class ValvePage {
     clearInterval(this.#wordsTimer);
     clearTimeout(this.#retry);
     this.#timeline.destroy();
+    this.#health.destroy();
   }
 
   async #load(keep) {

@@ -3,14 +3,16 @@
 import {get, url} from '../api.js';
 import {h, replace} from '../dom.js';
 import {faultTitle} from '../faults.js';
+import {link} from '../route.js';
 import {bodyRow, columns, headRow, scrollable} from './table.js';
 
 const kColumns = [
   {text: 'Rank', class: 'num', cell: (row) => String(row.rank)},
   columns.priority, columns.valve,
   {text: 'Why', class: 'remark', cell: (row) => row.why},
-  {text: 'Probable fault', cell: (row) =>
-    row.fault ? faultTitle(row.fault) : row.name ?? '–'},
+  {text: 'Probable fault', cell: (row) => !row.fault ? row.name ?? '–' :
+    row.episode ? h('a', {href: link('episode', row.episode)},
+        faultTitle(row.fault)) : faultTitle(row.fault)},
   {text: 'For', cell: (row) => row.discipline ?? '–'},
   {text: 'What to check', class: 'remark wide', cell: (row) =>
     row.check ?? '–'},
@@ -22,7 +24,7 @@ class Worklist {
   #list = h('div', {});
 
   constructor() {
-    this.element = h('section', {'aria-label': 'Work list'},
+    this.element = h('section', {},
         h('div', {class: 'controls'}, h('h1', {}, 'Work list'),
             h('a', {class: 'button', href: url('/worklist.csv'),
               download: 'worklist.csv'}, 'Save as CSV'),
