@@ -64,8 +64,11 @@ void AddStreamRoute(httplib::Server& server, const Api& api);
 void AddHistoryRoutes(httplib::Server& server, const Api& api);
 /// /api/v1/episodes/ID, ID.csv
 void AddEpisodeRoutes(httplib::Server& server, const Api& api);
+/// /api/v1/episodes/ID.svg, ID.png
+void AddPictureRoutes(httplib::Server& server, const Api& api);
 /// What changes the history, for who has the token.
 void AddActionRoutes(httplib::Server& server, const Api& api);
+/// /api/v1/worklist, worklist.csv, valves/ID/health
 void AddPlannerRoutes(httplib::Server& server, const Api& api);
 
 using Handler =

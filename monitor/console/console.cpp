@@ -104,6 +104,7 @@ void Console::Start(ConsoleSources sources) {
   AddStreamRoute(routes, *api_);
   AddHistoryRoutes(routes, *api_);
   AddEpisodeRoutes(routes, *api_);
+  AddPictureRoutes(routes, *api_);
   AddActionRoutes(routes, *api_);
   AddPlannerRoutes(routes, *api_);
   AddFiles();

@@ -9,6 +9,7 @@
 #include "monitor/console/console.h"
 #include "storage/cli/time_text.h"
 #include "storage/models.h"
+#include "storage/plot/gnuplot.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/history_fixture.h"
 #include "tests/storage/message_of.h"
@@ -259,6 +260,14 @@ TEST_F(ConsoleRoutesTest, AnEpisodeComesWithItsEvidence) {
               StartsWith("utc,CV_pct,X_pct,F_m3_h,r_X,r_F,d0,d_f1,d_f7,d_f19,"
                          "state,quality\n2026-11-20T14:55:41Z,40.0,"));
   EXPECT_EQ(std::count(csv->body.begin(), csv->body.end(), '\n'), 61);
+  const httplib::Result picture =
+      client_->Get("/api/v1/episodes/" + IdText() + ".svg");
+  if (storage::HaveGnuplot()) {
+    EXPECT_THAT(picture->body, HasSubstr("<svg"));
+    EXPECT_EQ(picture->get_header_value("Content-Type"), "image/svg+xml");
+  } else {
+    EXPECT_EQ(picture->status, 404);
+  }
 }
 
 TEST_F(ConsoleRoutesTest, HistoryIsPagedNewestFirst) {
