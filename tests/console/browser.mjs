@@ -1,0 +1,58 @@
+// Debian's Chromium without a window, and what tests ask of the page.
+
+import {createRequire} from 'node:module';
+
+// The packages of package.json stand in the build tree.
+const require = createRequire(process.env.FDI_NODE_MODULES + '/');
+const {chromium} = require('playwright-core');
+const axe = require('axe-core');
+
+export function launch() {
+  return chromium.launch({
+    executablePath: process.env.FDI_CHROMIUM,
+    args: ['--headless', '--no-sandbox', '--disable-gpu', '--disable-quic',
+      '--no-first-run', '--disable-background-networking',
+      '--disable-component-update', '--disable-sync'],
+  });
+}
+
+/**
+ * A window at a link of the page. `window.faults` are the errors of scripts,
+ * `window.hosts` whom it asked for anything.
+ */
+export async function open(browser, address, hash, options = {}) {
+  const context = await browser.newContext({
+    viewport: {width: 1600, height: 1000}, ...options});
+  const page = await context.newPage();
+  page.faults = [];
+  page.hosts = new Set();
+  page.on('pageerror', (error) => page.faults.push(error.stack));
+  page.on('request', (request) => page.hosts.add(new URL(request.url()).origin));
+  await page.goto(`${address}/${hash}`);
+  return page;
+}
+
+/** What axe has against the page: "rule: elements". */
+export async function accessibilityFaults(page) {
+  await page.evaluate(axe.source);
+  const {violations} = await page.evaluate(() => axe.run());
+  return violations.map(({id, nodes}) =>
+    `${id}: ${nodes.slice(0, 3).map((node) => node.html).join(' ')}`);
+}
+
+/** Share of pixels of an element that differ from its commonest colour. */
+export async function inkShare(page, selector) {
+  const picture = await page.locator(selector).first().screenshot();
+  return page.evaluate(async (bytes) => {
+    const bitmap = await createImageBitmap(
+        new Blob([new Uint8Array(bytes)], {type: 'image/png'}));
+    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+    const context = canvas.getContext('2d');
+    context.drawImage(bitmap, 0, 0);
+    const pixels = new Uint32Array(context.getImageData(
+        0, 0, canvas.width, canvas.height).data.buffer);
+    const counts = new Map();
+    for (const p of pixels) counts.set(p, (counts.get(p) ?? 0) + 1);
+    return 1 - Math.max(...counts.values()) / pixels.length;
+  }, [...picture]);
+}

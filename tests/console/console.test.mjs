@@ -1,0 +1,191 @@
+// The page against a real monitor and a real simulator over DDS: alarms,
+// actions, trends, a monitor that is killed, other hosts, accessibility.
+
+import assert from 'node:assert/strict';
+import {readFileSync} from 'node:fs';
+import {after, before, test} from 'node:test';
+
+import {accessibilityFaults, inkShare, launch, open} from './browser.mjs';
+import {Plant, until} from './programs.mjs';
+
+const kViews = ['#/', '#/alarms', '#/valve/V1', '#/history', '#/episode/last'];
+
+const plant = new Plant();
+let browser;
+let monitor;
+let address;
+let token;
+
+before(async () => {
+  [browser] = await Promise.all([launch(), plant.train()]);
+  ({monitor, address} = await plant.startMonitor());
+  token = readFileSync(plant.tokenFile, 'utf8').trim();
+});
+
+after(async () => {
+  await browser?.close();
+  await plant.stop();
+});
+
+/** Milliseconds after which a row of that valve is in the alarm list. */
+function watchForAlarm(page, valve) {
+  return page.evaluate((id) => new Promise((resolve) => {
+    const look = () => {
+      const row = [...document.querySelectorAll('tr[data-episode]')]
+          .find((node) => node.textContent.includes(id));
+      if (!row) return false;
+      resolve({seenMs: Date.now(), episode: row.dataset.episode});
+      return true;
+    };
+    if (look()) return;
+    const observer = new MutationObserver(() => look() && observer.disconnect());
+    observer.observe(document.body, {childList: true, subtree: true});
+  }), valve);
+}
+
+test('the page loads and shows what is on the bus', async () => {
+  const page = await open(browser, address, '#/');
+  plant.simulate('--valve', 'V1', '--duration', '36000', '--speed', '10',
+      '--fault', 'f19:abrupt@120:strength=0.5');
+  plant.simulate('--valve', 'CALM', '--duration', '36000', '--speed', '10',
+      '--seed', '2');
+
+  await page.locator('.tile', {hasText: 'CALM'}).waitFor();
+  await page.locator('.tile', {hasText: 'V1'}).waitFor();
+
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('a fault is in the alarm list within 2 s of its event', async () => {
+  const page = await open(browser, address, '#/alarms');
+
+  const {seenMs, episode} = await watchForAlarm(page, 'V1');
+
+  const answer = await fetch(`${address}/api/v1/episodes/${episode}`);
+  const {events} = await answer.json();
+  const detected = events.find((event) => event.kind === 'DETECTED');
+  const delay = seenMs - detected.recorded_ms;
+  console.log(`in the list after ${delay} ms`);
+  assert.ok(delay < 2000, `${delay} ms`);
+  await page.context().close();
+});
+
+test('acknowledging is asked for once and persists', async () => {
+  const page = await open(browser, address, '#/alarms');
+  await page.getByRole('button', {name: 'Acknowledge V1'}).click();
+  await page.getByLabel('Your name').fill('A. Operator');
+  await page.getByLabel('Comment').fill('sent somebody');
+  await page.getByLabel('Token').fill(token);
+  await page.getByRole('dialog').getByRole('button', {name: 'Acknowledge'})
+      .click();
+  await page.locator('tr.group-ACKED', {hasText: 'A. Operator'}).waitFor();
+
+  const {episodes} = JSON.parse(await plant.run('fdi-store', 'history', 'list',
+      '--valve', 'V1', '--json'));
+  assert.equal(episodes[0].acked_by, 'A. Operator');
+
+  // The token is known by now.
+  await page.getByRole('button', {name: 'Label V1'}).click();
+  assert.equal(await page.getByLabel('Token').count(), 0);
+  await page.getByRole('dialog').getByRole('button', {name: 'Label'}).click();
+  await page.getByRole('dialog').waitFor({state: 'detached'});
+  await page.context().close();
+});
+
+test('a wrong token is refused and asked for again', async () => {
+  const page = await open(browser, address, '#/alarms');
+  await page.getByRole('button', {name: 'Shelve V1'}).click();
+  await page.getByLabel('Your name').fill('B');
+  await page.getByLabel('Reason').fill('none');
+  await page.getByLabel('Token').fill('not-this-one-at-all');
+  const shelve = page.getByRole('dialog').getByRole('button', {name: 'Shelve'});
+  await shelve.click();
+  await page.getByRole('alert').waitFor();
+
+  await page.getByLabel('Token').fill(token);
+  await shelve.click();
+  await page.locator('tr.group-SHELVED', {hasText: 'V1'}).waitFor();
+  await page.context().close();
+});
+
+test('the trend is drawn', async () => {
+  const page = await open(browser, address, '#/valve/V1');
+  await page.locator('.panel').nth(2).waitFor();
+  await until(async () => await inkShare(page, '.panel .u-over') > 0.003,
+      'lines in the first panel');
+
+  const ink = await inkShare(page, '.panels');
+  assert.ok(ink > 0.01 && ink < 0.5, `ink ${ink}`);
+  assert.match(await page.locator('.words').textContent(), /flow|F/i);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('a killed monitor costs a gap, which is shown', async () => {
+  const page = await open(browser, address, '#/valve/CALM');
+  const summary = page.locator('.trend-summary');
+  const instants = async () =>
+    Number(/^(\d+) instants/.exec(await summary.textContent())?.[1] ?? 0);
+  const begin = async () =>
+    / from (\S+ ?\S*) to /.exec(await summary.textContent())[1];
+  await until(async () => await instants() > 100, 'a trend');
+  const firstBefore = await begin();
+  const countBefore = await instants();
+
+  monitor.kill('SIGKILL');
+  await monitor.ended;
+  await page.locator('#banner', {hasText: 'Data stale since'}).waitFor();
+  const port = new URL(address).port;
+  ({monitor} = await plant.startMonitor(port));
+  await page.locator('#banner').waitFor({state: 'hidden'});
+  await until(async () => await instants() > countBefore, 'new instants');
+
+  assert.match(await summary.textContent(), /[1-9]\d* gaps?: /);
+  assert.equal(await begin(), firstBefore);
+  assert.match(await page.locator('.note').textContent(), /started again/);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test('what was done to alarms is there after the restart', async () => {
+  const page = await open(browser, address, '#/alarms');
+  await page.locator('tr', {hasText: 'A. Operator'}).or(
+      page.locator('tr.group-SHELVED', {hasText: 'V1'})).first().waitFor();
+  await page.context().close();
+});
+
+test('every view passes axe, light and dark, and asks no other host',
+    async () => {
+      const page = await open(browser, address, '#/');
+      for (const hash of kViews) {
+        await page.evaluate((to) => location.hash === to ||
+            new Promise((shown) => {
+              addEventListener('hashchange', shown, {once: true});
+              location.hash = to;
+            }), hash);
+        await page.locator('main :is(.tile, tbody tr[role], .panel)').first()
+            .waitFor();
+        for (const colorScheme of ['light', 'dark']) {
+          await page.emulateMedia({colorScheme});
+          assert.deepEqual(await accessibilityFaults(page), [],
+              `${hash} ${colorScheme}`);
+        }
+      }
+      assert.deepEqual([...page.hosts], [address]);
+      assert.deepEqual(page.faults, []);
+      await page.context().close();
+    });
+
+test('by keys alone: to the list, to an alarm, to its dialog', async () => {
+  const page = await open(browser, address, '#/');
+  await page.keyboard.press('2');
+  await page.locator('h1', {hasText: 'Alarms'}).waitFor();
+  await page.locator('tr[data-episode]').first().waitFor();
+  await page.keyboard.press('j');
+  await page.keyboard.press('l');
+  await page.getByRole('dialog').waitFor();
+  await page.keyboard.press('Escape');
+  await page.getByRole('dialog').waitFor({state: 'detached'});
+  await page.context().close();
+});

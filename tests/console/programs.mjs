@@ -1,0 +1,80 @@
+// Our programs as children of a test.
+
+import {execFile, spawn} from 'node:child_process';
+import {mkdtempSync, rmSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import path from 'node:path';
+import {promisify} from 'node:util';
+
+const kPatienceMs = 30000;
+const bin = process.env.FDI_BIN;
+
+/** Waits for what `condition` gives once it is something. */
+export async function until(condition, what, patienceMs = kPatienceMs) {
+  const end = Date.now() + patienceMs;
+  for (;;) {
+    const value = await condition();
+    if (value) return value;
+    if (Date.now() > end) throw new Error(`timed out: ${what}`);
+    await new Promise((resolve) => setTimeout(resolve, 20));
+  }
+}
+
+/** A data directory, a domain and the programs in it; all end with stop(). */
+export class Plant {
+  data = mkdtempSync(path.join(tmpdir(), 'fdi-console-'));
+  tokenFile = path.join(this.data, 'token');
+  #domain = String(70 + process.pid % 20);
+  #children = new Set();
+
+  /** Runs a program to its end. @returns its stdout. */
+  async run(program, ...words) {
+    const {stdout} = await promisify(execFile)(path.join(bin, program),
+        ['--data', this.data, ...words],
+        {timeout: kPatienceMs, maxBuffer: 1 << 26});
+    return stdout;
+  }
+
+  /** Starts a program; `errors` is what it has said on stderr. */
+  start(program, ...words) {
+    const child = spawn(path.join(bin, program),
+        ['--data', this.data, '--domain', this.#domain, '--transport', 'udp',
+          ...words], {stdio: ['ignore', 'ignore', 'pipe']});
+    child.errors = '';
+    child.stderr.on('data', (text) => child.errors += text);
+    child.ended = new Promise((resolve) => child.once('exit', resolve));
+    this.#children.add(child);
+    return child;
+  }
+
+  train() {
+    return this.run('fdi-trainer', 'train', '--campaign',
+        process.env.FDI_CAMPAIGN, '--log-level', 'warning');
+  }
+
+  /** A monitor with a console on `port`, and the address of its page. */
+  async startMonitor(port = 0, ...words) {
+    const monitor = this.start('fdi-monitor', 'run', '--model-set', 'quick',
+        `--console=127.0.0.1:${port}`, '--console-write', this.tokenFile,
+        ...words);
+    await until(() => monitor.errors.includes('monitor_ready') ||
+        monitor.exitCode !== null, `monitor_ready\n${monitor.errors}`);
+    const found = /console\S* .*?(127\.0\.0\.1:\d+)/.exec(monitor.errors);
+    if (!found) throw new Error(`no address of a console:\n${monitor.errors}`);
+    return {monitor, address: `http://${found[1]}`};
+  }
+
+  /** A simulator of the conditions that the model set was trained in. */
+  simulate(...words) {
+    return this.start('fdi-simulator', 'run', '--parameters',
+        'paper-operating-point', '--excitation', 'operating-point', '--set',
+        'excitation.amplitude_pct=8', '--set', 'excitation.period_s=80',
+        '--log-level', 'warning', ...words);
+  }
+
+  async stop() {
+    for (const child of this.#children) child.kill('SIGKILL');
+    await Promise.all([...this.#children].map((child) => child.ended));
+    rmSync(this.data, {recursive: true, force: true});
+  }
+}

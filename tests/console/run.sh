@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# Tests of the live page in Chromium; 77 where there is none, or no node.
+# Usage: run.sh PROGRAMS NODE_MODULES    (folders of the build)
+set -euo pipefail
+cd "$(dirname "$0")"
+FDI_CHROMIUM=$(command -v chromium) || {
+  echo "skipped: chromium is not found (Debian: apt install chromium)"
+  exit 77
+}
+command -v node >/dev/null || {
+  echo "skipped: node is not found (Debian: apt install nodejs)"
+  exit 77
+}
+export FDI_CHROMIUM FDI_BIN=$1 FDI_NODE_MODULES=$2
+export FDI_CAMPAIGN=$PWD/../survival/quick.toml
+# One after the other: the load is measured alone.
+for file in *.test.mjs; do
+  node --test "$file"
+done
