@@ -94,7 +94,8 @@ void PrintShadow(const std::vector<ShadowDifference>& stretches,
     return;
   }
   table.Print(std::cout);
-  std::cout << stretches.size() << " stretches, "
+  std::cout << stretches.size()
+            << (stretches.size() == 1 ? " stretch, " : " stretches, ")
             << cli::FormatDuration(time_ns) << " in all\n";
 }
 

@@ -98,6 +98,7 @@ TEST_F(ShadowTest, OpenStretchGrowsUnderItsKeyAndIsGivenOnceMore) {
   Feed(0, 50);
   Feed(50, 80, kF7Offset);
   const auto first = Take();
+  EXPECT_THAT(Take(), IsEmpty());
   Feed(80, 90, kF7Offset);
   Feed(90, 140);
   const auto second = Take();
@@ -143,6 +144,23 @@ TEST_F(ShadowTest, StretchesOfAnHourAreBounded) {
   EXPECT_THAT(Take(), SizeIs(1));
   EXPECT_EQ(bank_->counts().recorded, 1U);
   EXPECT_GE(bank_->counts().left_out, 2U);
+}
+
+TEST_F(ShadowTest, EndOfTheStreamEndsStretchAndEpisode) {
+  ModelSet candidate = CandidateModels();
+  candidate.decision.clearing_samples = 100;
+  Use(candidate);
+  Feed(0, 50);
+  Feed(50, 90, kF7Offset);
+  active_.EndEpisode(EndReason::kStreamEnded);
+  bank_->EndStream({0, &name_});
+  const std::uint64_t differed = Samples(ShadowOutcome::kDiffered);
+  EXPECT_THAT(Take(), SizeIs(1));
+
+  Feed(90, 150);
+
+  EXPECT_EQ(Samples(ShadowOutcome::kDiffered), differed);
+  EXPECT_THAT(Take(), IsEmpty());
 }
 
 TEST_F(ShadowTest, HeldIsolationIsHeldOfBoth) {

@@ -36,16 +36,18 @@ class AppLabelsTest : public TrainerProgram {
   static std::string Validation() {
     return "[[validation]]\nsimulate = {duration_s = 1200}\n"
            "faults = [\"f1:abrupt@600\", \"f19:abrupt@600\"]\n"
-           "strengths = [0.5]\n";
+           "strengths = [0.5, 0.75]\n";
   }
   std::filesystem::path History() const { return Path("data") / "history.db"; }
   storage::RunStore Runs(
       storage::Access access = storage::Access::kReader) const {
     return storage::RunStore(Path("data") / "runs.db", access);
   }
-  storage::StoredRun RunWith(const std::string& fault) const {
+  storage::StoredRun RunWith(const std::string& fault,
+                             const std::string& strength = "0.5") const {
     storage::RunStore store = Runs();
-    const std::string needle = "\"" + fault + ":";
+    const std::string needle =
+        "\"" + fault + ":abrupt@600:strength=" + strength + "\"";
     for (const storage::RunInfo& info : store.List()) {
       if (info.samples == 1200 &&
           info.run.scenario.find(needle) != std::string::npos) {
@@ -56,11 +58,11 @@ class AppLabelsTest : public TrainerProgram {
     return {};
   }
   // Its only episode, labelled.
-  std::string Episode(const storage::StoredRun& run,
-                      const std::string& label) const {
+  std::string Episode(const storage::StoredRun& run, const std::string& label,
+                      bool held = false) const {
     const auto models = std::make_shared<const ModelSet>(
         storage::ModelStore(Path("data") / "models.db").Load("quick"));
-    const auto ids = RecordEpisodes(History(), models, run);
+    const auto ids = RecordEpisodes(History(), models, run, held);
     EXPECT_THAT(ids, SizeIs(1));
     Label(ids.at(0), label);
     return ids.at(0);
@@ -176,6 +178,62 @@ TEST_F(AppLabelsTest, ShortEpisodeIsRefusedWithItsLengthAndWhatIsNeeded) {
   EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(outcome.err,
               AllOf(HasSubstr("too short: 6"), HasSubstr("needed are 80")));
+}
+
+TEST_F(AppLabelsTest, FaultThatWasNotNamedLiveGetsTheStrengthThatFits) {
+  Episode(RunWith("f19"), "f19", true);
+  const json episode = RunJson("train --from-labels --dry-run")["episodes"][0];
+  EXPECT_TRUE(episode["refused"].is_null()) << episode;
+  EXPECT_NEAR(episode["strength"].get<double>(), 0.5, 0.05);
+}
+
+TEST_F(AppLabelsTest, StrengthOfAFaultThatFitsBadlyIsNotEstimated) {
+  Episode(RunWith("f1"), "f19");
+  const Outcome outcome = Run("train --from-labels");
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("gives f19 a factor of"));
+}
+
+// The set knows f19 up to 0.5.
+TEST_F(AppLabelsTest, StrengthBeyondTheTrainedOnesIsNotEstimated) {
+  Episode(RunWith("f19", "0.75"), "f19", true);
+  const Outcome outcome = Run("train --from-labels");
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("beyond what it was trained at (0.5)"));
+}
+
+// The fault acts from 600 s to 1200 s.
+TEST_F(AppLabelsTest, TimeAfterTheFaultDoesNotCountAsFault) {
+  storage::StoredRun run = RunWith("f19");
+  const std::int64_t end_ns = run.samples.back().sample.stamp_ns;
+  for (int k = 0; k < 400; ++k) {
+    storage::StoredSample after = run.samples[static_cast<std::size_t>(k)];
+    after.sample.seq += 1200;
+    after.sample.stamp_ns += 1200LL * 1'000'000'000;
+    run.samples.push_back(after);
+  }
+  Runs(storage::Access::kOccasionalWriter).Delete(run.info.id);
+  const std::string id = Episode(run, "true");
+  ASSERT_TRUE(storage::HistoryReader(History()).Show(id).cleared_ns);
+
+  const json set = RunJson("train --from-labels");
+
+  const storage::StoredRun kept =
+      Runs().Load(set["lineage"]["episodes"][0]["run"].get<std::string>());
+  EXPECT_LE(kept.samples.back().sample.stamp_ns, end_ns);
+  EXPECT_GE(kept.samples.size(), 500U);
+  EXPECT_GE(kept.samples.front().sample.stamp_ns,
+            run.samples[600].sample.stamp_ns);
+}
+
+TEST_F(AppLabelsTest, SignalsThatNotAllRunsHaveAreLeftOut) {
+  storage::StoredRun run = RunWith("f19");
+  Runs(storage::Access::kOccasionalWriter).Delete(run.info.id);
+  for (storage::StoredSample& stored : run.samples) {
+    stored.sample.Set(Signal::kSp, 50.0);
+  }
+  Episode(run, "true");
+  EXPECT_EQ(RunJson("train --from-labels")["version"], 2);
 }
 
 TEST_F(AppLabelsTest, RunsOfTheParentThatAreGoneAreNamed) {

@@ -13,13 +13,15 @@ namespace fdi::trainer {
 
 /// Records the episodes that `models` finds in `run`, with a trace of all that
 /// went before them, as a monitor does. @returns their ids.
+/// @param held no fault is named.
 inline std::vector<std::string> RecordEpisodes(
     const std::filesystem::path& history,
     const std::shared_ptr<const ModelSet>& models,
-    const storage::StoredRun& run) {
+    const storage::StoredRun& run, bool held = false) {
   storage::HistoryWriter writer(history);
   writer.BeginSession(run.info.run.start_ns, "test", "");
   ValveEngine engine(models);
+  engine.HoldIsolation(held);
   std::vector<std::string> ids;
   std::vector<storage::TraceInstant> trace;
   std::uint64_t episode = 0;

@@ -1,15 +1,15 @@
 #include "trainer/app/labelled_episodes.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <optional>
+#include <limits>
+#include <stdexcept>
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/app/episode_samples.h"
-#include "trainer/app/rescore.h"
 #include "trainer/app/run_input.h"
+#include "trainer/app/strength_estimate.h"
 
 namespace fdi::trainer {
 namespace {
@@ -35,13 +35,6 @@ std::vector<int> IsolatedIn(const storage::Episode& episode) {
     }
   }
   return faults;
-}
-
-double MedianOf(std::vector<double> values) {
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Samples in the longest piece without a gap.
@@ -182,47 +175,14 @@ class LabelReader::Impl {
     if (isolated == std::vector<int>{fault} && episode.strength != 0.0) {
       return episode.strength;
     }
-    return EstimatedStrength(episode, fault, run);
-  }
-
-  double EstimatedStrength(const storage::Episode& episode, int fault,
-                           const storage::StoredRun& run) const {
-    const std::string hint = "; say it: --strength " + episode.episode_id +
-                             "=S, S in [-1, 1] without 0";
-    const int index = FaultIndex(*parent_, fault);
-    if (index < 0) {
-      throw Refusal("the strength is unknown: " + NameOf(*parent_) +
-                    " does not know " + FaultName(fault) + hint);
+    const StrengthEstimate estimate =
+        EstimateStrength(parent_, run, fault, episode.detected_ns);
+    if (!estimate.problem.empty()) {
+      throw Refusal("the strength is unknown: " + estimate.problem +
+                    "; say it: --strength " + episode.episode_id +
+                    "=S, S in [-1, 1] without 0, 1 the full fault");
     }
-    std::vector<double> strengths;
-    std::vector<double> factors;
-    Rescore(parent_, run, [&](const Sample& sample, const Verdict& verdict) {
-      if (verdict.detected && sample.stamp_ns >= episode.detected_ns) {
-        const auto f = static_cast<std::size_t>(index);
-        strengths.push_back(verdict.strengths[f]);
-        factors.push_back(verdict.fault_factors[f]);
-      }
-    });
-    if (strengths.empty()) {
-      throw Refusal("the strength is unknown: " + NameOf(*parent_) +
-                    " detects nothing here" + hint);
-    }
-    const double least = 0.5 * parent_->decision.isolation_threshold;
-    const double factor = LaterMedian(factors);
-    const double strength = LaterMedian(strengths);
-    if (factor < least || strength == 0.0) {
-      throw Refusal("the strength is unknown: " + NameOf(*parent_) + " gives " +
-                    FaultName(fault) + " a factor of " + Number(factor) +
-                    ", needed is " + Number(least) + hint);
-    }
-    return strength;
-  }
-
-  // The first half is the search.
-  static double LaterMedian(const std::vector<double>& values) {
-    return MedianOf(
-        {values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-         values.end()});
+    return estimate.strength;
   }
 
   void TakeSamples(const storage::StoredRun& run,

@@ -40,8 +40,8 @@ std::vector<storage::Episode> FindLabelled(storage::HistoryReader& history,
 ///
 ///   true     the isolated fault, if it is one, at its estimated strength;
 ///   a fault  that fault: at the strength estimated live if it was isolated,
-///            else at what the parent's engine estimates on the same samples,
-///            if the fault explains them with a factor of T/2 at least;
+///            else at what EstimateStrength() makes of the same samples with
+///            the parent's engine;
 ///   false    normal operation, with up to 30 min before the detection.
 ///
 /// A fault counts from the detection until t_c and the samples dropped after a
