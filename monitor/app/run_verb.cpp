@@ -84,6 +84,22 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
       ->type_name("DIR");
 }
 
+void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
+  run.add_option("--on-event", service.on_event,
+                 "Tell of every fault event: a command that reads it as JSON "
+                 "from its standard input, or http://HOST[:PORT][/PATH] that "
+                 "it is posted to")
+      ->type_name("CMD|URL");
+  run.add_option("--on-event-rate", service.on_event_per_minute,
+                 "At most so many a minute; the rest is counted")
+      ->check(CLI::Range(1, 6000))
+      ->capture_default_str();
+  run.add_option("--on-event-timeout", service.on_event_timeout_s,
+                 "Give a delivery up after so long [s]")
+      ->check(CLI::Range(0.1, 600.0))
+      ->capture_default_str();
+}
+
 int Run(const RunArguments& arguments, const cli::Context& context) {
   ServiceOptions options = arguments.service;
   if (!arguments.model_set.empty()) {
@@ -155,6 +171,7 @@ void AddRunVerb(cli::Program& program) {
                  "samples")
       ->check(CLI::Range(0.0, 1800.0))
       ->capture_default_str();
+  AddOnEventOptions(run, service);
   run.add_flag("--http{127.0.0.1:9464}", arguments->http,
                "Serve /metrics, /healthz and /readyz; port 0: any free one")
       ->default_str("off")

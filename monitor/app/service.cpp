@@ -100,16 +100,26 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
       decisions_(participant_, options.lossless_decisions,
                  publication_stop_.get_token()),
       events_(participant_, context.log),
+      outward_(
+          options.on_event.empty()
+              ? nullptr
+              : std::make_unique<OutwardEvents>(
+                    events_,
+                    MakeEventDelivery(options.on_event,
+                                      Milliseconds(options.on_event_timeout_s)),
+                    EventHookOptions{.per_minute = options.on_event_per_minute},
+                    cli::LoadFaultTexts(context.options), context.log)),
       status_topic_(participant_),
       samples_(
           intake_participant_,
           options.best_effort ? idl::Profile::kBestEffort : idl::Profile::kLive,
           idl::Overflow::kOnTheWay),
       log_(context.log),
-      pipeline_(PipelineOptionsOf(options, data_),
-                {decisions_, console_ ? console_->Before(events_) : events_,
-                 history_, runs_.get(), console_ ? &console_->live() : nullptr},
-                assignment_, counters_, log_),
+      pipeline_(
+          PipelineOptionsOf(options, data_),
+          {decisions_, console_ ? console_->Before(EventsOut()) : EventsOut(),
+           history_, runs_.get(), console_ ? &console_->live() : nullptr},
+          assignment_, counters_, log_),
       heartbeat_(Members(pipeline_, intake_pulse_, service_pulse_)),
       started_ns_(cli::NowNs()),
       last_status_line_(std::chrono::steady_clock::now()) {
@@ -131,6 +141,11 @@ Service::~Service() {
   if (console_) {
     console_->Close();
   }
+}
+
+// The bus, and who else is told.
+EventSink& Service::EventsOut() {
+  return outward_ ? static_cast<EventSink&>(*outward_) : events_;
 }
 
 void Service::AnnounceModels(const ModelSet& models) {

@@ -13,6 +13,7 @@
 
 #include "idl/endpoint.h"
 #include "monitor/app/bus_sinks.h"
+#include "monitor/app/event_hook.h"
 #include "monitor/app/history_store.h"
 #include "monitor/app/model_assignment.h"
 #include "monitor/app/probes.h"
@@ -48,6 +49,10 @@ struct ServiceOptions {
   std::string shadow_valves{"*"};
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
+  /// Tell a program or a web server of events; empty: nobody.
+  std::string on_event;
+  int on_event_per_minute{60};
+  double on_event_timeout_s{10.0};
   /// Serve the live page.
   std::optional<console::ConsoleOptions> console;
 };
@@ -72,6 +77,7 @@ class Service {
   using TimePoint = Heartbeat::TimePoint;
 
   void ResendEvents();
+  EventSink& EventsOut();
   void Intake(const std::stop_token& stop);
   void AnnounceModels(const ModelSet& models);
   void Reload(const char* cause);
@@ -106,6 +112,7 @@ class Service {
   std::stop_source publication_stop_;  // ends waits for slow subscribers
   BusDecisionSink decisions_;
   BusEventSink events_;
+  std::unique_ptr<OutwardEvents> outward_;  // Null: nobody is told.
   idl::Publisher<idl::MonitorStatusMessage> status_topic_;
   idl::Subscriber<idl::ValveSampleMessage> samples_;
   Counters counters_;

@@ -9,6 +9,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
+constexpr milliseconds kHookPatience{1000};
 constexpr milliseconds kDrainLimit{1000};
 constexpr milliseconds kSubscriberPatience{1000};
 constexpr milliseconds kAcknowledgeLimit{300};
@@ -40,6 +41,9 @@ void Service::Shutdown() {
     intake_.join();
   }
   pipeline_.Stop();
+  if (outward_) {
+    outward_->hook().Stop(kHookPatience);
+  }
   history_.EndSession();
   PublishStatus();
   if (!publication_stop_.stop_requested()) {

@@ -1,0 +1,191 @@
+#include "monitor/app/event_hook.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "diagnosis/fault_catalogue.h"
+#include "storage/cli/logging.h"
+#include "storage/history_types.h"
+
+namespace fdi::monitor {
+namespace {
+
+constexpr std::int64_t kNsPerMs = 1'000'000;
+constexpr std::chrono::milliseconds kTick{100};
+
+// "f3|f6" by the candidates of the event, which know their numbers.
+std::string FaultsOf(const EpisodeEvent& event) {
+  if (event.models != nullptr && event.transition.faults != 0) {
+    return FaultSetName(*event.models, event.transition.faults);
+  }
+  std::vector<int> faults;
+  for (const Candidate& candidate : event.candidates) {
+    if (candidate.isolated) {
+      faults.push_back(candidate.fault);
+    }
+  }
+  std::ranges::sort(faults);
+  std::string names;
+  for (const int fault : faults) {
+    names += names.empty() ? "" : "|";
+    names += FaultName(fault);
+  }
+  return names;
+}
+
+}  // namespace
+
+cli::Json EventJson(const EpisodeEvent& event, bool persisted,
+                    const cli::FaultTexts& texts) {
+  const Transition& t = event.transition;
+  const std::string fault = FaultsOf(event);
+  const cli::FaultWords words = texts.Words(fault, t.strength);
+  const bool closed = t.kind == TransitionKind::kClosed;
+  return {{"kind", std::string(TransitionName(t.kind))},
+          {"valve", event.valve_id},
+          {"episode", storage::EpisodeIdText(event.episode_id)},
+          {"stamp_ms", t.stamp_ns / kNsPerMs},
+          {"fault", fault.empty() ? cli::Json() : cli::Json(fault)},
+          {"name", words.name},
+          {"severity", std::string(SeverityName(words.severity))},
+          {"discipline", words.discipline},
+          {"namur", std::string(NamurName(words.namur))},
+          {"check", words.check},
+          {"factor", t.factor},
+          {"strength", t.strength},
+          {"reason", closed ? cli::Json(std::string(EndReasonName(t.reason)))
+                            : cli::Json()},
+          {"model_set",
+           event.model_set + "@" + std::to_string(event.model_version)},
+          {"persisted", persisted}};
+}
+
+EventHook::EventHook(std::unique_ptr<EventDelivery> delivery,
+                     EventHookOptions options, LogSink log)
+    : delivery_(std::move(delivery)),
+      options_(std::move(options)),
+      log_(std::move(log)),
+      tokens_(options_.per_minute),
+      filled_(options_.now()) {
+  for (int i = 0; i < options_.threads; ++i) {
+    threads_.emplace_back([this] { Run(); });
+  }
+}
+
+EventHook::~EventHook() {
+  Stop(std::chrono::milliseconds(0));
+}
+
+void EventHook::Tell(cli::Json event) {
+  const std::lock_guard lock(mutex_);
+  if (stopping_) {
+    return;
+  }
+  if (newest_ || waiting_.size() >= options_.max_waiting ||
+      !TakeToken(options_.now())) {
+    if (newest_) {
+      ++left_out_;
+      ++counts_.left_out;
+    }
+    newest_ = std::move(event);
+  } else {
+    Admit(std::move(event));
+  }
+  changed_.notify_one();
+}
+
+void EventHook::Admit(cli::Json event) {
+  event["left_out"] = std::exchange(left_out_, 0);
+  waiting_.push_back(std::move(event));
+}
+
+bool EventHook::TakeToken(TimePoint now) {
+  const std::chrono::duration<double> since = now - filled_;
+  filled_ = now;
+  tokens_ =
+      std::min<double>(options_.per_minute,
+                       tokens_ + since.count() * options_.per_minute / 60.0);
+  if (tokens_ < 1.0) {
+    return false;
+  }
+  tokens_ -= 1.0;
+  return true;
+}
+
+void EventHook::Run() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait_for(lock, kTick,
+                      [this] { return stopping_ || !waiting_.empty(); });
+    if (newest_ && waiting_.size() < options_.max_waiting &&
+        TakeToken(options_.now())) {
+      Admit(*std::exchange(newest_, std::nullopt));
+    }
+    if (waiting_.empty()) {
+      if (stopping_) {
+        return;
+      }
+      continue;
+    }
+    const std::string text =
+        waiting_.front().dump(-1, ' ', false,
+                              cli::Json::error_handler_t::replace) +
+        "\n";
+    waiting_.pop_front();
+    ++busy_;
+    lock.unlock();
+    const std::optional<std::string> failure = delivery_->Deliver(text);
+    lock.lock();
+    --busy_;
+    Settle(failure);
+    changed_.notify_all();
+  }
+}
+
+void EventHook::Settle(const std::optional<std::string>& failure) {
+  if (!failure) {
+    ++counts_.delivered;
+    return;
+  }
+  ++counts_.failed;
+  log_(LogLevel::kWarning,
+       cli::EventLine("event_hook_failed",
+                      {{"reason", *failure},
+                       {"failed", std::to_string(counts_.failed)},
+                       {"delivered", std::to_string(counts_.delivered)}}));
+}
+
+void EventHook::Stop(std::chrono::milliseconds patience) {
+  {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, patience,
+                      [this] { return waiting_.empty() && busy_ == 0; });
+    stopping_ = true;
+    const std::uint64_t dropped = waiting_.size() + (newest_ ? 1 : 0);
+    counts_.left_out += dropped;
+    waiting_.clear();
+    newest_.reset();
+    changed_.notify_all();
+  }
+  if (threads_.empty()) {
+    return;
+  }
+  delivery_->Interrupt();
+  for (std::thread& thread : threads_) {
+    thread.join();
+  }
+  threads_.clear();
+  const Counts told = counts();
+  log_(LogLevel::kInfo,
+       cli::EventLine("event_hook_stopped",
+                      {{"delivered", std::to_string(told.delivered)},
+                       {"failed", std::to_string(told.failed)},
+                       {"left_out", std::to_string(told.left_out)}}));
+}
+
+EventHook::Counts EventHook::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+}  // namespace fdi::monitor

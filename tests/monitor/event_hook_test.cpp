@@ -1,0 +1,264 @@
+#include "monitor/app/event_hook.h"
+
+#include <csignal>
+#include <fstream>
+#include <future>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <httplib.h>
+
+#include "diagnosis/error.h"
+#include "storage/cli/shared_files.h"
+#include "tests/monitor/linear_models.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+std::string Slurp(const std::filesystem::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path).rdbuf();
+  return text.str();
+}
+
+// Runs until told, and notes what it got.
+class FakeDelivery : public EventDelivery {
+ public:
+  std::optional<std::string> Deliver(const std::string& json) override {
+    std::unique_lock lock(mutex);
+    got.push_back(cli::Json::parse(json));
+    changed.notify_all();
+    changed.wait(lock, [this] { return open; });
+    return failure;
+  }
+  void Interrupt() override { Open(); }
+  void Open() {
+    const std::lock_guard lock(mutex);
+    open = true;
+    changed.notify_all();
+  }
+  bool WaitFor(std::size_t count) {
+    std::unique_lock lock(mutex);
+    return changed.wait_for(lock, seconds(10),
+                            [&] { return got.size() >= count; });
+  }
+
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<cli::Json> got;
+  bool open{true};
+  std::optional<std::string> failure;
+};
+
+class ProgramDeliveryTest : public testing::Test {
+ protected:
+  std::filesystem::path Out() const { return directory_.path() / "out"; }
+  storage::TemporaryDirectory directory_;
+};
+
+TEST_F(ProgramDeliveryTest, ProgramReadsTheEventFromItsInput) {
+  const auto delivery =
+      MakeEventDelivery("tee '" + Out().string() + "'", seconds(10));
+  EXPECT_EQ(delivery->Deliver("{\"a\": \"$(id); rm -rf `x`\"}\n"),
+            std::nullopt);
+  EXPECT_EQ(Slurp(Out()), "{\"a\": \"$(id); rm -rf `x`\"}\n");
+}
+
+TEST_F(ProgramDeliveryTest, WordsAreNotForAShell) {
+  const auto delivery = MakeEventDelivery(
+      "touch '" + Out().string() + " a' $(echo) ;", seconds(10));
+  // $(echo) and ; are names of files.
+  EXPECT_EQ(delivery->Deliver("x"), std::nullopt);
+  EXPECT_TRUE(std::filesystem::exists(Out().string() + " a"));
+  EXPECT_TRUE(std::filesystem::remove("$(echo)"));
+  EXPECT_TRUE(std::filesystem::remove(";"));
+}
+
+TEST_F(ProgramDeliveryTest, FailureSaysWhy) {
+  EXPECT_THAT(*MakeEventDelivery("/no/such/program", seconds(1))->Deliver("x"),
+              HasSubstr("No such file"));
+  EXPECT_EQ(*MakeEventDelivery("false", seconds(10))->Deliver("x"),
+            "exit status 1");
+}
+
+TEST_F(ProgramDeliveryTest, WhatDoesNotEndIsKilledWithItsChildren) {
+  const auto delivery = DeliverToProgram(
+      {"sh", "-c", "sleep 1000 & echo $! > " + Out().string() + "; wait"},
+      milliseconds(300));
+  EXPECT_EQ(*delivery->Deliver("x"), "killed after 300 ms");
+  const pid_t child = std::stoi(Slurp(Out()));
+  for (int i = 0; i < 1000 && kill(child, 0) == 0; ++i) {
+    const std::string stat = Slurp("/proc/" + std::to_string(child) + "/stat");
+    if (stat.find(") Z ") != std::string::npos) {
+      break;  // Dead; whoever adopted it has not looked yet.
+    }
+    std::this_thread::yield();
+  }
+  const std::string stat = Slurp("/proc/" + std::to_string(child) + "/stat");
+  EXPECT_TRUE(stat.empty() || stat.find(") Z ") != std::string::npos) << stat;
+}
+
+TEST_F(ProgramDeliveryTest, InterruptionEndsItAtOnce) {
+  const auto delivery = MakeEventDelivery("sleep 1000", seconds(1000));
+  auto result = std::async(std::launch::async,
+                           [&delivery] { return delivery->Deliver("x"); });
+  delivery->Interrupt();
+  EXPECT_EQ(result.get().value_or(""), "the monitor stops");
+}
+
+class UrlDeliveryTest : public testing::Test {
+ protected:
+  UrlDeliveryTest() {
+    server_.Post("/hook", [this](const httplib::Request& request,
+                                 httplib::Response& response) {
+      type_ = request.get_header_value("Content-Type");
+      body_ = request.body;
+      response.status = status_;
+    });
+    port_ = server_.bind_to_any_port("127.0.0.1");
+    thread_ = std::thread([this] { server_.listen_after_bind(); });
+    while (!server_.is_running()) {
+      std::this_thread::yield();
+    }
+  }
+  ~UrlDeliveryTest() override {
+    server_.stop();
+    thread_.join();
+  }
+  std::unique_ptr<EventDelivery> Delivery() const {
+    return MakeEventDelivery(
+        "http://127.0.0.1:" + std::to_string(port_) + "/hook", seconds(5));
+  }
+
+  httplib::Server server_;
+  int port_{0};
+  int status_{204};
+  std::string type_;
+  std::string body_;
+  std::thread thread_;
+};
+
+TEST_F(UrlDeliveryTest, ServerGetsJson) {
+  EXPECT_EQ(Delivery()->Deliver("{}"), std::nullopt);
+  EXPECT_EQ(type_, "application/json");
+  EXPECT_EQ(body_, "{}");
+}
+
+TEST_F(UrlDeliveryTest, RefusalAndAbsenceAreFailures) {
+  status_ = 500;
+  EXPECT_EQ(*Delivery()->Deliver("{}"), "HTTP status 500");
+  EXPECT_TRUE(
+      MakeEventDelivery("http://127.0.0.1:1/", seconds(1))->Deliver("{}"));
+}
+
+TEST(EventDeliveryTest, WhatIsNeitherIsRefused) {
+  for (const char* target : {"", "  ", "http://", "https://host/", "ftp://x"}) {
+    EXPECT_THROW(MakeEventDelivery(target, seconds(1)), ConfigError) << target;
+  }
+}
+
+class EventHookTest : public testing::Test {
+ protected:
+  EventHookTest() {
+    auto delivery = std::make_unique<FakeDelivery>();
+    fake_ = delivery.get();
+    options_.now = [this] {
+      const std::lock_guard lock(clock_mutex_);
+      return now_;
+    };
+    options_.per_minute = 3;
+    delivery_ = std::move(delivery);
+  }
+  void Start() {
+    hook_.emplace(std::move(delivery_), options_,
+                  [this](LogLevel, std::string_view line) {
+                    log_ += std::string(line) + "\n";
+                  });
+  }
+  void Advance(seconds time) {
+    const std::lock_guard lock(clock_mutex_);
+    now_ += time;
+  }
+
+  EventHookOptions options_;
+  std::mutex clock_mutex_;
+  std::chrono::steady_clock::time_point now_{};
+  std::unique_ptr<EventDelivery> delivery_;
+  FakeDelivery* fake_;
+  std::string log_;
+  std::optional<EventHook> hook_;
+};
+
+TEST_F(EventHookTest, BeyondTheRateTheNewestIsToldWithTheCountOfTheOthers) {
+  Start();
+  for (int i = 0; i < 10; ++i) {
+    hook_->Tell({{"i", i}});
+  }
+  ASSERT_TRUE(fake_->WaitFor(3));
+  Advance(seconds(20));
+  ASSERT_TRUE(fake_->WaitFor(4));
+  hook_->Stop(seconds(10));
+
+  EXPECT_EQ(fake_->got[3]["i"], 9);
+  EXPECT_EQ(fake_->got[3]["left_out"], 6);
+  EXPECT_EQ(fake_->got[0]["left_out"], 0);
+  EXPECT_EQ(hook_->counts().delivered, 4u);
+  EXPECT_EQ(hook_->counts().left_out, 6u);
+}
+
+TEST_F(EventHookTest, ADeliveryThatHangsHoldsNobodyUp) {
+  fake_->open = false;
+  options_.per_minute = 100;
+  options_.max_waiting = 5;
+  Start();
+  for (int i = 0; i < 50; ++i) {
+    hook_->Tell({{"i", i}});
+  }
+  ASSERT_TRUE(fake_->WaitFor(2));
+  EXPECT_EQ(fake_->got.size(), 2u);  // Two threads.
+  hook_->Stop(milliseconds(0));
+  EXPECT_GE(hook_->counts().left_out, 40u);
+}
+
+TEST_F(EventHookTest, FailuresAreCountedAndLogged) {
+  fake_->failure = "no such luck";
+  Start();
+  hook_->Tell({{"i", 1}});
+  hook_->Stop(seconds(10));
+  EXPECT_EQ(hook_->counts().failed, 1u);
+  EXPECT_THAT(log_, HasSubstr("event_hook_failed reason=\"no such luck\""));
+}
+
+TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
+  const cli::FaultTexts texts(cli::SharedFile("faults.toml"));
+  EpisodeEvent event;
+  event.valve_id = "V1";
+  event.episode_id = 0xAB;
+  event.models = SharedLinearModels();
+  event.model_set = "linear";
+  event.model_version = 1;
+  event.transition.kind = TransitionKind::kIsolated;
+  event.transition.stamp_ns = 5'000'000;
+  event.transition.faults = 2;  // f7
+  event.transition.strength = 0.7;
+
+  const cli::Json json = EventJson(event, true, texts);
+  EXPECT_EQ(json["kind"], "ISOLATED");
+  EXPECT_EQ(json["fault"], "f7");
+  EXPECT_EQ(json["name"], texts.Of(7).name);
+  EXPECT_EQ(json["severity"], "critical");
+  EXPECT_EQ(json["episode"], "00000000000000ab");
+  EXPECT_EQ(json["stamp_ms"], 5);
+  EXPECT_TRUE(json["reason"].is_null());
+  event.transition.faults = 0;
+  EXPECT_TRUE(EventJson(event, true, texts)["fault"].is_null());
+}
+
+}  // namespace
+}  // namespace fdi::monitor
