@@ -58,8 +58,8 @@ struct LiveTrend {
 struct LiveSlot;
 
 /// What the diagnosis shows people: the state of each valve and its last 900
-/// instants, packed. That is 94 kB a valve for six signals, two channels and
-/// five faults, 119 kB for nineteen: 240 MB for 2000 valves. After a change of
+/// instants, packed. That is 91 kB a valve for six signals, two channels and
+/// five faults, 116 kB for nineteen: 232 MB for 2000 valves. After a change of
 /// the source up to thrice that until the new one has sent as many.
 ///
 /// Thread safe. The diagnosis takes two locks a sample that readers hold for

@@ -8,8 +8,7 @@ namespace fdi::console {
 namespace {
 
 using monitor::kF7Offset;
-using testing::Each;
-using testing::ElementsAre;
+using monitor::PlantSample;
 
 using LiveBoardTest = BoardTest;
 
@@ -22,7 +21,7 @@ TEST_F(LiveBoardTest, ShowsWhatTheEngineSaidLast) {
   EXPECT_EQ(valve.isolated, 2U);  // f7 is fault 1 of {f1, f7}.
   EXPECT_EQ(valve.factor, engine_.verdict().fault_factors[1]);
   EXPECT_EQ(valve.strength, engine_.verdict().strengths[1]);
-  EXPECT_EQ(valve.stamp_ns, monitor::PlantSample(79).stamp_ns);
+  EXPECT_EQ(valve.stamp_ns, PlantSample(79).stamp_ns);
   EXPECT_EQ(valve.models->model_set, "linear@1");
   ASSERT_EQ(valve.spark.size(), 60U);
   EXPECT_EQ(valve.spark.front(), 0.0);
@@ -42,6 +41,16 @@ TEST_F(LiveBoardTest, TheTrendHoldsTheLast900InstantsOverAnIsolation) {
   EXPECT_LT(board_.bytes(), 150'000U);
 }
 
+TEST_F(LiveBoardTest, AnAnswerThatFlapsKeepsItsTrend) {
+  Verdict verdict;
+  for (std::uint64_t k = 0; k < 500; ++k) {
+    verdict.isolated = k / 5 % 2;
+    board_.Show("V1", PlantSample(k), models_.get(), verdict, false);
+  }
+
+  EXPECT_EQ(board_.Trend("V1").value().points.size(), 500U);
+}
+
 TEST_F(LiveBoardTest, ANewSourceGoesOnWithTheTrend) {
   Show(0, 100);
   Show(200, 210, 0.0, 2);
@@ -51,8 +60,8 @@ TEST_F(LiveBoardTest, ANewSourceGoesOnWithTheTrend) {
   ASSERT_EQ(trend.points.size(), 120U);
   EXPECT_EQ(trend.points[100].sample.seq, 200U);
   ASSERT_EQ(trend.gaps.size(), 2U);
-  EXPECT_EQ(trend.gaps[0].from_ns, monitor::PlantSample(99).stamp_ns);
-  EXPECT_EQ(trend.gaps[0].to_ns, monitor::PlantSample(200).stamp_ns);
+  EXPECT_EQ(trend.gaps[0].from_ns, PlantSample(99).stamp_ns);
+  EXPECT_EQ(trend.gaps[0].to_ns, PlantSample(200).stamp_ns);
   EXPECT_EQ(board_.TakeGaps().size(), 2U);
   EXPECT_TRUE(board_.TakeGaps().empty());
 }
@@ -81,7 +90,7 @@ TEST_F(LiveBoardTest, AnotherModelSetBeginsTheTrendAnew) {
   Show(0, 50);
   const auto other = monitor::SharedLinearModels(0x5678);
   ValveEngine engine(other);
-  const Sample sample = monitor::PlantSample(50);
+  const Sample sample = PlantSample(50);
   board_.Show("V1", sample, other.get(), engine.Step(sample), true);
 
   EXPECT_EQ(board_.Trend("V1").value().points.size(), 1U);
@@ -92,7 +101,7 @@ TEST_F(LiveBoardTest, AnotherModelSetBeginsTheTrendAnew) {
 TEST_F(LiveBoardTest, AValveWithoutModelsHasReadingsOnly) {
   Verdict verdict;
   verdict.quality = Quality::kUnassigned;
-  board_.Show("bare", monitor::PlantSample(0), nullptr, verdict, false);
+  board_.Show("bare", PlantSample(0), nullptr, verdict, false);
 
   const LiveTrend trend = board_.Trend("bare").value();
   EXPECT_EQ(trend.now.models, nullptr);
