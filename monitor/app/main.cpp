@@ -8,5 +8,6 @@ int main(int argc, char** argv) {
   program.MapError<fdi::idl::TransportError>(fdi::cli::kExitTransport);
   fdi::monitor::AddRunVerb(program);
   fdi::monitor::AddWatchVerb(program);
+  fdi::monitor::AddTopVerb(program);
   return program.Run(argc, argv);
 }

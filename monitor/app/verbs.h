@@ -12,4 +12,7 @@ void AddRunVerb(cli::Program& program);
 /// `watch`: prints or counts what monitors publish.
 void AddWatchVerb(cli::Program& program);
 
+/// `top`: a live table of what they publish.
+void AddTopVerb(cli::Program& program);
+
 }  // namespace fdi::monitor

@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "idl/endpoint.h"
+#include "monitor/app/dds_options.h"
 #include "monitor/app/verbs.h"
 #include "monitor/app/watch_print.h"
 #include "monitor/valve_directory.h"
@@ -35,17 +36,6 @@ struct WatchOptions {
   std::uint64_t expect{0};
 };
 
-idl::DdsOptions DdsOptionsOf(const WatchOptions& options,
-                             const cli::GlobalOptions& global) {
-  idl::DdsOptions dds;
-  dds.domain = global.domain;
-  dds.interfaces = global.interface;
-  dds.transport = global.transport;
-  dds.qos_file = global.qos_file.string();
-  dds.max_valves = options.max_valves;
-  return dds;
-}
-
 bool Passed(Clock::time_point since, double seconds) {
   return seconds > 0.0 &&
          Clock::now() - since > std::chrono::duration<double>(seconds);
@@ -58,8 +48,8 @@ class Watch {
       : options_(options),
         json_(context.options.json),
         printer_(context.options.utc),
-        participant_(DdsOptionsOf(options, context.options), context.log,
-                     "fdi-monitor watch"),
+        participant_(DdsOptionsOf(context.options, options.max_valves),
+                     context.log, "fdi-monitor watch"),
         models_(participant_),
         events_(participant_),
         status_(participant_) {
