@@ -45,6 +45,6 @@ settings.addEventListener('change', ({detail}) => {
   if (detail === 'theme') applyTheme();
   if (detail === 'theme' || detail === 'utc') show(false);
 });
-addEventListener('hashchange', () => show(true));
-store.start();
+await store.start();
 show(false);
+addEventListener('hashchange', () => show(true));

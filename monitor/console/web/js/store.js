@@ -20,13 +20,16 @@ class Store extends EventTarget {
   #instance = null;
   #lostMs = null;
 
+  /** @returns a promise that the names of faults are known, or cannot be. */
   start() {
     this.stream.addEventListener('message', ({detail}) => this.#take(detail));
     this.stream.addEventListener('state', () => this.#connection());
     this.stream.open(null);
     setInterval(() => this.refreshStatus(), kStatusPeriodMs);
-    return Promise.all([this.refreshStatus(), this.#loadCatalogue(),
-      this.#resync(), this.#probeWorklist()]);
+    this.refreshStatus();
+    this.#resync();
+    this.#probeWorklist();
+    return this.#loadCatalogue();
   }
 
   /** Samples of this valve come with the stream from now on; null: none. */

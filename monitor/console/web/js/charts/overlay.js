@@ -68,7 +68,7 @@ function drawGaps(u, ctx, {left, top, width, height}, gaps, first) {
     if (to <= from) continue;
     ctx.fillStyle = hatch(ctx, cssColor('--hatch'));
     ctx.fillRect(from, top, Math.max(to - from, 2), height);
-    const text = gap.reason +
+    const text = reasonText(gap) +
       (gap.to_ms === null ? '' : ` ${durationText(gap.to_ms - gap.from_ms)}`);
     if (first && ctx.measureText(text).width < to - from - 4) {
       ctx.fillStyle = cssColor('--ink-soft');
@@ -77,6 +77,9 @@ function drawGaps(u, ctx, {left, top, width, height}, gaps, first) {
     }
   }
 }
+
+/** "monitor down" */
+export const reasonText = ({reason}) => reason.replaceAll('_', ' ');
 
 // Detected: a thin strip along the upper edge; isolated: a thick one.
 function drawRibbon(u, ctx, {top}, table) {
@@ -111,9 +114,13 @@ function drawMarks(u, ctx, {left, top, width, height}, marks, first) {
     const room = ctx.measureText(text).width + 8 * ratio;
     row = x - lastX < room ? row + 1 : 0;
     lastX = x;
-    ctx.textAlign = x + room > left + width ? 'right' : 'left';
-    ctx.fillText(text, x + (ctx.textAlign === 'left' ? 4 : -4) * ratio,
-        top + (13 + 13 * row) * ratio);
+    const start = x + room > left + width ? x - room : x + 2 * ratio;
+    ctx.fillStyle = cssColor('--raised');
+    ctx.fillRect(start, top + (2 + 14 * row) * ratio, room - 2 * ratio,
+        14 * ratio);
+    ctx.fillStyle = cssColor('--ink');
+    ctx.textAlign = 'left';
+    ctx.fillText(text, start + 3 * ratio, top + (13 + 14 * row) * ratio);
   }
 }
 

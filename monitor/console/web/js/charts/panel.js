@@ -170,7 +170,7 @@ export class Panel {
     const {threshold, lines} = this.panel;
     lines.forEach(({column}, i) => {
       const d = this.scene.table[column]?.at(-1);
-      this.u.series[i + 1].width = d >= threshold ? 2.5 : 1.25;
+      this.u.series[i + 1].width = d >= threshold ? 2 : 1.25;
       this.#entries[i].button.classList.toggle('strong', d >= threshold);
     });
   }

@@ -4,11 +4,11 @@
 import {h, replace, setText} from '../dom.js';
 import {markWord} from '../faults.js';
 import {durationText, timeText} from '../format.js';
+import {reasonText} from './overlay.js';
 import {Panel} from './panel.js';
 import {panelsOf} from './panels.js';
 
 const kLeastSpanMs = 5000;
-const kFreshMs = 3600000;
 let count = 0;
 
 export class Timeline {
@@ -26,12 +26,16 @@ export class Timeline {
   #resize = new ResizeObserver(() => this.#fit());
   #data;
 
-  /** `live`: the newest is where it goes on; else all of it is shown. */
-  constructor(data, {live, nowMs, describe}) {
+  /**
+   * `live`: the newest is where it goes on; else all of it is shown.
+   * `silentMs()`: for how long nothing was heard.
+   */
+  constructor(data, {live, nowMs, silentMs, describe}) {
     this.#data = data;
     this.#spanMs = live ? 15 * 60000 : null;
     this.live = live;
     this.nowMs = nowMs;
+    this.silentMs = silentMs;
     this.#buttons = h('div', {
       'class': 'chart-tools', 'role': 'group', 'aria-label': 'Time shown'});
     this.#panelBox.tabIndex = 0;
@@ -118,7 +122,7 @@ export class Timeline {
       `${size} instants from ${timeText(columns.t[0])} to ` +
       `${timeText(columns.t.at(-1))}. ` + (gaps.length === 0 ? 'No gaps. ' :
         `${gaps.length} ${gaps.length === 1 ? 'gap' : 'gaps'}: ` +
-        list(gaps, (gap) => `${timeText(gap.from_ms)} ${gap.reason}` +
+        list(gaps, (gap) => `${timeText(gap.from_ms)} ${reasonText(gap)}` +
           (gap.to_ms === null ? '' :
             `, ${durationText(gap.to_ms - gap.from_ms)}`)) + '. ') +
       (marks.length === 0 ? '' : 'Marks: ' + list(marks, (mark) =>
@@ -130,9 +134,7 @@ export class Timeline {
     const {t} = this.#scene.table;
     const first = t[0] ?? this.nowMs() - 60000;
     const last = t.at(-1) ?? this.nowMs();
-    const now = this.nowMs();
-    const end = this.live && this.#data.openGapFromMs !== null &&
-        now > last && now - last < kFreshMs ? now : last;
+    const end = last + (this.live ? this.silentMs() : 0);
     const begin = this.#spanMs === null ? first : end - this.#spanMs;
     return [begin, Math.max(end, begin + kLeastSpanMs)];
   }

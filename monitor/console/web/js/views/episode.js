@@ -51,12 +51,11 @@ function facts({episode: row, model_hash: hash}) {
 }
 
 function eventText(event) {
+  const isolated = members(event.faults).length > 0;
   return [
-    event.faults ? faultTitle(event.faults) : null,
-    event.factor === null || event.factor === undefined ? null :
-      `factor ${factorText(event.factor)}`,
-    event.strength === null || event.strength === undefined ? null :
-      `strength ${percentText(event.strength)}`,
+    isolated ? faultTitle(event.faults) : null,
+    isolated ? `factor ${factorText(event.factor)}` : null,
+    isolated ? `strength ${percentText(event.strength)}` : null,
     event.value, event.reason && (kEndWords[event.reason] ?? event.reason),
     event.comment,
   ].filter(Boolean).join(', ');

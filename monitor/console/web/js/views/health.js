@@ -43,16 +43,16 @@ function tableOf(health) {
 
 function trendTable(trends) {
   const heads = ['Limit', 'Now', 'A day', 'Reaches it'];
-  const unit = (trend) => unitText(trend.unit);
+  const withUnit = (value, {unit}) => value === null ? '–' :
+    `${numberText(value)} ${unitText(unit)}`;
   return scrollable('Trends to limits', h('table', {class: 'small'},
       h('caption', {}, 'Trends to limits'),
       h('thead', {}, h('tr', {}, heads.map((text) =>
         h('th', {scope: 'col'}, text)))),
       h('tbody', {}, trends.map((trend) => h('tr', {},
-          h('th', {scope: 'row'}, trend.limit),
-          h('td', {}, `${numberText(trend.now)} ${unit(trend)}`),
-          h('td', {}, trend.per_day === null ? '–' :
-            `${numberText(trend.per_day)} ${unit(trend)}`),
+          h('th', {scope: 'row'}, trend.limit.replace('=', ' = ')),
+          h('td', {}, withUnit(trend.now, trend)),
+          h('td', {}, withUnit(trend.per_day, trend)),
           h('td', {}, trend.text))))));
 }
 

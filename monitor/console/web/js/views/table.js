@@ -65,9 +65,9 @@ export const columns = {
     factorText(row.peak_factor)},
   strength: {text: 'Strength', class: 'num wide', cell: (row) =>
     percentText(row.strength)},
-  discipline: {text: 'For', class: 'wide', cell: (row) =>
+  discipline: {text: 'For', class: 'wider', cell: (row) =>
     row.discipline ?? '–'},
-  namur: {text: 'NE 107', class: 'wide', cell: (row) => namurText(row.namur)},
+  namur: {text: 'NE 107', class: 'wider', cell: (row) => namurText(row.namur)},
   label: {text: 'Label', class: 'wide', cell: (row) => labelText(row.label)},
 };
 

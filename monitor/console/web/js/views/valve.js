@@ -18,7 +18,7 @@ import {exportPng} from '../charts/export.js';
 import {HealthSection} from './health.js';
 
 const kTrendSeconds = 900;  // What the monitor keeps.
-const kWordsPeriodMs = 5000;
+const kWordsPeriodMs = 2000;
 
 function stateLine(tile) {
   if (!tile) return ['not heard of yet'];
@@ -98,7 +98,8 @@ class ValvePage {
     this.title = id;
     this.#health = new HealthSection(id);
     this.#timeline = new Timeline(this.#data, {
-      live: true, nowMs: () => store.nowMs(),
+      live: true, nowMs: () => store.nowMs(), silentMs: () =>
+        store.stream.connected ? 0 : Date.now() - store.stream.heardMs,
       describe: `Trend of ${id}; arrows move, plus and minus zoom`,
     });
     this.element = h('article', {class: 'valve'},
