@@ -43,7 +43,7 @@ std::vector<StoredAccumulator> ShadowAccumulators(Database& history);
 /// Settings of ListShadow().
 struct ShadowFilter {
   std::string valve_glob{"*"};  ///< As in a shell: * ? [...].
-  std::string candidate;        ///< NAME or NAME@VERSION; empty: any.
+  std::string candidate{};      ///< NAME or NAME@VERSION; empty: any.
   std::int64_t since_ns{std::numeric_limits<std::int64_t>::min()};
   std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
   std::int64_t limit{0};  ///< The newest so many; 0: all.

@@ -10,6 +10,7 @@
 #include "storage/cli/time_text.h"
 #include "storage/health_retention.h"
 #include "storage/retention.h"
+#include "storage/shadow_retention.h"
 
 namespace fdi::storage {
 namespace {
@@ -38,6 +39,7 @@ struct PruneOptions {
   FileOptions runs;
   FileOptions history;
   FileOptions health;
+  FileOptions shadow;
   bool dry_run{false};
 };
 
@@ -72,6 +74,12 @@ std::vector<Pruned> PruneAll(const PruneOptions& options,
     pruned.push_back(
         {"history.db", "hours of health",
          PruneHealth(data.history(), options.health.Limits(options.dry_run))});
+  }
+  if (options.shadow.Asked()) {
+    require(data.history());
+    pruned.push_back(
+        {"history.db", "shadow differences",
+         PruneShadow(data.history(), options.shadow.Limits(options.dry_run))});
   }
   return pruned;
 }
@@ -110,10 +118,10 @@ void PrintPruned(const std::vector<Pruned>& pruned, const Context& context) {
 
 int Prune(const PruneOptions& options, const Context& context) {
   if (!options.runs.Asked() && !options.history.Asked() &&
-      !options.health.Asked()) {
+      !options.health.Asked() && !options.shadow.Asked()) {
     throw ConfigError(
         "prune: say what may go: --runs-age, --runs-size, --history-age, "
-        "--history-size or --health-age");
+        "--history-size, --health-age or --shadow-age");
   }
   const std::vector<Pruned> pruned = PruneAll(options, DataOf(context));
   if (context.options.json) {
@@ -155,12 +163,14 @@ void AddPruneVerb(cli::Program& program) {
   CLI::App& verb = program.AddVerb(
       "prune",
       "Delete old recorded runs, old episodes that are closed, acknowledged "
-      "and not labelled, and old hours of health",
+      "and not labelled, old hours of health and old differences of candidates",
       [options](const Context& c) { return Prune(*options, c); });
   AddLimits(verb, "runs", options->runs);
   AddLimits(verb, "history", options->history);
   verb.add_option("--health-age", options->health.age,
                   "Delete hours of health that are older: 1000d, ...");
+  verb.add_option("--shadow-age", options->shadow.age,
+                  "Delete differences of a candidate that are older: 90d, ...");
   verb.add_flag("--dry-run", options->dry_run, "Only say what would go");
 }
 

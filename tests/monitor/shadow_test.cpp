@@ -1,3 +1,5 @@
+#include "monitor/app/shadow.h"
+
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,6 +13,7 @@
 namespace fdi::monitor {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
@@ -229,6 +232,21 @@ TEST_F(ShadowPipelineTest, CandidateIsKeptAndNeverHeardOfOutside) {
   EXPECT_THAT(history_.kept.shadow_accumulators, SizeIs(1));
   ASSERT_NE(pipeline_->shadow_counts(), nullptr);
   EXPECT_EQ(pipeline_->shadow_counts()->recorded, 1U);
+}
+
+TEST(ShadowMetricsTest, CountsAreFamiliesOfThePage) {
+  ShadowCounts counts;
+  counts.samples[1] = 7;
+  counts.recorded = 2;
+  counts.valves[static_cast<std::size_t>(ShadowFit::kSignals)] = 3;
+
+  const std::string page = ShadowMetrics(counts);
+
+  EXPECT_THAT(
+      page,
+      AllOf(HasSubstr("fdi_shadow_samples_total{outcome=\"differed\"} 7\n"),
+            HasSubstr("fdi_shadow_differences_total{outcome=\"recorded\"} 2\n"),
+            HasSubstr("fdi_shadow_valves{fit=\"signals\"} 3\n")));
 }
 
 TEST_F(ShadowPipelineTest, WithoutACandidateNothingIsCompared) {

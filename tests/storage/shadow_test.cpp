@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "storage/history.h"
+#include "storage/shadow_retention.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {
@@ -82,6 +83,22 @@ TEST_F(ShadowTest, FiltersAreValveCandidateTimeAndNumber) {
   EXPECT_THAT(valves({.since_ns = kDetected + 150 * kSecond}),
               ElementsAre("PV-2", "LV-3"));
   EXPECT_THAT(valves({.limit = 1}), ElementsAre("LV-3"));
+}
+
+TEST_F(ShadowTest, OldStretchesArePruned) {
+  Keep({Stretch("LV-1", 0, 10), Stretch("LV-1", 100, 10)});
+  RetentionLimits limits;
+  limits.before_ns = kDetected + 50 * kSecond;
+  limits.dry_run = true;
+  EXPECT_EQ(PruneShadow(path_, limits).deleted, 1);
+  EXPECT_THAT(ListShadow(database_), SizeIs(2));
+
+  limits.dry_run = false;
+  EXPECT_EQ(PruneShadow(path_, limits).deleted, 1);
+
+  EXPECT_THAT(ListShadow(database_),
+              ElementsAre(Field(&ShadowDifference::from_ns,
+                                kDetected + 100 * kSecond)));
 }
 
 TEST_F(ShadowTest, AccumulatorsAreThoseKeptLast) {
