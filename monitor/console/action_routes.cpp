@@ -84,9 +84,13 @@ Json Shelve(const Api& api, const httplib::Request& request) {
 
 Json EndShelf(const Api& api, const httplib::Request& request) {
   const Json body = BodyOf(request);
-  return ShelfJson(storage::HistoryEditor(api.sources.history)
-                       .EndShelf(std::stoll(request.matches[1]),
-                                 NoteOf(body, request, api)));
+  try {
+    return ShelfJson(storage::HistoryEditor(api.sources.history)
+                         .EndShelf(std::stoll(request.matches[1]),
+                                   NoteOf(body, request, api)));
+  } catch (const DataError& error) {  // It is over already.
+    throw ConfigError(error.what());
+  }
 }
 
 using Action = Json (*)(const Api&, const httplib::Request&);

@@ -30,6 +30,17 @@ std::string NewInstance() {
   return text;
 }
 
+std::string Reason(int status) {
+  switch (status) {
+    case 404:
+      return "there is no such page";
+    case 413:
+      return "the body has more than " + std::to_string(kMaxBody) + " bytes";
+    default:
+      return "this request cannot be answered";
+  }
+}
+
 }  // namespace
 
 // Shows events that went to the bus.
@@ -159,9 +170,7 @@ void Console::Guard() {
       [](const httplib::Request& request, httplib::Response& response) {
         if (response.body.empty()) {
           SendError(response, response.status,
-                    response.status == 404
-                        ? request.path + ": there is no such page"
-                        : "this request cannot be answered");
+                    request.path + ": " + Reason(response.status));
         }
         return httplib::Server::HandlerResponse::Handled;
       }));

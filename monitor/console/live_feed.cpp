@@ -112,13 +112,9 @@ void LiveFeed::TellSamples() {
     if (client->valve().empty()) {
       continue;
     }
-    const auto trend =
-        client->next_sample
-            ? parts_.board.Since(client->valve(), *client->next_sample)
-            : parts_.board.Trend(client->valve(), 0);
+    const auto trend = parts_.board.Since(client->valve(), client->next_sample);
     if (!trend) {
-      client->next_sample = 0;  // Not seen yet: all of it is new.
-      continue;
+      continue;  // Not seen yet.
     }
     client->next_sample = trend->next;
     Json samples = Json::array();

@@ -52,14 +52,14 @@ void StreamClient::End() {
 }
 
 std::shared_ptr<StreamClient> StreamHub::Admit(
-    std::string valve, const StreamClient::Message& hello) {
+    StreamClient::Wish wish, const StreamClient::Message& hello) {
   const std::lock_guard lock(mutex_);
   if (closed_ || clients_.size() >= options_.max_clients) {
     ++counts_.refused;
     return nullptr;
   }
   auto client =
-      std::make_shared<StreamClient>(std::move(valve), options_.max_bytes);
+      std::make_shared<StreamClient>(std::move(wish), options_.max_bytes);
   client->Push(hello);
   clients_.push_back(client);
   ++counts_.admitted;

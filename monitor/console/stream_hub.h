@@ -6,7 +6,6 @@
 #include <deque>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,9 +22,17 @@ class StreamClient {
   using Message = std::shared_ptr<const std::string>;
   enum class Outcome : std::uint8_t { kMessage, kTimeout, kEnded };
 
+  /// Of which valve it wants the samples, from which one on.
+  struct Wish {
+    std::string valve;  ///< Empty: of none.
+    std::uint64_t next_sample{0};
+  };
+
   /// @param max_bytes that may wait; at least one message may.
-  StreamClient(std::string valve, std::size_t max_bytes)
-      : valve_(std::move(valve)), max_bytes_(max_bytes) {}
+  StreamClient(Wish wish, std::size_t max_bytes)
+      : next_sample(wish.next_sample),
+        valve_(std::move(wish.valve)),
+        max_bytes_(max_bytes) {}
 
   /// Never waits. @returns false if the client was too slow: it is ended.
   bool Push(const Message& message);
@@ -37,7 +44,7 @@ class StreamClient {
   const std::string& valve() const { return valve_; }
 
   /// For LiveBoard::Since(); of the thread that pushes.
-  std::optional<std::uint64_t> next_sample;
+  std::uint64_t next_sample;
 
  private:
   const std::string valve_;
@@ -70,7 +77,7 @@ class StreamHub {
 
   /// @param hello what it is told first. @returns null if all places are taken
   ///   or it was closed.
-  std::shared_ptr<StreamClient> Admit(std::string valve,
+  std::shared_ptr<StreamClient> Admit(StreamClient::Wish wish,
                                       const StreamClient::Message& hello);
   void Release(const std::shared_ptr<StreamClient>& client);
 

@@ -29,8 +29,10 @@ void Stream(const Api& api, const httplib::Request& request,
     SendError(response, 400, "valve: expected an id of 1..64 bytes");
     return;
   }
+  // What comes after hello is told, so that a trend asked for then fits on.
+  const auto trend = api.board.Trend(valve, 0);
   const auto client = api.hub.Admit(
-      valve,
+      {valve, trend ? trend->next : 0},
       StreamEvent("hello", Dump({{"now_ms", Ms(api.sources.utc_now_ns())},
                                  {"instance", api.instance}})));
   if (!client) {

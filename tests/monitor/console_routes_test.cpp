@@ -208,6 +208,8 @@ TEST_F(ConsoleRoutesTest, AnAlarmIsAcknowledgedLabelledAndShelved) {
   EXPECT_EQ(action["origin"], "console 127.0.0.1");
   Post("/api/v1/shelf/" + shelf["shelf_id"].dump() + "/end", {{"who", "bo"}});
   EXPECT_TRUE(Get("/api/v1/shelf")["shelf"].empty());
+  Post("/api/v1/shelf/" + shelf["shelf_id"].dump() + "/end", {{"who", "bo"}},
+       400);
 }
 
 TEST_F(ConsoleRoutesTest, WithoutTheTokenNothingIsChanged) {

@@ -21,7 +21,7 @@ TEST(ConsoleStreamTest, AnEventIsOneBlockOfText) {
 
 TEST(ConsoleStreamTest, AClientGetsHelloAndThenAllInOrder) {
   StreamHub hub;
-  const auto client = hub.Admit("V1", Text("hello"));
+  const auto client = hub.Admit({"V1", 0}, Text("hello"));
   hub.Broadcast(Text("one"));
   hub.Send(*client, Text("two"));
 
@@ -35,8 +35,8 @@ TEST(ConsoleStreamTest, AClientGetsHelloAndThenAllInOrder) {
 
 TEST(ConsoleStreamTest, AClientThatDoesNotReadIsDroppedAndCounted) {
   StreamHub hub({2, 1000});
-  const auto slow = hub.Admit("", Text("hello"));
-  const auto quick = hub.Admit("", Text("hello"));
+  const auto slow = hub.Admit({}, Text("hello"));
+  const auto quick = hub.Admit({}, Text("hello"));
   StreamClient::Message message;
   for (int i = 0; i < 100; ++i) {
     hub.Broadcast(Text(std::string(100, 'x')));
@@ -53,7 +53,7 @@ TEST(ConsoleStreamTest, AClientThatDoesNotReadIsDroppedAndCounted) {
 
 TEST(ConsoleStreamTest, OneMessageMayBeLargerThanTheQueue) {
   StreamHub hub({1, 10});
-  const auto client = hub.Admit("", Text(std::string(1000, 'x')));
+  const auto client = hub.Admit({}, Text(std::string(1000, 'x')));
   StreamClient::Message message;
 
   EXPECT_EQ(client->Next(milliseconds(0), message), Outcome::kMessage);
@@ -64,20 +64,20 @@ TEST(ConsoleStreamTest, PlacesAreBoundedAndComeFree) {
   StreamHub hub;
   std::vector<std::shared_ptr<StreamClient>> clients;
   for (int i = 0; i < 16; ++i) {
-    clients.push_back(hub.Admit("", Text("hello")));
+    clients.push_back(hub.Admit({}, Text("hello")));
     ASSERT_NE(clients.back(), nullptr);
   }
 
-  EXPECT_EQ(hub.Admit("", Text("hello")), nullptr);
+  EXPECT_EQ(hub.Admit({}, Text("hello")), nullptr);
   hub.Release(clients.front());
-  EXPECT_NE(hub.Admit("", Text("hello")), nullptr);
+  EXPECT_NE(hub.Admit({}, Text("hello")), nullptr);
   EXPECT_EQ(hub.counts().admitted, 17U);
   EXPECT_EQ(hub.counts().refused, 1U);
 }
 
 TEST(ConsoleStreamTest, ClosingEndsThoseWhoWaitAndAdmitsNone) {
   StreamHub hub;
-  const auto client = hub.Admit("", Text("hello"));
+  const auto client = hub.Admit({}, Text("hello"));
   StreamClient::Message message;
   client->Next(milliseconds(0), message);
   Outcome outcome = Outcome::kMessage;
@@ -87,7 +87,7 @@ TEST(ConsoleStreamTest, ClosingEndsThoseWhoWaitAndAdmitsNone) {
   waiting.join();
 
   EXPECT_EQ(outcome, Outcome::kEnded);
-  EXPECT_EQ(hub.Admit("", Text("hello")), nullptr);
+  EXPECT_EQ(hub.Admit({}, Text("hello")), nullptr);
 }
 
 }  // namespace

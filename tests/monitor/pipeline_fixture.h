@@ -30,7 +30,7 @@ class PipelineTest : public testing::Test {
 
   void Start(SampleSink* samples = nullptr) {
     pipeline_ = std::make_unique<Pipeline>(
-        options_, PipelineSinks{bus_, bus_, history_, samples},
+        options_, PipelineSinks{bus_, bus_, history_, samples, live_},
         std::make_shared<FixedResolver>(SharedLinearModels()), counters_, log_);
     pipeline_->Start({});
   }
@@ -51,6 +51,7 @@ class PipelineTest : public testing::Test {
   PipelineOptions options_;
   FakeBus bus_;
   FakeHistory history_;
+  LiveSink* live_{nullptr};
   Counters counters_;
   std::vector<std::string> lines_;
   ThrottledLog log_{[this](LogLevel, std::string_view line) {

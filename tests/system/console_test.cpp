@@ -156,6 +156,8 @@ TEST_F(ConsoleTest, AFaultIsOnTheStreamWithinTwoSecondsOfItsEvent) {
       R"re(event: tiles\n.*"id":"V1","state":"ISOLATED".*"unacked":true)re"));
   EXPECT_TRUE(listener.Await(R"re(event: sample\n.*"x":30.0)re"));
   EXPECT_EQ(Get("/api/v1/valves/V1/trend")["t_ms"].size(), 80U);
+  Publish(200, 201);
+  EXPECT_TRUE(listener.Await(R"re(event: gap\n.*"valve":"V1")re"));
 }
 
 TEST_F(ConsoleTest, AnAcknowledgementIsToldToAllAndSurvivesARestart) {

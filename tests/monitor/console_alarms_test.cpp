@@ -1,0 +1,121 @@
+#include <gmock/gmock.h>
+
+#include "monitor/console/alarm_book.h"
+#include "monitor/console/stored_models.h"
+#include "storage/cli/shared_files.h"
+#include "storage/history_editor.h"
+#include "storage/models.h"
+#include "tests/monitor/linear_models.h"
+#include "tests/storage/history_fixture.h"
+
+namespace fdi::console {
+namespace {
+
+class AlarmBookTest : public storage::HistoryFixture {
+ protected:
+  void Begin(const std::string& valve) {
+    writer_.Record(
+        Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve));
+  }
+  void End(const std::string& valve) {
+    writer_.Record(
+        Event(TransitionKind::kClosed, 60, 0, 0.1, EndReason::kCleared, valve));
+  }
+  std::string IdOf(const std::string& valve) const {
+    return storage::EpisodeIdText(Id(valve));
+  }
+
+  storage::HistoryWriter writer_{path_};
+  cli::FaultTexts texts_{cli::SharedFile("faults.toml")};
+  AlarmBook book_{path_, texts_};
+};
+
+TEST_F(AlarmBookTest, TellsWhatChangesFromTheFirstLookOn) {
+  Begin("OLD");
+  EXPECT_TRUE(book_.Refresh(kDetected).empty());
+  Begin("NEW");
+  const std::vector<Json> news = book_.Refresh(kDetected);
+
+  ASSERT_EQ(news.size(), 1U);
+  EXPECT_EQ(news[0]["valve"], "NEW");
+  EXPECT_EQ(news[0]["isa"], "UNACK");
+  EXPECT_TRUE(book_.Refresh(kDetected).empty());
+  const auto valves = book_.ByValve();
+  EXPECT_EQ(valves->at("OLD").since_ns, kDetected);
+  EXPECT_EQ(valves->at("NEW").episode, IdOf("NEW"));
+  EXPECT_TRUE(valves->at("NEW").unacked);
+}
+
+TEST_F(AlarmBookTest, TellsWhatAnotherProgramDidAndWhatIsOffTheList) {
+  Begin("V");
+  book_.Refresh(kDetected);
+  storage::HistoryEditor(path_).Acknowledge(IdOf("V"), By("anna", kDetected));
+  const std::vector<Json> acked = book_.Refresh(kDetected);
+  End("V");
+  const std::vector<Json> ended = book_.Refresh(kDetected);
+
+  ASSERT_EQ(acked.size(), 1U);
+  EXPECT_EQ(acked[0]["isa"], "ACKED");
+  ASSERT_EQ(ended.size(), 1U);
+  EXPECT_EQ(ended[0]["isa"], "NORMAL");
+  EXPECT_EQ(ended[0]["state"], "CLOSED");
+  EXPECT_TRUE(book_.ByValve()->empty());
+}
+
+TEST_F(AlarmBookTest, TellsWhenAShelfRunsOut) {
+  Begin("V");
+  const std::int64_t until_ns = kDetected + 600 * kSecond;
+  storage::HistoryEditor(path_).Shelve("V", std::nullopt, until_ns,
+                                       By("anna", kDetected));
+  book_.Refresh(kDetected + kSecond);
+  EXPECT_EQ(book_.ByValve()->at("V").shelved_until_ns, until_ns);
+  EXPECT_TRUE(book_.Refresh(until_ns - 1).empty());
+  const std::vector<Json> back = book_.Refresh(until_ns);
+
+  ASSERT_EQ(back.size(), 1U);
+  EXPECT_TRUE(back[0]["shelved"].is_null());
+  EXPECT_EQ(back[0]["isa"], "UNACK");
+  EXPECT_FALSE(book_.ByValve()->at("V").shelved_until_ns);
+}
+
+class StoredModelsTest : public testing::Test {
+ protected:
+  StoredModelsTest() {
+    storage::ModelStore store(path_, storage::Access::kOccasionalWriter);
+    const ModelSet saved = store.Save(monitor::LinearModels());
+    episode_.model_set = "linear@1";
+    episode_.model_hash = saved.content_hash;
+    episode_.channels = {"X", "F"};
+    episode_.faults = {"f1"};
+    episode_.flow_unit = FlowUnit::kTPerHour;
+  }
+
+  storage::TemporaryDirectory directory_;
+  std::filesystem::path path_{directory_.path() / "models.db"};
+  storage::Episode episode_;
+};
+
+TEST_F(StoredModelsTest, GiveTheThresholdsThatHeld) {
+  StoredModels models(path_);
+
+  const auto facts = models.For(episode_);
+  ASSERT_EQ(facts->channels.size(), 1U);
+  EXPECT_EQ(facts->channels[0].low, -5.0);
+  EXPECT_EQ(facts->isolation_threshold, 0.7);
+  EXPECT_EQ(models.For(episode_), facts);
+}
+
+TEST_F(StoredModelsTest, OfAnotherContentTheEpisodeTellsTheNames) {
+  StoredModels models(path_);
+  models.For(episode_);
+  episode_.model_hash ^= 1U;
+
+  const auto facts = models.For(episode_);
+  ASSERT_EQ(facts->channels.size(), 2U);
+  EXPECT_EQ(facts->channels[1].unit, "t/h");
+  EXPECT_TRUE(std::isnan(facts->channels[0].low));
+  EXPECT_EQ(facts->faults, std::vector<std::string>{"f1"});
+}
+
+}  // namespace
+}  // namespace fdi::console
