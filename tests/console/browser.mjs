@@ -17,8 +17,8 @@ export function launch() {
 }
 
 /**
- * A window at a link of the page. `window.faults` are the errors of scripts,
- * `window.hosts` whom it asked for anything.
+ * A window at a link of the page. Its `faults` are the errors of scripts and
+ * what they tried in vain, its `hosts` whom it asked for anything.
  */
 export async function open(browser, address, hash, options = {}) {
   const context = await browser.newContext({
@@ -27,6 +27,12 @@ export async function open(browser, address, hash, options = {}) {
   page.faults = [];
   page.hosts = new Set();
   page.on('pageerror', (error) => page.faults.push(error.stack));
+  // What the policy of the page forbids never becomes a request.
+  page.on('console', (message) => {
+    if (message.text().includes('Content Security Policy')) {
+      page.faults.push(message.text());
+    }
+  });
   page.on('request', (request) => page.hosts.add(new URL(request.url()).origin));
   await page.goto(`${address}/${hash}`);
   return page;

@@ -27,6 +27,14 @@ export class Plant {
   #domain = String(70 + process.pid % 20);
   #children = new Set();
 
+  constructor() {
+    process.once('exit', () => this.#kill());
+  }
+
+  #kill() {
+    for (const child of this.#children) child.kill('SIGKILL');
+  }
+
   /** Runs a program to its end. @returns its stdout. */
   async run(program, ...words) {
     const {stdout} = await promisify(execFile)(path.join(bin, program),
@@ -73,7 +81,7 @@ export class Plant {
   }
 
   async stop() {
-    for (const child of this.#children) child.kill('SIGKILL');
+    this.#kill();
     await Promise.all([...this.#children].map((child) => child.ended));
     rmSync(this.data, {recursive: true, force: true});
   }
