@@ -288,6 +288,7 @@ TEST_F(AppLabelsTest, OptionsOfLabelsNeedThem) {
   EXPECT_EQ(Run("train --from-labels").code, 3);  // There is no history.db.
   EXPECT_EQ(Run("train --runs 1a --dry-run").code, 2);
   EXPECT_EQ(Run("train --from-labels --campaign c.toml").code, 2);
+  EXPECT_EQ(Run("train --from-labels --print-campaign").code, 2);
 }
 
 }  // namespace

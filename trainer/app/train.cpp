@@ -41,6 +41,11 @@ void CheckOptions(const TrainOptions& options) {
       throw ConfigError(std::string(name) + " is of --from-labels");
     }
   }
+  if (options.from_labels && options.print_campaign) {
+    throw ConfigError(
+        "--print-campaign: with --from-labels, --dry-run says what would be "
+        "done");
+  }
 }
 
 // `train --runs` is a campaign in memory.

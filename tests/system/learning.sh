@@ -1,0 +1,113 @@
+#!/usr/bin/env bash
+# The whole way of docs/learning.md with the built programs over DDS: a fault
+# that the set does not know is recorded, labelled, learnt, compared and run in
+# the shadow. Usage: learning.sh FOLDER-OF-PROGRAMS
+set -euo pipefail
+bin=$(cd "$1" && pwd)
+work=$(mktemp -d)
+export FDI_DATA=$work/data
+domain=$((60 + $$ % 40))
+monitor=
+trap '[ -z "$monitor" ] || kill -9 "$monitor" 2>/dev/null; rm -rf "$work"' EXIT
+cd "$work"
+
+fail() {
+  echo "learning: $*" >&2
+  cat ./*.log >&2
+  exit 1
+}
+expect() {  # WHAT FOUND WANTED
+  [ "$2" = "$3" ] || fail "$1: $2, wanted $3"
+}
+history() { sqlite3 -readonly "$FDI_DATA/history.db" "$1"; }
+# SQL over the columns value of what PATH holds in a JSON file.
+json() {  # FILE PATH SQL
+  sqlite3 :memory: "with j as (select * from json_each(
+    cast(readfile('$1') as text), '$2')) $3"
+}
+start() {  # OPTIONS
+  : >monitor.log
+  "$bin/fdi-monitor" --domain "$domain" run "$@" 2>monitor.log &
+  monitor=$!
+  timeout 30 sh -c 'until grep -q monitor_ready monitor.log; do sleep 0.05; done' ||
+    fail "the monitor does not start"
+}
+stop() {
+  kill -TERM "$monitor"
+  wait "$monitor" || fail "the monitor ended with $?"
+  monitor=
+}
+publish() {  # SEED
+  timeout 60 "$bin/fdi-simulator" --domain "$domain" run --scenario plant.toml \
+    --seed "$1" --speed max >simulator.log 2>&1 || fail "the simulator fails"
+  timeout 30 sh -c "until grep -q 'transition=CLOSED' monitor.log; do sleep 0.05; done" ||
+    fail "the episode does not end"
+}
+
+common='parameters = "paper-operating-point"
+excitation = {name = "operating-point", amplitude_pct = 8, period_s = 80}'
+cat >campaign.toml <<TOML
+name = "valve"
+[training]
+max_rules = 1
+max_regressors = 2
+starts = 1
+[scenario]
+$common
+duration_s = 300
+[[run]]
+simulate = {duration_s = 900}
+[[run]]
+simulate = {}
+faults = ["f19"]
+strengths = [0.5]
+[[validation]]
+simulate = {duration_s = 600, seed = 500}
+repeat = 6
+faults = ["f1:abrupt@300"]
+strengths = [0.5]
+TOML
+cat >plant.toml <<TOML
+valve = "LV-1"
+$common
+duration_s = 1200
+faults = ["f1:abrupt@600:strength=0.5"]
+TOML
+
+"$bin/fdi-trainer" train --campaign campaign.toml >/dev/null 2>train.log
+start
+publish 77
+stop
+expect 'fault of the episode' \
+  "$(history 'select fault from fault_history')" unknown
+episode=$(history 'select episode_id from fault_history')
+"$bin/fdi-store" history label "$episode" f1 --by kim >/dev/null
+
+"$bin/fdi-trainer" train --from-labels --strength "$episode=0.5" --json \
+  >trained.json 2>train.log || fail "training fails"
+expect 'lineage' "$(json trained.json '$.lineage.episodes' \
+  "select value ->> 'episode_id', value ->> 'labelled_by', value ->> 'fault'
+   from j")" "$episode|kim|f1"
+
+"$bin/fdi-trainer" compare valve@1 valve@2 --campaign campaign.toml --json \
+  >compared.json 2>compare.log || fail "comparing fails"
+expect 'right by the parent, right by the new set, of' \
+  "$(sqlite3 :memory: "select c ->> '\$.a.exact', c ->> '\$.b.exact',
+    c ->> '\$.b.faulty_runs' from
+    (select cast(readfile('compared.json') as text) as c)")" '0|6|6'
+expect 'judgement' "$(json compared.json '$.measures' \
+  "select value ->> 'judgement' from j
+   where value ->> 'measure' = 'final set'")" 'valve@2 is better (p = 0.0313)'
+
+start --shadow valve
+publish 78
+stop
+"$bin/fdi-store" history shadow --json >shadow.json
+expect 'what the shadow said' "$(json shadow.json '$.differences' \
+  "select value ->> '\$.active.model_set', value ->> '\$.active.state',
+   value ->> '\$.candidate.model_set', value ->> '\$.candidate.state',
+   value ->> '\$.candidate.fault' from j")" \
+  'valve@1|DETECTED|valve@2|ISOLATED|f1'
+expect 'sets that have episodes' \
+  "$(history 'select distinct model_set from fault_history')" valve@1
+echo "learning: ok"
