@@ -45,7 +45,7 @@ function alarmSummary() {
 
 function bannerText() {
   const {stream} = store;
-  if (stream.connected) return '';
+  if (stream.connected || stream.resting) return '';
   if (stream.heardMs === null) {
     return stream.retryMs ? `No connection: ${stream.reason}.` : '';
   }

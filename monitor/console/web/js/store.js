@@ -25,7 +25,7 @@ class Store extends EventTarget {
     this.stream.addEventListener('message', ({detail}) => this.#take(detail));
     this.stream.addEventListener('state', () => this.#connection());
     this.stream.open(null);
-    setInterval(() => this.refreshStatus(), kStatusPeriodMs);
+    setInterval(() => this.#poll(), kStatusPeriodMs);
     this.refreshStatus();
     this.#resync();
     this.#probeWorklist();
@@ -44,6 +44,12 @@ class Store extends EventTarget {
   /** The model set of that name, or null. */
   modelSet(name) {
     return this.status?.model_sets?.find((m) => m.model_set === name) ?? null;
+  }
+
+  // A page that nobody looks at has no stream; its title still counts alarms.
+  #poll() {
+    if (this.stream.resting) this.#resync();
+    else this.refreshStatus();
   }
 
   async refreshStatus() {

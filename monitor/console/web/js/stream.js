@@ -6,6 +6,9 @@ import {errorOf, url} from './api.js';
 const kSilenceMs = 12000;
 const kFirstDelayMs = 500;
 const kLongestDelayMs = 10000;
+// A browser has six connections to a monitor and a monitor has room for sixteen
+// pages: one that nobody looks at gives its own back.
+const kHiddenMs = 20000;
 
 /** Cuts "event: a\ndata: b\n\n" into {type, data}; text may come in pieces. */
 export class EventParser {
@@ -38,30 +41,56 @@ export class Stream extends EventTarget {
   heardMs = null;
   reason = '';
   retryMs = null;
+  resting = false;  // Nobody looks: the connection is given back.
   #valve = null;
   #abort = null;
   #previous = null;  // Is listened to until the next one speaks.
   #delayMs = kFirstDelayMs;
   #timer = null;
   #watchdog = null;
+  #hiding = null;
 
   constructor() {
     super();
     addEventListener('online', () => this.retryNow());
-    document.addEventListener('visibilitychange', () => {
-      if (!document.hidden) this.retryNow();
-    });
+    document.addEventListener('visibilitychange', () => this.#visibility());
+    if (document.hidden) this.#visibility();
   }
 
   /** Listens from now on; with the samples of `valve` unless null. */
   open(valve) {
     if (this.#abort && valve === this.#valve) return;
     this.#valve = valve;
-    this.#connect();
+    if (!this.resting) this.#connect();
   }
 
   retryNow() {
     if (this.#timer) this.#connect();
+  }
+
+  #visibility() {
+    clearTimeout(this.#hiding);
+    if (document.hidden) {
+      this.#hiding = setTimeout(() => this.#rest(), kHiddenMs);
+    } else if (this.resting) {
+      this.resting = false;
+      this.#connect();
+    } else {
+      this.retryNow();
+    }
+  }
+
+  #rest() {
+    this.resting = true;
+    clearTimeout(this.#timer);
+    clearTimeout(this.#watchdog);
+    this.#timer = null;
+    const abort = this.#abort;
+    this.#abort = null;  // Its end is no loss.
+    abort?.abort();
+    this.#previous?.abort();
+    this.connected = false;
+    this.dispatchEvent(new Event('state'));
   }
 
   async #connect() {

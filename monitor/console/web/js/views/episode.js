@@ -131,14 +131,15 @@ class EpisodePage {
         h('div', {class: 'row-end'},
             h('button', {type: 'button', onclick: () => this.#copy(copied)},
                 'Copy the link'), copied,
-            h('button', {type: 'button', onclick: () => exportPng(
-                this.#timeline, `${this.title}, episode ${this.id}`)},
-            'Save as PNG'),
+            this.#timeline ? h('button', {type: 'button', onclick: () =>
+              exportPng(this.#timeline, `${this.title}, episode ${this.id}`)},
+            'Save as PNG') : null,
             h('a', {'class': 'button', 'download': `${this.id}.csv`,
               'href': url(path('episodes', `${this.id}.csv`))},
             'Save as CSV')),
         h('dl', {class: 'facts'}, facts(found).map(([name, value]) =>
           h('div', {}, h('dt', {}, name), h('dd', {}, value)))),
+        this.#data.words ? h('p', {class: 'words'}, this.#data.words) : null,
         checks.map(({name, check}) => h('p', {class: 'checks'},
             h('strong', {}, `Check for ${name}: `), check)),
         this.#timeline ? this.#timeline.element :
