@@ -59,6 +59,13 @@ for block in "$out"/[0-9][0-9].*; do
   esac
 done
 
+# The page of step 5 answers.
+port=$(sed -n 's/.*console_listening address=127.0.0.1:\([0-9]*\).*/\1/p' \
+  "$out/service.log")
+exec 3<>"/dev/tcp/127.0.0.1/${port:?}"
+printf 'GET / HTTP/1.0\r\nHost: 127.0.0.1:%s\r\n\r\n' "$port" >&3
+head -n 1 <&3 | grep -q ' 200 ' || fail "the page does not answer"
+
 kill -TERM "$service"
 wait "$service" || fail "the monitor ended with $?"
 service=
