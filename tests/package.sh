@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes the Debian package, looks at what is in it and runs the programs from
 # where it unpacks. With FDI_PACKAGE_CHROOT=1 also installs, upgrades, removes
-# and purges it in a fresh Debian 12 (needs root, debootstrap and the network).
+# and purges it in a fresh Debian 12 (needs root, debootstrap and the network),
+# and asks lintian where there is one.
 # Usage: package.sh BUILD_DIRECTORY
 set -euo pipefail
 build=$(cd "$1" && pwd)
@@ -77,11 +78,12 @@ export FDI_DATA=$folder/data
 "$root/usr/bin/fdi-trainer" train --print-campaign \
   --campaign "$root/usr/share/fdi/campaigns/paper.toml" >/dev/null
 
+echo "package: $(basename "$package"), $(stat -c %s "$package") bytes," \
+  "$(find "$root" -name '*.1.gz' | wc -l) manual pages"
+[ -n "${FDI_PACKAGE_CHROOT:-}" ] || exit 0
+
 if command -v lintian >/dev/null; then
   errors=$(lintian --fail-on none "$package" 2>/dev/null | grep '^E:' || true)
   [ -z "$errors" ] || fail "$errors"
 fi
-echo "package: $(basename "$package"), $(stat -c %s "$package") bytes," \
-  "$(find "$root" -name '*.1.gz' | wc -l) manual pages"
-[ -n "${FDI_PACKAGE_CHROOT:-}" ] || exit 0
 "$(dirname "$0")/package_chroot.sh" "$package"

@@ -41,7 +41,7 @@ done
 # As a new user: from an empty directory to an episode.
 quietly within sh -ec 'cd /empty
   fdi-trainer train --campaign /usr/share/fdi/campaigns/paper.toml
-  fdi-monitor run --model-set paper 2>monitor.log &
+  fdi-monitor run --model-set paper --console=127.0.0.1:0 2>monitor.log &
   monitor=$!
   until grep -q monitor_ready monitor.log; do sleep 0.1; done
   fdi-simulator run --valve FV-101 --parameters paper-operating-point \
@@ -51,7 +51,8 @@ quietly within sh -ec 'cd /empty
   wait $monitor
   fdi-store history list --fault f19
   fdi-store history plot last --output episode.png
-  test -s episode.png'
+  test -s episode.png
+  grep console_listening monitor.log'
 within sh -c 'cd /empty && fdi-store history list --fault f19 --json' |
   grep -q '"fault": "f19"' || fail "no episode of f19"
 
