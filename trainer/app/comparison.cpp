@@ -134,7 +134,8 @@ std::string JudgementOf(const ComparedMeasure& measure, const std::string& a,
            ", needed are " + std::to_string(kLeastDecidedPairs) + ")";
   }
   const double p = PValue(test);
-  const std::string value = " (p = " + cli::FormatNumber(p, 4) + ")";
+  const std::string value =
+      p < 1e-4 ? " (p < 0.0001)" : " (p = " + cli::FormatNumber(p, 4) + ")";
   if (p > kSignificant) {
     return "no difference shown" + value;
   }
