@@ -1,4 +1,5 @@
 #include "idl/participant.h"
+#include "monitor/app/examples.h"
 #include "monitor/app/verbs.h"
 #include "storage/cli/program.h"
 
@@ -9,5 +10,6 @@ int main(int argc, char** argv) {
   fdi::monitor::AddRunVerb(program);
   fdi::monitor::AddWatchVerb(program);
   fdi::monitor::AddTopVerb(program);
+  program.AddExamples(fdi::monitor::Examples());
   return program.Run(argc, argv);
 }

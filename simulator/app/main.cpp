@@ -1,4 +1,5 @@
 #include "idl/participant.h"
+#include "simulator/app/examples.h"
 #include "simulator/app/sample_publisher.h"
 #include "simulator/app/verbs.h"
 #include "storage/cli/program.h"
@@ -13,5 +14,6 @@ int main(int argc, char** argv) {
   simulator::AddFaultsVerb(program);
   program.MapError<idl::TransportError>(cli::kExitTransport);
   program.MapError<simulator::NoReaderError>(cli::kExitTransport);
+  program.AddExamples(simulator::Examples());
   return program.Run(argc, argv);
 }

@@ -1,3 +1,4 @@
+#include "storage/app/examples.h"
 #include "storage/app/verbs.h"
 #include "storage/cli/program.h"
 
@@ -18,5 +19,6 @@ int main(int argc, char** argv) {
   fdi::storage::AddShadowVerb(program);
   fdi::storage::AddMaintenanceVerbs(program);
   fdi::storage::AddPruneVerb(program);
+  program.AddExamples(fdi::storage::Examples());
   return program.Run(argc, argv);
 }

@@ -20,6 +20,9 @@
 namespace fdi::cli {
 namespace {
 
+// What --check-examples throws.
+struct ExampleCheckRequest {};
+
 const CLI::App& Chosen(const CLI::App& app) {
   const auto chosen = app.get_subcommands();
   return chosen.empty() ? app : Chosen(*chosen.front());
@@ -116,6 +119,11 @@ Program::Program(std::string name, std::string description)
     : app_(std::make_unique<CLI::App>(std::move(description), name)) {
   AddGlobalOptions(*app_, options_);
   AddDocumentationOptions(*app_);
+  app_->add_flag_callback(
+          "--check-examples", [] { throw ExampleCheckRequest(); },
+          "Try whether the examples of --help are understood")
+      ->configurable(false)
+      ->group("");
   app_->fallthrough();
   app_->require_subcommand(1);
   app_->failure_message({});
@@ -145,6 +153,11 @@ CLI::App& Program::AddVerb(CLI::App& group, const std::string& name,
   verb.require_subcommand(0);
   verbs_.push_back({&verb, std::move(action)});
   return verb;
+}
+
+void Program::AddExamples(std::vector<VerbExamples> examples) {
+  examples_ = std::move(examples);
+  SetExamples(*app_, examples_);
 }
 
 int Program::Run(int argc, const char* const* argv) noexcept {
@@ -180,6 +193,8 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
   } catch (const PrintConfigRequest&) {
     std::cout << TomlConfig().to_config(app_.get(), true, false, {});
     return kExitOk;
+  } catch (const ExampleCheckRequest&) {
+    return ReportExamples();
   } catch (const CLI::Success& request) {
     return app_->exit(request);
   } catch (const CLI::ConfigError& error) {
@@ -191,6 +206,14 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
     throw fdi::ConfigError(in_config() + ": " + error.what());
   }
   return RunVerb(argc, argv);
+}
+
+int Program::ReportExamples() {
+  const std::vector<std::string> findings = CheckExamples(*app_, examples_);
+  for (const std::string& finding : findings) {
+    Report(finding);
+  }
+  return findings.empty() ? kExitOk : kExitFailure;
 }
 
 int Program::RunVerb(int argc, const char* const* argv) {

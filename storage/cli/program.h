@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diagnosis/log.h"
+#include "storage/cli/examples.h"
 #include "storage/cli/global_options.h"
 
 namespace CLI {
@@ -72,6 +73,11 @@ class Program {
   CLI::App& AddVerb(CLI::App& group, const std::string& name,
                     const std::string& description, VerbAction action);
 
+  /// Puts examples below the help of verbs, groups (both by path, "history
+  /// list") and, for "", the program; after the verbs were added.
+  /// @throws std::logic_error for a verb that is not there.
+  void AddExamples(std::vector<VerbExamples> examples);
+
   /// Exceptions of type E, and what derives from it, end with `code`. Known
   /// without: ConfigError and std::invalid_argument 2, DataError and
   /// filesystem and system errors 3, NotFoundError 5; all others 1.
@@ -94,6 +100,7 @@ class Program {
     VerbAction action;
   };
   int ParseAndRun(int argc, const char* const* argv);
+  int ReportExamples();
   int RunVerb(int argc, const char* const* argv);
   int ExitCodeOf(const std::exception& error) const;
   void Report(const std::string& message) const;
@@ -101,6 +108,7 @@ class Program {
   std::unique_ptr<CLI::App> app_;
   GlobalOptions options_;
   std::vector<Verb> verbs_;
+  std::vector<VerbExamples> examples_;
   std::vector<std::function<std::optional<int>(const std::exception&)>>
       mappers_;
 };

@@ -228,5 +228,47 @@ TEST_F(ProgramConfigTest, PrintedConfigReadsBackAsTheSameConfig) {
   EXPECT_EQ(again.out, printed.out);
 }
 
+TEST(ProgramTest, ExamplesStandBelowTheHelpOfTheirVerb) {
+  Program program("prog", "A program");
+  program.AddVerb("greet", "Greets", [](const Context&) { return 0; });
+  program.AddExamples({{"greet", {{"Say hello", "prog greet"}}}});
+  const char* arguments[] = {"prog", "greet", "--help"};
+  testing::internal::CaptureStdout();
+
+  EXPECT_EQ(program.Run(3, arguments), 0);
+
+  EXPECT_THAT(testing::internal::GetCapturedStdout(),
+              HasSubstr("Examples:\n  # Say hello\n  prog greet\n"));
+  EXPECT_THROW(program.AddExamples({{"gret", {}}}), std::logic_error);
+}
+
+// What --check-examples reports.
+std::string FindingsOf(const std::vector<Example>& examples) {
+  Program program("prog", "A program");
+  CLI::App& greet =
+      program.AddVerb("greet", "Greets", [](const Context&) { return 0; });
+  std::string who;
+  greet.add_option("--who", who, "Whom")->check(CLI::ExistingFile);
+  program.AddExamples({{"", examples}, {"greet", examples}});
+  const char* arguments[] = {"prog", "--check-examples"};
+  testing::internal::CaptureStderr();
+  const int code = program.Run(2, arguments);
+  const std::string findings = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(code, findings.empty() ? 0 : 1);
+  return findings;
+}
+
+TEST(ProgramTest, ExamplesThatTheParserRefusesAreFound) {
+  const Example good{"Hello", "FDI_DATA=x prog greet --who 'a file' | less"};
+
+  EXPECT_THAT(FindingsOf({good, good}), IsEmpty());
+  EXPECT_THAT(FindingsOf({good}), HasSubstr("greet has fewer than two"));
+  EXPECT_THAT(FindingsOf({good, {"Old", "prog greet --whom x"}}),
+              HasSubstr("prog greet --whom x: "));
+  EXPECT_THAT(FindingsOf({good, {"Old", "prog gret"}}), HasSubstr("prog gret"));
+  EXPECT_THAT(FindingsOf({good, {"Other", "prig greet"}}),
+              HasSubstr("does not call prog"));
+}
+
 }  // namespace
 }  // namespace fdi::cli

@@ -1,4 +1,5 @@
 #include "storage/cli/program.h"
+#include "trainer/app/examples.h"
 #include "trainer/app/verbs.h"
 
 int main(int argc, char** argv) {
@@ -12,5 +13,6 @@ int main(int argc, char** argv) {
   fdi::trainer::AddInjectVerb(program);
   fdi::trainer::AddOnboardVerb(program);
   fdi::trainer::AddCoverageVerb(program);
+  program.AddExamples(fdi::trainer::Examples());
   return program.Run(argc, argv);
 }

@@ -1,0 +1,32 @@
+#include "monitor/app/examples.h"
+
+namespace fdi::monitor {
+
+std::vector<cli::VerbExamples> Examples() {
+  return {
+      {"",
+       {{"Diagnose what is on the bus, with a page to look at",
+         "fdi-monitor run --model-set paper --console"},
+        {"Watch it in another terminal", "fdi-monitor top"}}},
+      {"run",
+       {{"Every valve with the set that is assigned to it; store the samples",
+         "fdi-monitor run --record"},
+        {"One set for the valves FV-1..., open to the plant network",
+         "fdi-monitor run --model-set paper@2 --valves 'FV-1*' --interface "
+         "all"},
+        {"A page on which people may acknowledge and label",
+         "fdi-monitor run --console=127.0.0.1:8080 --console-write token"},
+        {"See what a new set would say, beside the old one",
+         "fdi-monitor run --shadow paper@3"}}},
+      {"watch",
+       {{"All fault events as JSON lines", "fdi-monitor watch --events --json"},
+        {"How many vectors come in ten seconds",
+         "fdi-monitor watch --count --for 10"}}},
+      {"top",
+       {{"The worst valves first; q quits, s sorts, / filters",
+         "fdi-monitor top"},
+        {"Once, for a script", "fdi-monitor top --once --valves 'FV-1*'"}}},
+  };
+}
+
+}  // namespace fdi::monitor
