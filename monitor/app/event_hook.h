@@ -24,7 +24,8 @@ namespace fdi::monitor {
 /// Settings of EventHook.
 struct EventHookOptions {
   int per_minute{60};  ///< Deliveries; so many at once.
-  int threads{2};      ///< Deliveries under way at a time.
+  /// Deliveries under way at a time; more than one lose the order of events.
+  int threads{1};
   std::size_t max_waiting{256};
   std::function<std::chrono::steady_clock::time_point()> now{
       std::chrono::steady_clock::now};

@@ -122,6 +122,7 @@ HistoryStore::EventKey HistoryStore::KeyOf(const EpisodeEvent& event) {
 
 void HistoryStore::Together(const std::function<void()>& records) {
   recorded_.clear();
+  cause_changes_.clear();
   writer_.Together(records);
   if (unsent_.size() >= kMaxUnsent) {
     unsent_.clear();  // They are sent again at the next start.
@@ -129,6 +130,7 @@ void HistoryStore::Together(const std::function<void()>& records) {
   for (const auto& [key, event_id] : std::exchange(recorded_, {})) {
     unsent_[key] = event_id;
   }
+  TellCauses();
 }
 
 void HistoryStore::Record(const EpisodeEvent& event) {
@@ -143,7 +145,45 @@ void HistoryStore::Record(const EpisodeEvent& event) {
     if (id) {
       recorded_.emplace_back(KeyOf(event), *id);
     }
+    LookForCauses(event);
   });
+}
+
+void HistoryStore::WatchCauses(
+    std::vector<storage::CauseGroup> groups,
+    std::function<void(const storage::CauseChange&)> told) {
+  causes_.emplace(writer_.database(), std::move(groups));
+  cause_told_ = std::move(told);
+}
+
+// Within the transaction that records the event.
+void HistoryStore::LookForCauses(const EpisodeEvent& event) {
+  if (!causes_) {
+    return;
+  }
+  const std::string episode_id = storage::EpisodeIdText(event.episode_id);
+  std::vector<storage::CauseChange> changes;
+  if (event.transition.kind == TransitionKind::kIsolated ||
+      event.transition.kind == TransitionKind::kReisolated) {
+    changes = causes_->Isolated(episode_id, event.valve_id,
+                                event.transition.stamp_ns);
+  } else if (event.transition.kind == TransitionKind::kClosed) {
+    changes = causes_->Ended(episode_id);
+  }
+  cause_changes_.insert(cause_changes_.end(), changes.begin(), changes.end());
+}
+
+void HistoryStore::TellCauses() {
+  for (const storage::CauseChange& change : std::exchange(cause_changes_, {})) {
+    const storage::CommonCause& cause = change.cause;
+    log_(LogLevel::kWarning,
+         cli::EventLine("common_cause",
+                        {{"kind", std::string(CauseChangeName(change.kind))},
+                         {"cause", cause.cause_id},
+                         {"group", cause.group},
+                         {"episodes", std::to_string(cause.members.size())}}));
+    cause_told_(change);
+  }
 }
 
 void HistoryStore::Resume(std::uint64_t episode_id, std::int64_t stamp_ns) {

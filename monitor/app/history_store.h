@@ -4,12 +4,14 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include "diagnosis/log.h"
 #include "monitor/sinks.h"
+#include "storage/common_cause.h"
 #include "storage/history.h"
 
 namespace fdi::monitor {
@@ -36,6 +38,11 @@ class HistoryStore : public HistorySink {
   std::vector<storage::UnsentEvent> UnsentEvents();
   void MarkResent(const storage::UnsentEvent& event);
 
+  /// Looks for common causes among what is recorded from now on. `told` is
+  /// called once a change is on the disk, by the history thread.
+  void WatchCauses(std::vector<storage::CauseGroup> groups,
+                   std::function<void(const storage::CauseChange&)> told);
+
   void Together(const std::function<void()>& records) override;
   void Record(const EpisodeEvent& event) override;
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) override;
@@ -51,11 +58,16 @@ class HistoryStore : public HistorySink {
  private:
   using EventKey = std::tuple<std::uint64_t, TransitionKind, std::int64_t>;
   static EventKey KeyOf(const EpisodeEvent& event);
+  void LookForCauses(const EpisodeEvent& event);
+  void TellCauses();
   void Tolerate(const char* operation, const std::function<void()>& call);
 
   storage::HistoryWriter writer_;
   Clock utc_now_ns_;
   LogSink log_;
+  std::optional<storage::CommonCauseBook> causes_;
+  std::function<void(const storage::CauseChange&)> cause_told_;
+  std::vector<storage::CauseChange> cause_changes_;  // By Together().
   std::map<EventKey, std::int64_t> unsent_;
   std::vector<std::pair<EventKey, std::int64_t>> recorded_;  // By Together().
 };

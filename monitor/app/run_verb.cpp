@@ -85,6 +85,13 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
 }
 
 void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
+  run.add_option(
+         "--groups", service.groups,
+         "Groups of valves, [[group]] name, valves, faults, min_valves, "
+         "within_s: faults of many at once get one parent; without it "
+         "DATA/groups.toml")
+      ->check(CLI::ExistingFile)
+      ->type_name("FILE.toml");
   run.add_option("--on-event", service.on_event,
                  "Tell of every fault event: a command that reads it as JSON "
                  "from its standard input, or http://HOST[:PORT][/PATH] that "

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "monitor/app/cause_groups.h"
 #include "monitor/app/shadow.h"
 #include "monitor/app/status.h"
 #include "storage/cli/time_text.h"
@@ -124,6 +125,7 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
       started_ns_(cli::NowNs()),
       last_status_line_(std::chrono::steady_clock::now()) {
   ResendEvents();
+  WatchCauses();
   if (console_) {
     ServeConsole();
   }
@@ -141,6 +143,24 @@ Service::~Service() {
   if (console_) {
     console_->Close();
   }
+}
+
+// Before the first event.
+void Service::WatchCauses() {
+  const std::filesystem::path usual = data_.path / "groups.toml";
+  if (options_.groups.empty() && !std::filesystem::exists(usual)) {
+    return;
+  }
+  auto groups =
+      ReadCauseGroups(options_.groups.empty() ? usual : options_.groups);
+  context_.log(LogLevel::kInfo,
+               "cause_groups groups=" + std::to_string(groups.size()));
+  history_.WatchCauses(std::move(groups),
+                       [this](const storage::CauseChange& change) {
+                         if (outward_) {
+                           outward_->hook().Tell(CauseJson(change));
+                         }
+                       });
 }
 
 // The bus, and who else is told.

@@ -49,6 +49,8 @@ struct ServiceOptions {
   std::string shadow_valves{"*"};
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
+  /// Groups of valves with causes in common; empty: DATA/groups.toml, if any.
+  std::filesystem::path groups;
   /// Tell a program or a web server of events; empty: nobody.
   std::string on_event;
   int on_event_per_minute{60};
@@ -77,6 +79,7 @@ class Service {
   using TimePoint = Heartbeat::TimePoint;
 
   void ResendEvents();
+  void WatchCauses();
   EventSink& EventsOut();
   void Intake(const std::stop_token& stop);
   void AnnounceModels(const ModelSet& models);

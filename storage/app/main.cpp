@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   fdi::storage::AddHistoryVerbs(program);
   fdi::storage::AddEvidenceVerbs(program);
   fdi::storage::AddPlotVerbs(program);
+  fdi::storage::AddCausesVerb(program);
   fdi::storage::AddFaultsVerb(program);
   fdi::storage::AddHealthVerbs(program);
   fdi::storage::AddWorkListVerb(program);

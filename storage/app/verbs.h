@@ -14,6 +14,8 @@ void AddHistoryVerbs(cli::Program& program);  ///< history list|show|ack|...
 void AddEvidenceVerbs(cli::Program& program);
 /// history plot, runs plot; after AddHistoryVerbs() and AddRunsVerbs().
 void AddPlotVerbs(cli::Program& program);
+/// history causes; after AddHistoryVerbs().
+void AddCausesVerb(cli::Program& program);
 void AddFaultsVerb(cli::Program& program);        ///< faults
 void AddHealthVerbs(cli::Program& program);       ///< health show|trend
 void AddWorkListVerb(cli::Program& program);      ///< worklist

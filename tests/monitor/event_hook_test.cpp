@@ -216,12 +216,13 @@ TEST_F(EventHookTest, ADeliveryThatHangsHoldsNobodyUp) {
   fake_->open = false;
   options_.per_minute = 100;
   options_.max_waiting = 5;
+  options_.threads = 2;
   Start();
   for (int i = 0; i < 50; ++i) {
     hook_->Tell({{"i", i}});
   }
   ASSERT_TRUE(fake_->WaitFor(2));
-  EXPECT_EQ(fake_->got.size(), 2u);  // Two threads.
+  EXPECT_EQ(fake_->got.size(), 2u);
   hook_->Stop(milliseconds(0));
   EXPECT_GE(hook_->counts().left_out, 40u);
 }

@@ -1,0 +1,85 @@
+#include "monitor/app/cause_groups.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "storage/cli/toml_reader.h"
+
+namespace fdi::monitor {
+namespace {
+
+constexpr std::int64_t kNsPerMs = 1'000'000;
+constexpr double kLongestWindowS = 86'400.0;
+
+storage::CauseGroup ReadGroup(cli::TomlReader& table) {
+  storage::CauseGroup group;
+  group.name = table.Text("name").value_or("");
+  if (group.name.empty()) {
+    table.Refuse("name", "is missing");
+  }
+  group.valve_globs = table.Texts("valves");
+  if (group.valve_globs.empty()) {
+    table.Refuse("valves", "is missing: ids or globs of two valves or more");
+  }
+  if (const auto faults = table.Texts("faults"); !faults.empty()) {
+    group.faults.clear();
+    for (const std::string& name : faults) {
+      const auto fault = ParseFault(name);
+      if (!fault) {
+        table.Refuse("faults", "unknown fault '" + name + "'; there are " +
+                                   std::string(kFaultNames));
+      }
+      group.faults.push_back(FaultName(*fault));
+    }
+  }
+  const auto valves = table.Integer("min_valves").value_or(group.min_valves);
+  if (valves < 2 || valves > 100'000) {
+    table.Refuse("min_valves", "is not in 2..100000");
+  }
+  group.min_valves = static_cast<int>(valves);
+  if (const auto seconds = table.Number("within_s", 1.0, kLongestWindowS)) {
+    group.within_ns = static_cast<std::int64_t>(*seconds * 1e9);
+  }
+  return group;
+}
+
+}  // namespace
+
+std::vector<storage::CauseGroup> ReadCauseGroups(
+    const std::filesystem::path& path) {
+  cli::TomlReader file(path);
+  std::vector<storage::CauseGroup> groups;
+  std::set<std::string> names;
+  for (cli::TomlReader& table : file.Tables("group")) {
+    groups.push_back(ReadGroup(table));
+    if (!names.insert(groups.back().name).second) {
+      table.Refuse("name",
+                   "two groups are called '" + groups.back().name + "'");
+    }
+  }
+  file.Finish();
+  return groups;
+}
+
+cli::Json CauseJson(const storage::CauseChange& change) {
+  const storage::CommonCause& cause = change.cause;
+  cli::Json members = cli::Json::array();
+  std::set<std::string> valves;
+  for (const storage::CauseMember& member : cause.members) {
+    valves.insert(member.valve_id);
+    members.push_back({{"valve", member.valve_id},
+                       {"episode", member.episode_id},
+                       {"fault", member.fault}});
+  }
+  return {{"kind", "COMMON_CAUSE_" + std::string(CauseChangeName(change.kind))},
+          {"cause", cause.cause_id},
+          {"group", cause.group},
+          {"stamp_ms", cause.ended_ns.value_or(cause.opened_ns) / kNsPerMs},
+          {"valves", valves.size()},
+          {"members", members}};
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "storage/cli/json_output.h"
+#include "storage/common_cause.h"
+
+namespace fdi::monitor {
+
+/// Reads the groups of valves that may have a cause in common:
+///
+///     [[group]]
+///     name = "air header west"
+///     valves = ["FV-1*", "LV-207"]   # ids or globs
+///     faults = ["f16", "f17"]        # any of them; these by default
+///     min_valves = 3                 # so many valves, 2 or more,
+///     within_s = 300                 # within so many seconds
+///
+/// @throws ConfigError naming file, line and key; NotFoundError.
+std::vector<storage::CauseGroup> ReadCauseGroups(
+    const std::filesystem::path& path);
+
+/// {"kind": "COMMON_CAUSE_OPENED", ..., "cause", "group", "stamp_ms", "valves",
+/// "members": [{"valve", "episode", "fault"}]}
+cli::Json CauseJson(const storage::CauseChange& change);
+
+}  // namespace fdi::monitor
