@@ -33,7 +33,8 @@ export async function open(browser, address, hash, options = {}) {
       page.faults.push(message.text());
     }
   });
-  page.on('request', (request) => page.hosts.add(new URL(request.url()).origin));
+  page.on('request', (request) =>
+    page.hosts.add(new URL(request.url()).origin));
   await page.goto(`${address}/${hash}`);
   return page;
 }

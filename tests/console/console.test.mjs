@@ -39,7 +39,8 @@ function watchForAlarm(page, valve) {
       return true;
     };
     if (look()) return;
-    const observer = new MutationObserver(() => look() && observer.disconnect());
+    const observer =
+      new MutationObserver(() => look() && observer.disconnect());
     observer.observe(document.body, {childList: true, subtree: true});
   }), valve);
 }
@@ -110,7 +111,7 @@ test('a wrong token is refused and asked for again', async () => {
   await page.context().close();
 });
 
-test('the trend is drawn', async () => {
+test('the trend is drawn, zooms by keys and is saved', async () => {
   const page = await open(browser, address, '#/valve/V1');
   await page.locator('.panel').nth(2).waitFor();
   await until(async () => await inkShare(page, '.panel .u-over') > 0.003,
@@ -119,6 +120,16 @@ test('the trend is drawn', async () => {
   const ink = await inkShare(page, '.panels');
   assert.ok(ink > 0.01 && ink < 0.5, `ink ${ink}`);
   assert.match(await page.locator('.words').textContent(), /flow|F/i);
+
+  await page.locator('.panels').focus();
+  await page.keyboard.press('+');
+  await page.locator('.paused').waitFor();
+  await page.keyboard.press('End');
+  await page.locator('.paused').waitFor({state: 'detached'});
+
+  const [picture] = await Promise.all([page.waitForEvent('download'),
+    page.getByRole('button', {name: 'Save as PNG'}).click()]);
+  assert.equal(picture.suggestedFilename(), 'V1.png');
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });

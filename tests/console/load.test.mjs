@@ -47,9 +47,7 @@ function workOfFrames({traceEvents: events}) {
 
 test('500 valves leave the main thread at rest', async () => {
   const page = await open(browser, address, '#/');
-  await until(async () => (await page.locator('.chip').first().textContent()) ===
-      `All ${kValves}`,
-      `${kValves} tiles`);
+  await page.locator('.chip', {hasText: `All ${kValves}`}).waitFor();
   await browser.startTracing(page, {categories: [
     'devtools.timeline', 'disabled-by-default-devtools.timeline']});
   const stamps = () => page.evaluate(() => performance.now());

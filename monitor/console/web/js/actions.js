@@ -77,7 +77,8 @@ export function acknowledge(rows) {
     fields: [],
     send: async (body) => {
       for (const row of rows) {
-        store.applyAlarm(await post(path('episodes', row.episode, 'ack'), body));
+        store.applyAlarm(
+            await post(path('episodes', row.episode, 'ack'), body));
       }
     },
   });

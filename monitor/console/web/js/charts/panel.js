@@ -29,7 +29,8 @@ function timeLabels(u, splits) {
 // As many decimals as the steps have.
 function numberLabels(u, splits) {
   const step = splits.length > 1 ? Math.abs(splits[1] - splits[0]) : 1;
-  const decimals = Math.min(6, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+  const decimals =
+    Math.min(6, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
   return splits.map((v) => (v + 0).toFixed(decimals).replace('-', '−'));
 }
 
@@ -105,7 +106,7 @@ export class Panel {
   #cursor(syncKey, handlers) {
     return {
       sync: {key: syncKey, setSeries: false,
-        filters: {pub: (type) => type === 'mousemove' || type === 'mouseleave'}},
+        filters: {pub: (type) => /^mouse(move|leave)$/.test(type)}},
       drag: {x: true, y: false, setScale: true},
       points: {size: 5},
       bind: {

@@ -225,7 +225,8 @@ export class Timeline {
       document.activeElement.title : null;
     const button = (text, action, title, pressed) => h('button', {
       'type': 'button', title, 'onclick': action,
-      'aria-label': /\w/.test(text) ? null : title, 'aria-pressed': pressed === undefined ? null : String(pressed)}, text);
+      'aria-label': /\w/.test(text) ? null : title,
+      'aria-pressed': pressed === undefined ? null : String(pressed)}, text);
     const following = this.#window === null;
     const minutes = this.live ? [5, 15, 60] : [];
     replace(this.#buttons,

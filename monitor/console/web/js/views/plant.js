@@ -86,10 +86,11 @@ class Plant {
       }});
     const filters = kFilters.map(({key, text: name}) => {
       const count = h('span', {class: 'chip-count'});
-      const button = h('button', {type: 'button', class: 'chip', onclick: () => {
-        this.#filter = key;
-        this.#refilter();
-      }}, name, ' ', count);
+      const button = h('button', {
+        type: 'button', class: 'chip', onclick: () => {
+          this.#filter = key;
+          this.#refilter();
+        }}, name, ' ', count);
       this.#buttons.set(key, {button, count});
       return button;
     });
