@@ -60,4 +60,5 @@ expect 'FV-7' fdi-store history list --valve F
 expect "$first" fdi-store runs show "${first:0:8}"
 expect "$first,$last" fdi-trainer train --runs "$first,${last:0:8}"
 expect '' fdi-store --data "$folder/none" runs show "${first:0:8}"
+expect 'last' fdi-store history ack la
 exit $failed

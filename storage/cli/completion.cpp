@@ -19,23 +19,18 @@ struct NamedKind {
   std::string_view kind;
 };
 
-constexpr std::array<NamedKind, 17> kNamedKinds = {{{"valve", "valve"},
-                                                    {"valves", "valve"},
-                                                    {"fault", "fault"},
-                                                    {"without", "fault"},
-                                                    {"model-set", "model"},
-                                                    {"shadow", "model"},
-                                                    {"run", "run"},
-                                                    {"runs", "run"},
-                                                    {"train-runs", "run"},
-                                                    {"episode", "episode"},
-                                                    {"type", "type"},
-                                                    {"report", "folder"},
-                                                    {"folder", "folder"},
-                                                    {"output", "file"},
-                                                    {"file", "file"},
-                                                    {"csv", "file"},
-                                                    {"map", "file"}}};
+constexpr std::array<NamedKind, 21> kNamedKinds = {
+    {{"valve", "valve"},       {"valves", "valve"},
+     {"fault", "fault"},       {"without", "fault"},
+     {"model-set", "model"},   {"parent", "model"},
+     {"candidate", "model"},   {"shadow", "model"},
+     {"run", "run"},           {"runs", "run"},
+     {"train-runs", "run"},    {"episode", "episode"},
+     {"episodes", "episode"},  {"type", "type"},
+     {"report", "folder"},     {"folder", "folder"},
+     {"output", "file"},       {"file", "file"},
+     {"csv", "file"},          {"map", "file"},
+     {"console-write", "file"}}};
 
 // "a b c" of "a, b or c", of "a, b, c" and of "{a,b,c}"; else empty.
 std::string WordsOf(const std::string& text) {
@@ -79,9 +74,11 @@ std::string ValueKind(const CLI::Option& option) {
       return std::string(named.kind);
     }
   }
-  return StartsWith(type, "DIR")    ? "folder"
-         : StartsWith(type, "FILE") ? "file"
-                                    : "any";
+  return StartsWith(type, "DIR")              ? "folder"
+         : StartsWith(type, "FILE")           ? "file"
+         : StartsWith(type, "NAME[@VERSION]") ? "model"
+         : StartsWith(type, "ID[@")           ? "run"
+                                              : "any";
 }
 
 // Single-quoted for bash.
