@@ -38,6 +38,6 @@ forbid '^(diagnosis|idl|simulator|trainer|monitor|storage)/[^/]+$' '(CLI/|toml\+
   'command line, TOML, logging and JSON belong to the programs'
 forbid '^monitor/(console|http)/' '(idl|simulator|trainer)/' \
   'the console knows monitor and storage only'
-forbid '^(diagnosis|idl|simulator|trainer|storage|monitor/app)/' 'httplib\.h' \
-  'HTTP belongs to monitor/http and monitor/console'
+forbid '^(diagnosis|idl|simulator|trainer|storage)/' 'httplib\.h' \
+  'HTTP belongs to the monitor'
 exit "$failed"
