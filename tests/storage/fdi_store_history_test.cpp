@@ -148,6 +148,25 @@ TEST_F(FdiStoreHistoryTest, ListIsCsvIfAskedForAndTextWithoutColour) {
               HasSubstr("no episode matches"));
 }
 
+TEST_F(FdiStoreHistoryTest, ColourIsForTerminalsThatWantIt) {
+  const std::string list = directory_.path().string() + " history list";
+  const auto on_terminal = [&](const std::string& environment) {
+    const std::string out = (directory_.path() / "terminal.txt").string();
+    const std::string command = environment + " script -qec '" +
+                                FDI_STORE_PROGRAM + " --data " + list +
+                                "' /dev/null >" + out;
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return Slurp(out);
+  };
+
+  EXPECT_THAT(on_terminal("TERM=xterm NO_COLOR="),
+              HasSubstr("\x1b[1;31mUNACK"));
+  EXPECT_THAT(on_terminal("TERM=xterm NO_COLOR=1"),
+              testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(on_terminal("TERM=dumb"), testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(on_terminal("TERM=xterm COLUMNS=80"), HasSubstr("too narrow"));
+}
+
 TEST_F(FdiStoreHistoryTest, StatisticsHaveDaysValvesFaultsAndLabels) {
   {
     HistoryWriter writer(path_);
