@@ -1,0 +1,118 @@
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <httplib.h>
+
+#include "diagnosis/valve_engine.h"
+#include "monitor/console/console.h"
+#include "storage/cli/time_text.h"
+#include "storage/models.h"
+#include "tests/monitor/linear_models.h"
+#include "tests/storage/history_fixture.h"
+
+namespace fdi::console {
+
+inline constexpr const char* kToken = "0123456789abcdef";
+
+class NoBus : public monitor::EventSink {
+ public:
+  bool Publish(const monitor::EpisodeEvent& /*event*/,
+               bool /*persisted*/) override {
+    return true;
+  }
+};
+
+/// The console over real HTTP, beside a history, without a pipeline.
+class ConsoleRoutesTest : public storage::HistoryFixture {
+ protected:
+  ConsoleRoutesTest() : writer_(path_) {
+    writer_.BeginSession(kDetected - kSecond, "test", "");
+    const auto folder = directory_.path() / "page";
+    std::filesystem::create_directory(folder);
+    std::ofstream(folder / "index.html") << "<title>page</title>";
+    std::ofstream(directory_.path() / "secret.txt") << "secret";
+    std::ofstream(directory_.path() / "token") << kToken << '\n';
+    storage::ModelStore(directory_.path() / "models.db",
+                        storage::Access::kOccasionalWriter);
+  }
+
+  void Start(bool writable = true) {
+    ConsoleOptions options;
+    options.address.host = "127.0.0.1";
+    options.files = directory_.path() / "page";
+    if (writable) {
+      options.token_file = directory_.path() / "token";
+    }
+    console_.emplace(options, cli::GlobalOptions{},
+                     [this](LogLevel, std::string_view line) {
+                       if (line.starts_with("console_listening")) {
+                         listening_ = line;
+                       }
+                     });
+    events_ = &console_->Before(bus_);
+    console_->Start({path_, directory_.path() / "models.db", "0.0", kDetected,
+                     [] {
+                       return MonitorFacts{"OK", {{"received", 7}}, 1};
+                     },
+                     cli::NowNs});
+    const std::size_t colon = listening_.find(':');
+    client_.emplace("127.0.0.1", std::stoi(listening_.substr(colon + 1)));
+  }
+
+  /// Begins an episode so many seconds after the others.
+  void RecordLater(const std::string& valve, double after_s) {
+    storage::NewEvent event = Event(TransitionKind::kDetected, after_s, 0, 0.3,
+                                    EndReason::kNone, valve);
+    event.transition.detection_stamp_ns = event.transition.stamp_ns;
+    writer_.Record(event);
+  }
+
+  void ShowValve(const std::string& id, int samples, double offset = 0.0) {
+    const auto models = monitor::SharedLinearModels();
+    ValveEngine engine(models);
+    for (int k = 0; k < samples; ++k) {
+      const Sample sample = monitor::PlantSample(static_cast<std::uint64_t>(k),
+                                                 k < 50 ? 0.0 : offset);
+      console_->live().Show(id, sample, models.get(), engine.Step(sample),
+                            false);
+    }
+  }
+
+  Json Get(const std::string& path, int status = 200) {
+    const httplib::Result answer = client_->Get(path);
+    EXPECT_TRUE(answer) << path;
+    if (!answer) {
+      return {};
+    }
+    EXPECT_EQ(answer->status, status) << path << answer->body;
+    return Json::parse(answer->body);
+  }
+  Json Post(const std::string& path, const Json& body, int status = 200,
+            const std::string& token = kToken) {
+    const httplib::Result answer =
+        client_->Post(path, {{"Authorization", "Bearer " + token}}, body.dump(),
+                      "application/json");
+    EXPECT_TRUE(answer) << path;
+    if (!answer) {
+      return {};
+    }
+    EXPECT_EQ(answer->status, status) << path << answer->body;
+    return Json::parse(answer->body);
+  }
+  std::string IdText() const { return storage::EpisodeIdText(Id()); }
+
+  storage::HistoryWriter writer_;
+  NoBus bus_;
+  std::optional<Console> console_;
+  monitor::EventSink* events_{nullptr};
+  std::string listening_;
+  std::optional<httplib::Client> client_;
+};
+
+}  // namespace fdi::console
