@@ -53,12 +53,12 @@ pages() {  # PROGRAM WORDS...
   name=$(IFS=-; echo "$*")
   page=$root/usr/share/man/man1/$name.1.gz
   gzip -dc "$page" | grep -q '^\.SH SYNOPSIS' || fail "no page $name(1)"
-  if command -v man >/dev/null; then
+  if [ $# -eq 1 ] && command -v man >/dev/null; then
     man --local-file "$page" >"$folder/page" 2>&1 || fail "$name(1) is no page"
   fi
   "$root/usr/bin/$1" "${@:2}" --help >"$folder/help"
   local verb
-  for verb in $(sed -n '/^Subcommands:/,$ s/^  \([a-z][a-z-]*\).*/\1/p' \
+  for verb in $(sed -n '/^Subcommands:/,/^$/ s/^  \([a-z][a-z-]*\).*/\1/p' \
     "$folder/help"); do
     pages "$@" "$verb"
   done
