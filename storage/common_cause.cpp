@@ -206,16 +206,26 @@ void CommonCauseBook::Insert(const std::string& cause_id,
 }
 
 std::vector<CauseChange> CommonCauseBook::Ended(const std::string& episode_id) {
-  Statement row = database_.Prepare(
+  Statement causes = database_.Prepare(
       "SELECT cause_id FROM common_cause_member JOIN common_cause "
       "USING (cause_id) WHERE episode_id = ? AND ended_ns IS NULL");
-  row.Bind(episode_id);
-  std::vector<std::string> causes;
-  while (row.Step()) {
-    causes.push_back(row.Text(0));
+  causes.Bind(episode_id);
+  return EndIfOver(causes);
+}
+
+std::vector<CauseChange> CommonCauseBook::EndThoseThatAreOver() {
+  Statement causes = database_.Prepare(
+      "SELECT cause_id FROM common_cause WHERE ended_ns IS NULL");
+  return EndIfOver(causes);
+}
+
+std::vector<CauseChange> CommonCauseBook::EndIfOver(Statement& causes) {
+  std::vector<std::string> ids;
+  while (causes.Step()) {
+    ids.push_back(causes.Text(0));
   }
   std::vector<CauseChange> changes;
-  for (const std::string& cause_id : causes) {
+  for (const std::string& cause_id : ids) {
     std::int64_t last_ns = 0;
     bool open = false;
     for (const CauseMember& member : ReadMembers(database_, cause_id)) {

@@ -69,8 +69,11 @@ class CommonCauseBook {
                                     std::int64_t stamp_ns);
   /// The episode has ended.
   std::vector<CauseChange> Ended(const std::string& episode_id);
+  /// Ends causes whose episodes ended while nobody looked.
+  std::vector<CauseChange> EndThoseThatAreOver();
 
  private:
+  std::vector<CauseChange> EndIfOver(Statement& causes);
   std::optional<CauseChange> Join(const CauseGroup& group,
                                   const std::string& cause_id,
                                   const std::string& episode_id);

@@ -154,6 +154,8 @@ void HistoryStore::WatchCauses(
     std::function<void(const storage::CauseChange&)> told) {
   causes_.emplace(writer_.database(), std::move(groups));
   cause_told_ = std::move(told);
+  writer_.Together([this] { cause_changes_ = causes_->EndThoseThatAreOver(); });
+  TellCauses();
 }
 
 // Within the transaction that records the event.

@@ -121,6 +121,20 @@ TEST_F(CommonCauseTest, ARestartBetweenTwoValvesChangesNothing) {
   EXPECT_EQ(Close("A-4", 601).at(0).kind, Kind::kEnded);
 }
 
+TEST_F(CommonCauseTest, WhatEndedWhileNobodyLookedIsEndedLater) {
+  for (const char* valve : {"A-1", "A-2", "A-3"}) {
+    Isolate(valve, 10);
+  }
+  for (const char* valve : {"A-1", "A-2", "A-3"}) {
+    writer_->Record(
+        Event(TransitionKind::kClosed, 90, 4, 0.1, EndReason::kCleared, valve));
+  }
+  std::vector<CauseChange> changes;
+  writer_->Together([&] { changes = book_->EndThoseThatAreOver(); });
+  EXPECT_EQ(changes.at(0).kind, Kind::kEnded);
+  EXPECT_EQ(Causes().at(0).ended_ns, kDetected + 90 * kSecond);
+}
+
 TEST_F(CommonCauseTest, ToldTwiceIsToldOnce) {
   Isolate("A-1", 10);
   Isolate("A-2", 11);
