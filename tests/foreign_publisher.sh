@@ -6,7 +6,7 @@
 set -euo pipefail
 bin=$1
 example=$(cd "$(dirname "$0")/../docs/examples/cyclone_publisher" && pwd)
-domain=${FDI_DOMAIN:-97}
+domain=${FDI_DOMAIN:-17}
 command -v idlc >/dev/null && [ -e /usr/include/dds/dds.h ] || {
   echo "foreign_publisher: skipped, no cyclonedds-dev and cyclonedds-tools"
   exit 77
