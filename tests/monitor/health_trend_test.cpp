@@ -61,14 +61,14 @@ TEST(StudentQuantileTest, AgreesWithTheTables) {
 // 600 drifts each; a share of 0.9 then errs by 0.012.
 TEST(HealthTrendTest, NinetyPercentIntervalsContainTheTruth) {
   for (const double rho : {0.0, 0.3, 0.6}) {
-    for (const int days : {60, 120, 240}) {
+    for (const int days : {30, 60, 120, 240}) {
       const double slope = 12.0 / days;
       const Score score = Simulate(600, days, slope, rho, 0.5 * days, 11);
       const double share = Share(score.contained, score.given);
       RecordProperty("contained_" + std::to_string(days) + "_days_rho_" +
                          std::to_string(rho),
                      std::to_string(share));
-      EXPECT_GT(score.given, 570) << rho << ' ' << days;
+      EXPECT_GT(score.given, 500) << rho << ' ' << days;
       EXPECT_GE(share, 0.85) << rho << ' ' << days;
       EXPECT_LE(share, 0.95) << rho << ' ' << days;
     }
