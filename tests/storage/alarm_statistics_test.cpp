@@ -17,7 +17,13 @@ AlarmSpan Span(const std::string& valve, std::int64_t from_ns,
                std::optional<std::int64_t> to_ns,
                std::optional<std::string> label = {},
                const std::string& fault = "f7") {
-  return {valve, fault, from_ns, to_ns, std::move(label)};
+  AlarmSpan span;
+  span.valve_id = valve;
+  span.fault = fault;
+  span.detected_ns = from_ns;
+  span.ended_ns = to_ns;
+  span.label = std::move(label);
+  return span;
 }
 
 AlarmStatistics Of(const std::vector<AlarmSpan>& spans,
