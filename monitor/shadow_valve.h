@@ -39,6 +39,16 @@ struct ShadowLimits {
   std::int64_t silence_ns{3'600'000'000'000};  ///< Ends the open episode.
 };
 
+/// A stretch that has not ended.
+struct OpenStretch {
+  ShadowDifference difference;
+  std::uint64_t active_faults{0};  ///< By fault number.
+  std::uint64_t candidate_faults{0};
+  bool counted{false};  ///< Long enough; recorded or left out.
+  bool kept{false};     ///< It is recorded.
+  bool changed{false};  ///< Since it was taken last.
+};
+
 /// The candidate on one valve: its engine beside the active one, on the same
 /// samples, and the stretches in which the answers differ. Pure but for what
 /// the samples tell. One thread, that of `parts`.
@@ -67,15 +77,6 @@ class ShadowValve {
   std::uint64_t left_out() const { return left_out_; }  ///< By max_per_hour.
 
  private:
-  struct Open {
-    ShadowDifference difference;
-    std::uint64_t active_faults;  // By fault number.
-    std::uint64_t candidate_faults;
-    bool counted{false};  // Recorded, or left out.
-    bool kept{false};
-    bool changed{false};
-  };
-
   ShadowFit FitOf(const Sample& sample, const ModelSet* active) const;
   void Compare(const Verdict& active, const ModelSet& models);
   void Begin(const Verdict& active, const ModelSet& models);
@@ -92,7 +93,7 @@ class ShadowValve {
   std::int64_t stamp_ns_{0};
   std::uint64_t source_id_{0};
   bool seen_{false};
-  std::optional<Open> open_;
+  std::optional<OpenStretch> open_;
   std::vector<ShadowDifference> closed_;
   std::int64_t hour_{0};
   int in_hour_{0};

@@ -41,8 +41,8 @@ EpisodeSamples FromTrace(storage::HistoryReader& history,
                          const storage::Episode& episode,
                          const TimeSpan& span) {
   EpisodeSamples result;
-  for (storage::TraceInstant& instant : history.Trace(episode.id)) {
-    result.run.samples.push_back(std::move(instant.received));
+  for (const storage::TraceInstant& instant : history.Trace(episode.id)) {
+    result.run.samples.push_back(instant.received);
   }
   KeepAccepted(span, result.run.samples);
   storage::NewRun& row = result.run.info.run;

@@ -204,7 +204,7 @@ class LabelReader::Impl {
     for (storage::StoredSample stored : run.samples) {
       if (span.Contains(stored.sample.stamp_ns)) {
         stored.truth = FaultTruth{meaning.fault, meaning.strength};
-        part.samples.push_back(std::move(stored));
+        part.samples.push_back(stored);
       }
     }
     TrainingRun usable = ToTrainingRun(part, false);
