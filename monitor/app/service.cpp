@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <utility>
 
-#include "monitor/app/cause_groups.h"
 #include "monitor/app/shadow.h"
 #include "monitor/app/status.h"
 #include "storage/cli/time_text.h"
@@ -145,43 +144,10 @@ Service::~Service() {
   }
 }
 
-// Before the first event.
-void Service::WatchCauses() {
-  const std::filesystem::path usual = data_.path / "groups.toml";
-  if (options_.groups.empty() && !std::filesystem::exists(usual)) {
-    return;
-  }
-  auto groups =
-      ReadCauseGroups(options_.groups.empty() ? usual : options_.groups);
-  context_.log(LogLevel::kInfo,
-               "cause_groups groups=" + std::to_string(groups.size()));
-  history_.WatchCauses(std::move(groups),
-                       [this](const storage::CauseChange& change) {
-                         if (outward_) {
-                           outward_->hook().Tell(CauseJson(change));
-                         }
-                       });
-}
-
-// The bus, and who else is told.
-EventSink& Service::EventsOut() {
-  return outward_ ? static_cast<EventSink&>(*outward_) : events_;
-}
-
 void Service::AnnounceModels(const ModelSet& models) {
   models_topic_.Write(idl::Describe(models));
   context_.log(LogLevel::kInfo, "models_loaded model_set=" + models.name + "@" +
                                     std::to_string(models.version));
-}
-
-// What an earlier session committed but perhaps did not send.
-void Service::ResendEvents() {
-  for (const storage::UnsentEvent& event : history_.UnsentEvents()) {
-    if (events_.Resend(event)) {
-      history_.MarkResent(event);
-      counters_.Add(Counter::kEventsResent);
-    }
-  }
 }
 
 void Service::Intake(const std::stop_token& stop) {
