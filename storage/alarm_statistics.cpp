@@ -94,7 +94,8 @@ AlarmStatistics ComputeAlarmStatistics(const std::vector<AlarmSpan>& spans,
   std::vector<std::int64_t> all;
   for (const AlarmSpan& span : spans) {
     const std::int64_t end_ns =
-        std::max(span.detected_ns, span.ended_ns.value_or(now_ns));
+        std::max(span.detected_ns, span.ended_ns.value_or(std::max(
+                                       now_ns, span.last_ns.value_or(now_ns))));
     if (end_ns < since_ns || span.detected_ns >= until_ns) {
       continue;
     }
@@ -137,7 +138,8 @@ std::vector<AlarmSpan> ReadAlarmSpans(Database& database,
   std::vector<AlarmSpan> spans;
   while (row.Step()) {
     spans.push_back({row.Text(0), row.Text(1), row.Int64(2),
-                     row.OptionalInt64(3), row.OptionalText(4)});
+                     row.OptionalInt64(3), row.OptionalText(4),
+                     row.OptionalInt64(5)});
   }
   return spans;
 }

@@ -33,6 +33,7 @@ struct AlarmSpan {
   std::int64_t detected_ns{0};
   std::optional<std::int64_t> ended_ns;
   std::optional<std::string> label;
+  std::optional<std::int64_t> last_ns;  ///< While open: of the newest evidence.
 };
 
 struct DayAlarms {
@@ -71,7 +72,8 @@ struct AlarmStatistics {
 
 /// @param spans by detection. Those that end before `since_ns` or begin at
 ///   `until_ns` or later do not count.
-/// @param now_ns to which open episodes last.
+/// @param now_ns to which open episodes last; to their newest evidence where
+///   stamps are ahead of the clock.
 AlarmStatistics ComputeAlarmStatistics(const std::vector<AlarmSpan>& spans,
                                        std::int64_t since_ns,
                                        std::int64_t until_ns,

@@ -140,7 +140,9 @@ std::string StatisticsQuery(const EpisodeFilter& filter) {
 std::string AlarmSpanQuery(const EpisodeFilter& filter) {
   return std::string(
              "SELECT e.valve_id, coalesce(e.fault, ''), e.detected_ns, "
-             "e.ended_ns, e.label FROM episode e INDEXED BY episode_statistics "
+             "e.ended_ns, e.label, CASE WHEN e.ended_ns IS NULL THEN (SELECT "
+             "max(last_ns) FROM episode_trace t WHERE t.episode_id = "
+             "e.episode_id) END FROM episode e INDEXED BY episode_statistics "
              "WHERE (e.ended_ns IS NULL OR e.ended_ns >= ?2) AND "
              "e.detected_ns < ?3 AND ") +
          ValveCondition(filter) + " AND " + FaultCondition(filter) +

@@ -25,9 +25,10 @@ std::string SpanText(std::int64_t span_ns) {
 
 std::string FaultText(const FaultReason& reason, const WorkOptions& options) {
   std::string text = reason.words.name + ": ";
+  const std::int64_t now_ns = std::max(options.now_ns, reason.last_ns);
   text += reason.ended_ns
-              ? "ended " + SpanText(options.now_ns - *reason.ended_ns) + " ago"
-              : "stands for " + SpanText(options.now_ns - reason.detected_ns);
+              ? "ended " + SpanText(now_ns - *reason.ended_ns) + " ago"
+              : "stands for " + SpanText(now_ns - reason.detected_ns);
   text += ", severity " + std::string(SeverityName(reason.words.severity));
   if (reason.strength != 0.0) {
     text += " at strength " + cli::FormatNumber(reason.strength, 2);

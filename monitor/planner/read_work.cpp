@@ -1,6 +1,7 @@
 #include "monitor/planner/read_work.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 
 #include "diagnosis/error.h"
@@ -60,6 +61,7 @@ void AddEpisode(const Episode& episode, const cli::FaultTexts& texts,
   place->episode_id = episode.episode_id;
   place->detected_ns = episode.detected_ns;
   place->ended_ns = episode.ended_ns;
+  place->last_ns = episode.trace_end_ns.value_or(episode.detected_ns);
 }
 
 std::vector<Episode> EpisodesOf(storage::HistoryReader& history,
@@ -70,7 +72,7 @@ std::vector<Episode> EpisodesOf(storage::HistoryReader& history,
   filter.state = storage::EpisodeState::kOpen;
   std::vector<Episode> episodes = history.List(filter);
   filter.since_ns = query.since_ns;
-  filter.until_ns = query.options.now_ns;
+  filter.until_ns = std::numeric_limits<std::int64_t>::max();
   filter.state = storage::EpisodeState::kAny;
   for (Episode& episode : history.List(filter)) {
     episodes.push_back(std::move(episode));
@@ -114,7 +116,7 @@ void RequireDiscipline(const std::string& discipline) {
     if (discipline == DisciplineName(d)) {
       return;
     }
-    accepted += " " + std::string(DisciplineName(d));
+    accepted.append(" ").append(DisciplineName(d));
   }
   throw ConfigError("discipline '" + discipline + "' is none of" + accepted);
 }
@@ -132,9 +134,8 @@ std::vector<WorkRow> ReadWorkList(storage::HistoryReader& history,
   const std::map<std::string, Record> records = RecordsOf(episodes);
   for (const std::string& valve :
        HealthValves(history.database(), query.valve_glob)) {
-    AddHealth(ReadHealth(history.database(),
-                         {valve, query.since_ns, query.options.now_ns}),
-              query, valves[valve]);
+    AddHealth(ReadHealth(history.database(), {valve, query.since_ns}), query,
+              valves[valve]);
   }
   std::vector<ValveWork> work;
   for (auto& [valve, facts] : valves) {

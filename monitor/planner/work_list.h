@@ -24,6 +24,7 @@ struct FaultReason {
   std::string episode_id;       ///< The newest.
   std::int64_t detected_ns{0};  ///< Of it.
   std::optional<std::int64_t> ended_ns;
+  std::int64_t last_ns{0};  ///< Newest evidence, which a clock may be behind.
 };
 
 /// A limit that is reached or that a significant trend leads to.

@@ -113,6 +113,38 @@ std::string CommandLine(int argc, const char* const* argv) {
   return line;
 }
 
+// Whether a verb has a flag of that name that may have a value: [=VALUE].
+bool TakesValue(const CLI::App& app, const std::string& flag) {
+  const CLI::Option* option = app.get_option_no_throw(flag);
+  if (option != nullptr && option->get_type_name().starts_with("[=")) {
+    return true;
+  }
+  const auto verbs = app.get_subcommands([](const CLI::App*) { return true; });
+  return std::any_of(verbs.begin(), verbs.end(), [&flag](const CLI::App* verb) {
+    return TakesValue(*verb, flag);
+  });
+}
+
+// The words of a command line, where such a value may also stand after a blank:
+// the parser knows it after "=" alone.
+std::vector<std::string> WithValues(const CLI::App& app, int argc,
+                                    const char* const* argv) {
+  std::vector<std::string> words;
+  for (int i = 0; i < argc; ++i) {
+    const std::string word = argv[i];
+    const bool value = !words.empty() && !word.starts_with("-") &&
+                       words.back().starts_with("--") &&
+                       words.back().find('=') == std::string::npos &&
+                       TakesValue(app, words.back());
+    if (value) {
+      words.back().append("=").append(word);
+    } else {
+      words.push_back(word);
+    }
+  }
+  return words;
+}
+
 }  // namespace
 
 Program::Program(std::string name, std::string description)
@@ -189,7 +221,12 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
     return "--config " + (option->count() > 0 ? option->results().front() : "");
   };
   try {
-    app_->parse(argc, argv);
+    const std::vector<std::string> words = WithValues(*app_, argc, argv);
+    std::vector<const char*> pointers;
+    for (const std::string& word : words) {
+      pointers.push_back(word.c_str());
+    }
+    app_->parse(static_cast<int>(pointers.size()), pointers.data());
   } catch (const PrintConfigRequest&) {
     std::cout << TomlConfig().to_config(app_.get(), true, false, {});
     return kExitOk;

@@ -44,6 +44,17 @@ TEST(AlarmStatisticsTest, TimeInAlarmIsCutAtMidnight) {
   EXPECT_DOUBLE_EQ(figures.valves.at("V").alarm_s, 4 * 3600.0);
 }
 
+// Runs faster than real time are ahead of the clock.
+TEST(AlarmStatisticsTest, AnOpenEpisodeLastsToItsNewestEvidence) {
+  AlarmSpan ahead = Span("V", 5 * kHour, std::nullopt);
+  ahead.last_ns = 6 * kHour;
+
+  const auto figures = Of({ahead, Span("W", kHour, std::nullopt)}, 2 * kHour);
+
+  EXPECT_DOUBLE_EQ(figures.valves.at("V").alarm_s, 3600.0);
+  EXPECT_DOUBLE_EQ(figures.valves.at("W").alarm_s, 3600.0);
+}
+
 // Also the part of an earlier episode, which is not counted itself.
 TEST(AlarmStatisticsTest, OnlyWhatFallsIntoTheTimeCounts) {
   const std::vector<AlarmSpan> spans = {

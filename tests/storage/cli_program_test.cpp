@@ -33,6 +33,7 @@ struct Outcome {
   std::string err;
   GlobalOptions options;
   std::string who;
+  std::string mood{"none"};
   double gain{0.0};
 };
 
@@ -54,6 +55,7 @@ Outcome RunProgram(std::vector<const char*> arguments,
       });
   greet.add_option("--who", outcome.who, "Whom");
   greet.add_option("--gain", outcome.gain, "Gain");
+  greet.add_flag("--mood{good}", outcome.mood, "Mood")->type_name("[=MOOD]");
   CLI::App& store = program.AddGroup("store", "Doors");
   program.AddVerb(store, "open", "Opens", [](const Context&) { return 1; });
   program.MapError<BusError>(kExitTransport);
@@ -76,6 +78,16 @@ TEST(ProgramTest, GlobalOptionsAreAcceptedBeforeAndAfterTheVerb) {
   EXPECT_EQ(after.code, kExitOk);
   EXPECT_EQ(after.options.domain, 7);
   EXPECT_TRUE(after.options.json);
+}
+
+TEST(ProgramTest, ValueOfAFlagStandsBehindABlankOrAnEqualsSign) {
+  EXPECT_EQ(RunProgram({"greet"}).mood, "none");
+  EXPECT_EQ(RunProgram({"greet", "--mood"}).mood, "good");
+  EXPECT_EQ(RunProgram({"greet", "--mood=bad"}).mood, "bad");
+  EXPECT_EQ(RunProgram({"greet", "--mood", "bad"}).mood, "bad");
+  const Outcome both = RunProgram({"greet", "--mood", "--who", "all"});
+  EXPECT_EQ(both.mood, "good");
+  EXPECT_EQ(both.who, "all");
 }
 
 TEST(ProgramTest, LaterOfTwoGlobalOptionsCounts) {

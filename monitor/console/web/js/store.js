@@ -41,6 +41,11 @@ class Store extends EventTarget {
     return Date.now() + this.offsetMs;
   }
 
+  /** Of a valve whose stamps are ahead of the clock, its newest stamp. */
+  valveNowMs(valve) {
+    return Math.max(this.nowMs(), this.tiles.get(valve)?.stamp_ms ?? 0);
+  }
+
   /** The model set of that name, or null. */
   modelSet(name) {
     return this.status?.model_sets?.find((m) => m.model_set === name) ?? null;

@@ -32,7 +32,8 @@ export function faultCell(row) {
 /** How long it lasted, or lasts. */
 export function lastedText(row) {
   return durationText(
-      (row.cleared_ms ?? row.ended_ms ?? store.nowMs()) - row.detected_ms);
+      (row.cleared_ms ?? row.ended_ms ?? store.valveNowMs(row.valve)) -
+      row.detected_ms);
 }
 
 export function labelText(label) {

@@ -39,7 +39,7 @@ function stateLine(tile) {
     tile.strength === null || tile.strength === undefined ? null :
       h('span', {class: 'tag'}, `strength ${percentText(tile.strength)}`),
     h('span', {class: 'tag'},
-        `for ${durationText(store.nowMs() - tile.since_ms)}`),
+        `for ${durationText(store.valveNowMs(tile.id) - tile.since_ms)}`),
     quality,
     tile.episode ? h('a', {href: link('episode', tile.episode)},
         'Open the episode') : null,
