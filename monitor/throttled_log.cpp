@@ -8,8 +8,8 @@ std::string_view LogIdName(LogId id) {
   static constexpr std::array<std::string_view,
                               static_cast<std::size_t>(LogId::kCount_)>
       kNames{"M101", "M102", "M103", "M104", "M105", "M106", "M107", "M108",
-             "M109", "M110", "M111", "M112", "M113", "M114", "M115", "M121", "M122",
-             "M123", "M124", "M131", "M132", "M141", "M151"};
+             "M109", "M110", "M111", "M112", "M113", "M114", "M115", "M121",
+             "M122", "M123", "M124", "M131", "M132", "M141", "M151"};
   return kNames[static_cast<std::size_t>(id)];
 }
 

@@ -3,8 +3,8 @@
 #include <functional>
 #include <string>
 
-#include "monitor/http/http_server.h"
 #include "monitor/app/metrics_page.h"
+#include "monitor/http/http_server.h"
 
 namespace fdi::monitor {
 
