@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "monitor/app/cause_groups.h"
 #include "monitor/app/shadow.h"
 #include "monitor/app/status.h"
 #include "storage/cli/time_text.h"
@@ -63,6 +64,15 @@ std::vector<Heartbeat::Member> Members(const Pipeline& pipeline,
   return members;
 }
 
+std::vector<storage::CauseGroup> CauseGroupsOf(
+    const ServiceOptions& options, const storage::DataDirectory& data) {
+  const std::filesystem::path usual = data.path / "groups.toml";
+  if (options.groups.empty() && !std::filesystem::exists(usual)) {
+    return {};
+  }
+  return ReadCauseGroups(options.groups.empty() ? usual : options.groups);
+}
+
 std::filesystem::path LockOf(const storage::DataDirectory& data) {
   std::filesystem::path path = data.history();
   return path += ".lock";
@@ -82,6 +92,13 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
                    : nullptr),
       data_(Prepared(context.options.data_dir)),
       lock_(LockOf(data_), "recording faults"),
+      pipeline_options_(PipelineOptionsOf(options, data_)),
+      cause_groups_(CauseGroupsOf(options, data_)),
+      delivery_(
+          options.on_event.empty()
+              ? nullptr
+              : MakeEventDelivery(options.on_event,
+                                  Milliseconds(options.on_event_timeout_s))),
       participant_(DdsOptionsOf(options, context.options), context.log,
                    "fdi-monitor"),
       intake_participant_(DdsOptionsOf(options, context.options), context.log,
@@ -101,12 +118,10 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
                  publication_stop_.get_token()),
       events_(participant_, context.log),
       outward_(
-          options.on_event.empty()
+          delivery_ == nullptr
               ? nullptr
               : std::make_unique<OutwardEvents>(
-                    events_,
-                    MakeEventDelivery(options.on_event,
-                                      Milliseconds(options.on_event_timeout_s)),
+                    events_, std::move(delivery_),
                     EventHookOptions{.per_minute = options.on_event_per_minute},
                     cli::LoadFaultTexts(context.options), context.log)),
       status_topic_(participant_),
@@ -116,7 +131,7 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
           idl::Overflow::kOnTheWay),
       log_(context.log),
       pipeline_(
-          PipelineOptionsOf(options, data_),
+          pipeline_options_,
           {decisions_, console_ ? console_->Before(EventsOut()) : EventsOut(),
            history_, runs_.get(), console_ ? &console_->live() : nullptr},
           assignment_, counters_, log_),

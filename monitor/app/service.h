@@ -10,6 +10,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "idl/endpoint.h"
 #include "monitor/app/bus_sinks.h"
@@ -104,6 +105,10 @@ class Service {
   ServiceManager manager_;
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
+  // Read before a session begins: an error in them leaves no trace.
+  PipelineOptions pipeline_options_;
+  std::vector<storage::CauseGroup> cause_groups_;
+  std::unique_ptr<EventDelivery> delivery_;  // Null: nobody outside is told.
   idl::Participant participant_;
   idl::Participant intake_participant_;  // See idl::Overflow.
   idl::Publisher<idl::ModelSetInfoMessage> models_topic_;

@@ -6,15 +6,12 @@ namespace fdi::monitor {
 
 // Before the first event.
 void Service::WatchCauses() {
-  const std::filesystem::path usual = data_.path / "groups.toml";
-  if (options_.groups.empty() && !std::filesystem::exists(usual)) {
+  if (cause_groups_.empty()) {
     return;
   }
-  auto groups =
-      ReadCauseGroups(options_.groups.empty() ? usual : options_.groups);
   context_.log(LogLevel::kInfo,
-               "cause_groups groups=" + std::to_string(groups.size()));
-  history_.WatchCauses(std::move(groups),
+               "cause_groups groups=" + std::to_string(cause_groups_.size()));
+  history_.WatchCauses(std::move(cause_groups_),
                        [this](const storage::CauseChange& change) {
                          if (outward_) {
                            outward_->hook().Tell(CauseJson(change));
