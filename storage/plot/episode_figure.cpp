@@ -155,11 +155,14 @@ FigurePanel FactorPanel(const EpisodeEvidence& evidence,
     panel.levels = {{evidence.models->decision.isolation_threshold,
                      "threshold T", ink::kPurple}};
   }
+  // Decisions come after the detection: before it, a fault that looks normal
+  // has a factor near 1, too.
   std::vector<std::vector<double>> factors;
   for (std::size_t f = 0; f < episode.faults.size(); ++f) {
     factors.push_back(Values(trace, [f](const TraceInstant& instant) {
-      return f < instant.fault_factors.size() ? instant.fault_factors[f]
-                                              : kMissing;
+      return instant.state != State::kNormal && f < instant.fault_factors.size()
+                 ? instant.fault_factors[f]
+                 : kMissing;
     }));
   }
   const auto order = ByWeight(episode, factors);

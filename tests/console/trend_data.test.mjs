@@ -76,6 +76,15 @@ test('a gap breaks the lines and takes the reason that was given', () => {
   assert.equal(table.x[11], 30);
 });
 
+test('factors of faults are drawn while an episode is open', () => {
+  const data = new TrendData();
+  data.load(trend(seconds(0, 3), {
+    d: [[0.9, 0.8, 0.7]], state: ['NORMAL', 'DETECTED', 'ISOLATED']}), false);
+
+  assert.deepEqual(data.table([]).d1, [null, 0.8, 0.7]);
+  assert.deepEqual(data.columns.d1, [0.9, 0.8, 0.7]);
+});
+
 test('the expected value is the measured one without the residual', () => {
   const data = new TrendData();
   data.load(trend(seconds(0, 3)), false);

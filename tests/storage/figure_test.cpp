@@ -1,4 +1,5 @@
 // What a picture shows, and the script that draws it.
+#include <cmath>
 #include <sstream>
 
 #include <gmock/gmock.h>
@@ -124,6 +125,17 @@ TEST_F(EpisodeFigureTest, ThresholdsAreThoseOfTheSetThatGaveTheAnswer) {
   EXPECT_EQ(figure.panels[3].levels[0].value, 3.5);
   EXPECT_EQ(figure.panels[3].levels[1].value, -2.5);
   EXPECT_EQ(figure.panels[4].levels[0].value, 0.7);
+}
+
+TEST_F(EpisodeFigureTest, FaultsHaveFactorsFromTheDetectionOn) {
+  const TimeFigure figure = EpisodeFigure(Evidence());
+
+  const std::vector<double>& fault = figure.panels[4].curves[0].values;
+  const std::vector<double>& normal = figure.panels[4].curves.back().values;
+  ASSERT_EQ(fault.size(), 150U);
+  EXPECT_TRUE(std::isnan(fault[29]));
+  EXPECT_FALSE(std::isnan(fault[30]));
+  EXPECT_FALSE(std::isnan(normal[29]));
 }
 
 TEST_F(EpisodeFigureTest, TimeIsCutToWhatIsAskedFor) {

@@ -150,7 +150,11 @@ export class TrendData {
     return [...found, ...named].sort((a, b) => a.from_ms - b.from_ms);
   }
 
-  /** Columns to draw: with estimates ŷ = y − r, and nulls within gaps. */
+  /**
+   * Columns to draw: with estimates ŷ = y − r, factors of faults only while an
+   * episode is open (before it, a fault that looks normal is near 1, too), and
+   * nulls within gaps.
+   */
   table(gaps) {
     const {columns} = this;
     const table = {...columns};
@@ -161,6 +165,10 @@ export class TrendData {
         const r = columns[`r${c}`][i];
         return y === null || r === null ? null : y - r;
       });
+    });
+    this.meta.faults.forEach((_, f) => {
+      table[`d${f + 1}`] = columns[`d${f + 1}`].map(
+          (d, i) => columns.state[i] === 'NORMAL' ? null : d);
     });
     const cuts = gaps.filter((gap) => gap.to_ms !== null &&
         columns.t.some((t, i) => t >= gap.to_ms && i > 0 &&
