@@ -37,7 +37,7 @@ function(fdi_settings target)
 endfunction()
 
 # Tests and command lines under sanitizers: twice as fast to build without
-# optimisation, and nothing in them takes long.
+# optimisation. Not where numerical templates are: the linker takes any copy.
 function(fdi_quick_build target)
   if(FDI_SANITIZE AND NOT FDI_FUZZ)
     target_compile_options(${target} PRIVATE -O0)
@@ -67,14 +67,16 @@ function(fdi_program name)
   install(TARGETS ${name} RUNTIME)
 endfunction()
 
-# fdi_test(name LABEL unit|system SOURCES a_test.cpp ... LIBRARIES lib ...)
+# fdi_test(name [NUMERICAL] LABEL unit|system SOURCES a_test.cpp ... LIBRARIES lib ...)
 function(fdi_test name)
-  cmake_parse_arguments(ARG "" "LABEL" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "NUMERICAL" "LABEL" "SOURCES;LIBRARIES" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} GTest::gtest
                         GTest::gmock GTest::gtest_main)
   fdi_settings(${name})
-  fdi_quick_build(${name})
+  if(NOT ARG_NUMERICAL)
+    fdi_quick_build(${name})
+  endif()
   if(NOT TARGET ${ARG_LABEL}_tests)
     add_custom_target(${ARG_LABEL}_tests)  # unit_tests, system_tests
   endif()
