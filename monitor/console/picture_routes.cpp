@@ -1,5 +1,4 @@
 // Pictures of episodes, drawn by gnuplot as `fdi-store history plot` does.
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <mutex>
@@ -10,40 +9,15 @@
 #include "monitor/console/api.h"
 #include "storage/plot/episode_figure.h"
 #include "storage/plot/gnuplot.h"
+#include "storage/plot/scratch_folder.h"
 
 namespace fdi::console {
 namespace {
 
-// A file of its own to draw into, removed in the end.
-class ScratchFile {
- public:
-  explicit ScratchFile(const std::string& ending) {
-    std::string name =
-        (std::filesystem::temp_directory_path() / "fdi-picture-XXXXXX")
-            .string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw DataError(name + ": cannot be made");
-    }
-    folder_ = name;
-    path_ = folder_ / ("picture." + ending);
-  }
-  ~ScratchFile() {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-  }
-  ScratchFile(const ScratchFile&) = delete;
-  ScratchFile& operator=(const ScratchFile&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-  std::string Read() const {
-    std::ifstream file(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-
- private:
-  std::filesystem::path folder_;
-  std::filesystem::path path_;
-};
+std::string Contents(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
 
 std::string Draw(const Api& api, const std::string& id,
                  const std::string& ending) {
@@ -57,12 +31,13 @@ std::string Draw(const Api& api, const std::string& id,
   storage::EpisodeFigureOptions options;
   options.fault_name =
       api.texts.Words(evidence.episode.fault.value_or(""), 0.0).name;
-  const ScratchFile file(ending);
+  const storage::ScratchFolder scratch;
+  const std::filesystem::path file = scratch.path() / ("picture." + ending);
   // One at a time: a picture takes a processor.
   static std::mutex drawing;
   const std::lock_guard lock(drawing);
-  storage::DrawFigure(storage::EpisodeFigure(evidence, options), file.path());
-  return file.Read();
+  storage::DrawFigure(storage::EpisodeFigure(evidence, options), file);
+  return Contents(file);
 }
 
 }  // namespace

@@ -9,6 +9,12 @@
 
 namespace fdi::testing {
 
+inline constexpr int kSettled = kMaxLag;  ///< Samples before LIVE.
+
+inline void FullF6(Sample& sample) {
+  AddF6(sample, 1.0);
+}
+
 struct Seen {
   std::vector<Transition> transitions;
   Verdict last;

@@ -1,33 +1,23 @@
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
 #include "diagnosis/valve_engine.h"
-#include "tests/diagnosis/allocation_count.h"
 #include "tests/diagnosis/engine_run.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {
 namespace {
 
-using testing::AddF3;
 using testing::AddF6;
-using testing::Noise;
+using testing::FullF6;
+using testing::kSettled;
 using testing::PlantSample;
 using testing::Seen;
 using testing::SharedPlant;
-using testing::StampOf;
 using testing::StepRange;
-
-constexpr int kSettled = kMaxLag;  // samples before LIVE
-
-void FullF6(Sample& sample) {
-  AddF6(sample, 1.0);
-}
 
 TEST(ValveEngineIntakeTest, RepeatedAndLateSamplesChangeNothing) {
   ValveEngine engine(SharedPlant());

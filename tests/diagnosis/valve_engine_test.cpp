@@ -1,7 +1,6 @@
 #include "diagnosis/valve_engine.h"
 
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <vector>
 
@@ -17,18 +16,13 @@ namespace {
 
 using testing::AddF3;
 using testing::AddF6;
+using testing::FullF6;
 using testing::Noise;
 using testing::PlantSample;
 using testing::Seen;
 using testing::SharedPlant;
 using testing::StampOf;
 using testing::StepRange;
-
-constexpr int kSettled = kMaxLag;  // samples before LIVE
-
-void FullF6(Sample& sample) {
-  AddF6(sample, 1.0);
-}
 
 TEST(ValveEngineTest, NormalOperationOpensNoEpisode) {
   ValveEngine engine(SharedPlant());
