@@ -5,7 +5,7 @@
 # SQLite what happened. Leaves pictures and databases in demo-out/.
 set -euo pipefail
 cd "$(dirname "$0")"
-cmake/prepare.sh
+cmake/prepare.sh programs
 
 export PATH=$PWD/build/release/bin:$PATH
 out=demo-out

@@ -10,7 +10,9 @@
 #include <cstdlib>
 #include <string>
 
-#include "storage/history.h"
+#include "storage/history/history_database.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/history_writer.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::storage {
@@ -158,26 +160,29 @@ bool TimeQueries(const std::filesystem::path& path) {
 
 // 100 valves fail in the same sample: three hundred events.
 void TimeEvents(const std::filesystem::path& path) {
-  ModelSet models;
-  models.name = "demo";
-  models.faults = {1, 7};
+  auto models = std::make_shared<ModelSet>();
+  models->name = "demo";
+  models->faults = {1, 7};
   HistoryWriter writer(path);
   const auto record = [&](std::int64_t base) {
     for (int v = 0; v < 300; ++v) {
-      Transition transition;
-      transition.kind = TransitionKind::kDetected;
-      transition.stamp_ns = base;
-      transition.detection_stamp_ns = base;
-      writer.Record({std::string("B").append(std::to_string(v)), 1, transition,
-                     &models, base, std::nullopt});
+      FaultEvent event;
+      event.valve_id = std::string("B").append(std::to_string(v));
+      event.source_id = 1;
+      event.transition.kind = TransitionKind::kDetected;
+      event.transition.stamp_ns = base;
+      event.transition.detection_stamp_ns = base;
+      event.episode_id = EpisodeId(event.valve_id, 1, base);
+      event.models = models;
+      writer.Record(event, base);
     }
   };
   auto start = Clock::now();
   record(kNow + kSecond);
   const double alone = MillisecondsSince(start);
   start = Clock::now();
-  writer.Together([&] { record(kNow + 2 * kSecond); });
-  std::printf("300 events, a commit each: %.1f ms; together: %.1f ms\n", alone,
+  writer.CommitBatch([&] { record(kNow + 2 * kSecond); });
+  std::printf("300 events, a commit each: %.1f ms; one batch: %.1f ms\n", alone,
               MillisecondsSince(start));
 }
 

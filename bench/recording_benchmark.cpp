@@ -14,7 +14,8 @@
 #include <vector>
 
 #include "bench/cpu_seconds.h"
-#include "storage/runs.h"
+#include "storage/runs/run_recorder.h"
+#include "storage/runs/runs.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::storage {

@@ -7,7 +7,7 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/synthetic_models.h"
-#include "monitor/shadow_valve.h"
+#include "monitor/shadow.h"
 
 namespace fdi::bench {
 namespace {
@@ -25,7 +25,8 @@ std::shared_ptr<const ModelSet> Extended(std::uint64_t hash) {
 void StepBoth(benchmark::State& state) {
   const auto active = Extended(1);
   ValveEngine engine(active);
-  monitor::ShadowValve shadow("V1", EngineParts(Extended(2)), {});
+  monitor::ShadowCounts counts;
+  monitor::ShadowValve shadow("V1", EngineParts(Extended(2)), {}, counts);
   std::vector<Sample> samples =
       Samples(kSamples, 0, state.range(1) != 0 ? kFault : 0.0);
   std::uint64_t later = 0;

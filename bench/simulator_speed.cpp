@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "simulator/control_valve.h"
-#include "simulator/valve_dynamics.h"
 #include "simulator/valve_simulation.h"
 
 namespace {

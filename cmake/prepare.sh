@@ -1,8 +1,12 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that are missing and builds Release.
-# Usage: cmake/prepare.sh [CMAKE_OPTION ...]     Called by demo.sh and test.sh.
+# Usage: cmake/prepare.sh [programs|tests|package]
+#   programs   the four programs and the live page (default)
+#   tests      these and the tests
+#   package    the programs, and the Debian package in build/package/
 set -euo pipefail
 cd "$(dirname "$0")/.."
+purpose=${1:-programs}
 
 packages=(
   g++ cmake ninja-build pkg-config git ca-certificates
@@ -11,12 +15,31 @@ packages=(
   libsqlite3-dev libsqlitecpp-dev sqlite3 zlib1g-dev libssl-dev
   libcpp-httplib-dev libsystemd-dev
   libcli11-dev libtomlplusplus-dev libspdlog-dev nlohmann-json3-dev
-  libgtest-dev libgmock-dev libbenchmark-dev
   gnuplot-nox
-  cyclonedds-dev cyclonedds-tools
 )
-# The plot library of the live page comes by npm, whose own package or not.
-command -v npm >/dev/null || packages+=(nodejs npm)
+for_package=(dpkg-dev file gzip help2man)
+for_tests=(libgtest-dev libgmock-dev cyclonedds-dev cyclonedds-tools chromium
+  make procps iproute2)
+testing=OFF
+packaging=OFF
+case $purpose in
+  programs) ;;
+  package)
+    packages+=("${for_package[@]}")
+    packaging=ON
+    ;;
+  tests)
+    packages+=("${for_package[@]}" "${for_tests[@]}")
+    # The browser's driver comes by npm, which may be Debian's or not.
+    command -v npm >/dev/null || packages+=(nodejs npm)
+    testing=ON
+    packaging=ON
+    ;;
+  *)
+    echo "usage: $0 [programs|tests|package]" >&2
+    exit 2
+    ;;
+esac
 
 missing=()
 for package in "${packages[@]}"; do
@@ -39,9 +62,12 @@ if [ "${#missing[@]}" -gt 0 ]; then
 fi
 
 log=$(mktemp)
-cmake --preset release "$@" >"$log" 2>&1 || {
+cmake --preset release -DBUILD_TESTING=$testing -DFDI_PACKAGE=$packaging \
+  >"$log" 2>&1 || {
   cat "$log" >&2
   exit 1
 }
 cmake --build --preset release
 rm -f "$log"
+[ "$purpose" != package ] ||
+  cpack --config build/release/CPackConfig.cmake -B build/package

@@ -11,30 +11,14 @@
 namespace fdi {
 namespace {
 
-constexpr std::array<FaultFacts, kLastFault> kFaults{{
-    {"f1", "valve clogging", "F1", false},
-    {"f2", "plug or seat sedimentation", "", false},
-    {"f3", "plug or seat erosion", "F2", false},
-    {"f4", "increased friction of valve or bushing", "", true},
-    {"f5", "external leakage", "", false},
-    {"f6", "internal leakage", "F3", false},
-    {"f7", "medium evaporation or critical flow", "F4", false},
-    {"f8", "twisted piston rod", "", false},
-    {"f9", "housing or terminals leak air", "", false},
-    {"f10", "diaphragm perforation", "", false},
-    {"f11", "spring fault", "", false},
-    {"f12", "electro-pneumatic transducer fault", "", true},
-    {"f13", "rod displacement sensor fault", "", true},
-    {"f14", "positioner pressure sensor fault", "", true},
-    {"f15", "positioner feedback fault", "", false},
-    {"f16", "supply pressure drop", "", false},
-    {"f17", "unexpected pressure change across the valve", "", true},
-    {"f18", "bypass valve open", "", false},
-    {"f19", "flow sensor fault", "F5", true},
-    {"t1", "temperature transmitter fault", "", true},
-    {"p1", "inlet pressure transmitter fault", "", true},
-    {"p2", "outlet pressure transmitter fault", "", true},
-}};
+// "f1..f19, t1, p1, p2".
+std::string JoinedNames() {
+  std::string names = "f1..f" + std::to_string(kFaultCount);
+  for (int fault = kFaultCount + 1; fault <= kLastFault; ++fault) {
+    names += ", " + std::string(FaultFactsOf(fault).name);
+  }
+  return names;
+}
 
 constexpr std::array<int, 5> kPaperFaults{1, 3, 6, 7, 19};
 
@@ -62,9 +46,11 @@ std::string Lower(std::string_view text) {
 
 }  // namespace
 
+const std::string kFaultNames = JoinedNames();
+
 const FaultFacts& FaultFactsOf(int fault) {
-  Require(fault >= 1 && fault <= kLastFault, "fault must be in 1..22");
-  return kFaults[static_cast<std::size_t>(fault - 1)];
+  Require(fault >= 1 && fault <= kLastFault, "fault is not of the catalogue");
+  return kFaultCatalogue[fault - 1];
 }
 
 std::string FaultName(int fault) {
@@ -111,16 +97,8 @@ std::string DidYouMeanFault(std::string_view name,
 }
 
 std::optional<Signal> TransmitterOf(int fault) {
-  switch (fault) {
-    case kTemperatureTransmitterFault:
-      return Signal::kT1;
-    case kInletPressureTransmitterFault:
-      return Signal::kP1;
-    case kOutletPressureTransmitterFault:
-      return Signal::kP2;
-    default:
-      return std::nullopt;
-  }
+  return fault >= 1 && fault <= kLastFault ? FaultFactsOf(fault).transmitter
+                                           : std::nullopt;
 }
 
 int RequireFault(std::string_view name) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -9,27 +10,58 @@
 
 namespace fdi {
 
-/// The nineteen actuator faults of the DAMADICS benchmark, numbered 1..19.
-inline constexpr int kFaultCount = 19;
-
-/// Faults outside the benchmark follow: of the transmitters of T1, P1 and P2.
-inline constexpr int kTemperatureTransmitterFault = 20;
-inline constexpr int kInletPressureTransmitterFault = 21;
-inline constexpr int kOutletPressureTransmitterFault = 22;
-/// All faults are 1..kLastFault.
-inline constexpr int kLastFault = kOutletPressureTransmitterFault;
-
-/// The names of all faults, for messages and help.
-inline constexpr std::string_view kFaultNames = "f1..f19, t1, p1, p2";
-
 struct FaultFacts {
-  std::string_view name;         ///< "f1" or, beyond 19, "t1", "p1", "p2".
+  std::string_view name;         ///< "f1"; "t1", "p1", "p2" of transmitters.
   std::string_view description;  ///< "valve clogging".
   std::string_view paper_name;   ///< "F1".."F5", or empty.
   bool is_signed;                ///< Strength in [-1, 1], else in [0, 1].
+  /// The signal whose transmitter is at fault.
+  std::optional<Signal> transmitter{};
 };
 
-/// @throws std::invalid_argument if `fault` is not in 1..22.
+/// All faults; the number of a fault is its place, from 1 on. Models, databases
+/// and messages hold these numbers: a new fault comes last.
+inline constexpr FaultFacts kFaultCatalogue[] = {
+    {"f1", "valve clogging", "F1", false},
+    {"f2", "plug or seat sedimentation", "", false},
+    {"f3", "plug or seat erosion", "F2", false},
+    {"f4", "increased friction of valve or bushing", "", true},
+    {"f5", "external leakage", "", false},
+    {"f6", "internal leakage", "F3", false},
+    {"f7", "medium evaporation or critical flow", "F4", false},
+    {"f8", "twisted piston rod", "", false},
+    {"f9", "housing or terminals leak air", "", false},
+    {"f10", "diaphragm perforation", "", false},
+    {"f11", "spring fault", "", false},
+    {"f12", "electro-pneumatic transducer fault", "", true},
+    {"f13", "rod displacement sensor fault", "", true},
+    {"f14", "positioner pressure sensor fault", "", true},
+    {"f15", "positioner feedback fault", "", false},
+    {"f16", "supply pressure drop", "", false},
+    {"f17", "unexpected pressure change across the valve", "", true},
+    {"f18", "bypass valve open", "", false},
+    {"f19", "flow sensor fault", "F5", true},
+    {"t1", "temperature transmitter fault", "", true, Signal::kT1},
+    {"p1", "inlet pressure transmitter fault", "", true, Signal::kP1},
+    {"p2", "outlet pressure transmitter fault", "", true, Signal::kP2},
+};
+
+/// The actuator faults of the DAMADICS benchmark are 1..kFaultCount.
+inline constexpr int kFaultCount = 19;
+/// All faults are 1..kLastFault.
+inline constexpr int kLastFault = static_cast<int>(std::size(kFaultCatalogue));
+
+inline constexpr int kTemperatureTransmitterFault = 20;
+inline constexpr int kInletPressureTransmitterFault = 21;
+inline constexpr int kOutletPressureTransmitterFault = 22;
+static_assert(kFaultCatalogue[kTemperatureTransmitterFault - 1].name == "t1" &&
+              kFaultCatalogue[kOutletPressureTransmitterFault - 1].name ==
+                  "p2");
+
+/// The names of all faults, for messages and help: "f1..f19, t1, p1, p2".
+extern const std::string kFaultNames;
+
+/// @throws std::invalid_argument if `fault` is not in 1..kLastFault.
 const FaultFacts& FaultFactsOf(int fault);
 
 /// "f19", "t1"; "normal" for 0; "unknown" for anything else.
@@ -39,7 +71,7 @@ std::string FaultName(int fault);
 /// for the five faults of [Mendonça et al., 2009] (f1 f3 f6 f7 f19).
 std::optional<int> ParseFault(std::string_view name);
 
-/// The signal whose transmitter is at fault: T1, P1 or P2 for 20, 21, 22.
+/// The signal whose transmitter is at fault, if it is such a fault.
 std::optional<Signal> TransmitterOf(int fault);
 
 /// For messages: " (did you mean 'f19'?)", or "" if `name` is not nearly the

@@ -77,7 +77,7 @@ struct ChannelObserver {
 /// One observer: normal operation (fault 0) or one fault condition.
 struct Observer {
   std::string name;      ///< "normal", "f19 0.50".
-  int fault{0};          ///< 0 = normal, else 1..19.
+  int fault{0};          ///< 0 = normal, else 1..22.
   double strength{0.0};  ///< Of the condition it was trained on; signed.
   std::vector<ChannelObserver> channels;  ///< One per ModelSet::channels.
 };

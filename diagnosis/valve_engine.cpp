@@ -1,18 +1,46 @@
 #include "diagnosis/valve_engine.h"
 
+#include <cmath>
 #include <limits>
 
 #include "diagnosis/coverage.h"
 #include "diagnosis/detection.h"
 #include "diagnosis/episode.h"
 #include "diagnosis/intake.h"
+#include "diagnosis/model_set.h"
 #include "diagnosis/observer_bank.h"
+#include "diagnosis/sample.h"
 #include "diagnosis/snapshot.h"
-#include "diagnosis/source_order.h"
-#include "diagnosis/stuck_readings.h"
+#include "diagnosis/verdict.h"
 
 namespace fdi {
 namespace {
+
+// The first reason why a signal of `required` is unusable in `sample`, or
+// kAccepted; signals that are not present are no reason.
+Intake CheckValues(const ModelSet& models, SignalMask required,
+                   const Sample& sample) {
+  if ((required & MaskOf(Signal::kF)) != 0 && sample.Has(Signal::kF) &&
+      sample.flow_unit != models.flow_unit) {
+    return Intake::kUnit;
+  }
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    if ((required & MaskOf(signal)) == 0 || !sample.Has(signal)) {
+      continue;
+    }
+    if (sample.quality[i] == SignalQuality::kBad) {
+      return Intake::kBadQuality;
+    }
+    if (!std::isfinite(sample.values[i])) {
+      return Intake::kNotFinite;
+    }
+    if (!PlausibleRange(signal).Contains(sample.values[i])) {
+      return Intake::kRange;
+    }
+  }
+  return Intake::kAccepted;
+}
 
 constexpr std::uint32_t kSnapshotFormat = 1;
 

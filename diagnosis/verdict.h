@@ -14,7 +14,7 @@ namespace fdi {
 enum class Intake : std::uint8_t {
   kAccepted,
   kRepeat,      ///< seq seen before from this source.
-  kLate,        ///< seq or stamp before the newest one of this source.
+  kLate,        ///< seq before the newest one of this source.
   kSuperseded,  ///< A newer source speaks for this valve.
   kBadQuality,  ///< A required signal has quality BAD.
   kNotFinite,   ///< A required signal is NaN or infinite.

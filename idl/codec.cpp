@@ -1,216 +1,364 @@
 #include "idl/codec.h"
 
-#include "idl/codec_fields.h"
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <limits>
+#include <string>
+#include <vector>
 
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/field_list.h"
+
+// How a record becomes a message of fdi_v1.idl and back:
+//
+//     KeyFields(transfer, record, wire)   the members that are its key
+//     Fields(transfer, record, wire)      all others
+//
+// each name every field once. A Transfer<true> copies the fields to the wire
+// and throws at the first that does not fit; a Transfer<false> copies them from
+// the wire, where anything may stand, and remembers that one did not fit. What
+// fits is the same either way.
 namespace fdi::idl {
 namespace {
 
-// Enumerators stand in the same order on both sides; the last ones prove it.
-template <typename Ours, typename Wire>
-constexpr bool SameEnd(Ours ours, Wire wire) {
-  return static_cast<unsigned>(ours) == static_cast<unsigned>(wire);
-}
-static_assert(SameEnd(SignalQuality::kBad, v1::SIGNAL_BAD));
-static_assert(SameEnd(ValveMode::kCalibrating, v1::MODE_CALIBRATING));
-static_assert(SameEnd(FlowUnit::kTPerHour, v1::FLOW_T_PER_H));
-static_assert(SameEnd(Intake::kPeriod, v1::INTAKE_PERIOD));
-static_assert(SameEnd(Quality::kUnassigned, v1::QUALITY_UNASSIGNED));
-static_assert(SameEnd(State::kIsolated, v1::STATE_ISOLATED));
-static_assert(SameEnd(TransitionKind::kClosed, v1::TRANSITION_CLOSED));
-static_assert(SameEnd(EndReason::kUnknown, v1::END_UNKNOWN));
-static_assert(SameEnd(Health::kFailing, v1::HEALTH_FAILING));
-static_assert(kMaxChannels == 16 && kMaxFaults == 64 && kMaxObservers == 128,
+static_assert(kMaxChannels == 16 && kMaxFaults == 64 && kMaxObservers == 128 &&
+                  kSignalCount == 10 && kLastFault <= 255,
               "fdi_v1.idl cannot grow");
-static_assert(kSignalCount == 10, "fdi_v1.idl cannot grow");
 
-bool StampFits(std::int64_t stamp_ns) {
-  return stamp_ns >= kMinStampNs && stamp_ns <= kMaxStampNs;
-}
-
-std::int64_t CheckedStamp(std::int64_t stamp_ns) {
-  if (!StampFits(stamp_ns)) {
-    throw DataError("stamp_ns is " + std::to_string(stamp_ns) +
-                    ", accepted are the years 1900 to 2100");
+// LastOf(enumerator) is the last one of its enumeration. Enumerators stand in
+// the same order on both sides, and the last ones prove it.
+#define FDI_LAST(OURS, WIRE)                                                 \
+  static_assert(static_cast<unsigned>(OURS) == static_cast<unsigned>(WIRE)); \
+  constexpr std::int64_t LastOf(decltype(OURS)) {                            \
+    return static_cast<std::int64_t>(OURS);                                  \
   }
-  return stamp_ns;
+FDI_LAST(Signal::kPz, kSignalCount - 1)
+FDI_LAST(SignalQuality::kBad, v1::SIGNAL_BAD)
+FDI_LAST(ValveMode::kCalibrating, v1::MODE_CALIBRATING)
+FDI_LAST(FlowUnit::kTPerHour, v1::FLOW_T_PER_H)
+FDI_LAST(Intake::kPeriod, v1::INTAKE_PERIOD)
+FDI_LAST(Quality::kUnassigned, v1::QUALITY_UNASSIGNED)
+FDI_LAST(State::kIsolated, v1::STATE_ISOLATED)
+FDI_LAST(TransitionKind::kClosed, v1::TRANSITION_CLOSED)
+FDI_LAST(EndReason::kUnknown, v1::END_UNKNOWN)
+FDI_LAST(Health::kFailing, v1::HEALTH_FAILING)
+#undef FDI_LAST
+
+template <bool kEncodes>
+class Transfer {
+ public:
+  // A field whose range follows from its type: enumerators, counts (int to
+  // unsigned long), texts up to the bound of the IDL; all others as they are.
+  template <typename Ours, typename Wire>
+  void operator()(const char* field, Ours& ours, Wire&& wire) {
+    using Plain = std::remove_const_t<Ours>;
+    if constexpr (std::is_enum_v<Plain>) {
+      Ranged(field, ours, wire, 0, LastOf(ours));
+    } else if constexpr (std::same_as<Plain, int>) {
+      Ranged(field, ours, wire, 0, std::numeric_limits<int>::max());
+    } else if constexpr (!std::is_arithmetic_v<Plain>) {
+      Text(field, ours, wire);
+    } else if constexpr (kEncodes) {
+      static_assert(std::same_as<Plain, std::remove_cvref_t<Wire>>);
+      wire = ours;
+    } else {
+      static_assert(std::same_as<Plain, std::remove_cvref_t<Wire>>);
+      ours = wire;
+    }
+  }
+
+  // An integer or enumerator in low..high. A foreign enumerator arrives as any
+  // 32-bit pattern.
+  template <typename Ours, typename Wire>
+  void Ranged(const char* field, Ours& ours, Wire&& wire, std::int64_t low,
+              std::int64_t high) {
+    std::int64_t value = 0;
+    if constexpr (kEncodes) {
+      value = static_cast<std::int64_t>(ours);
+    } else {
+      value = static_cast<std::int64_t>(wire);
+    }
+    if (value < low || value > high) {
+      Refuse(field, " is " + std::to_string(value) + ", accepted are " +
+                        (low == kMinStampNs ? "the years 1900 to 2100"
+                                            : Range(low, high)));
+    } else if constexpr (kEncodes) {
+      wire = static_cast<std::remove_cvref_t<Wire>>(value);
+    } else {
+      ours = static_cast<Ours>(value);
+    }
+  }
+
+  // The name of an instance: not empty.
+  template <typename Ours, typename Wire>
+  void Id(const char* field, Ours& ours, Wire& wire) {
+    static_assert(Wire::max_size == kMaxIdLength);
+    if constexpr (kEncodes) {
+      ValidateId(ours);
+    }
+    Text(field, ours, wire);
+    if (ours.empty()) {
+      Refuse(field, " is empty");
+    }
+  }
+
+  // A list of records, or of fault numbers.
+  template <typename Ours, typename Wire>
+  void List(const char* field, Ours& ours, Wire&& wire, std::size_t most) {
+    const std::size_t count = kEncodes ? ours.size() : wire.size();
+    if (!CountFits(field, count, most)) {
+      return;
+    }
+    if constexpr (kEncodes) {
+      wire.resize(count);
+    } else {
+      ours.resize(count);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      if constexpr (std::same_as<typename Ours::value_type, int>) {
+        Ranged(field, ours[i], wire[i], 1, kLastFault);
+      } else {
+        Fields(*this, ours[i], wire[i]);
+      }
+    }
+  }
+
+  // The first `count` values of an array of ours; the others become 0.
+  template <typename Values, typename Count, typename Wire>
+  void Array(const char* field, Values& values, Count& count, Wire&& wire) {
+    const std::size_t used =
+        kEncodes ? static_cast<std::size_t>(count) : wire.size();
+    if (!CountFits(field, used, values.size())) {
+      return;
+    }
+    if constexpr (kEncodes) {
+      wire.assign(values.begin(), values.begin() + count);
+    } else {
+      count = static_cast<int>(used);
+      std::ranges::fill(std::ranges::copy(wire, values.begin()).out,
+                        values.end(), 0.0);
+    }
+  }
+
+  void Require(const char* field, bool fits) {
+    if (!fits) {
+      Refuse(field, " does not fit the other fields");
+    }
+  }
+
+  bool all_fit() const { return all_fit_; }
+
+ private:
+  template <typename Ours, typename Wire>
+  void Text(const char* field, Ours& ours, Wire& wire) {
+    if constexpr (!kEncodes) {
+      ours = wire.c_str();
+    } else if (ours.size() > Wire::max_size ||
+               ours.find('\0') != std::string::npos) {
+      Refuse(field, " '" + ours + "' has " + std::to_string(ours.size()) +
+                        " bytes, accepted are 0 to " +
+                        std::to_string(Wire::max_size) + " without NUL");
+    } else {
+      wire = ours;
+    }
+  }
+
+  bool CountFits(const char* field, std::size_t count, std::size_t most) {
+    if (count <= most) {
+      return true;
+    }
+    Refuse(field, " has " + std::to_string(count) + " entries, accepted are " +
+                      Range(0, static_cast<std::int64_t>(most)));
+    return false;
+  }
+
+  static std::string Range(std::int64_t low, std::int64_t high) {
+    return std::to_string(low) + " to " + std::to_string(high);
+  }
+
+  void Refuse(const char* field, const std::string& reason) {
+    if (kEncodes) {
+      throw DataError(field + reason);
+    }
+    all_fit_ = false;
+  }
+
+  bool all_fit_{true};
+};
+
+// Either a T to be read or one to be written.
+template <typename Given, typename T>
+concept Is = std::same_as<std::remove_const_t<Given>, T>;
+
+#define FDI_FIELD(name) t(#name, m.name, w.name());
+
+template <typename Message>
+void KeyFields(auto& t, Message& m, auto& w) {
+  if constexpr (requires { m.valve_id; }) {
+    t.Id("valve_id", m.valve_id, w.valve_id());
+  } else if constexpr (requires { m.monitor; }) {
+    t.Id("monitor", m.monitor, w.monitor());
+  } else {
+    t.Id("model_set", m.model_set, w.model_set());
+    FDI_FIELD(model_hash)
+  }
 }
+
+template <typename Mask, typename Wire>
+void SignalsField(auto& t, const char* field, Mask& mask, Wire&& wire) {
+  t.Ranged(field, mask, wire, 0, (1 << kSignalCount) - 1);
+}
+
+void Fields(auto& t, Is<ValveSampleMessage> auto& message, auto& w) {
+  auto& m = message.sample;
+  FDI_FOR_EACH(FDI_FIELD, source_id, seq)
+  t.Ranged("stamp_ns", m.stamp_ns, w.stamp_ns(), kMinStampNs, kMaxStampNs);
+  const auto value = [&](Signal signal) -> auto& {
+    return m.values[Index(signal)];
+  };
+  t("cv", value(Signal::kCv), w.cv());
+  t("p1", value(Signal::kP1), w.p1());
+  t("p2", value(Signal::kP2), w.p2());
+  t("t1", value(Signal::kT1), w.t1());
+  t("x", value(Signal::kX), w.x());
+  t("f", value(Signal::kF), w.f());
+  t("sp", value(Signal::kSp), w.sp());
+  t("cvi", value(Signal::kCvi), w.cvi());
+  t("ps", value(Signal::kPs), w.ps());
+  t("pz", value(Signal::kPz), w.pz());
+  SignalsField(t, "present", m.present, w.present());
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    t("quality", m.quality[i], w.quality()[i]);
+  }
+  FDI_FOR_EACH(FDI_FIELD, mode, flow_unit, epoch)
+}
+
+void Fields(auto& t, Is<DecisionMessage> auto& message, auto& w) {
+  t("model_hash", message.model_hash, w.model_hash());
+  auto& m = message.verdict;
+  FDI_FOR_EACH(FDI_FIELD, source_id, seq, stamp_ns, intake, initialised,
+               quality, state, detected, confidence, normal_factor, isolated)
+  t.Array("residuals", m.residuals, message.channel_count, w.residuals());
+  t.Array("fault_factors", m.fault_factors, message.fault_count,
+          w.fault_factors());
+  t.Array("fault_strengths", m.strengths, message.fault_count,
+          w.fault_strengths());
+  t.Require("fault_strengths",
+            w.fault_strengths().size() == w.fault_factors().size());
+  t.Array("observer_factors", m.observer_factors, message.observer_count,
+          w.observer_factors());
+}
+
+void Fields(auto& t, Is<FaultCandidate> auto& m, auto& w) {
+  t.Ranged("candidates.fault", m.fault, w.fault(), 1, kLastFault);
+  FDI_FOR_EACH(FDI_FIELD, factor, strength, isolated)
+}
+
+void Fields(auto& t, Is<FaultEvent> auto& m, auto& w) {
+  FDI_FAULT_EVENT_FIELDS(FDI_FIELD)
+  auto& transition = m.transition;
+  t("transition", transition.kind, w.transition());
+  t("end_reason", transition.reason, w.end_reason());
+  t("stamp_ns", transition.stamp_ns, w.stamp_ns());
+  t("detection_stamp_ns", transition.detection_stamp_ns,
+    w.detection_stamp_ns());
+  t("faults", transition.faults, w.faults());
+  t("factor", transition.factor, w.factor());
+  t("strength", transition.strength, w.strength());
+  t.List("candidates", m.candidates, w.candidates(), kMaxFaults);
+}
+
+void Fields(auto& t, Is<ChannelSpec> auto& m, auto& w) {
+  t("channels.name", m.name, w.name());
+  t("channels.output", m.output, w.output());
+  FDI_FOR_EACH(FDI_FIELD, lower_threshold, upper_threshold)
+}
+
+void Fields(auto& t, Is<ObserverInfo> auto& m, auto& w) {
+  t("observers.name", m.name, w.name());
+  t.Ranged("observers.fault", m.fault, w.fault(), 0, kLastFault);
+  FDI_FIELD(strength)
+}
+
+// A group of faults that cannot be told apart.
+void Fields(auto& t, Is<std::vector<int>> auto& m, auto& w) {
+  t.List("groups.faults", m, w.faults(), kMaxFaults);
+}
+
+void Fields(auto& t, Is<ModelSetInfoMessage> auto& m, auto& w) {
+  FDI_FOR_EACH(FDI_FIELD, version, created_ns, sample_period_s, flow_unit)
+  SignalsField(t, "required", m.required, w.required());
+  FDI_FOR_EACH(FDI_FIELD, isolation_threshold, isolation_fraction,
+               detection_samples, isolation_samples, clearing_samples,
+               settling_samples)
+  t.List("channels", m.channels, w.channels(), kMaxChannels);
+  t.List("observers", m.observers, w.observers(), kMaxObservers);
+  t.List("faults", m.faults, w.faults(), kMaxFaults);
+  t.List("undetectable", m.undetectable, w.undetectable(), kMaxFaults);
+  t.List("groups", m.groups, w.groups(), kMaxGroups);
+}
+
+// A counter: its name and its total.
+void Fields(auto& t, Is<std::pair<std::string, std::uint64_t>> auto& m,
+            auto& w) {
+  t("counters.name", m.first, w.name());
+  t("counters.value", m.second, w.value());
+}
+
+void Fields(auto& t, Is<MonitorStatusMessage> auto& m, auto& w) {
+  FDI_FOR_EACH(FDI_FIELD, software, started_ns, stamp_ns, health, text)
+  t.List("counters", m.counters, w.counters(), kMaxCounters);
+}
+
+#undef FDI_FIELD
 
 }  // namespace
 
-void Codec<ValveSampleMessage>::EncodeKey(const ValveSampleMessage& message,
-                                          Wire& wire) {
-  SetId(message.valve_id, wire.valve_id());
+template <typename Message>
+void Codec<Message>::EncodeKey(const Message& message, Wire& wire) {
+  Transfer<true> transfer;
+  KeyFields(transfer, message, wire);
 }
 
-void Codec<ValveSampleMessage>::Encode(const ValveSampleMessage& message,
-                                       Wire& wire) {
-  const Sample& sample = message.sample;
-  EncodeKey(message, wire);
-  wire.source_id(sample.source_id);
-  wire.seq(sample.seq);
-  wire.stamp_ns(CheckedStamp(sample.stamp_ns));
-  wire.cv(sample[Signal::kCv]);
-  wire.p1(sample[Signal::kP1]);
-  wire.p2(sample[Signal::kP2]);
-  wire.t1(sample[Signal::kT1]);
-  wire.x(sample[Signal::kX]);
-  wire.f(sample[Signal::kF]);
-  wire.sp(sample[Signal::kSp]);
-  wire.cvi(sample[Signal::kCvi]);
-  wire.ps(sample[Signal::kPs]);
-  wire.pz(sample[Signal::kPz]);
-  wire.present(sample.present);
-  for (std::size_t i = 0; i < kSignalCount; ++i) {
-    wire.quality()[i] = ToWire(sample.quality[i], v1::SIGNAL_BAD, "quality");
+template <typename Message>
+void Codec<Message>::Encode(const Message& message, Wire& wire) {
+  Transfer<true> transfer;
+  KeyFields(transfer, message, wire);
+  Fields(transfer, message, wire);
+}
+
+template <typename Message>
+bool Codec<Message>::Decode(const Wire& wire, Message& message) {
+  Transfer<false> transfer;
+  KeyFields(transfer, message, wire);
+  Fields(transfer, message, wire);
+  return transfer.all_fit();
+}
+
+std::string KeyInHandle(
+    const eprosima::fastrtps::rtps::InstanceHandle_t& handle) {
+  constexpr std::size_t kText = 8;
+  std::array<unsigned, 16> bytes{};
+  std::copy_n(static_cast<const std::uint8_t*>(handle.value), bytes.size(),
+              bytes.begin());
+  const bool little = bytes[1] == 1;
+  const unsigned length = little ? bytes[4] : bytes[7];
+  const unsigned rest = bytes[0] + bytes[5] + bytes[6] +
+                        (little ? bytes[7] : bytes[1] + bytes[4]);
+  if (rest != 0 || length < 2 || length > bytes.size() - kText) {
+    return "";
   }
-  wire.mode(ToWire(sample.mode, v1::MODE_CALIBRATING, "mode"));
-  wire.flow_unit(ToWire(sample.flow_unit, v1::FLOW_T_PER_H, "flow_unit"));
-  wire.epoch(sample.epoch);
+  std::string text(bytes.begin() + kText, bytes.begin() + kText + length);
+  // One NUL, the last.
+  return text.find('\0') == length - 1 ? text.substr(0, length - 1) : "";
 }
 
-bool Codec<ValveSampleMessage>::Decode(const Wire& wire,
-                                       ValveSampleMessage& message) {
-  Sample& sample = message.sample;
-  message.valve_id = wire.valve_id().c_str();
-  sample.source_id = wire.source_id();
-  sample.seq = wire.seq();
-  sample.stamp_ns = wire.stamp_ns();
-  sample.values = {wire.cv(), wire.p1(), wire.p2(),  wire.t1(), wire.x(),
-                   wire.f(),  wire.sp(), wire.cvi(), wire.ps(), wire.pz()};
-  sample.present = wire.present();
-  sample.epoch = wire.epoch();
-  bool known = true;
-  for (std::size_t i = 0; i < kSignalCount; ++i) {
-    known =
-        FromWire(wire.quality()[i], v1::SIGNAL_BAD, sample.quality[i]) && known;
-  }
-  return known && !message.valve_id.empty() && StampFits(sample.stamp_ns) &&
-         wire.present() < (1U << kSignalCount) &&
-         FromWire(wire.mode(), v1::MODE_CALIBRATING, sample.mode) &&
-         FromWire(wire.flow_unit(), v1::FLOW_T_PER_H, sample.flow_unit);
-}
-
-void Codec<DecisionMessage>::EncodeKey(const DecisionMessage& message,
-                                       Wire& wire) {
-  SetId(message.valve_id, wire.valve_id());
-}
-
-void Codec<DecisionMessage>::Encode(const DecisionMessage& message,
-                                    Wire& wire) {
-  const Verdict& verdict = message.verdict;
-  EncodeKey(message, wire);
-  wire.source_id(verdict.source_id);
-  wire.seq(verdict.seq);
-  wire.stamp_ns(verdict.stamp_ns);
-  wire.model_hash(message.model_hash);
-  wire.intake(ToWire(verdict.intake, v1::INTAKE_PERIOD, "intake"));
-  wire.initialised(verdict.initialised);
-  wire.quality(ToWire(verdict.quality, v1::QUALITY_UNASSIGNED, "quality"));
-  wire.state(ToWire(verdict.state, v1::STATE_ISOLATED, "state"));
-  wire.detected(verdict.detected);
-  wire.confidence(verdict.confidence);
-  wire.normal_factor(verdict.normal_factor);
-  wire.isolated(verdict.isolated);
-  SetArray(verdict.residuals, message.channel_count, wire.residuals(),
-           "residuals");
-  SetArray(verdict.fault_factors, message.fault_count, wire.fault_factors(),
-           "fault_factors");
-  SetArray(verdict.strengths, message.fault_count, wire.fault_strengths(),
-           "fault_strengths");
-  SetArray(verdict.observer_factors, message.observer_count,
-           wire.observer_factors(), "observer_factors");
-}
-
-bool Codec<DecisionMessage>::Decode(const Wire& wire,
-                                    DecisionMessage& message) {
-  Verdict& verdict = message.verdict;
-  message.valve_id = wire.valve_id().c_str();
-  message.model_hash = wire.model_hash();
-  message.channel_count = static_cast<int>(wire.residuals().size());
-  message.fault_count = static_cast<int>(wire.fault_factors().size());
-  message.observer_count = static_cast<int>(wire.observer_factors().size());
-  verdict.source_id = wire.source_id();
-  verdict.seq = wire.seq();
-  verdict.stamp_ns = wire.stamp_ns();
-  verdict.initialised = wire.initialised();
-  verdict.detected = wire.detected();
-  verdict.confidence = wire.confidence();
-  verdict.normal_factor = wire.normal_factor();
-  verdict.isolated = wire.isolated();
-  verdict.transition_count = 0;
-  return !message.valve_id.empty() &&
-         wire.fault_strengths().size() == wire.fault_factors().size() &&
-         FromWire(wire.intake(), v1::INTAKE_PERIOD, verdict.intake) &&
-         FromWire(wire.quality(), v1::QUALITY_UNASSIGNED, verdict.quality) &&
-         FromWire(wire.state(), v1::STATE_ISOLATED, verdict.state) &&
-         GetArray(wire.residuals(), verdict.residuals) &&
-         GetArray(wire.fault_factors(), verdict.fault_factors) &&
-         GetArray(wire.fault_strengths(), verdict.strengths) &&
-         GetArray(wire.observer_factors(), verdict.observer_factors);
-}
-
-void Codec<FaultEventMessage>::EncodeKey(const FaultEventMessage& message,
-                                         Wire& wire) {
-  SetId(message.valve_id, wire.valve_id());
-}
-
-void Codec<FaultEventMessage>::Encode(const FaultEventMessage& message,
-                                      Wire& wire) {
-  const Transition& transition = message.transition;
-  EncodeKey(message, wire);
-  wire.episode_id(message.episode_id);
-  wire.source_id(message.source_id);
-  wire.seq(message.seq);
-  wire.transition(ToWire(transition.kind, v1::TRANSITION_CLOSED, "transition"));
-  wire.end_reason(ToWire(transition.reason, v1::END_UNKNOWN, "end_reason"));
-  wire.stamp_ns(transition.stamp_ns);
-  wire.detection_stamp_ns(transition.detection_stamp_ns);
-  wire.faults(transition.faults);
-  wire.factor(transition.factor);
-  wire.strength(transition.strength);
-  RequireCount(message.candidates.size(), kMaxFaults, "candidates");
-  wire.candidates().resize(message.candidates.size());
-  for (std::size_t i = 0; i < message.candidates.size(); ++i) {
-    const FaultCandidate& candidate = message.candidates[i];
-    v1::FaultCandidate& out = wire.candidates()[i];
-    out.fault(ToWireFault(candidate.fault, "candidate"));
-    out.factor(candidate.factor);
-    out.strength(candidate.strength);
-    out.isolated(candidate.isolated);
-  }
-  SetText(message.model_set, wire.model_set(), "model_set");
-  wire.model_version(ToWireCount(message.model_version, "model_version"));
-  wire.model_hash(message.model_hash);
-  wire.persisted(message.persisted);
-}
-
-bool Codec<FaultEventMessage>::Decode(const Wire& wire,
-                                      FaultEventMessage& message) {
-  Transition& transition = message.transition;
-  message.valve_id = wire.valve_id().c_str();
-  message.episode_id = wire.episode_id();
-  message.source_id = wire.source_id();
-  message.seq = wire.seq();
-  transition.stamp_ns = wire.stamp_ns();
-  transition.detection_stamp_ns = wire.detection_stamp_ns();
-  transition.faults = wire.faults();
-  transition.factor = wire.factor();
-  transition.strength = wire.strength();
-  message.model_set = wire.model_set().c_str();
-  message.model_hash = wire.model_hash();
-  message.persisted = wire.persisted();
-  message.candidates.clear();
-  for (const v1::FaultCandidate& candidate : wire.candidates()) {
-    if (!IsFault(candidate.fault())) {
-      return false;
-    }
-    message.candidates.push_back({candidate.fault(), candidate.factor(),
-                                  candidate.strength(), candidate.isolated()});
-  }
-  return !message.valve_id.empty() && message.candidates.size() <= kMaxFaults &&
-         FromWireCount(wire.model_version(), message.model_version) &&
-         FromWire(wire.transition(), v1::TRANSITION_CLOSED, transition.kind) &&
-         FromWire(wire.end_reason(), v1::END_UNKNOWN, transition.reason);
-}
+template struct Codec<ValveSampleMessage>;
+template struct Codec<DecisionMessage>;
+template struct Codec<FaultEvent>;
+template struct Codec<ModelSetInfoMessage>;
+template struct Codec<MonitorStatusMessage>;
 
 }  // namespace fdi::idl

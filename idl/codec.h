@@ -1,7 +1,12 @@
 #pragma once
 
-#include <string>
-#include <utility>
+#include <atomic>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <tuple>
+#include <type_traits>
+#include <unordered_set>
 
 #include "fdi_v1.h"
 #include "fdi_v1PubSubTypes.h"
@@ -10,97 +15,128 @@
 /// Inside idl/ only: plain messages to generated types and back.
 namespace fdi::idl {
 
-/// Names and conversions of one topic. Encode() throws DataError naming the
-/// field that does not fit; Decode() answers false for what no publisher of
-/// ours sends (an enumerator, a size, a fault out of range), `message` being
-/// unspecified then. EncodeKey() fills the key members only.
+/// The name of a topic and its types on the wire.
 template <typename Message>
-struct Codec;
+struct TopicOf;
 
-template <>
-struct Codec<ValveSampleMessage> {
-  using Wire = v1::ValveSample;
-  using Type = v1::ValveSamplePubSubType;
-  static constexpr const char* kTopic = "fdi/v1/ValveSample";
-  static void EncodeKey(const ValveSampleMessage& message, Wire& wire);
-  static void Encode(const ValveSampleMessage& message, Wire& wire);
-  static bool Decode(const Wire& wire, ValveSampleMessage& message);
-  using Key = std::string;
-  static const Key& KeyOf(const ValveSampleMessage& message) {
-    return message.valve_id;
-  }
-  static void SetKey(const Key& key, ValveSampleMessage& message) {
-    message.valve_id = key;
-  }
+#define FDI_TOPIC(MESSAGE, NAME)                           \
+  template <>                                              \
+  struct TopicOf<MESSAGE> {                                \
+    using Wire = v1::NAME;                                 \
+    using Type = v1::NAME##PubSubType;                     \
+    static constexpr const char* kTopic = "fdi/v1/" #NAME; \
+  };
+FDI_TOPIC(ValveSampleMessage, ValveSample)
+FDI_TOPIC(DecisionMessage, DecisionVector)
+FDI_TOPIC(FaultEvent, FaultEvent)
+FDI_TOPIC(ModelSetInfoMessage, ModelSetInfo)
+FDI_TOPIC(MonitorStatusMessage, MonitorStatus)
+#undef FDI_TOPIC
+
+/// Conversion of the messages of one topic; the fields are listed in codec.cpp,
+/// once for both directions.
+template <typename Message>
+struct Codec : TopicOf<Message> {
+  using Wire = typename TopicOf<Message>::Wire;
+
+  /// @throws DataError naming the field that does not fit, and what would.
+  static void Encode(const Message& message, Wire& wire);
+  /// The members that are the key only. @throws as Encode().
+  static void EncodeKey(const Message& message, Wire& wire);
+  /// @returns false for what no publisher of ours sends (an enumerator, a size,
+  ///   a fault out of range); `message` is unspecified then.
+  static bool Decode(const Wire& wire, Message& message);
 };
 
-template <>
-struct Codec<DecisionMessage> {
-  using Wire = v1::DecisionVector;
-  using Type = v1::DecisionVectorPubSubType;
-  static constexpr const char* kTopic = "fdi/v1/DecisionVector";
-  static void EncodeKey(const DecisionMessage& message, Wire& wire);
-  static void Encode(const DecisionMessage& message, Wire& wire);
-  static bool Decode(const Wire& wire, DecisionMessage& message);
-  using Key = std::string;
-  static const Key& KeyOf(const DecisionMessage& message) {
-    return message.valve_id;
+/// References to the members of `message` that are its key.
+template <typename Message>
+auto KeyOf(Message& message) {
+  if constexpr (requires { message.valve_id; }) {
+    return std::tie(message.valve_id);
+  } else if constexpr (requires { message.monitor; }) {
+    return std::tie(message.monitor);
+  } else {
+    return std::tie(message.model_set, message.model_hash);
   }
-  static void SetKey(const Key& key, DecisionMessage& message) {
-    message.valve_id = key;
-  }
-};
+}
 
-template <>
-struct Codec<FaultEventMessage> {
-  using Wire = v1::FaultEvent;
-  using Type = v1::FaultEventPubSubType;
-  static constexpr const char* kTopic = "fdi/v1/FaultEvent";
-  static void EncodeKey(const FaultEventMessage& message, Wire& wire);
-  static void Encode(const FaultEventMessage& message, Wire& wire);
-  static bool Decode(const Wire& wire, FaultEventMessage& message);
-  using Key = std::string;
-  static const Key& KeyOf(const FaultEventMessage& message) {
-    return message.valve_id;
-  }
-  static void SetKey(const Key& key, FaultEventMessage& message) {
-    message.valve_id = key;
-  }
-};
+template <typename... T>
+std::tuple<std::remove_const_t<T>...> CopyOf(const std::tuple<T&...>& members) {
+  return members;
+}
+/// The same members by value.
+template <typename Message>
+using Key = decltype(CopyOf(KeyOf(std::declval<Message&>())));
 
-template <>
-struct Codec<ModelSetInfoMessage> {
-  using Wire = v1::ModelSetInfo;
-  using Type = v1::ModelSetInfoPubSubType;
-  static constexpr const char* kTopic = "fdi/v1/ModelSetInfo";
-  static void EncodeKey(const ModelSetInfoMessage& message, Wire& wire);
-  static void Encode(const ModelSetInfoMessage& message, Wire& wire);
-  static bool Decode(const Wire& wire, ModelSetInfoMessage& message);
-  using Key = std::pair<std::string, std::uint64_t>;
-  static Key KeyOf(const ModelSetInfoMessage& message) {
-    return {message.model_set, message.model_hash};
-  }
-  static void SetKey(const Key& key, ModelSetInfoMessage& message) {
-    message.model_set = key.first;
-    message.model_hash = key.second;
-  }
-};
+/// The id in a handle that is a serialized key; empty if it is none.
+///
+/// Other DDS libraries end an instance with its key, serialized, where Fast DDS
+/// sends an MD5 sum of it. If that key has at most 16 bytes (an id of at most
+/// 7), Fast DDS 2.9.1 takes it for the sum, so that no message ever had this
+/// handle:
+///
+///     00 01 00 00 | 07 00 00 00 | 'F' 'V' '-' '1' '0' '1' 00 | 00
+///     ^ little endian, 00 00 big  ^ length of the text with its NUL
+std::string KeyInHandle(
+    const eprosima::fastrtps::rtps::InstanceHandle_t& handle);
 
-template <>
-struct Codec<MonitorStatusMessage> {
-  using Wire = v1::MonitorStatus;
-  using Type = v1::MonitorStatusPubSubType;
-  static constexpr const char* kTopic = "fdi/v1/MonitorStatus";
-  static void EncodeKey(const MonitorStatusMessage& message, Wire& wire);
-  static void Encode(const MonitorStatusMessage& message, Wire& wire);
-  static bool Decode(const Wire& wire, MonitorStatusMessage& message);
-  using Key = std::string;
-  static const Key& KeyOf(const MonitorStatusMessage& message) {
-    return message.monitor;
+/// A generated type that survives foreign bytes and several endpoints.
+///
+/// What cannot be deserialized, for whatever reason, is refused and counted,
+/// once: the library deserializes a message into an object of its own first,
+/// for its key, and then into that of the reader.
+///
+/// Generated types compute keys in a buffer that all endpoints of the type
+/// share, from which two threads got each other's keys; hence the lock.
+template <typename Generated>
+class CheckedType : public Generated {
+ public:
+  bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload,
+                   void* data) override {
+    try {
+      if (Generated::deserialize(payload, data)) {
+        return true;
+      }
+    } catch (const std::exception&) {
+      // E.g. bad_alloc of an absurd length; counted below.
+    }
+    const std::lock_guard lock(objects_mutex_);
+    if (!objects_of_library_.contains(data)) {
+      refused_.fetch_add(1, std::memory_order_relaxed);
+    }
+    return false;
   }
-  static void SetKey(const Key& key, MonitorStatusMessage& message) {
-    message.monitor = key;
+
+  void* createData() override {
+    void* const data = Generated::createData();
+    const std::lock_guard lock(objects_mutex_);
+    objects_of_library_.insert(data);
+    return data;
   }
+
+  void deleteData(void* data) override {
+    {
+      const std::lock_guard lock(objects_mutex_);
+      objects_of_library_.erase(data);
+    }
+    Generated::deleteData(data);
+  }
+
+  bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle,
+              bool force_md5) override {
+    const std::lock_guard lock(key_mutex_);
+    return Generated::getKey(data, handle, force_md5);
+  }
+
+  std::uint64_t refused() const {
+    return refused_.load(std::memory_order_relaxed);
+  }
+
+ private:
+  std::mutex key_mutex_;
+  std::mutex objects_mutex_;
+  std::unordered_set<const void*> objects_of_library_;
+  std::atomic<std::uint64_t> refused_{0};
 };
 
 }  // namespace fdi::idl

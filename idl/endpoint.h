@@ -73,7 +73,7 @@ class Publisher {
   int matched() const;
 
  private:
-  class Impl;
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
@@ -91,7 +91,7 @@ struct SubscriberStatus {
   /// Written since this subscriber exists, and will never come: overwritten by
   /// a live writer, or dropped on the way.
   std::uint64_t lost{0};
-  std::uint64_t undecodable{0};  ///< A value no publisher of ours sends.
+  std::uint64_t undecodable{0};  ///< What we never send, and unknown ends.
   /// Messages of valves beyond max_valves: lost, and how many valves (exact
   /// up to 65536).
   std::uint64_t rejected_instances{0};
@@ -100,6 +100,7 @@ struct SubscriberStatus {
   /// than loss; what a live writer overwrites meanwhile is counted as lost.
   std::uint64_t rejected_samples{0};
   std::uint64_t incompatible{0};  ///< Writers that offer less than is asked.
+  std::uint64_t waiting{0};       ///< Messages that Take() is behind with.
   int matched{0};                 ///< Writers now.
   int alive{0};                   ///< Of these, writers that show life.
 };
@@ -153,18 +154,18 @@ class Subscriber {
   SubscriberStatus status() const;
 
  private:
-  class Impl;
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
 extern template class Publisher<ValveSampleMessage>;
 extern template class Publisher<DecisionMessage>;
-extern template class Publisher<FaultEventMessage>;
+extern template class Publisher<FaultEvent>;
 extern template class Publisher<ModelSetInfoMessage>;
 extern template class Publisher<MonitorStatusMessage>;
 extern template class Subscriber<ValveSampleMessage>;
 extern template class Subscriber<DecisionMessage>;
-extern template class Subscriber<FaultEventMessage>;
+extern template class Subscriber<FaultEvent>;
 extern template class Subscriber<ModelSetInfoMessage>;
 extern template class Subscriber<MonitorStatusMessage>;
 

@@ -1,5 +1,3 @@
-#include "idl/library_log.h"
-
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -11,6 +9,8 @@
 #include <vector>
 
 #include <fastdds/dds/log/Log.hpp>
+
+#include "idl/participant_impl.h"
 
 namespace fdi::idl {
 namespace {
@@ -32,15 +32,10 @@ Registry& TheRegistry() {
   return registry;
 }
 
-LogLevel LevelOf(const Log::Entry& entry) {
-  switch (entry.kind) {
-    case Log::Kind::Error:
-      return LogLevel::kError;
-    case Log::Kind::Warning:
-      return LogLevel::kWarning;
-    default:
-      return LogLevel::kDebug;
-  }
+LogLevel LevelOf(Log::Kind kind) {
+  return kind == Log::Kind::Error     ? LogLevel::kError
+         : kind == Log::Kind::Warning ? LogLevel::kWarning
+                                      : LogLevel::kDebug;
 }
 
 // Called by the one log thread of the library.
@@ -69,7 +64,7 @@ class Throttle : public eprosima::fastdds::dds::LogConsumer {
     Registry& registry = TheRegistry();
     const std::lock_guard lock(registry.mutex);
     if (!registry.sinks.empty() && *registry.sinks.back()) {
-      (*registry.sinks.back())(LevelOf(entry), line);
+      (*registry.sinks.back())(LevelOf(entry.kind), line);
     }
   }
 

@@ -121,7 +121,7 @@ dds::DomainParticipantQos MakeQos(const DdsOptions& options,
                                   const ProfileFile& profiles,
                                   const std::string& name) {
   dds::DomainParticipantQos qos;
-  const std::set<std::string>* stated = profiles.ParticipantPolicies();
+  const std::set<std::string>* stated = profiles.Stated(kParticipantProfile);
   if (stated != nullptr) {
     Check(dds::DomainParticipantFactory::get_instance()
               ->get_participant_qos_from_profile(kParticipantProfile, qos),
@@ -209,12 +209,6 @@ dds::Topic* Participant::Impl::TopicOf(const std::string& topic,
   return found;
 }
 
-void Participant::Impl::Log(LogLevel level, const std::string& line) const {
-  if (log_) {
-    log_(level, line);
-  }
-}
-
 void Participant::Impl::ReportIncompatible(const std::string& topic,
                                            bool remote_is_writer,
                                            dds::QosPolicyId_t id,
@@ -233,11 +227,14 @@ void Participant::Impl::ReportIncompatible(const std::string& topic,
     }
   }
   const std::string own_text = own == ours.end() ? "unknown" : own->second;
-  Log(LogLevel::kWarning,
-      "qos_incompatible topic=" + topic + " policy=" + PolicyName(id) +
-          (remote_is_writer
-               ? " requested_here=" + own_text + " offered_there=" + theirs
-               : " offered_here=" + own_text + " requested_there=" + theirs));
+  if (!log_) {
+    return;
+  }
+  log_(LogLevel::kWarning,
+       "qos_incompatible topic=" + topic + " policy=" + PolicyName(id) +
+           (remote_is_writer
+                ? " requested_here=" + own_text + " offered_there=" + theirs
+                : " offered_here=" + own_text + " requested_there=" + theirs));
 }
 
 void Participant::Impl::Remember(const RemoteKey& key, PolicyTexts texts) {

@@ -1,22 +1,26 @@
 #pragma once
 
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 
-#include "idl/library_log.h"
 #include "idl/participant.h"
 #include "idl/profile_file.h"
-#include "idl/qos_report.h"
+#include "idl/qos.h"
 
-/// Inside idl/ only.
+/// Inside idl/ only: what the endpoints of a participant share.
 namespace fdi::idl {
 
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
@@ -33,6 +37,55 @@ Handle* NotNull(Handle* handle, const std::string& operation) {
   return handle;
 }
 
+/// `timeout` from now; a timeout without end is one of a year, so that nothing
+/// overflows.
+inline std::chrono::steady_clock::time_point DeadlineIn(
+    std::chrono::milliseconds timeout) {
+  const std::chrono::milliseconds longest = std::chrono::hours(24 * 365);
+  return std::chrono::steady_clock::now() + std::min(timeout, longest);
+}
+
+/// How many remote endpoints are matched: set by a callback, waited for by
+/// other threads.
+class Matched {
+ public:
+  void Set(int count) {
+    {
+      const std::lock_guard lock(mutex_);
+      count_.store(count);
+    }
+    changed_.notify_all();
+  }
+
+  int count() const { return count_.load(); }
+
+  bool WaitFor(int count, std::chrono::milliseconds timeout) const {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_until(lock, DeadlineIn(timeout),
+                               [&] { return count_.load() >= count; });
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  std::atomic<int> count_{0};
+};
+
+/// While it lives, what the DDS library logs goes to `sink`, at most one line
+/// per place in the library and 10 s; with several alive, to the newest. The
+/// library never writes to stdout once one has existed.
+class LibraryLog {
+ public:
+  explicit LibraryLog(LogSink sink);
+  ~LibraryLog();
+  LibraryLog(const LibraryLog&) = delete;
+  LibraryLog& operator=(const LibraryLog&) = delete;
+
+ private:
+  LogSink sink_;
+};
+
+/// What Participant is outside of idl/, with the library's handle in it.
 class Participant::Impl
     : private eprosima::fastdds::dds::DomainParticipantListener {
  public:
@@ -46,8 +99,6 @@ class Participant::Impl
   eprosima::fastdds::dds::Topic* TopicOf(
       const std::string& topic,
       const eprosima::fastdds::dds::TypeSupport& type);
-
-  void Log(LogLevel level, const std::string& line) const;
 
   /// Logs that policy `id` of a remote endpoint on `topic` is incompatible with
   /// ours, with both sides.

@@ -8,13 +8,13 @@
 #include <tinyxml2.h>
 
 #include "diagnosis/error.h"
+#include "idl/participant_impl.h"
 #include "idl/qos.h"
 
 namespace fdi::idl {
 namespace {
 
-using eprosima::fastdds::dds::DomainParticipantFactory;
-using Stated = std::map<std::string, std::set<std::string>>;
+namespace dds = eprosima::fastdds::dds;
 
 // Calls visit(element) for the child elements of `parent`.
 template <typename Visit>
@@ -41,34 +41,81 @@ std::set<std::string> PoliciesOf(const tinyxml2::XMLElement& endpoint) {
   return policies;
 }
 
-void AddProfile(const std::string& path, const tinyxml2::XMLElement& element,
-                Stated& stated) {
-  const char* name = element.Attribute("profile_name");
-  if (name == nullptr) {
-    throw ConfigError("QoS file '" + path + "': a " + element.Name() +
-                      " without profile_name");
-  }
-  stated[name] = PoliciesOf(element);
+// Calls visit(element, policy) for the policies that a profile of an endpoint
+// may state: the name in XML and how to reach it in the QoS.
+template <typename Visit>
+void ForEachPolicy(Visit visit) {
+  visit(
+      "reliability", [](auto& q) -> auto& { return q.reliability(); });
+  visit(
+      "durability", [](auto& q) -> auto& { return q.durability(); });
+  visit(
+      "deadline", [](auto& q) -> auto& { return q.deadline(); });
+  visit(
+      "liveliness", [](auto& q) -> auto& { return q.liveliness(); });
+  visit(
+      "lifespan", [](auto& q) -> auto& { return q.lifespan(); });
+  visit(
+      "historyQos", [](auto& q) -> auto& { return q.history(); });
+  visit(
+      "resourceLimitsQos",
+      [](auto& q) -> auto& { return q.resource_limits(); });
+  visit(
+      "historyMemoryPolicy",
+      [](auto& q) -> auto& { return q.endpoint().history_memory_policy; });
+  visit(
+      "unicastLocatorList",
+      [](auto& q) -> auto& { return q.endpoint().unicast_locator_list; });
+  visit(
+      "multicastLocatorList",
+      [](auto& q) -> auto& { return q.endpoint().multicast_locator_list; });
 }
 
-void CheckNames(const std::string& path, const Stated& stated,
-                const std::set<std::string>& accepted,
-                const std::set<std::string>& policies) {
-  for (const auto& [name, elements] : stated) {
-    if (!accepted.contains(name)) {
-      std::string names;
-      for (const std::string& each : accepted) {
-        names += " " + each;
-      }
-      throw ConfigError("QoS file '" + path + "': unknown profile '" + name +
-                        "', accepted are" + names);
+// Of writers alone, or found elsewhere in a writer than in a reader.
+constexpr const char* kPublishMode = "publishMode";
+constexpr const char* kTimes = "times";
+
+bool CanOverride(const std::string& element) {
+  bool known = element == kPublishMode || element == kTimes;
+  ForEachPolicy([&](const char* name, auto) { known |= element == name; });
+  return known;
+}
+
+// What both kinds of endpoint have.
+template <typename Qos>
+void CopyStated(const std::set<std::string>& stated, const Qos& from, Qos& to) {
+  ForEachPolicy([&](const char* name, auto policy) {
+    if (stated.contains(name)) {
+      policy(to) = policy(from);
     }
-    for (const std::string& element : elements) {
-      if (!policies.empty() && !policies.contains(element)) {
-        throw ConfigError("QoS file '" + path + "': profile '" + name +
-                          "' states '" + element +
-                          "', which cannot be overridden");
-      }
+  });
+}
+
+// @throws ConfigError unless a profile of this name may state `elements`; the
+// names are those of the topics with `suffix`.
+void CheckProfile(const std::string& path, const std::string& name,
+                  const std::set<std::string>& elements,
+                  const std::string& suffix) {
+  std::set<std::string> accepted{kParticipantProfile};
+  if (!suffix.empty()) {
+    accepted.clear();
+    for (const std::string& endpoint : EndpointNames()) {
+      accepted.insert(endpoint + suffix);
+    }
+  }
+  if (!accepted.contains(name)) {
+    std::string names;
+    for (const std::string& each : accepted) {
+      names += " " + each;
+    }
+    throw ConfigError("QoS file '" + path + "': unknown profile '" + name +
+                      "', accepted are" + names);
+  }
+  for (const std::string& element : elements) {
+    if (!suffix.empty() && !CanOverride(element)) {
+      throw ConfigError("QoS file '" + path + "': profile '" + name +
+                        "' states '" + element +
+                        "', which cannot be overridden");
     }
   }
 }
@@ -87,18 +134,12 @@ void LoadOnce(const std::string& path) {
     throw ConfigError("QoS file '" + path + "': this process already uses '" +
                       loaded + "'");
   }
-  if (DomainParticipantFactory::get_instance()->load_XML_profiles_file(
-          absolute) != eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+  if (dds::DomainParticipantFactory::get_instance()->load_XML_profiles_file(
+          absolute) != ReturnCode::RETCODE_OK) {
     throw ConfigError("QoS file '" + path +
                       "' has profiles that Fast DDS does not accept");
   }
   loaded = absolute;
-}
-
-const std::set<std::string>* Find(const Stated& stated,
-                                  const std::string& name) {
-  const auto found = stated.find(name);
-  return found == stated.end() ? nullptr : &found->second;
 }
 
 }  // namespace
@@ -117,36 +158,65 @@ ProfileFile::ProfileFile(const std::string& path) {
     throw ConfigError("QoS file '" + path + "' has no <profiles> element");
   }
   ForEachChild(*profiles, [&](const tinyxml2::XMLElement& element) {
-    const std::string_view kind = element.Name();
-    if (kind == "data_writer" || kind == "publisher") {
-      AddProfile(path, element, writers_);
-    } else if (kind == "data_reader" || kind == "subscriber") {
-      AddProfile(path, element, readers_);
-    } else if (kind == "participant") {
-      AddProfile(path, element, participants_);
-    } else if (kind != "transport_descriptors") {
-      throw ConfigError("QoS file '" + path + "': unexpected <" +
-                        std::string(kind) + ">");
+    const std::string kind = element.Name();
+    if (kind == "transport_descriptors") {
+      return;
     }
+    const bool writer = kind == "data_writer" || kind == "publisher";
+    const bool reader = kind == "data_reader" || kind == "subscriber";
+    if (!writer && !reader && kind != "participant") {
+      throw ConfigError("QoS file '" + path + "': unexpected <" + kind + ">");
+    }
+    const char* name = element.Attribute("profile_name");
+    if (name == nullptr) {
+      throw ConfigError("QoS file '" + path + "': a " + kind +
+                        " without profile_name");
+    }
+    CheckProfile(path, name, stated_[name] = PoliciesOf(element),
+                 writer   ? "_writer"
+                 : reader ? "_reader"
+                          : "");
   });
-  CheckNames(path, writers_, WriterProfileNames(), OverridablePolicies());
-  CheckNames(path, readers_, ReaderProfileNames(), OverridablePolicies());
-  CheckNames(path, participants_, {kParticipantProfile}, {});
   LoadOnce(path);
 }
 
-const std::set<std::string>* ProfileFile::Writer(
-    const std::string& profile) const {
-  return Find(writers_, profile);
+const std::set<std::string>* ProfileFile::Stated(
+    const std::string& name) const {
+  const auto found = stated_.find(name);
+  return found == stated_.end() ? nullptr : &found->second;
 }
 
-const std::set<std::string>* ProfileFile::Reader(
-    const std::string& profile) const {
-  return Find(readers_, profile);
+dds::DataWriterQos ProfileFile::Override(
+    const std::string& name, dds::DataWriterQos qos,
+    const dds::Publisher& publisher) const {
+  if (const auto* stated = Stated(name)) {
+    dds::DataWriterQos from;
+    Check(publisher.get_datawriter_qos_from_profile(name, from),
+          "get_datawriter_qos_from_profile " + name);
+    CopyStated(*stated, from, qos);
+    if (stated->contains(kPublishMode)) {
+      qos.publish_mode() = from.publish_mode();
+    }
+    if (stated->contains(kTimes)) {
+      qos.reliable_writer_qos().times = from.reliable_writer_qos().times;
+    }
+  }
+  return qos;
 }
 
-const std::set<std::string>* ProfileFile::ParticipantPolicies() const {
-  return Find(participants_, kParticipantProfile);
+dds::DataReaderQos ProfileFile::Override(
+    const std::string& name, dds::DataReaderQos qos,
+    const dds::Subscriber& subscriber) const {
+  if (const auto* stated = Stated(name)) {
+    dds::DataReaderQos from;
+    Check(subscriber.get_datareader_qos_from_profile(name, from),
+          "get_datareader_qos_from_profile " + name);
+    CopyStated(*stated, from, qos);
+    if (stated->contains(kTimes)) {
+      qos.reliable_reader_qos().times = from.reliable_reader_qos().times;
+    }
+  }
+  return qos;
 }
 
 }  // namespace fdi::idl

@@ -4,13 +4,18 @@
 #include <set>
 #include <string>
 
+#include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+
+/// Inside idl/ only.
 namespace fdi::idl {
 
-/// Which policies a QoS file states, by profile. A profile overrides exactly
-/// what it states; all else stays as in qos.cpp, so that a file about
-/// reliability does not bring back the library's limit of ten valves.
+/// The QoS file of --qos. A profile overrides exactly the policies that it
+/// states; all others stay as in qos.cpp, so that a file about reliability does
+/// not bring back the library's limit of ten valves.
 ///
-/// Element names as in Fast DDS XML: "reliability", "historyQos", "times", ...
+/// Element names are those of Fast DDS XML: "reliability", "historyQos", ...
 class ProfileFile {
  public:
   ProfileFile() = default;
@@ -20,17 +25,20 @@ class ProfileFile {
   ///   missing, not XML, or states what cannot be overridden.
   explicit ProfileFile(const std::string& path);
 
-  /// The policies stated by a data_writer or data_reader profile; nullptr if
-  /// there is no such profile.
-  const std::set<std::string>* Writer(const std::string& profile) const;
-  const std::set<std::string>* Reader(const std::string& profile) const;
-  /// Likewise of the participant profile kParticipantProfile.
-  const std::set<std::string>* ParticipantPolicies() const;
+  /// `qos` with what the profile `name` states in its place, if there is one.
+  /// @throws TransportError
+  eprosima::fastdds::dds::DataWriterQos Override(
+      const std::string& name, eprosima::fastdds::dds::DataWriterQos qos,
+      const eprosima::fastdds::dds::Publisher& publisher) const;
+  eprosima::fastdds::dds::DataReaderQos Override(
+      const std::string& name, eprosima::fastdds::dds::DataReaderQos qos,
+      const eprosima::fastdds::dds::Subscriber& subscriber) const;
+
+  /// The policies that the profile `name` states; nullptr if there is none.
+  const std::set<std::string>* Stated(const std::string& name) const;
 
  private:
-  std::map<std::string, std::set<std::string>> writers_;
-  std::map<std::string, std::set<std::string>> readers_;
-  std::map<std::string, std::set<std::string>> participants_;
+  std::map<std::string, std::set<std::string>> stated_;  // By profile.
 };
 
 inline constexpr const char* kParticipantProfile = "fdi_participant";

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -8,13 +9,9 @@
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 
-#include "idl/checked_type.h"
 #include "idl/codec.h"
-#include "idl/deadline.h"
 #include "idl/endpoint.h"
-#include "idl/matched.h"
 #include "idl/participant_impl.h"
-#include "idl/qos.h"
 
 namespace fdi::idl {
 namespace {
@@ -42,130 +39,62 @@ eprosima::fastrtps::Duration_t Until(Clock::time_point deadline) {
 }  // namespace
 
 template <typename Message>
-class Publisher<Message>::Impl : private dds::DataWriterListener {
- public:
+struct Publisher<Message>::Impl : dds::DataWriterListener {
   using Traits = Codec<Message>;
 
   Impl(Participant& participant, const PublisherOptions& options)
-      : participant_(participant.impl()),
-        lossless_(options.profile == Profile::kLossless) {
-    const int valves =
-        options.valves > 0 ? options.valves : participant.options().max_valves;
-    dds::Topic* topic = participant_.TopicOf(
-        Traits::kTopic,
-        dds::TypeSupport(new CheckedType<typename Traits::Type>()));
-    const EndpointQos ours = QosFor<Message>(options.profile, valves);
+      : bus(participant.impl()),
+        lossless(options.profile == Profile::kLossless) {
+    const EndpointQos ours = QosFor<Message>(
+        options.profile,
+        options.valves > 0 ? options.valves : bus.options().max_valves);
     dds::PublisherQos publisher_qos;
     if (!ours.partition.empty()) {
       publisher_qos.partition().push_back(ours.partition.c_str());
     }
-    publisher_ = NotNull(participant_->create_publisher(publisher_qos),
-                         "create_publisher");
-    try {
-      const dds::DataWriterQos qos = MakeQos(ours);
-      policies_ = Describe(qos);
-      writer_ = NotNull(publisher_->create_datawriter(
-                            topic, qos, this,
-                            dds::StatusMask::publication_matched()
-                                << dds::StatusMask::offered_incompatible_qos()),
-                        std::string("create_datawriter of ") + Traits::kTopic);
-    } catch (...) {
-      participant_->delete_publisher(publisher_);
-      throw;
-    }
+    publisher = {
+        NotNull(bus->create_publisher(publisher_qos), "create_publisher"),
+        [this](dds::Publisher* handle) { bus->delete_publisher(handle); }};
+    const dds::DataWriterQos qos =
+        bus.profiles().Override(ours.name + "_writer", ours.writer, *publisher);
+    policies = Describe(qos);
+    dds::Topic* topic =
+        bus.TopicOf(Traits::kTopic,
+                    dds::TypeSupport(new CheckedType<typename Traits::Type>()));
+    writer = NotNull(publisher->create_datawriter(
+                         topic, qos, this,
+                         dds::StatusMask::publication_matched()
+                             << dds::StatusMask::offered_incompatible_qos()),
+                     std::string("create_datawriter of ") + Traits::kTopic);
   }
 
   ~Impl() override {
-    writer_->set_listener(nullptr);
+    writer->set_listener(nullptr);
     // Deleting a writer frees its changes while its heartbeat may still walk
     // through them, for ever if a dead reader has not acknowledged them.
     std::size_t removed = 0;
-    writer_->clear_history(&removed);
-    publisher_->delete_datawriter(writer_);
-    participant_->delete_publisher(publisher_);
+    writer->clear_history(&removed);
+    publisher->delete_datawriter(writer);
   }
 
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  WriteResult Write(const Message& message, const std::stop_token& stop,
-                    std::chrono::milliseconds timeout) {
-    const std::lock_guard lock(mutex_);
-    Traits::Encode(message, wire_);
-    const dds::InstanceHandle_t* instance = InstanceOf(message);
-    if (instance == nullptr) {
-      refused_.fetch_add(1, std::memory_order_relaxed);
-      return WriteResult::kTooManyValves;
-    }
-    const auto send = [&] { return writer_->write(&wire_, *instance); };
-    if (!Retry(send, "write", stop, DeadlineIn(timeout))) {
-      return WriteResult::kNotSent;
-    }
-    written_.fetch_add(1, std::memory_order_relaxed);
-    return WriteResult::kSent;
-  }
-
-  void Dispose(const Message& message) {
-    const std::lock_guard lock(mutex_);
-    const auto found = instances_.find(Traits::KeyOf(message));
-    if (found == instances_.end()) {
-      return;
-    }
-    Traits::EncodeKey(message, wire_);
-    const auto send = [&] { return writer_->dispose(&wire_, found->second); };
-    if (!Retry(send, "dispose", {}, Clock::now() + kDisposeTimeout)) {
-      throw TransportError("dispose: the readers are behind",
-                           static_cast<int>(ReturnCode::RETCODE_TIMEOUT));
-    }
-  }
-
-  bool WaitForReaders(int count, std::chrono::milliseconds timeout) const {
-    return matched_.WaitFor(count, timeout);
-  }
-
-  bool WaitForAcknowledged(std::chrono::milliseconds timeout) {
-    return writer_->wait_for_acknowledgments(Until(DeadlineIn(timeout))) ==
-           ReturnCode::RETCODE_OK;
-  }
-
-  int matched() const { return matched_.count(); }
-
-  PublisherStatus status() const {
-    PublisherStatus status;
-    status.written = written_.load(std::memory_order_relaxed);
-    status.retries = retries_.load(std::memory_order_relaxed);
-    status.refused = refused_.load(std::memory_order_relaxed);
-    status.incompatible = incompatible_.load(std::memory_order_relaxed);
-    status.matched = matched_.count();
-    return status;
-  }
-
- private:
-  dds::DataWriterQos MakeQos(const EndpointQos& ours) const {
-    dds::DataWriterQos qos = ours.writer;
-    const std::string name = ours.name + "_writer";
-    if (const auto* policies = participant_.profiles().Writer(name)) {
-      dds::DataWriterQos stated;
-      Check(publisher_->get_datawriter_qos_from_profile(name, stated),
-            "get_datawriter_qos_from_profile " + name);
-      Override(stated, *policies, qos);
-    }
-    return qos;
-  }
-
-  // The instance of the message that stands in wire_; nullptr beyond the limit.
+  // The instance of the message that stands in `wire`; nullptr beyond the
+  // limit.
   const dds::InstanceHandle_t* InstanceOf(const Message& message) {
-    auto& instance = instances_[Traits::KeyOf(message)];
-    if (!instance.isDefined()) {
-      instance = writer_->register_instance(&wire_);
+    auto found = instances.find(KeyOf(message));
+    if (found != instances.end()) {
+      return &found->second;
     }
-    if (instance.isDefined()) {
-      return &instance;
+    const dds::InstanceHandle_t handle = writer->register_instance(&wire);
+    if (!handle.isDefined()) {
+      return nullptr;
     }
-    instances_.erase(Traits::KeyOf(message));
-    return nullptr;
+    return &instances.emplace(KeyOf(message), handle).first->second;
   }
 
+  // Calls `send` until the history has room. @returns whether it had in time.
   template <typename Send>
   bool Retry(Send send, const char* operation, const std::stop_token& stop,
              Clock::time_point deadline) {
@@ -177,8 +106,8 @@ class Publisher<Message>::Impl : private dds::DataWriterListener {
       if (!IsFull(code)) {
         Check(code, std::string(operation) + " on " + Traits::kTopic);
       }
-      retries_.fetch_add(1, std::memory_order_relaxed);
-      if (!lossless_ || stop.stop_requested() || Clock::now() >= deadline) {
+      retries.fetch_add(1, std::memory_order_relaxed);
+      if (!lossless || stop.stop_requested() || Clock::now() >= deadline) {
         return false;
       }
       std::this_thread::sleep_for(kBackOff);
@@ -188,30 +117,31 @@ class Publisher<Message>::Impl : private dds::DataWriterListener {
   void on_publication_matched(
       dds::DataWriter* /*writer*/,
       const dds::PublicationMatchedStatus& status) override {
-    matched_.Set(status.current_count);
+    matched.Set(status.current_count);
   }
 
   void on_offered_incompatible_qos(
       dds::DataWriter* /*writer*/,
       const dds::OfferedIncompatibleQosStatus& status) override {
-    incompatible_.store(status.total_count, std::memory_order_relaxed);
-    participant_.ReportIncompatible(Traits::kTopic, false,
-                                    status.last_policy_id, policies_);
+    incompatible.store(status.total_count, std::memory_order_relaxed);
+    bus.ReportIncompatible(Traits::kTopic, false, status.last_policy_id,
+                           policies);
   }
 
-  Participant::Impl& participant_;
-  const bool lossless_;
-  dds::Publisher* publisher_{nullptr};
-  dds::DataWriter* writer_{nullptr};
-  PolicyTexts policies_;
-  Matched matched_;
-  std::atomic<std::uint64_t> written_{0};
-  std::atomic<std::uint64_t> retries_{0};
-  std::atomic<std::uint64_t> refused_{0};
-  std::atomic<std::uint64_t> incompatible_{0};
-  std::mutex mutex_;  // Guards what follows.
-  std::map<typename Traits::Key, dds::InstanceHandle_t> instances_;
-  typename Traits::Wire wire_;
+  Participant::Impl& bus;
+  const bool lossless;
+  std::unique_ptr<dds::Publisher, std::function<void(dds::Publisher*)>>
+      publisher;
+  dds::DataWriter* writer{nullptr};
+  PolicyTexts policies;
+  Matched matched;
+  std::atomic<std::uint64_t> written{0};
+  std::atomic<std::uint64_t> retries{0};
+  std::atomic<std::uint64_t> refused{0};
+  std::atomic<std::uint64_t> incompatible{0};
+  std::mutex mutex;  // Guards what follows.
+  std::map<Key<Message>, dds::InstanceHandle_t, std::less<>> instances;
+  typename Traits::Wire wire;
 };
 
 template <typename Message>
@@ -226,39 +156,69 @@ template <typename Message>
 WriteResult Publisher<Message>::Write(const Message& message,
                                       std::stop_token stop,
                                       std::chrono::milliseconds timeout) {
-  return impl_->Write(message, stop, timeout);
+  Impl& impl = *impl_;
+  const std::lock_guard lock(impl.mutex);
+  Impl::Traits::Encode(message, impl.wire);
+  const dds::InstanceHandle_t* instance = impl.InstanceOf(message);
+  if (instance == nullptr) {
+    impl.refused.fetch_add(1, std::memory_order_relaxed);
+    return WriteResult::kTooManyValves;
+  }
+  const auto send = [&] { return impl.writer->write(&impl.wire, *instance); };
+  if (!impl.Retry(send, "write", stop, DeadlineIn(timeout))) {
+    return WriteResult::kNotSent;
+  }
+  impl.written.fetch_add(1, std::memory_order_relaxed);
+  return WriteResult::kSent;
 }
 
 template <typename Message>
 void Publisher<Message>::Dispose(const Message& message) {
-  impl_->Dispose(message);
+  Impl& impl = *impl_;
+  const std::lock_guard lock(impl.mutex);
+  const auto found = impl.instances.find(KeyOf(message));
+  if (found == impl.instances.end()) {
+    return;
+  }
+  Impl::Traits::EncodeKey(message, impl.wire);
+  const auto send = [&] {
+    return impl.writer->dispose(&impl.wire, found->second);
+  };
+  if (!impl.Retry(send, "dispose", {}, Clock::now() + kDisposeTimeout)) {
+    throw TransportError("dispose: the readers are behind",
+                         static_cast<int>(ReturnCode::RETCODE_TIMEOUT));
+  }
 }
 
 template <typename Message>
 bool Publisher<Message>::WaitForReaders(
     int count, std::chrono::milliseconds timeout) const {
-  return impl_->WaitForReaders(count, timeout);
+  return impl_->matched.WaitFor(count, timeout);
 }
 
 template <typename Message>
 bool Publisher<Message>::WaitForAcknowledged(
     std::chrono::milliseconds timeout) {
-  return impl_->WaitForAcknowledged(timeout);
+  return impl_->writer->wait_for_acknowledgments(Until(DeadlineIn(timeout))) ==
+         ReturnCode::RETCODE_OK;
 }
 
 template <typename Message>
 PublisherStatus Publisher<Message>::status() const {
-  return impl_->status();
+  constexpr auto kOrder = std::memory_order_relaxed;
+  return {impl_->written.load(kOrder), impl_->retries.load(kOrder),
+          impl_->refused.load(kOrder), impl_->incompatible.load(kOrder),
+          matched()};
 }
 
 template <typename Message>
 int Publisher<Message>::matched() const {
-  return impl_->matched();
+  return impl_->matched.count();
 }
 
 template class Publisher<ValveSampleMessage>;
 template class Publisher<DecisionMessage>;
-template class Publisher<FaultEventMessage>;
+template class Publisher<FaultEvent>;
 template class Publisher<ModelSetInfoMessage>;
 template class Publisher<MonitorStatusMessage>;
 

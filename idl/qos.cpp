@@ -90,64 +90,62 @@ void TransientLocal(EndpointQos& qos) {
   qos.reader.durability().kind = dds::TRANSIENT_LOCAL_DURABILITY_QOS;
 }
 
-const std::set<std::string>& EndpointNames() {
-  static const std::set<std::string> names{"fdi_valve_sample",
-                                           "fdi_valve_sample_lossless",
-                                           "fdi_valve_sample_best_effort",
-                                           "fdi_decision_vector",
-                                           "fdi_decision_vector_lossless",
-                                           "fdi_fault_event",
-                                           "fdi_model_set_info",
-                                           "fdi_monitor_status"};
-  return names;
+// The policies as words, for the log.
+std::string Text(const eprosima::fastrtps::Duration_t& duration) {
+  if (duration == eprosima::fastrtps::c_TimeInfinite) {
+    return "infinite";
+  }
+  return std::to_string(duration.to_ns() / 1000000) + "ms";
 }
 
-std::set<std::string> WithSuffix(const std::string& suffix) {
-  std::set<std::string> names;
-  for (const std::string& name : EndpointNames()) {
-    names.insert(name + suffix);
+std::string Text(const dds::DurabilityQosPolicy& policy) {
+  switch (policy.kind) {
+    case dds::VOLATILE_DURABILITY_QOS:
+      return "VOLATILE";
+    case dds::TRANSIENT_LOCAL_DURABILITY_QOS:
+      return "TRANSIENT_LOCAL";
+    case dds::TRANSIENT_DURABILITY_QOS:
+      return "TRANSIENT";
+    default:
+      return "PERSISTENT";
   }
-  return names;
 }
 
-// What both kinds of endpoint have.
-template <typename Qos>
-void OverrideShared(const Qos& stated, const std::set<std::string>& policies,
-                    Qos& qos) {
-  const auto states = [&](const char* name) { return policies.contains(name); };
-  if (states("reliability")) {
-    qos.reliability() = stated.reliability();
+std::string Text(const dds::LivelinessQosPolicy& policy) {
+  const std::string lease = "/" + Text(policy.lease_duration);
+  switch (policy.kind) {
+    case dds::AUTOMATIC_LIVELINESS_QOS:
+      return "AUTOMATIC" + lease;
+    case dds::MANUAL_BY_PARTICIPANT_LIVELINESS_QOS:
+      return "MANUAL_BY_PARTICIPANT" + lease;
+    default:
+      return "MANUAL_BY_TOPIC" + lease;
   }
-  if (states("durability")) {
-    qos.durability() = stated.durability();
-  }
-  if (states("deadline")) {
-    qos.deadline() = stated.deadline();
-  }
-  if (states("liveliness")) {
-    qos.liveliness() = stated.liveliness();
-  }
-  if (states("lifespan")) {
-    qos.lifespan() = stated.lifespan();
-  }
-  if (states("historyQos")) {
-    qos.history() = stated.history();
-  }
-  if (states("resourceLimitsQos")) {
-    qos.resource_limits() = stated.resource_limits();
-  }
-  if (states("historyMemoryPolicy")) {
-    qos.endpoint().history_memory_policy =
-        stated.endpoint().history_memory_policy;
-  }
-  if (states("unicastLocatorList")) {
-    qos.endpoint().unicast_locator_list =
-        stated.endpoint().unicast_locator_list;
-  }
-  if (states("multicastLocatorList")) {
-    qos.endpoint().multicast_locator_list =
-        stated.endpoint().multicast_locator_list;
-  }
+}
+
+PolicyTexts Texts(const dds::ReliabilityQosPolicy& reliability,
+                  const dds::DurabilityQosPolicy& durability,
+                  const dds::DeadlineQosPolicy& deadline,
+                  const dds::LivelinessQosPolicy& liveliness,
+                  const dds::OwnershipQosPolicy& ownership) {
+  const bool reliable = reliability.kind == dds::RELIABLE_RELIABILITY_QOS;
+  const bool shared = ownership.kind == dds::SHARED_OWNERSHIP_QOS;
+  return {
+      {dds::RELIABILITY_QOS_POLICY_ID, reliable ? "RELIABLE" : "BEST_EFFORT"},
+      {dds::DURABILITY_QOS_POLICY_ID, Text(durability)},
+      {dds::DEADLINE_QOS_POLICY_ID, Text(deadline.period)},
+      {dds::LIVELINESS_QOS_POLICY_ID, Text(liveliness)},
+      {dds::OWNERSHIP_QOS_POLICY_ID, shared ? "SHARED" : "EXCLUSIVE"}};
+}
+
+// Our endpoints have functions for what remote ones have as members.
+PolicyTexts TextsOfOurs(const auto& qos) {
+  return Texts(qos.reliability(), qos.durability(), qos.deadline(),
+               qos.liveliness(), qos.ownership());
+}
+PolicyTexts TextsOfRemote(const auto& qos) {
+  return Texts(qos.m_reliability, qos.m_durability, qos.m_deadline,
+               qos.m_liveliness, qos.m_ownership);
 }
 
 }  // namespace
@@ -192,7 +190,7 @@ EndpointQos QosFor<DecisionMessage>(Profile profile, int valves) {
 }
 
 template <>
-EndpointQos QosFor<FaultEventMessage>(Profile /*profile*/, int valves) {
+EndpointQos QosFor<FaultEvent>(Profile /*profile*/, int valves) {
   EndpointQos qos = Common("fdi_fault_event");
   TransientLocal(qos);
   KeepLast(qos, valves, 16, 16);
@@ -222,40 +220,45 @@ EndpointQos QosFor<MonitorStatusMessage>(Profile /*profile*/, int /*valves*/) {
   return qos;
 }
 
-std::set<std::string> WriterProfileNames() {
-  return WithSuffix("_writer");
-}
-std::set<std::string> ReaderProfileNames() {
-  return WithSuffix("_reader");
-}
-
-const std::set<std::string>& OverridablePolicies() {
-  static const std::set<std::string> names{
-      "reliability",        "durability",
-      "deadline",           "liveliness",
-      "lifespan",           "historyQos",
-      "resourceLimitsQos",  "historyMemoryPolicy",
-      "unicastLocatorList", "multicastLocatorList",
-      "publishMode",        "times"};
+const std::set<std::string>& EndpointNames() {
+  static const std::set<std::string> names{"fdi_valve_sample",
+                                           "fdi_valve_sample_lossless",
+                                           "fdi_valve_sample_best_effort",
+                                           "fdi_decision_vector",
+                                           "fdi_decision_vector_lossless",
+                                           "fdi_fault_event",
+                                           "fdi_model_set_info",
+                                           "fdi_monitor_status"};
   return names;
 }
 
-void Override(const dds::DataWriterQos& stated,
-              const std::set<std::string>& policies, dds::DataWriterQos& qos) {
-  OverrideShared(stated, policies, qos);
-  if (policies.contains("publishMode")) {
-    qos.publish_mode() = stated.publish_mode();
-  }
-  if (policies.contains("times")) {
-    qos.reliable_writer_qos().times = stated.reliable_writer_qos().times;
-  }
+PolicyTexts Describe(const dds::DataWriterQos& qos) {
+  return TextsOfOurs(qos);
+}
+PolicyTexts Describe(const dds::DataReaderQos& qos) {
+  return TextsOfOurs(qos);
+}
+PolicyTexts Describe(const dds::WriterQos& qos) {
+  return TextsOfRemote(qos);
+}
+PolicyTexts Describe(const dds::ReaderQos& qos) {
+  return TextsOfRemote(qos);
 }
 
-void Override(const dds::DataReaderQos& stated,
-              const std::set<std::string>& policies, dds::DataReaderQos& qos) {
-  OverrideShared(stated, policies, qos);
-  if (policies.contains("times")) {
-    qos.reliable_reader_qos().times = stated.reliable_reader_qos().times;
+std::string PolicyName(dds::QosPolicyId_t id) {
+  switch (id) {
+    case dds::RELIABILITY_QOS_POLICY_ID:
+      return "RELIABILITY";
+    case dds::DURABILITY_QOS_POLICY_ID:
+      return "DURABILITY";
+    case dds::DEADLINE_QOS_POLICY_ID:
+      return "DEADLINE";
+    case dds::LIVELINESS_QOS_POLICY_ID:
+      return "LIVELINESS";
+    case dds::OWNERSHIP_QOS_POLICY_ID:
+      return "OWNERSHIP";
+    default:
+      return "policy_" + std::to_string(static_cast<int>(id));
   }
 }
 

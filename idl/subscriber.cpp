@@ -1,24 +1,23 @@
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <cstring>
+#include <functional>
 #include <mutex>
 #include <set>
 #include <unordered_map>
+#include <vector>
 
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
-#include "idl/bounded_queue.h"
-#include "idl/checked_type.h"
+#include "diagnosis/concurrency/bounded_queue.h"
 #include "idl/codec.h"
-#include "idl/deadline.h"
 #include "idl/endpoint.h"
 #include "idl/gap_counter.h"
-#include "idl/matched.h"
 #include "idl/participant_impl.h"
-#include "idl/qos.h"
-#include "idl/reception.h"
 
 namespace fdi::idl {
 namespace {
@@ -27,111 +26,90 @@ namespace dds = eprosima::fastdds::dds;
 
 constexpr std::size_t kRefusedLimit = 65536;
 
-// Messages that wait for Take(), so many as fit into 16 MB. They wait here and
-// not in the library, which searches its history at every release.
+// Messages that wait for Take(), so many as fit into 8 MB; another 8 MB may be
+// taken and not yet handed out. They wait here and not in the library, which
+// searches its history at every release.
 constexpr std::size_t QueueCapacity(std::size_t item_bytes) {
-  return std::clamp<std::size_t>((16U << 20U) / item_bytes, 1024, 65536);
+  return std::clamp<std::size_t>((8U << 20U) / item_bytes, 512, 32768);
+}
+
+constexpr std::chrono::hours kLongestWait{1};  // The clock must not overflow.
+
+struct HandleHash {
+  std::size_t operator()(const dds::InstanceHandle_t& handle) const {
+    std::size_t hash = 0;  // The handle is an MD5 sum: any part will do.
+    std::memcpy(
+        &hash,
+        static_cast<const eprosima::fastrtps::rtps::octet*>(handle.value),
+        sizeof hash);
+    return hash;
+  }
+};
+
+// 64-bit FNV-1a over the 16 bytes of the writer's GUID.
+std::uint64_t WriterId(const dds::InstanceHandle_t& writer) {
+  std::uint64_t hash = 14695981039346656037U;
+  for (std::size_t i = 0; i < 16; ++i) {
+    hash = (hash ^ writer.value[i]) * 1099511628211U;
+  }
+  return hash;
+}
+
+std::int64_t NowNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
 }
 
 }  // namespace
 
 template <typename Message>
-class Subscriber<Message>::Impl : private dds::DataReaderListener {
- public:
+struct Subscriber<Message>::Impl : dds::DataReaderListener {
   using Traits = Codec<Message>;
   using Type = CheckedType<typename Traits::Type>;
 
-  Impl(Participant& participant, Profile profile, Overflow overflow)
-      : participant_(participant.impl()),
-        holds_receipt_(overflow == Overflow::kOnTheWay),
-        max_keys_(
-            4 * static_cast<std::size_t>(participant.options().max_valves) +
-            1024) {
-    dds::Topic* topic =
-        participant_.TopicOf(Traits::kTopic, dds::TypeSupport(new Type()));
-    type_ = participant_->find_type(topic->get_type_name());
-    // The reader is enabled once reader_ is set: callbacks use it.
-    dds::SubscriberQos subscriber_qos;
-    subscriber_qos.entity_factory().autoenable_created_entities = false;
-    const EndpointQos ours =
-        QosFor<Message>(profile, participant.options().max_valves);
-    if (!ours.partition.empty()) {
-      subscriber_qos.partition().push_back(ours.partition.c_str());
-    }
-    subscriber_ = NotNull(participant_->create_subscriber(subscriber_qos),
-                          "create_subscriber");
-    try {
-      const dds::DataReaderQos qos = MakeQos(ours);
-      policies_ = Describe(qos);
-      has_lease_ =
-          qos.liveliness().lease_duration != eprosima::fastrtps::c_TimeInfinite;
-      reader_ =
-          NotNull(subscriber_->create_datareader(topic, qos, this, Mask()),
-                  std::string("create_datareader of ") + Traits::kTopic);
-    } catch (...) {
-      participant_->delete_subscriber(subscriber_);
-      throw;
-    }
-    Check(reader_->enable(), "enable a reader");
-  }
-
-  ~Impl() override {
-    queue_.Close();
-    reader_->set_listener(nullptr);
-    subscriber_->delete_datareader(reader_);
-    participant_->delete_subscriber(subscriber_);
-  }
-
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
-  int Take(const Handlers<Message>& handlers, std::chrono::milliseconds timeout,
-           int limit) {
-    int handed = HandOut(handlers, limit);
-    if (handed == 0) {
-      queue_.Wait(DeadlineIn(timeout));
-      handed = HandOut(handlers, limit);
-    }
-    return handed;
-  }
-
-  void Interrupt() { queue_.Interrupt(); }
-
-  bool WaitForWriters(int count, std::chrono::milliseconds timeout) const {
-    return matched_.WaitFor(count, timeout);
-  }
-
-  SubscriberStatus status() const {
-    SubscriberStatus status;
-    status.received = received_.load(std::memory_order_relaxed);
-    status.ended = ended_.load(std::memory_order_relaxed);
-    status.undecodable = undecodable_.load(std::memory_order_relaxed);
-    const auto* type = dynamic_cast<const Type*>(type_.get());
-    const std::uint64_t refused_bytes = type == nullptr ? 0 : type->refused();
-    status.undecodable += refused_bytes;
-    status.rejected_instances =
-        rejected_instances_.load(std::memory_order_relaxed);
-    // Messages refused for a reason of their own are missing, too.
-    const std::uint64_t missing = missing_.load(std::memory_order_relaxed);
-    const std::uint64_t explained = status.rejected_instances + refused_bytes;
-    status.lost = std::max(missing - std::min(missing, explained),
-                           lost_.load(std::memory_order_relaxed));
-    status.rejected_samples = rejected_samples_.load(std::memory_order_relaxed);
-    status.incompatible = incompatible_.load(std::memory_order_relaxed);
-    status.matched = matched_.count();
-    status.alive =
-        has_lease_ ? alive_.load(std::memory_order_relaxed) : status.matched;
-    const std::lock_guard lock(refused_mutex_);
-    status.refused_valves = refused_valves_.size();
-    return status;
-  }
-
- private:
   struct Item {
     Message message;
     Reception reception;
     bool ended{false};
   };
+
+  Impl(Participant& participant, Profile profile, Overflow overflow)
+      : bus(participant.impl()),
+        holds_receipt(overflow == Overflow::kOnTheWay),
+        max_keys(4 * static_cast<std::size_t>(bus.options().max_valves) +
+                 1024) {
+    dds::Topic* topic =
+        bus.TopicOf(Traits::kTopic, dds::TypeSupport(new Type()));
+    type = bus->find_type(topic->get_type_name());
+    const EndpointQos ours = QosFor<Message>(profile, bus.options().max_valves);
+    // The reader is enabled once `reader` is set: callbacks use it.
+    dds::SubscriberQos subscriber_qos;
+    subscriber_qos.entity_factory().autoenable_created_entities = false;
+    if (!ours.partition.empty()) {
+      subscriber_qos.partition().push_back(ours.partition.c_str());
+    }
+    subscriber = {
+        NotNull(bus->create_subscriber(subscriber_qos), "create_subscriber"),
+        [this](dds::Subscriber* handle) { bus->delete_subscriber(handle); }};
+    const dds::DataReaderQos qos = bus.profiles().Override(
+        ours.name + "_reader", ours.reader, *subscriber);
+    policies = Describe(qos);
+    has_lease =
+        qos.liveliness().lease_duration != eprosima::fastrtps::c_TimeInfinite;
+    reader = NotNull(subscriber->create_datareader(topic, qos, this, Mask()),
+                     std::string("create_datareader of ") + Traits::kTopic);
+    Check(reader->enable(), "enable a reader");
+  }
+
+  ~Impl() override {
+    queue.Close();
+    reader->set_listener(nullptr);
+    subscriber->delete_datareader(reader);
+  }
+
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
 
   static dds::StatusMask Mask() {
     return dds::StatusMask::data_available()
@@ -142,173 +120,181 @@ class Subscriber<Message>::Impl : private dds::DataReaderListener {
            << dds::StatusMask::liveliness_changed();
   }
 
-  dds::DataReaderQos MakeQos(const EndpointQos& ours) const {
-    dds::DataReaderQos qos = ours.reader;
-    const std::string name = ours.name + "_reader";
-    if (const auto* policies = participant_.profiles().Reader(name)) {
-      dds::DataReaderQos stated;
-      Check(subscriber_->get_datareader_qos_from_profile(name, stated),
-            "get_datareader_qos_from_profile " + name);
-      Override(stated, *policies, qos);
-    }
-    return qos;
-  }
-
-  int HandOut(const Handlers<Message>& handlers, int limit) {
+  // Of the thread that takes. Waits for the first message only.
+  int HandOut(const Handlers<Message>& handlers,
+              std::chrono::milliseconds timeout, int limit) {
     int handed = 0;
     while (handed < limit) {
-      auto [item, opened] = queue_.Pop();
-      if (opened) {
-        Drain(false);
+      if (next == batch.size()) {
+        next = 0;
+        queue.PopAll(batch, handed == 0 ? std::min<std::chrono::milliseconds>(
+                                              timeout, kLongestWait)
+                                        : std::chrono::milliseconds(0));
+        if (queue.Reopened()) {
+          Drain(false);
+        }
+        if (batch.empty()) {
+          break;
+        }
       }
-      if (!item) {
-        break;
-      }
+      const Item& item = batch[next++];
       ++handed;
-      if (item->ended) {
-        ended_.fetch_add(1, std::memory_order_relaxed);
-      } else {
-        received_.fetch_add(1, std::memory_order_relaxed);
-      }
+      Add(item.ended ? &SubscriberStatus::ended : &SubscriberStatus::received);
       const auto& handler =
-          item->ended ? handlers.on_ended : handlers.on_message;
+          item.ended ? handlers.on_ended : handlers.on_message;
       if (handler) {
-        handler(item->message, item->reception);
+        handler(item.message, item.reception);
       }
     }
     return handed;
   }
 
-  // Moves from the library to queue_ while its gate is open. Called by the
+  // Moves from the library to `queue` while there is room. Called by the
   // thread that receives, which holds locks of the library and so must not
-  // wait for the thread that takes but with holds_receipt_, and by the thread
-  // that opens the gate: who comes second leaves the work to the first.
+  // wait for the thread that takes but with holds_receipt, and by the thread
+  // that made room: who comes second leaves the work to the first.
   void Drain(bool waits) noexcept {
-    pending_.store(true);
-    while (pending_.load()) {
-      const std::unique_lock lock(drain_mutex_, std::try_to_lock);
+    pending.store(true);
+    while (pending.load()) {
+      const std::unique_lock lock(drain_mutex, std::try_to_lock);
       if (!lock.owns_lock()) {
         return;
       }
-      pending_.store(false);
+      pending.store(false);
       DrainLocked(waits);
     }
   }
 
   void DrainLocked(bool waits) noexcept {
     dds::SampleInfo info;
-    while (waits ? queue_.WaitUntilOpen() : queue_.open()) {
-      if (reader_->take_next_sample(&wire_, &info) != ReturnCode::RETCODE_OK) {
-        missing_.store(gaps_.missing(), std::memory_order_relaxed);
+    while (waits ? queue.WaitForRoom() : queue.HasRoom()) {
+      if (reader->take_next_sample(&wire, &info) != ReturnCode::RETCODE_OK) {
+        const std::lock_guard lock(status_mutex);
+        missing = gaps.missing();
         return;
       }
       try {
         Accept(info);
       } catch (const std::exception&) {  // Out of memory.
-        lost_.fetch_add(1, std::memory_order_relaxed);
+        Add(&SubscriberStatus::lost);
       }
     }
   }
 
   void Accept(const dds::SampleInfo& info) {
     Item item;
-    item.reception = ReceptionOf(info);
+    item.reception = {info.source_timestamp.to_ns(),
+                      info.reception_timestamp.to_ns(),
+                      WriterId(info.publication_handle)};
     item.ended = !info.valid_data;
-    gaps_.Count(item.reception.writer_id,
-                info.sample_identity.sequence_number().to64long(),
-                item.reception.sent_ns);
-    if (item.ended) {
-      // An end carries a hash of the key: keys_ knows what it stands for.
-      const auto found = keys_.find(info.instance_handle);
-      if (found == keys_.end()) {
-        return;
-      }
-      Traits::SetKey(found->second, item.message);
-      keys_.erase(found);
-    } else if (!Traits::Decode(wire_, item.message)) {
-      undecodable_.fetch_add(1, std::memory_order_relaxed);
+    gaps.Count(item.reception.writer_id,
+               info.sample_identity.sequence_number().to64long(),
+               item.reception.sent_ns);
+    if (item.ended ? !FindKey(info.instance_handle, item.message)
+                   : !Traits::Decode(wire, item.message)) {
+      Add(&SubscriberStatus::undecodable);
       return;
-    } else if (!keys_.contains(info.instance_handle)) {
-      if (keys_.size() >= max_keys_) {
-        keys_.clear();  // Ids that come and go for ever must not fill memory.
-      }
-      keys_.emplace(info.instance_handle, Traits::KeyOf(item.message));
     }
-    queue_.Push(std::move(item));
+    if (!item.ended && !keys.contains(info.instance_handle)) {
+      if (keys.size() >= max_keys) {
+        keys.clear();  // Ids that come and go for ever must not fill memory.
+      }
+      keys.emplace(info.instance_handle, CopyOf(KeyOf(item.message)));
+    }
+    queue.TryPush(std::move(item));  // There is room, or it is the end.
+  }
+
+  // Sets the key of the instance that has ended. An end carries the handle of
+  // its instance only, an MD5 sum of the key: `keys` has what it stands for. A
+  // handle that no message had may be a short key itself, see KeyInHandle().
+  bool FindKey(const dds::InstanceHandle_t& handle, Message& message) {
+    const auto found = keys.find(handle);
+    if (found != keys.end()) {
+      KeyOf(message) = found->second;
+      keys.erase(found);
+      return true;
+    }
+    auto& id = std::get<0>(KeyOf(message));
+    id = KeyInHandle(handle);
+    return !id.empty();
+  }
+
+  void Add(std::uint64_t SubscriberStatus::*count, std::uint64_t more = 1) {
+    const std::lock_guard lock(status_mutex);
+    counted.*count += more;
   }
 
   void on_data_available(dds::DataReader* /*reader*/) override {
-    Drain(holds_receipt_);
+    Drain(holds_receipt);
   }
 
   void on_subscription_matched(
       dds::DataReader* /*reader*/,
       const dds::SubscriptionMatchedStatus& status) override {
-    matched_.Set(status.current_count);
+    matched.Set(status.current_count);
   }
 
   void on_liveliness_changed(
       dds::DataReader* /*reader*/,
       const dds::LivelinessChangedStatus& status) override {
-    alive_.store(status.alive_count, std::memory_order_relaxed);
+    const std::lock_guard lock(status_mutex);
+    counted.alive = status.alive_count;
   }
 
   void on_requested_incompatible_qos(
       dds::DataReader* /*reader*/,
       const dds::RequestedIncompatibleQosStatus& status) override {
-    incompatible_.store(status.total_count, std::memory_order_relaxed);
-    participant_.ReportIncompatible(Traits::kTopic, true, status.last_policy_id,
-                                    policies_);
+    {
+      const std::lock_guard lock(status_mutex);
+      counted.incompatible = status.total_count;
+    }
+    bus.ReportIncompatible(Traits::kTopic, true, status.last_policy_id,
+                           policies);
   }
 
   void on_sample_lost(dds::DataReader* /*reader*/,
                       const dds::SampleLostStatus& status) override {
-    lost_.fetch_add(static_cast<std::uint64_t>(status.total_count_change),
-                    std::memory_order_relaxed);
+    Add(&SubscriberStatus::lost,
+        static_cast<std::uint64_t>(status.total_count_change));
   }
 
   void on_sample_rejected(dds::DataReader* /*reader*/,
                           const dds::SampleRejectedStatus& status) override {
     if (status.last_reason != dds::REJECTED_BY_INSTANCES_LIMIT) {
-      rejected_samples_.fetch_add(status.total_count_change,
-                                  std::memory_order_relaxed);
+      Add(&SubscriberStatus::rejected_samples, status.total_count_change);
       return;
     }
-    rejected_instances_.fetch_add(status.total_count_change,
-                                  std::memory_order_relaxed);
-    const std::lock_guard lock(refused_mutex_);
-    if (refused_valves_.size() < kRefusedLimit) {
-      refused_valves_.insert(status.last_instance_handle);
+    Add(&SubscriberStatus::rejected_instances, status.total_count_change);
+    const std::lock_guard lock(status_mutex);
+    if (refused_valves.size() < kRefusedLimit) {
+      refused_valves.insert(status.last_instance_handle);
     }
   }
 
-  Participant::Impl& participant_;
-  const bool holds_receipt_;
-  const std::size_t max_keys_;
-  dds::TypeSupport type_;
-  dds::Subscriber* subscriber_{nullptr};
-  dds::DataReader* reader_{nullptr};
-  PolicyTexts policies_;
-  bool has_lease_{false};
-  Matched matched_;
-  std::atomic<int> alive_{0};
-  std::atomic<std::uint64_t> received_{0};
-  std::atomic<std::uint64_t> ended_{0};
-  std::atomic<std::uint64_t> lost_{0};     // As the library counts,
-  std::atomic<std::uint64_t> missing_{0};  // as gaps_ does.
-  std::atomic<std::uint64_t> undecodable_{0};
-  std::atomic<std::uint64_t> rejected_instances_{0};
-  std::atomic<std::uint64_t> rejected_samples_{0};
-  std::atomic<std::uint64_t> incompatible_{0};
-  mutable std::mutex refused_mutex_;
-  std::set<dds::InstanceHandle_t> refused_valves_;
-  BoundedQueue<Item> queue_{QueueCapacity(sizeof(Item))};
-  std::atomic<bool> pending_{false};
-  std::mutex drain_mutex_;  // Guards what follows.
-  GapCounter gaps_{NowNs()};
-  typename Traits::Wire wire_;
-  std::unordered_map<dds::InstanceHandle_t, typename Traits::Key, HandleHash>
-      keys_;
+  Participant::Impl& bus;
+  const bool holds_receipt;
+  const std::size_t max_keys;
+  dds::TypeSupport type;
+  std::unique_ptr<dds::Subscriber, std::function<void(dds::Subscriber*)>>
+      subscriber;
+  dds::DataReader* reader{nullptr};
+  PolicyTexts policies;
+  bool has_lease{false};
+  Matched matched;
+  BoundedQueue<Item> queue{QueueCapacity(sizeof(Item))};
+  std::vector<Item> batch;  // Taken from it, and handed out up to `next`.
+  std::size_t next{0};
+  std::atomic<bool> pending{false};
+
+  mutable std::mutex status_mutex;  // Guards what follows.
+  SubscriberStatus counted;         // lost: as the library counts,
+  std::uint64_t missing{0};         // as `gaps` does.
+  std::set<dds::InstanceHandle_t> refused_valves;
+
+  std::mutex drain_mutex;  // Guards what follows.
+  GapCounter gaps{NowNs()};
+  typename Traits::Wire wire;
+  std::unordered_map<dds::InstanceHandle_t, Key<Message>, HandleHash> keys;
 };
 
 template <typename Message>
@@ -322,28 +308,44 @@ Subscriber<Message>::~Subscriber() = default;
 template <typename Message>
 int Subscriber<Message>::Take(const Handlers<Message>& handlers,
                               std::chrono::milliseconds timeout, int limit) {
-  return impl_->Take(handlers, timeout, limit);
+  return impl_->HandOut(handlers, timeout, limit);
 }
 
 template <typename Message>
 void Subscriber<Message>::Interrupt() {
-  impl_->Interrupt();
+  impl_->queue.Interrupt();
 }
 
 template <typename Message>
 bool Subscriber<Message>::WaitForWriters(
     int count, std::chrono::milliseconds timeout) const {
-  return impl_->WaitForWriters(count, timeout);
+  return impl_->matched.WaitFor(count, timeout);
 }
 
 template <typename Message>
 SubscriberStatus Subscriber<Message>::status() const {
-  return impl_->status();
+  const Impl& impl = *impl_;
+  const auto* type = dynamic_cast<const typename Impl::Type*>(impl.type.get());
+  const std::uint64_t refused_bytes = type == nullptr ? 0 : type->refused();
+  const std::lock_guard lock(impl.status_mutex);
+  SubscriberStatus status = impl.counted;
+  status.undecodable += refused_bytes;
+  // Messages refused for a reason of their own are missing, too.
+  const std::uint64_t explained = status.rejected_instances + refused_bytes;
+  status.lost =
+      std::max(impl.missing - std::min(impl.missing, explained), status.lost);
+  status.waiting = impl.queue.size();
+  status.matched = impl.matched.count();
+  if (!impl.has_lease) {
+    status.alive = status.matched;
+  }
+  status.refused_valves = impl.refused_valves.size();
+  return status;
 }
 
 template class Subscriber<ValveSampleMessage>;
 template class Subscriber<DecisionMessage>;
-template class Subscriber<FaultEventMessage>;
+template class Subscriber<FaultEvent>;
 template class Subscriber<ModelSetInfoMessage>;
 template class Subscriber<MonitorStatusMessage>;
 

@@ -1,21 +1,15 @@
 #include "idl/wire.h"
 
-#include <algorithm>
+#include <iterator>
 
 #include "diagnosis/error.h"
 
 namespace fdi::idl {
 
 std::string_view HealthName(Health health) {
-  switch (health) {
-    case Health::kOk:
-      return "OK";
-    case Health::kDegraded:
-      return "DEGRADED";
-    case Health::kFailing:
-      return "FAILING";
-  }
-  return "?";
+  constexpr std::string_view kNames[] = {"OK", "DEGRADED", "FAILING"};
+  const auto i = static_cast<std::size_t>(health);
+  return i < std::size(kNames) ? kNames[i] : "?";
 }
 
 void ValidateId(std::string_view id) {
@@ -39,22 +33,6 @@ DecisionMessage MakeDecision(std::string valve_id, const ModelSet& models,
   message.observer_count = static_cast<int>(models.observers.size());
   message.verdict = verdict;
   return message;
-}
-
-std::vector<FaultCandidate> CandidatesOf(const ModelSet& models,
-                                         const Verdict& verdict) {
-  std::vector<FaultCandidate> candidates;
-  for (std::size_t i = 0; i < models.faults.size(); ++i) {
-    const bool isolated = ((verdict.isolated >> i) & 1U) != 0;
-    const double factor = verdict.fault_factors[i];
-    if (isolated || factor >= 0.5 * models.decision.isolation_threshold) {
-      candidates.push_back(
-          {models.faults[i], factor, verdict.strengths[i], isolated});
-    }
-  }
-  std::ranges::stable_sort(candidates, std::ranges::greater{},
-                           &FaultCandidate::factor);
-  return candidates;
 }
 
 ModelSetInfoMessage Describe(const ModelSet& models) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/records/fault_event.h"
 #include "diagnosis/sample.h"
 #include "diagnosis/verdict.h"
 
@@ -41,29 +42,6 @@ struct DecisionMessage {
   int fault_count{0};
   int observer_count{0};
   Verdict verdict;
-};
-
-/// One fault in the running of an episode.
-struct FaultCandidate {
-  int fault{0};          ///< 1..19
-  double factor{0.0};    ///< Decision factor at the transition [-].
-  double strength{0.0};  ///< Estimated; signed.
-  bool isolated{false};  ///< Member of the isolated set.
-};
-
-/// Topic fdi/v1/FaultEvent, key valve_id.
-struct FaultEventMessage {
-  std::string valve_id;
-  std::uint64_t source_id{0};
-  std::uint64_t seq{0};  ///< Of the sample at the transition, or the last one.
-  std::uint64_t episode_id{0};
-  Transition transition;
-  /// Largest factor first; see CandidatesOf(). Empty if nothing matches.
-  std::vector<FaultCandidate> candidates;
-  std::string model_set;
-  int model_version{0};
-  std::uint64_t model_hash{0};
-  bool persisted{false};  ///< Committed to the history before it was sent.
 };
 
 struct ObserverInfo {
@@ -116,11 +94,6 @@ void ValidateId(std::string_view id);
 /// The sizes of `models` beside the verdict. @throws as ValidateId().
 DecisionMessage MakeDecision(std::string valve_id, const ModelSet& models,
                              const Verdict& verdict);
-
-/// The faults of `verdict` that are isolated, or whose factor is at least half
-/// the isolation threshold; largest factor first.
-std::vector<FaultCandidate> CandidatesOf(const ModelSet& models,
-                                         const Verdict& verdict);
 
 ModelSetInfoMessage Describe(const ModelSet& models);
 

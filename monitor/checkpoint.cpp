@@ -9,67 +9,84 @@ namespace fdi::monitor {
 namespace {
 
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
+constexpr std::size_t kMostDifferences = 100'000;
 
 std::int64_t DayOf(std::int64_t stamp_ns) {
   return stamp_ns / kDayNs - (stamp_ns % kDayNs < 0 ? 1 : 0);
 }
 
-void MergeHealth(std::vector<HealthHour>& older,
-                 std::vector<HealthHour> newer) {
-  using Key =
-      std::tuple<std::string, std::int64_t, std::uint64_t, std::uint32_t>;
-  const auto key_of = [](const HealthHour& h) {
-    return Key(h.valve_id, h.hour, h.model_hash, h.epoch);
-  };
-  std::map<Key, std::size_t> places;
+// Puts each record of `newer` on top of the one in `older` with its key, by
+// `combine`; behind the others if there is none or `combine` says false.
+template <typename T, typename KeyOf, typename Combine>
+void Merge(std::vector<T>& older, std::vector<T> newer, KeyOf key_of,
+           Combine combine, std::size_t most = SIZE_MAX) {
+  std::map<decltype(key_of(newer.front())), std::size_t> places;
   for (std::size_t i = 0; i < older.size(); ++i) {
     places[key_of(older[i])] = i;
   }
-  for (HealthHour& hour : newer) {
-    const auto [place, added] = places.try_emplace(key_of(hour), older.size());
-    if (added || older[place->second].channels != hour.channels) {
-      older.push_back(std::move(hour));
-    } else {
-      older[place->second].Add(hour);
+  for (T& record : newer) {
+    const auto [place, added] =
+        places.try_emplace(key_of(record), older.size());
+    const bool combined = !added && place->second < older.size() &&
+                          combine(older[place->second], record);
+    if (!combined && older.size() < most) {
+      older.push_back(std::move(record));
     }
   }
 }
 
-void MergeAccumulators(std::vector<Accumulator>& older,
-                       std::vector<Accumulator> newer) {
-  std::map<std::string, Accumulator> latest;
-  for (auto* list : {&older, &newer}) {
-    for (Accumulator& accumulator : *list) {
-      latest[accumulator.valve_id] = std::move(accumulator);
-    }
-  }
-  older.clear();
-  for (auto& [valve, accumulator] : latest) {
-    older.push_back(std::move(accumulator));
-  }
+void Merge(std::vector<Accumulator>& older, std::vector<Accumulator> newer) {
+  Merge(
+      older, std::move(newer), [](const Accumulator& a) { return a.valve_id; },
+      [](Accumulator& old, Accumulator& fresh) {
+        old = std::move(fresh);
+        return true;
+      });
 }
 
 }  // namespace
 
 Checkpoint Merged(Checkpoint older, Checkpoint newer) {
-  std::map<std::pair<std::string, std::int64_t>, std::size_t> places;
-  for (std::size_t i = 0; i < older.coverage.size(); ++i) {
-    places[{older.coverage[i].valve_id, older.coverage[i].day}] = i;
-  }
-  for (CoverageDay& day : newer.coverage) {
-    const auto place = places.find({day.valve_id, day.day});
-    if (place == places.end() ||
-        older.coverage[place->second].period_s != day.period_s) {
-      older.coverage.push_back(std::move(day));
-    } else {
-      older.coverage[place->second].samples.Add(day.samples);
-    }
-  }
-  MergeAccumulators(older.accumulators, std::move(newer.accumulators));
-  MergeAccumulators(older.shadow_accumulators,
-                    std::move(newer.shadow_accumulators));
-  MergeHealth(older.health, std::move(newer.health));
+  Merge(
+      older.coverage, std::move(newer.coverage),
+      [](const CoverageDay& d) { return std::pair(d.valve_id, d.day); },
+      [](CoverageDay& old, CoverageDay& fresh) {
+        if (old.period_s != fresh.period_s) {
+          return false;
+        }
+        old.samples.Add(fresh.samples);
+        return true;
+      });
+  Merge(
+      older.health, std::move(newer.health),
+      [](const HealthHour& h) {
+        return std::tuple(h.valve_id, h.hour, h.model_hash, h.epoch);
+      },
+      [](HealthHour& old, HealthHour& fresh) {
+        if (old.channels != fresh.channels) {
+          return false;
+        }
+        old.Add(fresh);
+        return true;
+      });
+  Merge(older.accumulators, std::move(newer.accumulators));
+  Merge(older.shadow_accumulators, std::move(newer.shadow_accumulators));
   older.shadow = Merged(std::move(older.shadow), std::move(newer.shadow));
+  return older;
+}
+
+std::vector<ShadowDifference> Merged(std::vector<ShadowDifference> older,
+                                     std::vector<ShadowDifference> newer) {
+  Merge(
+      older, std::move(newer),
+      [](const ShadowDifference& d) {
+        return std::tuple(d.valve_id, d.source_id, d.from_ns, d.candidate_hash);
+      },
+      [](ShadowDifference& old, ShadowDifference& fresh) {
+        old = std::move(fresh);
+        return true;
+      },
+      kMostDifferences);
   return older;
 }
 
@@ -84,8 +101,8 @@ void CoverageBook::Add(std::int64_t stamp_ns, Quality quality,
   place->samples.Add(quality, samples);
 }
 
-void CoverageBook::TakeTo(const std::string& valve_id, double period_s,
-                          std::vector<CoverageDay>& days) {
+void CoverageBook::TakeInto(const std::string& valve_id, double period_s,
+                            std::vector<CoverageDay>& days) {
   for (const Day& day : days_) {
     days.push_back({valve_id, day.day, period_s, day.samples});
   }

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "diagnosis/quality_count.h"
@@ -13,88 +12,115 @@
 
 namespace fdi::monitor {
 
-/// What a monitor counts from its start on. Gauges stand for now.
+/// What a monitor counts from its start on. The table in counters.cpp says in
+/// words what each of them is.
 enum class Counter : std::uint8_t {
-  kReceived,           ///< Samples handed to the pipeline.
-  kDiagnosed,          ///< Samples that went through an engine.
-  kUnassigned,         ///< Samples of valves without a model set.
-  kRefusedSamples,     ///< Samples of valves beyond max_valves.
-  kFilteredSamples,    ///< Samples of valves that --valves leaves out.
-  kBadIds,             ///< Samples whose valve id is empty or too long.
-  kDecisions,          ///< Decision vectors handed to the bus.
-  kDecisionsUnsent,    ///< Decision vectors that the bus did not take.
-  kEvents,             ///< Fault events published.
-  kEventsUnpersisted,  ///< Of these, before they were in the history.
-  kEventsUnsent,       ///< Fault events that the bus did not take.
-  kEventsResent,       ///< Sent again after a restart.
-  kEventsLost,         ///< Never to be stored: the backlog was full.
-  kPersistFailures,    ///< Failed transactions on the history.
-  kTraceDropped,       ///< Points of evidence that were not stored.
-  kRecorded,           ///< Samples committed to runs.
-  kRecordDropped,      ///< Samples that are missing in runs.
-  kRecordFailures,     ///< Failed commits of runs.
-  kGaps,               ///< Gaps of more than 3 periods in the stream.
-  kInitialisations,    ///< Times an engine began anew: first sight, gap, swap.
-  kStaleEvents,        ///< Times a valve fell silent.
-  kEpisodes,           ///< Episodes begun.
-  kModelSwaps,         ///< Valves that changed to another model set.
-  kModelFailures,      ///< Model sets that could not be loaded.
+  kReceived,
+  kDiagnosed,
+  kUnassigned,
+  kRefusedSamples,
+  kFilteredSamples,
+  kBadIds,
+  kDecisions,
+  kDecisionsUnsent,
+  kEvents,
+  kEventsUnpersisted,
+  kEventsUnsent,
+  kEventsResent,
+  kEventsLost,
+  kPersistFailures,
+  kTraceDropped,
+  kRecorded,
+  kRecordDropped,
+  kRecordFailures,
+  kGaps,
+  kInitialisations,
+  kStaleEvents,
+  kEpisodes,
+  kModelSwaps,
+  kModelFailures,
   kCount_
 };
 inline constexpr std::size_t kCounterCount =
     static_cast<std::size_t>(Counter::kCount_);
 
-std::string_view CounterName(Counter counter);  ///< "received", ...
-std::string QualityLabel(Quality quality);      ///< "live", ...
-
-/// How a counter is exposed: counters of one family stand side by side and
+/// A number that a monitor tells: on the bus by its name, on the page of
+/// metrics as a value of a family. Values of one family stand side by side and
 /// differ in a label.
-struct CounterMetric {
-  std::string_view family;  ///< "fdi_samples_received_total", ...
+struct Measure {
+  enum class Type : std::uint8_t { kCounter, kGauge };
+  std::string name;         ///< "received"; empty: not told on the bus.
+  std::string_view family;  ///< "fdi_waiting"; empty: not on the page.
+  Type type{Type::kCounter};
   std::string_view help;
   std::string_view label;  ///< Empty: the family has one value.
-  std::string_view value;
+  std::string label_value;
+  std::uint64_t value{0};
 };
-const CounterMetric& MetricOf(Counter counter);
 
-/// Totals by reason. Thread safe.
+/// Totals: by Counter; of samples by Intake; of samples, or of sample periods
+/// without any (STALE), by Quality. Thread safe.
 class Counters {
  public:
-  void Add(Counter counter, std::uint64_t n = 1) {
-    values_[static_cast<std::size_t>(counter)].fetch_add(
-        n, std::memory_order_relaxed);
+  template <typename What>
+  void Add(What what, std::uint64_t n = 1) {
+    totals_[Place(what)].fetch_add(n, std::memory_order_relaxed);
   }
-  void Add(Intake intake) {
-    intake_[static_cast<std::size_t>(intake)].fetch_add(
-        1, std::memory_order_relaxed);
-  }
-  /// Samples, or sample periods without any: STALE.
-  void Add(Quality quality, std::uint64_t n = 1) {
-    quality_[static_cast<std::size_t>(quality)].fetch_add(
-        n, std::memory_order_relaxed);
-  }
-  std::uint64_t operator[](Counter counter) const {
-    return values_[static_cast<std::size_t>(counter)].load(
-        std::memory_order_relaxed);
-  }
-  std::uint64_t operator[](Intake intake) const {
-    return intake_[static_cast<std::size_t>(intake)].load(
-        std::memory_order_relaxed);
+  template <typename What>
+  std::uint64_t operator[](What what) const {
+    return totals_[Place(what)].load(std::memory_order_relaxed);
   }
 
-  std::uint64_t operator[](Quality quality) const {
-    return quality_[static_cast<std::size_t>(quality)].load(
-        std::memory_order_relaxed);
-  }
-
-  /// Name and total of each, intake reasons as "accepted", "range", ...,
-  /// samples by quality as "samples_live", "samples_uncovered", ...
-  std::vector<std::pair<std::string, std::uint64_t>> Snapshot() const;
+  /// All totals, as of now: of the counters, of the samples by verdict of the
+  /// intake ("accepted", "range", ...), of the sample periods by quality
+  /// ("samples_live", ...).
+  std::vector<Measure> Measures() const;
 
  private:
-  std::array<std::atomic<std::uint64_t>, kCounterCount> values_{};
-  std::array<std::atomic<std::uint64_t>, kIntakeCount> intake_{};
-  std::array<std::atomic<std::uint64_t>, kQualityCount> quality_{};
+  static std::size_t Place(Counter counter) {
+    return static_cast<std::size_t>(counter);
+  }
+  static std::size_t Place(Intake intake) {
+    return kCounterCount + static_cast<std::size_t>(intake);
+  }
+  static std::size_t Place(Quality quality) {
+    return kCounterCount + kIntakeCount + static_cast<std::size_t>(quality);
+  }
+
+  std::array<std::atomic<std::uint64_t>,
+             kCounterCount + kIntakeCount + kQualityCount>
+      totals_{};
+};
+
+/// A page of metrics in the text format of Prometheus, version 0.0.4: for each
+/// family `# HELP`, `# TYPE`, then its values. Names of counters end in _total
+/// and carry the unit, e.g. fdi_database_wal_bytes.
+class Exposition {
+ public:
+  using Type = Measure::Type;
+
+  struct Label {
+    std::string_view name;
+    std::string_view value;
+  };
+
+  /// Begins a family. Each name once.
+  void Family(std::string_view name, Type type, std::string_view help);
+
+  /// A value of the family begun last, with at most one label.
+  void Value(double value, Label label = {});
+  void Value(std::uint64_t value, Label label = {});
+
+  /// Measures with a family, those of one family in a row.
+  void Add(const std::vector<Measure>& measures);
+
+  const std::string& text() const { return text_; }
+
+ private:
+  void Line(std::string_view value, Label label);
+
+  std::string name_;
+  std::string text_;
 };
 
 }  // namespace fdi::monitor

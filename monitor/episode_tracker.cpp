@@ -16,24 +16,6 @@ std::int64_t Ns(double seconds) {
 
 }  // namespace
 
-std::vector<Candidate> CandidatesOf(const ModelSet& models,
-                                    const Verdict& verdict, FaultSet isolated) {
-  std::vector<Candidate> candidates;
-  const double half = 0.5 * models.decision.isolation_threshold;
-  for (std::size_t i = 0; i < models.faults.size(); ++i) {
-    const bool member = (isolated >> i & 1U) != 0;
-    if (member || verdict.fault_factors[i] >= half) {
-      candidates.push_back({models.faults[i], verdict.fault_factors[i],
-                            verdict.strengths[i], member});
-    }
-  }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) {
-                     return a.factor > b.factor;
-                   });
-  return candidates;
-}
-
 EpisodeTracker::EpisodeTracker(std::string valve_id,
                                const TraceOptions& options)
     : valve_id_(std::move(valve_id)),
@@ -121,7 +103,7 @@ void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
                                     EpisodeOutlet& outlet) {
   const OpenEpisode episode = std::move(*recovered_);
   recovered_.reset();
-  EpisodeEvent event;
+  FaultEvent event;
   event.valve_id = valve_id_;
   event.source_id = episode.source_id;
   event.episode_id = episode.episode_id;
@@ -208,7 +190,7 @@ void EpisodeTracker::FollowUnknown(const Verdict& verdict,
     open_->candidates.clear();
     return;
   }
-  std::vector<Candidate> candidates = CandidatesOf(models, verdict, 0);
+  std::vector<FaultCandidate> candidates = CandidatesOf(models, verdict, 0);
   if (!candidates.empty()) {
     open_->candidates = std::move(candidates);
   }
@@ -220,7 +202,7 @@ void EpisodeTracker::Emit(Transition transition,
   const bool closed = transition.kind == TransitionKind::kClosed;
   const bool superseded = transition.reason == EndReason::kSuperseded;
   transition.detection_stamp_ns = open_->detection_stamp_ns;
-  EpisodeEvent event;
+  FaultEvent event;
   event.valve_id = valve_id_;
   event.source_id = open_->source_id;
   event.seq = seq_;

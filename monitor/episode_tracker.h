@@ -7,8 +7,9 @@
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/records/fault_event.h"
+#include "diagnosis/records/service_records.h"
 #include "diagnosis/verdict.h"
-#include "monitor/records.h"
 #include "monitor/trace.h"
 
 namespace fdi::monitor {
@@ -26,7 +27,7 @@ struct TraceOptions {
 class EpisodeOutlet {
  public:
   virtual ~EpisodeOutlet() = default;
-  virtual void Event(EpisodeEvent event) = 0;
+  virtual void Event(FaultEvent event) = 0;
   virtual void Evidence(EpisodeTrace trace) = 0;
   virtual void Gap(DataGap gap) = 0;
   /// An episode of an earlier session goes on.
@@ -80,7 +81,7 @@ class EpisodeTracker {
     bool resumed{false};
     bool tracing{true};
     FaultSet faults{0};  // isolated last
-    std::vector<Candidate> candidates;
+    std::vector<FaultCandidate> candidates;
   };
 
   void NoteGap(const Sample& sample, const Verdict& verdict,

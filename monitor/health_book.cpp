@@ -104,8 +104,8 @@ void HealthBook::Add(const Sample& sample, const Verdict& verdict,
   }
 }
 
-void HealthBook::TakeTo(const std::string& valve_id,
-                        std::vector<HealthHour>& hours) {
+void HealthBook::TakeInto(const std::string& valve_id,
+                          std::vector<HealthHour>& hours) {
   if (hour_) {
     done_.push_back(std::move(*hour_));
     hour_.reset();

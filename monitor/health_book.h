@@ -25,7 +25,7 @@ class StrokeCount {
 
   /// @param position [%]
   Step Push(double position);
-  /// What follows does not belong to what was.
+  /// The next position is not compared with those before.
   void Restart() { started_ = false; }
 
  private:
@@ -45,7 +45,7 @@ class HealthBook {
            double period_s);
 
   /// Appends what was added since the last call.
-  void TakeTo(const std::string& valve_id, std::vector<HealthHour>& hours);
+  void TakeInto(const std::string& valve_id, std::vector<HealthHour>& hours);
 
  private:
   HealthHour& At(const Sample& sample, const ModelSet* models);

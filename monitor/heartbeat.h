@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace fdi::monitor {
@@ -32,7 +33,7 @@ class Heartbeat {
  public:
   using TimePoint = Pulse::Clock::time_point;
   struct Member {
-    std::string_view thread;  ///< "intake", ...
+    std::string_view thread;  ///< "diagnosis", ...
     const Pulse* pulse;
   };
 
@@ -42,33 +43,48 @@ class Heartbeat {
   const std::vector<Member>& members() const { return members_; }
 
   /// Threads that did not beat after `since`.
-  std::vector<std::string_view> StalledSince(TimePoint since) const;
+  std::vector<std::string_view> StalledSince(TimePoint since) const {
+    std::vector<std::string_view> stalled;
+    for (const Member& member : members_) {
+      if (member.pulse->last() <= since) {
+        stalled.push_back(member.thread);
+      }
+    }
+    return stalled;
+  }
 
  private:
   std::vector<Member> members_;
 };
 
-/// When to tell a service manager that all is well: in each interval once, and
-/// only if every thread got on since it was told last.
+/// When to notify a service manager that all is well: once in each interval,
+/// and only if every thread got on since the last time.
 class Watchdog {
  public:
   using TimePoint = Heartbeat::TimePoint;
   using Interval = std::chrono::microseconds;
 
-  /// @param interval between two signs; half of what the manager allows.
+  /// @param interval between two notifications; half of what the manager
+  ///   allows.
   Watchdog(const Heartbeat& heartbeat, Interval interval, TimePoint now)
-      : heartbeat_(heartbeat), interval_(interval), told_(now) {}
+      : heartbeat_(heartbeat), interval_(interval), notified_(now) {}
 
-  /// @returns whether to tell now; then it is taken as done.
-  bool Tell(TimePoint now);
+  /// @returns whether to notify now; then it is taken as done.
+  bool Due(TimePoint now) {
+    if (now < next() || !heartbeat_.StalledSince(notified_).empty()) {
+      return false;
+    }
+    notified_ = now;
+    return true;
+  }
 
-  /// When Tell() is to be asked again.
-  TimePoint next() const { return told_ + interval_; }
+  /// When to ask again.
+  TimePoint next() const { return notified_ + interval_; }
 
  private:
   const Heartbeat& heartbeat_;
   Interval interval_;
-  TimePoint told_;
+  TimePoint notified_;
 };
 
 }  // namespace fdi::monitor

@@ -1,18 +1,23 @@
 #include "monitor/pipeline.h"
 
+#include <array>
+#include <exception>
 #include <utility>
+
+#include "diagnosis/quality_count.h"
+#include "diagnosis/records/valve_glob.h"
 
 namespace fdi::monitor {
 namespace {
 
 constexpr std::size_t kMaxIdLength = 64;
-constexpr std::chrono::milliseconds kTick{100};
+constexpr std::size_t kRememberedRefusals = 65536;
 constexpr std::chrono::milliseconds kTendPeriod{250};
-constexpr std::size_t kBeatItems = 64;
+constexpr std::uint64_t kBeatSamples = 64;
 
 // In the order of Intake.
 constexpr std::array<LogId, kIntakeCount> kRejectionIds{
-    LogId::kRange /* accepted: never used */,
+    LogId::kMissingSignal /* accepted, and yet not judged */,
     LogId::kRepeat,
     LogId::kLate,
     LogId::kSuperseded,
@@ -22,211 +27,241 @@ constexpr std::array<LogId, kIntakeCount> kRejectionIds{
     LogId::kUnit,
     LogId::kPeriod};
 
-SampleRecorderOptions RecorderOptionsOf(const PipelineOptions& options) {
-  SampleRecorderOptions recorder = options.recorder;
-  recorder.utc_now_ns = options.history.utc_now_ns;
-  return recorder;
+// "F|T1"
+std::string SignalNames(SignalMask signals) {
+  std::string names;
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    if ((signals & MaskOf(signal)) != 0) {
+      names.append(names.empty() ? "" : "|").append(SignalName(signal));
+    }
+  }
+  return names;
 }
 
 }  // namespace
 
 Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
                    std::shared_ptr<const ModelResolver> resolver,
-                   Counters& counters, ThrottledLog& log)
+                   const MonitorContext& context)
     : options_(std::move(options)),
       decisions_(sinks.decisions),
       live_(sinks.live),
-      counters_(counters),
-      log_(log),
-      writer_(sinks.history, sinks.events, counters, log, options_.history),
-      recorder_(sinks.samples != nullptr
-                    ? std::make_unique<SampleRecorder>(
-                          *sinks.samples, counters, log,
-                          RecorderOptionsOf(options_),
-                          [this](DataGap gap) { writer_.Gap(std::move(gap)); })
-                    : nullptr),
-      directory_(options_.max_valves, options_.valve_glob),
-      registry_(options_.registry, std::move(resolver), writer_, counters, log,
-                sinks.live),
+      resolver_(std::move(resolver)),
+      context_(context),
+      counters_(context.counters),
+      log_(context.log),
+      journal_(sinks.history, sinks.events, context, options_.journal),
+      recorder_(
+          sinks.samples == nullptr
+              ? nullptr
+              : std::make_unique<Recorder>(
+                    *sinks.samples, context, options_.recorder,
+                    [this](DataGap gap) { journal_.Gap(std::move(gap)); })),
       shadow_(options_.shadow.candidate
-                  ? std::make_unique<ShadowBank>(options_.shadow, log)
-                  : nullptr),
-      queue_(options_.queue_samples),
-      last_tend_(std::chrono::steady_clock::now()),
-      last_checkpoint_(last_tend_) {}
+                  ? std::make_unique<ShadowBank>(options_.shadow, log_)
+                  : nullptr) {}
 
 Pipeline::~Pipeline() {
-  Stop();
+  try {
+    Stop();
+  } catch (...) {
+    // Whoever wants to know calls Stop().
+  }
 }
 
 void Pipeline::Start(const std::vector<OpenEpisode>& open,
                      std::vector<Accumulator> accumulators,
                      std::vector<Accumulator> shadow_accumulators) {
+  for (Accumulator& accumulator : accumulators) {
+    accumulators_[accumulator.valve_id] = std::move(accumulator);
+  }
   if (shadow_) {
     shadow_->Restore(std::move(shadow_accumulators));
   }
-  registry_.Recover(open, std::move(accumulators),
-                    std::chrono::steady_clock::now());
-  thread_ = std::thread([this] { Run(); });
+  last_tended_ = last_checkpoint_ = std::chrono::steady_clock::now();
+  Recover(open);
+  started_ = true;
+  journal_.Start();
+  if (recorder_) {
+    recorder_->Start();
+  }
 }
 
-std::optional<ValveDirectory::Entry> Pipeline::Admit(
-    std::string_view valve_id) {
+// A valve has one open episode; the older one of two cannot go on.
+void Pipeline::Recover(const std::vector<OpenEpisode>& episodes) {
+  for (const OpenEpisode& episode : episodes) {
+    const auto [known, fresh] = recovered_.emplace(episode.valve_id, episode);
+    if (fresh) {
+      continue;
+    }
+    OpenEpisode older = episode;
+    if (older.detection_stamp_ns > known->second.detection_stamp_ns) {
+      std::swap(older, known->second);
+    }
+    EpisodeTracker tracker(older.valve_id, options_.trace);
+    tracker.Recover(older);
+    tracker.AbandonRecovery(EndReason::kUnknown, journal_);
+  }
+  if (!recovered_.empty()) {
+    recovery_deadline_ = last_tended_ + options_.recovery_window;
+  }
+}
+
+void Pipeline::Stop() {
+  if (!std::exchange(started_, false)) {
+    return;
+  }
+  FirstError errors;
+  errors.Try([this] {
+    TendSilent(std::chrono::steady_clock::now());
+    for (const std::unique_ptr<Valve>& valve : valves_) {
+      valve->monitor.Flush(journal_);
+    }
+    TakeCheckpoint();
+  });
+  // The recorder first: it may report a gap.
+  if (recorder_) {
+    errors.Try([this] { recorder_->Stop(); });
+  }
+  errors.Try([this] { journal_.Stop(); });
+  errors.Rethrow();
+}
+
+// @returns null for a valve that is not served, which is counted.
+Pipeline::Valve* Pipeline::Admit(std::string_view valve_id) {
+  const auto known = by_id_.find(valve_id);
+  if (known != by_id_.end()) {
+    return known->second;
+  }
   if (valve_id.empty() || valve_id.size() > kMaxIdLength) {
     counters_.Add(Counter::kBadIds);
     log_.Report(LogId::kBadId, "sample_rejected", [&] {
       return "reason=valve_id length=" + std::to_string(valve_id.size());
     });
-    return std::nullopt;
+    return nullptr;
   }
-  ValveDirectory::Entry entry{};
-  switch (directory_.Find(valve_id, entry)) {
-    case ValveDirectory::Answer::kServed:
-      return entry;
-    case ValveDirectory::Answer::kFiltered:
-      counters_.Add(Counter::kFilteredSamples);
-      return std::nullopt;
-    case ValveDirectory::Answer::kRefused:
-      counters_.Add(Counter::kRefusedSamples);
-      log_.Report(LogId::kValveRefused, "valve_refused", [&] {
-        return "valve=" + std::string(valve_id) +
-               " max_valves=" + std::to_string(options_.max_valves) +
-               " refused_valves=" + std::to_string(directory_.refused());
-      });
-      return std::nullopt;
+  if (!GlobMatches(options_.valve_glob, valve_id)) {
+    counters_.Add(Counter::kFilteredSamples);
+    return nullptr;
   }
-  return std::nullopt;
+  return valves_.size() < static_cast<std::size_t>(options_.max_valves)
+             ? &AddValve(valve_id)
+             : Refuse(valve_id);
 }
 
-bool Pipeline::Offer(std::string_view valve_id, const Sample& sample,
-                     std::uint64_t writer) {
-  counters_.Add(Counter::kReceived);
-  const std::optional<ValveDirectory::Entry> entry = Admit(valve_id);
-  if (!entry) {
-    return !failed_;
+// Of refused ids only a bounded set of hashes is kept.
+Pipeline::Valve* Pipeline::Refuse(std::string_view valve_id) {
+  if (refused_.size() < kRememberedRefusals) {
+    refused_.insert(Hash{}(valve_id));
   }
-  return queue_.PushQuietly(
-      Item{*entry, writer, std::chrono::steady_clock::now(), false, sample});
+  counters_.Add(Counter::kRefusedSamples);
+  log_.Report(LogId::kValveRefused, "valve_refused", [&] {
+    return "valve=" + std::string(valve_id) +
+           " max_valves=" + std::to_string(options_.max_valves) +
+           " refused_valves=" + std::to_string(refused_.size());
+  });
+  return nullptr;
 }
 
-bool Pipeline::OfferEnd(std::string_view valve_id, std::uint64_t writer) {
-  const std::optional<ValveDirectory::Entry> entry = Admit(valve_id);
-  if (!entry) {
-    return !failed_;
+Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
+  const std::string id(valve_id);
+  std::optional<EngineParts> parts;
+  Resolve(id, parts);
+  log_.Line(LogLevel::kDebug,
+            "valve_seen valve=" + id + " model_set=" +
+                (parts ? NameOf(parts->plan->models()) : "none"));
+  auto valve =
+      std::make_unique<Valve>(Valve{ValveMonitor(id, parts, options_.trace),
+                                    shadow_ ? shadow_->Add(id) : nullptr});
+  valve->monitor.HoldIsolation(resolver_->IsolationHeld(id));
+  if (const auto open = recovered_.find(id); open != recovered_.end()) {
+    valve->monitor.Recover(open->second);
+    recovered_.erase(open);
   }
-  return queue_.PushQuietly(
-      Item{*entry, writer, std::chrono::steady_clock::now(), true, Sample{}});
-}
-
-Pipeline::Backlog Pipeline::backlog() const {
-  return {queue_.size(), recorder_ ? recorder_->waiting() : 0,
-          writer_.backlog()};
-}
-
-std::vector<Heartbeat::Member> Pipeline::threads() const {
-  std::vector<Heartbeat::Member> threads{{"diagnosis", &pulse_},
-                                         {"history", &writer_.pulse()}};
-  if (recorder_) {
-    threads.push_back({"recorder", &recorder_->pulse()});
+  if (auto saved = accumulators_.extract(id)) {
+    valve->monitor.Resume(std::move(saved.mapped()));
   }
-  return threads;
-}
-
-void Pipeline::Reassign(std::shared_ptr<const ModelResolver> resolver) {
-  const std::lock_guard lock(resolver_mutex_);
-  next_resolver_ = std::move(resolver);
-  queue_.Wake();
-}
-
-void Pipeline::Stop() {
-  queue_.Close();
-  if (thread_.joinable()) {
-    thread_.join();
-  }
-  if (recorder_) {
-    recorder_->Stop();
-  }
-  writer_.Stop();
-}
-
-void Pipeline::Rethrow() const {
-  if (failed_) {
-    std::rethrow_exception(error_);
-  }
-}
-
-void Pipeline::Run() {
-  try {
-    Diagnose();
-  } catch (...) {
-    error_ = std::current_exception();
-    failed_ = true;
-    queue_.Close();
-  }
-}
-
-void Pipeline::Diagnose() {
-  std::vector<Item> batch;
-  while (queue_.PopAll(batch, kTick)) {
-    pulse_.Beat();
-    AdoptPendingResolver();
-    if (decisions_.WantsLast()) {
-      registry_.PublishLast(decisions_);
-    }
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      Handle(batch[i]);
-      if (i % kBeatItems == 0) {
-        pulse_.Beat();
-      }
-    }
-    // While samples wait, silence is measured up to the newest one handled.
-    const TimePoint now = batch.empty() ? std::chrono::steady_clock::now()
-                                        : batch.back().received;
-    if (now - last_tend_ >= kTendPeriod) {
-      last_tend_ = now;
-      registry_.Tend(now, options_.history.utc_now_ns());
-    }
-    if (now - last_checkpoint_ >= options_.checkpoint_period) {
-      last_checkpoint_ = now;
-      TakeCheckpoint();
-    }
-  }
-  registry_.Tend(std::chrono::steady_clock::now(),
-                 options_.history.utc_now_ns());
-  registry_.Flush();
-  TakeCheckpoint();
-}
-
-void Pipeline::TakeCheckpoint() {
-  Checkpoint checkpoint = registry_.TakeCheckpoint();
-  if (shadow_) {
-    shadow_->TakeTo(checkpoint);
-  }
-  writer_.Keep(std::move(checkpoint));
-}
-
-void Pipeline::AdoptPendingResolver() {
-  std::shared_ptr<const ModelResolver> next;
+  by_id_[id] = valve.get();
   {
-    const std::lock_guard lock(resolver_mutex_);
-    next = std::exchange(next_resolver_, nullptr);
+    const std::lock_guard lock(mutex_);
+    names_.push_back(id);
   }
-  if (next) {
-    registry_.Reassign(std::move(next));
-  }
+  return *valves_.emplace_back(std::move(valve));
 }
 
-void Pipeline::Handle(const Item& item) {
-  if (item.ended) {
-    HandleEnd(item);
+// @returns false if the model set of the valve cannot be had.
+bool Pipeline::Resolve(const std::string& valve_id,
+                       std::optional<EngineParts>& parts) {
+  parts.reset();
+  try {
+    if (const auto models = resolver_->ModelsFor(valve_id)) {
+      parts = plans_.For(models);
+    }
+  } catch (const std::exception& error) {
+    counters_.Add(Counter::kModelFailures);
+    const std::string reason = error.what();
+    log_.Report(
+        LogId::kModelFailure, "model_set_unusable",
+        [&] { return "valve=" + valve_id + " reason=\"" + reason + "\""; },
+        LogLevel::kError);
+    return false;
+  }
+  if (!parts) {
+    log_.Report(LogId::kUnassigned, "valve_unassigned",
+                [&valve_id] { return "valve=" + valve_id; });
+  }
+  return true;
+}
+
+void Pipeline::Offer(std::string_view valve_id, const Sample& sample,
+                     std::uint64_t writer, TimePoint received) {
+  if (offered_++ % kBeatSamples == 0) {
+    pulse_.Beat();
+  }
+  counters_.Add(Counter::kReceived);
+  Valve* const valve = Admit(valve_id);
+  if (valve == nullptr) {
     return;
   }
   const ValveOutcome outcome =
-      registry_.Step(item.valve, item.sample, item.writer, item.received);
-  const Verdict& verdict = outcome.verdict;
-  if (shadow_) {
-    shadow_->Step(item.valve, item.sample, outcome);
+      valve->monitor.Step(sample, writer, received, journal_);
+  if (valve->shadow != nullptr) {
+    shadow_->Step(*valve->shadow, sample, outcome);
   }
+  Count(*valve, sample, outcome);
+  const Verdict& verdict = outcome.verdict;
+  if (!OutOfOrder(verdict.intake)) {
+    Publish(*valve, outcome);
+    if (live_ != nullptr) {
+      live_->Show(valve->monitor.id(), sample, outcome);
+    }
+  }
+  if (recorder_) {
+    recorder_->Record({valve->monitor.id(), sample, verdict.intake,
+                       verdict.initialised, outcome.model_swapped, false});
+  }
+}
+
+void Pipeline::OfferEnd(std::string_view valve_id, std::uint64_t writer) {
+  Valve* const valve = Admit(valve_id);
+  if (valve == nullptr || !valve->monitor.EndStream(writer, journal_)) {
+    return;
+  }
+  if (valve->shadow != nullptr) {
+    valve->shadow->EndStream();
+  }
+  if (recorder_) {
+    recorder_->Record({valve->monitor.id(), {}, {}, false, false, true});
+  }
+  if (live_ != nullptr) {
+    live_->ShowSilence(valve->monitor.id(), Silence::kEnded);
+  }
+}
+
+void Pipeline::Count(const Valve& valve, const Sample& sample,
+                     const ValveOutcome& outcome) {
+  const Verdict& verdict = outcome.verdict;
   counters_.Add(outcome.models != nullptr ? Counter::kDiagnosed
                                           : Counter::kUnassigned);
   counters_.Add(verdict.intake);
@@ -236,55 +271,171 @@ void Pipeline::Handle(const Item& item) {
   if (CountsAsTime(verdict)) {
     counters_.Add(verdict.quality);
   }
-  if (verdict.intake != Intake::kAccepted) {
-    CountRejection(item, verdict.intake);
-  }
-  if (!OutOfOrder(verdict.intake)) {
-    Publish(item, outcome);
-    if (live_ != nullptr) {
-      live_->Show(*item.valve.name, item.sample, outcome.models, verdict,
-                  outcome.model_swapped);
-    }
-  }
-  if (recorder_) {
-    recorder_->Record({*item.valve.name, item.sample, verdict.intake,
-                       verdict.initialised, outcome.model_swapped, false});
-  }
-}
-
-void Pipeline::HandleEnd(const Item& item) {
-  if (!registry_.EndStream(item.valve, item.writer)) {
+  // The engine accepts a sample that lacks signals; the channels that need them
+  // abstain. Without any channel left nothing is judged, which has a reason.
+  const bool unjudged =
+      verdict.quality == Quality::kBadInput && outcome.missing != 0;
+  if (verdict.intake == Intake::kAccepted && !unjudged) {
     return;
   }
-  if (shadow_) {
-    shadow_->EndStream(item.valve);
-  }
-  if (recorder_) {
-    recorder_->Record({*item.valve.name, {}, {}, false, false, true});
-  }
-  if (live_ != nullptr) {
-    live_->ShowSilence(*item.valve.name, Silence::kEnded);
-  }
+  log_.Report(
+      kRejectionIds[static_cast<std::size_t>(verdict.intake)],
+      "sample_rejected", [&] {
+        return (verdict.intake != Intake::kAccepted
+                    ? "reason=" + std::string(IntakeName(verdict.intake))
+                    : "reason=missing_signal signal=" +
+                          SignalNames(outcome.missing)) +
+               " valve=" + valve.monitor.id() +
+               " seq=" + std::to_string(sample.seq);
+      });
 }
 
-void Pipeline::Publish(const Item& item, const ValveOutcome& outcome) {
-  if (decisions_.Publish(*item.valve.name, outcome.models, outcome.verdict)) {
+void Pipeline::Publish(const Valve& valve, const ValveOutcome& outcome) {
+  const std::string& id = valve.monitor.id();
+  if (decisions_.Publish(id, outcome.models, outcome.verdict)) {
     counters_.Add(Counter::kDecisions);
     return;
   }
   counters_.Add(Counter::kDecisionsUnsent);
-  log_.Report(LogId::kUnsent, "publication_failed", [&item] {
-    return "topic=DecisionVector valve=" + *item.valve.name;
-  });
+  log_.Report(LogId::kUnsent, "publication_failed",
+              [&id] { return "topic=DecisionVector valve=" + id; });
 }
 
-void Pipeline::CountRejection(const Item& item, Intake intake) {
-  log_.Report(kRejectionIds[static_cast<std::size_t>(intake)],
-              "sample_rejected", [&] {
-                return "reason=" + std::string(IntakeName(intake)) +
-                       " valve=" + *item.valve.name +
-                       " seq=" + std::to_string(item.sample.seq);
-              });
+void Pipeline::Tend(TimePoint now) {
+  pulse_.Beat();
+  AdoptNextResolver();
+  if (decisions_.WantsLast()) {
+    PublishLast();
+  }
+  if (now - last_tended_ >= kTendPeriod) {
+    last_tended_ = now;
+    TendSilent(now);
+  }
+  if (now - last_checkpoint_ >= options_.checkpoint_period) {
+    last_checkpoint_ = now;
+    TakeCheckpoint();
+  }
+}
+
+void Pipeline::TendSilent(TimePoint now) {
+  for (const std::unique_ptr<Valve>& valve : valves_) {
+    ValveMonitor& monitor = valve->monitor;
+    if (monitor.CheckStale(now)) {
+      counters_.Add(Counter::kStaleEvents);
+      log_.Report(LogId::kStale, "valve_stale",
+                  [&monitor] { return "valve=" + monitor.id(); });
+      if (live_ != nullptr) {
+        live_->ShowSilence(monitor.id(), Silence::kStale);
+      }
+    }
+    counters_.Add(Quality::kStale, monitor.CountStale(now));
+    monitor.CheckTimeout(now, options_.stale_timeout, journal_);
+  }
+  if (recovery_deadline_ && now >= *recovery_deadline_) {
+    recovery_deadline_.reset();
+    GiveUpRecovery();
+  }
+  TakeCensus();
+}
+
+void Pipeline::GiveUpRecovery() {
+  const std::int64_t now_ns = context_.utc_now_ns();
+  for (const std::unique_ptr<Valve>& valve : valves_) {
+    valve->monitor.GiveUpRecovery(now_ns, journal_);
+  }
+  for (const auto& [id, episode] : std::exchange(recovered_, {})) {
+    EpisodeTracker tracker(id, options_.trace);
+    tracker.Recover(episode);
+    tracker.GiveUpRecovery(now_ns, journal_);
+  }
+}
+
+void Pipeline::TakeCensus() {
+  ValveCensus census;
+  for (const std::unique_ptr<Valve>& valve : valves_) {
+    const ValveMonitor& monitor = valve->monitor;
+    ++census.valves;
+    census.unassigned += monitor.models() == nullptr ? 1 : 0;
+    census.stale += monitor.stale() ? 1 : 0;
+    census.ended += monitor.ended() ? 1 : 0;
+    census.open_episodes += monitor.episode_open() ? 1 : 0;
+    census.trace_bytes += monitor.trace_bytes();
+  }
+  const std::lock_guard lock(mutex_);
+  census_ = census;
+}
+
+void Pipeline::PublishLast() {
+  for (const std::unique_ptr<Valve>& valve : valves_) {
+    const ValveMonitor& monitor = valve->monitor;
+    // No stamp: a model set was adopted since.
+    if (monitor.seen() && CountsAsTime(monitor.verdict()) &&
+        monitor.verdict().stamp_ns != 0) {
+      decisions_.PublishLast(monitor.id(), monitor.models(), monitor.verdict());
+    }
+  }
+}
+
+void Pipeline::TakeCheckpoint() {
+  Checkpoint checkpoint;
+  for (const std::unique_ptr<Valve>& valve : valves_) {
+    valve->monitor.TakeCheckpoint(checkpoint);
+    if (valve->shadow != nullptr) {
+      valve->shadow->TakeCheckpoint(checkpoint);
+    }
+  }
+  journal_.Commit(std::move(checkpoint));
+}
+
+void Pipeline::Reassign(std::shared_ptr<const ModelResolver> resolver) {
+  const std::lock_guard lock(mutex_);
+  next_resolver_ = std::move(resolver);
+}
+
+void Pipeline::AdoptNextResolver() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!next_resolver_) {
+      return;
+    }
+    resolver_ = std::exchange(next_resolver_, nullptr);
+  }
+  std::uint64_t swapped = 0;
+  std::vector<EngineParts> alive;  // A plan is made once, adopted or not.
+  for (const std::unique_ptr<Valve>& valve : valves_) {
+    ValveMonitor& monitor = valve->monitor;
+    std::optional<EngineParts> parts;
+    // A valve whose new set cannot be had goes on with the one it has.
+    if (Resolve(monitor.id(), parts) && monitor.Adopt(parts, journal_)) {
+      ++swapped;
+    }
+    if (parts) {
+      alive.push_back(*parts);
+    }
+    monitor.HoldIsolation(resolver_->IsolationHeld(monitor.id()));
+  }
+  counters_.Add(Counter::kModelSwaps, swapped);
+  log_.Line(LogLevel::kInfo,
+            "models_reassigned valves_swapped=" + std::to_string(swapped));
+}
+
+ValveCensus Pipeline::census() const {
+  const std::lock_guard lock(mutex_);
+  return census_;
+}
+
+std::vector<std::string> Pipeline::valve_names() const {
+  const std::lock_guard lock(mutex_);
+  return names_;
+}
+
+std::vector<Heartbeat::Member> Pipeline::threads() const {
+  std::vector<Heartbeat::Member> threads{{"diagnosis", &pulse_},
+                                         {"history", &journal_.pulse()}};
+  if (recorder_) {
+    threads.push_back({"recorder", &recorder_->pulse()});
+  }
+  return threads;
 }
 
 }  // namespace fdi::monitor

@@ -1,26 +1,25 @@
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <exception>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
+#include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
-#include "monitor/bounded_queue.h"
 #include "monitor/counters.h"
-#include "monitor/episode_writer.h"
 #include "monitor/heartbeat.h"
-#include "monitor/sample_recorder.h"
-#include "monitor/shadow_bank.h"
+#include "monitor/journal.h"
+#include "monitor/recorder.h"
+#include "monitor/shadow.h"
 #include "monitor/sinks.h"
 #include "monitor/throttled_log.h"
-#include "monitor/valve_registry.h"
+#include "monitor/valve_monitor.h"
 
 namespace fdi::monitor {
 
@@ -28,11 +27,14 @@ namespace fdi::monitor {
 struct PipelineOptions {
   int max_valves{2000};
   std::string valve_glob{"*"};
-  std::size_t queue_samples{8192};  ///< Between intake and diagnosis.
+  TraceOptions trace;
+  std::chrono::milliseconds stale_timeout{3'600'000};  ///< Ends an episode.
+  /// A valve that stays silent for so long after the start gives up the
+  /// episode that the last session left open.
+  std::chrono::milliseconds recovery_window{60'000};
   std::chrono::milliseconds checkpoint_period{60'000};
-  RegistryOptions registry;
-  EpisodeWriterOptions history;  ///< utc_now_ns is needed.
-  SampleRecorderOptions recorder;
+  JournalOptions journal;
+  RecorderOptions recorder;
   ShadowOptions shadow;  ///< Without a candidate: none runs.
 };
 
@@ -45,113 +47,144 @@ struct PipelineSinks {
   LiveSink* live{nullptr};       ///< Null: nobody looks.
 };
 
-/// From samples to decisions, events and records, on threads of its own:
+/// How the valves are now.
+struct ValveCensus {
+  std::uint64_t valves{0};
+  std::uint64_t unassigned{0};
+  std::uint64_t stale{0};
+  std::uint64_t ended{0};
+  std::uint64_t open_episodes{0};
+  std::uint64_t trace_bytes{0};
+};
+
+/// From samples to decisions, events and records. The thread that takes samples
+/// from the bus, the diagnosis thread, diagnoses them, too: what it is behind
+/// with waits at the subscriber, which then stops receiving, so nothing is
+/// dropped and no thread only moves samples.
 ///
-///     intake (the caller) -> queue -> diagnosis -> decision vectors
-///                                       |-> history thread -> outbox thread
-///                                       \-> recorder thread
+///     diagnosis thread: Offer() -> engine -> decision vectors
+///                                    |-> Journal: history thread, publisher
+///                                    \-> Recorder: recorder thread
 ///
-/// The queue never drops: full, Offer() waits, and the reader stops taking.
+/// Built idle; Start() starts the threads of journal and recorder. All calls
+/// come from the diagnosis thread, Start() and Stop() while there is none,
+/// except where noted.
 class Pipeline {
  public:
+  using TimePoint = ValveMonitor::TimePoint;
+
   Pipeline(PipelineOptions options, PipelineSinks sinks,
-           std::shared_ptr<const ModelResolver> resolver, Counters& counters,
-           ThrottledLog& log);
+           std::shared_ptr<const ModelResolver> resolver,
+           const MonitorContext& context);
   ~Pipeline();
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
-  /// Begins to diagnose. @param open episodes that the last session left open.
-  /// @param accumulators of valves, as the last session kept them.
+  /// @param open episodes that the last session left open.
+  /// @param accumulators of valves, as of the last session's last checkpoint.
   /// @param shadow_accumulators the same of the candidate.
   void Start(const std::vector<OpenEpisode>& open,
              std::vector<Accumulator> accumulators = {},
              std::vector<Accumulator> shadow_accumulators = {});
 
-  /// A sample that was received. One intake thread. Waits while the queue is
-  /// full. @param writer who sent it. @returns false once stopped. The
-  /// diagnosis may sleep on, for at most 100 ms, until AnnounceOffers(): waking
-  /// it for each of many samples costs more than diagnosing them.
-  bool Offer(std::string_view valve_id, const Sample& sample,
-             std::uint64_t writer);
-  /// The publisher ended the stream of the valve. As Offer().
-  bool OfferEnd(std::string_view valve_id, std::uint64_t writer);
-  /// No sample follows at once. Intake thread.
-  void AnnounceOffers() { queue_.Announce(); }
+  /// A sample that was received. @param writer who sent it.
+  void Offer(std::string_view valve_id, const Sample& sample,
+             std::uint64_t writer,
+             TimePoint received = std::chrono::steady_clock::now());
+  /// The publisher ended the stream of the valve.
+  void OfferEnd(std::string_view valve_id, std::uint64_t writer);
 
-  /// Asks `resolver` for the models of all valves from now on. Between two
-  /// samples: none is lost or diagnosed twice. Thread safe.
+  /// Does what is due beside samples: silent valves, checkpoints, newcomers on
+  /// the bus, another assignment. To be called ten times a second or so, by a
+  /// busy thread as well. @param now all samples received before were offered.
+  void Tend(TimePoint now = std::chrono::steady_clock::now());
+
+  /// Asks `resolver` for the models of all valves from the next Tend() on:
+  /// between two samples, none is lost or diagnosed twice. Thread safe.
   void Reassign(std::shared_ptr<const ModelResolver> resolver);
 
-  /// Diagnoses, stores and publishes what is in, then ends the threads.
-  /// Episodes stay open: the next session goes on with them.
+  /// Stores and publishes what is there, then ends the threads; nothing if they
+  /// were not started. Episodes stay open: the next session goes on with them.
+  /// @throws what a thread ended with.
   void Stop();
 
-  /// A thread died of an exception; Stop() and then Rethrow().
-  bool failed() const { return failed_; }
-  void Rethrow() const;
+  /// What follows is thread safe.
 
-  ValveCensus census() const { return registry_.census(); }
+  /// A thread died of an exception, which Stop() throws.
+  bool failed() const {
+    return journal_.failed() || (recorder_ && recorder_->failed());
+  }
+  ValveCensus census() const;                    ///< As of the last Tend().
+  std::vector<std::string> valve_names() const;  ///< Of all valves seen.
   /// Of the candidate; null if none runs.
   const ShadowCounts* shadow_counts() const {
     return shadow_ ? &shadow_->counts() : nullptr;
   }
-  std::vector<std::string> valve_names() const { return registry_.names(); }
-  bool history_degraded() const { return writer_.degraded(); }
+  bool history_degraded() const { return journal_.degraded(); }
   bool recording_degraded() const { return recorder_ && recorder_->degraded(); }
-
-  /// Items that wait for each thread.
-  struct Backlog {
-    std::size_t diagnosis{0};
-    std::size_t recorder{0};
-    EpisodeWriter::Backlog history;
-  };
-  Backlog backlog() const;
-
+  Journal::Backlog journal_backlog() const { return journal_.backlog(); }
+  std::size_t recorder_backlog() const {
+    return recorder_ ? recorder_->waiting() : 0;
+  }
   /// Diagnosis, history and, if there is one, recorder.
   std::vector<Heartbeat::Member> threads() const;
 
  private:
-  using TimePoint = ValveMonitor::TimePoint;
-  struct Item {
-    ValveDirectory::Entry valve;
-    std::uint64_t writer;
-    TimePoint received;
-    bool ended;
-    Sample sample;
+  struct Valve {
+    ValveMonitor monitor;
+    ShadowValve* shadow;  // Null: not compared.
+  };
+  struct Hash {
+    using is_transparent = void;
+    std::size_t operator()(std::string_view text) const {
+      return std::hash<std::string_view>{}(text);
+    }
   };
 
-  std::optional<ValveDirectory::Entry> Admit(std::string_view valve_id);
-  void Run();
-  void Diagnose();
-  void Handle(const Item& item);
-  void HandleEnd(const Item& item);
-  void Publish(const Item& item, const ValveOutcome& outcome);
-  void CountRejection(const Item& item, Intake intake);
-  void AdoptPendingResolver();
+  Valve* Admit(std::string_view valve_id);
+  Valve* Refuse(std::string_view valve_id);
+  Valve& AddValve(std::string_view valve_id);
+  bool Resolve(const std::string& valve_id, std::optional<EngineParts>& parts);
+  void Count(const Valve& valve, const Sample& sample,
+             const ValveOutcome& outcome);
+  void Publish(const Valve& valve, const ValveOutcome& outcome);
+  void Recover(const std::vector<OpenEpisode>& episodes);
+  void AdoptNextResolver();
+  void TendSilent(TimePoint now);
+  void GiveUpRecovery();
+  void TakeCensus();
+  void PublishLast();
   void TakeCheckpoint();
 
   PipelineOptions options_;
   DecisionSink& decisions_;
   LiveSink* live_;
+  std::shared_ptr<const ModelResolver> resolver_;
+  MonitorContext context_;
   Counters& counters_;
   ThrottledLog& log_;
-  EpisodeWriter writer_;
-  std::unique_ptr<SampleRecorder> recorder_;
-  ValveDirectory directory_;
-  ValveRegistry registry_;
+  Journal journal_;
+  std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<ShadowBank> shadow_;
-  BoundedQueue<Item> queue_;
+  EnginePlans plans_;
+
+  std::vector<std::unique_ptr<Valve>> valves_;  // In the order of first sight.
+  std::unordered_map<std::string, Valve*, Hash, std::equal_to<>> by_id_;
+  std::unordered_set<std::size_t> refused_;  // Hashes of ids.
+  std::unordered_map<std::string, OpenEpisode> recovered_;
+  std::unordered_map<std::string, Accumulator> accumulators_;
+  std::optional<TimePoint> recovery_deadline_;  // While there is something to.
+
+  bool started_{false};
   Pulse pulse_;
-  TimePoint last_tend_;
+  std::uint64_t offered_{0};
+  TimePoint last_tended_;
   TimePoint last_checkpoint_;
 
-  std::mutex resolver_mutex_;
+  mutable std::mutex mutex_;  // Guards what follows.
   std::shared_ptr<const ModelResolver> next_resolver_;
-
-  std::atomic<bool> failed_{false};
-  std::exception_ptr error_;  // set before failed_
-  std::thread thread_;
+  std::vector<std::string> names_;
+  ValveCensus census_;
 };
 
 }  // namespace fdi::monitor

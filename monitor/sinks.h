@@ -7,13 +7,30 @@
 #include <string_view>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/records/fault_event.h"
+#include "diagnosis/records/service_records.h"
+#include "diagnosis/records/trace_point.h"
 #include "diagnosis/verdict.h"
-#include "monitor/checkpoint.h"
-#include "monitor/records.h"
 
 /// What the monitor needs from outside; the program wires it to DDS and SQLite.
-/// Each sink is called by one thread only, named beside it.
+/// Each sink is called by one thread only, which its comment names.
 namespace fdi::monitor {
+
+class Counters;
+class ThrottledLog;
+struct EpisodeTrace;
+
+/// What all parts of a monitor share.
+struct MonitorContext {
+  Counters& counters;
+  ThrottledLog& log;
+  std::function<std::int64_t()> utc_now_ns;
+};
+
+/// "NAME@VERSION"
+inline std::string NameOf(const ModelSet& models) {
+  return models.name + "@" + std::to_string(models.version);
+}
 
 /// Says which model set a valve is diagnosed with. Diagnosis thread.
 class ModelResolver {
@@ -47,61 +64,42 @@ class DecisionSink {
                            const Verdict& /*verdict*/) {}
 };
 
-/// Takes fault events to the bus. Outbox thread.
+/// Takes fault events to the bus. Publishing thread of the journal.
 class EventSink {
  public:
   virtual ~EventSink() = default;
   /// @returns false if it was not sent.
-  virtual bool Publish(const EpisodeEvent& event, bool persisted) = 0;
+  virtual bool Publish(const FaultEvent& event, bool persisted) = 0;
 };
 
-/// Keeps episodes. History thread. Every call may fail with a std::exception,
-/// can be repeated then, and doing it twice is a no-op except where noted.
+/// Stores episodes. History thread of the journal. Every call may fail with a
+/// std::exception, can be repeated then, and doing it twice is a no-op except
+/// where noted.
 class HistorySink {
  public:
   virtual ~HistorySink() = default;
-  /// Makes the calls of Record() and Resume() in `records` one commit: all of
-  /// it is on the disk on return or, if it fails, nothing.
-  virtual void Together(const std::function<void()>& records) = 0;
-  /// Within Together().
-  virtual void Record(const EpisodeEvent& event) = 0;
-  /// An episode left open by an earlier session goes on. Within Together().
+  /// Makes the calls of Record() and Resume() in `batch` one commit: all of it
+  /// is on the disk on return or, if it fails, nothing.
+  virtual void CommitBatch(const std::function<void()>& batch) = 0;
+  /// Within CommitBatch().
+  virtual void Record(const FaultEvent& event) = 0;
+  /// An episode left open by an earlier session goes on. Within CommitBatch().
   virtual void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) = 0;
   /// Buffers. Evidence of an episode that is not there is dropped.
   virtual void AddTrace(const EpisodeTrace& trace) = 0;
+  /// Buffers.
   virtual void AddGap(const DataGap& gap) = 0;
   /// On the disk on return, as a whole or, if it fails, not at all. Twice
   /// counts twice.
-  virtual void Keep(const Checkpoint& checkpoint) = 0;
+  virtual void CommitCheckpoint(const Checkpoint& checkpoint) = 0;
   /// The event is on the bus. Buffers.
-  virtual void MarkSent(const EpisodeEvent& event) = 0;
+  virtual void MarkSent(const FaultEvent& event) = 0;
   /// Stores what is buffered, and a sign of life; called each second. After a
   /// call that failed it writes in any case, so that success tells something.
   virtual void Commit() = 0;
 };
 
-/// Why nothing comes from a valve.
-enum class Silence : std::uint8_t {
-  kNone,
-  kStale,  ///< No sample for three periods.
-  kEnded,  ///< Its publisher ended the stream.
-};
-
-/// Shows people how the valves are. Diagnosis thread, which must not wait.
-class LiveSink {
- public:
-  virtual ~LiveSink() = default;
-  /// A sample in its order and what the engine said about it.
-  /// @param models null for a valve without a model set.
-  /// @param model_swapped another set answers from here on.
-  virtual void Show(const std::string& valve_id, const Sample& sample,
-                    const ModelSet* models, const Verdict& verdict,
-                    bool model_swapped) = 0;
-  /// The valve fell silent; its next sample ends that.
-  virtual void ShowSilence(const std::string& valve_id, Silence silence) = 0;
-};
-
-/// Keeps samples as runs. Recorder thread.
+/// Stores samples as runs. Recorder thread.
 class SampleSink {
  public:
   virtual ~SampleSink() = default;
@@ -115,6 +113,35 @@ class SampleSink {
   virtual void Close() = 0;
   /// How many samples are stored by now.
   virtual std::uint64_t recorded() const = 0;
+};
+
+/// What became of one sample.
+struct ValveOutcome {
+  const Verdict& verdict;  ///< Stands until the next call.
+  const ModelSet* models;  ///< Null while the valve is UNASSIGNED.
+  bool model_swapped;      ///< Another model set answers from here on.
+  bool isolation_held;     ///< See ModelResolver::IsolationHeld().
+  /// Signals that the model set reads and the sample lacks. Their channels
+  /// abstain; without any channel left the quality is BAD_INPUT.
+  SignalMask missing{0};
+};
+
+/// Why nothing comes from a valve.
+enum class Silence : std::uint8_t {
+  kNone,
+  kStale,  ///< No sample for three periods.
+  kEnded,  ///< Its publisher ended the stream.
+};
+
+/// Shows people how the valves are. Diagnosis thread, which must not wait.
+class LiveSink {
+ public:
+  virtual ~LiveSink() = default;
+  /// A sample in its order and what became of it.
+  virtual void Show(const std::string& valve_id, const Sample& sample,
+                    const ValveOutcome& outcome) = 0;
+  /// The valve fell silent; its next sample ends that.
+  virtual void ShowSilence(const std::string& valve_id, Silence silence) = 0;
 };
 
 }  // namespace fdi::monitor

@@ -1,49 +1,71 @@
 #include "monitor/throttled_log.h"
 
-#include <utility>
+#include <memory>
 
 namespace fdi::monitor {
+namespace {
 
-std::string_view LogIdName(LogId id) {
-  static constexpr std::array<std::string_view,
-                              static_cast<std::size_t>(LogId::kCount_)>
-      kNames{"M101", "M102", "M103", "M104", "M105", "M106", "M107", "M108",
-             "M109", "M110", "M111", "M112", "M113", "M114", "M115", "M121",
-             "M122", "M123", "M124", "M131", "M132", "M141", "M151"};
-  return kNames[static_cast<std::size_t>(id)];
+std::string IdName(LogId id) {
+  return "M" + std::to_string(static_cast<int>(id));
 }
 
-ThrottledLog::ThrottledLog(LogSink sink, std::chrono::milliseconds interval)
-    : sink_(std::move(sink)), interval_(interval) {}
+std::string WithNotShown(std::string line, std::uint64_t not_shown) {
+  return not_shown == 0
+             ? line
+             : line.append(" not_shown=").append(std::to_string(not_shown));
+}
+
+}  // namespace
+
+std::string LogLine(LogId id, std::string_view event, std::string_view fields) {
+  std::string line(event);
+  return line.append(" id=").append(IdName(id)).append(" ").append(fields);
+}
+
+bool LogLimit::Admit(std::string_view kind, std::uint64_t& not_shown) {
+  const auto now = std::chrono::steady_clock::now();
+  const std::lock_guard lock(mutex_);
+  auto place = windows_.find(kind);
+  if (place == windows_.end()) {
+    place = windows_.emplace(std::string(kind), Window{}).first;
+  }
+  Window& window = place->second;
+  if (window.shown == 0 || now - window.begin >= options_.interval) {
+    window.begin = now;
+    window.shown = 0;
+  }
+  if (window.shown >= options_.lines) {
+    ++window.not_shown;
+    return false;
+  }
+  ++window.shown;
+  not_shown = std::exchange(window.not_shown, 0);
+  return true;
+}
 
 void ThrottledLog::Report(LogId id, std::string_view event,
                           const std::function<std::string()>& fields,
                           LogLevel level) {
-  const Clock::time_point now = Clock::now();
-  std::uint64_t left_out = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    Entry& entry = entries_[static_cast<std::size_t>(id)];
-    if (entry.written && now - entry.last < interval_) {
-      ++entry.left_out;
-      return;
-    }
-    entry.written = true;
-    entry.last = now;
-    left_out = std::exchange(entry.left_out, 0);
+  std::uint64_t not_shown = 0;
+  if (limit_.Admit(IdName(id), not_shown)) {
+    Line(level, WithNotShown(LogLine(id, event, fields()), not_shown));
   }
-  std::string line(event);
-  line.append(" id=").append(LogIdName(id)).append(" ").append(fields());
-  if (left_out > 0) {
-    line.append(" not_shown=").append(std::to_string(left_out));
-  }
-  Line(level, line);
 }
 
 void ThrottledLog::Line(LogLevel level, std::string_view line) const {
   if (sink_) {
     sink_(level, line);
   }
+}
+
+LogSink LimitLog(LogSink sink, const LogLimitOptions& options) {
+  return [sink = std::move(sink), limit = std::make_shared<LogLimit>(options)](
+             LogLevel level, std::string_view line) {
+    std::uint64_t not_shown = 0;
+    if (sink && limit->Admit(line.substr(0, line.find(' ')), not_shown)) {
+      sink(level, WithNotShown(std::string(line), not_shown));
+    }
+  };
 }
 
 }  // namespace fdi::monitor

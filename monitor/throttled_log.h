@@ -1,57 +1,86 @@
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "diagnosis/log.h"
 
 namespace fdi::monitor {
 
-/// What a monitor reports again and again: log ids of docs/errors.md.
+/// What a monitor reports again and again: the numbers are the log ids of
+/// docs/errors.md, M101 and so on.
 enum class LogId : std::uint8_t {
-  kBadQuality,     ///< M101 sample_rejected reason=bad_quality
-  kNotFinite,      ///< M102 sample_rejected reason=not_finite
-  kRange,          ///< M103 sample_rejected reason=range
-  kUnit,           ///< M104 sample_rejected reason=unit
-  kPeriod,         ///< M105 sample_rejected reason=period
-  kRepeat,         ///< M106 sample_rejected reason=repeat
-  kLate,           ///< M107 sample_rejected reason=late
-  kSuperseded,     ///< M108 sample_rejected reason=superseded
-  kBadId,          ///< M109 sample_rejected reason=valve_id
-  kValveRefused,   ///< M110 valve_refused: beyond --max-valves
-  kUnassigned,     ///< M111 valve_unassigned
-  kModelFailure,   ///< M112 model_set_unusable
-  kGap,            ///< M113 data_gap
-  kStale,          ///< M114 valve_stale
-  kShadow,         ///< M115 shadow_not_compared
-  kUnsent,         ///< M121 publication_failed
-  kUnpersisted,    ///< M122 event_unpersisted
-  kPersistence,    ///< M123 persistence_degraded
-  kHistoryLost,    ///< M124 history_dropped
-  kRecordDropped,  ///< M131 record_dropped
-  kRecordFailed,   ///< M132 record_failed
-  kTransport,      ///< M141 transport_loss
-  kStalled,        ///< M151 threads_stalled
-  kCount_
+  kBadQuality = 101,     ///< sample_rejected reason=bad_quality
+  kNotFinite = 102,      ///< sample_rejected reason=not_finite
+  kRange = 103,          ///< sample_rejected reason=range
+  kUnit = 104,           ///< sample_rejected reason=unit
+  kPeriod = 105,         ///< sample_rejected reason=period
+  kRepeat = 106,         ///< sample_rejected reason=repeat
+  kLate = 107,           ///< sample_rejected reason=late
+  kSuperseded = 108,     ///< sample_rejected reason=superseded
+  kBadId = 109,          ///< sample_rejected reason=valve_id
+  kValveRefused = 110,   ///< valve_refused: beyond --max-valves
+  kUnassigned = 111,     ///< valve_unassigned
+  kModelFailure = 112,   ///< model_set_unusable
+  kGap = 113,            ///< data_gap
+  kStale = 114,          ///< valve_stale
+  kShadow = 115,         ///< shadow_not_compared
+  kMissingSignal = 116,  ///< sample_rejected reason=missing_signal
+  kUnsent = 121,         ///< publication_failed
+  kUnpersisted = 122,    ///< event_unpersisted
+  kPersistence = 123,    ///< persistence_degraded
+  kHistoryLost = 124,    ///< history_dropped
+  kRecordDropped = 131,  ///< record_dropped
+  kRecordFailed = 132,   ///< record_failed
+  kTransport = 141,      ///< transport_loss
+  kStalled = 151,        ///< threads_stalled
 };
 
-std::string_view LogIdName(LogId id);  ///< "M101", ...
+/// "event id=M101 FIELDS"
+std::string LogLine(LogId id, std::string_view event, std::string_view fields);
 
-/// Writes lines `event id=M101 key=value ...`, of each id the first at once
-/// and then at most one per interval, with the number of those left out.
+/// How many lines of one kind are shown.
+struct LogLimitOptions {
+  int lines{100};  ///< In each interval.
+  std::chrono::milliseconds interval{10'000};
+};
+
+/// Counts lines by kind and says which to show. Thread safe.
+class LogLimit {
+ public:
+  explicit LogLimit(const LogLimitOptions& options) : options_(options) {}
+
+  /// @param not_shown how many of the kind were not since the last shown one.
+  /// @returns whether the line is to be shown.
+  bool Admit(std::string_view kind, std::uint64_t& not_shown);
+
+ private:
+  struct Window {
+    std::chrono::steady_clock::time_point begin;
+    int shown{0};
+    std::uint64_t not_shown{0};
+  };
+
+  LogLimitOptions options_;
+  std::mutex mutex_;
+  std::map<std::string, Window, std::less<>> windows_;
+};
+
+/// Writes lines of the ids above, of each id the first at once and then at most
+/// one per interval, with the number of those left out (`not_shown=N`).
 ///
 /// Thread safe.
 class ThrottledLog {
  public:
-  using Clock = std::chrono::steady_clock;
-
   explicit ThrottledLog(LogSink sink, std::chrono::milliseconds interval =
-                                          std::chrono::milliseconds(10'000));
+                                          std::chrono::milliseconds(10'000))
+      : sink_(std::move(sink)), limit_({1, interval}) {}
 
   /// @param fields is called only for a line that is written; its result
   ///   follows the event, e.g. "valve=V1 reason=range".
@@ -63,16 +92,13 @@ class ThrottledLog {
   void Line(LogLevel level, std::string_view line) const;
 
  private:
-  struct Entry {
-    bool written{false};
-    Clock::time_point last;
-    std::uint64_t left_out{0};
-  };
-
   LogSink sink_;
-  std::chrono::milliseconds interval_;
-  std::mutex mutex_;
-  std::array<Entry, static_cast<std::size_t>(LogId::kCount_)> entries_;
+  LogLimit limit_;
 };
+
+/// A sink before `sink` that holds back what is beyond the limit of its event,
+/// the first word of a line, whoever writes it; the next line of the event that
+/// is shown says how many were not. Thread safe.
+LogSink LimitLog(LogSink sink, const LogLimitOptions& options = {});
 
 }  // namespace fdi::monitor

@@ -5,23 +5,11 @@
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/records/trace_point.h"
 #include "diagnosis/sample.h"
 #include "diagnosis/verdict.h"
 
 namespace fdi::monitor {
-
-/// One instant of a valve as evidence: what was read and what was decided.
-struct TracePoint {
-  Sample sample;  ///< As received, bit for bit.
-  Intake intake{Intake::kAccepted};
-  bool initialised{false};
-  Quality quality{Quality::kLive};
-  State state{State::kNormal};
-  FaultSet isolated{0};
-  std::vector<double> residuals;  ///< As float; NaN where it abstains.
-  double normal_factor{0.0};      ///< d_0, in steps of 1/32768.
-  std::vector<double> factors;    ///< d by fault index, likewise.
-};
 
 /// Past instants of one valve, packed: 100 bytes each for six signals, two
 /// channels and five faults, so 180 kB for half an hour at 1 Hz. Holds at most
@@ -94,6 +82,13 @@ class Trace {
   std::vector<double> values_;
   std::vector<float> residuals_;
   std::vector<std::uint16_t> factors_;  // d_0, then faults
+};
+
+/// Evidence of an episode, in the order in which it was gathered.
+struct EpisodeTrace {
+  std::uint64_t episode_id{0};
+  Trace trace;
+  bool complete{false};  ///< Nothing follows.
 };
 
 }  // namespace fdi::monitor

@@ -19,7 +19,10 @@ std::shared_ptr<const ModelSet> ModelsOf(
 ValveMonitor::ValveMonitor(const std::string& id,
                            const std::optional<EngineParts>& parts,
                            const TraceOptions& options)
-    : id_(id), models_(ModelsOf(parts)), tracker_(id, options) {
+    : id_(id),
+      models_(ModelsOf(parts)),
+      required_(parts ? parts->plan->required() : 0),
+      tracker_(id, options) {
   if (parts) {
     engine_.emplace(*parts);
   }
@@ -46,7 +49,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     stamp_ns_ = sample.stamp_ns;
     coverage_.Add(sample.stamp_ns, Quality::kUnassigned);
     health_.Add(sample, unassigned_, nullptr, period_s());
-    return {unassigned_, nullptr, swapped, isolation_held_};
+    return {unassigned_, nullptr, swapped, isolation_held_, 0};
   }
   RestoreOnce(sample.source_id);
   const Verdict& verdict = engine_->Step(sample);
@@ -60,7 +63,8 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     writer_ = writer;
   }
   tracker_.Step(sample, verdict, models_, outlet);
-  return {verdict, models_.get(), swapped, isolation_held_};
+  const auto missing = static_cast<SignalMask>(required_ & ~sample.present);
+  return {verdict, models_.get(), swapped, isolation_held_, missing};
 }
 
 void ValveMonitor::RestoreOnce(std::uint64_t source_id) {
@@ -78,8 +82,8 @@ void ValveMonitor::HoldIsolation(bool hold) {
 }
 
 void ValveMonitor::TakeCheckpoint(Checkpoint& checkpoint) {
-  coverage_.TakeTo(id_, period_s(), checkpoint.coverage);
-  health_.TakeTo(id_, checkpoint.health);
+  coverage_.TakeInto(id_, period_s(), checkpoint.coverage);
+  health_.TakeInto(id_, checkpoint.health);
   if (engine_ && seen_ && !stale_ && !ended_) {
     checkpoint.accumulators.push_back(
         {id_, source_id_, models_->content_hash, stamp_ns_, engine_->Save()});
@@ -122,6 +126,7 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
     engine_.reset();
   }
   models_ = std::move(models);
+  required_ = parts ? parts->plan->required() : SignalMask{0};
   swapped_ = true;
   return true;
 }

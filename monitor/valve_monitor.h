@@ -10,16 +10,9 @@
 #include "monitor/checkpoint.h"
 #include "monitor/episode_tracker.h"
 #include "monitor/health_book.h"
+#include "monitor/sinks.h"
 
 namespace fdi::monitor {
-
-/// What became of one sample.
-struct ValveOutcome {
-  const Verdict& verdict;  ///< Stands until the next call.
-  const ModelSet* models;  ///< Null while the valve is UNASSIGNED.
-  bool model_swapped;      ///< Another model set answers from here on.
-  bool isolation_held;     ///< See ModelResolver::IsolationHeld().
-};
 
 /// One valve of the plant: its engine, its episodes, its clock. A valve
 /// without a model set is listed, and its quality is UNASSIGNED.
@@ -36,15 +29,15 @@ class ValveMonitor {
   /// Before the first Step().
   void Recover(const OpenEpisode& episode) { tracker_.Recover(episode); }
 
-  /// What an earlier session kept, if the first sample comes from the source
-  /// that it is of. Before the first Step().
+  /// The accumulators as of the last checkpoint of an earlier session; they
+  /// count if the first sample is of the same source. Before the first Step().
   void Resume(Accumulator accumulator) { saved_ = std::move(accumulator); }
 
   /// See ModelResolver::IsolationHeld().
   void HoldIsolation(bool hold);
 
-  /// Adds what is kept of the valve: time since the last call and, of a valve
-  /// that speaks, the accumulators.
+  /// Adds the time and health since the last call and, of a valve that is not
+  /// silent, the accumulators.
   void TakeCheckpoint(Checkpoint& checkpoint);
 
   /// @param writer who sent it; see EndStream().
@@ -96,6 +89,7 @@ class ValveMonitor {
 
   std::string id_;
   std::shared_ptr<const ModelSet> models_;
+  SignalMask required_{0};  // By models_.
   std::optional<ValveEngine> engine_;
   EpisodeTracker tracker_;
   Verdict unassigned_;

@@ -1,6 +1,7 @@
 #include "simulator/fault_effects.h"
 
 #include <cmath>
+#include <iterator>
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
@@ -14,7 +15,7 @@ void ExtendLeak(double s, FaultEffects& e) {
   e.air_leak += 0.1 * s * 2e-6;
 }
 
-constexpr Effect kEffects[kLastFault] = {
+constexpr Effect kEffects[] = {
     /* f1 */ [](double s, FaultEffects& e) { e.upper_stop_factor *= 1.0 - s; },
     /* f2 */
     [](double s, FaultEffects& e) {
@@ -64,6 +65,7 @@ constexpr Effect kEffects[kLastFault] = {
     /* p1 */ [](double s, FaultEffects& e) { e.inlet_reading_step += s; },
     /* p2 */ [](double s, FaultEffects& e) { e.outlet_reading_step += s; },
 };
+static_assert(std::size(kEffects) == kLastFault);
 
 }  // namespace
 

@@ -36,12 +36,13 @@ struct FaultEffects {
 /// The water is never hotter than this [degC].
 inline constexpr double kMaxTemperatureC = 300.0;
 
-/// Adds what `fault` (1..22) does at `strength` to `effects`. Several faults
-/// may be combined; strength 0 leaves `effects` as it is.
+/// Adds what `fault` of the catalogue does at `strength` to `effects`. Several
+/// faults may be combined; strength 0 leaves `effects` as it is.
 ///
 /// Sizes after the DAMADICS benchmark's definition of its faults; a transmitter
 /// fault moves the reading by strength x span.
-/// @throws std::invalid_argument if `fault` is not in 1..22 or `strength` is
+/// @throws std::invalid_argument if `fault` is not of the catalogue or
+/// `strength` is
 ///   outside [0, 1] ([-1, 1] for the signed faults of the catalogue).
 void ApplyFault(int fault, double strength, FaultEffects& effects);
 

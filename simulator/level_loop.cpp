@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "simulator/water.h"
+#include "simulator/valve_equations.h"
 
 namespace fdi::simulator {
 namespace {

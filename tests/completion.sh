@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Completes command lines as bash does: sources what the programs print for it
-# and looks at COMPREPLY. Usage: completion.sh BIN_DIRECTORY
+# Completes command lines as bash does: sources the installed script and looks
+# at COMPREPLY. Usage: completion.sh BIN_DIRECTORY
 set -euo pipefail
 bin=$1
 folder=$(mktemp -d)
@@ -8,11 +8,8 @@ trap 'rm -rf "$folder"' EXIT
 export FDI_DATA=$folder/data
 PATH=$bin:$PATH
 
-for program in fdi-monitor fdi-simulator fdi-store fdi-trainer; do
-  "$bin/$program" --completion >"$folder/$program"
-  # shellcheck disable=SC1090
-  source "$folder/$program"
-done
+# shellcheck disable=SC1091
+source "$(dirname "$0")/../cmake/package/completion.bash"
 compopt() { :; }  # Works within a completion only.
 
 # The candidates for the last word, in one line.
@@ -43,6 +40,7 @@ expect '--model-set' fdi-monitor run --model
 expect 'udp' fdi-monitor --transport u
 expect 'paper' fdi-trainer train --preset p
 expect 'shm' fdi-monitor --transport = s
+expect 'lossless' fdi-monitor run --record l
 expect 'f19' fdi-store history list --fault f19
 expect 'f19:' fdi-simulator run --fault f19
 expect 'incipient@' fdi-simulator run --fault f19 : inc

@@ -58,11 +58,13 @@ pages() {  # PROGRAM WORDS...
   fi
   "$root/usr/bin/$1" "${@:2}" --help >"$folder/help"
   local verb
-  for verb in $(sed -n '/^Subcommands:/,/^$/ s/^  \([a-z][a-z-]*\).*/\1/p' \
+  for verb in $(sed -n '/^Verbs:/,/^$/ s/^  \([a-z][a-z-]*\).*/\1/p' \
     "$folder/help"); do
     pages "$@" "$verb"
   done
 }
+gzip -dc "$root/usr/share/man/man1/fdi-monitor-run.1.gz" |
+  sed -E 's/\\f[A-Z]|\\[,/]//g' | grep -qF '[=[ADDRESS:]PORT]' || fail "fdi-monitor-run(1) cuts --http at a colon"
 version=$(dpkg-deb --field "$package" Version)
 for program in fdi-monitor fdi-simulator fdi-store fdi-trainer; do
   "$root/usr/bin/$program" --version | grep -q "^$program ${version%-*}+" ||

@@ -2,14 +2,283 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <vector>
 
 #include "diagnosis/error.h"
+#include "diagnosis/model_set.h"
+#include "diagnosis/residual_windows.h"
 #include "trainer/statistics.h"
-#include "trainer/tail_fit.h"
-#include "trainer/window_limits.h"
 
 namespace fdi::trainer {
 namespace {
+
+constexpr double kTailQuantile = 0.95;
+constexpr double kShrinkage = 50.0;
+constexpr double kUpperBound = 1.645;  // 95 % of a normal distribution
+constexpr double kLowestShape = -0.1;
+constexpr double kHighestShape = 0.3;
+
+double Quantile(std::vector<double> values, double q) {
+  const auto at =
+      static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+// Largest excess over u of every cluster, in ascending order.
+std::vector<double> ClusterMaxima(std::span<const double> series, double u,
+                                  int separation) {
+  std::vector<double> maxima;
+  std::size_t last = 0;
+  for (std::size_t k = 0; k < series.size(); ++k) {
+    if (!(series[k] > u)) {
+      continue;
+    }
+    const double excess = series[k] - u;
+    if (!maxima.empty() && k - last < static_cast<std::size_t>(separation)) {
+      maxima.back() = std::max(maxima.back(), excess);
+    } else {
+      maxima.push_back(excess);
+    }
+    last = k;
+  }
+  std::sort(maxima.begin(), maxima.end());
+  return maxima;
+}
+
+// ξ = 2 − b0/(b0 − 2 b1),  σ = 2 b0 b1/(b0 − 2 b1) with b1 = E[z (1 − G(z))].
+void FitPareto(const std::vector<double>& maxima, TailThreshold& tail) {
+  const auto n = static_cast<double>(maxima.size());
+  double b0 = 0.0;
+  double b1 = 0.0;
+  for (std::size_t i = 0; i < maxima.size(); ++i) {
+    const double rank = (static_cast<double>(i) + 0.65) / n;
+    b0 += maxima[i] / n;
+    b1 += maxima[i] * (1.0 - rank) / n;
+  }
+  const double difference = b0 - 2.0 * b1;
+  const double raw = difference > 0.0 ? 2.0 - b0 / difference : 0.0;
+  tail.shape =
+      std::clamp(raw * n / (n + kShrinkage), kLowestShape, kHighestShape);
+  // σ keeps the mean excess σ/(1 − ξ), at its 95 % upper bound.
+  tail.scale = b0 * (1.0 - tail.shape) * (1.0 + kUpperBound / std::sqrt(n));
+}
+
+}  // namespace
+
+TailThreshold FitTail(std::span<const double> series, double rate,
+                      int separation) {
+  Require(series.size() >= 100, "a tail needs at least 100 values");
+  Require(rate > 0.0 && rate <= 0.01, "the rate must be in (0, 0.01]");
+  Require(separation >= 1, "the separation must be at least 1 sample");
+  TailThreshold tail;
+  tail.base = Quantile({series.begin(), series.end()}, kTailQuantile);
+  const std::vector<double> maxima =
+      ClusterMaxima(series, tail.base, separation);
+  tail.clusters = static_cast<int>(maxima.size());
+  if (maxima.empty()) {  // a series that never exceeds its own quantile
+    tail.level = tail.base;
+    return tail;
+  }
+  FitPareto(maxima, tail);
+  const double n = tail.clusters;
+  const double base_rate = n / static_cast<double>(series.size());
+  const double ratio = base_rate / rate;
+  const double reach = std::abs(tail.shape) < 1e-6
+                           ? std::log(ratio)
+                           : (std::pow(ratio, tail.shape) - 1.0) / tail.shape;
+  // No data of some hours support a level that they themselves exceed.
+  tail.level = tail.base + std::max(tail.scale * std::max(0.0, reach),
+                                    maxima.back() + tail.scale);
+  return tail;
+}
+
+namespace {
+
+constexpr std::size_t kFewestValues = 100;
+constexpr int kFewClusters = 10;      // too few for a tail of their own
+constexpr int kSomeClusters = 30;     // too few for their tail to be trusted
+constexpr double kSeenMean = 1.5;     // times what the record showed
+constexpr double kSeenLogRms = 0.25;  // more than what the record showed
+constexpr double kMargin = 1.25;      // on what correlation makes plausible
+constexpr double kCommandedDrift = 0.75;  // deviations
+constexpr double kLeastMean = 0.5;        // deviations
+constexpr double kLeastDeviation = 1.4;
+constexpr double kCommandMargin = 0.5;           // of the range
+constexpr double kLeastCommandMargin = 2.0;      // %
+constexpr double kLeastActivityVariance = 1e-6;  // to tell a slope from
+
+// What the windows of all series have seen, one entry per full window.
+struct WindowHistory {
+  std::vector<double> mean;
+  std::vector<double> energy;    // log-deviation of the residual
+  std::vector<double> activity;  // log-deviation of CV; empty without CV
+  std::vector<double> command;   // mean of CV; likewise
+};
+
+WindowHistory SlideWindow(const ResidualSeries& residuals,
+                          const ResidualSeries& commands, int length) {
+  WindowHistory history;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    ResidualWindow window(length);
+    ResidualWindow command(length);
+    for (std::size_t k = 0; k < residuals[i].size(); ++k) {
+      window.Push(residuals[i][k]);
+      if (!commands.empty()) {
+        command.Push(commands[i][k]);
+      }
+      if (window.full()) {
+        history.mean.push_back(window.mean());
+        history.energy.push_back(window.log_rms());
+        if (!commands.empty()) {
+          history.activity.push_back(command.log_rms());
+          history.command.push_back(command.mean());
+        }
+      }
+    }
+  }
+  return history;
+}
+
+// Of the line of y over x, in [0, 1]: a residual grows with what causes it.
+double Slope(std::span<const double> x, std::span<const double> y) {
+  const double mean_x = Mean(x);
+  const double mean_y = Mean(y);
+  double covariance = 0.0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    covariance += (x[k] - mean_x) * (y[k] - mean_y);
+  }
+  const double variance = Variance(x) * static_cast<double>(x.size());
+  return variance > kLeastActivityVariance * static_cast<double>(x.size())
+             ? std::clamp(covariance / variance, 0.0, 1.0)
+             : 0.0;
+}
+
+void FitActivity(WindowHistory& history, WindowLimits& limits) {
+  if (history.activity.empty()) {
+    return;
+  }
+  const auto [lowest, highest] =
+      std::minmax_element(history.command.begin(), history.command.end());
+  const double margin =
+      std::max(kCommandMargin * (*highest - *lowest), kLeastCommandMargin);
+  limits.command = {*lowest - margin, *highest + margin};
+  limits.activity_slope = Slope(history.activity, history.energy);
+  std::vector<double> sorted = history.activity;
+  std::sort(sorted.begin(), sorted.end());
+  limits.log_activity = SortedQuantile(sorted, 0.5);
+  for (std::size_t k = 0; k < history.energy.size(); ++k) {
+    history.energy[k] -=
+        limits.activity_slope *
+        std::max(history.activity[k] - limits.log_activity, 0.0);
+  }
+}
+
+// z with P(Z > z) = share of a standard normal distribution, by bisection.
+double NormalQuantile(double share) {
+  double low = 0.0;
+  double high = 40.0;
+  for (int i = 0; i < 60; ++i) {
+    const double z = 0.5 * (low + high);
+    (0.5 * std::erfc(z / std::numbers::sqrt2) > share ? low : high) = z;
+  }
+  return high;
+}
+
+// The limits that short-range correlation makes plausible.
+struct Plausible {
+  double mean;
+  double log_rms;
+};
+
+Plausible ByCorrelation(const std::vector<double>& residuals, int length,
+                        double share) {
+  const double sd = std::sqrt(Variance(residuals)) + 1e-6;
+  std::vector<double> squares;
+  for (const double r : residuals) {
+    squares.push_back(r * r / (sd * sd));
+  }
+  const double z = NormalQuantile(share);
+  const double samples = 2.0 * length;
+  const double kappa = Variance(squares);
+  return {kMargin * z * sd * std::sqrt(CorrelationTime(residuals) / samples),
+          std::log(kMargin * sd) +
+              0.5 * z * std::sqrt(kappa * CorrelationTime(squares) / samples)};
+}
+
+// @param bound What to take if the tail is not known, or poorly.
+double Level(const std::vector<double>& values, double share, int length,
+             double bound) {
+  const TailThreshold tail = FitTail(values, share, 2 * length);
+  if (tail.clusters < kFewClusters) {
+    return bound;
+  }
+  return tail.clusters < kSomeClusters ? std::min(tail.level, bound)
+                                       : tail.level;
+}
+
+// Limits on the windows of N samples over the normal residuals, each exceeded
+// by `share` of the samples.
+//
+// They come from the tail of the windows (FitTail). Where the record holds
+// fewer than 30 independent excesses, as some hours do of a window of minutes,
+// that tail is mostly its own uncertainty; then what short-range correlation
+// makes of a window is an upper bound, and stands alone below 10,
+//
+//     |mean| ≤ 1.25 z σ √(τ/2N),   log rms ≤ ln 1.25 σ + z/2 √(κ τ₂/2N),
+//
+// z the Gaussian quantile of `share`, τ and τ₂ the correlation times of the
+// residual and its square, κ the variance of r²/σ²; but never less than the
+// record itself showed, times 1.5 (mean) or e^0.25 (rms). Under inputs unlike
+// those of the training a model errs more: no limit on a mean is closer than
+// half a deviation, none on the deviation closer than 1.4 times it.
+//
+// The limit on the energy follows the activity of CV, see FitThresholds(). All
+// limits hold for means of CV over the window as in the record, and half their
+// range beyond, 2 % at least.
+//
+// @param commanded The model reads CV: what it errs by hangs on how the loop
+//   moves. Of a short record its mean is given 0.75 deviations.
+// @param commands CV at the samples of the residuals; empty: no slope.
+// @return Nothing if there are fewer than 100 full windows.
+std::optional<WindowLimits> FitWindow(const ResidualSeries& residuals,
+                                      const ResidualSeries& commands,
+                                      int length, double share,
+                                      bool commanded) {
+  WindowHistory history = SlideWindow(residuals, commands, length);
+  if (history.mean.size() < kFewestValues) {
+    return std::nullopt;
+  }
+  WindowLimits limits;
+  limits.length = length;
+  FitActivity(history, limits);
+  const std::vector<double> joined = Joined(residuals);
+  const double sd = std::sqrt(Variance(joined)) + 1e-6;
+  const Plausible plausible = ByCorrelation(joined, length, share);
+  const auto mean_level = [&] {
+    const double seen =
+        *std::max_element(history.mean.begin(), history.mean.end());
+    const double drift = commanded ? kCommandedDrift * sd : 0.0;
+    return std::max(Level(history.mean, share, length,
+                          std::max({plausible.mean, kSeenMean * seen, drift})),
+                    kLeastMean * sd);
+  };
+  limits.upper_mean = mean_level();
+  for (double& mean : history.mean) {
+    mean = -mean;
+  }
+  limits.lower_mean = -mean_level();
+  const double seen =
+      *std::max_element(history.energy.begin(), history.energy.end());
+  limits.upper_log_rms =
+      std::max(Level(history.energy, share, length,
+                     std::max(plausible.log_rms, seen + kSeenLogRms)),
+               std::log(kLeastDeviation * sd));
+  return limits;
+}
 
 // T1, P1 and P2 vary more from day to day, and with where the valve stays, than
 // in the hours of a training: means over windows within so many deviations are

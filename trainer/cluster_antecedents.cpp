@@ -5,12 +5,179 @@
 #include <limits>
 #include <numeric>
 #include <string>
+#include <utility>
 
 #include "diagnosis/error.h"
-#include "trainer/antecedent_projection.h"
-#include "trainer/cluster_distance.h"
+#include "trainer/gustafson_kessel.h"
 
 namespace fdi::trainer {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Heights from here on belong to the core.
+constexpr double kCoreHeight = 0.95;
+// Lower bound of a width as a share of the range of the regressor.
+constexpr double kMinWidthShare = 1e-3;
+
+// Points that a width is fitted to; more only cost time.
+constexpr Index kMaxFitPoints = 200;
+
+std::vector<Index> SortedOrder(const Eigen::Ref<const VectorXd>& x) {
+  std::vector<Index> order(static_cast<std::size_t>(x.size()));
+  std::iota(order.begin(), order.end(), Index{0});
+  std::sort(order.begin(), order.end(),
+            [&x](Index a, Index b) { return x(a) < x(b); });
+  return order;
+}
+
+// Gives points at the same position the largest of their heights, so that the
+// order in which they came is no matter.
+void MergeTies(const VectorXd& x, VectorXd& h) {
+  for (Index k = 1; k < h.size(); ++k) {
+    h(k) = x(k) == x(k - 1) ? std::max(h(k), h(k - 1)) : h(k);
+  }
+  for (Index k = h.size() - 2; k >= 0; --k) {
+    h(k) = x(k) == x(k + 1) ? h(k + 1) : h(k);
+  }
+}
+
+// The envelope of memberships over ascending positions.
+Envelope MakeEnvelope(VectorXd positions, VectorXd memberships) {
+  Envelope envelope{std::move(positions), std::move(memberships)};
+  VectorXd& h = envelope.heights;
+  MergeTies(envelope.positions, h);
+  Index peak = 0;
+  const double height = h.maxCoeff(&peak);
+  for (Index k = 1; k <= peak; ++k) {
+    h(k) = std::max(h(k), h(k - 1));
+  }
+  for (Index k = h.size() - 2; k > peak; --k) {
+    h(k) = std::max(h(k), h(k + 1));
+  }
+  if (height > 0.0) {
+    h /= height;
+  } else {
+    h.setOnes();
+  }
+  return envelope;
+}
+
+// The width w that minimizes Σ (h − exp(−d²/2w²))² over distances d > 0, by
+// golden section over log w.
+double FitWidth(const VectorXd& all_distances, const VectorXd& all_heights,
+                double min_width) {
+  const Index size = all_distances.size();
+  if (size == 0 || all_distances.maxCoeff() <= min_width) {
+    return min_width;
+  }
+  const auto kept = Eigen::seq(0, size - 1, 1 + size / kMaxFitPoints);
+  const VectorXd distances = all_distances(kept);
+  const VectorXd heights = all_heights(kept);
+  const auto error = [&](double log_width) {
+    const double scale = -0.5 * std::exp(-2.0 * log_width);
+    return (heights.array() - (scale * distances.array().square()).exp())
+        .square()
+        .sum();
+  };
+  constexpr double kGolden = 0.6180339887498949;
+  double low = std::log(min_width);
+  double high = std::log(10.0 * all_distances.maxCoeff());
+  double left = high - kGolden * (high - low);
+  double right = low + kGolden * (high - low);
+  double error_left = error(left);
+  double error_right = error(right);
+  while (high - low > 1e-3) {
+    if (error_left <= error_right) {
+      high = right;
+      right = left;
+      error_right = error_left;
+      left = high - kGolden * (high - low);
+      error_left = error(left);
+    } else {
+      low = left;
+      left = right;
+      error_left = error_right;
+      right = low + kGolden * (high - low);
+      error_right = error(right);
+    }
+  }
+  return std::exp(0.5 * (low + high));
+}
+
+double Middle(const FuzzySet& set) {
+  return 0.5 * (set.left_center + set.right_center);
+}
+
+}  // namespace
+
+Envelope ProjectMembership(const Eigen::Ref<const VectorXd>& x,
+                           const Eigen::Ref<const VectorXd>& memberships) {
+  Require(x.size() > 0 && x.size() == memberships.size(),
+          "x and memberships need the same size, at least 1");
+  const std::vector<Index> order = SortedOrder(x);
+  return MakeEnvelope(x(order), memberships(order));
+}
+
+FuzzySet FitFuzzySet(const Envelope& envelope, double min_width) {
+  Require(min_width > 0.0, "min_width must be above 0");
+  const VectorXd& x = envelope.positions;
+  const VectorXd& h = envelope.heights;
+  Require(x.size() > 0 && x.size() == h.size(),
+          "an envelope needs as many heights as positions, at least 1");
+  Index first = 0;
+  while (first + 1 < h.size() && h(first) < kCoreHeight) {
+    ++first;
+  }
+  Index last = h.size() - 1;
+  while (last > first && h(last) < kCoreHeight) {
+    --last;
+  }
+  FuzzySet set;
+  set.left_center = x(first);
+  set.right_center = x(last);
+  set.left_width =
+      FitWidth(x(first) - x.head(first).array(), h.head(first), min_width);
+  const Index right = h.size() - 1 - last;
+  set.right_width =
+      FitWidth(x.tail(right).array() - x(last), h.tail(right), min_width);
+  return set;
+}
+
+std::vector<std::vector<FuzzySet>> ProjectAntecedents(
+    const Eigen::Ref<const Eigen::MatrixXd>& x,
+    const Eigen::Ref<const Eigen::MatrixXd>& memberships) {
+  Require(x.rows() > 0 && x.rows() == memberships.rows(),
+          "X and U need the same number of rows, at least 1");
+  const auto n = static_cast<std::size_t>(x.cols());
+  const auto c = static_cast<std::size_t>(memberships.cols());
+  std::vector<std::vector<FuzzySet>> sets(c, std::vector<FuzzySet>(n));
+  for (std::size_t j = 0; j < n; ++j) {
+    const auto column = x.col(static_cast<Index>(j));
+    const std::vector<Index> order = SortedOrder(column);
+    const VectorXd positions = column(order);
+    const double range = positions(positions.size() - 1) - positions(0);
+    std::size_t lowest = 0;
+    std::size_t highest = 0;
+    for (std::size_t i = 0; i < c; ++i) {
+      if (!(range > 0.0)) {
+        sets[i][j] = {positions(0), positions(0), kInfinity, kInfinity};
+        continue;
+      }
+      const auto u = memberships.col(static_cast<Index>(i));
+      sets[i][j] = FitFuzzySet(MakeEnvelope(positions, u(order)),
+                               kMinWidthShare * range);
+      lowest = Middle(sets[i][j]) < Middle(sets[lowest][j]) ? i : lowest;
+      highest = Middle(sets[i][j]) > Middle(sets[highest][j]) ? i : highest;
+    }
+    sets[lowest][j].left_width = kInfinity;
+    sets[highest][j].right_width = kInfinity;
+  }
+  return sets;
+}
+
 namespace {
 
 using Eigen::Index;

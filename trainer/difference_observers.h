@@ -1,13 +1,67 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "diagnosis/model_set.h"
-#include "trainer/difference_fit.h"
+#include "trainer/channel_training.h"
+#include "trainer/observer_adaptation.h"
 #include "trainer/training.h"
 
 namespace fdi::trainer {
+
+/// A fault at a signed strength.
+struct FaultCondition {
+  int fault{0};
+  double strength{0.0};
+
+  bool operator==(const FaultCondition&) const = default;
+};
+
+/// The models of one channel in normal operation that difference observers
+/// build upon.
+struct NormalChannel {
+  ChannelPlan plan;  ///< That `normal` was fitted by.
+  TsModel normal;    ///< ŷ_0, maybe on its own past.
+  TsModel inputs;    ///< Without the own past: its rules serve the faults.
+  bool difference{false};  ///< The two differ: faults add to ŷ_0.
+  /// ŷ_0 over the healthy stretches, by stretch and sample.
+  std::vector<std::vector<double>> expected{};
+  /// For faults that leave the regressors of `inputs` as they are.
+  std::optional<Adaptation> adaptation{};
+};
+
+/// Fits both; ŷ_0 runs on its own past where the plan has candidates for that
+/// (ChannelPlan::own_past_pool) and it errs less on the validation stretches.
+///
+/// @param healthy The stretches that faults will be put onto.
+/// @param saturation Readings from here on are at the transmitter's limit.
+/// @throws DataError as FitChannel().
+NormalChannel FitNormalChannel(const ChannelPlan& plan, const Condition& normal,
+                               const std::vector<Stretch>& healthy,
+                               const TrainingOptions& options,
+                               double saturation);
+
+/// One channel of a fault observer ŷ_i = ŷ_0 + δ_i. δ_i is fitted to readings
+/// without the valve's background r_0 = y − ŷ_0: a flow keeps its ratio,
+/// everything else its difference to the healthy reading,
+///
+///     F_i ŷ_0/F,   X_i − r_0.
+///
+/// Membership and deviation are those of the readings with their background,
+/// widened by what the normal model errs more on data it was not fitted to,
+/// and by what δ_i errs on the folds left out.
+///
+/// @param normal_observer Calibrated (residual_sd) on residuals held out.
+/// @param healthy As FitNormalChannel() got them; `faulty` are the same with
+/// the fault in force.
+/// @throws DataError as AdaptModel().
+ChannelObserver FitDifference(const NormalChannel& channel,
+                              const ChannelObserver& normal_observer,
+                              const std::vector<Stretch>& healthy,
+                              const std::vector<Stretch>& faulty,
+                              const FaultCondition& fault, int settling);
 
 /// The samples of a healthy stretch as the valve would have answered with the
 /// fault in force all the time. Called from several threads.

@@ -4,13 +4,15 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <random>
 #include <utility>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
 #include "diagnosis/error.h"
-#include "trainer/cluster_starts.h"
 
 namespace fdi::trainer {
 namespace {
@@ -20,6 +22,52 @@ using Eigen::ArrayXXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+// A number in [0, 1) of 53 random bits: the library's distributions are not
+// the same everywhere.
+double Uniform(std::mt19937_64& generator) {
+  return static_cast<double>(generator() >> 11U) * 0x1p-53;
+}
+
+// A start for FitGustafsonKessel(): spheres around centers among the points
+// Z, N×n, each drawn with a probability proportional to the squared distance
+// from the nearest one drawn before. Fills centers and covariances.
+FuzzyPartition DrawCenters(const Eigen::Ref<const MatrixXd>& z,
+                           Index num_clusters, unsigned seed) {
+  std::mt19937_64 generator(seed);
+  FuzzyPartition start;
+  start.centers.resize(num_clusters, z.cols());
+  start.covariances.assign(static_cast<std::size_t>(num_clusters),
+                           MatrixXd::Identity(z.cols(), z.cols()));
+  ArrayXd nearest = ArrayXd::Ones(z.rows());
+  for (Index i = 0; i < num_clusters; ++i) {
+    double left = Uniform(generator) * nearest.sum();
+    Index k = 0;
+    while (k + 1 < z.rows() && left >= nearest(k)) {
+      left -= nearest(k);
+      ++k;
+    }
+    start.centers.row(i) = z.row(k);
+    const ArrayXd squared =
+        (z.rowwise() - z.row(k)).rowwise().squaredNorm().array();
+    nearest = i == 0 ? squared : nearest.min(squared).eval();
+  }
+  return start;
+}
+
+// A start for FitGustafsonKessel(): memberships at random, each row summing
+// to 1. All clusters begin in the middle, so that thin parallel ones are not
+// cut across. Fills the memberships.
+FuzzyPartition DrawMemberships(Index rows, Index num_clusters, unsigned seed) {
+  std::mt19937_64 generator(seed);
+  FuzzyPartition start;
+  start.memberships = MatrixXd::NullaryExpr(
+      rows, num_clusters, [&generator] { return Uniform(generator); });
+  const ArrayXd sum = start.memberships.rowwise().sum().array().max(
+      std::numeric_limits<double>::min());
+  start.memberships.array().colwise() /= sum;
+  return start;
+}
 
 constexpr double kSmallest = std::numeric_limits<double>::min();
 // Factor on the tolerance while starts compete on a subset of the points.
@@ -306,6 +354,61 @@ FuzzyPartition FitGustafsonKessel(const Eigen::Ref<const MatrixXd>& points,
   unsorted(order, Eigen::all) = best.memberships;
   best.memberships = std::move(unsorted);
   return best;
+}
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+void PlaceByDistance(const std::vector<Index>& columns,
+                     const Eigen::Ref<const VectorXd>& center,
+                     const Eigen::Ref<const MatrixXd>& covariance,
+                     Index num_regressors, TsRule& rule) {
+  const auto m = static_cast<Index>(columns.size());
+  Require(m >= 1 && center.size() == m && covariance.rows() == m &&
+              covariance.cols() == m && columns.back() < num_regressors,
+          "center and covariance need one entry per antecedent");
+  const Eigen::LLT<MatrixXd> factor(covariance);
+  Require(factor.info() == Eigen::Success,
+          "the covariance of a cluster is not positive definite");
+  const MatrixXd inverse = factor.matrixL().solve(MatrixXd::Identity(m, m));
+
+  const Index size = columns.back() + 1;
+  MatrixXd metric = MatrixXd::Zero(size, size);
+  metric(columns, columns) = inverse;
+  VectorXd place = VectorXd::Zero(size);
+  place(columns) = center;
+
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  rule.antecedents.assign(static_cast<std::size_t>(num_regressors),
+                          {0.0, 0.0, kInfinity, kInfinity});
+  rule.center.assign(place.begin(), place.end());
+  rule.metric.clear();
+  for (Index row = 0; row < size; ++row) {
+    for (Index j = 0; j <= row; ++j) {
+      rule.metric.push_back(metric(row, j));
+    }
+  }
+}
+
+double SugenoYasukawa(const Eigen::Ref<const Eigen::MatrixXd>& points,
+                      const FuzzyPartition& partition, double fuzziness) {
+  const Eigen::MatrixXd& u = partition.memberships;
+  const Eigen::MatrixXd& v = partition.centers;
+  Require(points.rows() > 0 && u.rows() == points.rows(),
+          "memberships need one row per point");
+  Require(v.rows() == u.cols() && v.cols() == points.cols(),
+          "centers need one row per cluster and one column per dimension");
+  const Eigen::RowVectorXd mean = points.colwise().mean();
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < v.rows(); ++i) {
+    const double separation = (v.row(i) - mean).squaredNorm();
+    sum += (u.col(i).array().pow(fuzziness) *
+            ((points.rowwise() - v.row(i)).rowwise().squaredNorm().array() -
+             separation))
+               .sum();
+  }
+  return sum;
 }
 
 }  // namespace fdi::trainer

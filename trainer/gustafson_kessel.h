@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "diagnosis/ts_model.h"
+
 namespace fdi::trainer {
 
 /// Settings of FitGustafsonKessel(). The defaults suit unit-variance data.
@@ -63,5 +65,38 @@ struct FuzzyPartition {
 FuzzyPartition FitGustafsonKessel(
     const Eigen::Ref<const Eigen::MatrixXd>& points,
     const GustafsonKesselOptions& options = {});
+
+/// Makes the distance to a cluster in the space of its antecedents,
+///
+///     log β(x) = −½ (x − v)ᵀ F⁻¹ (x − v) = −½ ‖L (x − v)‖²,   F⁻¹ = LᵀL,
+///
+/// the premise of a rule: fills center and metric and sets every antecedent to
+/// 1 everywhere.
+///
+/// @param columns m regressors among those of the rule, ascending.
+/// @param center v, m; in the units of the regressors.
+/// @param covariance F, m×m, s.p.d.
+/// @param num_regressors n ≥ m, of the rule.
+/// @throws std::invalid_argument if sizes differ or F is not s.p.d.
+void PlaceByDistance(const std::vector<Eigen::Index>& columns,
+                     const Eigen::Ref<const Eigen::VectorXd>& center,
+                     const Eigen::Ref<const Eigen::MatrixXd>& covariance,
+                     Eigen::Index num_regressors, TsRule& rule);
+
+/// The criterion of [Sugeno & Yasukawa, 1993] for the number of clusters,
+///
+///     S(c) = Σₖ Σᵢ μₖᵢᵐ (‖zₖ − vᵢ‖² − ‖vᵢ − z̄‖²),
+///
+/// small where clusters are compact and far apart. One cluster,
+/// v₁ = z̄ and μ = 1, gives the total scatter.
+///
+/// @param points Z, N×n: the points that were clustered.
+/// @param fuzziness m.
+/// @throws std::invalid_argument if the sizes do not match.
+///
+/// - [Sugeno & Yasukawa, 1993] "A fuzzy-logic-based approach to qualitative
+///   modeling", IEEE Trans. Fuzzy Systems 1(1), pp. 7–31.
+double SugenoYasukawa(const Eigen::Ref<const Eigen::MatrixXd>& points,
+                      const FuzzyPartition& partition, double fuzziness = 2.0);
 
 }  // namespace fdi::trainer

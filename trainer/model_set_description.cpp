@@ -1,13 +1,174 @@
 #include "trainer/model_set_description.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
+#include <limits>
+#include <optional>
 #include <string>
 
+#include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
-#include "trainer/validity.h"
 
 namespace fdi::trainer {
+namespace {
+
+constexpr double kCommandMargin = 0.1;  // of the range
+constexpr double kLeastCommandMargin = 5.0;
+constexpr double kMeanCommandMargin = 0.25;  // of the range
+constexpr double kLeastMeanCommandMargin = 2.0;
+constexpr double kStepFactor = 2.0;
+constexpr double kLeastStep = 5.0;
+constexpr double kInputMargin = 0.5;  // of the range
+constexpr double kLeastPressureShare = 0.05;
+constexpr double kLeastTemperature = 10.0;
+constexpr int kStuckFactor = 10;
+constexpr int kStuckMargin = 60;  // samples
+constexpr double kNoFlow = 0.02;  // of the largest flow
+
+SignalRange Joined(SignalRange a, SignalRange b) {
+  return {std::min(a.minimum, b.minimum), std::max(a.maximum, b.maximum)};
+}
+
+constexpr SignalRange kEmpty{std::numeric_limits<double>::infinity(),
+                             -std::numeric_limits<double>::infinity()};
+
+// Of `value(sample)` over all stretches; empty without samples.
+template <typename Value>
+SignalRange RangeOf(const std::vector<Stretch>& stretches, Value value) {
+  SignalRange range = kEmpty;
+  for (const Stretch& stretch : stretches) {
+    for (const Sample& sample : stretch.samples) {
+      const double v = value(sample);
+      range = Joined(range, {v, v});
+    }
+  }
+  return range;
+}
+
+template <typename Value>
+SignalRange RangeOf(const Condition& condition, Value value) {
+  return Joined(RangeOf(condition.training, value),
+                RangeOf(condition.validation, value));
+}
+
+double LargestStep(const std::vector<Stretch>& stretches) {
+  double largest = 0.0;
+  for (const Stretch& stretch : stretches) {
+    for (std::size_t k = 1; k < stretch.samples.size(); ++k) {
+      largest =
+          std::max(largest, std::abs(stretch.samples[k][Signal::kCv] -
+                                     stretch.samples[k - 1][Signal::kCv]));
+    }
+  }
+  return largest;
+}
+
+// Of the running mean of CV, once it has settled.
+SignalRange MeanCommands(const std::vector<Stretch>& stretches) {
+  SignalRange range = kEmpty;
+  for (const Stretch& stretch : stretches) {
+    double mean =
+        stretch.samples.empty() ? 0.0 : stretch.samples[0][Signal::kCv];
+    for (std::size_t k = 1; k < stretch.samples.size(); ++k) {
+      mean += kCvMeanGain * (stretch.samples[k][Signal::kCv] - mean);
+      if (k >= static_cast<std::size_t>(kCvMeanSettling)) {
+        range = Joined(range, {mean, mean});
+      }
+    }
+  }
+  return range;
+}
+
+SignalRange Widened(SignalRange range, double least) {
+  const double margin =
+      std::max(kInputMargin * (range.maximum - range.minimum), least);
+  return {range.minimum - margin, range.maximum + margin};
+}
+
+double Largest(SignalRange range) {
+  return std::max(std::abs(range.minimum), std::abs(range.maximum));
+}
+
+int StuckLimit(const Condition& normal, Signal signal) {
+  int longest = 0;
+  for (const auto* stretches : {&normal.training, &normal.validation}) {
+    for (const Stretch& stretch : *stretches) {
+      int length = 0;
+      double last = 0.0;
+      for (const Sample& sample : stretch.samples) {
+        if (!sample.Has(signal)) {
+          return 0;
+        }
+        length = length > 0 && sample[signal] == last ? length + 1 : 1;
+        last = sample[signal];
+        longest = std::max(longest, length);
+      }
+    }
+  }
+  return longest == 0 ? 0 : kStuckFactor * longest + kStuckMargin;
+}
+
+}  // namespace
+
+StuckLimits FitStuckLimits(const Condition& normal) {
+  return {StuckLimit(normal, Signal::kT1), StuckLimit(normal, Signal::kP1),
+          StuckLimit(normal, Signal::kP2)};
+}
+
+ValidityRegion TrainedRegion(const std::vector<Condition>& conditions) {
+  Require(!conditions.empty() && !conditions.front().training.empty() &&
+              !conditions.front().training.front().samples.empty(),
+          "a region of validity needs samples of normal operation");
+  const Condition& normal = conditions.front();
+  const Sample& first = normal.training.front().samples.front();
+  const auto of = [](Signal signal) {
+    return [signal](const Sample& sample) { return sample[signal]; };
+  };
+  ValidityRegion region;
+  if (first.Has(Signal::kCv)) {
+    SignalRange cv = kEmpty;
+    SignalRange mean = kEmpty;
+    double step = 0.0;
+    for (const Condition& condition : conditions) {
+      cv = Joined(cv, RangeOf(condition.training, of(Signal::kCv)));
+      mean = Joined(mean, MeanCommands(condition.training));
+      mean = Joined(mean, MeanCommands(condition.validation));
+      step = std::max(step, LargestStep(condition.training));
+    }
+    if (mean.minimum <= mean.maximum) {
+      const double room =
+          std::max(kLeastMeanCommandMargin,
+                   kMeanCommandMargin * (mean.maximum - mean.minimum));
+      region.cv_mean = {mean.minimum - room, mean.maximum + room};
+    }
+    const double margin = std::max(kLeastCommandMargin,
+                                   kCommandMargin * (cv.maximum - cv.minimum));
+    region.cv = {cv.minimum - margin, cv.maximum + margin};
+    region.cv_step = std::max(kStepFactor * step, kLeastStep);
+  }
+  const auto pressure = [&](Signal signal) {
+    const SignalRange range = RangeOf(normal, of(signal));
+    return Widened(range, kLeastPressureShare * Largest(range));
+  };
+  region.p1 = first.Has(Signal::kP1) ? pressure(Signal::kP1) : kUnbounded;
+  region.p2 = first.Has(Signal::kP2) ? pressure(Signal::kP2) : kUnbounded;
+  if (first.Has(Signal::kP1) && first.Has(Signal::kP2)) {
+    const SignalRange dp = RangeOf(normal, [](const Sample& sample) {
+      return sample[Signal::kP1] - sample[Signal::kP2];
+    });
+    region.dp = Widened(dp, kLeastPressureShare * Largest(dp));
+  }
+  if (first.Has(Signal::kT1)) {
+    region.t1 = Widened(RangeOf(normal, of(Signal::kT1)), kLeastTemperature);
+  }
+  if (first.Has(Signal::kF)) {
+    region.flow_cutoff = kNoFlow * Largest(RangeOf(normal, of(Signal::kF)));
+  }
+  return region;
+}
+
 namespace {
 
 std::string ObserverName(int fault, double strength) {

@@ -5,6 +5,7 @@
 
 #include "diagnosis/model_set.h"
 #include "trainer/calibration.h"
+#include "trainer/channel_training.h"
 #include "trainer/dataset.h"
 
 namespace fdi::trainer {
@@ -34,5 +35,43 @@ ChannelObserver CalibrateOn(TsModel model, const Condition& condition,
 /// @param series By channel.
 void CalibrateNormal(const std::vector<ResidualSeries>& series,
                      Observer& normal);
+
+/// Residuals of normal operation, by channel, and CV at the same samples.
+struct NormalResiduals {
+  std::vector<ResidualSeries> residuals;
+  std::vector<ResidualSeries> commands;
+};
+
+/// Residuals of normal operation that no model was fitted to: four folds, each
+/// predicted by models of the others with the regressors and as many rules as
+/// those of `chosen`. Folds are whole stretches where there are eight or more,
+/// else blocks of consecutive samples of each.
+///
+/// @param chosen The normal observer fitted to all data.
+/// @param plans By channel.
+/// @param threads 0: all of the machine.
+/// @return one series per stretch or block.
+NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
+                              const std::vector<ChannelPlan>& plans,
+                              const FitOptions& options, int threads);
+
+/// Sets ChannelObserver::interpolation_error of every observer between two of
+/// its fault (normal operation counts as strength 0): the root mean square
+/// error of interpolating it from its neighbours, less 0.3 deviations of its
+/// residual, per what the interpolation moves from the nearer one; within
+/// [0.02, 1]. The strongest observer takes over that of its neighbour; one
+/// without any neighbour of its fault keeps 0.5.
+///
+/// @param conditions parallel to models.observers.
+void FitInterpolationErrors(const std::vector<Condition>& conditions,
+                            ModelSet& models);
+
+/// Fills ModelSet::groups and ModelSet::undetectable by scoring the validation
+/// stretches of every fault condition: a fault is undetectable if under 5 % of
+/// its samples are beyond a threshold; faults i and l form a group if while i
+/// acts d_l ≥ T in more than half of the samples.
+///
+/// @param conditions parallel to models.observers.
+void FindGroups(const std::vector<Condition>& conditions, ModelSet& models);
 
 }  // namespace fdi::trainer

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-namespace fdi::trainer {
+#include "diagnosis/error.h"
 
+namespace fdi::trainer {
 double Mean(std::span<const double> values) {
   double sum = 0.0;
   for (const double value : values) {
@@ -38,6 +39,71 @@ double SortedQuantile(const std::vector<double>& sorted, double q) {
   const std::size_t high = std::min(low + 1, sorted.size() - 1);
   return sorted[low] +
          (at - static_cast<double>(low)) * (sorted[high] - sorted[low]);
+}
+
+SignTest CountSigns(const std::vector<double>& differences) {
+  SignTest test;
+  for (const double difference : differences) {
+    test.positive += difference > 0.0;
+    test.negative += difference < 0.0;
+    test.ties += difference == 0.0;
+  }
+  return test;
+}
+
+double PValue(const SignTest& test) {
+  const int n = test.decided();
+  const int least = std::min(test.positive, test.negative);
+  // Term i of the sum in logarithms: 2⁻ⁿ underflows beyond a thousand pairs.
+  double sum = 0.0;
+  for (int i = 0; i <= least; ++i) {
+    sum += std::exp(std::lgamma(n + 1.0) - std::lgamma(i + 1.0) -
+                    std::lgamma(n - i + 1.0) - n * std::log(2.0));
+  }
+  return std::min(1.0, 2.0 * sum);
+}
+
+Interval WilsonInterval(int successes, int trials) {
+  Require(successes >= 0 && successes <= trials,
+          "successes must be within the trials");
+  if (trials == 0) {
+    return {};
+  }
+  constexpr double kZ = 1.959963984540054;
+  const double n = trials;
+  const double p = successes / n;
+  const double z2n = kZ * kZ / n;
+  const double middle = p + z2n / 2.0;
+  const double half = kZ * std::sqrt(p * (1.0 - p) / n + z2n / (4.0 * n));
+  return {std::max(0.0, (middle - half) / (1.0 + z2n)),
+          std::min(1.0, (middle + half) / (1.0 + z2n))};
+}
+
+namespace {
+
+constexpr double kTail = 0.05;
+
+// P(N ≤ events) of a Poisson distribution of mean μ.
+double AtMost(int events, double mean) {
+  double sum = 0.0;
+  for (int k = 0; k <= events; ++k) {
+    sum += std::exp(k * std::log(mean) - mean - std::lgamma(k + 1.0));
+  }
+  return sum;
+}
+
+}  // namespace
+
+EventRate RateOf(int events, double hours) {
+  Require(events >= 0 && hours > 0.0,
+          "a rate needs a number of events and a time");
+  double low = 1e-6;
+  double high = 10.0 + 3.0 * events;
+  for (int i = 0; i < 100; ++i) {
+    const double mean = 0.5 * (low + high);
+    (AtMost(events, mean) > kTail ? low : high) = mean;
+  }
+  return {events / hours * kHoursPerYear, high / hours * kHoursPerYear};
 }
 
 }  // namespace fdi::trainer

@@ -14,4 +14,64 @@ double MeanSquare(std::span<const double> values);
 /// Linear between the values; `sorted` must not be empty, q in [0, 1].
 double SortedQuantile(const std::vector<double>& sorted, double q);
 
+/// Pairs that differ, by the sign of the difference.
+struct SignTest {
+  int positive{0};
+  int negative{0};
+  int ties{0};  ///< Say nothing.
+
+  int decided() const { return positive + negative; }
+};
+
+/// So many pairs must differ before the test can fall below 5 % at all:
+/// 2·2⁻⁵ > 0.05 ≥ 2·2⁻⁶.
+inline constexpr int kLeastDecidedPairs = 6;
+
+/// Counts the signs of `differences`; NaN is no pair.
+SignTest CountSigns(const std::vector<double>& differences);
+
+/// The two-sided exact sign test [Dixon & Mood, 1946]: how probable signs at
+/// least as uneven would be if both were equally likely,
+///
+///     p = min(1, 2 Σ_{i ≤ min(n₊, n₋)} C(n, i) 2⁻ⁿ),   n = n₊ + n₋,
+///
+/// 1 where no pair differs. Of detected or not, it is McNemar's exact test.
+///
+/// - [Dixon & Mood, 1946] "The statistical sign test", J. Am. Stat. Assoc.
+///   41(236), pp. 557–566.
+double PValue(const SignTest& test);
+
+struct Interval {
+  double low{0.0};
+  double high{1.0};
+};
+
+/// 95 % interval of a probability from k successes in n independent trials
+/// [Wilson, 1927], with z = 1.96:
+///
+///     (p + z²/2n ± z √(p (1 − p)/n + z²/4n²)) / (1 + z²/n),   p = k/n;
+///
+/// [0, 1] for n = 0. Unlike p ± z √(p (1 − p)/n) it stays within [0, 1] and has
+/// a width at p = 0 and p = 1.
+///
+/// @throws std::invalid_argument unless 0 ≤ k ≤ n.
+///
+/// - [Wilson, 1927] "Probable inference, the law of succession, and statistical
+///   inference", J. Am. Stat. Assoc. 22(158), pp. 209–212.
+Interval WilsonInterval(int successes, int trials);
+
+/// Hours of a year, 365.25 days.
+inline constexpr double kHoursPerYear = 8766.0;
+
+/// How often something happened, and how often it may.
+struct EventRate {
+  double per_year{0.0};
+  double upper{0.0};  ///< 95 % bound [1/year], exact for a Poisson process.
+};
+
+/// The rate of `events` in `hours`; the bound μ solves P(N ≤ events | μ) = 5 %:
+/// none in T says below 3/T.
+/// @throws std::invalid_argument if events < 0 or hours ≤ 0.
+EventRate RateOf(int events, double hours);
+
 }  // namespace fdi::trainer

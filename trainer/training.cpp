@@ -4,13 +4,10 @@
 
 #include "diagnosis/error.h"
 #include "trainer/calibration.h"
-#include "trainer/cross_validation.h"
 #include "trainer/model_set_description.h"
 #include "trainer/observer_adaptation.h"
 #include "trainer/observer_calibration.h"
 #include "trainer/parallel_for.h"
-#include "trainer/reporter.h"
-#include "trainer/separability.h"
 
 namespace fdi::trainer {
 namespace {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,5 +45,23 @@ TrainingOptions PresetOptions(std::string_view preset);
 ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
                        const TrainingOptions& options,
                        const Progress& progress = {});
+
+/// Hands progress to its receiver one call at a time. Thread safe.
+class Reporter {
+ public:
+  /// `progress` must outlive the reporter; it may be empty.
+  explicit Reporter(const Progress& progress) : progress_(progress) {}
+
+  void Tell(double share, std::string_view stage) {
+    const std::scoped_lock lock(mutex_);
+    if (progress_) {
+      progress_(share, stage);
+    }
+  }
+
+ private:
+  const Progress& progress_;
+  std::mutex mutex_;
+};
 
 }  // namespace fdi::trainer

@@ -4,55 +4,16 @@
 #include <exception>
 #include <utility>
 
+#include "cli/logging.h"
 #include "diagnosis/fault_catalogue.h"
-#include "storage/cli/logging.h"
-#include "storage/models.h"
+#include "storage/models/models.h"
 
 namespace fdi::monitor {
 namespace {
 
-idl::FaultEventMessage MessageOf(const EpisodeEvent& event, bool persisted) {
-  idl::FaultEventMessage message;
-  message.valve_id = event.valve_id;
-  message.source_id = event.source_id;
-  message.seq = event.seq;
-  message.episode_id = event.episode_id;
-  message.transition = event.transition;
-  for (const Candidate& candidate : event.candidates) {
-    message.candidates.push_back({candidate.fault, candidate.factor,
-                                  candidate.strength, candidate.isolated});
-  }
-  message.model_set = event.model_set;
-  message.model_version = event.model_version;
-  message.model_hash = event.model_hash;
-  message.persisted = persisted;
-  return message;
-}
-
-idl::FaultEventMessage MessageOf(const storage::UnsentEvent& event) {
-  idl::FaultEventMessage message;
-  message.valve_id = event.valve_id;
-  message.source_id = event.source_id;
-  message.episode_id = event.episode_id;
-  message.transition = event.transition;
-  for (const int fault : event.faults) {
-    if (fault != 0) {
-      message.candidates.push_back(
-          {fault, event.transition.factor, event.transition.strength, true});
-    }
-  }
-  const storage::ModelReference reference =
-      storage::ParseModelReference(event.model_set);
-  message.model_set = reference.name;
-  message.model_version = reference.version.value_or(0);
-  message.model_hash = event.model_hash;
-  message.persisted = true;
-  return message;
-}
-
-std::string IsolatedNames(const idl::FaultEventMessage& message) {
+std::string IsolatedNames(const FaultEvent& message) {
   std::string names;
-  for (const idl::FaultCandidate& candidate : message.candidates) {
+  for (const FaultCandidate& candidate : message.candidates) {
     if (candidate.isolated) {
       names.append(names.empty() ? "" : "|").append(FaultName(candidate.fault));
     }
@@ -138,15 +99,13 @@ idl::PublisherStatus BusDecisionSink::status() const {
 BusEventSink::BusEventSink(idl::Participant& participant, LogSink log)
     : publisher_(participant), log_(std::move(log)) {}
 
-bool BusEventSink::Publish(const EpisodeEvent& event, bool persisted) {
-  return Send(MessageOf(event, persisted));
+bool BusEventSink::Publish(const FaultEvent& event, bool persisted) {
+  FaultEvent message = event;
+  message.persisted = persisted;
+  return Send(message);
 }
 
-bool BusEventSink::Resend(const storage::UnsentEvent& event) {
-  return Send(MessageOf(event));
-}
-
-bool BusEventSink::Send(const idl::FaultEventMessage& message) {
+bool BusEventSink::Send(const FaultEvent& message) {
   if (log_) {
     const Transition& transition = message.transition;
     log_(LogLevel::kInfo,

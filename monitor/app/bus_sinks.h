@@ -8,7 +8,7 @@
 #include "diagnosis/log.h"
 #include "idl/endpoint.h"
 #include "monitor/sinks.h"
-#include "storage/history_types.h"
+#include "storage/history/episode.h"
 
 namespace fdi::monitor {
 
@@ -43,24 +43,21 @@ class BusDecisionSink : public DecisionSink {
   bool unheard_{false};  // Vectors of some valve were not sent.
 };
 
-/// Fault events over DDS, each also a line of the log.
+/// Fault events over DDS; each is a line of the log as well.
 class BusEventSink : public EventSink {
  public:
   BusEventSink(idl::Participant& participant, LogSink log);
 
-  bool Publish(const EpisodeEvent& event, bool persisted) override;
-
-  /// Sends an event of an earlier session again.
-  bool Resend(const storage::UnsentEvent& event);
+  bool Publish(const FaultEvent& event, bool persisted) override;
 
   bool WaitForAcknowledged(std::chrono::milliseconds timeout) {
     return publisher_.WaitForAcknowledged(timeout);
   }
 
  private:
-  bool Send(const idl::FaultEventMessage& message);
+  bool Send(const FaultEvent& message);
 
-  idl::Publisher<idl::FaultEventMessage> publisher_;
+  idl::Publisher<FaultEvent> publisher_;
   LogSink log_;
 };
 

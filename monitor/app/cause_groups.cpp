@@ -4,14 +4,14 @@
 #include <cmath>
 #include <set>
 
+#include "cli/time_text.h"
+#include "cli/toml_reader.h"
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
-#include "storage/cli/toml_reader.h"
 
 namespace fdi::monitor {
 namespace {
 
-constexpr std::int64_t kNsPerMs = 1'000'000;
 constexpr double kLongestWindowS = 86'400.0;
 
 storage::CauseGroup ReadGroup(cli::TomlReader& table) {
@@ -70,14 +70,15 @@ cli::Json CauseJson(const storage::CauseChange& change) {
   std::set<std::string> valves;
   for (const storage::CauseMember& member : cause.members) {
     valves.insert(member.valve_id);
-    members.push_back({{"valve", member.valve_id},
-                       {"episode", member.episode_id},
+    members.push_back({{"valve_id", member.valve_id},
+                       {"episode_id", member.episode_id},
                        {"fault", member.fault}});
   }
   return {{"kind", "COMMON_CAUSE_" + std::string(CauseChangeName(change.kind))},
-          {"cause", cause.cause_id},
+          {"cause_id", cause.cause_id},
           {"group", cause.group},
-          {"stamp_ms", cause.ended_ns.value_or(cause.opened_ns) / kNsPerMs},
+          {"stamp_utc",
+           cli::FormatTime(cause.ended_ns.value_or(cause.opened_ns), true)},
           {"valves", valves.size()},
           {"members", members}};
 }

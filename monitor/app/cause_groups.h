@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "storage/cli/json_output.h"
-#include "storage/common_cause.h"
+#include "cli/json_output.h"
+#include "storage/history/common_cause.h"
 
 namespace fdi::monitor {
 
@@ -21,8 +21,8 @@ namespace fdi::monitor {
 std::vector<storage::CauseGroup> ReadCauseGroups(
     const std::filesystem::path& path);
 
-/// {"kind": "COMMON_CAUSE_OPENED", ..., "cause", "group", "stamp_ms", "valves",
-/// "members": [{"valve", "episode", "fault"}]}
+/// {"kind": "COMMON_CAUSE_OPENED", ..., "cause_id", "group", "stamp_utc",
+/// "valves", "members": [{"valve_id", "episode_id", "fault"}]}
 cli::Json CauseJson(const storage::CauseChange& change);
 
 }  // namespace fdi::monitor

@@ -3,23 +3,24 @@
 #include <algorithm>
 #include <utility>
 
+#include "cli/logging.h"
+#include "cli/time_text.h"
 #include "diagnosis/fault_catalogue.h"
-#include "storage/cli/logging.h"
-#include "storage/history_types.h"
+#include "storage/history/episode.h"
+#include "storage/history/history_database.h"
 
 namespace fdi::monitor {
 namespace {
 
-constexpr std::int64_t kNsPerMs = 1'000'000;
 constexpr std::chrono::milliseconds kTick{100};
 
 // "f3|f6" by the candidates of the event, which know their numbers.
-std::string FaultsOf(const EpisodeEvent& event) {
+std::string FaultsOf(const FaultEvent& event) {
   if (event.models != nullptr && event.transition.faults != 0) {
     return FaultSetName(*event.models, event.transition.faults);
   }
   std::vector<int> faults;
-  for (const Candidate& candidate : event.candidates) {
+  for (const FaultCandidate& candidate : event.candidates) {
     if (candidate.isolated) {
       faults.push_back(candidate.fault);
     }
@@ -35,22 +36,25 @@ std::string FaultsOf(const EpisodeEvent& event) {
 
 }  // namespace
 
-cli::Json EventJson(const EpisodeEvent& event, bool persisted,
+cli::Json EventJson(const FaultEvent& event, bool persisted,
                     const cli::FaultTexts& texts) {
   const Transition& t = event.transition;
   const std::string fault = FaultsOf(event);
+  // The catalogue says "unlike any known fault" of what has no fault, which is
+  // wrong while known faults may still explain it.
+  const bool named = !fault.empty() || t.unknown == Unknown::kOutsideKnown;
   const cli::FaultWords words = texts.Words(fault, t.strength);
   const bool closed = t.kind == TransitionKind::kClosed;
   return {{"kind", std::string(TransitionName(t.kind))},
-          {"valve", event.valve_id},
-          {"episode", storage::EpisodeIdText(event.episode_id)},
-          {"stamp_ms", t.stamp_ns / kNsPerMs},
+          {"valve_id", event.valve_id},
+          {"episode_id", storage::EpisodeIdText(event.episode_id)},
+          {"stamp_utc", cli::FormatTime(t.stamp_ns, true)},
           {"fault", fault.empty() ? cli::Json() : cli::Json(fault)},
-          {"name", words.name},
+          {"name", named ? cli::Json(words.name) : cli::Json()},
           {"severity", std::string(SeverityName(words.severity))},
           {"discipline", words.discipline},
           {"namur", std::string(NamurName(words.namur))},
-          {"check", words.check},
+          {"check", named ? cli::Json(words.check) : cli::Json()},
           {"factor", t.factor},
           {"strength", t.strength},
           {"reason", closed ? cli::Json(std::string(EndReasonName(t.reason)))
@@ -66,17 +70,21 @@ EventHook::EventHook(std::unique_ptr<EventDelivery> delivery,
       options_(std::move(options)),
       log_(std::move(log)),
       tokens_(options_.per_minute),
-      filled_(options_.now()) {
-  for (int i = 0; i < options_.threads; ++i) {
-    threads_.emplace_back([this] { Run(); });
+      filled_(options_.now()) {}
+
+EventHook::~EventHook() {
+  try {
+    Stop(std::chrono::milliseconds(0));
+  } catch (...) {
+    // Whoever wants to know calls Stop().
   }
 }
 
-EventHook::~EventHook() {
-  Stop(std::chrono::milliseconds(0));
+void EventHook::Start() {
+  worker_.Start([this] { Run(); });
 }
 
-void EventHook::Tell(cli::Json event) {
+void EventHook::Notify(cli::Json event) {
   const std::lock_guard lock(mutex_);
   if (stopping_) {
     return;
@@ -132,11 +140,11 @@ void EventHook::Run() {
                               cli::Json::error_handler_t::replace) +
         "\n";
     waiting_.pop_front();
-    ++busy_;
+    busy_ = true;
     lock.unlock();
     const std::optional<std::string> failure = delivery_->Deliver(text);
     lock.lock();
-    --busy_;
+    busy_ = false;
     Settle(failure);
     changed_.notify_all();
   }
@@ -156,31 +164,26 @@ void EventHook::Settle(const std::optional<std::string>& failure) {
 }
 
 void EventHook::Stop(std::chrono::milliseconds patience) {
+  if (!worker_.started()) {
+    return;
+  }
   {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, patience,
-                      [this] { return waiting_.empty() && busy_ == 0; });
+                      [this] { return waiting_.empty() && !busy_; });
     stopping_ = true;
-    const std::uint64_t dropped = waiting_.size() + (newest_ ? 1 : 0);
-    counts_.left_out += dropped;
+    counts_.left_out += waiting_.size() + (newest_ ? 1 : 0);
     waiting_.clear();
     newest_.reset();
     changed_.notify_all();
   }
-  if (threads_.empty()) {
-    return;
-  }
   delivery_->Interrupt();
-  for (std::thread& thread : threads_) {
-    thread.join();
-  }
-  threads_.clear();
-  const Counts told = counts();
+  worker_.Join();
   log_(LogLevel::kInfo,
        cli::EventLine("event_hook_stopped",
-                      {{"delivered", std::to_string(told.delivered)},
-                       {"failed", std::to_string(told.failed)},
-                       {"left_out", std::to_string(told.left_out)}}));
+                      {{"delivered", std::to_string(counts_.delivered)},
+                       {"failed", std::to_string(counts_.failed)},
+                       {"left_out", std::to_string(counts_.left_out)}}));
 }
 
 EventHook::Counts EventHook::counts() const {

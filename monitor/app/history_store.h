@@ -3,16 +3,15 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "diagnosis/log.h"
 #include "monitor/sinks.h"
-#include "storage/common_cause.h"
-#include "storage/history.h"
+#include "storage/history/common_cause.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/history_writer.h"
 
 namespace fdi::monitor {
 
@@ -31,35 +30,39 @@ class HistoryStore : public HistorySink {
 
   /// Episodes that earlier sessions left open. Before anything is recorded.
   std::vector<OpenEpisode> OpenEpisodes();
-  /// What the last session kept of its valves.
-  std::vector<Accumulator> Accumulators();
+  /// The accumulators as of the last checkpoint.
+  std::vector<Accumulator> Accumulators() { return writer_.Accumulators(); }
   /// The same of the candidate of --shadow.
-  std::vector<Accumulator> ShadowAccumulators();
-  std::vector<storage::UnsentEvent> UnsentEvents();
-  void MarkResent(const storage::UnsentEvent& event);
+  std::vector<Accumulator> ShadowAccumulators() {
+    return writer_.ShadowAccumulators();
+  }
+  /// Events that an earlier session committed but perhaps did not send. What
+  /// cannot be read of them is reported, and left out.
+  std::vector<FaultEvent> UnsentEvents();
 
   /// Looks for common causes among what is recorded from now on. `told` is
   /// called once a change is on the disk, by the history thread.
   void WatchCauses(std::vector<storage::CauseGroup> groups,
                    std::function<void(const storage::CauseChange&)> told);
 
-  void Together(const std::function<void()>& records) override;
-  void Record(const EpisodeEvent& event) override;
+  void CommitBatch(const std::function<void()>& batch) override;
+  void Record(const FaultEvent& event) override;
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) override;
   void AddTrace(const EpisodeTrace& trace) override;
-  void AddGap(const DataGap& gap) override;
-  void Keep(const Checkpoint& checkpoint) override;
-  void MarkSent(const EpisodeEvent& event) override;
-  void Commit() override;
+  void AddGap(const DataGap& gap) override { writer_.AddGap(gap); }
+  void CommitCheckpoint(const Checkpoint& checkpoint) override {
+    writer_.CommitCheckpoint(checkpoint);
+  }
+  void MarkSent(const FaultEvent& event) override { writer_.MarkSent(event); }
+  void Commit() override { writer_.Commit(utc_now_ns_()); }
 
   /// An orderly end.
-  void EndSession();
+  void EndSession() { writer_.EndSession(utc_now_ns_(), true); }
 
  private:
-  using EventKey = std::tuple<std::uint64_t, TransitionKind, std::int64_t>;
-  static EventKey KeyOf(const EpisodeEvent& event);
-  void LookForCauses(const EpisodeEvent& event);
-  void TellCauses();
+  void LookForCauses(const FaultEvent& event);
+  void PublishCauses();
+  void ReportDamage(const std::vector<std::string>& damaged);
   void Tolerate(const char* operation, const std::function<void()>& call);
 
   storage::HistoryWriter writer_;
@@ -67,9 +70,7 @@ class HistoryStore : public HistorySink {
   LogSink log_;
   std::optional<storage::CommonCauseBook> causes_;
   std::function<void(const storage::CauseChange&)> cause_told_;
-  std::vector<storage::CauseChange> cause_changes_;  // By Together().
-  std::map<EventKey, std::int64_t> unsent_;
-  std::vector<std::pair<EventKey, std::int64_t>> recorded_;  // By Together().
+  std::vector<storage::CauseChange> cause_changes_;  // Of this batch.
 };
 
 }  // namespace fdi::monitor

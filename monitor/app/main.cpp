@@ -1,15 +1,53 @@
+#include <vector>
+
+#include "cli/examples.h"
+#include "cli/program.h"
 #include "idl/participant.h"
-#include "monitor/app/examples.h"
 #include "monitor/app/verbs.h"
-#include "storage/cli/program.h"
+#include "storage/database/database.h"
+
+namespace {
+
+// For --help and the manual pages.
+std::vector<fdi::cli::VerbExamples> Examples() {
+  return {
+      {"",
+       {{"Diagnose what is on the bus, with a page to look at",
+         "fdi-monitor run --model-set paper --console"},
+        {"Watch it in another terminal", "fdi-monitor top"}}},
+      {"run",
+       {{"Every valve with the set that is assigned to it; store the samples",
+         "fdi-monitor run --record"},
+        {"One set for the valves FV-1..., open to the plant network",
+         "fdi-monitor run --model-set paper@2 --valves 'FV-1*' --interface "
+         "all"},
+        {"A page on which people may acknowledge and label",
+         "fdi-monitor run --console=127.0.0.1:8080 --console-write token"},
+        {"See what a new set would say, beside the old one",
+         "fdi-monitor run --shadow paper@3"}}},
+      {"watch",
+       {{"All fault events as JSON lines", "fdi-monitor watch --events --json"},
+        {"How many vectors come in ten seconds",
+         "fdi-monitor watch --count --for 10"}}},
+      {"top",
+       {{"The worst valves first; q quits, s sorts, / filters",
+         "fdi-monitor top"},
+        {"Once, for a script", "fdi-monitor top --once --valves 'FV-1*'"}}},
+  };
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   fdi::cli::Program program("fdi-monitor",
                             "Recognises which fault a control valve has");
+  program.AddBusOptions();
+  program.AddFaultCatalogueOption();
+  program.MapError<fdi::storage::SqliteError>(fdi::cli::kExitData);
   program.MapError<fdi::idl::TransportError>(fdi::cli::kExitTransport);
   fdi::monitor::AddRunVerb(program);
   fdi::monitor::AddWatchVerb(program);
   fdi::monitor::AddTopVerb(program);
-  program.AddExamples(fdi::monitor::Examples());
+  program.AddExamples(Examples());
   return program.Run(argc, argv);
 }

@@ -15,21 +15,19 @@ ModelAssignment::ModelAssignment(
   for (const storage::ValveEntry& entry : store_.Valves()) {
     if (entry.model_set) {
       Load(*entry.model_set);
+      ++assigned_;
     }
   }
-  const std::optional<storage::ModelReference> reference =
-      wanted ? wanted : OnlyActive();
+  const std::optional<storage::ModelReference> reference = wanted ? wanted
+                                                           : assigned_ == 0
+                                                               ? OnlyActive()
+                                                               : std::nullopt;
   if (reference) {
     default_ = Load(*reference);
   }
 }
 
 std::optional<storage::ModelReference> ModelAssignment::OnlyActive() const {
-  for (const storage::ValveEntry& entry : store_.Valves()) {
-    if (entry.model_set) {
-      return std::nullopt;
-    }
-  }
   std::optional<storage::ModelReference> only;
   for (const storage::ModelSummary& summary : store_.List()) {
     if (!summary.active) {
@@ -78,8 +76,7 @@ std::size_t ModelAssignment::loaded() const {
 }
 
 std::string ModelAssignment::DefaultName() const {
-  return default_ ? default_->name + "@" + std::to_string(default_->version)
-                  : "none";
+  return default_ ? NameOf(*default_) : "none";
 }
 
 }  // namespace fdi::monitor

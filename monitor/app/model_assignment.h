@@ -9,7 +9,7 @@
 #include <string>
 
 #include "monitor/sinks.h"
-#include "storage/models.h"
+#include "storage/models/models.h"
 
 namespace fdi::monitor {
 
@@ -41,8 +41,11 @@ class ModelAssignment : public ModelResolver {
   /// How many sets are in use or were, one at least unless none is assigned.
   std::size_t loaded() const;
 
-  /// "NAME@VERSION", or "none".
+  /// Of the default set: "NAME@VERSION", or "none".
   std::string DefaultName() const;
+
+  /// How many valves had a set assigned when this was made.
+  std::size_t assigned() const { return assigned_; }
 
  private:
   std::shared_ptr<const ModelSet> Load(
@@ -54,6 +57,7 @@ class ModelAssignment : public ModelResolver {
   Announce announce_;
   mutable std::map<std::string, std::shared_ptr<const ModelSet>> loaded_;
   std::shared_ptr<const ModelSet> default_;
+  std::size_t assigned_{0};
 };
 
 /// Makes models.db, or migrates it, if need be. Then it can be read.

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "monitor/sinks.h"
-#include "storage/runs.h"
+#include "storage/runs/run_recorder.h"
+#include "storage/runs/runs.h"
 
 namespace fdi::monitor {
 

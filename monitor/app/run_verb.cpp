@@ -5,12 +5,12 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/program.h"
+#include "cli/stop_signals.h"
 #include "diagnosis/error.h"
 #include "monitor/app/service.h"
 #include "monitor/app/verbs.h"
-#include "monitor/log_limit.h"
-#include "storage/cli/program.h"
-#include "storage/cli/stop_signals.h"
+#include "monitor/throttled_log.h"
 
 namespace fdi::monitor {
 namespace {
@@ -70,9 +70,10 @@ void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
 }
 
 void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
-  run.add_flag("--console{127.0.0.1:8080}", arguments.console,
-               "Serve the live page and its API; port 0: any free one")
-      ->default_str("off")
+  run.add_option("--console", arguments.console,
+                 "Serve the live page and its API; port 0: any free one")
+      ->expected(0, 1)
+      ->default_str("127.0.0.1:8080")
       ->transform(AddressOr("127.0.0.1:8080"))
       ->type_name("[=[ADDRESS:]PORT]");
   run.add_option("--console-write", arguments.console_token,
@@ -93,7 +94,7 @@ void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
       ->check(CLI::ExistingFile)
       ->type_name("FILE.toml");
   run.add_option("--on-event", service.on_event,
-                 "Tell of every fault event: a command that reads it as JSON "
+                 "Notify of every fault event: a command that reads it as JSON "
                  "from its standard input, or http://HOST[:PORT][/PATH] that "
                  "it is posted to")
       ->type_name("CMD|URL");
@@ -151,10 +152,11 @@ void AddRunVerb(cli::Program& program) {
   run.add_option("--shadow-valves", arguments->service.shadow_valves,
                  "Compare only on ids that match GLOB")
       ->capture_default_str();
-  run.add_flag("--record{on}", arguments->record,
-               "Store the samples as runs; =lossless waits for the disk "
-               "instead of counting what it could not take")
-      ->default_str("off")
+  run.add_option("--record", arguments->record,
+                 "Store the samples as runs; =lossless waits for the disk "
+                 "instead of counting what it could not take")
+      ->expected(0, 1)
+      ->default_str("on")
       ->transform(ParseRecord)
       ->type_name("[=on|lossless|off]");
   ServiceOptions& service = arguments->service;
@@ -179,9 +181,10 @@ void AddRunVerb(cli::Program& program) {
       ->check(CLI::Range(0.0, 1800.0))
       ->capture_default_str();
   AddOnEventOptions(run, service);
-  run.add_flag("--http{127.0.0.1:9464}", arguments->http,
-               "Serve /metrics, /healthz and /readyz; port 0: any free one")
-      ->default_str("off")
+  run.add_option("--http", arguments->http,
+                 "Serve /metrics, /healthz and /readyz; port 0: any free one")
+      ->expected(0, 1)
+      ->default_str("127.0.0.1:9464")
       ->transform(AddressOr("127.0.0.1:9464"))
       ->type_name("[=[ADDRESS:]PORT]");
   AddConsoleOptions(run, *arguments);

@@ -1,23 +1,41 @@
+// The service from its start to its end. Orders that matter:
+//
+// Start: what an earlier session left unsent is sent before the journal's
+// threads use the same connection; samples are taken last, once everything
+// that looks at them is ready. They wait at the subscriber meanwhile.
+//
+// Stop: first nobody new is let in (HTTP), then the diagnosis takes what was
+// received, then journal and recorder store and publish it, then the hook gets
+// a second for its deliveries, then the session ends in the history, then the
+// last status goes out. Each step is tried, whatever became of those before.
 #include "monitor/app/service.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
 
+#include <systemd/sd-daemon.h>
+
+#include "cli/time_text.h"
 #include "monitor/app/cause_groups.h"
 #include "monitor/app/shadow.h"
-#include "monitor/app/status.h"
-#include "storage/cli/time_text.h"
+#include "monitor/app/verbs.h"
 
 namespace fdi::monitor {
 namespace {
 
 using std::chrono::milliseconds;
+using Clock = std::chrono::steady_clock;
 
 constexpr milliseconds kTakeTimeout{100};
 constexpr int kTakeLimit = 4096;  // Under full load Take() has no other end.
 constexpr milliseconds kTickPeriod{1000};
+constexpr milliseconds kHookPatience{1000};
+constexpr milliseconds kDrainLimit{1000};
+constexpr milliseconds kSubscriberPatience{1000};
+constexpr milliseconds kAcknowledgeLimit{300};
 
-std::chrono::milliseconds Milliseconds(double seconds) {
+milliseconds Milliseconds(double seconds) {
   return milliseconds(static_cast<std::int64_t>(seconds * 1e3));
 }
 
@@ -26,17 +44,6 @@ storage::DataDirectory Prepared(const std::filesystem::path& path) {
   storage::EnsureExists(data);
   PrepareModels(data.models());
   return data;
-}
-
-idl::DdsOptions DdsOptionsOf(const ServiceOptions& options,
-                             const cli::GlobalOptions& global) {
-  idl::DdsOptions dds;
-  dds.domain = global.domain;
-  dds.interfaces = global.interface;
-  dds.transport = global.transport;
-  dds.qos_file = global.qos_file.string();
-  dds.max_valves = options.max_valves;
-  return dds;
 }
 
 PipelineOptions PipelineOptionsOf(const ServiceOptions& options,
@@ -48,18 +55,15 @@ PipelineOptions PipelineOptionsOf(const ServiceOptions& options,
   }
   pipeline.max_valves = options.max_valves;
   pipeline.valve_glob = options.valves;
-  pipeline.registry.stale_timeout = Milliseconds(options.stale_timeout_s);
-  pipeline.registry.trace.before_s = options.trace_before_s;
-  pipeline.history.utc_now_ns = cli::NowNs;
+  pipeline.stale_timeout = Milliseconds(options.stale_timeout_s);
+  pipeline.trace.before_s = options.trace_before_s;
   pipeline.recorder.lossless = options.recording == Recording::kLossless;
   return pipeline;
 }
 
 std::vector<Heartbeat::Member> Members(const Pipeline& pipeline,
-                                       const Pulse& intake,
                                        const Pulse& service) {
   std::vector<Heartbeat::Member> members = pipeline.threads();
-  members.push_back({"intake", &intake});
   members.push_back({"service", &service});
   return members;
 }
@@ -76,6 +80,17 @@ std::vector<storage::CauseGroup> CauseGroupsOf(
 std::filesystem::path LockOf(const storage::DataDirectory& data) {
   std::filesystem::path path = data.history();
   return path += ".lock";
+}
+
+// To the service manager (systemd, Type=notify), if there is one that listens.
+void Notify(const std::string& state) {
+  sd_notify(0, state.c_str());
+}
+
+std::string MonotonicMicroseconds() {
+  return std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(
+                            Clock::now().time_since_epoch())
+                            .count());
 }
 
 }  // namespace
@@ -99,10 +114,10 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
               ? nullptr
               : MakeEventDelivery(options.on_event,
                                   Milliseconds(options.on_event_timeout_s))),
-      participant_(DdsOptionsOf(options, context.options), context.log,
-                   "fdi-monitor"),
-      intake_participant_(DdsOptionsOf(options, context.options), context.log,
-                          "fdi-monitor intake"),
+      participant_(DdsOptionsOf(context.options, options.max_valves),
+                   context.log, "fdi-monitor"),
+      intake_participant_(DdsOptionsOf(context.options, options.max_valves),
+                          context.log, "fdi-monitor intake"),
       models_topic_(participant_),
       changes_(data_.models()),
       assignment_(std::make_shared<const ModelAssignment>(
@@ -134,106 +149,175 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
           pipeline_options_,
           {decisions_, console_ ? console_->Before(EventsOut()) : EventsOut(),
            history_, runs_.get(), console_ ? &console_->live() : nullptr},
-          assignment_, counters_, log_),
-      heartbeat_(Members(pipeline_, intake_pulse_, service_pulse_)),
+          assignment_, {counters_, log_, cli::NowNs}),
+      heartbeat_(Members(pipeline_, service_pulse_)),
       started_ns_(cli::NowNs()),
-      last_status_line_(std::chrono::steady_clock::now()) {
+      last_status_line_(Clock::now()) {}
+
+Service::~Service() = default;
+
+// The bus, and who else is told.
+EventSink& Service::EventsOut() {
+  return outward_ ? static_cast<EventSink&>(*outward_) : events_;
+}
+
+// Any thread that resolves models.
+void Service::AnnounceModels(const ModelSet& models) {
+  models_topic_.Write(idl::Describe(models));
+  context_.log(LogLevel::kInfo, "models_loaded model_set=" + NameOf(models));
+}
+
+int Service::Run(cli::StopSignals& signals) {
+  FirstError errors;
+  errors.Try([&] {
+    Start();
+    Serve(signals);
+  });
+  errors.Try([this] { Stop(); });
+  errors.Rethrow();
+  const bool incomplete =
+      pipeline_.history_degraded() || pipeline_.recording_degraded();
+  return incomplete ? cli::kExitData : cli::kExitOk;
+}
+
+void Service::Start() {
   ResendEvents();
   WatchCauses();
+  if (outward_) {
+    outward_->hook().Start();
+  }
   if (console_) {
     ServeConsole();
   }
   pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators(),
                   history_.ShadowAccumulators());
-  intake_ = std::jthread([this](const std::stop_token& stop) { Intake(stop); });
+  diagnosis_.Start([this] { Diagnose(); });
   if (http_) {
     ServeProbes();
   }
 }
 
-Service::~Service() {
-  // Their threads look at all the rest.
-  http_.reset();
-  if (console_) {
-    console_->Close();
+// What an earlier session committed but perhaps did not send.
+void Service::ResendEvents() {
+  for (const FaultEvent& event : history_.UnsentEvents()) {
+    if (events_.Publish(event, true)) {
+      history_.MarkSent(event);
+      counters_.Add(Counter::kEventsResent);
+    }
   }
 }
 
-void Service::AnnounceModels(const ModelSet& models) {
-  models_topic_.Write(idl::Describe(models));
-  context_.log(LogLevel::kInfo, "models_loaded model_set=" + models.name + "@" +
-                                    std::to_string(models.version));
+void Service::WatchCauses() {
+  if (cause_groups_.empty()) {
+    return;
+  }
+  context_.log(LogLevel::kInfo,
+               "cause_groups groups=" + std::to_string(cause_groups_.size()));
+  history_.WatchCauses(std::move(cause_groups_),
+                       [this](const storage::CauseChange& change) {
+                         if (outward_) {
+                           outward_->hook().Notify(CauseJson(change));
+                         }
+                       });
 }
 
-void Service::Intake(const std::stop_token& stop) {
-  try {
-    const idl::Handlers<idl::ValveSampleMessage> handlers{
-        [this](const idl::ValveSampleMessage& message,
-               const idl::Reception& reception) {
-          pipeline_.Offer(message.valve_id, message.sample,
-                          reception.writer_id);
-        },
-        [this](const idl::ValveSampleMessage& message,
-               const idl::Reception& reception) {
-          pipeline_.OfferEnd(message.valve_id, reception.writer_id);
-        }};
-    const std::stop_callback wake(stop, [this] { samples_.Interrupt(); });
-    while (!stop.stop_requested() && !pipeline_.failed()) {
-      samples_.Take(handlers, kTakeTimeout, kTakeLimit);
-      pipeline_.AnnounceOffers();
-      intake_pulse_.Beat();
-    }
-    // What is there already; publishers that go on do not keep us.
-    while (std::chrono::steady_clock::now() < drain_until_.load() &&
-           samples_.Take(handlers, milliseconds(0), kTakeLimit) > 0) {
-    }
-  } catch (...) {
-    intake_error_ = std::current_exception();
-    intake_failed_ = true;
+void Service::ServeConsole() {
+  const auto facts = [this] {
+    const idl::MonitorStatusMessage status = StatusOf(Facts());
+    return console::MonitorFacts{idl::HealthName(status.health),
+                                 status.counters,
+                                 pipeline_.census().open_episodes};
+  };
+  console_->Start({data_.history(), data_.models(), context_.software,
+                   started_ns_, facts, cli::NowNs});
+}
+
+void Service::ServeProbes() {
+  const auto readiness = [this] {
+    return Readiness{
+        model_sets_,
+        !pipeline_.history_degraded() && !pipeline_.recording_degraded(),
+        samples_.status().matched};
+  };
+  http_->Add(ProbePages(heartbeat_, {[this] { return Metrics(); }, readiness}));
+  http_->Start();
+  context_.log(LogLevel::kInfo,
+               "http_listening address=" + ToString(http_->address()));
+}
+
+// The diagnosis thread: takes samples from the bus and diagnoses them. The
+// thread that receives has decoded them already, so that a thread between the
+// two would only move them. What this one is behind with waits at the
+// subscriber, which stops receiving when 16 MB wait.
+void Service::Diagnose() {
+  TimePoint
+      received{};  // The last sample; when it came, not when it was taken.
+  std::int64_t utc_to_steady_ns = 0;
+  const idl::Handlers<idl::ValveSampleMessage> handlers{
+      [&](const idl::ValveSampleMessage& message,
+          const idl::Reception& reception) {
+        received = TimePoint(
+            std::chrono::nanoseconds(reception.received_ns + utc_to_steady_ns));
+        pipeline_.Offer(message.valve_id, message.sample, reception.writer_id,
+                        received);
+      },
+      [&](const idl::ValveSampleMessage& message,
+          const idl::Reception& reception) {
+        pipeline_.OfferEnd(message.valve_id, reception.writer_id);
+      }};
+  const auto take = [&](milliseconds timeout) {
+    // Anew each time: the UTC clock may have been set.
+    utc_to_steady_ns =
+        Clock::now().time_since_epoch() / std::chrono::nanoseconds(1) -
+        cli::NowNs();
+    return samples_.Take(handlers, timeout, kTakeLimit);
+  };
+  while (!stopping_) {
+    // While samples wait, silence is measured up to the newest one handled.
+    const int taken = take(kTakeTimeout);
+    pipeline_.Tend(taken < kTakeLimit ? Clock::now() : received);
+  }
+  // What is there already; publishers that go on do not keep us.
+  while (Clock::now() < drain_until_.load() && take(milliseconds(0)) > 0) {
   }
 }
 
-int Service::Run(cli::StopSignals& signals) {
+void Service::Serve(cli::StopSignals& signals) {
   // Not through the log: scripts wait for this line at every log level.
   const std::string ready =
       "monitor_ready model_set=" + assignment_->DefaultName() +
+      " assigned=" + std::to_string(assignment_->assigned()) +
       " valves=" + options_.valves +
       " max_valves=" + std::to_string(options_.max_valves) +
       " domain=" + std::to_string(context_.options.domain) + "\n";
   std::fputs(ready.c_str(), stderr);
-  manager_.Ready();
-  auto next_tick = std::chrono::steady_clock::now();
-  if (manager_.watchdog_limit()) {
-    watchdog_.emplace(heartbeat_, *manager_.watchdog_limit() / 2, next_tick);
+  Notify("READY=1");
+  TimePoint next_tick = Clock::now();
+  std::uint64_t limit_us = 0;
+  if (sd_watchdog_enabled(0, &limit_us) > 0) {
+    watchdog_.emplace(heartbeat_, std::chrono::microseconds(limit_us / 2),
+                      next_tick);
   }
-  while (!pipeline_.failed() && !intake_failed_) {
-    const auto now = std::chrono::steady_clock::now();
+  while (!pipeline_.failed() && !diagnosis_.failed()) {
+    const TimePoint now = Clock::now();
     service_pulse_.Beat();
     if (now >= next_tick) {
       Tick();
       next_tick = now + kTickPeriod;
     }
+    const TimePoint wake = FeedWatchdog(next_tick);
     const cli::StopSignals::Event event = signals.WaitFor(
-        std::chrono::duration_cast<milliseconds>(
-            FeedWatchdog(next_tick) - std::chrono::steady_clock::now()) +
+        std::chrono::duration_cast<milliseconds>(wake - Clock::now()) +
         milliseconds(1));
     if (event == cli::StopSignals::Event::kStop) {
-      break;
+      return;
     }
     if (event == cli::StopSignals::Event::kReload) {
-      manager_.Reloading();
+      Notify("RELOADING=1\nMONOTONIC_USEC=" + MonotonicMicroseconds());
       Reload("signal");
-      manager_.Ready();
+      Notify("READY=1");
     }
   }
-  Shutdown();
-  pipeline_.Rethrow();
-  if (intake_error_) {
-    std::rethrow_exception(intake_error_);
-  }
-  const bool incomplete =
-      pipeline_.history_degraded() || pipeline_.recording_degraded();
-  return incomplete ? cli::kExitData : cli::kExitOk;
 }
 
 // @returns when to look again, `next_tick` at the latest.
@@ -241,9 +325,9 @@ Service::TimePoint Service::FeedWatchdog(TimePoint next_tick) {
   if (!watchdog_) {
     return next_tick;
   }
-  const TimePoint now = std::chrono::steady_clock::now();
-  if (watchdog_->Tell(now)) {
-    manager_.Alive();
+  const TimePoint now = Clock::now();
+  if (watchdog_->Due(now)) {
+    Notify("WATCHDOG=1");
   }
   return watchdog_->next() > now ? std::min(watchdog_->next(), next_tick)
                                  : next_tick;
@@ -262,13 +346,14 @@ void Service::Tick() {
   ReportLoss();
   ReportStall();
   PublishStatus();
-  if (std::chrono::steady_clock::now() - last_status_line_ >=
+  if (Clock::now() - last_status_line_ >=
       Milliseconds(options_.status_period_s)) {
-    last_status_line_ = std::chrono::steady_clock::now();
-    WriteStatusLine();
+    last_status_line_ = Clock::now();
+    context_.log(LogLevel::kInfo, StatusLine(StatusOf(Facts())));
   }
 }
 
+// Somebody asked for it, or changed the models: the answer is not throttled.
 void Service::Reload(const char* cause) {
   context_.log(LogLevel::kInfo, std::string("models_reload cause=") + cause);
   try {
@@ -284,11 +369,119 @@ void Service::Reload(const char* cause) {
     pipeline_.Reassign(std::move(next));
   } catch (const std::exception& error) {
     counters_.Add(Counter::kModelFailures);
-    const std::string reason = error.what();
-    log_.Report(
-        LogId::kModelFailure, "reload_failed",
-        [&reason] { return "reason=\"" + reason + "\""; }, LogLevel::kError);
+    log_.Line(LogLevel::kError,
+              LogLine(LogId::kModelFailure, "reload_failed",
+                      "reason=\"" + std::string(error.what()) + "\""));
   }
+}
+
+StatusFacts Service::Facts() const {
+  return {counters_,
+          pipeline_.census(),
+          samples_.status(),
+          decisions_.status(),
+          pipeline_.journal_backlog(),
+          pipeline_.recorder_backlog(),
+          pipeline_.history_degraded(),
+          pipeline_.recording_degraded(),
+          heartbeat_.StalledSince(Clock::now() - kStallLimit)};
+}
+
+std::string Service::Metrics() const {
+  MetricsFacts facts{context_.software, started_ns_, data_,
+                     heartbeat_.members()};
+  if (console_) {
+    facts.streams = console_->streams();
+    facts.board_bytes = console_->board_bytes();
+  }
+  std::string page = MetricsPage(Facts(), facts);
+  if (const ShadowCounts* counts = pipeline_.shadow_counts()) {
+    page += ShadowMetrics(*counts);
+  }
+  return page;
+}
+
+void Service::ReportLoss() {
+  const idl::SubscriberStatus dds = samples_.status();
+  const std::uint64_t loss =
+      dds.lost + dds.undecodable + dds.rejected_instances;
+  if (loss != std::exchange(reported_loss_, loss)) {
+    log_.Report(LogId::kTransport, "transport_loss", [&dds] {
+      return "lost=" + std::to_string(dds.lost) +
+             " undecodable=" + std::to_string(dds.undecodable) +
+             " rejected_instances=" + std::to_string(dds.rejected_instances) +
+             " refused_valves=" + std::to_string(dds.refused_valves);
+    });
+  }
+}
+
+void Service::ReportStall() {
+  const auto stalled = heartbeat_.StalledSince(Clock::now() - kStallLimit);
+  if (!stalled.empty()) {
+    log_.Report(
+        LogId::kStalled, "threads_stalled",
+        [&stalled] { return "threads=" + Joined(stalled); }, LogLevel::kError);
+  }
+}
+
+void Service::PublishStatus() {
+  idl::MonitorStatusMessage status = StatusOf(Facts());
+  status.monitor = MonitorName();
+  status.software = context_.software;
+  status.started_ns = started_ns_;
+  status.stamp_ns = cli::NowNs();
+  status_topic_.Write(status);
+  const std::string line = ManagerLine(status);
+  if (line != std::exchange(notified_status_, line)) {
+    Notify("STATUS=" + line);
+  }
+}
+
+void Service::Stop() {
+  context_.log(LogLevel::kInfo, "monitor_stopping");
+  Notify("STOPPING=1");
+  FirstError errors;
+  if (http_) {
+    errors.Try([this] { http_->Stop(); });
+  }
+  if (console_) {
+    errors.Try([this] { console_->Stop(); });
+  }
+  errors.Try([this] { StopDiagnosis(); });
+  if (outward_) {
+    errors.Try([this] { outward_->hook().Stop(kHookPatience); });
+  }
+  errors.Try([this] { history_.EndSession(); });
+  errors.Try([this] { PublishStatus(); });
+  if (!publication_stop_.stop_requested()) {
+    decisions_.WaitForAcknowledged(kAcknowledgeLimit);
+  }
+  events_.WaitForAcknowledged(kAcknowledgeLimit);
+  status_topic_.WaitForAcknowledged(kAcknowledgeLimit);
+  context_.log(LogLevel::kInfo, StatusLine(StatusOf(Facts())));
+  context_.log(LogLevel::kInfo, "monitor_stopped");
+  // Last, as a client may keep them for a second. Their threads look at all the
+  // rest, so they must not outlive this call.
+  http_.reset();
+  if (console_) {
+    errors.Try([this] { console_->Close(); });
+  }
+  errors.Rethrow();
+}
+
+// Diagnoses, stores and publishes what was received.
+void Service::StopDiagnosis() {
+  drain_until_ = Clock::now() + kDrainLimit;
+  stopping_ = true;
+  samples_.Interrupt();
+  // A subscriber that does not read must not keep the service from ending.
+  if (!diagnosis_.WaitFor(kSubscriberPatience)) {
+    publication_stop_.request_stop();
+  }
+  FirstError errors;
+  errors.Try([this] { diagnosis_.Join(); });
+  errors.Try([this] { pipeline_.Stop(); });
+  errors.Rethrow();
 }
 
 }  // namespace fdi::monitor

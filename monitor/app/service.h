@@ -3,32 +3,29 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "cli/program.h"
+#include "cli/stop_signals.h"
+#include "diagnosis/concurrency/worker.h"
 #include "idl/endpoint.h"
 #include "monitor/app/bus_sinks.h"
 #include "monitor/app/event_hook.h"
 #include "monitor/app/history_store.h"
 #include "monitor/app/model_assignment.h"
-#include "monitor/app/probes.h"
 #include "monitor/app/run_store.h"
-#include "monitor/app/service_manager.h"
 #include "monitor/app/status.h"
 #include "monitor/console/console.h"
 #include "monitor/heartbeat.h"
 #include "monitor/http/http_server.h"
 #include "monitor/pipeline.h"
-#include "storage/cli/program.h"
-#include "storage/cli/stop_signals.h"
-#include "storage/data_directory.h"
-#include "storage/exclusive_lock.h"
+#include "storage/database/data_directory.h"
+#include "storage/database/locks.h"
 
 namespace fdi::monitor {
 
@@ -52,7 +49,7 @@ struct ServiceOptions {
   std::optional<HttpAddress> http;
   /// Groups of valves with causes in common; empty: DATA/groups.toml, if any.
   std::filesystem::path groups;
-  /// Tell a program or a web server of events; empty: nobody.
+  /// Notify a program or a web server of events; empty: nobody.
   std::string on_event;
   int on_event_per_minute{60};
   double on_event_timeout_s{10.0};
@@ -61,10 +58,11 @@ struct ServiceOptions {
 };
 
 /// The monitor as a service: DDS on one side, the databases on the other, the
-/// pipeline between them. Lives for one run.
+/// pipeline between them. The thread of Run() looks after the rest: signals,
+/// status, watchdog, new models. Lives for one run.
 class Service {
  public:
-  /// Opens all; afterwards samples are taken.
+  /// Opens everything and starts nothing: no thread of ours runs yet.
   /// @throws ConfigError, DataError, NotFoundError, idl::TransportError,
   ///   storage::SqliteError
   Service(const ServiceOptions& options, const cli::Context& context);
@@ -72,37 +70,42 @@ class Service {
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
 
-  /// Serves until a signal asks to stop, then drains and closes.
-  /// @returns the exit code.
+  /// Serves until a signal asks to stop or a thread fails, then stores and
+  /// publishes what was received and ends all threads, whatever happens.
+  /// @returns the exit code. @throws the first error.
   int Run(cli::StopSignals& signals);
 
  private:
   using TimePoint = Heartbeat::TimePoint;
 
-  void ResendEvents();
-  void WatchCauses();
   EventSink& EventsOut();
-  void Intake(const std::stop_token& stop);
   void AnnounceModels(const ModelSet& models);
-  void Reload(const char* cause);
-  void ServeProbes();
+
+  void Start();
+  void WatchCauses();
+  void ResendEvents();
   void ServeConsole();
-  Readiness CurrentReadiness() const;
-  std::string Metrics() const;
-  StatusFacts Facts() const;
-  TimePoint FeedWatchdog(TimePoint next_tick);
+  void ServeProbes();
+  void Diagnose();
+
+  void Serve(cli::StopSignals& signals);
   void Tick();
+  void Reload(const char* cause);
+  TimePoint FeedWatchdog(TimePoint next_tick);
+
+  StatusFacts Facts() const;
+  std::string Metrics() const;
   void ReportLoss();
   void ReportStall();
   void PublishStatus();
-  void WriteStatusLine();
-  void Shutdown();
+
+  void Stop();
+  void StopDiagnosis();
 
   ServiceOptions options_;
   const cli::Context& context_;
-  std::unique_ptr<HttpServer> http_;
-  std::unique_ptr<console::Console> console_;
-  ServiceManager manager_;
+  std::unique_ptr<HttpServer> http_;           // Null: not served.
+  std::unique_ptr<console::Console> console_;  // Null: not served.
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
   // Read before a session begins: an error in them leaves no trace.
@@ -116,8 +119,8 @@ class Service {
   std::shared_ptr<const ModelAssignment> assignment_;
   std::atomic<std::size_t> model_sets_;
   HistoryStore history_;
-  std::unique_ptr<RunStore> runs_;
-  std::stop_source publication_stop_;  // ends waits for slow subscribers
+  std::unique_ptr<RunStore> runs_;     // Null: nothing is recorded.
+  std::stop_source publication_stop_;  // Ends waits for slow subscribers.
   BusDecisionSink decisions_;
   BusEventSink events_;
   std::unique_ptr<OutwardEvents> outward_;  // Null: nobody is told.
@@ -126,18 +129,16 @@ class Service {
   Counters counters_;
   ThrottledLog log_;
   Pipeline pipeline_;
-  Pulse intake_pulse_;
-  Pulse service_pulse_;  // of the thread that runs Run()
+  Pulse service_pulse_;  // Of the thread of Run().
   Heartbeat heartbeat_;
-  std::optional<Watchdog> watchdog_;
+  std::optional<Watchdog> watchdog_;  // If a manager asks for it.
+  std::string notified_status_;
   std::int64_t started_ns_;
   std::uint64_t reported_loss_{0};
-  std::chrono::steady_clock::time_point last_status_line_;
-  std::atomic<std::chrono::steady_clock::time_point> drain_until_{
-      std::chrono::steady_clock::time_point{}};
-  std::exception_ptr intake_error_;
-  std::atomic<bool> intake_failed_{false};
-  std::jthread intake_;
+  TimePoint last_status_line_;
+  std::atomic<bool> stopping_{false};
+  std::atomic<TimePoint> drain_until_{TimePoint{}};
+  Worker diagnosis_;
 };
 
 }  // namespace fdi::monitor

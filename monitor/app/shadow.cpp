@@ -1,25 +1,12 @@
 #include "monitor/app/shadow.h"
 
 #include <algorithm>
+#include <array>
 #include <string_view>
 
-#include "monitor/exposition.h"
-#include "storage/shadow.h"
+#include "monitor/counters.h"
 
 namespace fdi::monitor {
-namespace {
-
-storage::ShadowDifference ToStored(const ShadowDifference& d) {
-  return {d.valve_id,       d.source_id,
-          d.from_ns,        d.to_ns,
-          d.samples,        d.active_set,
-          d.active_hash,    std::string(StateName(d.active.state)),
-          d.active.fault,   d.candidate_set,
-          d.candidate_hash, std::string(StateName(d.candidate.state)),
-          d.candidate.fault};
-}
-
-}  // namespace
 
 std::shared_ptr<const ModelSet> LoadCandidate(
     const std::filesystem::path& models,
@@ -34,33 +21,6 @@ std::shared_ptr<const ModelSet> LoadCandidate(
     }
   }
   return std::make_shared<const ModelSet>(store.Load(chosen));
-}
-
-void KeepShadow(storage::Database& history, const Checkpoint& checkpoint) {
-  if (checkpoint.shadow.empty() && checkpoint.shadow_accumulators.empty()) {
-    return;
-  }
-  std::vector<storage::ShadowDifference> stretches;
-  for (const ShadowDifference& difference : checkpoint.shadow) {
-    stretches.push_back(ToStored(difference));
-  }
-  std::vector<storage::StoredAccumulator> accumulators;
-  for (const Accumulator& a : checkpoint.shadow_accumulators) {
-    accumulators.push_back(
-        {a.valve_id, a.source_id, a.model_hash, a.stamp_ns, a.bytes});
-  }
-  storage::KeepShadow(history, stretches, accumulators);
-}
-
-std::vector<Accumulator> ShadowAccumulators(storage::Database& history) {
-  std::vector<Accumulator> accumulators;
-  for (storage::StoredAccumulator& stored :
-       storage::ShadowAccumulators(history)) {
-    accumulators.push_back({stored.valve_id, stored.source_id,
-                            stored.model_hash, stored.stamp_ns,
-                            std::move(stored.bytes)});
-  }
-  return accumulators;
 }
 
 std::string ShadowMetrics(const ShadowCounts& counts) {

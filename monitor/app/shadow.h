@@ -5,10 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "monitor/checkpoint.h"
-#include "monitor/shadow_bank.h"
-#include "storage/database.h"
-#include "storage/models.h"
+#include "monitor/shadow.h"
+#include "storage/models/models.h"
 
 // What joins the candidate of --shadow to databases and metrics.
 namespace fdi::monitor {
@@ -18,12 +16,6 @@ namespace fdi::monitor {
 std::shared_ptr<const ModelSet> LoadCandidate(
     const std::filesystem::path& models,
     const storage::ModelReference& reference);
-
-/// Stores what of the checkpoint is the candidate's; twice is a no-op.
-void KeepShadow(storage::Database& history, const Checkpoint& checkpoint);
-
-/// As they were kept last.
-std::vector<Accumulator> ShadowAccumulators(storage::Database& history);
 
 /// Its families of the page of metrics.
 std::string ShadowMetrics(const ShadowCounts& counts);

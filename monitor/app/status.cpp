@@ -1,42 +1,209 @@
 #include "monitor/app/status.h"
 
+#include <algorithm>
 #include <array>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <map>
+#include <system_error>
+#include <utility>
 
+#include <nlohmann/json.hpp>
+#include <sys/resource.h>
 #include <unistd.h>
 
 namespace fdi::monitor {
+namespace {
 
-std::string MonitorName() {
-  std::array<char, 48> host{};
-  if (gethostname(host.data(), host.size() - 1) != 0) {
-    host = {'?'};
+using Type = Measure::Type;
+
+double Seconds(const timeval& time) {
+  return static_cast<double>(time.tv_sec) +
+         static_cast<double>(time.tv_usec) * 1e-6;
+}
+
+// User and system time of this process; 0 where the kernel does not say, as
+// below.
+double CpuSeconds() {
+  rusage usage{};
+  return getrusage(RUSAGE_SELF, &usage) == 0
+             ? Seconds(usage.ru_utime) + Seconds(usage.ru_stime)
+             : 0.0;
+}
+
+std::uint64_t ResidentBytes() {
+  std::ifstream file("/proc/self/statm");  // In pages: total, resident, ...
+  std::uint64_t total = 0;
+  std::uint64_t resident = 0;
+  file >> total >> resident;
+  return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+std::uint64_t OpenDescriptors() {
+  std::error_code error;
+  const std::filesystem::directory_iterator open("/proc/self/fd", error);
+  return error ? 0
+               : static_cast<std::uint64_t>(
+                     std::distance(begin(open), end(open)));
+}
+
+void AddDatabases(const storage::DataDirectory& data, Exposition& page) {
+  const std::array<std::pair<std::string_view, std::filesystem::path>, 3>
+      databases{{{"history", data.history()},
+                 {"models", data.models()},
+                 {"runs", data.runs()}}};
+  page.Family("fdi_database_bytes", Type::kGauge, "Size of the file");
+  for (const auto& [name, path] : databases) {
+    page.Value(std::uint64_t{storage::FileBytes(path)}, {"database", name});
   }
-  return std::string(host.data()) + ":" + std::to_string(getpid());
+  page.Family("fdi_database_wal_bytes", Type::kGauge,
+              "Size of the write-ahead log");
+  for (const auto& [name, path] : databases) {
+    page.Value(std::uint64_t{storage::WalBytes(path)}, {"database", name});
+  }
+}
+
+void AddThreads(const std::vector<Heartbeat::Member>& threads,
+                Exposition& page) {
+  page.Family("fdi_thread_idle_seconds", Type::kGauge,
+              "Time since the thread got on last");
+  const auto now = Pulse::Clock::now();
+  for (const Heartbeat::Member& member : threads) {
+    const std::chrono::duration<double> idle = now - member.pulse->last();
+    page.Value(std::max(idle.count(), 0.0), {"thread", member.thread});
+  }
+}
+
+std::vector<Measure> ConsoleMeasures(const console::StreamCounts& streams,
+                                     std::uint64_t board_bytes) {
+  constexpr std::string_view kStreams = "fdi_console_streams_total";
+  return {
+      {"", "fdi_console_streams", Type::kGauge, "Live streams now", "", "",
+       streams.clients},
+      {"", kStreams, Type::kCounter,
+       "Live streams that were begun, refused for want of a place, or "
+       "dropped because the client did not keep up",
+       "outcome", "admitted", streams.admitted},
+      {"", kStreams, Type::kCounter, "", "outcome", "refused", streams.refused},
+      {"", kStreams, Type::kCounter, "", "outcome", "dropped", streams.dropped},
+      {"", "fdi_console_bytes", Type::kGauge,
+       "Memory of the trends that the console shows", "", "", board_bytes}};
+}
+
+void AddProcess(const MetricsFacts& facts, Exposition& page) {
+  page.Add({{"", "fdi_build_info", Type::kGauge,
+             "1; the label says which build", "software", facts.software, 1},
+            {"", "process_resident_memory_bytes", Type::kGauge, "Memory in use",
+             "", "", ResidentBytes()},
+            {"", "process_open_fds", Type::kGauge, "Open file descriptors", "",
+             "", OpenDescriptors()}});
+  page.Family("process_cpu_seconds_total", Type::kCounter,
+              "User and system time");
+  page.Value(CpuSeconds());
+  page.Family("process_start_time_seconds", Type::kGauge,
+              "Start in UTC since 1970");
+  page.Value(static_cast<double>(facts.started_ns) / 1e9);
+}
+
+HttpPage Answer(bool good, const nlohmann::ordered_json& body) {
+  return {good ? 200 : 503, "application/json", body.dump() + "\n"};
+}
+
+HttpPage HealthPage(const Heartbeat& heartbeat) {
+  const auto stalled =
+      heartbeat.StalledSince(Pulse::Clock::now() - kStallLimit);
+  return Answer(stalled.empty(),
+                {{"healthy", stalled.empty()}, {"stalled", stalled}});
+}
+
+HttpPage ReadinessPage(const Readiness& readiness) {
+  return Answer(readiness.ready(), {{"ready", readiness.ready()},
+                                    {"model_sets", readiness.model_sets},
+                                    {"databases", readiness.databases},
+                                    {"publishers", readiness.publishers}});
+}
+
+}  // namespace
+
+std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
+  constexpr Type kCounter = Type::kCounter;
+  constexpr Type kGauge = Type::kGauge;
+  const idl::SubscriberStatus& samples = facts.samples;
+  const idl::PublisherStatus& decisions = facts.decisions;
+  const ValveCensus& census = facts.census;
+  const auto number = [](int n) { return static_cast<std::uint64_t>(n); };
+  constexpr std::string_view kRejected = "fdi_dds_samples_rejected_total";
+  constexpr std::string_view kRejectedHelp =
+      "Samples the reader refused: of valves beyond its limit, or sent again "
+      "once there is room";
+  constexpr std::string_view kSilentHelp =
+      "Valves without a sample for three periods, or whose publisher ended the "
+      "stream";
+  constexpr std::string_view kDegradedHelp =
+      "1 while the database does not take what is to be stored";
+  constexpr std::string_view kWaitingHelp =
+      "Samples, records or points of evidence in a queue";
+  std::vector<Measure> measures = facts.counters.Measures();
+  const std::vector<Measure> others{
+      {"dds_lost", "fdi_dds_samples_lost_total", kCounter,
+       "Samples written that will never come", "", "", samples.lost},
+      {"dds_undecodable", "fdi_dds_samples_undecodable_total", kCounter,
+       "Samples with a value that no publisher of ours sends", "", "",
+       samples.undecodable},
+      {"dds_rejected_instances", kRejected, kCounter, kRejectedHelp, "reason",
+       "max_valves", samples.rejected_instances},
+      {"dds_rejected_samples", kRejected, kCounter, kRejectedHelp, "reason",
+       "full", samples.rejected_samples},
+      {"dds_refused_valves", "fdi_dds_refused_valves", kGauge,
+       "Valves beyond the limit of the reader", "", "", samples.refused_valves},
+      {"dds_incompatible", "fdi_dds_incompatible_total", kCounter,
+       "Publishers of samples whose QoS does not fit", "", "",
+       samples.incompatible},
+      {"", "fdi_dds_publishers", kGauge, "Publishers of samples now", "state",
+       "matched", number(samples.matched)},
+      {"", "fdi_dds_publishers", kGauge, "", "state", "alive",
+       number(samples.alive)},
+      {"dds_decision_retries", "fdi_dds_decision_retries_total", kCounter,
+       "Times a slow subscriber made the diagnosis wait", "", "",
+       decisions.retries},
+      {"dds_decision_readers", "fdi_dds_decision_subscribers", kGauge,
+       "Subscribers to decision vectors now", "", "",
+       number(decisions.matched)},
+      {"valves", "fdi_valves", kGauge, "Valves seen", "", "", census.valves},
+      {"valves_unassigned", "fdi_valves_unassigned", kGauge,
+       "Valves without a model set", "", "", census.unassigned},
+      {"valves_stale", "fdi_valves_silent", kGauge, kSilentHelp, "reason",
+       "stale", census.stale},
+      {"valves_ended", "fdi_valves_silent", kGauge, kSilentHelp, "reason",
+       "ended", census.ended},
+      {"open_episodes", "fdi_open_episodes", kGauge, "Fault episodes now", "",
+       "", census.open_episodes},
+      {"trace_bytes", "fdi_trace_bytes", kGauge,
+       "Memory of the evidence kept for valves", "", "", census.trace_bytes},
+      {"", "fdi_persistence_degraded", kGauge, kDegradedHelp, "database",
+       "history", std::uint64_t{facts.history_degraded}},
+      {"", "fdi_persistence_degraded", kGauge, kDegradedHelp, "database",
+       "runs", std::uint64_t{facts.recording_degraded}},
+      {"waiting", "fdi_waiting", kGauge, kWaitingHelp, "queue", "diagnosis",
+       samples.waiting},
+      {"", "fdi_waiting", kGauge, kWaitingHelp, "queue", "recorder",
+       facts.recorder_backlog},
+      {"", "fdi_waiting", kGauge, kWaitingHelp, "queue", "history",
+       facts.journal.records},
+      {"", "fdi_waiting", kGauge, kWaitingHelp, "queue", "evidence",
+       facts.journal.trace_points}};
+  measures.insert(measures.end(), others.begin(), others.end());
+  return measures;
 }
 
 idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   idl::MonitorStatusMessage status;
-  status.counters = facts.counters.Snapshot();
-  const auto add = [&status](const char* name, std::uint64_t value) {
-    status.counters.emplace_back(name, value);
-  };
-  add("dds_lost", facts.samples.lost);
-  add("dds_undecodable", facts.samples.undecodable);
-  add("dds_rejected_instances", facts.samples.rejected_instances);
-  add("dds_refused_valves", facts.samples.refused_valves);
-  add("dds_rejected_samples", facts.samples.rejected_samples);
-  add("dds_incompatible", facts.samples.incompatible);
-  add("dds_decision_retries", facts.decisions.retries);
-  add("dds_decision_readers",
-      static_cast<std::uint64_t>(facts.decisions.matched));
-  add("valves", facts.census.valves);
-  add("valves_unassigned", facts.census.unassigned);
-  add("valves_stale", facts.census.stale);
-  add("valves_ended", facts.census.ended);
-  add("open_episodes", facts.census.open_episodes);
-  add("trace_bytes", facts.census.trace_bytes);
-  add("waiting", facts.waiting.diagnosis);
+  for (Measure& measure : MeasuresOf(facts)) {
+    if (!measure.name.empty()) {
+      status.counters.emplace_back(std::move(measure.name), measure.value);
+    }
+  }
   if (facts.history_degraded) {
     status.text = "persistence degraded: history";
   }
@@ -52,6 +219,14 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
                    Joined(facts.stalled);
   }
   return status;
+}
+
+std::string MonitorName() {
+  std::array<char, 48> host{};
+  if (gethostname(host.data(), host.size() - 1) != 0) {
+    host = {'?'};
+  }
+  return std::string(host.data()) + ":" + std::to_string(getpid());
 }
 
 std::string ManagerLine(const idl::MonitorStatusMessage& status) {
@@ -81,6 +256,30 @@ std::string StatusLine(const idl::MonitorStatusMessage& status) {
     }
   }
   return line;
+}
+
+std::string MetricsPage(const StatusFacts& status, const MetricsFacts& facts) {
+  Exposition page;
+  page.Add(MeasuresOf(status));
+  AddDatabases(facts.data, page);
+  AddThreads(facts.threads, page);
+  if (facts.streams) {
+    page.Add(ConsoleMeasures(*facts.streams, facts.board_bytes));
+  }
+  AddProcess(facts, page);
+  return page.text();
+}
+
+HttpServer::Pages ProbePages(const Heartbeat& heartbeat, ProbeSources sources) {
+  return {{"/metrics",
+           [metrics = std::move(sources.metrics)] {
+             return HttpPage{200, "text/plain; version=0.0.4; charset=utf-8",
+                             metrics()};
+           }},
+          {"/healthz", [&heartbeat] { return HealthPage(heartbeat); }},
+          {"/readyz", [readiness = std::move(sources.readiness)] {
+             return ReadinessPage(readiness());
+           }}};
 }
 
 }  // namespace fdi::monitor

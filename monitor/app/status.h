@@ -1,36 +1,48 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "idl/endpoint.h"
 #include "idl/wire.h"
+#include "monitor/console/live_stream.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
+#include "monitor/http/http_server.h"
 #include "monitor/pipeline.h"
-#include "monitor/valve_registry.h"
+#include "storage/database/data_directory.h"
+
+// How the monitor is: on the bus, in the log, over HTTP.
 
 namespace fdi::monitor {
 
-/// What a status message and a page of metrics are made of.
+/// What the status on the bus and the page of metrics are made of, as of now.
 struct StatusFacts {
   const Counters& counters;
   ValveCensus census;
   idl::SubscriberStatus samples;
   idl::PublisherStatus decisions;
-  Pipeline::Backlog waiting;
+  Journal::Backlog journal;
+  std::size_t recorder_backlog{0};
   bool history_degraded{false};
   bool recording_degraded{false};
   std::vector<std::string_view> stalled;  ///< Threads.
 };
 
+/// All that is counted and measured, the counters first.
+std::vector<Measure> MeasuresOf(const StatusFacts& facts);
+
+/// Measures with a name, and health. Monitor, software and stamps are the
+/// caller's.
+idl::MonitorStatusMessage StatusOf(const StatusFacts& facts);
+
 /// "host:pid"
 std::string MonitorName();
-
-/// Counters, gauges and health. Monitor, software and stamps are the caller's.
-idl::MonitorStatusMessage StatusOf(const StatusFacts& facts);
 
 /// One line for a service manager, without what changes all the time.
 std::string ManagerLine(const idl::MonitorStatusMessage& status);
@@ -40,5 +52,41 @@ std::string Joined(const std::vector<std::string_view>& words);
 
 /// "monitor_status received=1 ...": what is not zero.
 std::string StatusLine(const idl::MonitorStatusMessage& status);
+
+/// A thread that has not got on for so long is reported as stalled: longer than
+/// a database may keep it waiting.
+inline constexpr std::chrono::seconds kStallLimit{10};
+
+/// What a monitor needs to be of use.
+struct Readiness {
+  std::size_t model_sets{0};
+  bool databases{false};  ///< Take what is to be stored.
+  int publishers{0};      ///< Of samples.
+
+  bool ready() const { return model_sets > 0 && databases && publishers > 0; }
+};
+
+/// What the page of metrics says beside the status.
+struct MetricsFacts {
+  std::string software;
+  std::int64_t started_ns{0};  ///< UTC.
+  storage::DataDirectory data;
+  std::vector<Heartbeat::Member> threads;
+  std::optional<console::StreamCounts> streams;  ///< If there is a console.
+  std::uint64_t board_bytes{0};                  ///< Of the console.
+};
+
+/// All that is counted, in the text format of Prometheus.
+std::string MetricsPage(const StatusFacts& status, const MetricsFacts& facts);
+
+/// Where the pages come from; called by threads of the server.
+struct ProbeSources {
+  std::function<std::string()> metrics;
+  std::function<Readiness()> readiness;
+};
+
+/// /metrics; /healthz: 200 while all threads get on; /readyz: 200 while there
+/// are models, databases and a publisher. Else 503; the body, JSON, says why.
+HttpServer::Pages ProbePages(const Heartbeat& heartbeat, ProbeSources sources);
 
 }  // namespace fdi::monitor

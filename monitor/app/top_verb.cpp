@@ -1,22 +1,24 @@
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <string_view>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
 
+#include "cli/program.h"
+#include "cli/stop_signals.h"
+#include "cli/time_text.h"
 #include "diagnosis/error.h"
-#include "idl/endpoint.h"
-#include "monitor/app/dds_options.h"
-#include "monitor/app/terminal_session.h"
 #include "monitor/app/top_board.h"
-#include "monitor/app/top_screen.h"
 #include "monitor/app/verbs.h"
-#include "monitor/valve_directory.h"
-#include "storage/cli/program.h"
-#include "storage/cli/stop_signals.h"
-#include "storage/cli/time_text.h"
 
 namespace fdi::monitor {
 namespace {
@@ -25,213 +27,235 @@ using Clock = TopBoard::Clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kRefresh{1000};
-constexpr milliseconds kTakeTimeout{50};
 constexpr milliseconds kQuiet{1000};  // With --once: no new valve for so long.
 constexpr milliseconds kSilence{10'000};
+constexpr std::size_t kPageKeys = 2;  // A page is a half of the screen.
 
 struct TopOptions {
+  BusOptions bus{.program = "fdi-monitor top"};
   bool once{false};
   double wait_s{5.0};
-  std::string valves{"*"};
   std::string filter;
-  int max_valves{2000};
 };
 
-// On a terminal; lines of the log would spoil its screen.
-bool IsLive(const TopOptions& options, const cli::Context& context) {
-  return !options.once && !context.options.json;
-}
+// Escape codes of ECMA-48 and xterm, which every terminal of today knows.
+constexpr std::string_view kEnter = "\x1b[?1049h\x1b[?25l";  // Other screen,
+constexpr std::string_view kLeave = "\x1b[0m\x1b[?25h\x1b[?1049l";  // no cursor
+constexpr std::string_view kHome = "\x1b[H";
+constexpr std::string_view kNextLine = "\x1b[0m\x1b[K\r\n";
+constexpr std::string_view kEndOfScreen = "\x1b[0m\x1b[K\x1b[J";
+constexpr int kRestOfCodeMs = 20;
 
-/// The table of valves, filled from the bus.
-class Top {
+/// A terminal as a program has it that draws whole screens: keys come at once
+/// and unseen, the cursor is hidden, and what was on the screen comes back at
+/// the end. Ctrl-C stays the signal that it is.
+class Terminal {
  public:
-  Top(const TopOptions& options, const cli::Context& context)
-      : options_(options),
-        context_(context),
-        texts_(cli::LoadFaultTexts(context.options)),
-        participant_(DdsOptionsOf(context.options, options.max_valves),
-                     IsLive(options, context) ? LogSink() : context.log,
-                     "fdi-monitor top"),
-        models_(participant_),
-        events_(participant_),
-        status_(participant_),
-        decisions_(participant_, idl::Profile::kLive) {
-    view_.filter = options.filter;
-    view_.utc = context.options.utc;
+  /// @throws std::system_error if standard input or output is no terminal.
+  Terminal() {
+    if (isatty(STDOUT_FILENO) == 0 || tcgetattr(STDIN_FILENO, &before_) != 0) {
+      throw std::system_error(errno, std::generic_category(), "terminal");
+    }
+    termios keys = before_;
+    keys.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
+    keys.c_cc[VMIN] = 1;
+    keys.c_cc[VTIME] = 0;
+    keys.c_cc[VSUSP] = _POSIX_VDISABLE;  // It would leave the screen as it is.
+    tcsetattr(STDIN_FILENO, TCSAFLUSH, &keys);
+    Write(kEnter);
+  }
+  ~Terminal() {
+    Write(kLeave);
+    tcsetattr(STDIN_FILENO, TCSAFLUSH, &before_);
+  }
+  Terminal(const Terminal&) = delete;
+  Terminal& operator=(const Terminal&) = delete;
+
+  winsize size() const {
+    winsize size{};
+    const bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 &&
+                       size.ws_col > 0 && size.ws_row > 0;
+    return known ? size : winsize{24, 80, 0, 0};
   }
 
-  /// Waits until all is there that monitors have said; prints it.
-  int Once(cli::StopSignals& signals) {
-    const auto start = Clock::now();
-    auto newest = start;
-    std::size_t valves = 0;
-    while (!signals.stop_requested() &&
-           Clock::now() - start <
-               std::chrono::duration<double>(options_.wait_s)) {
-      Take();
-      if (board_.valves() > valves) {
-        valves = board_.valves();
-        newest = Clock::now();
-      }
-      const bool heard = valves > 0 && !board_.Health(Clock::now()).empty();
-      if (heard && Clock::now() - newest > kQuiet) {
+  /// Replaces what is on the screen; lines are separated by newlines.
+  void Draw(std::string_view screen) const {
+    std::string text(kHome);
+    for (const char c : screen) {
+      text += c == '\n' ? kNextLine : std::string_view(&c, 1);
+    }
+    Write(text.append(kEndOfScreen));
+  }
+
+  /// The next key, if one was pressed, as terminals send it: "q", "\r", or ESC
+  /// alone or with its code, "\x1b[A"; "\x04" at the end of the input.
+  std::optional<std::string> ReadKey() const {
+    if (!Readable(0)) {
+      return std::nullopt;
+    }
+    std::string key;
+    if (!ReadByte(key)) {
+      return errno == EINTR ? std::nullopt : std::optional<std::string>("\x04");
+    }
+    // CODE = ESC ("[" | "O") parameter* final; a final byte is in @..~.
+    while (key[0] == '\x1b' && key.size() < 9 && Readable(kRestOfCodeMs) &&
+           ReadByte(key)) {
+      const bool opens =
+          key.size() == 2 && (key.back() == '[' || key.back() == 'O');
+      if (!opens && key.back() >= '@' && key.back() <= '~') {
         break;
       }
     }
-    Look();
-    if (view_.health.empty() && valves == 0) {
-      throw NotFoundError(
-          "no monitor is heard on domain " +
-          std::to_string(context_.options.domain) +
-          ": is one running there, and on the same --interface?");
-    }
-    if (context_.options.json) {
-      cli::PrintJson(std::cout, TopJson(view_, texts_));
-    } else {
-      std::cout << TopTable(view_, texts_, cli::StdoutStyle());
-    }
-    return cli::kExitOk;
-  }
-
-  int Live(cli::StopSignals& signals) {
-    const bool colour = cli::StdoutStyle().colour;
-    TerminalSession terminal;
-    auto drawn = Clock::now() - kRefresh;
-    while (!signals.stop_requested() && !quit_) {
-      Take();
-      bool touched = false;
-      while (const auto key = terminal.ReadKey(milliseconds(0))) {
-        OnKey(*key, terminal.size().rows);
-        touched = true;
-        if (quit_) {
-          break;
-        }
-      }
-      if (touched || Clock::now() - drawn >= kRefresh) {
-        Look();
-        const auto size = terminal.size();
-        terminal.Draw(
-            TopScreen(view_, texts_, {colour, size.columns}, size.rows));
-        drawn = Clock::now();
-      }
-    }
-    return cli::kExitOk;
+    return key;
   }
 
  private:
-  void Take() {
-    // The models first: they explain the vectors.
-    models_.Take(
-        {[this](const auto& message, const auto&) { board_.Learn(message); },
-         {}},
-        milliseconds(0));
-    events_.Take({[this](const auto& message, const auto&) {
-                    if (Matches(message.valve_id)) {
-                      board_.Update(message);
-                    }
-                  },
-                  {}},
-                 milliseconds(0));
-    status_.Take({[this](const auto& message, const auto&) {
-                    board_.Update(message, Clock::now());
-                  },
-                  {}},
-                 milliseconds(0));
-    decisions_.Take({[this](const auto& message, const auto&) {
-                       if (Matches(message.valve_id)) {
-                         board_.Update(message, Clock::now());
-                       }
-                     },
-                     [this](const auto& message, const auto&) {
-                       board_.Remove(message.valve_id);
-                     }},
-                    kTakeTimeout, 1000);
-  }
-
-  bool Matches(const std::string& valve_id) const {
-    return options_.valves == "*" || GlobMatches(options_.valves, valve_id);
-  }
-
-  void Look() {
-    const auto now = Clock::now();
-    view_.rows = board_.Rows(view_.sort, view_.filter, now);
-    view_.valves = board_.valves();
-    view_.health = board_.Health(now);
-    view_.now_ns = cli::NowNs();
-  }
-
-  void OnKey(const TerminalSession::KeyPress& press, std::size_t height) {
-    using Key = TerminalSession::Key;
-    if (press.key == Key::kEndOfInput) {
-      quit_ = true;
-    } else if (view_.typing) {
-      Type(press);
-    } else if (press.key == Key::kCharacter) {
-      Command(press.character);
-    } else {
-      Scroll(press.key, std::max<std::size_t>(1, height / 2));
+  static void Write(std::string_view text) {
+    while (!text.empty()) {
+      const ssize_t count = write(STDOUT_FILENO, text.data(), text.size());
+      if (count < 0 && errno != EINTR) {
+        return;  // The terminal is gone; its input says so.
+      }
+      text.remove_prefix(count > 0 ? static_cast<std::size_t>(count) : 0);
     }
   }
-
-  void Command(char c) {
-    if (c == 'q' || c == 'Q') {
-      quit_ = true;
-    } else if (c == 's' || c == 'S') {
-      view_.sort = NextSort(view_.sort);
-      view_.first = 0;
-    } else if (c == '/') {
-      view_.typing = true;
+  static bool Readable(int timeout_ms) {
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    return poll(&input, 1, timeout_ms) > 0;
+  }
+  static bool ReadByte(std::string& text) {
+    char c = '\0';
+    errno = 0;
+    if (read(STDIN_FILENO, &c, 1) != 1) {
+      return false;
     }
+    text += c;
+    return true;
   }
 
-  void Type(const TerminalSession::KeyPress& press) {
-    using Key = TerminalSession::Key;
-    if (press.key == Key::kCharacter) {
-      view_.filter += press.character;
-    } else if (press.key == Key::kBackspace && !view_.filter.empty()) {
-      view_.filter.pop_back();
-    } else if (press.key == Key::kEscape) {
-      view_.filter.clear();
-    }
-    view_.typing = press.key != Key::kEnter && press.key != Key::kEscape;
-    view_.first = 0;
-  }
-
-  void Scroll(TerminalSession::Key key, std::size_t page) {
-    using Key = TerminalSession::Key;
-    const std::size_t last = view_.rows.empty() ? 0 : view_.rows.size() - 1;
-    const auto up = [this](std::size_t by) {
-      view_.first -= std::min(view_.first, by);
-    };
-    const auto down = [this, last](std::size_t by) {
-      view_.first = std::min(last, view_.first + by);
-    };
-    key == Key::kUp         ? up(1)
-    : key == Key::kDown     ? down(1)
-    : key == Key::kPageUp   ? up(page)
-    : key == Key::kPageDown ? down(page)
-    : key == Key::kHome     ? up(last)
-    : key == Key::kEnd      ? down(last)
-                            : void();
-  }
-
-  TopOptions options_;
-  const cli::Context& context_;
-  cli::FaultTexts texts_;
-  TopBoard board_{kSilence};
-  TopView view_;
-  bool quit_{false};
-  idl::Participant participant_;
-  idl::Subscriber<idl::ModelSetInfoMessage> models_;
-  idl::Subscriber<idl::FaultEventMessage> events_;
-  idl::Subscriber<idl::MonitorStatusMessage> status_;
-  idl::Subscriber<idl::DecisionMessage> decisions_;
+  termios before_{};
 };
 
+/// What keys do to the view. @returns false to quit.
+bool OnKey(const std::string& key, std::size_t height, TopView& view) {
+  const bool character = key.size() == 1 && key[0] >= ' ' && key[0] <= '~';
+  if (key == "\x04") {
+    return false;
+  }
+  if (view.typing) {
+    if (character) {
+      view.filter += key;
+    } else if ((key == "\x7f" || key == "\b") && !view.filter.empty()) {
+      view.filter.pop_back();
+    } else if (key == "\x1b") {
+      view.filter.clear();
+    }
+    view.typing = key[0] != '\x1b' && key != "\r" && key != "\n";
+    view.first = 0;
+    return true;
+  }
+  const std::size_t last = view.rows == 0 ? 0 : view.rows - 1;
+  const std::size_t page = std::max<std::size_t>(1, height / kPageKeys);
+  const auto any = [&key](std::initializer_list<std::string_view> codes) {
+    return std::ranges::find(codes, key) != codes.end();
+  };
+  if (any({"q", "Q"})) {
+    return false;
+  }
+  if (any({"s", "S"})) {
+    view.sort = NextSort(view.sort);
+    view.first = 0;
+  } else if (key == "/") {
+    view.typing = true;
+  } else if (any({"\x1b[A", "\x1bOA"})) {
+    view.first -= std::min<std::size_t>(view.first, 1);
+  } else if (any({"\x1b[B", "\x1bOB"})) {
+    view.first = std::min(last, view.first + 1);
+  } else if (key == "\x1b[5~") {
+    view.first -= std::min(view.first, page);
+  } else if (key == "\x1b[6~") {
+    view.first = std::min(last, view.first + page);
+  } else if (any({"\x1b[H", "\x1bOH", "\x1b[1~"})) {
+    view.first = 0;
+  } else if (any({"\x1b[F", "\x1bOF", "\x1b[4~"})) {
+    view.first = last;
+  }
+  return true;
+}
+
+void Take(BusView& bus, TopBoard& board) {
+  bus.Take([&board](const auto& message) { board.Add(message, Clock::now()); },
+           [&board](const std::string& valve_id) { board.Remove(valve_id); });
+}
+
+/// Waits until all is there that monitors have said; prints it.
+int Once(const TopOptions& options, const cli::Context& context, BusView& bus,
+         TopBoard& board) {
+  const cli::StopSignals signals;
+  const auto start = Clock::now();
+  auto newest = start;
+  std::size_t valves = 0;
+  const std::chrono::duration<double> patience(options.wait_s);
+  while (!signals.stop_requested() && Clock::now() - start < patience) {
+    Take(bus, board);
+    if (board.valves() > valves) {
+      valves = board.valves();
+      newest = Clock::now();
+    }
+    const bool heard = valves > 0 && !board.Health(Clock::now()).empty();
+    if (heard && Clock::now() - newest > kQuiet) {
+      break;
+    }
+  }
+  const cli::Report report =
+      board.Valves(TopSort::kWorst, options.filter, Clock::now());
+  if (report.document["monitor"].is_null() && valves == 0) {
+    throw NotFoundError("no monitor is heard on domain " +
+                        std::to_string(context.options.domain) +
+                        ": is one running there, and on the same --interface?");
+  }
+  if (context.options.json) {
+    report.PrintJson(std::cout);
+  } else {
+    report.PrintText(std::cout, {cli::StdoutStyle(), context.options.utc});
+  }
+  return cli::kExitOk;
+}
+
+int Live(const TopOptions& options, const cli::Context& context, BusView& bus,
+         TopBoard& board) {
+  const cli::StopSignals signals;
+  const bool colour = cli::StdoutStyle().colour;
+  const Terminal terminal;
+  TopView view{.filter = options.filter, .utc = context.options.utc};
+  auto drawn = Clock::now() - kRefresh;
+  while (!signals.stop_requested()) {
+    Take(bus, board);
+    const winsize size = terminal.size();
+    bool touched = false;
+    while (const auto key = terminal.ReadKey()) {
+      if (!OnKey(*key, size.ws_row, view)) {
+        return cli::kExitOk;
+      }
+      touched = true;
+    }
+    if (touched || Clock::now() - drawn >= kRefresh) {
+      view.now_ns = cli::NowNs();
+      drawn = Clock::now();
+      terminal.Draw(
+          TopScreen(board, view, {colour, size.ws_col}, size.ws_row, drawn));
+    }
+  }
+  return cli::kExitOk;
+}
+
 int RunTop(const TopOptions& options, const cli::Context& context) {
-  cli::StopSignals signals;
-  Top top(options, context);
-  return IsLive(options, context) ? top.Live(signals) : top.Once(signals);
+  // Lines of the log would spoil the screen.
+  const bool live = !options.once && !context.options.json;
+  TopBoard board(cli::LoadFaultTexts(context.options), kSilence);
+  BusView bus(options.bus, context, live ? LogSink() : context.log);
+  return live ? Live(options, context, bus, board)
+              : Once(options, context, bus, board);
 }
 
 }  // namespace
@@ -250,10 +274,11 @@ void AddTopVerb(cli::Program& program) {
   top.add_option("--wait", options->wait_s,
                  "With --once: wait so long for a monitor [s]")
       ->check(CLI::Range(0.1, 600.0));
-  top.add_option("--valves", options->valves, "Only ids that match GLOB");
+  top.add_option("--valves", options->bus.valves, "Only ids that match GLOB");
   top.add_option("--filter", options->filter,
                  "Only valves with this in id, fault, state or quality");
-  top.add_option("--max-valves", options->max_valves, "Room for so many valves")
+  top.add_option("--max-valves", options->bus.max_valves,
+                 "Room for so many valves")
       ->check(CLI::Range(1, 100000));
 }
 

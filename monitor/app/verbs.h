@@ -1,10 +1,25 @@
 #pragma once
 
+#include "cli/global_options.h"
+#include "idl/participant.h"
+
 namespace fdi::cli {
 class Program;
 }
 
 namespace fdi::monitor {
+
+/// Where on the bus a program is, as its options say.
+inline idl::DdsOptions DdsOptionsOf(const cli::GlobalOptions& options,
+                                    int max_valves) {
+  idl::DdsOptions dds;
+  dds.domain = options.domain;
+  dds.interfaces = options.interface;
+  dds.transport = options.transport;
+  dds.qos_file = options.qos_file.string();
+  dds.max_valves = max_valves;
+  return dds;
+}
 
 /// `run`: diagnoses the valves on the bus.
 void AddRunVerb(cli::Program& program);

@@ -2,38 +2,46 @@
 #include <cstdint>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
-#include <string_view>
+#include <type_traits>
 
 #include <CLI/CLI.hpp>
 
-#include "idl/endpoint.h"
-#include "monitor/app/dds_options.h"
+#include "cli/program.h"
+#include "cli/stop_signals.h"
 #include "monitor/app/verbs.h"
-#include "monitor/app/watch_print.h"
-#include "monitor/valve_directory.h"
-#include "storage/cli/program.h"
-#include "storage/cli/stop_signals.h"
+#include "monitor/app/watch_records.h"
 
 namespace fdi::monitor {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
-
-constexpr milliseconds kTakeTimeout{50};
+using Clock = WatchRecords::Clock;
 
 struct WatchOptions {
+  BusOptions bus{.program = "fdi-monitor watch"};
   bool count{false};
-  std::string valves{"*"};
   bool lossless{false};
   bool events_only{false};
-  int max_valves{2000};
   double for_s{0.0};   // 0: no limit
   double idle_s{0.0};  // 0: no limit
   std::uint64_t expect{0};
+};
+
+struct WatchCounts {
+  std::uint64_t decisions{0};
+  std::uint64_t events{0};
+  std::uint64_t status{0};
+  std::uint64_t models{0};
+  std::set<std::string> valves;
+
+  void Add(const idl::DecisionMessage& message) {
+    ++decisions;
+    valves.insert(message.valve_id);
+  }
+  void Add(const FaultEvent& /*message*/) { ++events; }
+  void Add(const idl::MonitorStatusMessage& /*message*/) { ++status; }
+  void Add(const idl::ModelSetInfoMessage& /*message*/) { ++models; }
 };
 
 bool Passed(Clock::time_point since, double seconds) {
@@ -41,149 +49,63 @@ bool Passed(Clock::time_point since, double seconds) {
          Clock::now() - since > std::chrono::duration<double>(seconds);
 }
 
-/// What is on the bus, printed or counted.
-class Watch {
- public:
-  Watch(const WatchOptions& options, const cli::Context& context)
-      : options_(options),
-        json_(context.options.json),
-        printer_(context.options.utc),
-        participant_(DdsOptionsOf(context.options, options.max_valves),
-                     context.log, "fdi-monitor watch"),
-        models_(participant_),
-        events_(participant_),
-        status_(participant_) {
-    if (!options.events_only) {
-      decisions_.emplace(participant_, options.lossless
-                                           ? idl::Profile::kLossless
-                                           : idl::Profile::kLive);
-    }
+void PrintCounts(const WatchCounts& counts, std::uint64_t lost, bool json) {
+  const cli::Json object{
+      {"decision_vectors", counts.decisions}, {"fault_events", counts.events},
+      {"valves", counts.valves.size()},       {"monitor_status", counts.status},
+      {"model_sets", counts.models},          {"lost", lost}};
+  if (json) {
+    cli::PrintJson(std::cout, object);
+    return;
   }
-
-  /// @returns whether all that was expected came.
-  bool Run(cli::StopSignals& signals) {
-    const Clock::time_point start = Clock::now();
-    last_message_ = start;
-    while (!signals.stop_requested() && !Passed(start, options_.for_s) &&
-           !Passed(last_message_, options_.idle_s) && !Satisfied()) {
-      Take();
-    }
-    return options_.expect == 0 || Satisfied();
+  for (const auto& [name, value] : object.items()) {
+    std::cout << name << ' ' << value << '\n';
   }
+}
 
-  void PrintCounts() const {
-    cli::Json counts{{"decision_vectors", decision_count_},
-                     {"fault_events", event_count_},
-                     {"valves", valves_.size()},
-                     {"monitor_status", status_count_},
-                     {"model_sets", model_count_},
-                     {"lost", Lost()}};
-    if (json_) {
-      cli::PrintJson(std::cout, counts);
-      return;
-    }
-    for (const auto& [name, value] : counts.items()) {
-      std::cout << name << ' ' << value << '\n';
-    }
+int RunWatch(WatchOptions options, const cli::Context& context) {
+  if (options.events_only) {
+    options.bus.decisions.reset();
+  } else if (options.lossless) {
+    options.bus.decisions = idl::Profile::kLossless;
   }
-
- private:
-  bool Satisfied() const {
-    return options_.expect > 0 && decision_count_ >= options_.expect;
-  }
-
-  std::uint64_t Lost() const {
-    const auto lost = [](const idl::SubscriberStatus& status) {
-      return status.lost + status.undecodable + status.rejected_instances;
-    };
-    return lost(events_.status()) + lost(status_.status()) +
-           (decisions_ ? lost(decisions_->status()) : 0);
-  }
-
-  void Take() {
-    // The models first: they explain the vectors.
-    models_.Take({[this](const auto& message, const auto&) {
-                    ++model_count_;
-                    printer_.Learn(message);
-                    Print(message);
-                  },
-                  {}},
-                 milliseconds(0));
-    events_.Take({[this](const auto& message, const auto&) {
-                    if (Matches(message.valve_id)) {
-                      ++event_count_;
-                      last_message_ = Clock::now();
-                      Print(message);
-                    }
-                  },
-                  {}},
-                 decisions_ ? milliseconds(0) : kTakeTimeout);
-    status_.Take({[this](const auto& message, const auto&) {
-                    ++status_count_;
-                    Print(message);
-                  },
-                  {}},
-                 milliseconds(0));
-    if (decisions_) {
-      decisions_->Take({[this](const auto& message, const auto&) {
-                          if (Matches(message.valve_id)) {
-                            ++decision_count_;
-                            last_message_ = Clock::now();
-                            valves_.insert(message.valve_id);
-                            Print(message);
-                          }
-                        },
-                        {}},
-                       kTakeTimeout, 1000);
-    }
-    if (!options_.count) {
-      std::cout.flush();
-    }
-  }
-
-  bool Matches(const std::string& valve_id) const {
-    return options_.valves == "*" || GlobMatches(options_.valves, valve_id);
-  }
-
-  template <typename Message>
-  void Print(const Message& message) const {
-    if (options_.count) {
-      return;
-    }
-    if (json_) {
-      std::cout << printer_.Object(message).dump(
-                       -1, ' ', false, cli::Json::error_handler_t::replace)
-                << '\n';
-    } else {
-      std::cout << printer_.Line(message) << '\n';
-    }
-  }
-
-  WatchOptions options_;
-  bool json_;
-  WatchPrinter printer_;
-  idl::Participant participant_;
-  idl::Subscriber<idl::ModelSetInfoMessage> models_;
-  idl::Subscriber<idl::FaultEventMessage> events_;
-  idl::Subscriber<idl::MonitorStatusMessage> status_;
-  std::optional<idl::Subscriber<idl::DecisionMessage>> decisions_;
-  Clock::time_point last_message_;
-  std::uint64_t decision_count_{0};
-  std::uint64_t event_count_{0};
-  std::uint64_t status_count_{0};
-  std::uint64_t model_count_{0};
-  std::set<std::string> valves_;
-};
-
-int RunWatch(const WatchOptions& options, const cli::Context& context) {
   cli::StopSignals signals;
-  Watch watch(options, context);
+  BusView bus(options.bus, context, context.log);
   std::cerr << "watch_ready domain=" << context.options.domain << '\n';
-  const bool complete = watch.Run(signals);
-  if (options.count) {
-    watch.PrintCounts();
+  const bool json = context.options.json;
+  WatchRecords records(context.options.utc, [json](const WatchRecord& record) {
+    std::cout << (json ? record.object.dump(-1, ' ', false,
+                                            cli::Json::error_handler_t::replace)
+                       : record.line)
+              << '\n';
+  });
+  WatchCounts counts;
+  const Clock::time_point start = Clock::now();
+  Clock::time_point last_message = start;
+  const auto satisfied = [&] {
+    return options.expect > 0 && counts.decisions >= options.expect;
+  };
+  while (!signals.stop_requested() && !Passed(start, options.for_s) &&
+         !Passed(last_message, options.idle_s) && !satisfied()) {
+    bus.Take(
+        [&](const auto& message) {
+          counts.Add(message);
+          if constexpr (requires { message.valve_id; }) {
+            last_message = Clock::now();
+          }
+          if (!options.count) {
+            records.Add(message, Clock::now());
+          }
+        },
+        [](const std::string& /*valve_id*/) {});
+    records.Flush(Clock::now());
+    std::cout.flush();
   }
-  return complete ? cli::kExitOk : cli::kExitFailure;
+  records.Flush(Clock::time_point::max());
+  if (options.count) {
+    PrintCounts(counts, bus.lost(), json);
+  }
+  return options.expect == 0 || satisfied() ? cli::kExitOk : cli::kExitFailure;
 }
 
 }  // namespace
@@ -197,13 +119,13 @@ void AddWatchVerb(cli::Program& program) {
       });
   watch.add_flag("--count", options->count,
                  "Print only how many messages came, at the end");
-  watch.add_option("--valves", options->valves, "Only ids that match GLOB");
+  watch.add_option("--valves", options->bus.valves, "Only ids that match GLOB");
   watch.add_flag("--lossless", options->lossless,
                  "Miss no decision vector of a monitor that runs with "
                  "--lossless-decisions");
   watch.add_flag("--events", options->events_only, "No decision vectors");
   watch
-      .add_option("--max-valves", options->max_valves,
+      .add_option("--max-valves", options->bus.max_valves,
                   "Room for so many valves")
       ->check(CLI::Range(1, 100000));
   watch.add_option("--for", options->for_s, "Stop after so long [s]")

@@ -4,8 +4,9 @@
 #include "diagnosis/error.h"
 #include "monitor/console/access.h"
 #include "monitor/console/api.h"
-#include "storage/history_editor.h"
-#include "storage/history_shelf.h"
+#include "storage/history/alarm.h"
+#include "storage/history/history_editor.h"
+#include "storage/history/history_reader.h"
 
 namespace fdi::console {
 namespace {
@@ -38,32 +39,30 @@ storage::OperatorNote NoteOf(const Json& body, const httplib::Request& request,
           "console " + request.remote_addr, api.sources.utc_now_ns()};
 }
 
+// The alarm as it is now.
 Json AlarmRow(const Api& api, const std::string& id) {
-  const std::int64_t now_ns = api.sources.utc_now_ns();
   storage::HistoryReader reader(api.sources.history);
-  const auto shelves = storage::ReadShelves(reader.database(), now_ns);
   return AlarmJson(
-      storage::AsAlarms({reader.Show(id)}, shelves, now_ns).front(), api.texts);
+      reader.Alarms({reader.Show(id)}, api.sources.utc_now_ns()).front(),
+      api.texts);
 }
 
-Json Acknowledge(const Api& api, const httplib::Request& request) {
-  const Json body = BodyOf(request);
+Json Acknowledge(const Api& api, const httplib::Request& request,
+                 const Json& body) {
   const std::string id = request.matches[1];
   storage::HistoryEditor(api.sources.history)
       .Acknowledge(id, NoteOf(body, request, api));
   return AlarmRow(api, id);
 }
 
-Json Label(const Api& api, const httplib::Request& request) {
-  const Json body = BodyOf(request);
+Json Label(const Api& api, const httplib::Request& request, const Json& body) {
   const std::string id = request.matches[1];
   storage::HistoryEditor(api.sources.history)
       .Label(id, TextOf(body, "label"), NoteOf(body, request, api));
   return AlarmRow(api, id);
 }
 
-Json Shelve(const Api& api, const httplib::Request& request) {
-  const Json body = BodyOf(request);
+Json Shelve(const Api& api, const httplib::Request& request, const Json& body) {
   const auto minutes = body.find("minutes");
   if (minutes == body.end() || !minutes->is_number() ||
       minutes->get<double>() <= 0.0 ||
@@ -82,8 +81,8 @@ Json Shelve(const Api& api, const httplib::Request& request) {
                   note.now_ns + time_ns, note));
 }
 
-Json EndShelf(const Api& api, const httplib::Request& request) {
-  const Json body = BodyOf(request);
+Json EndShelf(const Api& api, const httplib::Request& request,
+              const Json& body) {
   try {
     return ShelfJson(storage::HistoryEditor(api.sources.history)
                          .EndShelf(std::stoll(request.matches[1]),
@@ -93,43 +92,52 @@ Json EndShelf(const Api& api, const httplib::Request& request) {
   }
 }
 
-using Action = Json (*)(const Api&, const httplib::Request&);
+struct Action {
+  const char* path;
+  Json (*perform)(const Api&, const httplib::Request&, const Json& body);
+};
 
-void AddAction(httplib::Server& server, const Api& api, const char* path,
-               Action action) {
-  const auto perform = Answering(
-      [&api, action](const httplib::Request& request, httplib::Response&) {
-        Json result = action(api, request);
-        api.feed.Wake();
-        return result;
-      });
-  server.Post(path, [&api, perform](const httplib::Request& request,
-                                    httplib::Response& response) {
-    switch (MayWrite(request.get_header_value("Authorization"), api.token)) {
-      case Permission::kReadOnly:
-        SendError(response, 403,
-                  "this console is read-only: start the monitor with "
-                  "--console-write FILE");
-        return;
-      case Permission::kWrongToken:
-        response.set_header("WWW-Authenticate", "Bearer");
-        SendError(response, 401,
-                  "Authorization: expected Bearer and the token of the file "
-                  "named by --console-write");
-        return;
-      case Permission::kGranted:
-        perform(request, response);
-    }
-  });
+constexpr Action kActions[] = {
+    {"/api/v1/episodes/([0-9a-f]{1,16})/ack", Acknowledge},
+    {"/api/v1/episodes/([0-9a-f]{1,16})/label", Label},
+    {"/api/v1/shelf", Shelve},
+    {"/api/v1/shelf/([0-9]{1,18})/end", EndShelf}};
+
+// @returns whether the request may change anything; if not, it is answered.
+bool Admitted(const Api& api, const httplib::Request& request,
+              httplib::Response& response) {
+  switch (MayWrite(request.get_header_value("Authorization"), api.token)) {
+    case Permission::kReadOnly:
+      SendError(response, 403,
+                "this console is read-only: start the monitor with "
+                "--console-write FILE");
+      return false;
+    case Permission::kWrongToken:
+      response.set_header("WWW-Authenticate", "Bearer");
+      SendError(response, 401,
+                "Authorization: expected Bearer and the token of the file "
+                "named by --console-write");
+      return false;
+    case Permission::kGranted:
+      break;
+  }
+  return true;
 }
 
 }  // namespace
 
 void AddActionRoutes(httplib::Server& server, const Api& api) {
-  AddAction(server, api, "/api/v1/episodes/([0-9a-f]{1,16})/ack", Acknowledge);
-  AddAction(server, api, "/api/v1/episodes/([0-9a-f]{1,16})/label", Label);
-  AddAction(server, api, "/api/v1/shelf", Shelve);
-  AddAction(server, api, "/api/v1/shelf/([0-9]{1,18})/end", EndShelf);
+  for (const Action& action : kActions) {
+    server.Post(action.path, [&api, action](const httplib::Request& request,
+                                            httplib::Response& response) {
+      if (Admitted(api, request, response)) {
+        Guarded(response, [&] {
+          SendJson(response, action.perform(api, request, BodyOf(request)));
+          api.stream.Wake();
+        });
+      }
+    });
+  }
 }
 
 }  // namespace fdi::console

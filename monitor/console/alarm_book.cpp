@@ -2,23 +2,19 @@
 
 #include <algorithm>
 #include <limits>
-#include <set>
 #include <utility>
 
 #include "diagnosis/error.h"
-#include "storage/history_shelf.h"
 
 namespace fdi::console {
 namespace {
 
 using storage::Alarm;
 using storage::AlarmState;
-using storage::Episode;
 
-std::map<std::string, ValveAlarm> ByValveOf(
-    const std::vector<Alarm>& alarms,
-    const std::vector<storage::Shelf>& shelves) {
-  std::map<std::string, ValveAlarm> by_valve;
+AlarmBook::ByValveMap ByValveOf(const std::vector<Alarm>& alarms,
+                                const std::vector<storage::Shelf>& shelves) {
+  AlarmBook::ByValveMap by_valve;
   for (const Alarm& alarm : alarms) {
     ValveAlarm& valve = by_valve[alarm.episode.valve_id];
     valve.unacked |= alarm.state == AlarmState::kUnacked ||
@@ -38,64 +34,40 @@ std::map<std::string, ValveAlarm> ByValveOf(
 
 }  // namespace
 
-std::vector<Alarm> CurrentAlarms(storage::HistoryReader& reader,
-                                 std::int64_t now_ns) {
-  storage::EpisodeFilter filter;
-  filter.limit = kAlarmLimit;
-  filter.state = storage::EpisodeState::kOpen;
-  std::vector<Episode> episodes = reader.List(filter);
-  filter.state = storage::EpisodeState::kUnacked;
-  std::vector<Episode> unacked = reader.List(filter);
-  std::erase_if(unacked, [](const Episode& e) { return !e.ended_ns; });
-  std::reverse(unacked.begin(), unacked.end());
-  const std::size_t room =
-      static_cast<std::size_t>(kAlarmLimit) - episodes.size();
-  episodes.insert(episodes.end(), unacked.begin(),
-                  unacked.begin() + static_cast<std::ptrdiff_t>(
-                                        std::min(room, unacked.size())));
-  std::stable_sort(episodes.begin(), episodes.end(),
-                   [](const Episode& a, const Episode& b) {
-                     return a.detected_ns > b.detected_ns;
-                   });
-  return storage::AsAlarms(std::move(episodes),
-                           storage::ReadShelves(reader.database(), now_ns),
-                           now_ns);
-}
-
-std::int64_t AlarmBook::EarliestEnd(
-    const std::vector<storage::Shelf>& shelves) const {
-  std::int64_t earliest = std::numeric_limits<std::int64_t>::max();
-  for (const storage::Shelf& shelf : shelves) {
-    earliest = std::min(earliest, shelf.until_ns);
-  }
-  return earliest;
+ValveAlarm AlarmFor(const AlarmBook::ByValveMap& alarms,
+                    const std::string& valve_id) {
+  const auto found = alarms.find(valve_id);
+  return found == alarms.end() ? ValveAlarm{} : found->second;
 }
 
 std::vector<Json> AlarmBook::Refresh(std::int64_t now_ns) {
+  // SQLite changes the data version when another connection commits. A shelf
+  // that runs out changes alarms without a commit.
   const std::int64_t version = reader_.database().DataVersion();
-  if (data_version_ == version && now_ns < look_again_ns_) {
+  if (data_version_ == version && now_ns < earliest_shelf_end_ns_) {
     return {};
   }
-  const std::vector<Alarm> alarms = CurrentAlarms(reader_, now_ns);
-  const auto shelves = storage::ReadShelves(reader_.database(), now_ns);
+  const std::vector<Alarm> alarms = reader_.AlarmList(now_ns);
+  const auto shelves = reader_.Shelves(now_ns);
   std::map<std::string, std::string> rows;
   std::vector<Json> changed;
   for (const Alarm& alarm : alarms) {
+    const std::string& id = alarm.episode.episode_id;
     Json row = AlarmJson(alarm, texts_);
-    const std::string& text = rows[alarm.episode.episode_id] = Dump(row);
-    const auto known = rows_.find(alarm.episode.episode_id);
-    if (known == rows_.end() || known->second != text) {
+    rows[id] = Dump(row);
+    const auto known = rows_.find(id);
+    if (known == rows_.end() || known->second != rows[id]) {
       changed.push_back(std::move(row));
     }
   }
   for (const auto& [id, text] : rows_) {
-    if (!rows.contains(id)) {
-      try {
-        changed.push_back(AlarmJson(
-            storage::AsAlarms({reader_.Show(id)}, shelves, now_ns).front(),
-            texts_));
-      } catch (const NotFoundError&) {  // Pruned.
-      }
+    if (rows.contains(id)) {
+      continue;
+    }
+    try {
+      const auto left = reader_.Alarms({reader_.Show(id)}, now_ns);
+      changed.push_back(AlarmJson(left.front(), texts_));
+    } catch (const NotFoundError&) {  // Pruned.
     }
   }
   if (!data_version_) {
@@ -103,16 +75,18 @@ std::vector<Json> AlarmBook::Refresh(std::int64_t now_ns) {
   }
   rows_ = std::move(rows);
   data_version_ = version;
-  look_again_ns_ = EarliestEnd(shelves);
-  auto by_valve = std::make_shared<const std::map<std::string, ValveAlarm>>(
-      ByValveOf(alarms, shelves));
+  earliest_shelf_end_ns_ = std::numeric_limits<std::int64_t>::max();
+  for (const storage::Shelf& shelf : shelves) {
+    earliest_shelf_end_ns_ = std::min(earliest_shelf_end_ns_, shelf.until_ns);
+  }
+  auto by_valve =
+      std::make_shared<const ByValveMap>(ByValveOf(alarms, shelves));
   const std::lock_guard lock(mutex_);
   by_valve_ = std::move(by_valve);
   return changed;
 }
 
-std::shared_ptr<const std::map<std::string, ValveAlarm>> AlarmBook::ByValve()
-    const {
+std::shared_ptr<const AlarmBook::ByValveMap> AlarmBook::ByValve() const {
   const std::lock_guard lock(mutex_);
   return by_valve_;
 }

@@ -10,46 +10,41 @@
 #include <vector>
 
 #include "monitor/console/json.h"
-#include "storage/alarm.h"
-#include "storage/history_reader.h"
+#include "storage/history/history_reader.h"
 
 namespace fdi::console {
 
-inline constexpr std::int64_t kAlarmLimit = 500;
-
-/// Episodes that are open and those that have ended and nobody acknowledged,
-/// the newest first; of more than kAlarmLimit the open ones.
-std::vector<storage::Alarm> CurrentAlarms(storage::HistoryReader& reader,
-                                          std::int64_t now_ns);
-
-/// The alarms of the history, followed by looking: also what other programs
-/// did and shelves that ran out are noticed.
+/// The alarms of the history, followed by polling history.db: this also notices
+/// what other programs did and shelves that ran out.
 class AlarmBook {
  public:
+  using ByValveMap = std::map<std::string, ValveAlarm>;
+
   AlarmBook(const std::filesystem::path& history, const cli::FaultTexts& texts)
       : reader_(history), texts_(texts) {}
 
-  /// Looks into the history. One thread.
-  /// @returns what is new, has changed or is off the list, as JSON rows; of the
-  ///   first call nothing.
+  /// Polls the history. One thread.
+  /// @returns what is new, has changed or has left the list, as JSON rows; of
+  ///   the first call nothing.
   /// @throws storage::SqliteError, DataError
   std::vector<Json> Refresh(std::int64_t now_ns);
 
-  /// By valve id. Thread safe; as of the last Refresh().
-  std::shared_ptr<const std::map<std::string, ValveAlarm>> ByValve() const;
+  /// By valve id, as of the last Refresh(). Thread safe.
+  std::shared_ptr<const ByValveMap> ByValve() const;
 
  private:
-  std::int64_t EarliestEnd(const std::vector<storage::Shelf>& shelves) const;
-
   storage::HistoryReader reader_;
   const cli::FaultTexts& texts_;
   std::optional<std::int64_t> data_version_;
-  std::int64_t look_again_ns_{0};            // A shelf runs out.
-  std::map<std::string, std::string> rows_;  // By episode, as they were told.
+  std::int64_t earliest_shelf_end_ns_{0};
+  std::map<std::string, std::string> rows_;  // By episode, as last returned.
 
   mutable std::mutex mutex_;
-  std::shared_ptr<const std::map<std::string, ValveAlarm>> by_valve_{
-      std::make_shared<std::map<std::string, ValveAlarm>>()};
+  std::shared_ptr<const ByValveMap> by_valve_{std::make_shared<ByValveMap>()};
 };
+
+/// What `alarms` say of a valve; nothing special if it is not among them.
+ValveAlarm AlarmFor(const AlarmBook::ByValveMap& alarms,
+                    const std::string& valve_id);
 
 }  // namespace fdi::console

@@ -14,9 +14,29 @@ namespace {
 constexpr std::int64_t kNsPerMs = 1'000'000;
 constexpr std::int64_t kLastMs = 9'000'000'000'000;  // year 2255
 
-// What `send` throws becomes the answer.
-template <typename Send>
-void Guarded(httplib::Response& response, Send send) {
+// For the middle of a sentence: "flow transmitter ..." but "CV ...".
+std::string PlainName(const cli::FaultTexts& texts, std::string_view fault) {
+  std::string name = texts.Words(fault, 0.0).name;
+  if (name.size() > 1 &&
+      std::islower(static_cast<unsigned char>(name[1])) != 0) {
+    name[0] =
+        static_cast<char>(std::tolower(static_cast<unsigned char>(name[0])));
+  }
+  return name;
+}
+
+}  // namespace
+
+Json Api::Words(const ModelFacts* models, const TracePoint* point) const {
+  if (models == nullptr || point == nullptr) {
+    return {};
+  }
+  return Explain(*models, *point, [this](std::string_view fault) {
+    return PlainName(texts, fault);
+  });
+}
+
+void Guarded(httplib::Response& response, const std::function<void()>& send) {
   response.set_header("Cache-Control", "no-store");
   try {
     send();
@@ -33,17 +53,23 @@ void Guarded(httplib::Response& response, Send send) {
   }
 }
 
-}  // namespace
-
-std::string Api::PlainName(std::string_view fault) const {
-  std::string name = texts.Words(fault, 0.0).name;
-  // "Flow transmitter ..." but "CV ..."
-  if (name.size() > 1 &&
-      std::islower(static_cast<unsigned char>(name[1])) != 0) {
-    name[0] =
-        static_cast<char>(std::tolower(static_cast<unsigned char>(name[0])));
+void AddRoutes(httplib::Server& server, const Api& api,
+               std::span<const Route> routes) {
+  for (const Route& route : routes) {
+    server.Get(route.path, [&api, route](const httplib::Request& request,
+                                         httplib::Response& response) {
+      Guarded(response, [&] {
+        if (route.json != nullptr) {
+          SendJson(response, route.json(api, request));
+          return;
+        }
+        const File file = route.file(api, request);
+        response.set_header("Content-Disposition",
+                            "attachment; filename=\"" + file.name + "\"");
+        response.set_content(file.body, file.type.c_str());
+      });
+    });
   }
-  return name;
 }
 
 void SendJson(httplib::Response& response, const Json& json) {
@@ -54,26 +80,6 @@ void SendError(httplib::Response& response, int status,
                const std::string& what) {
   response.status = status;
   SendJson(response, {{"error", what}});
-}
-
-Handler Answering(Answer answer) {
-  return [answer = std::move(answer)](const httplib::Request& request,
-                                      httplib::Response& response) {
-    Guarded(response, [&] { SendJson(response, answer(request, response)); });
-  };
-}
-
-Handler AnsweringFile(
-    std::function<FileAnswer(const httplib::Request&)> answer) {
-  return [answer = std::move(answer)](const httplib::Request& request,
-                                      httplib::Response& response) {
-    Guarded(response, [&] {
-      const FileAnswer file = answer(request);
-      response.set_header("Content-Disposition",
-                          "attachment; filename=\"" + file.name + "\"");
-      response.set_content(file.body, file.type.c_str());
-    });
-  };
 }
 
 std::optional<std::string> Parameter(const httplib::Request& request,

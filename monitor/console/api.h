@@ -3,17 +3,18 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "cli/fault_texts.h"
 #include "monitor/console/alarm_book.h"
 #include "monitor/console/live_board.h"
-#include "monitor/console/live_feed.h"
-#include "monitor/console/stored_models.h"
-#include "monitor/console/stream_hub.h"
-#include "storage/cli/fault_texts.h"
+#include "monitor/console/live_stream.h"
+#include "monitor/planner/work_list.h"
 
 namespace httplib {
 class Server;
@@ -40,59 +41,67 @@ struct ConsoleSources {
   std::function<std::int64_t()> utc_now_ns;
 };
 
-/// What answers are made of; all outlive the server.
+/// The last work list that was asked for. Reading months of all valves takes a
+/// while, so it is valid for a minute.
+struct WorkListCache {
+  std::mutex mutex;
+  std::string query;
+  std::int64_t read_ns{0};
+  std::vector<planner::WorkRow> rows;
+};
+
+/// What answers are made of; all that it refers to outlives the server.
 struct Api {
   ConsoleSources sources;
   LiveBoard& board;
-  StreamHub& hub;
-  LiveFeed& feed;
+  LiveStream& stream;
   AlarmBook& alarms;
   StoredModels& models;
+  WorkListCache& work_list;
   const cli::FaultTexts& texts;
   std::string token;     ///< Empty: read-only.
   std::string instance;  ///< Differs after a restart.
 
-  /// FaultNamer of the catalogue, for the middle of a sentence.
-  std::string PlainName(std::string_view fault) const;
+  /// Explain(), with the faults called as the catalogue does.
+  Json Words(const ModelFacts* models, const TracePoint* point) const;
 };
 
-/// /api/v1/status, faults, valves, valves/ID/trend.
-void AddLiveRoutes(httplib::Server& server, const Api& api);
-/// /api/v1/stream
-void AddStreamRoute(httplib::Server& server, const Api& api);
-/// /api/v1/alarms, history, statistics, shelf
-void AddHistoryRoutes(httplib::Server& server, const Api& api);
-/// /api/v1/episodes/ID, ID.csv
-void AddEpisodeRoutes(httplib::Server& server, const Api& api);
-/// /api/v1/episodes/ID.svg, ID.png
-void AddPictureRoutes(httplib::Server& server, const Api& api);
-/// What changes the history, for who has the token.
-void AddActionRoutes(httplib::Server& server, const Api& api);
-/// /api/v1/worklist, worklist.csv, valves/ID/health
-void AddPlannerRoutes(httplib::Server& server, const Api& api);
-
-using Handler =
-    std::function<void(const httplib::Request&, httplib::Response&)>;
-using Answer = std::function<Json(const httplib::Request&, httplib::Response&)>;
-
-/// A handler that sends what `answer` returns. What it throws becomes
-/// {"error"} with 400 for ConfigError and std::invalid_argument, 404 for
-/// NotFoundError, 503 for a history that is busy, else 500.
-Handler Answering(Answer answer);
-
-/// A file to be kept, made of what the history tells.
-struct FileAnswer {
+/// A file for the user to save.
+struct File {
   std::string type;
   std::string name;
   std::string body;
 };
-/// As Answering().
-Handler AnsweringFile(
-    std::function<FileAnswer(const httplib::Request&)> answer);
+
+/// What answers GET of paths that match a regular expression: JSON or a file.
+struct Route {
+  const char* path;
+  Json (*json)(const Api&, const httplib::Request&);
+  File (*file)(const Api&, const httplib::Request&){nullptr};
+};
+
+/// /api/v1/status, faults, valves, valves/ID/trend.
+std::span<const Route> LiveRoutes();
+/// /api/v1/alarms, history, statistics, shelf, episodes/ID with .csv .svg .png.
+std::span<const Route> HistoryRoutes();
+/// /api/v1/worklist, worklist.csv, valves/ID/health.
+std::span<const Route> PlannerRoutes();
+
+/// An exception becomes {"error"} with 400 for ConfigError and
+/// std::invalid_argument, 404 for NotFoundError, 503 for a history that is
+/// busy, else 500.
+void AddRoutes(httplib::Server& server, const Api& api,
+               std::span<const Route> routes);
+/// /api/v1/stream
+void AddStreamRoute(httplib::Server& server, const Api& api);
+/// POST: changes to the history, for clients that have the token.
+void AddActionRoutes(httplib::Server& server, const Api& api);
 
 void SendJson(httplib::Response& response, const Json& json);
 void SendError(httplib::Response& response, int status,
                const std::string& what);
+/// Runs `send`; exceptions are answered as those of AddRoutes().
+void Guarded(httplib::Response& response, const std::function<void()>& send);
 
 /// The parameter of the query, or nothing if it is not there or empty.
 std::optional<std::string> Parameter(const httplib::Request& request,

@@ -4,9 +4,9 @@
 
 #include <httplib.h>
 
+#include "cli/shared_files.h"
 #include "diagnosis/error.h"
 #include "monitor/console/access.h"
-#include "storage/cli/shared_files.h"
 
 namespace fdi::console {
 namespace {
@@ -17,11 +17,6 @@ constexpr std::size_t kMaxBody = 16 * 1024;
 constexpr const char* kPolicy =
     "default-src 'self'; img-src 'self' data:; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'";
-
-monitor::HttpServerOptions ServerOptionsOf(const ConsoleOptions& options) {
-  return {options.address, "--console",
-          StreamOptions{}.max_clients + kAnsweringThreads, kMaxBody};
-}
 
 std::string NewInstance() {
   std::random_device random;
@@ -49,13 +44,13 @@ class Console::Events : public monitor::EventSink {
   Events(monitor::EventSink& bus, Console& console)
       : bus_(bus), console_(console) {}
 
-  bool Publish(const monitor::EpisodeEvent& event, bool persisted) override {
+  bool Publish(const FaultEvent& event, bool persisted) override {
     const bool sent = bus_.Publish(event, persisted);
     console_.board_.Mark(event);
     if (persisted) {
-      console_.feed_->Wake();
+      console_.stream_.Wake();
     } else {
-      console_.feed_->TellUnstored(event);
+      console_.stream_.AddUnstored(event);
     }
     return sent;
   }
@@ -82,7 +77,9 @@ std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked) {
 
 Console::Console(const ConsoleOptions& options,
                  const cli::GlobalOptions& global, LogSink log)
-    : server_(std::make_unique<monitor::HttpServer>(ServerOptionsOf(options))),
+    : server_(std::make_unique<monitor::HttpServer>(monitor::HttpServerOptions{
+          options.address, "--console",
+          StreamOptions{}.max_clients + kAnsweringThreads, kMaxBody})),
       files_(FindConsoleFiles(options.files)),
       token_(options.token_file ? LoadToken(*options.token_file) : ""),
       texts_(cli::LoadFaultTexts(global)),
@@ -104,22 +101,18 @@ monitor::EventSink& Console::Before(monitor::EventSink& bus) {
 void Console::Start(ConsoleSources sources) {
   models_ = std::make_unique<StoredModels>(sources.models);
   alarms_ = std::make_unique<AlarmBook>(sources.history, texts_);
-  feed_ = std::make_unique<LiveFeed>(
-      FeedParts{board_, hub_, *alarms_, texts_, sources.utc_now_ns, log_});
-  api_ = std::make_unique<Api>(Api{std::move(sources), board_, hub_, *feed_,
-                                   *alarms_, *models_, texts_, token_,
-                                   NewInstance()});
+  api_ = std::make_unique<Api>(Api{std::move(sources), board_, stream_,
+                                   *alarms_, *models_, work_list_, texts_,
+                                   token_, NewInstance()});
+  SetRulesOfEveryAnswer();
   httplib::Server& routes = server_->routes();
-  Guard();
-  AddLiveRoutes(routes, *api_);
+  for (const auto group : {LiveRoutes(), HistoryRoutes(), PlannerRoutes()}) {
+    AddRoutes(routes, *api_, group);
+  }
   AddStreamRoute(routes, *api_);
-  AddHistoryRoutes(routes, *api_);
-  AddEpisodeRoutes(routes, *api_);
-  AddPictureRoutes(routes, *api_);
   AddActionRoutes(routes, *api_);
-  AddPlannerRoutes(routes, *api_);
-  AddFiles();
-  feed_->Start();
+  routes.set_mount_point("/", files_.string(), {{"Cache-Control", "no-cache"}});
+  stream_.Start({board_, *alarms_, texts_, api_->sources.utc_now_ns, log_});
   server_->Start();
   const std::string& host = server_->address().host;
   log_(IsLoopback(host) ? LogLevel::kInfo : LogLevel::kWarning,
@@ -129,29 +122,20 @@ void Console::Start(ConsoleSources sources) {
 }
 
 void Console::Stop() {
-  hub_.Close();
-  server_->Stop();
+  stream_.Close();
+  if (server_) {
+    server_->Stop();
+  }
 }
 
 void Console::Close() {
-  if (server_) {
-    Stop();
-    server_.reset();
-  }
-  if (feed_) {
-    feed_->Stop();
-  }
+  // HTTP threads that write to a stream wait for its end, so that comes first.
+  Stop();
+  server_.reset();
+  stream_.Stop();
 }
 
-void Console::AddFiles() {
-  httplib::Server& routes = server_->routes();
-  routes.set_file_extension_and_mimetype_mapping("webmanifest",
-                                                 "application/manifest+json");
-  routes.set_mount_point("/", files_.string(), {{"Cache-Control", "no-cache"}});
-}
-
-// What holds for every answer.
-void Console::Guard() {
+void Console::SetRulesOfEveryAnswer() {
   httplib::Server& routes = server_->routes();
   routes.set_tcp_nodelay(true);
   routes.set_default_headers({{"Content-Security-Policy", kPolicy},

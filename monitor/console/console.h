@@ -25,39 +25,41 @@ struct ConsoleOptions {
 ///   nothing was asked for and none is installed.
 std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked);
 
-/// The live page of a monitor and its API (docs/console.md): shows what the
-/// pipeline tells it, reads the history, and lets those act who have the token.
-/// Threads of its own; neither diagnosis nor bus waits for any of them.
+/// The live page of a monitor and its API (docs/console.md): it shows what the
+/// pipeline passes to live(), reads the history, and lets those act who have
+/// the token. It has threads of its own; neither diagnosis nor bus waits for
+/// any of them.
 class Console {
  public:
   /// Binds the address and finds its files; nothing is answered yet.
   /// @throws ConfigError, DataError, NotFoundError, std::runtime_error
   Console(const ConsoleOptions& options, const cli::GlobalOptions& global,
           LogSink log);
+  /// As Close().
   ~Console();
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
 
   /// For the pipeline.
   monitor::LiveSink& live() { return board_; }
-  /// For the pipeline, in front of `bus`: events are shown once they are sent,
-  /// and so stored, if the history takes them.
+  /// For the pipeline, in front of `bus`: an event is shown once it is on the
+  /// bus, by which time it is in the history, unless that failed.
   monitor::EventSink& Before(monitor::EventSink& bus);
 
   /// Answers from now on. Once, with a history, before the pipeline starts.
+  /// What throws in here leaves no thread behind.
   void Start(ConsoleSources sources);
   /// Ends all streams and takes no further connections. Does not wait.
   void Stop();
-  /// Stops and waits for all threads: sources are not called any more.
+  /// Stops and waits for all threads: from here on `sources` are not called.
   void Close();
 
-  StreamCounts streams() const { return hub_.counts(); }
+  StreamCounts streams() const { return stream_.counts(); }
   std::size_t board_bytes() const { return board_.bytes(); }
 
  private:
   class Events;
-  void AddFiles();
-  void Guard();
+  void SetRulesOfEveryAnswer();
 
   std::unique_ptr<monitor::HttpServer> server_;
   std::filesystem::path files_;
@@ -65,11 +67,11 @@ class Console {
   cli::FaultTexts texts_;
   LogSink log_;
   LiveBoard board_;
-  StreamHub hub_;
+  LiveStream stream_;
+  WorkListCache work_list_;
   std::unique_ptr<Events> events_;
   std::unique_ptr<StoredModels> models_;
   std::unique_ptr<AlarmBook> alarms_;
-  std::unique_ptr<LiveFeed> feed_;
   std::unique_ptr<Api> api_;
 };
 

@@ -1,36 +1,33 @@
-// What the history tells: alarms, episodes, figures, shelves.
+// What the history tells: alarms, episodes with their evidence, figures,
+// shelves.
 #include <algorithm>
 #include <limits>
+#include <mutex>
+#include <sstream>
 
 #include <httplib.h>
 
+#include "cli/csv.h"
+#include "cli/plot/episode_figure.h"
+#include "cli/plot/gnuplot.h"
+#include "cli/report.h"
+#include "cli/time_text.h"
+#include "diagnosis/error.h"
 #include "monitor/console/api.h"
-#include "storage/alarm_statistics.h"
-#include "storage/cli/time_text.h"
-#include "storage/history_shelf.h"
 
 namespace fdi::console {
 namespace {
 
-using storage::Alarm;
 using storage::HistoryReader;
 
 constexpr std::int64_t kNsPerDay = 86'400'000'000'000;
 constexpr std::int64_t kPageLimit = 1000;
 
-Json AlarmsJson(const std::vector<Alarm>& alarms, const Api& api) {
-  Json list = Json::array();
-  for (const Alarm& alarm : alarms) {
-    list.push_back(AlarmJson(alarm, api.texts));
-  }
-  return list;
-}
-
-Json Alarms(const Api& api) {
+Json Alarms(const Api& api, const httplib::Request& /*request*/) {
   const std::int64_t now_ns = api.sources.utc_now_ns();
   HistoryReader reader(api.sources.history);
   return {{"now_ms", Ms(now_ns)},
-          {"alarms", AlarmsJson(CurrentAlarms(reader, now_ns), api)}};
+          {"alarms", AlarmsJson(reader.AlarmList(now_ns), api.texts)}};
 }
 
 storage::EpisodeFilter FilterOf(const Api& api,
@@ -46,7 +43,8 @@ storage::EpisodeFilter FilterOf(const Api& api,
   return filter;
 }
 
-// The newest first; a page ends before the oldest of the one before.
+// The newest first. A page goes on below the oldest row of the one before it,
+// which the page asks for as before_ms.
 Json History(const Api& api, const httplib::Request& request) {
   storage::EpisodeFilter filter = FilterOf(api, request);
   const std::int64_t limit =
@@ -62,11 +60,10 @@ Json History(const Api& api, const httplib::Request& request) {
   if (more) {
     episodes.pop_back();
   }
-  const auto shelves = storage::ReadShelves(reader.database(), filter.now_ns);
-  return {{"episodes", AlarmsJson(storage::AsAlarms(std::move(episodes),
-                                                    shelves, filter.now_ns),
-                                  api)},
-          {"more", more}};
+  return {
+      {"episodes", AlarmsJson(reader.Alarms(std::move(episodes), filter.now_ns),
+                              api.texts)},
+      {"more", more}};
 }
 
 Json DaysJson(const storage::AlarmStatistics& statistics) {
@@ -109,12 +106,10 @@ Json FaultsJson(const storage::AlarmStatistics& statistics, const Api& api) {
 Json Statistics(const Api& api, const httplib::Request& request) {
   const storage::EpisodeFilter filter = FilterOf(api, request);
   HistoryReader reader(api.sources.history);
-  const auto statistics = storage::ComputeAlarmStatistics(
-      storage::ReadAlarmSpans(reader.database(), filter), filter.since_ns,
-      filter.until_ns, filter.now_ns);
+  const auto statistics = reader.AlarmFigures(filter, filter.now_ns);
   Json gaps = Json::array();
-  for (const storage::DataGap& gap : reader.Gaps(filter)) {
-    gaps.push_back(GapJson({gap.valve_id, gap.from_ns, gap.to_ns, gap.reason}));
+  for (const DataGap& gap : reader.Gaps(filter)) {
+    gaps.push_back(GapJson(gap));
   }
   return {{"per_day", DaysJson(statistics)},
           {"valves", ValvesJson(statistics)},
@@ -127,37 +122,201 @@ Json Statistics(const Api& api, const httplib::Request& request) {
           {"gaps", std::move(gaps)}};
 }
 
-Json Shelves(const Api& api) {
+Json Shelves(const Api& api, const httplib::Request& /*request*/) {
   HistoryReader reader(api.sources.history);
   Json list = Json::array();
-  for (const storage::Shelf& shelf :
-       storage::ReadShelves(reader.database(), api.sources.utc_now_ns())) {
+  for (const storage::Shelf& shelf : reader.Shelves(api.sources.utc_now_ns())) {
     list.push_back(ShelfJson(shelf));
   }
   return {{"shelf", std::move(list)}};
 }
 
+// Of what people did, a value and who; of transitions, what was decided.
+Json EventJson(const storage::HistoryEntry& event) {
+  const bool by_hand = !event.who.empty();
+  return {{"kind", event.kind},
+          {"at_ms", Ms(event.stamp_ns)},
+          {"recorded_ms", Ms(event.recorded_ns)},
+          {"faults", TextOrNull(event.faults)},
+          {"factor", by_hand ? Json() : Rounded(event.factor, 3)},
+          {"strength", by_hand ? Json() : Rounded(event.strength, 3)},
+          {"reason", TextOrNull(event.reason)},
+          {"value", TextOrNull(event.value)},
+          {"who", TextOrNull(event.who)},
+          {"comment", TextOrNull(event.comment)},
+          {"origin", TextOrNull(event.origin)}};
+}
+
+Json MarksOf(const std::vector<storage::HistoryEntry>& events) {
+  Json marks = Json::array();
+  for (const storage::HistoryEntry& event : events) {
+    if (event.who.empty()) {
+      marks.push_back(
+          {{"t_ms", Ms(event.stamp_ns)},
+           {"kind", event.kind},
+           {"text", event.faults.empty() ? event.reason : event.faults}});
+    }
+  }
+  return marks;
+}
+
+Json GapsOf(HistoryReader& reader, const storage::Episode& episode,
+            const std::vector<TracePoint>& points) {
+  Json gaps = Json::array();
+  if (points.empty()) {
+    return gaps;
+  }
+  storage::EpisodeFilter filter;
+  filter.since_ns = points.front().sample.stamp_ns;
+  filter.until_ns = points.back().sample.stamp_ns;
+  for (const DataGap& gap : reader.Gaps(filter)) {
+    if (gap.valve_id.empty() || gap.valve_id == episode.valve_id) {
+      gaps.push_back(GapJson(gap));
+    }
+  }
+  return gaps;
+}
+
+// Where the episode is best understood: at its isolation, else the last
+// instant that was abnormal.
+const TracePoint* Telling(const storage::Episode& episode,
+                          const std::vector<TracePoint>& points) {
+  const TracePoint* telling = nullptr;
+  for (const TracePoint& point : points) {
+    const bool before_isolation =
+        !episode.isolated_ns || point.sample.stamp_ns <= *episode.isolated_ns;
+    if (point.state != State::kNormal && before_isolation) {
+      telling = &point;
+    }
+  }
+  return telling;
+}
+
+Json Episode(const Api& api, const httplib::Request& request) {
+  HistoryReader reader(api.sources.history);
+  const storage::Alarm alarm =
+      reader
+          .Alarms({reader.Show(std::string(request.matches[1]))},
+                  api.sources.utc_now_ns())
+          .front();
+  const storage::Episode& episode = alarm.episode;
+  const auto events = reader.Events(episode.id);
+  const std::vector<TracePoint> points = reader.Trace(episode.id);
+  const auto models = api.models.For(episode);
+
+  Json trace = TrendJson(models.get(), episode.valve_id, points);
+  trace["gaps"] = GapsOf(reader, episode, points);
+  trace["marks"] = MarksOf(events);
+  trace["words"] = api.Words(models.get(), Telling(episode, points));
+  Json list = Json::array();
+  for (const storage::HistoryEntry& event : events) {
+    list.push_back(EventJson(event));
+  }
+  return {{"episode", AlarmJson(alarm, api.texts)},
+          {"events", std::move(list)},
+          {"trace", std::move(trace)},
+          {"model_hash", ModelFactsJson(*models)["hash"]}};
+}
+
+std::string ColumnName(Signal signal, FlowUnit unit) {
+  for (const cli::SignalColumn& column : cli::kSignalColumns) {
+    if (column.signal == signal &&
+        (signal != Signal::kF || column.flow_unit == unit)) {
+      return std::string(column.name);
+    }
+  }
+  return std::string(SignalName(signal));
+}
+
+Json CsvRow(const TracePoint& point, SignalMask signals,
+            const ModelFacts& models) {
+  Json row{{"utc", cli::FormatTime(point.sample.stamp_ns, true)}};
+  const auto value = [](const std::vector<double>& values, std::size_t i) {
+    return i < values.size() ? Rounded(values[i], 6) : Json();
+  };
+  for (std::size_t s = 0; s < kSignalCount; ++s) {
+    const auto signal = static_cast<Signal>(s);
+    if ((signals & MaskOf(signal)) != 0) {
+      row[ColumnName(signal, models.flow_unit)] =
+          point.sample.Has(signal) ? Rounded(point.sample[signal], 6) : Json();
+    }
+  }
+  for (std::size_t c = 0; c < models.channels.size(); ++c) {
+    row["r_" + models.channels[c].name] = value(point.residuals, c);
+  }
+  row["d0"] = Rounded(point.normal_factor, 6);
+  for (std::size_t f = 0; f < models.faults.size(); ++f) {
+    row["d_" + models.faults[f]] = value(point.factors, f);
+  }
+  row["state"] = StateName(point.state);
+  row["quality"] = QualityName(point.quality);
+  return row;
+}
+
+// The evidence as CSV: readings under the column names that the programs
+// import, then residuals r_CHANNEL, d0 and d_FAULT.
+File EpisodeCsv(const Api& api, const httplib::Request& request) {
+  const std::string id = request.matches[1];
+  HistoryReader reader(api.sources.history);
+  const storage::Episode episode = reader.Show(id);
+  const auto models = api.models.For(episode);
+  const std::vector<TracePoint> points = reader.Trace(episode.id);
+  SignalMask signals = 0;
+  for (const TracePoint& point : points) {
+    signals = static_cast<SignalMask>(signals | point.sample.present);
+  }
+  std::vector<cli::Column> columns;
+  const Json keys = CsvRow({}, signals, *models);
+  for (const auto& [key, value] : keys.items()) {
+    columns.push_back({key, key});
+  }
+  cli::Report report;
+  Json& rows = report.document["rows"] = Json::array();
+  for (const TracePoint& point : points) {
+    rows.push_back(CsvRow(point, signals, *models));
+  }
+  std::ostringstream csv;
+  report.Table("rows", std::move(columns)).PrintCsv(csv);
+  return {"text/csv; charset=utf-8", "episode-" + id + ".csv", csv.str()};
+}
+
+// The picture of `fdi-store history plot`, drawn by gnuplot.
+File EpisodePicture(const Api& api, const httplib::Request& request) {
+  const std::string id = request.matches[1];
+  const std::string ending = request.matches[2];
+  if (!plot::HaveGnuplot()) {
+    throw NotFoundError(
+        "gnuplot is not installed; on Debian it is in gnuplot-nox");
+  }
+  HistoryReader reader(api.sources.history);
+  const plot::EpisodeEvidence evidence =
+      plot::LoadEvidence(reader, id, api.sources.models);
+  plot::EpisodeFigureOptions options;
+  options.fault_name =
+      api.texts.Words(evidence.episode.fault.value_or(""), 0.0).name;
+  // A picture takes a whole processor, so only one is drawn at a time.
+  static std::mutex drawing;
+  const std::lock_guard lock(drawing);
+  const bool svg = ending == "svg";
+  return {svg ? "image/svg+xml" : "image/png", "episode-" + id + "." + ending,
+          plot::DrawFigure(plot::EpisodeFigure(evidence, options),
+                           svg ? plot::Format::kSvg : plot::Format::kPng)};
+}
+
+constexpr Route kRoutes[] = {
+    {"/api/v1/alarms", Alarms},
+    {"/api/v1/history", History},
+    {"/api/v1/statistics", Statistics},
+    {"/api/v1/shelf", Shelves},
+    {"/api/v1/episodes/([0-9a-fA-F]{1,16}|last)", Episode},
+    {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.csv", nullptr, EpisodeCsv},
+    {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.(svg|png)", nullptr,
+     EpisodePicture}};
+
 }  // namespace
 
-void AddHistoryRoutes(httplib::Server& server, const Api& api) {
-  server.Get("/api/v1/alarms",
-             Answering([&api](const httplib::Request&, httplib::Response&) {
-               return Alarms(api);
-             }));
-  server.Get(
-      "/api/v1/history",
-      Answering([&api](const httplib::Request& request, httplib::Response&) {
-        return History(api, request);
-      }));
-  server.Get(
-      "/api/v1/statistics",
-      Answering([&api](const httplib::Request& request, httplib::Response&) {
-        return Statistics(api, request);
-      }));
-  server.Get("/api/v1/shelf",
-             Answering([&api](const httplib::Request&, httplib::Response&) {
-               return Shelves(api);
-             }));
+std::span<const Route> HistoryRoutes() {
+  return kRoutes;
 }
 
 }  // namespace fdi::console

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "diagnosis/fault_catalogue.h"
+
 namespace fdi::console {
 namespace {
 
@@ -17,6 +19,12 @@ std::string KeyOf(Signal signal) {
     return static_cast<char>(std::tolower(c));
   });
   return key;
+}
+
+Json Reading(const TracePoint& point, Signal signal) {
+  return point.sample.Has(signal)
+             ? Rounded(point.sample[signal], kReadingDecimals)
+             : Json();
 }
 
 std::string_view QualityOf(const ValveState& valve) {
@@ -42,19 +50,17 @@ Json FaultsOf(const ValveState& valve) {
   return faults;
 }
 
-Json FactorsJson(const std::vector<double>& factors) {
+Json RoundedList(const std::vector<double>& values, int decimals) {
   Json list = Json::array();
-  for (const double factor : factors) {
-    list.push_back(Rounded(factor, kFactorDecimals));
+  for (const double value : values) {
+    list.push_back(Rounded(value, decimals));
   }
   return list;
 }
 
-Json ChannelsJson(const ModelFacts* models) {
+Json ChannelsJson(const ModelFacts& models) {
   Json channels = Json::array();
-  for (std::size_t c = 0; models != nullptr && c < models->channels.size();
-       ++c) {
-    const ModelFacts::Channel& channel = models->channels[c];
+  for (const ModelFacts::Channel& channel : models.channels) {
     channels.push_back({{"name", channel.name},
                         {"unit", channel.unit},
                         {"low", channel.low},
@@ -63,50 +69,21 @@ Json ChannelsJson(const ModelFacts* models) {
   return channels;
 }
 
-// A column for each signal that any of the points has.
-void AddReadings(const std::vector<monitor::TracePoint>& points, Json& trend) {
-  SignalMask present = 0;
-  for (const monitor::TracePoint& point : points) {
-    present = static_cast<SignalMask>(present | point.sample.present);
-  }
-  for (std::size_t s = 0; s < kSignalCount; ++s) {
-    const auto signal = static_cast<Signal>(s);
-    if ((present & MaskOf(signal)) == 0) {
-      continue;
-    }
-    Json column = Json::array();
-    for (const monitor::TracePoint& point : points) {
-      column.push_back(point.sample.Has(signal)
-                           ? Rounded(point.sample[signal], kReadingDecimals)
-                           : Json());
-    }
-    trend[KeyOf(signal)] = std::move(column);
+// Appends to each column its value in `row`; null where a point has none.
+void AppendTo(Json& columns, const std::vector<double>& row, int decimals) {
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    columns[c].push_back(c < row.size() ? Rounded(row[c], decimals) : Json());
   }
 }
 
-// One column of numbers per index; null where a point has none.
-template <typename Values>
-Json Columns(const std::vector<monitor::TracePoint>& points, std::size_t count,
-             int decimals, Values values) {
-  Json columns = Json::array();
-  for (std::size_t c = 0; c < count; ++c) {
-    Json column = Json::array();
-    for (const monitor::TracePoint& point : points) {
-      const std::vector<double>& row = values(point);
-      column.push_back(c < row.size() ? Rounded(row[c], decimals) : Json());
-    }
-    columns.push_back(std::move(column));
+std::string_view StateOf(const storage::Episode& episode) {
+  if (episode.ended_ns) {
+    return "CLOSED";
   }
-  return columns;
-}
-
-template <typename Value>
-Json Column(const std::vector<monitor::TracePoint>& points, Value value) {
-  Json column = Json::array();
-  for (const monitor::TracePoint& point : points) {
-    column.push_back(value(point));
+  if (episode.cleared_ns) {
+    return "CLEARED";
   }
-  return column;
+  return episode.isolated_ns ? "ISOLATED" : "DETECTED";
 }
 
 }  // namespace
@@ -136,14 +113,27 @@ Json TextOrNull(const std::string& text) {
   return text.empty() ? Json() : Json(text);
 }
 
+Json TextOrNull(const std::optional<std::string>& text) {
+  return TextOrNull(text.value_or(""));
+}
+
 Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
               bool newest_only) {
   const bool named = valve.isolated != 0;
+  Json missing = Json::array();
+  for (std::size_t s = 0; s < kSignalCount; ++s) {
+    if ((valve.missing & MaskOf(static_cast<Signal>(s))) != 0) {
+      missing.push_back(SignalName(static_cast<Signal>(s)));
+    }
+  }
   Json tile = {
       {"id", valve.id},
-      {"state", StateName(valve.state)},
+      {"state", ShownState(valve.state, valve.silence == monitor::Silence::kNone
+                                            ? valve.quality
+                                            : Quality::kStale)},
       {"quality", QualityOf(valve)},
       {"reasons", CoverageReasonsName(valve.reasons)},
+      {"missing", std::move(missing)},
       {"faults", FaultsOf(valve)},
       {"factor", named ? Rounded(valve.factor, kFactorDecimals) : Json()},
       {"strength", named ? Rounded(valve.strength, kFactorDecimals) : Json()},
@@ -159,87 +149,156 @@ Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
                     ? Json()
                     : Rounded(valve.spark.back(), kFactorDecimals);
   } else {
-    tile["spark"] = FactorsJson(valve.spark);
+    tile["spark"] = RoundedList(valve.spark, kFactorDecimals);
   }
   return tile;
 }
 
 Json ModelFactsJson(const ModelFacts& models) {
-  char hash[17];
-  std::snprintf(hash, sizeof hash, "%016llx",
-                static_cast<unsigned long long>(models.hash));
-  return {
-      {"model_set", models.model_set},     {"hash", hash},
-      {"channels", ChannelsJson(&models)}, {"faults", models.faults},
-      {"T", models.isolation_threshold},   {"t_k", models.isolation_samples},
-      {"n_d", models.detection_samples},   {"period_s", models.period_s}};
+  return {{"model_set", models.model_set},
+          {"hash", storage::EpisodeIdText(models.hash)},
+          {"channels", ChannelsJson(models)},
+          {"faults", models.faults},
+          {"T", models.isolation_threshold},
+          {"t_k", models.isolation_samples},
+          {"n_d", models.detection_samples},
+          {"period_s", models.period_s}};
+}
+
+Json SampleJson(const std::string& valve_id, const TracePoint& point) {
+  Json sample = {{"valve", valve_id}, {"t_ms", Ms(point.sample.stamp_ns)}};
+  for (std::size_t s = 0; s < kSignalCount; ++s) {
+    const auto signal = static_cast<Signal>(s);
+    if (point.sample.Has(signal)) {
+      sample[KeyOf(signal)] = Reading(point, signal);
+    }
+  }
+  sample["residuals"] = RoundedList(point.residuals, kReadingDecimals);
+  sample["d0"] = Rounded(point.normal_factor, kFactorDecimals);
+  sample["d"] = RoundedList(point.factors, kFactorDecimals);
+  sample["state"] = StateName(point.state);
+  sample["quality"] = QualityName(point.quality);
+  return sample;
 }
 
 Json TrendJson(const ModelFacts* models, const std::string& valve_id,
-               const std::vector<monitor::TracePoint>& points) {
+               const std::vector<TracePoint>& points) {
+  static const ModelFacts kNoModels;
+  const ModelFacts& facts = models != nullptr ? *models : kNoModels;
   Json trend = {
       {"valve", valve_id},
-      {"model_set", models != nullptr ? Json(models->model_set) : Json()},
-      {"channels", ChannelsJson(models)},
-      {"faults",
-       models != nullptr ? models->faults : std::vector<std::string>{}},
-      {"T", models != nullptr ? Json(models->isolation_threshold) : Json()}};
-  trend["t_ms"] = Column(
-      points, [](const auto& point) { return Ms(point.sample.stamp_ns); });
-  AddReadings(points, trend);
-  trend["residuals"] = Columns(
-      points, models != nullptr ? models->channels.size() : 0, kReadingDecimals,
-      [](const auto& point) -> const auto& { return point.residuals; });
-  trend["d0"] = Column(points, [](const auto& point) {
-    return Rounded(point.normal_factor, kFactorDecimals);
-  });
-  trend["d"] = Columns(
-      points, models != nullptr ? models->faults.size() : 0, kFactorDecimals,
-      [](const auto& point) -> const auto& { return point.factors; });
-  trend["state"] =
-      Column(points, [](const auto& point) { return StateName(point.state); });
-  trend["quality"] = Column(
-      points, [](const auto& point) { return QualityName(point.quality); });
+      {"model_set", TextOrNull(facts.model_set)},
+      {"channels", ChannelsJson(facts)},
+      {"faults", facts.faults},
+      {"T", models != nullptr ? Json(facts.isolation_threshold) : Json()}};
+  for (const char* key : {"t_ms", "d0", "state", "quality"}) {
+    trend[key] = Json::array();
+  }
+  trend["residuals"] = Json(facts.channels.size(), Json::array());
+  trend["d"] = Json(facts.faults.size(), Json::array());
+  SignalMask present = 0;
+  for (const TracePoint& point : points) {
+    present = static_cast<SignalMask>(present | point.sample.present);
+    trend["t_ms"].push_back(Ms(point.sample.stamp_ns));
+    AppendTo(trend["residuals"], point.residuals, kReadingDecimals);
+    trend["d0"].push_back(Rounded(point.normal_factor, kFactorDecimals));
+    AppendTo(trend["d"], point.factors, kFactorDecimals);
+    trend["state"].push_back(StateName(point.state));
+    trend["quality"].push_back(QualityName(point.quality));
+  }
+  // A column for each signal that any of the points has.
+  for (std::size_t s = 0; s < kSignalCount; ++s) {
+    const auto signal = static_cast<Signal>(s);
+    for (std::size_t i = 0;
+         (present & MaskOf(signal)) != 0 && i < points.size(); ++i) {
+      trend[KeyOf(signal)].push_back(Reading(points[i], signal));
+    }
+  }
   trend["flow_unit"] = FlowUnitName(
       points.empty() ? FlowUnit::kM3PerHour : points.back().sample.flow_unit);
   return trend;
 }
 
-Json MarksJson(const std::vector<Mark>& marks) {
-  Json list = Json::array();
-  for (const Mark& mark : marks) {
-    list.push_back({{"t_ms", Ms(mark.stamp_ns)},
-                    {"kind", TransitionName(mark.kind)},
-                    {"text", mark.text}});
-  }
-  return list;
-}
-
-Json GapJson(const monitor::DataGap& gap) {
+Json GapJson(const DataGap& gap) {
   return {{"valve", TextOrNull(gap.valve_id)},
           {"from_ms", Ms(gap.from_ns)},
           {"to_ms", Ms(gap.to_ns)},
           {"reason", gap.reason}};
 }
 
-Json SampleJson(const std::string& valve_id, const monitor::TracePoint& point) {
-  Json sample = {{"valve", valve_id}, {"t_ms", Ms(point.sample.stamp_ns)}};
-  for (std::size_t s = 0; s < kSignalCount; ++s) {
-    const auto signal = static_cast<Signal>(s);
-    if (point.sample.Has(signal)) {
-      sample[KeyOf(signal)] = Rounded(point.sample[signal], kReadingDecimals);
-    }
+Json ShelfJson(const storage::Shelf& shelf) {
+  return {{"shelf_id", shelf.shelf_id},
+          {"valve", shelf.valve_id},
+          {"fault", TextOrNull(shelf.fault)},
+          {"from_ms", Ms(shelf.from_ns)},
+          {"until_ms", Ms(shelf.until_ns)},
+          {"who", shelf.who},
+          {"comment", shelf.comment},
+          {"origin", shelf.origin},
+          {"ended_ms", Ms(shelf.ended_ns)},
+          {"ended_by", TextOrNull(shelf.ended_by)}};
+}
+
+Json AlarmJson(const storage::Alarm& alarm, const cli::FaultTexts& texts) {
+  const storage::Episode& e = alarm.episode;
+  const cli::FaultWords words =
+      texts.Words(e.fault.value_or("unknown"), e.strength);
+  return {{"episode", e.episode_id},
+          {"valve", e.valve_id},
+          {"fault", TextOrNull(e.fault)},
+          {"state", StateOf(e)},
+          {"isa", storage::AlarmStateName(alarm.state)},
+          {"shelved", alarm.shelf ? ShelfJson(*alarm.shelf) : Json()},
+          {"detected_ms", Ms(e.detected_ns)},
+          {"isolated_ms", Ms(e.isolated_ns)},
+          {"cleared_ms", Ms(e.cleared_ns)},
+          {"ended_ms", Ms(e.ended_ns)},
+          {"end_reason", TextOrNull(e.end_reason)},
+          {"peak_factor", Rounded(e.peak_factor, kFactorDecimals)},
+          {"strength", Rounded(e.strength, kFactorDecimals)},
+          {"label", TextOrNull(e.label)},
+          {"acked_by", TextOrNull(e.acked_by)},
+          {"acked_ms", Ms(e.acked_ns)},
+          {"model_set", e.model_set},
+          {"severity", cli::SeverityName(words.severity)},
+          {"discipline", words.discipline},
+          {"namur", cli::NamurName(words.namur)},
+          {"name", words.name},
+          {"check", words.check}};
+}
+
+Json AlarmsJson(const std::vector<storage::Alarm>& alarms,
+                const cli::FaultTexts& texts) {
+  Json list = Json::array();
+  for (const storage::Alarm& alarm : alarms) {
+    list.push_back(AlarmJson(alarm, texts));
   }
-  Json residuals = Json::array();
-  for (const double residual : point.residuals) {
-    residuals.push_back(Rounded(residual, kReadingDecimals));
+  return list;
+}
+
+storage::Alarm AlarmOf(const FaultEvent& event) {
+  storage::Alarm alarm;
+  storage::Episode& e = alarm.episode;
+  const Transition& transition = event.transition;
+  e.id = event.episode_id;
+  e.episode_id = storage::EpisodeIdText(event.episode_id);
+  e.valve_id = event.valve_id;
+  e.detected_ns = transition.detection_stamp_ns;
+  e.peak_factor = transition.factor;
+  e.strength = transition.strength;
+  e.model_set = event.model_set + "@" + std::to_string(event.model_version);
+  if (const std::string faults = IsolatedFaults(event); !faults.empty()) {
+    e.fault = faults;
+    e.isolated_ns = transition.stamp_ns;
   }
-  sample["residuals"] = std::move(residuals);
-  sample["d0"] = Rounded(point.normal_factor, kFactorDecimals);
-  sample["d"] = FactorsJson(point.factors);
-  sample["state"] = StateName(point.state);
-  sample["quality"] = QualityName(point.quality);
-  return sample;
+  if (transition.kind == TransitionKind::kCleared) {
+    e.cleared_ns = transition.stamp_ns;
+  } else if (transition.kind == TransitionKind::kClosed) {
+    e.ended_ns = transition.stamp_ns;
+    e.end_reason = EndReasonName(transition.reason);
+  }
+  alarm.state = storage::AlarmStateOf(e);
+  return alarm;
 }
 
 }  // namespace fdi::console

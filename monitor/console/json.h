@@ -5,11 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "cli/fault_texts.h"
+#include "cli/json_output.h"
 #include "monitor/console/live_board.h"
-#include "monitor/console/words.h"
-#include "storage/alarm.h"
-#include "storage/cli/fault_texts.h"
-#include "storage/cli/json_output.h"
+#include "storage/history/alarm.h"
 
 /// What the console answers, as JSON; the keys are those of docs/console.md.
 namespace fdi::console {
@@ -24,8 +23,9 @@ Json Ms(std::int64_t stamp_ns);
 Json Ms(const std::optional<std::int64_t>& stamp_ns);
 /// Rounded to `decimals`; null if it is not finite.
 Json Rounded(double value, int decimals);
-/// Null for an empty text.
+/// Null for a text that is empty or missing.
 Json TextOrNull(const std::string& text);
+Json TextOrNull(const std::optional<std::string>& text);
 
 /// What the alarms say of a valve.
 struct ValveAlarm {
@@ -44,19 +44,21 @@ Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
 
 Json ModelFactsJson(const ModelFacts& models);
 
+/// One instant of a valve, for the stream.
+Json SampleJson(const std::string& valve_id, const TracePoint& point);
+/// Many instants as columns.
 /// @param models null: no residuals, thresholds or factors.
 Json TrendJson(const ModelFacts* models, const std::string& valve_id,
-               const std::vector<monitor::TracePoint>& points);
-Json MarksJson(const std::vector<Mark>& marks);
-Json GapJson(const monitor::DataGap& gap);
-
-/// One instant of a valve, for the stream.
-Json SampleJson(const std::string& valve_id, const monitor::TracePoint& point);
+               const std::vector<TracePoint>& points);
+Json GapJson(const DataGap& gap);
 
 Json AlarmJson(const storage::Alarm& alarm, const cli::FaultTexts& texts);
+Json AlarmsJson(const std::vector<storage::Alarm>& alarms,
+                const cli::FaultTexts& texts);
 Json ShelfJson(const storage::Shelf& shelf);
 
-/// An event that is not in the history, or not yet, as the alarm it is.
-storage::Alarm AlarmOf(const monitor::EpisodeEvent& event);
+/// The alarm that `event` is about, from the event alone: it is not, or not
+/// yet, in the history.
+storage::Alarm AlarmOf(const FaultEvent& event);
 
 }  // namespace fdi::console

@@ -1,12 +1,11 @@
 #include "monitor/console/live_board.h"
 
 #include <algorithm>
-#include <set>
-#include <string>
+#include <array>
 #include <utility>
 
 #include "diagnosis/fault_catalogue.h"
-#include "monitor/console/live_slot.h"
+#include "monitor/trace.h"
 
 namespace fdi::console {
 namespace {
@@ -15,6 +14,9 @@ constexpr std::size_t kMarks = 64;
 constexpr std::size_t kGapsOfValve = 32;
 constexpr std::size_t kGapsWaiting = 256;
 constexpr double kGapPeriods = 3.0;
+constexpr std::size_t kEarlierSources = 3;
+constexpr std::int64_t kDayNs = 86'400'000'000'000;
+constexpr std::int64_t kSparkStepNs = 1'000'000'000;
 
 template <typename T>
 void PushBounded(std::deque<T>& queue, T value, std::size_t limit) {
@@ -24,12 +26,15 @@ void PushBounded(std::deque<T>& queue, T value, std::size_t limit) {
   }
 }
 
-std::string TextOf(const monitor::EpisodeEvent& event) {
-  if (event.transition.kind == TransitionKind::kClosed) {
-    return std::string(EndReasonName(event.transition.reason));
-  }
+monitor::Trace EmptyTrace() {
+  return {kTrendInstants, kDayNs, /*keeps_isolated=*/false};
+}
+
+}  // namespace
+
+std::string IsolatedFaults(const FaultEvent& event) {
   std::string text;
-  for (const monitor::Candidate& candidate : event.candidates) {
+  for (const FaultCandidate& candidate : event.candidates) {
     if (candidate.isolated) {
       text.append(text.empty() ? "" : "|").append(FaultName(candidate.fault));
     }
@@ -37,27 +42,129 @@ std::string TextOf(const monitor::EpisodeEvent& event) {
   return text;
 }
 
-}  // namespace
+// What the board holds of one valve.
+//
+// The trend is a sequence of packed traces: a Trace holds instants of one
+// source with the same signals, so a new source, or a signal that is added,
+// begins another one. pieces.back() is the trace that grows.
+struct LiveBoard::Slot {
+  const ModelSet* models{nullptr};  // The diagnosis thread alone uses it.
+
+  mutable std::mutex mutex;  // Guards all that follows.
+  ValveState now;
+  std::uint64_t pushed{0};  // Instants so far.
+  std::deque<console::Mark> marks;
+  std::deque<DataGap> gaps;
+  std::array<float, kSparkPoints> spark{};
+  std::size_t spark_count{0};
+  std::int64_t spark_stamp_ns{0};
+  std::deque<monitor::Trace> pieces;
+
+  Slot() { pieces.push_back(EmptyTrace()); }
+
+  void Describe(const Verdict& verdict) {
+    now.state = verdict.state;
+    now.quality = verdict.quality;
+    now.silence = monitor::Silence::kNone;
+    now.reasons = verdict.uncovered;
+    now.isolated = verdict.isolated;
+    now.d0 = verdict.normal_factor;
+    now.stamp_ns = verdict.stamp_ns;
+    now.factor = 0.0;
+    now.strength = 0.0;
+    for (std::size_t f = 0; f < kMaxFaults; ++f) {
+      if ((verdict.isolated >> f & 1U) != 0 &&
+          verdict.fault_factors[f] >= now.factor) {
+        now.factor = verdict.fault_factors[f];
+        now.strength = verdict.strengths[f];
+      }
+    }
+  }
+
+  void AddSpark(const Verdict& verdict) {
+    // A clock that was set back begins a new line.
+    if (verdict.stamp_ns < spark_stamp_ns) {
+      spark_count = 0;
+    } else if (spark_count > 0 &&
+               verdict.stamp_ns - spark_stamp_ns < kSparkStepNs) {
+      return;
+    }
+    spark_stamp_ns = verdict.stamp_ns;
+    spark[spark_count++ % kSparkPoints] =
+        static_cast<float>(1.0 - verdict.normal_factor);
+  }
+
+  ValveState Now(std::size_t spark_points) const {
+    ValveState state = now;
+    const std::size_t count =
+        std::min({spark_points, spark_count, kSparkPoints});
+    for (std::size_t i = spark_count - count; i < spark_count; ++i) {
+      state.spark.push_back(static_cast<double>(spark[i % kSparkPoints]));
+    }
+    return state;
+  }
+
+  void Push(const Sample& sample, const Verdict& verdict, int channels,
+            int faults) {
+    if (pieces.back().size() > 0 &&
+        !pieces.back().Continues(sample, verdict, channels, faults)) {
+      pieces.push_back(EmptyTrace());
+    }
+    pieces.back().Push(sample, verdict, channels, faults);
+    // The first piece goes once those behind it fill a trend by themselves.
+    while (pieces.size() > kEarlierSources + 1 ||
+           (pieces.size() > 1 &&
+            instants() - pieces.front().size() >= kTrendInstants)) {
+      pieces.pop_front();
+    }
+    ++pushed;
+  }
+
+  void ClearTrend() {
+    pieces.clear();
+    pieces.push_back(EmptyTrace());
+  }
+
+  std::size_t instants() const {
+    std::size_t count = 0;
+    for (const monitor::Trace& piece : pieces) {
+      count += piece.size();
+    }
+    return count;
+  }
+
+  /// The newest `count` instants, oldest first.
+  std::vector<TracePoint> Points(std::size_t count) const {
+    std::vector<TracePoint> points;
+    std::size_t behind = instants();
+    for (const monitor::Trace& piece : pieces) {
+      behind -= piece.size();
+      if (count > behind) {
+        const auto some = piece.Unpack(count - behind);
+        points.insert(points.end(), some.begin(), some.end());
+      }
+    }
+    return points;
+  }
+};
 
 LiveBoard::LiveBoard() = default;
 LiveBoard::~LiveBoard() = default;
 
-LiveSlot* LiveBoard::Find(std::string_view valve_id) const {
+LiveBoard::Slot* LiveBoard::Find(std::string_view valve_id) const {
   const std::shared_lock lock(slots_mutex_);
   const auto found = slots_.find(valve_id);
-  return found == slots_.end() ? nullptr : found->second;
+  return found == slots_.end() ? nullptr : found->second.get();
 }
 
-LiveSlot& LiveBoard::At(const std::string& valve_id) {
-  if (LiveSlot* const slot = Find(valve_id)) {
+LiveBoard::Slot& LiveBoard::At(const std::string& valve_id) {
+  if (Slot* const slot = Find(valve_id)) {
     return *slot;
   }
-  auto slot = std::make_unique<LiveSlot>();
+  auto slot = std::make_unique<Slot>();
   slot->now.id = valve_id;
   const std::unique_lock lock(slots_mutex_);
-  const auto place = by_id_.emplace(valve_id, std::move(slot)).first;
-  slots_.emplace(place->first, place->second.get());
-  return *place->second;
+  return *slots_.emplace(valve_id, std::move(slot)).first->second;
 }
 
 std::shared_ptr<const ModelFacts> LiveBoard::Facts(const ModelSet& models) {
@@ -70,7 +177,7 @@ std::shared_ptr<const ModelFacts> LiveBoard::Facts(const ModelSet& models) {
   return facts;
 }
 
-void LiveBoard::NoteGap(LiveSlot& slot, const Sample& sample) {
+void LiveBoard::NoteGap(Slot& slot, const Sample& sample) {
   const double period_s = slot.now.models ? slot.now.models->period_s : 0.0;
   const std::int64_t from_ns = slot.now.stamp_ns;
   const std::int64_t limit_ns =
@@ -79,18 +186,19 @@ void LiveBoard::NoteGap(LiveSlot& slot, const Sample& sample) {
       sample.stamp_ns - from_ns <= limit_ns) {
     return;
   }
-  const monitor::DataGap gap{slot.now.id, from_ns, sample.stamp_ns, "stream"};
+  const DataGap gap{slot.now.id, from_ns, sample.stamp_ns, "stream"};
   PushBounded(slot.gaps, gap, kGapsOfValve);
   const std::lock_guard lock(gaps_mutex_);
   PushBounded(gaps_, gap, kGapsWaiting);
 }
 
 void LiveBoard::Show(const std::string& valve_id, const Sample& sample,
-                     const ModelSet* models, const Verdict& verdict,
-                     bool model_swapped) {
-  LiveSlot& slot = At(valve_id);
+                     const monitor::ValveOutcome& outcome) {
+  const ModelSet* const models = outcome.models;
+  const Verdict& verdict = outcome.verdict;
+  Slot& slot = At(valve_id);
   const std::lock_guard lock(slot.mutex);
-  if (models != slot.models || model_swapped) {
+  if (models != slot.models || outcome.model_swapped) {
     slot.models = models;
     const auto facts = models != nullptr ? Facts(*models) : nullptr;
     if (facts != slot.now.models) {
@@ -100,6 +208,7 @@ void LiveBoard::Show(const std::string& valve_id, const Sample& sample,
   }
   NoteGap(slot, sample);
   slot.Describe(verdict);
+  slot.now.missing = outcome.missing;
   slot.AddSpark(verdict);
   slot.Push(sample, verdict,
             models != nullptr ? static_cast<int>(models->channels.size()) : 0,
@@ -109,22 +218,25 @@ void LiveBoard::Show(const std::string& valve_id, const Sample& sample,
 
 void LiveBoard::ShowSilence(const std::string& valve_id,
                             monitor::Silence silence) {
-  LiveSlot& slot = At(valve_id);
+  Slot& slot = At(valve_id);
   const std::lock_guard lock(slot.mutex);
   slot.now.silence = silence;
   ++slot.now.version;
 }
 
-void LiveBoard::Mark(const monitor::EpisodeEvent& event) {
-  LiveSlot* const slot = Find(event.valve_id);
+void LiveBoard::Mark(const FaultEvent& event) {
+  Slot* const slot = Find(event.valve_id);
   if (slot == nullptr) {
     return;  // An episode of an earlier session, of a valve that is silent.
   }
   const std::lock_guard lock(slot->mutex);
-  PushBounded(slot->marks,
-              console::Mark{event.transition.stamp_ns, event.transition.kind,
-                            TextOf(event)},
-              kMarks);
+  PushBounded(
+      slot->marks,
+      console::Mark{event.transition.stamp_ns, event.transition.kind,
+                    event.transition.kind == TransitionKind::kClosed
+                        ? std::string(EndReasonName(event.transition.reason))
+                        : IsolatedFaults(event)},
+      kMarks);
   if (event.transition.kind == TransitionKind::kClosed) {
     // Of a silent valve no sample follows that would say so.
     slot->now.state = State::kNormal;
@@ -136,26 +248,17 @@ void LiveBoard::Mark(const monitor::EpisodeEvent& event) {
 std::vector<ValveState> LiveBoard::Valves(bool spark) const {
   std::vector<ValveState> valves;
   const std::shared_lock lock(slots_mutex_);
-  valves.reserve(by_id_.size());
-  for (const auto& [id, slot] : by_id_) {
+  valves.reserve(slots_.size());
+  for (const auto& [id, slot] : slots_) {
     const std::lock_guard slot_lock(slot->mutex);
     valves.push_back(slot->Now(spark ? kSparkPoints : 1));
   }
   return valves;
 }
 
-std::optional<ValveState> LiveBoard::Valve(std::string_view valve_id) const {
-  const LiveSlot* const slot = Find(valve_id);
-  if (slot == nullptr) {
-    return std::nullopt;
-  }
-  const std::lock_guard lock(slot->mutex);
-  return slot->Now(kSparkPoints);
-}
-
 std::optional<LiveTrend> LiveBoard::Trend(std::string_view valve_id,
                                           std::size_t instants) const {
-  const LiveSlot* const slot = Find(valve_id);
+  const Slot* const slot = Find(valve_id);
   if (slot == nullptr) {
     return std::nullopt;
   }
@@ -169,7 +272,7 @@ std::optional<LiveTrend> LiveBoard::Trend(std::string_view valve_id,
 
 std::optional<LiveTrend> LiveBoard::Since(std::string_view valve_id,
                                           std::uint64_t next) const {
-  const LiveSlot* const slot = Find(valve_id);
+  const Slot* const slot = Find(valve_id);
   if (slot == nullptr) {
     return std::nullopt;
   }
@@ -183,22 +286,9 @@ std::optional<LiveTrend> LiveBoard::Since(std::string_view valve_id,
   return trend;
 }
 
-std::vector<std::shared_ptr<const ModelFacts>> LiveBoard::ModelSets() const {
-  std::set<std::shared_ptr<const ModelFacts>> seen;
-  std::vector<std::shared_ptr<const ModelFacts>> sets;
-  const std::shared_lock lock(slots_mutex_);
-  for (const auto& [id, slot] : by_id_) {
-    const std::lock_guard slot_lock(slot->mutex);
-    if (slot->now.models && seen.insert(slot->now.models).second) {
-      sets.push_back(slot->now.models);
-    }
-  }
-  return sets;
-}
-
-std::vector<monitor::DataGap> LiveBoard::TakeGaps() {
+std::vector<DataGap> LiveBoard::TakeGaps() {
   const std::lock_guard lock(gaps_mutex_);
-  std::vector<monitor::DataGap> gaps(gaps_.begin(), gaps_.end());
+  std::vector<DataGap> gaps(gaps_.begin(), gaps_.end());
   gaps_.clear();
   return gaps;
 }
@@ -206,9 +296,12 @@ std::vector<monitor::DataGap> LiveBoard::TakeGaps() {
 std::size_t LiveBoard::bytes() const {
   std::size_t bytes = 0;
   const std::shared_lock lock(slots_mutex_);
-  for (const auto& [id, slot] : by_id_) {
+  for (const auto& [id, slot] : slots_) {
     const std::lock_guard slot_lock(slot->mutex);
-    bytes += sizeof(LiveSlot) + slot->trend_bytes();
+    bytes += sizeof(Slot);
+    for (const monitor::Trace& piece : slot->pieces) {
+      bytes += piece.bytes();
+    }
   }
   return bytes;
 }

@@ -9,13 +9,10 @@
 #include <shared_mutex>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <vector>
 
 #include "monitor/console/model_facts.h"
-#include "monitor/records.h"
 #include "monitor/sinks.h"
-#include "monitor/trace.h"
 
 namespace fdi::console {
 
@@ -30,6 +27,7 @@ struct ValveState {
   Quality quality{Quality::kSettling};
   monitor::Silence silence{monitor::Silence::kNone};
   CoverageReasons reasons{0};
+  SignalMask missing{0};  ///< That the model set needs and the sample lacks.
   FaultSet isolated{0};
   double factor{0.0};    ///< The largest of the isolated set [-].
   double strength{0.0};  ///< Estimated, of that fault; signed [-].
@@ -49,21 +47,23 @@ struct Mark {
 /// The last instants of a valve.
 struct LiveTrend {
   ValveState now;
-  std::vector<monitor::TracePoint> points;  ///< Oldest first.
+  std::vector<TracePoint> points;  ///< Oldest first.
   std::vector<Mark> marks;
-  std::vector<monitor::DataGap> gaps;  ///< Of this valve, in its stream.
-  std::uint64_t next{0};               ///< For LiveBoard::Since().
+  std::vector<DataGap> gaps;  ///< Of this valve, in its stream.
+  std::uint64_t next{0};      ///< For LiveBoard::Since().
 };
 
-struct LiveSlot;
+/// The faults that `event` isolates, joined by |; empty if none.
+std::string IsolatedFaults(const FaultEvent& event);
 
-/// What the diagnosis shows people: the state of each valve and its last 900
-/// instants, packed. That is 91 kB a valve for six signals, two channels and
-/// five faults, 116 kB for nineteen: 232 MB for 2000 valves. After a change of
-/// the source up to thrice that until the new one has sent as many.
+/// The last-value cache of the console: the state of each valve and its last
+/// 900 instants, packed. That is 91 kB a valve for six signals, two channels
+/// and five faults, 116 kB for nineteen: 232 MB for 2000 valves. After a change
+/// of the source it is up to three times as much until the new source has sent
+/// as many instants.
 ///
-/// Thread safe. The diagnosis takes two locks a sample that readers hold for
-/// microseconds: no reader does more than copy inside.
+/// Thread safe. The diagnosis takes two locks per sample, which readers hold
+/// for microseconds: no reader does more than copy under them.
 class LiveBoard : public monitor::LiveSink {
  public:
   LiveBoard();
@@ -72,17 +72,15 @@ class LiveBoard : public monitor::LiveSink {
   LiveBoard& operator=(const LiveBoard&) = delete;
 
   void Show(const std::string& valve_id, const Sample& sample,
-            const ModelSet* models, const Verdict& verdict,
-            bool model_swapped) override;
+            const monitor::ValveOutcome& outcome) override;
   void ShowSilence(const std::string& valve_id,
                    monitor::Silence silence) override;
 
   /// An event of an episode. Any thread.
-  void Mark(const monitor::EpisodeEvent& event);
+  void Mark(const FaultEvent& event);
 
-  /// By id. @param spark false: without sparklines but their newest point.
+  /// By id. @param spark false: of the sparklines only the newest point.
   std::vector<ValveState> Valves(bool spark = true) const;
-  std::optional<ValveState> Valve(std::string_view valve_id) const;
   /// Nothing if the valve was never seen.
   std::optional<LiveTrend> Trend(std::string_view valve_id,
                                  std::size_t instants = kTrendInstants) const;
@@ -91,34 +89,25 @@ class LiveBoard : public monitor::LiveSink {
   std::optional<LiveTrend> Since(std::string_view valve_id,
                                  std::uint64_t next) const;
 
-  /// The model sets that valves run with now.
-  std::vector<std::shared_ptr<const ModelFacts>> ModelSets() const;
-
   /// Gaps that were noticed since the last call, at most 256.
-  std::vector<monitor::DataGap> TakeGaps();
+  std::vector<DataGap> TakeGaps();
 
   std::size_t bytes() const;
 
  private:
-  struct Hash {
-    using is_transparent = void;
-    std::size_t operator()(std::string_view text) const {
-      return std::hash<std::string_view>{}(text);
-    }
-  };
-  LiveSlot& At(const std::string& valve_id);
-  LiveSlot* Find(std::string_view valve_id) const;
+  struct Slot;
+  Slot& At(const std::string& valve_id);
+  Slot* Find(std::string_view valve_id) const;
   std::shared_ptr<const ModelFacts> Facts(const ModelSet& models);
-  void NoteGap(LiveSlot& slot, const Sample& sample);
+  void NoteGap(Slot& slot, const Sample& sample);
 
-  mutable std::shared_mutex slots_mutex_;
-  std::map<std::string, std::unique_ptr<LiveSlot>, std::less<>> by_id_;
-  std::unordered_map<std::string_view, LiveSlot*, Hash, std::equal_to<>> slots_;
-  // Of the diagnosis thread; by content.
+  mutable std::shared_mutex slots_mutex_;  // Slots come and never go.
+  std::map<std::string, std::unique_ptr<Slot>, std::less<>> slots_;
+  // By content hash. The diagnosis thread alone uses it.
   std::map<std::uint64_t, std::weak_ptr<const ModelFacts>> facts_;
 
   std::mutex gaps_mutex_;
-  std::deque<monitor::DataGap> gaps_;
+  std::deque<DataGap> gaps_;
 };
 
 }  // namespace fdi::console

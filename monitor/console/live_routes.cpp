@@ -1,5 +1,6 @@
-// How the monitor and its valves are now.
+// How the monitor and its valves are now, and the stream of what changes.
 #include <algorithm>
+#include <set>
 
 #include <httplib.h>
 
@@ -11,19 +12,17 @@ namespace {
 
 constexpr double kStalePeriods = 3.0;
 constexpr std::int64_t kNsPerS = 1'000'000'000;
+constexpr std::chrono::milliseconds kPingPeriod{5000};
+constexpr std::size_t kMaxIdLength = 64;
 
-Json Status(const Api& api) {
+Json Status(const Api& api, const httplib::Request& /*request*/) {
   const MonitorFacts facts = api.sources.facts();
   Json counters = Json::object();
   for (const auto& [name, value] : facts.counters) {
     counters[name] = value;
   }
-  Json sets = Json::array();
+  std::set<std::shared_ptr<const ModelFacts>> sets;
   double period_s = 1.0;
-  for (const auto& models : api.board.ModelSets()) {
-    sets.push_back(ModelFactsJson(*models));
-    period_s = std::max(period_s, models->period_s);
-  }
   std::uint64_t live = 0;
   std::uint64_t stale = 0;
   const std::vector<ValveState> valves = api.board.Valves(false);
@@ -31,6 +30,14 @@ Json Status(const Api& api) {
     const bool silent = valve.silence != monitor::Silence::kNone;
     stale += silent ? 1 : 0;
     live += !silent && valve.quality == Quality::kLive ? 1 : 0;
+    if (valve.models) {
+      sets.insert(valve.models);
+      period_s = std::max(period_s, valve.models->period_s);
+    }
+  }
+  Json model_sets = Json::array();
+  for (const auto& models : sets) {
+    model_sets.push_back(ModelFactsJson(*models));
   }
   return {{"now_ms", Ms(api.sources.utc_now_ns())},
           {"started_ms", Ms(api.sources.started_ns)},
@@ -45,16 +52,14 @@ Json Status(const Api& api) {
             {"live", live},
             {"stale", stale},
             {"open_episodes", facts.open_episodes}}},
-          {"model_sets", std::move(sets)}};
+          {"model_sets", std::move(model_sets)}};
 }
 
-Json Valves(const Api& api) {
+Json Valves(const Api& api, const httplib::Request& /*request*/) {
   const auto alarms = api.alarms.ByValve();
   Json tiles = Json::array();
   for (const ValveState& valve : api.board.Valves()) {
-    const auto found = alarms->find(valve.id);
-    tiles.push_back(
-        TileJson(valve, found == alarms->end() ? ValveAlarm{} : found->second));
+    tiles.push_back(TileJson(valve, AlarmFor(*alarms, valve.id)));
   }
   return {{"now_ms", Ms(api.sources.utc_now_ns())},
           {"valves", std::move(tiles)}};
@@ -66,11 +71,10 @@ void AddStoredGaps(const Api& api, const std::string& valve_id,
   storage::HistoryReader reader(api.sources.history);
   storage::EpisodeFilter filter;
   filter.since_ns = since_ns;
-  for (const storage::DataGap& gap : reader.Gaps(filter)) {
+  for (const DataGap& gap : reader.Gaps(filter)) {
     if (gap.valve_id.empty() ||
         (gap.valve_id == valve_id && gap.reason != "stream")) {
-      gaps.push_back(
-          GapJson({gap.valve_id, gap.from_ns, gap.to_ns, gap.reason}));
+      gaps.push_back(GapJson(gap));
     }
   }
 }
@@ -85,45 +89,87 @@ Json Trend(const Api& api, const httplib::Request& request) {
                         " has sent nothing since the monitor started");
   }
   const std::int64_t since_ns = trend->now.stamp_ns - seconds * kNsPerS;
-  std::erase_if(trend->points, [since_ns](const monitor::TracePoint& point) {
+  std::erase_if(trend->points, [since_ns](const TracePoint& point) {
     return point.sample.stamp_ns < since_ns;
   });
   Json json = TrendJson(trend->now.models.get(), valve_id, trend->points);
   json["gaps"] = Json::array();
-  for (const monitor::DataGap& gap : trend->gaps) {
+  for (const DataGap& gap : trend->gaps) {
     json["gaps"].push_back(GapJson(gap));
   }
   AddStoredGaps(api, valve_id, since_ns, json["gaps"]);
-  json["marks"] = MarksJson(trend->marks);
-  json["words"] = trend->now.models && !trend->points.empty()
-                      ? Json(Explain(*trend->now.models, trend->points.back(),
-                                     [&api](std::string_view f) {
-                                       return api.PlainName(f);
-                                     }))
-                      : Json();
+  json["marks"] = Json::array();
+  for (const Mark& mark : trend->marks) {
+    json["marks"].push_back({{"t_ms", Ms(mark.stamp_ns)},
+                             {"kind", TransitionName(mark.kind)},
+                             {"text", mark.text}});
+  }
+  json["words"] =
+      api.Words(trend->now.models.get(),
+                trend->points.empty() ? nullptr : &trend->points.back());
   return json;
+}
+
+Json Faults(const Api& api, const httplib::Request& /*request*/) {
+  return cli::FaultTextsJson(api.texts);
+}
+
+constexpr Route kRoutes[] = {{"/api/v1/status", Status},
+                             {"/api/v1/faults", Faults},
+                             {"/api/v1/valves", Valves},
+                             {"/api/v1/valves/(.+)/trend", Trend}};
+
+void Stream(const Api& api, const httplib::Request& request,
+            httplib::Response& response) {
+  const std::string valve = Parameter(request, "valve").value_or("");
+  if (valve.size() > kMaxIdLength) {
+    SendError(response, 400, "valve: expected an id of 1..64 bytes");
+    return;
+  }
+  // The samples begin here: a trend that the page asks for after it was
+  // greeted overlaps with them, and nothing is missed between the two.
+  const auto trend = api.board.Trend(valve, 0);
+  const auto client = api.stream.Admit(
+      valve, trend ? trend->next : 0,
+      StreamEvent("hello", Dump({{"now_ms", Ms(api.sources.utc_now_ns())},
+                                 {"instance", api.instance}})));
+  if (!client) {
+    response.set_header("Retry-After", "5");
+    SendError(response, 503, "all places for live streams are taken");
+    return;
+  }
+  response.set_header("Cache-Control", "no-store");
+  response.set_chunked_content_provider(
+      "text/event-stream",
+      [&stream = api.stream, client](std::size_t /*offset*/,
+                                     httplib::DataSink& sink) {
+        Message message;
+        switch (stream.Next(*client, kPingPeriod, message)) {
+          case LiveStream::Outcome::kMessage:
+            return sink.write(message->data(), message->size());
+          case LiveStream::Outcome::kTimeout:
+            return sink.write(": ping\n\n", 8);
+          case LiveStream::Outcome::kEnded:
+            break;
+        }
+        return false;
+      },
+      [&stream = api.stream, client](bool /*success*/) {
+        stream.Release(client);
+      });
 }
 
 }  // namespace
 
-void AddLiveRoutes(httplib::Server& server, const Api& api) {
-  server.Get("/api/v1/status",
-             Answering([&api](const httplib::Request&, httplib::Response&) {
-               return Status(api);
-             }));
-  server.Get("/api/v1/faults",
-             Answering([&api](const httplib::Request&, httplib::Response&) {
-               return cli::FaultTextsJson(api.texts);
-             }));
-  server.Get("/api/v1/valves",
-             Answering([&api](const httplib::Request&, httplib::Response&) {
-               return Valves(api);
-             }));
-  server.Get(
-      "/api/v1/valves/(.+)/trend",
-      Answering([&api](const httplib::Request& request, httplib::Response&) {
-        return Trend(api, request);
-      }));
+std::span<const Route> LiveRoutes() {
+  return kRoutes;
+}
+
+void AddStreamRoute(httplib::Server& server, const Api& api) {
+  server.Get("/api/v1/stream", [&api](const httplib::Request& request,
+                                      httplib::Response& response) {
+    Stream(api, request, response);
+  });
 }
 
 }  // namespace fdi::console

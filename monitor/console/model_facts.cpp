@@ -1,20 +1,101 @@
 #include "monitor/console/model_facts.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <optional>
+
+#include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "storage/models/models.h"
 
 namespace fdi::console {
+namespace {
+
+constexpr std::size_t kCachedSets = 32;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+std::string UnitOf(Signal signal, FlowUnit flow_unit) {
+  return std::string(signal == Signal::kF ? FlowUnitName(flow_unit)
+                                          : SignalUnit(signal));
+}
+
+std::shared_ptr<const ModelFacts> FactsOf(const storage::Episode& episode) {
+  auto facts = std::make_shared<ModelFacts>();
+  facts->model_set = episode.model_set;
+  facts->hash = episode.model_hash;
+  facts->isolation_threshold = kNone;
+  facts->flow_unit = episode.flow_unit;
+  for (const std::string& name : episode.channels) {
+    const Signal signal = ParseSignal(name).value_or(Signal::kX);
+    facts->channels.push_back(
+        {name, signal, UnitOf(signal, episode.flow_unit), kNone, kNone});
+  }
+  facts->faults = episode.faults;
+  return facts;
+}
+
+// In the order of Signal.
+constexpr std::array<std::string_view, kSignalCount> kPlainNames{
+    "command",        "inlet pressure",    "outlet pressure",
+    "temperature",    "rod position",      "flow",
+    "set point",      "positioner output", "chamber pressure",
+    "supply pressure"};
+
+// r relative to the threshold on its side; above 1 it is beyond it.
+double Excess(const ModelFacts::Channel& channel, double residual) {
+  const double threshold = residual < 0.0 ? channel.low : channel.high;
+  return threshold != 0.0 ? residual / threshold : 0.0;
+}
+
+std::optional<std::size_t> FarthestBeyond(const ModelFacts& models,
+                                          const TracePoint& point) {
+  std::optional<std::size_t> farthest;
+  double most = 1.0;
+  const std::size_t count =
+      std::min(models.channels.size(), point.residuals.size());
+  for (std::size_t c = 0; c < count; ++c) {
+    const double excess = Excess(models.channels[c], point.residuals[c]);
+    if (excess > most) {  // Never of NaN.
+      most = excess;
+      farthest = c;
+    }
+  }
+  return farthest;
+}
+
+std::string Fitting(const ModelFacts& models, const TracePoint& point,
+                    const FaultNamer& name) {
+  std::vector<std::size_t> fitting;
+  for (std::size_t f = 0;
+       f < std::min(models.faults.size(), point.factors.size()); ++f) {
+    if (point.factors[f] >= 0.5 * models.isolation_threshold) {
+      fitting.push_back(f);
+    }
+  }
+  std::stable_sort(fitting.begin(), fitting.end(),
+                   [&](std::size_t a, std::size_t b) {
+                     return point.factors[a] > point.factors[b];
+                   });
+  std::string text;
+  for (const std::size_t f : fitting) {
+    text.append(text.empty() ? "" : ", ").append(name(models.faults[f]));
+  }
+  return text.empty() ? "no known fault" : text;
+}
+
+}  // namespace
 
 std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models) {
   auto facts = std::make_shared<ModelFacts>();
   facts->model_set = models.name + "@" + std::to_string(models.version);
   facts->hash = models.content_hash;
   for (const ChannelSpec& channel : models.channels) {
-    const std::string_view unit = channel.output == Signal::kF
-                                      ? FlowUnitName(models.flow_unit)
-                                      : SignalUnit(channel.output);
-    facts->channels.push_back({channel.name, channel.output, std::string(unit),
-                               channel.lower_threshold,
-                               channel.upper_threshold});
+    facts->channels.push_back(
+        {channel.name, channel.output, UnitOf(channel.output, models.flow_unit),
+         channel.lower_threshold, channel.upper_threshold});
   }
   for (const int fault : models.faults) {
     facts->faults.push_back(FaultName(fault));
@@ -25,6 +106,63 @@ std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models) {
   facts->period_s = models.sample_period_s;
   facts->flow_unit = models.flow_unit;
   return facts;
+}
+
+std::shared_ptr<const ModelFacts> StoredModels::For(
+    const storage::Episode& episode) {
+  const std::lock_guard lock(mutex_);
+  const auto known = known_.find(episode.model_set);
+  if (known != known_.end() && known->second->hash == episode.model_hash) {
+    return known->second;
+  }
+  std::shared_ptr<const ModelFacts> facts;
+  try {
+    facts = FactsOf(storage::ModelStore(path_).Load(episode.model_set));
+  } catch (const NotFoundError&) {
+  }
+  // A set of the same name and version in another models.db differs by hash.
+  if (!facts || facts->hash != episode.model_hash) {
+    return FactsOf(episode);
+  }
+  if (known_.size() >= kCachedSets) {
+    known_.erase(known_.begin());
+  }
+  known_[episode.model_set] = facts;
+  return facts;
+}
+
+std::string_view ShownState(State state, Quality quality) {
+  return state == State::kNormal && quality != Quality::kLive
+             ? "NOT_JUDGED"
+             : StateName(state);
+}
+
+std::string TwoDigits(double value) {
+  char text[32];
+  if (std::abs(value) >= 10.0) {
+    std::snprintf(text, sizeof text, "%.0f", value);
+  } else {
+    std::snprintf(text, sizeof text, "%.2g", value);
+  }
+  return text;
+}
+
+std::string Explain(const ModelFacts& models, const TracePoint& point,
+                    const FaultNamer& name) {
+  const std::optional<std::size_t> channel = FarthestBeyond(models, point);
+  if (!channel && point.state == State::kNormal) {
+    return "as the normal model expects";
+  }
+  std::string text = "no reading beyond its threshold now";
+  if (channel) {
+    const ModelFacts::Channel& c = models.channels[*channel];
+    const double residual = point.residuals[*channel];
+    text = std::string(kPlainNames.at(static_cast<std::size_t>(c.output))) +
+           " " + TwoDigits(std::abs(residual)) + " " + c.unit +
+           (residual < 0.0 ? " below" : " above") +
+           " what the normal model expects";
+  }
+  return text + "; fits: " + Fitting(models, point, name);
 }
 
 }  // namespace fdi::console

@@ -1,11 +1,18 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/records/trace_point.h"
+#include "storage/history/episode.h"
 
 namespace fdi::console {
 
@@ -30,5 +37,43 @@ struct ModelFacts {
 };
 
 std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models);
+
+/// The facts of model sets in models.db that found the episodes of the history.
+/// Thread safe; caches 32 of them.
+class StoredModels {
+ public:
+  explicit StoredModels(std::filesystem::path models)
+      : path_(std::move(models)) {}
+
+  /// Of the set that made the episode. If that set is gone, what the episode
+  /// itself tells: names, without thresholds (NaN).
+  std::shared_ptr<const ModelFacts> For(const storage::Episode& episode);
+
+ private:
+  std::filesystem::path path_;
+  std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<const ModelFacts>> known_;
+};
+
+/// "NORMAL", "DETECTED", "ISOLATED", or "NOT_JUDGED" where the engine would say
+/// NORMAL of a sample that it did not judge. The quality is the reason.
+std::string_view ShownState(State state, Quality quality);
+
+/// Plain name of what the diagnosis calls "f19".
+using FaultNamer = std::function<std::string(std::string_view)>;
+
+/// What the observers say about an instant, for people:
+///
+///     "flow 12 m3/h above what the normal model expects; fits: flow
+///      transmitter wrong, plug eroded"
+///
+/// The channel is the one whose normal residual is farthest beyond its
+/// threshold, relative to it; faults fit whose factor is at least T/2, the best
+/// first. Without a channel beyond its threshold the text says so.
+std::string Explain(const ModelFacts& models, const TracePoint& point,
+                    const FaultNamer& name);
+
+/// 12.34 as "12", 0.01234 as "0.012": two significant digits.
+std::string TwoDigits(double value);
 
 }  // namespace fdi::console

@@ -4,152 +4,114 @@
 #include <cmath>
 #include <limits>
 
+#include "cli/time_text.h"
 #include "diagnosis/fault_catalogue.h"
-#include "storage/cli/text_table.h"
-#include "storage/cli/time_text.h"
-#include "storage/history_types.h"
+#include "storage/history/episode.h"
+#include "storage/history/history_database.h"
 
 namespace fdi::planner {
 namespace {
 
 using cli::Json;
 
-constexpr std::int64_t kNsPerMs = 1'000'000;
-constexpr std::int64_t kMsPerHour = 3'600'000;
+constexpr std::int64_t kNsPerHour = 3'600'000'000'000;
+constexpr double kMsPerHour = 3.6e6;
 constexpr double kFullStroke = 100.0;  // [%]
 
-// Six digits that count; null if it is not finite.
-Json Number(double value) {
-  if (!std::isfinite(value)) {
-    return nullptr;
-  }
-  if (value == 0.0) {
-    return 0.0;
-  }
-  const double scale =
-      std::pow(10.0, 5.0 - std::floor(std::log10(std::abs(value))));
-  return std::round(value * scale) / scale;
+Json Hours(std::int64_t ms) {
+  return SixDigits(static_cast<double>(ms) / kMsPerHour);
 }
 
-double Hours(std::int64_t ms) {
-  return static_cast<double>(ms) / static_cast<double>(kMsPerHour);
+// The sums are integers in units of `quantum`, so that parts of an hour add up
+// exactly over restarts; only here they become figures in the channel's unit.
+Json MeanOf(const ResidualSums& sums, double quantum) {
+  return SixDigits(static_cast<double>(sums.residual) /
+                   static_cast<double>(sums.samples) * quantum);
+}
+Json RmsOf(const ResidualSums& sums, double quantum) {
+  return SixDigits(std::sqrt(static_cast<double>(sums.square) /
+                             static_cast<double>(sums.samples)) *
+                   quantum);
 }
 
-double Strokes(std::int64_t travel) {
-  return static_cast<double>(travel) * HealthHour::kTravel / kFullStroke;
-}
-
-std::string UnitOf(const HealthHour& hour, Signal signal) {
-  return std::string(signal == Signal::kF ? FlowUnitName(hour.flow_unit)
-                                          : SignalUnit(signal));
-}
-
-Json BinsJson(const HealthHour& hour, std::size_t c) {
-  Json bins = Json::array();
+Json ChannelJson(const HealthHour& hour, std::size_t c) {
+  const Signal signal = hour.channels[c].output;
   const double quantum = hour.channels[c].quantum();
+  ResidualSums all;
+  Json bins = Json::array();
   for (std::size_t b = 0; b < hour.bins.size(); ++b) {
     if (c >= hour.bins[b].size() || hour.bins[b][c].samples == 0) {
       continue;
     }
     const ResidualSums& sums = hour.bins[b][c];
-    const auto n = static_cast<double>(sums.samples);
-    bins.push_back(
-        {{"cv_from", b * 100 / kCommandBins},
-         {"cv_to", (b + 1) * 100 / kCommandBins},
-         {"samples", sums.samples},
-         {"mean", Number(static_cast<double>(sums.residual) / n * quantum)},
-         {"rms",
-          Number(std::sqrt(static_cast<double>(sums.square) / n) * quantum)}});
+    all.Add(sums);
+    bins.push_back({{"cv_from", b * 100 / kCommandBins},
+                    {"cv_to", (b + 1) * 100 / kCommandBins},
+                    {"samples", sums.samples},
+                    {"mean", MeanOf(sums, quantum)},
+                    {"rms", RmsOf(sums, quantum)}});
   }
-  return bins;
+  // Measured output less residual is what the normal model expected. Its sum
+  // may be 0, as may the samples: 0/0 is not finite, and so null.
+  const auto residual = static_cast<double>(all.residual);
+  const double expected = static_cast<double>(all.output) - residual;
+  return {
+      {"signal", std::string(SignalName(signal))},
+      {"unit", std::string(signal == Signal::kF ? FlowUnitName(hour.flow_unit)
+                                                : SignalUnit(signal))},
+      {"mean", MeanOf(all, quantum)},
+      {"rms", RmsOf(all, quantum)},
+      {"percent", SixDigits(100.0 * residual / expected)},
+      {"bins", std::move(bins)}};
 }
 
-Json ChannelsJson(const HealthHour& hour) {
+Json HourJson(const HealthHour& hour) {
   Json channels = Json::array();
   for (std::size_t c = 0; c < hour.channels.size(); ++c) {
-    const ChannelFigures figures = FiguresOf(hour, c);
-    const Signal signal = hour.channels[c].output;
-    channels.push_back({{"signal", std::string(SignalName(signal))},
-                        {"unit", UnitOf(hour, signal)},
-                        {"mean", Number(figures.mean)},
-                        {"rms", Number(figures.rms)},
-                        {"percent", Number(figures.percent)},
-                        {"bins", BinsJson(hour, c)}});
+    channels.push_back(ChannelJson(hour, c));
   }
-  return channels;
-}
-
-Json StrengthsJson(const HealthHour& hour) {
   Json strengths = Json::array();
   for (const StrengthSums& sums : hour.strengths) {
-    strengths.push_back(
-        {{"fault", FaultName(sums.fault)},
-         {"strength",
-          Number(static_cast<double>(sums.strength) * HealthHour::kShare /
-                 static_cast<double>(sums.samples))},
-         {"samples", sums.samples}});
+    const double mean =
+        static_cast<double>(sums.strength) / static_cast<double>(sums.samples);
+    strengths.push_back({{"fault", FaultName(sums.fault)},
+                         {"strength", SixDigits(mean * HealthHour::kShare)},
+                         {"samples", sums.samples}});
   }
-  return strengths;
+  const double normal_factor = static_cast<double>(hour.normal_factor) /
+                               static_cast<double>(hour.live_samples);
+  return {{"hour_utc", cli::FormatTime(hour.hour * kNsPerHour, true)},
+          {"epoch", hour.epoch},
+          {"model_hash", storage::EpisodeIdText(hour.model_hash)},
+          {"seen_h", Hours(hour.seen_ms)},
+          {"live_h", Hours(hour.live_ms)},
+          {"alarm_h", Hours(hour.alarm_ms)},
+          {"open_h", Hours(hour.open_ms)},
+          {"shut_h", Hours(hour.shut_ms)},
+          {"d0", SixDigits(normal_factor * HealthHour::kShare)},
+          {"travel_strokes", SixDigits(static_cast<double>(hour.travel) *
+                                       HealthHour::kTravel / kFullStroke)},
+          {"reversals", hour.reversals},
+          {"channels", std::move(channels)},
+          {"strengths", std::move(strengths)}};
 }
 
 std::string DayText(double day) {
-  return cli::FormatTime(
-             static_cast<std::int64_t>(day) * 24 * kMsPerHour * kNsPerMs, true)
+  return cli::FormatTime(static_cast<std::int64_t>(day) * 24 * kNsPerHour, true)
       .substr(0, 10);
 }
 
-Json RowJson(const WorkRow& row) {
-  const FaultReason* fault =
-      row.work.faults.empty() ? nullptr : &row.work.faults.front();
-  const auto of_fault = [fault](auto value) {
-    return fault != nullptr ? Json(value(*fault)) : Json();
-  };
-  Json trends = Json::array();
-  for (const TrendReason& reason : row.work.trends) {
-    trends.push_back(ForecastJson(reason));
-  }
-  return {{"rank", row.rank},
-          {"valve", row.work.valve_id},
-          {"score", Number(row.score)},
-          {"why", row.why},
-          {"fault", of_fault([](auto& f) { return f.fault; })},
-          {"name", of_fault([](auto& f) { return f.words.name; })},
-          {"discipline", of_fault([](auto& f) { return f.words.discipline; })},
-          {"namur", of_fault([](auto& f) {
-             return std::string(NamurName(f.words.namur));
-           })},
-          {"severity", of_fault([](auto& f) {
-             return std::string(SeverityName(f.words.severity));
-           })},
-          {"check", of_fault([](auto& f) { return f.words.check; })},
-          {"strength", of_fault([](auto& f) { return Number(f.strength); })},
-          {"open", of_fault([](auto& f) { return !f.ended_ns.has_value(); })},
-          {"episodes", of_fault([](auto& f) { return f.episodes; })},
-          {"episode", of_fault([](auto& f) { return f.episode_id; })},
-          {"detected_ms",
-           of_fault([](auto& f) { return f.detected_ns / kNsPerMs; })},
-          {"confirmed", of_fault([](auto& f) { return f.confirmed; })},
-          {"trends", trends},
-          {"travel_strokes", Number(row.work.travel_strokes)},
-          {"service_hours", Number(row.work.service_hours)},
-          {"live_share", Number(row.work.live_share)},
-          {"last_ms",
-           row.work.last_ns ? Json(*row.work.last_ns / kNsPerMs) : Json()}};
-}
-
-}  // namespace
-
-Json ForecastJson(const TrendReason& reason) {
-  const monitor::HealthForecast& f = reason.forecast;
+Json TrendJson(const LimitTrend& trend) {
+  const monitor::HealthForecast& f = trend.forecast;
   const auto number = [](const std::optional<double>& value) {
-    return value ? Number(*value) : Json();
+    return value ? SixDigits(*value) : Json();
   };
   const auto of_time = [&f](double monitor::TimeToLimit::*part) {
-    return f.time ? Number(*f.time.*part) : Json();
+    return f.time ? SixDigits(*f.time.*part) : Json();
   };
   const bool any = f.days > 0;
-  return {{"limit", HealthLimitText(reason.limit)},
-          {"unit", HealthUnit(reason.limit, reason.flow_unit)},
+  return {{"limit", HealthLimitText(trend.limit)},
+          {"unit", HealthUnit(trend.limit, trend.flow_unit)},
           {"answer", std::string(AnswerName(f.answer))},
           {"text", ForecastText(f)},
           {"now", number(f.now)},
@@ -162,59 +124,61 @@ Json ForecastJson(const TrendReason& reason) {
           {"rests_on_days", f.days}};
 }
 
-Json WorkListJson(std::span<const WorkRow> rows) {
+}  // namespace
+
+Json SixDigits(double value) {
+  if (!std::isfinite(value)) {
+    return nullptr;
+  }
+  if (value == 0.0) {
+    return 0.0;
+  }
+  const double scale =
+      std::pow(10.0, 5.0 - std::floor(std::log10(std::abs(value))));
+  return std::round(value * scale) / scale;
+}
+
+std::vector<monitor::HealthLimit> DefaultLimits() {
+  return ParseLimits({"F=-10%", "F=10%"});
+}
+
+std::vector<monitor::HealthLimit> ParseLimits(
+    const std::vector<std::string>& texts) {
+  if (texts.empty()) {
+    return DefaultLimits();
+  }
+  std::vector<monitor::HealthLimit> limits;
+  for (const std::string& text : texts) {
+    limits.push_back(monitor::ParseHealthLimit(text));
+  }
+  return limits;
+}
+
+std::vector<LimitTrend> TrendsOf(
+    std::span<const HealthHour> hours,
+    const std::vector<monitor::HealthLimit>& limits) {
+  std::vector<LimitTrend> trends;
+  for (const monitor::HealthLimit& limit : limits) {
+    const monitor::HealthSeries series = SeriesOf(hours, limit);
+    trends.push_back({limit, Forecast(series, limit), series.flow_unit});
+  }
+  return trends;
+}
+
+Json TrendsJson(std::span<const LimitTrend> trends) {
   Json list = Json::array();
-  for (const WorkRow& row : rows) {
-    list.push_back(RowJson(row));
+  for (const LimitTrend& trend : trends) {
+    list.push_back(TrendJson(trend));
   }
-  return {{"rows", list}};
-}
-
-ChannelFigures FiguresOf(const HealthHour& hour, std::size_t c) {
-  ResidualSums sums;
-  for (const auto& bin : hour.bins) {
-    if (c < bin.size()) {
-      sums.Add(bin[c]);
-    }
-  }
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  if (sums.samples == 0) {
-    return {kNan, kNan, kNan, 0};
-  }
-  const double quantum = hour.channels[c].quantum();
-  const auto n = static_cast<double>(sums.samples);
-  const auto residual = static_cast<double>(sums.residual);
-  const double expected = static_cast<double>(sums.output) - residual;
-  return {residual / n * quantum,
-          std::sqrt(static_cast<double>(sums.square) / n) * quantum,
-          expected != 0.0 ? 100.0 * residual / expected : kNan, sums.samples};
-}
-
-double NormalFactorOf(const HealthHour& hour) {
-  return hour.live_samples == 0
-             ? std::numeric_limits<double>::quiet_NaN()
-             : static_cast<double>(hour.normal_factor) * HealthHour::kShare /
-                   static_cast<double>(hour.live_samples);
+  return list;
 }
 
 Json HealthHoursJson(std::span<const HealthHour> hours) {
   Json list = Json::array();
   for (const HealthHour& hour : hours) {
-    list.push_back({{"hour_ms", hour.hour * kMsPerHour},
-                    {"epoch", hour.epoch},
-                    {"model_hash", storage::EpisodeIdText(hour.model_hash)},
-                    {"seen_h", Number(Hours(hour.seen_ms))},
-                    {"live_h", Number(Hours(hour.live_ms))},
-                    {"alarm_h", Number(Hours(hour.alarm_ms))},
-                    {"open_h", Number(Hours(hour.open_ms))},
-                    {"shut_h", Number(Hours(hour.shut_ms))},
-                    {"d0", Number(NormalFactorOf(hour))},
-                    {"travel_strokes", Number(Strokes(hour.travel))},
-                    {"reversals", hour.reversals},
-                    {"channels", ChannelsJson(hour)},
-                    {"strengths", StrengthsJson(hour)}});
+    list.push_back(HourJson(hour));
   }
-  return {{"hours", list}};
+  return list;
 }
 
 std::vector<HealthHour> DaysOf(std::span<const HealthHour> hours) {

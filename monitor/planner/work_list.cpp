@@ -2,12 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
 #include <utility>
+
+#include "cli/text_table.h"
+#include "cli/time_text.h"
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "storage/history/health.h"
 
 namespace fdi::planner {
 namespace {
 
+using cli::Json;
+using storage::Episode;
+
 constexpr double kNsPerDay = 86'400e9;
+constexpr double kNsPerHour = 3'600e9;
+constexpr std::int64_t kHourNs = 3'600'000'000'000;
+constexpr double kMsPerHour = 3.6e6;
+constexpr double kFullStroke = 100.0;  // [%]
 constexpr double kOtherReasons = 0.25;
 constexpr double kRepetition = 0.1;
 constexpr double kMostRepetition = 2.0;
@@ -23,20 +39,230 @@ void SortByWeight(std::vector<Reason>& reasons, const WorkOptions& options) {
   });
 }
 
+// "40 min", "5 h", "3 days"
+std::string SpanText(std::int64_t span_ns) {
+  const double hours = std::max(0.0, static_cast<double>(span_ns)) / kNsPerHour;
+  if (hours < 1.0) {
+    return std::to_string(std::lround(hours * 60.0)) + " min";
+  }
+  if (hours < 2.0 * 24.0) {
+    return std::to_string(std::lround(hours)) + " h";
+  }
+  return std::to_string(std::lround(hours / 24.0)) + " days";
+}
+
+std::string FaultText(const FaultReason& reason, const WorkOptions& options) {
+  std::string text = reason.words.name + ": ";
+  const std::int64_t now_ns = std::max(options.now_ns, reason.last_ns);
+  text += reason.ended_ns
+              ? "ended " + SpanText(now_ns - *reason.ended_ns) + " ago"
+              : "stands for " + SpanText(now_ns - reason.detected_ns);
+  text += ", severity " + std::string(SeverityName(reason.words.severity));
+  if (reason.strength != 0.0) {
+    text += " at strength " + cli::FormatNumber(reason.strength, 2);
+  }
+  if (reason.episodes > 1) {
+    text += ", " + std::to_string(reason.episodes) + " episodes";
+  }
+  if (reason.confirmed) {
+    text += ", confirmed by a label";
+  } else if (reason.trust < 0.5) {
+    text += ", labels called this answer wrong before";
+  }
+  return text;
+}
+
+std::string TrendText(const LimitTrend& trend) {
+  const monitor::HealthLimit& limit = trend.limit;
+  const std::string unit = HealthUnit(limit, trend.flow_unit);
+  const std::string name =
+      limit.kind == monitor::HealthLimit::Kind::kStrength
+          ? FaultName(limit.fault) + " strength"
+      : limit.kind == monitor::HealthLimit::Kind::kTravel ? "travel"
+      : limit.kind == monitor::HealthLimit::Kind::kReversals
+          ? "reversals"
+          : std::string(SignalName(limit.signal));
+  std::string text = name;
+  if (trend.forecast.now) {
+    text += " at " + cli::FormatNumber(*trend.forecast.now, 2) +
+            (unit.empty() ? "" : " " + unit);
+  }
+  return text + ", limit " + HealthLimitText(limit) + ": " +
+         ForecastText(trend.forecast);
+}
+
+// A reason of either kind.
+struct WeightedText {
+  double weight;
+  std::string text;
+};
+
+std::vector<WeightedText> TextsOf(const ValveWork& work,
+                                  const WorkOptions& options) {
+  std::vector<WeightedText> texts;
+  for (const FaultReason& reason : work.faults) {
+    texts.push_back({WeightOf(reason, options), FaultText(reason, options)});
+  }
+  for (const LimitTrend& trend : work.trends) {
+    texts.push_back({WeightOf(trend, options), TrendText(trend)});
+  }
+  return texts;
+}
+
 double ScoreOf(const ValveWork& work, const WorkOptions& options) {
   double most = 0.0;
   double sum = 0.0;
-  const auto add = [&](double weight) {
+  for (const auto& [weight, text] : TextsOf(work, options)) {
     most = std::max(most, weight);
     sum += weight;
-  };
-  for (const FaultReason& reason : work.faults) {
-    add(WeightOf(reason, options));
-  }
-  for (const TrendReason& reason : work.trends) {
-    add(WeightOf(reason, options));
   }
   return most + kOtherReasons * (sum - most);
+}
+
+// What an episode was: as its label says, or its answer.
+std::string FaultOf(const Episode& episode) {
+  const std::string label = episode.label.value_or("");
+  return ParseFault(label) ? label : episode.fault.value_or("unknown");
+}
+
+// Labels on one answer in the plant.
+struct Record {
+  int right{0};
+  int wrong{0};
+
+  double trust() const { return (right + 1.0) / (right + wrong + 1.0); }
+};
+
+std::map<std::string, Record> RecordsOf(const std::vector<Episode>& episodes) {
+  std::map<std::string, Record> records;
+  for (const Episode& episode : episodes) {
+    if (episode.label) {
+      Record& record = records[episode.fault.value_or("unknown")];
+      const bool right =
+          *episode.label == "true" || *episode.label == episode.fault;
+      ++(right ? record.right : record.wrong);
+    }
+  }
+  return records;
+}
+
+// Episodes come in order of detection: the newest one has the last word.
+void AddEpisode(const Episode& episode, const cli::FaultTexts& texts,
+                std::vector<FaultReason>& reasons) {
+  const std::string fault = FaultOf(episode);
+  auto place = std::ranges::find(reasons, fault, &FaultReason::fault);
+  if (place == reasons.end()) {
+    place = reasons.insert(reasons.end(), FaultReason{});
+    place->fault = fault;
+  }
+  place->words = texts.Words(fault, episode.strength);
+  place->strength = episode.strength;
+  place->factor = episode.peak_factor;
+  ++place->episodes;
+  place->confirmed = place->confirmed || episode.label.has_value();
+  place->episode_id = episode.episode_id;
+  place->detected_ns = episode.detected_ns;
+  place->ended_ns = episode.ended_ns;
+  place->last_ns = episode.trace_end_ns.value_or(episode.detected_ns);
+}
+
+std::vector<Episode> EpisodesOf(storage::HistoryReader& history,
+                                const WorkQuery& query) {
+  storage::EpisodeFilter filter;
+  filter.valve_glob = query.valve_glob;
+  filter.until_ns = query.since_ns;
+  filter.state = storage::EpisodeState::kOpen;
+  std::vector<Episode> episodes = history.List(filter);
+  filter.since_ns = query.since_ns;
+  filter.until_ns = std::numeric_limits<std::int64_t>::max();
+  filter.state = storage::EpisodeState::kAny;
+  for (Episode& episode : history.List(filter)) {
+    episodes.push_back(std::move(episode));
+  }
+  return episodes;
+}
+
+void AddHealth(const std::vector<HealthHour>& hours, const WorkQuery& query,
+               ValveWork& work) {
+  if (hours.empty()) {
+    return;
+  }
+  double live = 0.0;
+  for (const HealthHour& hour : hours) {
+    if (hour.epoch == hours.back().epoch) {
+      work.travel_strokes +=
+          static_cast<double>(hour.travel) * HealthHour::kTravel / kFullStroke;
+      work.service_hours += static_cast<double>(hour.seen_ms) / kMsPerHour;
+      live += static_cast<double>(hour.live_ms) / kMsPerHour;
+    }
+  }
+  work.live_share = work.service_hours > 0.0 ? live / work.service_hours : 0.0;
+  work.last_ns = hours.back().hour * kHourNs;
+  work.trends = TrendsOf(hours, query.limits);
+}
+
+void RequireDiscipline(const std::string& discipline) {
+  std::string accepted;
+  for (const auto d : {cli::Discipline::kOperator, cli::Discipline::kInstrument,
+                       cli::Discipline::kAir, cli::Discipline::kMechanical}) {
+    if (discipline == DisciplineName(d)) {
+      return;
+    }
+    accepted.append(" ").append(DisciplineName(d));
+  }
+  throw ConfigError("discipline '" + discipline + "' is none of" + accepted);
+}
+
+Json RowJson(const WorkRow& row) {
+  const ValveWork& work = row.work;
+  Json json{{"rank", row.rank},
+            {"valve_id", work.valve_id},
+            {"score", SixDigits(row.score)},
+            {"why", row.why}};
+  for (const char* key :
+       {"fault", "name", "discipline", "namur", "severity", "check", "strength",
+        "open", "episodes", "episode_id", "detected_utc", "confirmed"}) {
+    json[key] = nullptr;
+  }
+  if (!work.faults.empty()) {
+    const FaultReason& fault = work.faults.front();
+    json.update({{"fault", fault.fault},
+                 {"name", fault.words.name},
+                 {"discipline", fault.words.discipline},
+                 {"namur", NamurName(fault.words.namur)},
+                 {"severity", SeverityName(fault.words.severity)},
+                 {"check", fault.words.check},
+                 {"strength", SixDigits(fault.strength)},
+                 {"open", !fault.ended_ns},
+                 {"episodes", fault.episodes},
+                 {"episode_id", fault.episode_id},
+                 {"detected_utc", cli::FormatTime(fault.detected_ns, true)},
+                 {"confirmed", fault.confirmed}});
+  }
+  json["trends"] = TrendsJson(work.trends);
+  json["travel_strokes"] = SixDigits(work.travel_strokes);
+  json["service_hours"] = SixDigits(work.service_hours);
+  json["live_share"] = SixDigits(work.live_share);
+  json["last_utc"] =
+      work.last_ns ? Json(cli::FormatTime(*work.last_ns, true)) : Json();
+  return json;
+}
+
+std::string RowText(const WorkRow& row) {
+  const ValveWork& work = row.work;
+  std::string text = std::to_string(row.rank) + ". " + work.valve_id + "  (" +
+                     cli::FormatNumber(row.score, 2) + ")\n   because " +
+                     row.why;
+  if (!work.faults.empty()) {
+    const cli::FaultWords& words = work.faults.front().words;
+    text += "\n   " + words.discipline + ": " + words.check;
+  }
+  if (work.service_hours > 0.0) {
+    text += "\n   " + cli::FormatNumber(work.travel_strokes, 0) +
+            " strokes in " + cli::FormatNumber(work.service_hours, 0) + " h, " +
+            cli::FormatNumber(100.0 * work.live_share, 0) + " % of it judged";
+  }
+  return text;
 }
 
 }  // namespace
@@ -57,7 +283,7 @@ double WeightOf(const FaultReason& reason, const WorkOptions& options) {
          std::exp2(-days / options.half_life_days) * repetition;
 }
 
-double WeightOf(const TrendReason& reason, const WorkOptions& options) {
+double WeightOf(const LimitTrend& reason, const WorkOptions& options) {
   using Answer = monitor::HealthForecast::Answer;
   const double points = Points(cli::Severity::kHigh);
   if (reason.forecast.answer == Answer::kReached) {
@@ -80,7 +306,7 @@ std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
     }
     SortByWeight(work.faults, options);
     SortByWeight(work.trends, options);
-    std::erase_if(work.trends, [&](const TrendReason& reason) {
+    std::erase_if(work.trends, [&](const LimitTrend& reason) {
       return WeightOf(reason, options) <= 0.0;
     });
     const std::string why = WhyText(work, options);
@@ -94,6 +320,75 @@ std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
     rows[i].rank = static_cast<int>(i) + 1;
   }
   return rows;
+}
+
+std::string WhyText(const ValveWork& work, const WorkOptions& options) {
+  std::vector<WeightedText> texts = TextsOf(work, options);
+  std::ranges::stable_sort(texts, std::greater{}, &WeightedText::weight);
+  std::string why;
+  for (const auto& [weight, text] : texts) {
+    why += (why.empty() ? "" : "; ") + text;
+  }
+  return why;
+}
+
+std::vector<WorkRow> ReadWorkList(storage::HistoryReader& history,
+                                  const cli::FaultTexts& texts,
+                                  const WorkQuery& query) {
+  if (!query.discipline.empty()) {
+    RequireDiscipline(query.discipline);
+  }
+  std::map<std::string, ValveWork> valves;
+  const std::vector<Episode> episodes = EpisodesOf(history, query);
+  for (const Episode& episode : episodes) {
+    if (episode.label != "false") {
+      AddEpisode(episode, texts, valves[episode.valve_id].faults);
+    }
+  }
+  const std::map<std::string, Record> records = RecordsOf(episodes);
+  for (const std::string& valve :
+       HealthValves(history.database(), query.valve_glob)) {
+    AddHealth(ReadHealth(history.database(), {valve, query.since_ns}), query,
+              valves[valve]);
+  }
+  std::vector<ValveWork> work;
+  for (auto& [valve, facts] : valves) {
+    facts.valve_id = valve;
+    for (FaultReason& reason : facts.faults) {
+      const auto record = records.find(reason.fault);
+      reason.trust = record == records.end() ? 1.0 : record->second.trust();
+    }
+    if (!query.discipline.empty()) {
+      std::erase_if(facts.faults, [&query](const FaultReason& reason) {
+        return reason.words.discipline.find(query.discipline) ==
+               std::string::npos;
+      });
+      facts.trends.clear();
+    }
+    work.push_back(std::move(facts));
+  }
+  std::vector<WorkRow> rows = RankWork(std::move(work), query.options);
+  if (query.top != 0 && rows.size() > query.top) {
+    rows.resize(query.top);
+  }
+  return rows;
+}
+
+cli::Report WorkListReport(std::span<const WorkRow> rows) {
+  cli::Report report;
+  Json& list = report.document["rows"] = Json::array();
+  for (const WorkRow& row : rows) {
+    list.push_back(RowJson(row));
+    report.Line(RowText(row));
+  }
+  if (rows.empty()) {
+    report.Line("Nothing to do.");
+  }
+  report.Csv("rows", {"rank", "valve_id", "score", "severity", "discipline",
+                      "namur", "fault", "name", "why", "check", "strength",
+                      "open", "episodes", "episode_id", "confirmed",
+                      "detected_utc", "travel_strokes", "service_hours"});
+  return report;
 }
 
 }  // namespace fdi::planner

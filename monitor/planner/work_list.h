@@ -2,11 +2,14 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "monitor/health_series.h"
-#include "storage/cli/fault_texts.h"
+#include "cli/fault_texts.h"
+#include "cli/report.h"
+#include "monitor/planner/health_view.h"
+#include "storage/history/history_reader.h"
 
 namespace fdi::planner {
 
@@ -17,28 +20,22 @@ struct FaultReason {
   cli::FaultWords words;
   double strength{0.0};   ///< Estimated, of the newest episode.
   double factor{0.0};     ///< Its peak factor.
-  int episodes{0};        ///< Those labelled false apart.
+  int episodes{0};        ///< Without those labelled false.
   bool confirmed{false};  ///< A label says so.
   /// Of labels on this answer in the plant: (right + 1) / (right + wrong + 1).
   double trust{1.0};
   std::string episode_id;       ///< The newest.
   std::int64_t detected_ns{0};  ///< Of it.
   std::optional<std::int64_t> ended_ns;
-  std::int64_t last_ns{0};  ///< Newest evidence, which a clock may be behind.
-};
-
-/// A limit that is reached or that a significant trend leads to.
-struct TrendReason {
-  monitor::HealthLimit limit;
-  monitor::HealthForecast forecast;
-  FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  /// Of the newest evidence. The clock of this machine may be behind it.
+  std::int64_t last_ns{0};
 };
 
 /// What is known of one valve.
 struct ValveWork {
   std::string valve_id;
   std::vector<FaultReason> faults;
-  std::vector<TrendReason> trends;
+  std::vector<LimitTrend> trends;
   /// Since the equipment was replaced or repaired last (its epoch).
   double travel_strokes{0.0};
   double service_hours{0.0};
@@ -50,8 +47,8 @@ struct ValveWork {
 struct WorkRow {
   int rank{0};
   double score{0.0};
-  ValveWork work;  ///< Reasons by their weight, the weightiest first.
-  std::string why;
+  ValveWork work;   ///< Its reasons by weight, the weightiest first.
+  std::string why;  ///< The reasons in words, in the same order.
 };
 
 /// Settings of RankWork().
@@ -77,10 +74,34 @@ std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
 
 /// S · C · U · R
 double WeightOf(const FaultReason& reason, const WorkOptions& options);
-double WeightOf(const TrendReason& reason, const WorkOptions& options);
+double WeightOf(const LimitTrend& trend, const WorkOptions& options);
 
 /// The reasons in words, the weightiest first.
 std::string WhyText(const ValveWork& work, const WorkOptions& options);
-std::string TrendText(const TrendReason& reason);
+
+/// Settings of ReadWorkList().
+struct WorkQuery {
+  std::string valve_glob{"*"};
+  std::int64_t since_ns{0};  ///< Episodes from then on, and open ones.
+  std::vector<monitor::HealthLimit> limits;
+  std::string discipline;  ///< Only reasons of it; empty: any.
+  std::size_t top{0};      ///< 0: all.
+  WorkOptions options;     ///< now_ns is needed.
+};
+
+/// What history.db knows of the plant, ranked; see RankWork(). Trends are those
+/// of the hours of health from since_ns on.
+/// @throws ConfigError for an unknown discipline, naming the accepted ones.
+std::vector<WorkRow> ReadWorkList(storage::HistoryReader& history,
+                                  const cli::FaultTexts& texts,
+                                  const WorkQuery& query);
+
+/// {"rows": [{"rank", "valve_id", "score", "why", "fault", "name",
+/// "discipline", "namur", "severity", "check", "strength", "open", "episodes",
+/// "episode_id", "detected_utc", "confirmed", "trends": TrendsJson(),
+/// "travel_strokes", "service_hours", "live_share", "last_utc"}]}, for people
+/// as sentences. `fault` to `confirmed` are those of the weightiest fault; null
+/// where there is none.
+cli::Report WorkListReport(std::span<const WorkRow> rows);
 
 }  // namespace fdi::planner

@@ -1,12 +1,10 @@
-#include <array>
-#include <iostream>
+#include <cstdio>
 #include <string>
 
+#include "cli/report.h"
 #include "diagnosis/fault_catalogue.h"
 #include "simulator/app/verbs.h"
 #include "simulator/fault_effects.h"
-#include "storage/cli/json_output.h"
-#include "storage/cli/text_table.h"
 
 namespace fdi::simulator {
 namespace {
@@ -16,7 +14,7 @@ struct EffectField {
   double FaultEffects::*field;
 };
 
-constexpr std::array<EffectField, 23> kFields = {{
+constexpr EffectField kFields[] = {
     {"upper travel stop x", &FaultEffects::upper_stop_factor},
     {"plug against rod +", &FaultEffects::plug_offset},
     {"Kv x", &FaultEffects::kv_factor},
@@ -40,7 +38,9 @@ constexpr std::array<EffectField, 23> kFields = {{
     {"T1 reading, share of span, +", &FaultEffects::temperature_reading_step},
     {"P1 reading, share of span, +", &FaultEffects::inlet_reading_step},
     {"P2 reading, share of span, +", &FaultEffects::outlet_reading_step},
-}};
+};
+// An effect without a text here would be missing from the list of faults.
+static_assert(sizeof(FaultEffects) == std::size(kFields) * sizeof(double));
 
 // What differs from the healthy valve: "Kv x 0.8, opening + 0.1".
 std::string EffectText(int fault, double strength) {
@@ -58,45 +58,43 @@ std::string EffectText(int fault, double strength) {
   return text;
 }
 
-int PrintFaults(const cli::GlobalOptions& options) {
-  cli::TextTable table({{"fault"},
-                        {"description"},
-                        {"strength"},
-                        {"effect at strength 1"},
-                        {"paper"}});
-  cli::Json json;
-  json["faults"] = cli::Json::array();
+cli::Report Faults(const cli::Context& /*context*/) {
+  cli::Report report;
+  cli::Json& faults = report.document["faults"] = cli::Json::array();
   for (int fault = 1; fault <= kLastFault; ++fault) {
     const FaultFacts& facts = FaultFactsOf(fault);
-    const double least = facts.is_signed ? -1.0 : 0.0;
-    const std::string effect = EffectText(fault, 1.0);
-    cli::Json entry;
+    cli::Json& entry = faults.emplace_back();
     entry["name"] = facts.name;
     entry["description"] = facts.description;
-    entry["strength_min"] = least;
+    entry["strength_min"] = facts.is_signed ? -1.0 : 0.0;
     entry["strength_max"] = 1.0;
-    entry["effect"] = effect;
+    entry["effect"] = EffectText(fault, 1.0);
     entry["paper_name"] = facts.paper_name;
-    json["faults"].push_back(std::move(entry));
-    table.AddRow(
-        {std::string(facts.name), std::string(facts.description),
-         facts.is_signed ? "-1..1" : "0..1", effect,
-         facts.paper_name.empty() ? "-" : std::string(facts.paper_name)});
   }
-  if (options.json) {
-    cli::PrintJson(std::cout, json);
-  } else {
-    table.Print(std::cout);
-  }
-  return cli::kExitOk;
+  const auto strengths = [](const cli::Json& row) -> std::string {
+    return row["strength_min"] == 0.0 ? "0..1" : "-1..1";
+  };
+  const auto paper_name = [](const cli::Json& row) {
+    const auto name = row["paper_name"].get<std::string>();
+    return name.empty() ? "-" : name;
+  };
+  report.Table("faults",
+               {{.heading = "fault", .key = "name"},
+                {.heading = "description", .key = "description"},
+                {.heading = "strength",
+                 .key = "strength_min",
+                 .text = strengths,
+                 .align = cli::Align::kLeft},
+                {.heading = "effect at strength 1", .key = "effect"},
+                {.heading = "paper", .key = "paper_name", .text = paper_name}});
+  return report;
 }
 
 }  // namespace
 
 void AddFaultsVerb(cli::Program& program) {
-  program.AddVerb(
-      "faults", "List the faults that can be injected",
-      [](const cli::Context& context) { return PrintFaults(context.options); });
+  program.AddVerb("faults", "List the faults that can be injected",
+                  cli::ReportAction(Faults));
 }
 
 }  // namespace fdi::simulator

@@ -5,8 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/csv.h"
 #include "diagnosis/error.h"
-#include "storage/csv_columns.h"
 
 namespace fdi::simulator {
 namespace {
@@ -16,9 +16,9 @@ using Json = nlohmann::json;
 constexpr double kStepTolerance = 0.01;  // As in a CSV.
 constexpr double kMaxSeconds = 3.2e9;    // Nanoseconds must fit.
 
-const storage::SignalColumn* FindColumn(std::string_view key) {
-  for (const storage::SignalColumn& column : storage::kSignalColumns) {
-    if (storage::SameName(column.name, key)) {
+const cli::SignalColumn* FindColumn(std::string_view key) {
+  for (const cli::SignalColumn& column : cli::kSignalColumns) {
+    if (cli::SameName(column.name, key)) {
       return &column;
     }
   }
@@ -26,13 +26,13 @@ const storage::SignalColumn* FindColumn(std::string_view key) {
 }
 
 bool IsTime(std::string_view key) {
-  return storage::SameName(key, storage::kTimeColumn);
+  return cli::SameName(key, cli::kTimeColumn);
 }
 
 bool IsTruth(std::string_view key) {
-  return storage::SameName(key, storage::kFaultColumn) ||
-         storage::SameName(key, storage::kFaultNumberColumn) ||
-         storage::SameName(key, storage::kStrengthColumn);
+  return cli::SameName(key, cli::kFaultColumn) ||
+         cli::SameName(key, cli::kFaultNumberColumn) ||
+         cli::SameName(key, cli::kStrengthColumn);
 }
 
 bool IsBlank(std::string_view line) {
@@ -42,8 +42,7 @@ bool IsBlank(std::string_view line) {
 }  // namespace
 
 void JsonLineReader::Refuse(const std::string& reason) const {
-  throw DataError(options_.source + ':' + std::to_string(line_) + ": " +
-                  reason);
+  throw DataError(source_ + ':' + std::to_string(line_) + ": " + reason);
 }
 
 std::optional<JsonRow> JsonLineReader::TakeLine(std::string_view line) {
@@ -57,7 +56,7 @@ std::optional<JsonRow> JsonLineReader::TakeLine(std::string_view line) {
   }
   JsonRow row;
   for (const auto& [key, value] : object.items()) {
-    if (storage::SameName(key, storage::kModeColumn)) {
+    if (cli::SameName(key, cli::kModeColumn)) {
       const auto mode =
           ParseValveMode(value.is_string() ? value.get<std::string>() : "");
       if (!mode) {
@@ -94,7 +93,7 @@ void JsonLineReader::Set(const std::string& key, double value, JsonRow& row) {
     row.t_s = value;
     return;
   }
-  const storage::SignalColumn& column = *FindColumn(key);
+  const cli::SignalColumn& column = *FindColumn(key);
   if (row.sample.Has(column.signal)) {
     Refuse("key \"" + key + "\": the signal is there twice");
   }
@@ -130,7 +129,7 @@ void JsonLineReader::CheckTime(std::optional<double> t_s) {
     period_s_ = step;
   }
   const bool on_time = std::abs(step - period_s_) <= kStepTolerance * period_s_;
-  if (!on_time && !(options_.split_gaps && step > period_s_)) {
+  if (!on_time && !(split_gaps_ && step > period_s_)) {
     Refuse("time jumps by " + std::to_string(step) +
            " s, the sample period is " + std::to_string(period_s_) + " s" +
            (step > period_s_ ? " (--split-gaps accepts gaps)" : ""));

@@ -4,17 +4,12 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/sample.h"
 
 namespace fdi::simulator {
-
-/// Settings of JsonLineReader.
-struct JsonLineOptions {
-  std::string source{"stdin"};  ///< For messages.
-  bool split_gaps{false};       ///< A gap in time is no error.
-};
 
 struct JsonRow {
   Sample sample;              ///< stamp_ns from t_s; seq counts from 0.
@@ -31,8 +26,10 @@ struct JsonRow {
 /// keys are ignored.
 class JsonLineReader {
  public:
-  explicit JsonLineReader(JsonLineOptions options)
-      : options_(std::move(options)) {}
+  /// @param source For messages.
+  /// @param split_gaps Accepts gaps in time.
+  JsonLineReader(std::string source, bool split_gaps)
+      : source_(std::move(source)), split_gaps_(split_gaps) {}
 
   /// @returns nothing for a blank line.
   /// @throws DataError naming source, line, key and reason.
@@ -46,7 +43,8 @@ class JsonLineReader {
   void CheckTime(std::optional<double> t_s);
   [[noreturn]] void Refuse(const std::string& reason) const;
 
-  JsonLineOptions options_;
+  std::string source_;
+  bool split_gaps_;
   std::vector<std::string> ignored_keys_;
   std::optional<FlowUnit> flow_unit_;
   std::optional<double> last_t_s_;

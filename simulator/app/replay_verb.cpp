@@ -8,11 +8,11 @@
 #include <unistd.h>
 
 #include "diagnosis/error.h"
-#include "simulator/app/feed.h"
-#include "simulator/app/replay_feed.h"
+#include "simulator/app/delivery.h"
+#include "simulator/app/recorded_feed.h"
 #include "simulator/app/verbs.h"
-#include "storage/data_directory.h"
-#include "storage/runs.h"
+#include "storage/database/data_directory.h"
+#include "storage/runs/runs.h"
 
 namespace fdi::simulator {
 namespace {
@@ -51,13 +51,13 @@ Recording LoadRun(const ReplayOptions& options, const cli::Context& context) {
 }
 
 Recording LoadCsv(const ReplayOptions& options, const cli::Context& context) {
-  storage::CsvOptions csv;
+  cli::CsvOptions csv;
   csv.required = MaskOf(Signal::kCv);
   csv.split_gaps = options.stream.split_gaps;
-  storage::CsvTable table = storage::ReadCsvFile(options.csv, csv);
+  cli::CsvTable table = cli::ReadCsvFile(options.csv, csv);
   LogIgnored(context.log, options.csv, table.header.ignored_columns);
   Recording recording;
-  for (storage::CsvRun& run : table.runs) {
+  for (SampleSeries& run : table.runs) {
     recording.samples.insert(recording.samples.end(), run.samples.begin(),
                              run.samples.end());
   }
@@ -84,9 +84,8 @@ std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options,
                                cli::StopSignals& signals,
                                std::string& valve_id) {
   if (options.csv == kStdinName) {
-    return std::make_unique<StreamFeed>(LineInput(STDIN_FILENO, signals),
-                                        options.stream, restamping,
-                                        context.log);
+    return std::make_unique<StreamFeed>(STDIN_FILENO, signals, options.stream,
+                                        restamping, context.log);
   }
   Recording recording = options.run.empty() ? LoadCsv(options, context)
                                             : LoadRun(options, context);
@@ -96,10 +95,10 @@ std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options,
   return std::make_unique<StoredFeed>(std::move(recording.samples), restamping);
 }
 
-int Replay(const ReplayOptions& options, const cli::Context& context) {
+cli::Report Replay(const ReplayOptions& options, const cli::Context& context) {
   Check(options);
   const bool at_once = options.csv == kStdinName && !options.delivery.speed;
-  const Speed speed =
+  const double speed =
       ParseSpeed(options.delivery.speed.value_or(at_once ? "max" : "1"));
   SamplePublisherOptions publishing =
       PublisherOptionsOf(options.delivery, speed);
@@ -113,20 +112,15 @@ int Replay(const ReplayOptions& options, const cli::Context& context) {
   restamping.source_id = NewSourceId();
 
   cli::StopSignals signals;
-  FeedSummary summary;
-  SourceSummary& source = summary.sources.emplace_back();
-  source.source_id = restamping.source_id;
-  source.valve_id = options.valve;
+  FedValve valve{options.valve, restamping.source_id};
   const auto feed =
-      OpenFeed(options, restamping, context, signals, source.valve_id);
-  RequireValveId(source.valve_id);
+      OpenFeed(options, restamping, context, signals, valve.valve_id);
+  RequireValveId(valve.valve_id);
   FeedSinks sinks;
   sinks.publisher = std::make_unique<SamplePublisher>(
-      publishing, std::vector{source.valve_id}, context, signals);
+      publishing, std::vector{valve.valve_id}, context, signals);
   sinks.publisher->AwaitReader();
-  Deliver(*feed, sinks, Pacer(speed, signals), signals, summary);
-  PrintSummary(summary, context.options);
-  return ExitCodeOf(summary);
+  return Deliver(*feed, sinks, speed, signals, {valve});
 }
 
 }  // namespace
@@ -135,7 +129,7 @@ void AddReplayVerb(cli::Program& program) {
   auto options = std::make_shared<ReplayOptions>();
   CLI::App& verb = program.AddVerb(
       "replay", "Publish a stored run, a CSV file or what comes on stdin",
-      [options](const cli::Context& context) {
+      [options](const cli::Context& context) -> cli::Report {
         return Replay(*options, context);
       });
   verb.add_option("--csv", options->csv,

@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "diagnosis/error.h"
-#include "simulator/app/feed.h"
+#include "simulator/app/delivery.h"
 #include "simulator/app/scenario_toml.h"
 #include "simulator/app/verbs.h"
 
@@ -141,34 +141,23 @@ storage::NewRun NewRunOf(const Scenario& scenario,
   return run;
 }
 
-FeedSummary SummaryOf(const std::vector<Scenario>& scenarios) {
-  FeedSummary summary;
-  for (const Scenario& scenario : scenarios) {
-    SourceSummary& source = summary.sources.emplace_back();
-    source.valve_id = scenario.valve_id;
-    source.source_id = scenario.config.source_id;
-    source.seed = scenario.config.seed;
-  }
-  return summary;
-}
-
-std::vector<std::string> ValveIds(const std::vector<Scenario>& scenarios) {
-  std::vector<std::string> ids;
-  for (const Scenario& scenario : scenarios) {
-    ids.push_back(scenario.valve_id);
-  }
-  return ids;
-}
-
-int Run(const RunOptions& options, const cli::Context& context) {
-  const Speed speed = options.no_publish
-                          ? ParseSpeed("max")
-                          : ParseSpeed(options.delivery.speed.value_or("1"));
+cli::Report Run(const RunOptions& options, const cli::Context& context) {
+  const double speed = options.no_publish
+                           ? ParseSpeed("max")
+                           : ParseSpeed(options.delivery.speed.value_or("1"));
   const std::vector<Scenario> scenarios = Scenarios(options);
   cli::StopSignals signals;
   SimulationFeed feed(scenarios, signals);
-  FeedSummary summary = SummaryOf(scenarios);
+  std::vector<FedValve> valves;
+  std::vector<std::string> ids;
+  for (const Scenario& scenario : scenarios) {
+    valves.push_back(
+        {scenario.valve_id, scenario.config.source_id, scenario.config.seed});
+    ids.push_back(scenario.valve_id);
+  }
 
+  // The files are opened before the wait for a reader, so that what cannot be
+  // written is refused at once; the runs begin behind it.
   FeedSinks sinks;
   if (!options.export_file.empty()) {
     sinks.csv = std::make_unique<CsvSink>(options.export_file);
@@ -179,17 +168,15 @@ int Run(const RunOptions& options, const cli::Context& context) {
   }
   if (!options.no_publish) {
     sinks.publisher = std::make_unique<SamplePublisher>(
-        PublisherOptionsOf(options.delivery, speed), ValveIds(scenarios),
-        context, signals);
+        PublisherOptionsOf(options.delivery, speed), std::move(ids), context,
+        signals);
     sinks.publisher->AwaitReader();
   }
   for (std::size_t i = 0; sinks.runs && i < scenarios.size(); ++i) {
-    summary.sources[i].run_id =
+    valves[i].run_id =
         sinks.runs->Begin(NewRunOf(scenarios[i], context.software));
   }
-  Deliver(feed, sinks, Pacer(speed, signals), signals, summary);
-  PrintSummary(summary, context.options);
-  return ExitCodeOf(summary);
+  return Deliver(feed, sinks, speed, signals, std::move(valves));
 }
 
 void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
@@ -237,7 +224,7 @@ void AddRunVerb(cli::Program& program) {
   auto options = std::make_shared<RunOptions>();
   CLI::App& verb =
       program.AddVerb("run", "Simulate valves and publish their samples",
-                      [options](const cli::Context& context) {
+                      [options](const cli::Context& context) -> cli::Report {
                         return Run(*options, context);
                       });
   AddScenarioOptions(verb, *options);

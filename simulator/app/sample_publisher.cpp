@@ -4,7 +4,7 @@
 #include <chrono>
 #include <utility>
 
-#include "storage/cli/logging.h"
+#include "cli/logging.h"
 
 namespace fdi::simulator {
 namespace {

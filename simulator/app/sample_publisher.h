@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "cli/program.h"
+#include "cli/stop_signals.h"
 #include "diagnosis/log.h"
 #include "diagnosis/sample.h"
 #include "idl/endpoint.h"
 #include "idl/participant.h"
-#include "storage/cli/program.h"
-#include "storage/cli/stop_signals.h"
 
 namespace fdi::simulator {
 

@@ -1,15 +1,22 @@
 #include "simulator/app/scenario_toml.h"
 
 #include <algorithm>
-#include <concepts>
+#include <array>
+#include <charconv>
 #include <limits>
+#include <string>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
+#include "cli/csv.h"
+#include "cli/time_text.h"
 #include "diagnosis/error.h"
-#include "simulator/app/scenario_fields.h"
-#include "storage/cli/time_text.h"
-#include "storage/csv.h"
+#include "diagnosis/field_list.h"
 
+// A scenario as TOML. The keys of a table are the names of the members of its
+// struct, listed once for the reader and the writer; the unit of a field is the
+// end of its name, its range is in the Validate() of its struct.
 namespace fdi::simulator {
 namespace {
 
@@ -17,6 +24,49 @@ using cli::TomlReader;
 using std::filesystem::path;
 
 constexpr double kForever = 1e10;
+
+// VisitFields(value, visit) calls visit(name, field) for each field; a struct
+// within has a list of its own.
+#define FDI_VISIT(FIELD) visit(#FIELD, value.FIELD);
+#define FDI_FIELDS(STRUCT, ...)                      \
+  template <typename Visitor>                        \
+  void VisitFields(STRUCT& value, Visitor&& visit) { \
+    FDI_FOR_EACH(FDI_VISIT, __VA_ARGS__)             \
+  }
+
+FDI_FIELDS(Disturbance, sd, correlation)
+FDI_FIELDS(OperatingPointExcitation, cv_pct, cv_noise_pct, p1_kpa, p1_noise_kpa,
+           p2_kpa, p2_noise_kpa, t1_degc, amplitude_pct, period_s)
+FDI_FIELDS(SineExcitation, phase_s)
+FDI_FIELDS(LevelLoopExcitation, level_set_point_pct, steam_demand_t_h,
+           steam_noise_t_h, level_noise_pct, pump_noise_kpa, initial_cv_pct,
+           proportional_gain, integral_time_s, inlet_opening, outlet_opening,
+           bypass_opening)
+FDI_FIELDS(InputProfile, t_s, cv_pct, p1_kpa, p2_kpa, t1_degc, cv_noise_pct,
+           p1_noise_kpa, p2_noise_kpa)
+FDI_FIELDS(ActuatorParameters, moving_mass_kg, damping_n_s_m, spring_rate_n_m,
+           spring_preload_m, diaphragm_area_m2, stroke_m, chamber_volume_m3,
+           air_temperature_k, ambient_pressure_pa, supply_pressure_gauge_pa,
+           plug_area_m2, play_fraction, coulomb_friction_n)
+FDI_FIELDS(PositionerParameters, gain, integral_time_s, derivative_time_s,
+           filter_time_s, sampling_period_s, filling_cv, venting_cv,
+           transducer_dead_zone)
+FDI_FIELDS(TrimParameters, kv_m3_h, characteristic, exponent, bypass_kv_m3_h)
+FDI_FIELDS(Transmitter, low, high, noise_sd)
+FDI_FIELDS(InstrumentParameters, flow_unit, command, pressure, temperature,
+           position, flow, positioner_noise_sd_pct, resolution_bits)
+FDI_FIELDS(ValveParameters, name, actuator, positioner, trim, instruments)
+FDI_FIELDS(ValveSimulationConfig, cold_start, continuous_inputs, noise,
+           resolution)
+// The rows of a recorded excitation come from a file.
+template <typename Visitor>
+void VisitFields(RecordedExcitation& /*value*/, Visitor&& /*visit*/) {}
+
+#undef FDI_FIELDS
+#undef FDI_VISIT
+
+constexpr const char* kCharacteristics[] = {"exponential", "linear"};
+static_assert(static_cast<int>(FlowCharacteristic::kLinear) == 1);
 
 path Resolve(const path& folder, const path& file) {
   return file.is_absolute() ? file : folder / file;
@@ -56,11 +106,11 @@ class FieldReader {
   }
   void operator()(const char* key, FlowCharacteristic& field) {
     if (const auto text = table_.Text(key)) {
-      if (*text != "exponential" && *text != "linear") {
+      const auto found = std::ranges::find(kCharacteristics, *text);
+      if (found == std::end(kCharacteristics)) {
         table_.Refuse(key, "'" + *text + "': expected exponential or linear");
       }
-      field = *text == "linear" ? FlowCharacteristic::kLinear
-                                : FlowCharacteristic::kExponential;
+      field = static_cast<FlowCharacteristic>(found - kCharacteristics);
     }
   }
   template <typename Struct>
@@ -74,6 +124,81 @@ class FieldReader {
  private:
   TomlReader& table_;
 };
+
+// The shortest text that reads back as `value`.
+template <typename Number>
+std::string Shortest(Number value) {
+  std::array<char, 32> buffer{};
+  const auto [end, error] =
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+  return {buffer.data(), end};
+}
+
+// "[a, b, c]" of the texts that `text_of` makes of `items`.
+template <typename Items, typename TextOf>
+std::string List(const Items& items, TextOf text_of) {
+  std::string list;
+  for (const auto& item : items) {
+    list += (list.empty() ? "" : ", ") + text_of(item);
+  }
+  return '[' + list + ']';
+}
+
+using Lines = std::vector<std::pair<std::string, std::string>>;
+
+// Appends "PREFIXfield" and its value for all fields, inner structs included.
+class FieldWriter {
+ public:
+  FieldWriter(std::string prefix, Lines& lines)
+      : prefix_(std::move(prefix)), lines_(lines) {}
+
+  void operator()(const char* key, double field) { Add(key, Shortest(field)); }
+  void operator()(const char* key, int field) { Add(key, Shortest(field)); }
+  void operator()(const char* key, bool field) {
+    Add(key, field ? "true" : "false");
+  }
+  void operator()(const char* key, std::vector<double>& field) {
+    Add(key, List(field, Shortest<double>));
+  }
+  void operator()(const char* key, std::string& field) {
+    Add(key, QuoteToml(field));
+  }
+  void operator()(const char* key, FlowUnit field) {
+    Add(key, QuoteToml(FlowUnitName(field)));
+  }
+  void operator()(const char* key, FlowCharacteristic field) {
+    Add(key, QuoteToml(kCharacteristics[static_cast<int>(field)]));
+  }
+  template <typename Struct>
+  requires(std::is_class_v<Struct> && !std::is_same_v<Struct, std::string> &&
+           !std::is_same_v<Struct, std::vector<double>>) void
+  operator()(const char* key, Struct& field) {
+    VisitFields(field, FieldWriter(prefix_ + key + '.', lines_));
+  }
+
+ private:
+  void Add(const char* key, std::string value) {
+    lines_.emplace_back(prefix_ + key, std::move(value));
+  }
+
+  std::string prefix_;
+  Lines& lines_;
+};
+
+// Appends the fields of `value` that differ from those of `defaults`.
+template <typename Struct>
+void AppendDifferences(const std::string& prefix, Struct value, Struct defaults,
+                       Lines& result) {
+  Lines lines;
+  Lines others;
+  VisitFields(value, FieldWriter(prefix, lines));
+  VisitFields(defaults, FieldWriter(prefix, others));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (lines[i] != others[i]) {
+      result.push_back(std::move(lines[i]));
+    }
+  }
+}
 
 // Runs `read`; a ConfigError without a place is given that of `key`.
 template <typename Read>
@@ -108,12 +233,12 @@ void ReadParameters(TomlReader& table, const path& folder,
 // Takes CV, P1, P2 and T1 of a CSV as excitation, and its period and length.
 void LoadExcitation(const path& folder, const std::string& file,
                     Scenario& scenario) {
-  storage::CsvOptions options;
+  cli::CsvOptions options;
   options.required =
       static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kP1) |
                               MaskOf(Signal::kP2) | MaskOf(Signal::kT1));
-  const auto table = storage::ReadCsvFile(Resolve(folder, file), options);
-  const storage::CsvRun& run = table.runs.front();
+  const auto table = cli::ReadCsvFile(Resolve(folder, file), options);
+  const SampleSeries& run = table.runs.front();
   RecordedExcitation recorded;
   recorded.rows.reserve(run.samples.size());
   for (const LabelledSample& row : run.samples) {
@@ -221,6 +346,46 @@ TomlReader ReaderOf(const std::string& setting, std::string_view key,
   }
 }
 
+void AppendParameters(const ValveParameters& parameters, Lines& result) {
+  const auto names = ParameterSetNames();
+  const bool shipped = std::ranges::count(names, parameters.name) > 0;
+  const std::string base = shipped ? parameters.name : names.front();
+  result.emplace_back("parameters.base", QuoteToml(base));
+  AppendDifferences("parameters.", parameters, ParameterSet(base), result);
+}
+
+void AppendExcitation(const Scenario& scenario, Lines& result) {
+  const ExcitationConfig& excitation = scenario.config.excitation;
+  const std::string name(ExcitationName(excitation));
+  const bool from_file = std::holds_alternative<RecordedExcitation>(excitation);
+  result.emplace_back(
+      "excitation.name",
+      QuoteToml(from_file ? name + ':' + scenario.excitation_file : name));
+  std::visit(
+      [&result](const auto& e) {
+        AppendDifferences("excitation.", e, std::remove_cvref_t<decltype(e)>{},
+                          result);
+      },
+      excitation);
+}
+
+// An inline table: {t_s = [0, 10], ...}.
+std::string InputText(const InputProfile& input) {
+  Lines lines;
+  AppendDifferences("", input, InputProfile{}, lines);
+  std::string table;
+  for (const auto& [key, value] : lines) {
+    table += (table.empty() ? "" : ", ") + key + " = " + value;
+  }
+  return '{' + table + '}';
+}
+
+std::string ModeText(const ModeStretch& stretch) {
+  return "{from_s = " + Shortest(stretch.from_s) +
+         ", until_s = " + Shortest(stretch.until_s) +
+         ", mode = " + QuoteToml(ValveModeName(stretch.mode)) + '}';
+}
+
 }  // namespace
 
 ValveSimulationConfig DefaultConfig() {
@@ -273,11 +438,7 @@ void ApplyScenario(TomlReader& table, const path& folder, Scenario& scenario) {
     AtKey(table, "start",
           [&] { config.start_ns = cli::ParseTime(*start, true); });
   }
-  config.cold_start = table.Boolean("cold_start").value_or(config.cold_start);
-  config.continuous_inputs =
-      table.Boolean("continuous_inputs").value_or(config.continuous_inputs);
-  config.noise = table.Boolean("noise").value_or(config.noise);
-  config.resolution = table.Boolean("resolution").value_or(config.resolution);
+  VisitFields(config, FieldReader(table));
 }
 
 void ApplyScenarioFile(const path& file, Scenario& scenario) {
@@ -296,6 +457,52 @@ void ApplySetting(std::string_view setting, Scenario& scenario) {
                                setting.substr(at + 1));
   ApplyScenario(reader, {}, scenario);
   reader.Finish();
+}
+
+std::string QuoteToml(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string quoted = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7F) {
+      quoted += "\\u00";
+      quoted += {kDigits[byte >> 4U], kDigits[byte & 0xFU]};
+    } else {
+      quoted += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
+    }
+  }
+  return quoted + '"';
+}
+
+std::string ScenarioText(const Scenario& scenario) {
+  ValveSimulationConfig config = scenario.config;
+  Lines lines = {{"valve", QuoteToml(scenario.valve_id)}};
+  AppendParameters(config.parameters, lines);
+  AppendExcitation(scenario, lines);
+  if (!config.inputs.empty()) {
+    lines.emplace_back("input", List(config.inputs, InputText));
+  }
+  if (!config.modes.empty()) {
+    lines.emplace_back("mode", List(config.modes, ModeText));
+  }
+  lines.emplace_back("faults",
+                     List(config.faults, [](const FaultSchedule& fault) {
+                       return QuoteToml(ToText(fault));
+                     }));
+  lines.emplace_back("seed", Shortest(config.seed));
+  lines.emplace_back("duration_s", Shortest(config.duration_s));
+  lines.emplace_back("period_s", Shortest(config.period_s));
+  if (config.start_ns != 0) {
+    lines.emplace_back("start",
+                       QuoteToml(cli::FormatTime(config.start_ns, true)));
+  }
+  VisitFields(config, FieldWriter("", lines));
+  lines.emplace_back("tolerance_scale", Shortest(config.tolerance_scale));
+  std::string text;
+  for (const auto& [key, value] : lines) {
+    text += key + " = " + value + '\n';
+  }
+  return text;
 }
 
 }  // namespace fdi::simulator

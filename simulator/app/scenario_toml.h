@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "cli/toml_reader.h"
 #include "simulator/valve_simulation.h"
-#include "storage/cli/toml_reader.h"
 
 namespace fdi::simulator {
 
@@ -89,5 +89,8 @@ void ApplySetting(std::string_view setting, Scenario& scenario);
 /// excitation and parameters it has what differs from the defaults of that name
 /// (which the software version pins). Numbers read back as the same bits.
 std::string ScenarioText(const Scenario& scenario);
+
+/// Text in TOML's quotes.
+std::string QuoteToml(std::string_view text);
 
 }  // namespace fdi::simulator

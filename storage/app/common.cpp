@@ -1,120 +1,147 @@
-#include "storage/app/common.h"
-
-#include <algorithm>
-#include <climits>
-#include <fstream>
-#include <iostream>
-#include <limits>
-
-#include <CLI/CLI.hpp>
-#include <pwd.h>
-#include <unistd.h>
+// What the verbs have in common: options, values of documents, texts.
+#include <sstream>
 
 #include "diagnosis/error.h"
-#include "storage/cli/signal_list.h"
-#include "storage/cli/text_table.h"
-#include "storage/cli/time_text.h"
+#include "diagnosis/fault_catalogue.h"
+#include "storage/app/verbs.h"
 
 namespace fdi::storage {
 
-DataDirectory DataOf(const cli::Context& context) {
+DataDirectory DataOf(const Context& context) {
   return {context.options.data_dir};
 }
 
-DataDirectory WritableDataOf(const cli::Context& context) {
+DataDirectory WritableDataOf(const Context& context) {
   const DataDirectory data = DataOf(context);
   EnsureExists(data);
   return data;
 }
 
-cli::Json SignalsJson(SignalMask signals) {
-  cli::Json names = cli::Json::array();
-  for (std::size_t i = 0; i < kSignalCount; ++i) {
-    const auto signal = static_cast<Signal>(i);
-    if ((signals & MaskOf(signal)) != 0) {
-      names.push_back(std::string(SignalName(signal)));
-    }
+void EpisodeOptions::AddTo(CLI::App& verb) {
+  verb.add_option("--valve", valve, "Glob over valve ids: 'FV-1*'");
+  verb.add_option("--fault", fault,
+                  std::string(kFaultNames) + ", paper1..paper5 or unknown");
+  window.AddTo(verb);
+  verb.add_option("--state", state,
+                  "any; of the episode open, detected, isolated or closed; of "
+                  "the alarm unack, acked, rtn_unack, normal or shelved; "
+                  "unacked: unack or rtn_unack");
+  AddLimit(verb, limit);
+}
+
+EpisodeFilter EpisodeOptions::Filter(const Context& context) const {
+  if (!fault.empty() && fault != "unknown" && !ParseFault(fault)) {
+    throw ConfigError("--fault: unknown fault '" + fault + "'" +
+                      DidYouMeanFault(fault, {"unknown"}) + ": expected " +
+                      std::string(kFaultNames) + ", paper1..paper5 or unknown");
   }
-  return names;
+  EpisodeFilter filter;
+  filter.valve_glob = valve;
+  filter.fault = fault;
+  filter.since_ns = window.since_ns(context);
+  filter.until_ns = window.until_ns(context);
+  filter.state = ParseEpisodeState(state);
+  filter.limit = limit;
+  filter.now_ns = cli::NowNs();
+  return filter;
 }
 
-SignalMask ParseSignals(std::string_view list) {
-  constexpr SignalMask kAll = (1U << kSignalCount) - 1U;
-  return cli::ParseSignals(CLI::detail::split(std::string(list), ','), kAll);
+void NoteOptions::AddTo(CLI::App& verb) {
+  verb.add_option("--by", who, "Who says so");
+  verb.add_option("--comment", comment, "Why");
 }
 
-cli::Json TimeJson(const std::optional<std::int64_t>& stamp_ns) {
-  return stamp_ns ? cli::Json(cli::FormatTime(*stamp_ns, true)) : cli::Json();
+OperatorNote NoteOptions::Note() const {
+  return {who, comment, cli::Origin("fdi-store"), cli::NowNs()};
 }
 
-std::string TimeText(const std::optional<std::int64_t>& stamp_ns,
-                     const cli::Context& context) {
-  return stamp_ns ? cli::FormatTime(*stamp_ns, context.options.utc) : "-";
+void AddEpisode(CLI::App& verb, std::string& id, bool required) {
+  verb.add_option("episode", id, "ID, a unique beginning of it, or last")
+      ->required(required);
+}
+
+void AddOutput(CLI::App& verb, std::string& output) {
+  output = "-";
+  verb.add_option("-o,--output", output, "File, or - for stdout");
+}
+
+void AddLimit(CLI::App& verb, std::int64_t& limit) {
+  verb.add_option("--limit", limit, "The newest so many; 0: all")
+      ->check(CLI::NonNegativeNumber);
+}
+
+Json TimeJson(const std::optional<std::int64_t>& stamp_ns) {
+  return stamp_ns ? Json(cli::FormatTime(*stamp_ns, true)) : Json();
+}
+
+Json TextJson(const std::optional<std::string>& text) {
+  return text && !text->empty() ? Json(*text) : Json();
+}
+
+Json NumberJson(const std::optional<double>& number) {
+  return number && std::isfinite(*number) ? Json(*number) : Json();
+}
+
+// Rounding is all that varies in an output that stood still: its variance is
+// some 1e-28 of what the residual has. Of an output that varies, a model would
+// have to miss by 3000 times its deviation to get here.
+bool VafSaysSomething(double vaf) {
+  return vaf > -1e9;
+}
+
+Json VafJson(double vaf) {
+  return VafSaysSomething(vaf) ? NumberJson(vaf) : Json();
 }
 
 std::string Hex(std::uint64_t value) {
   return EpisodeIdText(value);
 }
 
-void PrintFields(
-    std::ostream& out,
-    const std::vector<std::pair<std::string, std::string>>& fields) {
-  std::size_t width = 0;
-  for (const auto& [name, value] : fields) {
-    width = std::max(width, name.size());
-  }
-  for (const auto& [name, value] : fields) {
-    out << name << ':' << std::string(width - name.size() + 2, ' ') << value
-        << '\n';
-  }
+const std::vector<std::string>& EpisodeKeys() {
+  static const std::vector<std::string> keys = {
+      "episode_id",  "valve_id", "detected_utc", "isolated_utc",
+      "cleared_utc", "fault",    "peak_factor",  "model_set",
+      "end_reason",  "label",    "acked_by"};
+  return keys;
 }
 
-void WriteOutput(const std::string& path,
-                 const std::function<void(std::ostream&)>& write) {
-  if (path == "-") {
-    write(std::cout);
-    return;
-  }
-  const std::string partial = path + ".part";
-  std::ofstream file(partial, std::ios::binary | std::ios::trunc);
-  if (file) {
-    write(file);
-    file.close();
-  }
-  if (!file) {
-    std::error_code ignored;
-    std::filesystem::remove(partial, ignored);
-    throw DataError("cannot write " + path);
-  }
-  std::filesystem::rename(partial, path);
+Json EpisodeJson(const Episode& episode) {
+  return {{"episode_id", episode.episode_id},
+          {"valve_id", episode.valve_id},
+          {"detected_utc", episode.detected_utc},
+          {"isolated_utc", TextJson(episode.isolated_utc)},
+          {"cleared_utc", TextJson(episode.cleared_utc)},
+          {"fault", TextJson(episode.fault)},
+          {"peak_factor", episode.peak_factor},
+          {"model_set", episode.model_set},
+          {"end_reason", TextJson(episode.end_reason)},
+          {"label", TextJson(episode.label)},
+          {"acked_by", TextJson(episode.acked_by)}};
 }
 
-void TimeWindow::AddTo(CLI::App& verb) {
-  verb.add_option("--since", since, "From this time on: 2026-11-20, 2h, ...");
-  verb.add_option("--until", until, "Before this time");
+Json ShelfJson(const Shelf& shelf) {
+  return {{"shelf_id", shelf.shelf_id},
+          {"valve_id", shelf.valve_id},
+          {"fault", TextJson(shelf.fault)},
+          {"from_utc", TimeJson(shelf.from_ns)},
+          {"until_utc", TimeJson(shelf.until_ns)},
+          {"who", shelf.who},
+          {"comment", TextJson(shelf.comment)},
+          {"origin", shelf.origin},
+          {"ended_utc", TimeJson(shelf.ended_ns)},
+          {"ended_by", TextJson(shelf.ended_by)},
+          {"ended_origin", TextJson(shelf.ended_origin)}};
 }
 
-std::int64_t TimeWindow::since_ns(const cli::Context& context) const {
-  return since.empty()
-             ? std::numeric_limits<std::int64_t>::min()
-             : cli::ParseTimeOrAgo(since, context.options.utc, cli::NowNs());
-}
-
-std::int64_t TimeWindow::until_ns(const cli::Context& context) const {
-  return until.empty()
-             ? std::numeric_limits<std::int64_t>::max()
-             : cli::ParseTimeOrAgo(until, context.options.utc, cli::NowNs());
-}
-
-cli::Json HoursJson(const std::vector<CoverageTime>& coverage) {
-  cli::Json valves = cli::Json::object();
+Json HoursJson(const std::vector<CoverageTime>& coverage) {
+  Json valves = Json::object();
   for (const CoverageTime& time : coverage) {
     valves[time.valve_id][time.quality] = time.hours;
   }
   return valves;
 }
 
-void PrintHours(std::ostream& out, const std::vector<CoverageTime>& coverage) {
+void AddHours(Report& report, const std::vector<CoverageTime>& coverage) {
   if (coverage.empty()) {
     return;
   }
@@ -126,19 +153,36 @@ void PrintHours(std::ostream& out, const std::vector<CoverageTime>& coverage) {
     table.AddRow({time.valve_id, time.quality, cli::FormatNumber(time.hours, 2),
                   std::to_string(time.samples)});
   }
-  table.Print(out);
+  AddTextTable(report, table);
 }
 
-std::string UserName() {
-  const passwd* entry = getpwuid(geteuid());
-  return entry != nullptr && entry->pw_name != nullptr ? entry->pw_name
-                                                       : "unknown";
+void AddTextTable(Report& report, const cli::TextTable& table) {
+  std::ostringstream text;
+  table.Print(text);
+  std::string lines = text.str();
+  lines.pop_back();  // Line() ends the last one.
+  report.Line(std::move(lines));
 }
 
-std::string Origin() {
-  char host[HOST_NAME_MAX + 1] = {};
-  const bool known = gethostname(host, sizeof host - 1) == 0;
-  return "fdi-store " + UserName() + "@" + (known ? host : "localhost");
+std::string TimeText(const std::optional<std::int64_t>& stamp_ns,
+                     const Context& context) {
+  return stamp_ns ? cli::FormatTime(*stamp_ns, context.options.utc) : "-";
+}
+
+cli::Column TextColumn(std::string heading,
+                       std::function<std::string(const Json& row)> text,
+                       int spare, cli::Align align) {
+  cli::Column column;
+  column.heading = std::move(heading);
+  column.text = std::move(text);
+  column.spare = spare;
+  column.align = align;
+  return column;
+}
+
+cli::Column TextField(std::string heading, std::string text) {
+  return TextColumn(std::move(heading),
+                    [text = std::move(text)](const Json&) { return text; });
 }
 
 }  // namespace fdi::storage

@@ -1,26 +1,146 @@
 #pragma once
 
-#include "storage/cli/program.h"
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include <CLI/CLI.hpp>
+
+#include "cli/output_folder.h"
+#include "cli/program.h"
+#include "cli/report.h"
+#include "cli/text_table.h"
+#include "cli/time_text.h"
+#include "cli/verb_options.h"
+#include "storage/database/data_directory.h"
+#include "storage/history/alarm.h"
+#include "storage/history/episode.h"
+#include "storage/history/history_editor.h"
+
+/// The verbs of fdi-store, one file per noun. A verb reads what it needs, fills
+/// the document of a Report, and declares which of its members people see.
 namespace fdi::storage {
 
-// Each adds the verbs of one group of fdi-store.
-void AddRunsVerbs(cli::Program& program);     ///< runs list|show|import|...
-void AddModelsVerbs(cli::Program& program);   ///< models list|show|...
-void AddValvesVerbs(cli::Program& program);   ///< valves list|show|add|...
-void AddTypesVerbs(cli::Program& program);    ///< types list|show|delete
-void AddHistoryVerbs(cli::Program& program);  ///< history list|show|ack|...
-/// history export; after AddHistoryVerbs().
-void AddEvidenceVerbs(cli::Program& program);
-/// history plot, runs plot; after AddHistoryVerbs() and AddRunsVerbs().
-void AddPlotVerbs(cli::Program& program);
-/// history causes; after AddHistoryVerbs().
-void AddCausesVerb(cli::Program& program);
-void AddFaultsVerb(cli::Program& program);        ///< faults
-void AddHealthVerbs(cli::Program& program);       ///< health show|trend
-void AddWorkListVerb(cli::Program& program);      ///< worklist
-void AddShadowVerb(cli::Program& program);        ///< history shadow; likewise
-void AddMaintenanceVerbs(cli::Program& program);  ///< doctor, backup, migrate
-void AddPruneVerb(cli::Program& program);         ///< prune
+using cli::Context;
+using cli::Json;
+using cli::Report;
+
+// Each adds the verbs of one group, in the order in which --help lists them.
+void AddRunsVerbs(cli::Program& program);
+void AddModelsVerbs(cli::Program& program);
+void AddValvesVerbs(cli::Program& program);
+void AddTypesVerbs(cli::Program& program);
+void AddHistoryVerbs(cli::Program& program);  ///< list, show, export, plot
+// To the group `history`, which must be there.
+void AddHistoryFigures(cli::Program& program, CLI::App& group);
+void AddAlarmVerbs(cli::Program& program, CLI::App& group);
+void AddPlannerVerbs(cli::Program& program);  ///< faults, health, worklist
+void AddMaintenanceVerbs(cli::Program& program);
+
+/// For --help and the manual pages.
+std::vector<cli::VerbExamples> Examples();
+
+/// Of a verb without options.
+struct NoOptions {};
+
+/// Adds a verb to a group or, with program.root(), to the program. The action
+/// gets the Options that the caller ties to the options of the command line:
+///
+///     auto [verb, options] = AddVerb(program, group, "list", "...", List);
+///     verb.add_option("--valve", options.valve, "Glob over valve ids");
+template <typename Options>
+std::pair<CLI::App&, Options&> AddVerb(cli::Program& program, CLI::App& group,
+                                       const std::string& name,
+                                       const std::string& description,
+                                       Report (*action)(const Options&,
+                                                        const Context&)) {
+  auto options = std::make_shared<Options>();
+  CLI::App& verb = program.AddVerb(
+      group, name, description,
+      cli::ReportAction([options, action](const Context& context) {
+        return action(*options, context);
+      }));
+  return {verb, *options};
+}
+
+/// --data.
+DataDirectory DataOf(const Context& context);
+/// --data, made if it is not there; for verbs that write.
+DataDirectory WritableDataOf(const Context& context);
+
+/// The options that narrow a list of episodes.
+struct EpisodeOptions {
+  std::string valve{"*"};
+  std::string fault;
+  std::string state{"any"};
+  std::int64_t limit{0};
+  cli::TimeWindow window;
+
+  void AddTo(CLI::App& verb);
+  /// @throws ConfigError
+  EpisodeFilter Filter(const Context& context) const;
+};
+
+/// The options of what people do: --by, --comment.
+struct NoteOptions {
+  std::string who{cli::UserName()};
+  std::string comment;
+
+  void AddTo(CLI::App& verb);
+  /// From this program, now.
+  OperatorNote Note() const;
+};
+
+/// The positional argument of verbs about one episode.
+void AddEpisode(CLI::App& verb, std::string& id, bool required = true);
+/// -o, --output with "-" for stdout.
+void AddOutput(CLI::App& verb, std::string& output);
+/// --limit.
+void AddLimit(CLI::App& verb, std::int64_t& limit);
+
+// Values of documents: null where there is none.
+Json TimeJson(const std::optional<std::int64_t>& stamp_ns);  ///< RFC 3339, UTC
+Json TextJson(const std::optional<std::string>& text);  ///< Null if empty, too.
+Json NumberJson(const std::optional<double>& number);   ///< Null if not finite.
+/// The variance accounted for, 100 (1 - var(residual) / var(output)) %, says
+/// nothing of an output that stood still in the validation data.
+bool VafSaysSomething(double vaf);
+Json VafJson(double vaf);              ///< Null where it says nothing.
+std::string Hex(std::uint64_t value);  ///< 16 digits
+
+/// An array of what `row_of` makes of each item.
+template <typename Items, typename RowOf>
+Json Rows(const Items& items, RowOf row_of) {
+  Json rows = Json::array();
+  for (const auto& item : items) {
+    rows.push_back(row_of(item));
+  }
+  return rows;
+}
+
+/// The columns of the view fault_history, in its order.
+const std::vector<std::string>& EpisodeKeys();
+Json EpisodeJson(const Episode& episode);
+Json ShelfJson(const Shelf& shelf);
+
+/// {"V1": {"LIVE": 12.5, ...}, ...}: hours by valve and quality.
+Json HoursJson(const std::vector<CoverageTime>& coverage);
+/// The same as a table for people; nothing if there are none.
+void AddHours(Report& report, const std::vector<CoverageTime>& coverage);
+/// A table for people alone, whose rows are not rows of the document.
+void AddTextTable(Report& report, const cli::TextTable& table);
+
+/// As the user wants times, "-" if there is none.
+std::string TimeText(const std::optional<std::int64_t>& stamp_ns,
+                     const Context& context);
+/// A column, or field, whose text for people is not a member of the document.
+cli::Column TextColumn(std::string heading,
+                       std::function<std::string(const Json& row)> text,
+                       int spare = 0, cli::Align align = cli::Align::kLeft);
+cli::Column TextField(std::string heading, std::string text);
 
 }  // namespace fdi::storage

@@ -189,6 +189,34 @@ test('every view passes axe, light and dark, and asks no other host',
       await page.context().close();
     });
 
+test('links that nobody made show a view all the same', async () => {
+  for (const hash of ['#/valve/%E0%A4%A', '#/__proto__', '#/constructor']) {
+    const page = await open(browser, address, hash);
+    await page.locator('main h1').waitFor();
+    assert.deepEqual(page.faults, [], hash);
+    await page.context().close();
+  }
+});
+
+test('tile and alarm list give a set of faults one priority', async () => {
+  const page = await open(browser, address, '#/');
+  await page.locator('.tile').first().waitFor();
+
+  const priorities = await page.evaluate(async () => {
+    const {priorityOf} = await import('/js/faults.js');
+    const {store} = await import('/js/store.js');
+    const of = (faults) => priorityOf({faults, strength: 0.5});
+    const sorted = [...store.faults.keys()].filter((key) => key !== 'unknown')
+        .sort((a, b) => of([b]) - of([a]));
+    const [mild, grave] = [sorted[0], sorted.at(-1)];
+    return {mild: of([mild]), grave: of([grave]), both: of([mild, grave])};
+  });
+
+  assert.ok(priorities.mild > priorities.grave);
+  assert.equal(priorities.both, priorities.grave);
+  await page.context().close();
+});
+
 test('by keys alone: to the list, to an alarm, to its dialog', async () => {
   const page = await open(browser, address, '#/');
   await page.keyboard.press('2');

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Tests of the live page in Chromium; 77 where there is none, or no node.
+# Tests of the live page in Chromium; 77 where there is none, or no node, or
+# where the packages that drive it were not fetched.
 # Usage: run.sh PROGRAMS NODE_MODULES    (folders of the build)
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -9,6 +10,10 @@ FDI_CHROMIUM=$(command -v chromium) || {
 }
 command -v node >/dev/null || {
   echo "skipped: node is not found (Debian: apt install nodejs)"
+  exit 77
+}
+[ -d "$2/playwright-core" ] || {
+  echo "skipped: npm has not fetched what drives the browser (see the build)"
   exit 77
 }
 export FDI_CHROMIUM FDI_BIN=$1 FDI_NODE_MODULES=$2

@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/clearing.h"
-#include "diagnosis/isolation.h"
+#include "diagnosis/episode.h"
 #include "tests/diagnosis/linear_plant.h"
 
 namespace fdi {

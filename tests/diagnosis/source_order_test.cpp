@@ -1,6 +1,6 @@
-#include "diagnosis/source_order.h"
-
 #include <gtest/gtest.h>
+
+#include "diagnosis/intake.h"
 
 namespace fdi {
 namespace {

@@ -1,10 +1,9 @@
-#include "diagnosis/stuck_readings.h"
-
 #include <memory>
 
 #include <gtest/gtest.h>
 
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/intake.h"
 #include "diagnosis/valve_engine.h"
 #include "tests/diagnosis/linear_plant.h"
 

@@ -7,7 +7,7 @@
 #include <zlib.h>
 
 #include "diagnosis/error.h"
-#include "storage/sample_codec.h"
+#include "storage/runs/sample_codec.h"
 
 namespace {
 

@@ -4,27 +4,27 @@
 #include <sstream>
 #include <string>
 
+#include "cli/csv.h"
 #include "diagnosis/error.h"
-#include "storage/csv.h"
 
 namespace {
 
-using fdi::storage::CsvRun;
+using fdi::SampleSeries;
 
-void ReadAgain(const CsvRun& run) {
+void ReadAgain(const SampleSeries& run) {
   std::stringstream text;
-  fdi::storage::WriteCsv(text, run.samples, run.flow_unit, 0);
-  fdi::storage::CsvOptions options;
+  fdi::cli::WriteCsv(text, run.samples, run.flow_unit, 0);
+  fdi::cli::CsvOptions options;
   options.period_s = run.period_s;
   options.required = 0;
   try {
-    const fdi::storage::CsvTable table = fdi::storage::ReadCsv(text, options);
+    const fdi::cli::CsvTable table = fdi::cli::ReadCsv(text, options);
     if (table.runs.size() != 1 ||
         table.runs[0].samples.size() != run.samples.size()) {
       std::abort();
     }
   } catch (const fdi::DataError&) {
-    // Signals that a row lacked are written as nan, which is refused.
+    // A run without any reading of CV, or of both X and F, is refused.
   }
 }
 
@@ -35,13 +35,13 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
   if (size == 0) {
     return 0;
   }
-  fdi::storage::CsvOptions options;
+  fdi::cli::CsvOptions options;
   options.split_gaps = (data[0] & 1) != 0;
   options.period_s = (data[0] & 2) != 0 ? 1.0 : 0.0;
   std::istringstream input(
       std::string(reinterpret_cast<const char*>(data) + 1, size - 1));
   try {
-    for (const CsvRun& run : fdi::storage::ReadCsv(input, options).runs) {
+    for (const SampleSeries& run : fdi::cli::ReadCsv(input, options).runs) {
       ReadAgain(run);
     }
   } catch (const fdi::DataError&) {

@@ -8,7 +8,7 @@
 #include <zlib.h>
 
 #include "diagnosis/error.h"
-#include "storage/model_codec.h"
+#include "storage/models/model_codec.h"
 
 namespace {
 

@@ -6,10 +6,10 @@
 
 #include <unistd.h>
 
+#include "cli/tag_map.h"
+#include "cli/toml_reader.h"
 #include "diagnosis/error.h"
 #include "simulator/app/scenario_toml.h"
-#include "storage/cli/tag_map.h"
-#include "storage/cli/toml_reader.h"
 
 namespace {
 

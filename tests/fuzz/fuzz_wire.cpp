@@ -2,7 +2,6 @@
 #include <cstring>
 
 #include "diagnosis/error.h"
-#include "idl/checked_type.h"
 #include "idl/codec.h"
 
 namespace {
@@ -41,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
       Receive<fdi::idl::DecisionMessage>(data + 1, size - 1);
       break;
     case 2:
-      Receive<fdi::idl::FaultEventMessage>(data + 1, size - 1);
+      Receive<fdi::FaultEvent>(data + 1, size - 1);
       break;
     case 3:
       Receive<fdi::idl::ModelSetInfoMessage>(data + 1, size - 1);

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "cli/csv.h"
 #include "idl/codec.h"
 #include "simulator/app/scenario_toml.h"
-#include "storage/csv.h"
-#include "storage/model_codec.h"
-#include "storage/sample_codec.h"
+#include "storage/models/model_codec.h"
+#include "storage/runs/sample_codec.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/model_set_fixture.h"
 
@@ -47,7 +47,7 @@ void WriteTables() {
     for (std::size_t k = 0; truth && k < samples.size(); ++k) {
       samples[k].truth = fdi::FaultTruth{k > 9 ? 19 : 0, k > 9 ? 0.5 : 0.0};
     }
-    fdi::storage::WriteCsv(text, samples, fdi::FlowUnit::kM3PerHour, start);
+    fdi::cli::WriteCsv(text, samples, fdi::FlowUnit::kM3PerHour, start);
     Write("csv", truth ? "truth" : "plain", std::string(1, '\1') + text.str());
   }
 }
@@ -117,7 +117,7 @@ void WriteMessages() {
   const fdi::ModelSet models = fdi::monitor::LinearModels();
   WriteMessage<fdi::idl::ValveSampleMessage>(0, {"V1", PlantSample(7)});
   WriteMessage(1, fdi::idl::MakeDecision("V1", models, {}));
-  fdi::idl::FaultEventMessage event;
+  fdi::FaultEvent event;
   event.valve_id = "V1";
   event.model_set = "linear";
   event.candidates = {{7, 0.9, 0.5, true}};

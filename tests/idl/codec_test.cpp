@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/error.h"
-#include "idl/checked_type.h"
+#include "diagnosis/fault_catalogue.h"
 
 namespace fdi::idl {
 namespace {
@@ -147,7 +147,7 @@ TEST(CodecTest, SmallModelSetsMakeSmallMessages) {
 }
 
 TEST(CodecTest, FaultEventsArriveWhole) {
-  FaultEventMessage sent;
+  FaultEvent sent;
   sent.valve_id = "V";
   sent.source_id = 1;
   sent.seq = 2;
@@ -160,7 +160,7 @@ TEST(CodecTest, FaultEventsArriveWhole) {
   sent.model_hash = 7;
   sent.persisted = true;
 
-  const FaultEventMessage got = RoundTrip(sent);
+  const FaultEvent got = RoundTrip(sent);
 
   EXPECT_EQ(got.episode_id, 3U);
   EXPECT_EQ(got.seq, 2U);
@@ -251,6 +251,40 @@ TEST(CodecTest, TooLongTextsAndListsAreRefused) {
   EXPECT_THROW(Codec<MonitorStatusMessage>::Encode(status, wire), DataError);
 }
 
+TEST(CodecTest, WhatDoesNotFitIsNamed) {
+  FaultEvent event;
+  event.valve_id = "V";
+  v1::FaultEvent wire;
+  event.candidates = {{kLastFault + 1, 0.9, 0.5, true}};
+  EXPECT_THAT([&] { Codec<FaultEvent>::Encode(event, wire); },
+              ThrowsMessage<DataError>(
+                  "candidates.fault is " + std::to_string(kLastFault + 1) +
+                  ", accepted are 1 to " + std::to_string(kLastFault)));
+  event.candidates.resize(kMaxFaults + 1, {1, 0.9, 0.5, true});
+  EXPECT_THAT([&] { Codec<FaultEvent>::Encode(event, wire); },
+              ThrowsMessage<DataError>(
+                  "candidates has 65 entries, accepted are 0 to 64"));
+  event.candidates.clear();
+  event.model_version = -1;
+  EXPECT_THAT([&] { Codec<FaultEvent>::Encode(event, wire); },
+              ThrowsMessage<DataError>(HasSubstr("model_version is -1")));
+}
+
+// The last fault of the catalogue is one; what comes behind it is none.
+TEST(CodecTest, FaultsBeyondTheCatalogueAreNotDecoded) {
+  FaultEvent event;
+  event.valve_id = "V";
+  event.candidates = {{kLastFault, 0.9, 0.5, true}};
+  v1::FaultEvent wire;
+  Codec<FaultEvent>::Encode(event, wire);
+  ASSERT_TRUE(Codec<FaultEvent>::Decode(wire, event));
+
+  for (const int fault : {0, kLastFault + 1, 255}) {
+    wire.candidates()[0].fault(static_cast<std::uint8_t>(fault));
+    EXPECT_FALSE(Codec<FaultEvent>::Decode(wire, event)) << fault;
+  }
+}
+
 TEST(CodecTest, EnumeratorsNobodyDefinedAreNotDecoded) {
   v1::ValveSample wire;
   Codec<ValveSampleMessage>::Encode(SomeSample(), wire);
@@ -309,6 +343,27 @@ TEST(CodecTest, BytesThatAreNoMessageAreCountedNotThrown) {
 
   EXPECT_FALSE(type.deserialize(&payload, &wire));
   EXPECT_EQ(type.refused(), 1U);
+}
+
+// Cyclone DDS ends the instance "FV-101" with its key, little endian.
+TEST(CodecTest, AShortKeyIsReadFromTheHandle) {
+  const auto key_of = [](const std::string& bytes) {
+    eprosima::fastrtps::rtps::InstanceHandle_t handle;
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+      handle.value[i] = static_cast<std::uint8_t>(bytes[i]);
+    }
+    return KeyInHandle(handle);
+  };
+  using std::string;
+  EXPECT_EQ(key_of(string("\0\1\0\0\7\0\0\0", 8) + "FV-101"), "FV-101");
+  EXPECT_EQ(key_of(string("\0\0\0\0\0\0\0\7", 8) + "FV-101"), "FV-101");
+  EXPECT_EQ(key_of(string("\0\1\0\3\7\0\0\0", 8) + "FV-101"), "FV-101");
+  EXPECT_EQ(key_of(string("\0\1\0\0\10\0\0\0", 8) + "FV-1012"), "FV-1012");
+  // What is an MD5 sum, or no text with its end.
+  EXPECT_EQ(key_of("0123456789abcdef"), "");
+  EXPECT_EQ(key_of(string("\0\1\0\0\6\0\0\0", 8) + "FV-101"), "");
+  EXPECT_EQ(key_of(string("\0\1\0\0\1\0\0\0", 8)), "");
+  EXPECT_EQ(key_of(""), "");
 }
 
 TEST(CodecTest, ThreadsThatShareATypeGetTheirOwnKeys) {

@@ -238,8 +238,8 @@ TEST_F(DeliveryTest, NoMemoryIsTakenForValvesThatAreNotThere) {
   Subscriber<ValveSampleMessage> samples_in(participant);
   Publisher<DecisionMessage> decisions_out(participant);
   Subscriber<DecisionMessage> decisions_in(participant, Profile::kLossless);
-  Publisher<FaultEventMessage> events_out(participant);
-  Subscriber<FaultEventMessage> events_in(participant);
+  Publisher<FaultEvent> events_out(participant);
+  Subscriber<FaultEvent> events_in(participant);
 
   ASSERT_GT(before, 0);
   EXPECT_LT(ResidentKilobytes() - before, 10000);

@@ -107,11 +107,11 @@ TEST_F(ProfileFileTest, KnowsWhichPoliciesAProfileStates) {
             "<qos><publishMode><kind>SYNCHRONOUS</kind></publishMode></qos>"
             "</data_writer>"));
 
-  ASSERT_NE(file.Writer("fdi_decision_vector_writer"), nullptr);
-  EXPECT_THAT(*file.Writer("fdi_decision_vector_writer"),
+  ASSERT_NE(file.Stated("fdi_decision_vector_writer"), nullptr);
+  EXPECT_THAT(*file.Stated("fdi_decision_vector_writer"),
               ::testing::ElementsAre("historyQos", "publishMode"));
-  EXPECT_EQ(file.Reader("fdi_decision_vector_writer"), nullptr);
-  EXPECT_EQ(file.ParticipantPolicies(), nullptr);
+  EXPECT_EQ(file.Stated("fdi_decision_vector_reader"), nullptr);
+  EXPECT_EQ(file.Stated(kParticipantProfile), nullptr);
 }
 
 }  // namespace

@@ -50,7 +50,8 @@ TEST(WireTest, CandidatesAreTheIsolatedAndTheLikelyLargestFirst) {
   verdict.strengths[2] = -0.75;
   verdict.isolated = 0b100;
 
-  const auto candidates = CandidatesOf(ThreeFaults(), verdict);
+  const auto candidates =
+      CandidatesOf(ThreeFaults(), verdict, verdict.isolated);
 
   ASSERT_EQ(candidates.size(), 2U);
   EXPECT_EQ(candidates[0].fault, 19);
@@ -65,7 +66,8 @@ TEST(WireTest, IsolatedFaultIsACandidateWhateverItsFactor) {
   verdict.fault_factors[0] = 0.01;
   verdict.isolated = 0b001;
 
-  const auto candidates = CandidatesOf(ThreeFaults(), verdict);
+  const auto candidates =
+      CandidatesOf(ThreeFaults(), verdict, verdict.isolated);
 
   ASSERT_EQ(candidates.size(), 1U);
   EXPECT_EQ(candidates[0].fault, 1);

@@ -49,9 +49,9 @@ class CauseGroupsTest : public testing::Test {
           told_.push_back(change);
         });
   }
-  EpisodeEvent Event(const std::string& valve, TransitionKind kind,
-                     std::int64_t at_s) const {
-    EpisodeEvent event;
+  FaultEvent Event(const std::string& valve, TransitionKind kind,
+                   std::int64_t at_s) const {
+    FaultEvent event;
     event.valve_id = valve;
     event.source_id = 1;
     event.episode_id = EpisodeId(valve, 1, kStart);
@@ -66,7 +66,7 @@ class CauseGroupsTest : public testing::Test {
   }
   void Record(const std::string& valve, TransitionKind kind,
               std::int64_t at_s) {
-    store_->Together([&] { store_->Record(Event(valve, kind, at_s)); });
+    store_->CommitBatch([&] { store_->Record(Event(valve, kind, at_s)); });
   }
 
   storage::TemporaryDirectory directory_;
@@ -109,7 +109,7 @@ TEST_F(CauseGroupsTest, CauseIsToldOnceItIsStoredAndOverARestart) {
   EXPECT_TRUE(told_.empty());
   Open();
   // The transaction fails: nothing happened.
-  EXPECT_THROW(store_->Together([this] {
+  EXPECT_THROW(store_->CommitBatch([this] {
     store_->Record(Event("A-2", TransitionKind::kIsolated, 20));
     throw std::runtime_error("disk full");
   }),

@@ -28,7 +28,7 @@ TEST(CheckpointTest, TimeIsBookedOnTheDayOfItsSample) {
   book.Add(3 * kDay, Quality::kLive, 5);
   book.Add(3 * kDay, Quality::kStale, 2);
   std::vector<CoverageDay> days;
-  book.TakeTo("V1", 2.0, days);
+  book.TakeInto("V1", 2.0, days);
   ASSERT_EQ(days.size(), 2U);
   EXPECT_EQ(days[0].day, 2);
   EXPECT_EQ(days[0].samples[Quality::kLive], 1U);
@@ -37,7 +37,7 @@ TEST(CheckpointTest, TimeIsBookedOnTheDayOfItsSample) {
   EXPECT_EQ(days[1].samples[Quality::kLive], 5U);
   EXPECT_EQ(days[1].samples[Quality::kStale], 2U);
   days.clear();
-  book.TakeTo("V1", 2.0, days);
+  book.TakeInto("V1", 2.0, days);
   EXPECT_TRUE(days.empty());
 }
 
@@ -45,13 +45,13 @@ TEST(CheckpointTest, MergingAddsTimeAndKeepsTheNewestAccumulator) {
   CoverageBook book;
   Checkpoint older;
   book.Add(0, Quality::kLive, 3);
-  book.TakeTo("V1", 1.0, older.coverage);
+  book.TakeInto("V1", 1.0, older.coverage);
   older.accumulators = {{"V1", 1, 1, 10, {}}, {"V2", 1, 1, 10, {}}};
   Checkpoint newer;
   book.Add(0, Quality::kLive, 4);
-  book.TakeTo("V1", 1.0, newer.coverage);
+  book.TakeInto("V1", 1.0, newer.coverage);
   book.Add(kDay, Quality::kLive, 1);
-  book.TakeTo("V1", 1.0, newer.coverage);
+  book.TakeInto("V1", 1.0, newer.coverage);
   newer.accumulators = {{"V1", 1, 1, 20, {}}};
 
   const Checkpoint merged = Merged(older, newer);
@@ -82,9 +82,8 @@ std::shared_ptr<const ModelSet> WatchedModels() {
 class RestartTest : public testing::Test {
  protected:
   RestartTest() {
-    options_.history.utc_now_ns = [] { return std::int64_t{1'000}; };
-    options_.history.commit_period = milliseconds(5);
-    options_.history.retry_period = milliseconds(5);
+    options_.journal.commit_period = milliseconds(5);
+    options_.journal.retry_period = milliseconds(5);
   }
 
   // One session over samples [from, to); the fault begins at 400.
@@ -95,23 +94,23 @@ class RestartTest : public testing::Test {
     FakeHistory history;
     Pipeline pipeline(options_, PipelineSinks{bus, bus, history, nullptr},
                       std::make_shared<FixedResolver>(WatchedModels()),
-                      counters_, log_);
+                      context_);
     pipeline.Start({}, std::move(kept));
     for (std::uint64_t k = from; k < to; ++k) {
-      EXPECT_TRUE(
-          pipeline.Offer(valve, PlantSample(k, k < 400 ? 0.0 : 1.0), 1));
+      pipeline.Offer(valve, PlantSample(k, k < 400 ? 0.0 : 1.0), 1);
     }
     pipeline.Stop();
     detected_.reset();
     if (!history.detected.empty()) {
       detected_ = history.detected.front();
     }
-    return history.kept;
+    return history.checkpoint_sum;
   }
 
   PipelineOptions options_;
   Counters counters_;
   ThrottledLog log_{[](LogLevel, std::string_view) {}};
+  MonitorContext context_{counters_, log_, [] { return std::int64_t{1'000}; }};
   std::optional<std::int64_t> detected_;
 };
 
@@ -167,19 +166,19 @@ TEST_F(RestartTest, AHistoryThatFailsGetsAllTimeLater) {
   FakeHistory history;
   history.broken = true;
   Pipeline pipeline(options_, PipelineSinks{bus, bus, history, nullptr},
-                    std::make_shared<FixedResolver>(WatchedModels()), counters_,
-                    log_);
+                    std::make_shared<FixedResolver>(WatchedModels()), context_);
   pipeline.Start({});
   for (std::uint64_t k = 0; k < 200; ++k) {
     pipeline.Offer("V1", PlantSample(k), 1);
   }
   while (!pipeline.history_degraded()) {
+    pipeline.Tend();
     std::this_thread::yield();
   }
   history.notice.Apply([&] { history.broken = false; });
   pipeline.Stop();
-  ASSERT_EQ(history.kept.coverage.size(), 1U);
-  EXPECT_EQ(history.kept.coverage[0].samples[Quality::kLive],
+  ASSERT_EQ(history.checkpoint_sum.coverage.size(), 1U);
+  EXPECT_EQ(history.checkpoint_sum.coverage[0].samples[Quality::kLive],
             200U - kSettlingSamples);
 }
 
@@ -189,7 +188,7 @@ TEST_F(RestartTest, AProvisionalBaselineIsDetectedAndNotNamed) {
     FakeHistory history;
     Pipeline pipeline(options_, PipelineSinks{bus, bus, history, nullptr},
                       std::make_shared<FixedResolver>(SharedLinearModels()),
-                      counters_, log_);
+                      context_);
     pipeline.Start({});
     for (std::uint64_t k = 0; k < 100; ++k) {
       pipeline.Offer(provisional ? "provisional1" : "V1",

@@ -1,10 +1,10 @@
 #include <gmock/gmock.h>
 
+#include "cli/shared_files.h"
 #include "monitor/console/alarm_book.h"
-#include "monitor/console/stored_models.h"
-#include "storage/cli/shared_files.h"
-#include "storage/history_editor.h"
-#include "storage/models.h"
+#include "monitor/console/model_facts.h"
+#include "storage/history/history_editor.h"
+#include "storage/models/models.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/history_fixture.h"
 
@@ -15,11 +15,13 @@ class AlarmBookTest : public storage::HistoryFixture {
  protected:
   void Begin(const std::string& valve) {
     writer_.Record(
-        Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve));
+        Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve),
+        kDetected);
   }
   void End(const std::string& valve) {
     writer_.Record(
-        Event(TransitionKind::kClosed, 60, 0, 0.1, EndReason::kCleared, valve));
+        Event(TransitionKind::kClosed, 60, 0, 0.1, EndReason::kCleared, valve),
+        kDetected);
   }
   std::string IdOf(const std::string& valve) const {
     return storage::EpisodeIdText(Id(valve));

@@ -16,7 +16,7 @@ TEST_F(LiveBoardTest, ShowsWhatTheEngineSaidLast) {
   Show(0, 50);
   Show(50, 80, kF7Offset);
 
-  const ValveState valve = board_.Valve("V1").value();
+  const ValveState valve = board_.Trend("V1").value().now;
   EXPECT_EQ(valve.state, State::kIsolated);
   EXPECT_EQ(valve.isolated, 2U);  // f7 is fault 1 of {f1, f7}.
   EXPECT_EQ(valve.factor, engine_.verdict().fault_factors[1]);
@@ -45,7 +45,7 @@ TEST_F(LiveBoardTest, AnAnswerThatFlapsKeepsItsTrend) {
   Verdict verdict;
   for (std::uint64_t k = 0; k < 500; ++k) {
     verdict.isolated = k / 5 % 2;
-    board_.Show("V1", PlantSample(k), models_.get(), verdict, false);
+    board_.Show("V1", PlantSample(k), {verdict, models_.get(), false, false});
   }
 
   EXPECT_EQ(board_.Trend("V1").value().points.size(), 500U);
@@ -91,17 +91,16 @@ TEST_F(LiveBoardTest, AnotherModelSetBeginsTheTrendAnew) {
   const auto other = monitor::SharedLinearModels(0x5678);
   ValveEngine engine(other);
   const Sample sample = PlantSample(50);
-  board_.Show("V1", sample, other.get(), engine.Step(sample), true);
+  board_.Show("V1", sample, {engine.Step(sample), other.get(), true, false});
 
   EXPECT_EQ(board_.Trend("V1").value().points.size(), 1U);
-  ASSERT_EQ(board_.ModelSets().size(), 1U);
-  EXPECT_EQ(board_.ModelSets().front()->hash, 0x5678U);
+  EXPECT_EQ(board_.Trend("V1")->now.models->hash, 0x5678U);
 }
 
 TEST_F(LiveBoardTest, AValveWithoutModelsHasReadingsOnly) {
   Verdict verdict;
   verdict.quality = Quality::kUnassigned;
-  board_.Show("bare", PlantSample(0), nullptr, verdict, false);
+  board_.Show("bare", PlantSample(0), {verdict, nullptr, false, false});
 
   const LiveTrend trend = board_.Trend("bare").value();
   EXPECT_EQ(trend.now.models, nullptr);
@@ -112,20 +111,20 @@ TEST_F(LiveBoardTest, AValveWithoutModelsHasReadingsOnly) {
 
 TEST_F(LiveBoardTest, SilenceStandsUntilTheNextSample) {
   Show(0, 5);
-  const std::uint64_t before = board_.Valve("V1")->version;
+  const std::uint64_t before = board_.Trend("V1")->now.version;
   board_.ShowSilence("V1", monitor::Silence::kStale);
-  const ValveState silent = board_.Valve("V1").value();
+  const ValveState silent = board_.Trend("V1").value().now;
   Show(5, 6);
 
   EXPECT_EQ(silent.silence, monitor::Silence::kStale);
   EXPECT_GT(silent.version, before);
-  EXPECT_EQ(board_.Valve("V1")->silence, monitor::Silence::kNone);
+  EXPECT_EQ(board_.Trend("V1")->now.silence, monitor::Silence::kNone);
 }
 
 TEST_F(LiveBoardTest, AnEndedEpisodeIsMarkedAndTheStateReturnsToNormal) {
   Show(0, 50);
   Show(50, 80, kF7Offset);
-  monitor::EpisodeEvent event;
+  FaultEvent event;
   event.valve_id = "V1";
   event.transition.kind = TransitionKind::kClosed;
   event.transition.reason = EndReason::kStaleTimeout;
@@ -151,7 +150,7 @@ TEST_F(LiveBoardTest, ReadersAndTheDiagnosisShareIt) {
   });
   Show(1, 2000);
 
-  EXPECT_EQ(board_.Valve("V1")->version, 2000U);
+  EXPECT_EQ(board_.Trend("V1")->now.version, 2000U);
 }
 
 }  // namespace

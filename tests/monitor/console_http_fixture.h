@@ -9,10 +9,10 @@
 #include <gtest/gtest.h>
 #include <httplib.h>
 
+#include "cli/time_text.h"
 #include "diagnosis/valve_engine.h"
 #include "monitor/console/console.h"
-#include "storage/cli/time_text.h"
-#include "storage/models.h"
+#include "storage/models/models.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/history_fixture.h"
 
@@ -22,8 +22,7 @@ inline constexpr const char* kToken = "0123456789abcdef";
 
 class NoBus : public monitor::EventSink {
  public:
-  bool Publish(const monitor::EpisodeEvent& /*event*/,
-               bool /*persisted*/) override {
+  bool Publish(const FaultEvent& /*event*/, bool /*persisted*/) override {
     return true;
   }
 };
@@ -67,10 +66,10 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
 
   /// Begins an episode so many seconds after the others.
   void RecordLater(const std::string& valve, double after_s) {
-    storage::NewEvent event = Event(TransitionKind::kDetected, after_s, 0, 0.3,
-                                    EndReason::kNone, valve);
+    FaultEvent event = Event(TransitionKind::kDetected, after_s, 0, 0.3,
+                             EndReason::kNone, valve);
     event.transition.detection_stamp_ns = event.transition.stamp_ns;
-    writer_.Record(event);
+    writer_.Record(event, kDetected);
   }
 
   void ShowValve(const std::string& id, int samples, double offset = 0.0) {
@@ -79,8 +78,8 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
     for (int k = 0; k < samples; ++k) {
       const Sample sample = monitor::PlantSample(static_cast<std::uint64_t>(k),
                                                  k < 50 ? 0.0 : offset);
-      console_->live().Show(id, sample, models.get(), engine.Step(sample),
-                            false);
+      console_->live().Show(id, sample,
+                            {engine.Step(sample), models.get(), false, false});
     }
   }
 

@@ -1,10 +1,11 @@
 // What the console tells over HTTP, and to whom.
 #include <algorithm>
+#include <thread>
 
 #include <gmock/gmock.h>
 
+#include "cli/plot/gnuplot.h"
 #include "diagnosis/error.h"
-#include "storage/plot/gnuplot.h"
 #include "tests/monitor/console_http_fixture.h"
 #include "tests/storage/message_of.h"
 
@@ -65,6 +66,22 @@ TEST_F(ConsoleRoutesTest, ValvesAndTrendsOfAnyId) {
   EXPECT_EQ(Get("/api/v1/status")["model_sets"][0]["T"], 0.7);
 }
 
+TEST_F(ConsoleRoutesTest, AValveThatIsNotJudgedIsNotCalledNormal) {
+  Start();
+  const auto models = monitor::SharedLinearModels();
+  Verdict verdict;
+  verdict.quality = Quality::kBadInput;
+  console_->live().Show(
+      "V1", monitor::PlantSample(0),
+      {verdict, models.get(), false, false, MaskOf(Signal::kF)});
+
+  const Json tile = Get("/api/v1/valves")["valves"][0];
+
+  EXPECT_EQ(tile["state"], "NOT_JUDGED");
+  EXPECT_EQ(tile["quality"], "BAD_INPUT");
+  EXPECT_EQ(tile["missing"], Json::array({"F"}));
+}
+
 TEST_F(ConsoleRoutesTest, WhatCannotBeIsRefusedWithTheRange) {
   Start();
   ShowValve("V1", 3);
@@ -104,7 +121,7 @@ TEST_F(ConsoleRoutesTest, AnEpisodeComesWithItsEvidence) {
   EXPECT_EQ(std::count(csv->body.begin(), csv->body.end(), '\n'), 61);
   const httplib::Result picture =
       client_->Get("/api/v1/episodes/" + IdText() + ".svg");
-  if (storage::HaveGnuplot()) {
+  if (plot::HaveGnuplot()) {
     EXPECT_THAT(picture->body, HasSubstr("<svg"));
     EXPECT_EQ(picture->get_header_value("Content-Type"), "image/svg+xml");
   } else {
@@ -132,6 +149,22 @@ TEST_F(ConsoleRoutesTest, HistoryIsPagedNewestFirst) {
   EXPECT_EQ(statistics["valves"].size(), 3U);
   EXPECT_EQ(statistics["per_day"][0]["day"], "2026-11-20");
   EXPECT_EQ(statistics["per_day"][0]["episodes"], 3);
+}
+
+TEST_F(ConsoleRoutesTest, ItsEndEndsStreamsAndThreads) {
+  Start();
+  std::jthread listener([this] {
+    client_->Get("/api/v1/stream", [](const char* /*data*/,
+                                      std::size_t /*size*/) { return true; });
+  });
+  while (console_->streams().clients == 0) {
+    std::this_thread::yield();
+  }
+
+  console_.reset();  // As when something throws after the console started.
+
+  listener.join();
+  EXPECT_FALSE(client_->Get("/api/v1/status"));
 }
 
 TEST(ConsoleFilesTest, AFolderWithoutAPageIsNamed) {

@@ -2,15 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include "monitor/console/stream_hub.h"
+#include "monitor/console/live_stream.h"
 
 namespace fdi::console {
 namespace {
 
 using std::chrono::milliseconds;
-using Outcome = StreamClient::Outcome;
+using Outcome = LiveStream::Outcome;
 
-StreamClient::Message Text(const std::string& text) {
+Message Text(const std::string& text) {
   return std::make_shared<const std::string>(text);
 }
 
@@ -20,74 +20,75 @@ TEST(ConsoleStreamTest, AnEventIsOneBlockOfText) {
 }
 
 TEST(ConsoleStreamTest, AClientGetsHelloAndThenAllInOrder) {
-  StreamHub hub;
-  const auto client = hub.Admit({"V1", 0}, Text("hello"));
-  hub.Broadcast(Text("one"));
-  hub.Send(*client, Text("two"));
+  LiveStream stream;
+  const auto client = stream.Admit("V1", 0, Text("hello"));
+  stream.Broadcast(Text("one"));
+  stream.Broadcast(Text("two"));
 
-  StreamClient::Message message;
+  Message message;
   for (const char* expected : {"hello", "one", "two"}) {
-    ASSERT_EQ(client->Next(milliseconds(0), message), Outcome::kMessage);
+    ASSERT_EQ(stream.Next(*client, milliseconds(0), message),
+              Outcome::kMessage);
     EXPECT_EQ(*message, expected);
   }
-  EXPECT_EQ(client->Next(milliseconds(0), message), Outcome::kTimeout);
+  EXPECT_EQ(stream.Next(*client, milliseconds(0), message), Outcome::kTimeout);
 }
 
 TEST(ConsoleStreamTest, AClientThatDoesNotReadIsDroppedAndCounted) {
-  StreamHub hub({2, 1000});
-  const auto slow = hub.Admit({}, Text("hello"));
-  const auto quick = hub.Admit({}, Text("hello"));
-  StreamClient::Message message;
+  LiveStream stream({2, 1000});
+  const auto slow = stream.Admit("", 0, Text("hello"));
+  const auto quick = stream.Admit("", 0, Text("hello"));
+  Message message;
   for (int i = 0; i < 100; ++i) {
-    hub.Broadcast(Text(std::string(100, 'x')));
-    while (quick->Next(milliseconds(0), message) == Outcome::kMessage) {
+    stream.Broadcast(Text(std::string(100, 'x')));
+    while (stream.Next(*quick, milliseconds(0), message) == Outcome::kMessage) {
     }
   }
 
-  EXPECT_EQ(slow->Next(milliseconds(0), message), Outcome::kEnded);
-  EXPECT_EQ(quick->Next(milliseconds(0), message), Outcome::kTimeout);
-  EXPECT_EQ(hub.counts().dropped, 1U);
-  hub.Release(slow);
-  EXPECT_EQ(hub.counts().clients, 1U);
+  EXPECT_EQ(stream.Next(*slow, milliseconds(0), message), Outcome::kEnded);
+  EXPECT_EQ(stream.Next(*quick, milliseconds(0), message), Outcome::kTimeout);
+  EXPECT_EQ(stream.counts().dropped, 1U);
+  stream.Release(slow);
+  EXPECT_EQ(stream.counts().clients, 1U);
 }
 
 TEST(ConsoleStreamTest, OneMessageMayBeLargerThanTheQueue) {
-  StreamHub hub({1, 10});
-  const auto client = hub.Admit({}, Text(std::string(1000, 'x')));
-  StreamClient::Message message;
+  LiveStream stream({1, 10});
+  const auto client = stream.Admit("", 0, Text(std::string(1000, 'x')));
+  Message message;
 
-  EXPECT_EQ(client->Next(milliseconds(0), message), Outcome::kMessage);
-  EXPECT_EQ(hub.counts().dropped, 0U);
+  EXPECT_EQ(stream.Next(*client, milliseconds(0), message), Outcome::kMessage);
+  EXPECT_EQ(stream.counts().dropped, 0U);
 }
 
 TEST(ConsoleStreamTest, PlacesAreBoundedAndComeFree) {
-  StreamHub hub;
-  std::vector<std::shared_ptr<StreamClient>> clients;
+  LiveStream stream;
+  std::vector<std::shared_ptr<LiveStream::Client>> clients;
   for (int i = 0; i < 16; ++i) {
-    clients.push_back(hub.Admit({}, Text("hello")));
+    clients.push_back(stream.Admit("", 0, Text("hello")));
     ASSERT_NE(clients.back(), nullptr);
   }
 
-  EXPECT_EQ(hub.Admit({}, Text("hello")), nullptr);
-  hub.Release(clients.front());
-  EXPECT_NE(hub.Admit({}, Text("hello")), nullptr);
-  EXPECT_EQ(hub.counts().admitted, 17U);
-  EXPECT_EQ(hub.counts().refused, 1U);
+  EXPECT_EQ(stream.Admit("", 0, Text("hello")), nullptr);
+  stream.Release(clients.front());
+  EXPECT_NE(stream.Admit("", 0, Text("hello")), nullptr);
+  EXPECT_EQ(stream.counts().admitted, 17U);
+  EXPECT_EQ(stream.counts().refused, 1U);
 }
 
 TEST(ConsoleStreamTest, ClosingEndsThoseWhoWaitAndAdmitsNone) {
-  StreamHub hub;
-  const auto client = hub.Admit({}, Text("hello"));
-  StreamClient::Message message;
-  client->Next(milliseconds(0), message);
+  LiveStream stream;
+  const auto client = stream.Admit("", 0, Text("hello"));
+  Message message;
+  stream.Next(*client, milliseconds(0), message);
   Outcome outcome = Outcome::kMessage;
   std::thread waiting(
-      [&] { outcome = client->Next(milliseconds(20'000), message); });
-  hub.Close();
+      [&] { outcome = stream.Next(*client, milliseconds(20'000), message); });
+  stream.Close();
   waiting.join();
 
   EXPECT_EQ(outcome, Outcome::kEnded);
-  EXPECT_EQ(hub.Admit({}, Text("hello")), nullptr);
+  EXPECT_EQ(stream.Admit("", 0, Text("hello")), nullptr);
 }
 
 }  // namespace

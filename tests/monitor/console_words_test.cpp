@@ -1,7 +1,7 @@
 #include <limits>
 
 #include "diagnosis/fault_catalogue.h"
-#include "monitor/console/words.h"
+#include "monitor/console/model_facts.h"
 #include "tests/monitor/console_fixture.h"
 
 namespace fdi::console {
@@ -20,9 +20,9 @@ ModelFacts TwoChannels() {
   return models;
 }
 
-monitor::TracePoint Abnormal(std::vector<double> residuals,
-                             std::vector<double> factors) {
-  monitor::TracePoint point;
+TracePoint Abnormal(std::vector<double> residuals,
+                    std::vector<double> factors) {
+  TracePoint point;
   point.state = State::kDetected;
   point.residuals = std::move(residuals);
   point.factors = std::move(factors);
@@ -43,7 +43,7 @@ TEST(ConsoleWordsTest, TheFarthestChannelAndTheFaultsThatFitBestFirst) {
 
 TEST(ConsoleWordsTest, NothingBeyondItsThresholdIsSaidSo) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  monitor::TracePoint point = Abnormal({kNone, 3.9}, {0.0, 0.0, 0.0});
+  TracePoint point = Abnormal({kNone, 3.9}, {0.0, 0.0, 0.0});
   EXPECT_EQ(Explain(TwoChannels(), point, Describe),
             "no reading beyond its threshold now; fits: no known fault");
   point.state = State::kNormal;

@@ -5,12 +5,15 @@
 #include <future>
 #include <sstream>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <httplib.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include "cli/shared_files.h"
 #include "diagnosis/error.h"
-#include "storage/cli/shared_files.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -112,6 +115,36 @@ TEST_F(ProgramDeliveryTest, InterruptionEndsItAtOnce) {
   EXPECT_EQ(result.get().value_or(""), "the monitor stops");
 }
 
+// For as long as it lives this process can open so many more files.
+class FileLimit {
+ public:
+  explicit FileLimit(int more) {
+    getrlimit(RLIMIT_NOFILE, &before_);
+    rlimit limit = before_;
+    const int lowest = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    close(lowest);
+    limit.rlim_cur = static_cast<rlim_t>(lowest + more);
+    setrlimit(RLIMIT_NOFILE, &limit);
+  }
+  ~FileLimit() { setrlimit(RLIMIT_NOFILE, &before_); }
+  FileLimit(const FileLimit&) = delete;
+  FileLimit& operator=(const FileLimit&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(ProgramDeliveryTest, WithoutFilesADeliveryFailsAtOnceAndSaysWhy) {
+  const auto delivery = MakeEventDelivery("sleep 1000", seconds(1000));
+  const FileLimit limit(1);  // The event itself takes it.
+  EXPECT_THAT(delivery->Deliver("x").value_or(""), HasSubstr("pidfd_open"));
+}
+
+TEST_F(ProgramDeliveryTest, WithoutFilesNoDeliveryIsMade) {
+  const FileLimit limit(0);
+  EXPECT_THROW(MakeEventDelivery("true", seconds(1)), std::system_error);
+}
+
 class UrlDeliveryTest : public testing::Test {
  protected:
   UrlDeliveryTest() {
@@ -158,7 +191,8 @@ TEST_F(UrlDeliveryTest, RefusalAndAbsenceAreFailures) {
 }
 
 TEST(EventDeliveryTest, WhatIsNeitherIsRefused) {
-  for (const char* target : {"", "  ", "http://", "https://host/", "ftp://x"}) {
+  for (const char* target :
+       {"", "  ", "http://", "https://host/", "ftp://x", "echo 'a"}) {
     EXPECT_THROW(MakeEventDelivery(target, seconds(1)), ConfigError) << target;
   }
 }
@@ -180,6 +214,7 @@ class EventHookTest : public testing::Test {
                   [this](LogLevel, std::string_view line) {
                     log_ += std::string(line) + "\n";
                   });
+    hook_->Start();
   }
   void Advance(seconds time) {
     const std::lock_guard lock(clock_mutex_);
@@ -198,7 +233,7 @@ class EventHookTest : public testing::Test {
 TEST_F(EventHookTest, BeyondTheRateTheNewestIsToldWithTheCountOfTheOthers) {
   Start();
   for (int i = 0; i < 10; ++i) {
-    hook_->Tell({{"i", i}});
+    hook_->Notify({{"i", i}});
   }
   ASSERT_TRUE(fake_->WaitFor(3));
   Advance(seconds(20));
@@ -216,13 +251,12 @@ TEST_F(EventHookTest, ADeliveryThatHangsHoldsNobodyUp) {
   fake_->open = false;
   options_.per_minute = 100;
   options_.max_waiting = 5;
-  options_.threads = 2;
   Start();
   for (int i = 0; i < 50; ++i) {
-    hook_->Tell({{"i", i}});
+    hook_->Notify({{"i", i}});
   }
-  ASSERT_TRUE(fake_->WaitFor(2));
-  EXPECT_EQ(fake_->got.size(), 2u);
+  ASSERT_TRUE(fake_->WaitFor(1));
+  EXPECT_EQ(fake_->got.size(), 1u);
   hook_->Stop(milliseconds(0));
   EXPECT_GE(hook_->counts().left_out, 40u);
 }
@@ -230,7 +264,7 @@ TEST_F(EventHookTest, ADeliveryThatHangsHoldsNobodyUp) {
 TEST_F(EventHookTest, FailuresAreCountedAndLogged) {
   fake_->failure = "no such luck";
   Start();
-  hook_->Tell({{"i", 1}});
+  hook_->Notify({{"i", 1}});
   hook_->Stop(seconds(10));
   EXPECT_EQ(hook_->counts().failed, 1u);
   EXPECT_THAT(log_, HasSubstr("event_hook_failed reason=\"no such luck\""));
@@ -238,7 +272,7 @@ TEST_F(EventHookTest, FailuresAreCountedAndLogged) {
 
 TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
   const cli::FaultTexts texts(cli::SharedFile("faults.toml"));
-  EpisodeEvent event;
+  FaultEvent event;
   event.valve_id = "V1";
   event.episode_id = 0xAB;
   event.models = SharedLinearModels();
@@ -254,11 +288,24 @@ TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
   EXPECT_EQ(json["fault"], "f7");
   EXPECT_EQ(json["name"], texts.Of(7).name);
   EXPECT_EQ(json["severity"], "critical");
-  EXPECT_EQ(json["episode"], "00000000000000ab");
-  EXPECT_EQ(json["stamp_ms"], 5);
+  EXPECT_EQ(json["episode_id"], "00000000000000ab");
+  EXPECT_EQ(json["stamp_utc"], "1970-01-01T00:00:00.005Z");
   EXPECT_TRUE(json["reason"].is_null());
-  event.transition.faults = 0;
+}
+
+// Only once no known fault explains it any more.
+TEST(EventJsonTest, ADetectionIsNotYetUnlikeAnyKnownFault) {
+  const cli::FaultTexts texts(cli::SharedFile("faults.toml"));
+  FaultEvent event;
+  event.transition.kind = TransitionKind::kDetected;
+  event.transition.unknown = Unknown::kTooEarly;
   EXPECT_TRUE(EventJson(event, true, texts)["fault"].is_null());
+  EXPECT_TRUE(EventJson(event, true, texts)["name"].is_null());
+  EXPECT_TRUE(EventJson(event, true, texts)["check"].is_null());
+
+  event.transition.unknown = Unknown::kOutsideKnown;
+  EXPECT_TRUE(EventJson(event, true, texts)["fault"].is_null());
+  EXPECT_EQ(EventJson(event, true, texts)["name"], texts.Of(0).name);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "monitor/checkpoint.h"
 #include "monitor/episode_tracker.h"
 #include "monitor/sinks.h"
 
@@ -79,7 +80,7 @@ class FakeBus : public DecisionSink, public EventSink {
     });
     return true;
   }
-  bool Publish(const EpisodeEvent& event, bool persisted) override {
+  bool Publish(const FaultEvent& event, bool persisted) override {
     notice.Apply([&] {
       events.emplace_back(event.transition.kind, persisted);
       event_times.push_back(std::chrono::steady_clock::now());
@@ -96,11 +97,11 @@ class FakeBus : public DecisionSink, public EventSink {
 
 class FakeHistory : public HistorySink {
  public:
-  void Together(const std::function<void()>& records) override {
+  void CommitBatch(const std::function<void()>& batch) override {
     std::this_thread::sleep_for(commit_time);
-    records();
+    batch();
   }
-  void Record(const EpisodeEvent& event) override {
+  void Record(const FaultEvent& event) override {
     notice.Await([this] { return !stuck; });
     notice.Apply([&] {
       ++attempts;
@@ -126,14 +127,14 @@ class FakeHistory : public HistorySink {
       gaps.push_back(gap);
     });
   }
-  void Keep(const Checkpoint& checkpoint) override {
+  void CommitCheckpoint(const Checkpoint& checkpoint) override {
     notice.Apply([&] {
       FailIfBroken();
-      kept = Merged(std::move(kept), checkpoint);
+      checkpoint_sum = Merged(std::move(checkpoint_sum), checkpoint);
       ++checkpoints;
     });
   }
-  void MarkSent(const EpisodeEvent& /*event*/) override {
+  void MarkSent(const FaultEvent& /*event*/) override {
     notice.Apply([&] {
       FailIfBroken();
       ++sent;
@@ -150,7 +151,7 @@ class FakeHistory : public HistorySink {
   int attempts{0};
   std::map<std::pair<std::uint64_t, TransitionKind>, int> recorded;
   std::vector<DataGap> gaps;
-  Checkpoint kept;
+  Checkpoint checkpoint_sum;
   int checkpoints{0};
   std::vector<std::int64_t> detected;  // Stamps.
   std::size_t trace_points{0};
@@ -167,7 +168,7 @@ class FakeHistory : public HistorySink {
 /// Takes what a valve says, and forgets it.
 class FakeOutlet : public EpisodeOutlet {
  public:
-  void Event(EpisodeEvent /*event*/) override {}
+  void Event(FaultEvent /*event*/) override {}
   void Evidence(EpisodeTrace /*trace*/) override {}
   void Gap(DataGap /*gap*/) override {}
   void Resumed(const OpenEpisode& /*episode*/,

@@ -1,5 +1,6 @@
 #include "monitor/heartbeat.h"
 
+#include <atomic>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -34,31 +35,31 @@ bool Eventually(Condition condition) {
   return true;
 }
 
-TEST(WatchdogTest, TellsOncePerIntervalWhileAllThreadsBeat) {
+TEST(WatchdogTest, IsDueOncePerIntervalWhileAllThreadsBeat) {
   Pulse pulse;
-  const Heartbeat heartbeat({{"intake", &pulse}});
+  const Heartbeat heartbeat({{"diagnosis", &pulse}});
   const TimePoint start = Now() - milliseconds(1);
   Watchdog watchdog(heartbeat, milliseconds(100), start);
   pulse.Beat();
 
-  EXPECT_FALSE(watchdog.Tell(start + milliseconds(99)));
-  EXPECT_TRUE(watchdog.Tell(start + milliseconds(100)));
+  EXPECT_FALSE(watchdog.Due(start + milliseconds(99)));
+  EXPECT_TRUE(watchdog.Due(start + milliseconds(100)));
   EXPECT_EQ(watchdog.next(), start + milliseconds(200));
 }
 
 TEST(WatchdogTest, OneSilentThreadKeepsItSilentUntilItBeatsAgain) {
   Pulse alive;
   Pulse stuck;
-  const Heartbeat heartbeat({{"intake", &alive}, {"writer", &stuck}});
+  const Heartbeat heartbeat({{"diagnosis", &alive}, {"writer", &stuck}});
   const TimePoint start = Now();
   Watchdog watchdog(heartbeat, milliseconds(1), start);
   ASSERT_TRUE(Eventually([&] { return Now() > start; }));
   alive.Beat();
 
-  EXPECT_FALSE(watchdog.Tell(start + milliseconds(10)));
+  EXPECT_FALSE(watchdog.Due(start + milliseconds(10)));
   EXPECT_THAT(heartbeat.StalledSince(start), ElementsAre("writer"));
   stuck.Beat();
-  EXPECT_TRUE(watchdog.Tell(start + milliseconds(10)));
+  EXPECT_TRUE(watchdog.Due(start + milliseconds(10)));
 }
 
 // The threads of a pipeline whose sinks hold them up.
@@ -66,13 +67,28 @@ class PipelineHeartbeatTest : public testing::Test {
  protected:
   PipelineHeartbeatTest() {
     PipelineOptions options;
-    options.history.utc_now_ns = [] { return std::int64_t{1'000}; };
-    options.history.commit_period = milliseconds(20);
+    options.journal.commit_period = milliseconds(20);
     options.recorder.commit_period = milliseconds(20);
     pipeline_ = std::make_unique<Pipeline>(
         options, PipelineSinks{bus_, bus_, history_, &runs_},
-        std::make_shared<FixedResolver>(SharedLinearModels()), counters_, log_);
+        std::make_shared<FixedResolver>(SharedLinearModels()),
+        MonitorContext{counters_, log_, [] { return std::int64_t{1'000}; }});
     pipeline_->Start({});
+    // The diagnosis thread of a service.
+    diagnosis_ = std::jthread([this](const std::stop_token& stop) {
+      while (!stop.stop_requested()) {
+        for (; offered_ < wanted_; ++offered_) {
+          pipeline_->Offer(
+              "V1", PlantSample(offered_, offered_ < 50 ? 0.0 : kF7Offset), 1);
+        }
+        pipeline_->Tend();
+        std::this_thread::sleep_for(milliseconds(5));
+      }
+    });
+  }
+  ~PipelineHeartbeatTest() override {
+    diagnosis_.request_stop();
+    diagnosis_.join();
   }
 
   /// Threads that stand still from now on.
@@ -88,6 +104,9 @@ class PipelineHeartbeatTest : public testing::Test {
   Counters counters_;
   ThrottledLog log_{{}};
   std::unique_ptr<Pipeline> pipeline_;
+  std::uint64_t offered_{0};
+  std::atomic<std::uint64_t> wanted_{0};
+  std::jthread diagnosis_;
 };
 
 TEST_F(PipelineHeartbeatTest, IdleThreadsBeat) {
@@ -96,8 +115,7 @@ TEST_F(PipelineHeartbeatTest, IdleThreadsBeat) {
 
 TEST_F(PipelineHeartbeatTest, ABusThatHoldsTheDiagnosisUpIsSeen) {
   bus_.notice.Apply([this] { bus_.held = true; });
-  pipeline_->Offer("V1", PlantSample(0), 1);
-  pipeline_->AnnounceOffers();
+  wanted_ = 1;
 
   EXPECT_THAT(Stalled(Heartbeat(pipeline_->threads())),
               ElementsAre("diagnosis"));
@@ -106,9 +124,7 @@ TEST_F(PipelineHeartbeatTest, ABusThatHoldsTheDiagnosisUpIsSeen) {
 
 TEST_F(PipelineHeartbeatTest, AHistoryThatDoesNotReturnIsSeen) {
   history_.notice.Apply([this] { history_.stuck = true; });
-  for (std::uint64_t k = 0; k < 80; ++k) {
-    pipeline_->Offer("V1", PlantSample(k, k < 50 ? 0.0 : kF7Offset), 1);
-  }
+  wanted_ = 80;
 
   EXPECT_THAT(Stalled(Heartbeat(pipeline_->threads())), ElementsAre("history"));
   history_.notice.Apply([this] { history_.stuck = false; });
@@ -116,8 +132,7 @@ TEST_F(PipelineHeartbeatTest, AHistoryThatDoesNotReturnIsSeen) {
 
 TEST_F(PipelineHeartbeatTest, ARecorderThatDoesNotReturnIsSeen) {
   runs_.notice.Apply([this] { runs_.held = true; });
-  pipeline_->Offer("V1", PlantSample(0), 1);
-  pipeline_->AnnounceOffers();
+  wanted_ = 1;
 
   EXPECT_THAT(Stalled(Heartbeat(pipeline_->threads())),
               ElementsAre("recorder"));

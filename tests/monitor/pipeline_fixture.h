@@ -22,22 +22,24 @@ inline std::string ValveName(int v) {
 class PipelineTest : public testing::Test {
  protected:
   PipelineTest() {
-    options_.history.utc_now_ns = [] { return std::int64_t{1'000}; };
-    options_.history.retry_period = std::chrono::milliseconds(20);
-    options_.history.commit_period = std::chrono::milliseconds(20);
+    options_.journal.retry_period = std::chrono::milliseconds(20);
+    options_.journal.commit_period = std::chrono::milliseconds(20);
     options_.recorder.commit_period = std::chrono::milliseconds(20);
   }
 
-  void Start(SampleSink* samples = nullptr) {
+  void Make(SampleSink* samples = nullptr) {
     pipeline_ = std::make_unique<Pipeline>(
         options_, PipelineSinks{bus_, bus_, history_, samples, live_},
-        std::make_shared<FixedResolver>(SharedLinearModels()), counters_, log_);
+        std::make_shared<FixedResolver>(SharedLinearModels()), context_);
+  }
+  void Start(SampleSink* samples = nullptr) {
+    Make(samples);
     pipeline_->Start({});
   }
   void Offer(const std::string& valve, std::uint64_t from, std::uint64_t to,
              double offset = 0.0) {
     for (std::uint64_t k = from; k < to; ++k) {
-      ASSERT_TRUE(pipeline_->Offer(valve, PlantSample(k, offset), 1));
+      pipeline_->Offer(valve, PlantSample(k, offset), 1);
     }
   }
   void OfferEpisode(const std::string& valve) {
@@ -59,6 +61,7 @@ class PipelineTest : public testing::Test {
     const std::lock_guard lock(mutex);
     lines_.emplace_back(line);
   }};
+  MonitorContext context_{counters_, log_, [] { return std::int64_t{1'000}; }};
   std::unique_ptr<Pipeline> pipeline_;
 };
 

@@ -73,7 +73,7 @@ TEST_F(PipelineStorageTest, ACommitOfManyThatFailsIsRepeated) {
 }
 
 TEST_F(PipelineStorageTest, AStuckHistoryHoldsAnEventUpForItsPatienceOnly) {
-  options_.history.patience = milliseconds(50);
+  options_.journal.patience = milliseconds(50);
   history_.stuck = true;
   Start();
   const auto start = std::chrono::steady_clock::now();

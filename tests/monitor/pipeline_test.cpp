@@ -1,5 +1,6 @@
 #include "monitor/pipeline.h"
 
+#include <filesystem>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -81,39 +82,58 @@ TEST_F(PipelineTest, AModelSetThatCannotBeHadLeavesTheValveUnassigned) {
   EXPECT_EQ(counters_[Counter::kModelFailures], 1U);
 }
 
-TEST_F(PipelineTest, AFullQueueMakesTheIntakeWaitAndDropsNothing) {
-  options_.queue_samples = 16;
-  bus_.held = true;
-  Start();
-  std::atomic<int> offered{0};
-  std::thread intake([&] {
-    for (std::uint64_t k = 0; k < 500; ++k) {
-      pipeline_->Offer("V1", PlantSample(k), 1);
-      bus_.notice.Apply([&] { ++offered; });
-    }
-  });
+std::size_t ThreadCount() {
+  using std::filesystem::directory_iterator;
+  return static_cast<std::size_t>(std::distance(
+      directory_iterator("/proc/self/task"), directory_iterator{}));
+}
 
-  // One batch at the diagnosis, one in the queue, one at the door.
-  ASSERT_TRUE(bus_.notice.Await(
-      [&] { return pipeline_->backlog().diagnosis == 16 || offered > 33; }));
-  EXPECT_LE(offered, 33);
-  bus_.notice.Apply([&] { bus_.held = false; });
-  intake.join();
+// What runs before Start() may use the connections of the sinks.
+TEST_F(PipelineTest, NoThreadStartsBeforeStart) {
+  FakeRuns runs;
+  const std::size_t before = ThreadCount();
+  Make(&runs);
+  EXPECT_EQ(ThreadCount(), before);
+  pipeline_->Start({});
+  EXPECT_EQ(ThreadCount(), before + 3);
   pipeline_->Stop();
+  EXPECT_EQ(ThreadCount(), before);
+}
 
-  EXPECT_EQ(bus_.decisions.size(), 500U);
+// Runs that cannot even be refused: not a std::exception.
+class BrokenRuns : public FakeRuns {
+ public:
+  void Commit() override { throw 42; }
+};
+
+TEST_F(PipelineTest, WhatAThreadEndsWithIsThrownByStop) {
+  BrokenRuns runs;
+  options_.recorder.lossless = true;
+  options_.recorder.queue_samples = 8;
+  options_.recorder.commit_period = milliseconds(0);
+  Start(&runs);
+  Offer("V1", 0, 100);  // Nobody makes room any more, and nobody waits.
+
+  EXPECT_THROW(pipeline_->Stop(), int);
+  EXPECT_TRUE(pipeline_->failed());
+  EXPECT_EQ(bus_.decisions.size(), 100U);
 }
 
 TEST_F(PipelineTest, ASwapUnderLoadNeitherLosesNorRepeatsASample) {
   Start();
-  std::thread intake([&] { Offer("V1", 0, 20'000); });
+  std::thread diagnosis([&] {
+    for (std::uint64_t k = 0; k < 20'000; k += 100) {
+      Offer("V1", k, k + 100);
+      pipeline_->Tend();
+    }
+  });
   const auto seen = [&](std::size_t count) {
     return bus_.notice.Await([&] { return bus_.decisions.size() >= count; });
   };
   ASSERT_TRUE(seen(2000));
   pipeline_->Reassign(
       std::make_shared<FixedResolver>(SharedLinearModels(0x99)));
-  intake.join();
+  diagnosis.join();
   pipeline_->Stop();
 
   ASSERT_EQ(bus_.decisions.size(), 20'000U);
@@ -129,14 +149,13 @@ TEST_F(PipelineTest, ASwapUnderLoadNeitherLosesNorRepeatsASample) {
 }
 
 TEST_F(PipelineTest, AnOpenEpisodeOfAValveThatStaysSilentIsClosedUnknown) {
-  options_.registry.recovery_window = milliseconds(0);
-  pipeline_ = std::make_unique<Pipeline>(
-      options_, PipelineSinks{bus_, bus_, history_, nullptr},
-      std::make_shared<FixedResolver>(SharedLinearModels()), counters_, log_);
+  options_.recovery_window = milliseconds(0);
+  Make();
   OpenEpisode open;
   open.valve_id = "gone";
   open.episode_id = 42;
   pipeline_->Start({open});
+  pipeline_->Tend(std::chrono::steady_clock::now() + std::chrono::seconds(1));
   ASSERT_TRUE(AwaitEvents(1));
   pipeline_->Stop();
 
@@ -146,9 +165,9 @@ TEST_F(PipelineTest, AnOpenEpisodeOfAValveThatStaysSilentIsClosedUnknown) {
 
 TEST_F(PipelineTest, EveryCounterHasANameOfItsOwn) {
   std::vector<std::string> names;
-  for (const auto& [name, total] : counters_.Snapshot()) {
-    EXPECT_LE(name.size(), 32U);
-    names.push_back(name);
+  for (const Measure& measure : counters_.Measures()) {
+    EXPECT_LE(measure.name.size(), 32U);
+    names.push_back(measure.name);
   }
   std::sort(names.begin(), names.end());
   EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());

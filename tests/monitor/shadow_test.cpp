@@ -6,7 +6,7 @@
 
 #include <gmock/gmock.h>
 
-#include "monitor/shadow_bank.h"
+#include "monitor/shadow.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/monitor/pipeline_fixture.h"
 
@@ -39,6 +39,7 @@ class ShadowTest : public testing::Test {
     options.candidate = Shared(std::move(candidate));
     options.limits = limits;
     bank_ = std::make_unique<ShadowBank>(options, log_);
+    valve_ = nullptr;
   }
   // Samples [from, to) of the plant go to both.
   void Feed(std::uint64_t from, std::uint64_t to, double offset = 0.0) {
@@ -49,13 +50,18 @@ class ShadowTest : public testing::Test {
   void Give(const Sample& sample, bool held = false) {
     active_.HoldIsolation(held);
     const Verdict& verdict = active_.Step(sample);
-    bank_->Step({0, &name_}, sample,
-                {verdict, active_models_.get(), false, held});
+    bank_->Step(Valve(), sample, {verdict, active_models_.get(), false, held});
   }
   std::vector<ShadowDifference> Take() {
     Checkpoint checkpoint;
-    bank_->TakeTo(checkpoint);
+    Valve().TakeCheckpoint(checkpoint);
     return checkpoint.shadow;
+  }
+  ShadowValve& Valve() {
+    if (valve_ == nullptr) {
+      valve_ = bank_->Add("V0");
+    }
+    return *valve_;
   }
   std::uint64_t Samples(ShadowOutcome outcome) const {
     return bank_->counts().samples[static_cast<std::size_t>(outcome)];
@@ -64,13 +70,13 @@ class ShadowTest : public testing::Test {
     return bank_->counts().valves[static_cast<std::size_t>(fit)];
   }
 
-  const std::string name_{"V0"};
   std::vector<std::string> lines_;
   ThrottledLog log_{
       [this](LogLevel, std::string_view line) { lines_.emplace_back(line); }};
   std::shared_ptr<const ModelSet> active_models_ = SharedLinearModels();
   ValveEngine active_{active_models_};
   std::unique_ptr<ShadowBank> bank_;
+  ShadowValve* valve_{nullptr};
 };
 
 TEST_F(ShadowTest, StretchBeginsWhereTheAnswersPartAndSaysBoth) {
@@ -156,7 +162,7 @@ TEST_F(ShadowTest, EndOfTheStreamEndsStretchAndEpisode) {
   Feed(0, 50);
   Feed(50, 90, kF7Offset);
   active_.EndEpisode(EndReason::kStreamEnded);
-  bank_->EndStream({0, &name_});
+  Valve().EndStream();
   const std::uint64_t differed = Samples(ShadowOutcome::kDiffered);
   EXPECT_THAT(Take(), SizeIs(1));
 
@@ -201,7 +207,7 @@ TEST_F(ShadowTest, AccumulatorsOfAnotherCandidateCountForNothing) {
   Use(CandidateModels());
   Feed(0, 100);
   Checkpoint checkpoint;
-  bank_->TakeTo(checkpoint);
+  Valve().TakeCheckpoint(checkpoint);
   ASSERT_THAT(checkpoint.shadow_accumulators, SizeIs(1));
   EXPECT_EQ(checkpoint.shadow_accumulators[0].model_hash, 0x9999U);
 
@@ -226,10 +232,10 @@ TEST_F(ShadowPipelineTest, CandidateIsKeptAndNeverHeardOfOutside) {
   for (const FakeBus::Decision& decision : bus_.decisions) {
     EXPECT_EQ(decision.model_hash, 0x1234U);
   }
-  ASSERT_THAT(history_.kept.shadow, SizeIs(1));
-  EXPECT_EQ(history_.kept.shadow[0].valve_id, "V1");
-  EXPECT_EQ(history_.kept.shadow[0].active.fault, "f7");
-  EXPECT_THAT(history_.kept.shadow_accumulators, SizeIs(1));
+  ASSERT_THAT(history_.checkpoint_sum.shadow, SizeIs(1));
+  EXPECT_EQ(history_.checkpoint_sum.shadow[0].valve_id, "V1");
+  EXPECT_EQ(history_.checkpoint_sum.shadow[0].active.fault, "f7");
+  EXPECT_THAT(history_.checkpoint_sum.shadow_accumulators, SizeIs(1));
   ASSERT_NE(pipeline_->shadow_counts(), nullptr);
   EXPECT_EQ(pipeline_->shadow_counts()->recorded, 1U);
 }
@@ -254,7 +260,7 @@ TEST_F(ShadowPipelineTest, WithoutACandidateNothingIsCompared) {
   OfferEpisode("V1");
   pipeline_->Stop();
   EXPECT_EQ(pipeline_->shadow_counts(), nullptr);
-  EXPECT_THAT(history_.kept.shadow, IsEmpty());
+  EXPECT_THAT(history_.checkpoint_sum.shadow, IsEmpty());
 }
 
 }  // namespace

@@ -1,8 +1,9 @@
 // What `fdi-monitor top` makes of the messages, and how it looks.
+#include <sstream>
+
 #include <gmock/gmock.h>
 
 #include "monitor/app/top_board.h"
-#include "monitor/app/top_screen.h"
 
 namespace fdi::monitor {
 namespace {
@@ -41,9 +42,9 @@ idl::DecisionMessage Decision(const std::string& valve, State state,
   return message;
 }
 
-idl::FaultEventMessage Event(const std::string& valve, TransitionKind kind,
-                             std::uint64_t episode) {
-  idl::FaultEventMessage message;
+FaultEvent Event(const std::string& valve, TransitionKind kind,
+                 std::uint64_t episode) {
+  FaultEvent message;
   message.valve_id = valve;
   message.episode_id = episode;
   message.transition.kind = kind;
@@ -54,36 +55,43 @@ idl::FaultEventMessage Event(const std::string& valve, TransitionKind kind,
 class TopTest : public testing::Test {
  protected:
   TopTest() {
-    board_.Learn(Info());
-    board_.Update(Decision("calm", State::kNormal, 0, {0.9, 0, 0}), now_);
-    board_.Update(Decision("seen", State::kDetected, 0, {0.2, 0.6, 0}), now_);
-    board_.Update(Decision("ill", State::kIsolated, 0b110, {0.95, 0.7, 0.8}),
-                  now_);
+    board_.Add(Info(), now_);
+    board_.Add(Decision("calm", State::kNormal, 0, {0.9, 0, 0}), now_);
+    board_.Add(Decision("seen", State::kDetected, 0, {0.2, 0.6, 0}), now_);
+    board_.Add(Decision("ill", State::kIsolated, 0b110, {0.95, 0.7, 0.8}),
+               now_);
     idl::DecisionMessage settling =
         Decision("new", State::kNormal, 0, {0, 0, 0});
     settling.verdict.quality = Quality::kSettling;
-    board_.Update(settling, now_);
+    board_.Add(settling, now_);
   }
 
   std::vector<std::string> Valves(TopSort sort,
                                   const std::string& filter = "") {
     std::vector<std::string> valves;
-    for (const TopRow& row : board_.Rows(sort, filter, now_)) {
-      valves.push_back(row.valve_id);
+    for (const cli::Json& row : Rows(sort, filter)) {
+      valves.push_back(row["valve_id"]);
     }
     return valves;
   }
-  TopView View() {
-    TopView view;
-    view.rows = board_.Rows(TopSort::kWorst, "", now_);
-    view.valves = board_.valves();
-    view.utc = true;
-    return view;
+  cli::Json Rows(TopSort sort, const std::string& filter = "") {
+    return board_.Valves(sort, filter, now_).document["valves"];
+  }
+  cli::Json Row(const std::string& filter) {
+    return Rows(TopSort::kWorst, filter).at(0);
+  }
+  std::string Table() {
+    std::ostringstream out;
+    board_.Valves(TopSort::kWorst, "", now_).PrintText(out, {});
+    return out.str();
+  }
+  std::string Screen(TopView& view, std::size_t width, std::size_t height) {
+    return TopScreen(board_, view, {width == 40, width}, height, now_);
   }
 
   const Clock::time_point now_{std::chrono::hours(1)};
-  TopBoard board_{std::chrono::seconds(10)};
   const cli::FaultTexts texts_{FDI_FAULT_CATALOGUE};
+  TopBoard board_{texts_, std::chrono::seconds(10)};
 };
 
 TEST_F(TopTest, WorstStandsFirst) {
@@ -96,13 +104,40 @@ TEST_F(TopTest, WorstStandsFirst) {
 }
 
 TEST_F(TopTest, TheFactorIsThatOfTheIsolatedFaults) {
-  const TopRow row = board_.Rows(TopSort::kWorst, "", now_).front();
+  const cli::Json row = Row("");
 
-  EXPECT_EQ(row.faults, "f7|f19");
-  EXPECT_EQ(row.factor, 0.8);
-  EXPECT_EQ(row.strength, 0.25);
-  EXPECT_EQ(row.factors.front().first, "f1");
-  EXPECT_EQ(row.model_set, "demo@2");
+  EXPECT_EQ(row["fault"], "f7|f19");
+  EXPECT_EQ(row["factor"], 0.8);
+  EXPECT_EQ(row["strength"], 0.25);
+  EXPECT_EQ(row["factors"].begin().key(), "f1");
+  EXPECT_EQ(row["model_set"], "demo@2");
+}
+
+TEST_F(TopTest, AValveThatIsNotJudgedIsNotCalledNormal) {
+  for (const Quality quality :
+       {Quality::kBadInput, Quality::kUncovered, Quality::kUnassigned}) {
+    idl::DecisionMessage message = Decision("calm", State::kNormal, 0, {});
+    message.verdict.quality = quality;
+    board_.Add(message, now_);
+
+    EXPECT_EQ(Row("calm")["state"], "NOT_JUDGED");
+    EXPECT_EQ(Row("calm")["quality"], QualityName(quality));
+  }
+  idl::DecisionMessage open = Decision("ill", State::kIsolated, 0b1, {1, 0, 0});
+  open.verdict.quality = Quality::kBadInput;
+  board_.Add(open, now_);
+  EXPECT_EQ(Row("ill")["state"], "ISOLATED");
+}
+
+TEST_F(TopTest, BeforeTheModelSetIsKnownNoPositionLooksLikeAFault) {
+  idl::DecisionMessage message =
+      Decision("early", State::kIsolated, 0b10, {0.1, 0.9, 0.0});
+  message.model_hash = 8;
+  board_.Add(message, now_);
+
+  EXPECT_EQ(Row("early")["fault"], "#2");
+  EXPECT_EQ(Row("early")["residuals"].begin().key(), "#1");
+  EXPECT_TRUE(Row("early")["model_set"].is_null());
 }
 
 TEST_F(TopTest, AFilterLooksAtValveFaultStateAndQuality) {
@@ -113,25 +148,25 @@ TEST_F(TopTest, AFilterLooksAtValveFaultStateAndQuality) {
 }
 
 TEST_F(TopTest, AValveIsAbnormalSinceItsOpenEpisodeBegan) {
-  board_.Update(Event("ill", TransitionKind::kDetected, 1));
-  board_.Update(Event("ill", TransitionKind::kClosed, 99));  // Another one.
-  EXPECT_EQ(board_.Rows(TopSort::kWorst, "ill", now_)[0].since_ns,
-            40 * kSecond);
-  EXPECT_THAT(TopTable(View(), texts_, {}), HasSubstr("60 s"));
+  board_.Add(Event("ill", TransitionKind::kDetected, 1), now_);
+  board_.Add(Event("ill", TransitionKind::kClosed, 99), now_);  // Another one.
+  EXPECT_EQ(Row("ill")["since_utc"], "1970-01-01T00:00:40Z");
+  EXPECT_THAT(Table(), HasSubstr("60 s"));
 
-  board_.Update(Event("ill", TransitionKind::kClosed, 1));
+  board_.Add(Event("ill", TransitionKind::kClosed, 1), now_);
 
-  EXPECT_FALSE(board_.Rows(TopSort::kWorst, "ill", now_)[0].since_ns);
+  EXPECT_TRUE(Row("ill")["since_utc"].is_null());
 }
 
 TEST_F(TopTest, WhoHasNotSpokenForAWhileIsSilent) {
   const auto later = now_ + std::chrono::seconds(11);
-  board_.Update(Decision("calm", State::kNormal, 0, {0, 0, 0}), later);
+  board_.Add(Decision("calm", State::kNormal, 0, {0, 0, 0}), later);
 
-  const auto rows = board_.Rows(TopSort::kValve, "", later);
+  const cli::Json rows =
+      board_.Valves(TopSort::kValve, "", later).document["valves"];
 
-  EXPECT_FALSE(rows[0].silent);
-  EXPECT_TRUE(rows[1].silent);
+  EXPECT_EQ(rows[0]["silent"], false);
+  EXPECT_EQ(rows[1]["silent"], true);
   board_.Remove("ill");
   EXPECT_EQ(board_.valves(), 3U);
 }
@@ -142,7 +177,7 @@ TEST_F(TopTest, AMonitorThatIsGoneIsNotHeard) {
   status.monitor = "m";
   status.health = idl::Health::kDegraded;
   status.text = "disk";
-  board_.Update(status, now_);
+  board_.Add(status, now_);
 
   EXPECT_EQ(board_.Health(now_), "DEGRADED: disk");
   EXPECT_EQ(board_.Health(now_ + std::chrono::seconds(6)), "");
@@ -150,7 +185,8 @@ TEST_F(TopTest, AMonitorThatIsGoneIsNotHeard) {
 
 TEST_F(TopTest, TheScreenHasTheLinesAndColumnsOfTheTerminal) {
   for (const std::size_t height : {3U, 8U, 30U}) {
-    const std::string screen = TopScreen(View(), texts_, {true, 40}, height);
+    TopView view;
+    const std::string screen = Screen(view, 40, height);
     EXPECT_EQ(static_cast<std::size_t>(
                   std::count(screen.begin(), screen.end(), '\n') + 1),
               height);
@@ -162,23 +198,21 @@ TEST_F(TopTest, TheScreenHasTheLinesAndColumnsOfTheTerminal) {
 }
 
 TEST_F(TopTest, WhatDoesNotFitIsCountedAndScrolledTo) {
-  TopView view = View();
-  const std::string top = TopScreen(view, texts_, {false, 200}, 8);
+  TopView view;
+  const std::string top = Screen(view, 200, 8);
   EXPECT_THAT(top, HasSubstr("ill"));
   EXPECT_THAT(top, HasSubstr("2 more below"));
   EXPECT_THAT(top, Not(HasSubstr("calm")));
 
   view.first = 100;
 
-  EXPECT_THAT(TopScreen(view, texts_, {false, 200}, 8), HasSubstr("calm"));
+  EXPECT_THAT(Screen(view, 200, 8), HasSubstr("calm"));
 }
 
 TEST_F(TopTest, FaultsAreCalledByTheirNames) {
-  EXPECT_THAT(TopTable(View(), texts_, {}),
-              HasSubstr(texts_.Words("f7|f19", 0.25).name));
-  const cli::Json json = TopJson(View(), texts_);
-  EXPECT_EQ(json["valves"][0]["fault"], "f7|f19");
-  EXPECT_TRUE(json["valves"][3]["fault"].is_null());
+  EXPECT_THAT(Table(), HasSubstr(texts_.Words("f7|f19", 0.25).name));
+  EXPECT_EQ(Rows(TopSort::kWorst)[0]["fault"], "f7|f19");
+  EXPECT_TRUE(Rows(TopSort::kWorst)[3]["fault"].is_null());
 }
 
 TEST(ClippedTest, CodesTakeNoRoomAndLettersStayWhole) {

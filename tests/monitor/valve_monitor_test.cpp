@@ -15,9 +15,7 @@ using testing::ElementsAre;
 
 class Notebook : public EpisodeOutlet {
  public:
-  void Event(EpisodeEvent event) override {
-    events.push_back(std::move(event));
-  }
+  void Event(FaultEvent event) override { events.push_back(std::move(event)); }
   void Evidence(EpisodeTrace trace) override {
     complete = complete || trace.complete;
     for (TracePoint& point : trace.trace.Unpack()) {
@@ -31,13 +29,13 @@ class Notebook : public EpisodeOutlet {
 
   std::vector<TransitionKind> Kinds() const {
     std::vector<TransitionKind> kinds;
-    for (const EpisodeEvent& event : events) {
+    for (const FaultEvent& event : events) {
       kinds.push_back(event.transition.kind);
     }
     return kinds;
   }
 
-  std::vector<EpisodeEvent> events;
+  std::vector<FaultEvent> events;
   std::vector<std::pair<std::uint64_t, TracePoint>> evidence;
   std::vector<DataGap> gaps;
   std::vector<std::uint64_t> resumed;
@@ -86,7 +84,7 @@ TEST_F(ValveMonitorTest, AFaultIsDetectedIsolatedAndClearedAsOneEpisode) {
               ElementsAre(TransitionKind::kDetected, TransitionKind::kIsolated,
                           TransitionKind::kCleared, TransitionKind::kClosed));
   const std::uint64_t id = EpisodeId("V1", 1, PlantSample(100).stamp_ns);
-  for (const EpisodeEvent& event : notebook_.events) {
+  for (const FaultEvent& event : notebook_.events) {
     EXPECT_EQ(event.episode_id, id);
   }
   ASSERT_FALSE(notebook_.events.at(1).candidates.empty());
@@ -145,7 +143,7 @@ TEST_F(ValveMonitorTest, ASupersededEpisodeBelongsToItsOwnSource) {
   Feed(100, 120, kF7Offset);
   Feed(0, 5, 0.0, 2);
 
-  const EpisodeEvent& closed = notebook_.events.back();
+  const FaultEvent& closed = notebook_.events.back();
   EXPECT_EQ(closed.transition.kind, TransitionKind::kClosed);
   EXPECT_EQ(closed.transition.reason, EndReason::kSuperseded);
   EXPECT_EQ(closed.source_id, 1U);

@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <httplib.h>
 
+#include "cli/time_text.h"
 #include "monitor/console/console.h"
-#include "storage/cli/time_text.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::console {
@@ -51,7 +51,9 @@ class PlannerRoutesTest : public storage::HistoryFixture {
                       {3600, 3600 * (i % 7), 3600 * 64, 3600 * 5000}};
       hours.push_back(hour);
     }
-    writer_.Keep({}, {}, hours);
+    Checkpoint checkpoint;
+    checkpoint.health = hours;
+    writer_.CommitCheckpoint(checkpoint);
   }
   Json Get(const std::string& path, int status = 200) {
     const httplib::Result answer = client_->Get(path);
@@ -67,7 +69,7 @@ class PlannerRoutesTest : public storage::HistoryFixture {
 TEST_F(PlannerRoutesTest, WorkListNamesValveAndReason) {
   const Json rows = Get("/api/v1/worklist")["rows"];
   ASSERT_EQ(rows.size(), 1u);
-  EXPECT_EQ(rows[0]["valve"], "V/1 a");
+  EXPECT_EQ(rows[0]["valve_id"], "V/1 a");
   EXPECT_EQ(rows[0]["fault"], "f19");
   EXPECT_THAT(rows[0]["why"].get<std::string>(),
               HasSubstr("Flow transmitter wrong"));
@@ -84,7 +86,7 @@ TEST_F(PlannerRoutesTest, WorkListIsAFileToo) {
   const httplib::Result answer = client_->Get("/api/v1/worklist.csv");
   ASSERT_TRUE(answer);
   EXPECT_THAT(answer->get_header_value("Content-Type"), HasSubstr("text/csv"));
-  EXPECT_THAT(answer->body, HasSubstr("\r\n1,V/1 a,"));
+  EXPECT_THAT(answer->body, HasSubstr("\n1,V/1 a,"));
 }
 
 TEST_F(PlannerRoutesTest, MonthsOfAValveAreColumnsOfOneLength) {

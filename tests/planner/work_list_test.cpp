@@ -5,10 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "monitor/planner/health_view.h"
-#include "monitor/planner/read_work.h"
-#include "storage/cli/shared_files.h"
-#include "storage/history_editor.h"
+#include "cli/shared_files.h"
+#include "storage/history/history_editor.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::planner {
@@ -71,7 +69,7 @@ TEST(WorkListTest, WeightIsSeverityConfidenceUrgencyAndRepetition) {
 
 TEST(WorkListTest, TrendsWeighTheMoreTheNearerTheirLimit) {
   using Answer = monitor::HealthForecast::Answer;
-  TrendReason reason;
+  LimitTrend reason;
   reason.forecast.answer = Answer::kTime;
   reason.forecast.time = monitor::TimeToLimit{45.0, 30.0, 60.0};
   EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 3.0);
@@ -142,7 +140,9 @@ class ReadWorkTest : public storage::HistoryFixture {
       hour.bins[5] = {{3600, residual, 0, 3600LL * 5000 + residual}};
       hours.push_back(hour);
     }
-    writer_.Keep({}, {}, hours);
+    Checkpoint checkpoint;
+    checkpoint.health = hours;
+    writer_.CommitCheckpoint(checkpoint);
   }
 
   storage::HistoryWriter writer_;
@@ -198,8 +198,8 @@ TEST_F(ReadWorkTest, TopAndDisciplineNarrowIt) {
 
 TEST_F(ReadWorkTest, CsvQuotesWhatNeedsIt) {
   std::ostringstream csv;
-  WriteWorkListCsv(csv, Read());
-  EXPECT_THAT(csv.str(), HasSubstr("rank,valve,score,severity"));
+  WorkListReport(Read()).PrintCsv(csv);
+  EXPECT_THAT(csv.str(), HasSubstr("rank,valve_id,score,severity"));
   EXPECT_THAT(csv.str(),
               HasSubstr(",\"Valve does not close, travel blocked: "));
 }

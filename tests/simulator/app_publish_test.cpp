@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "storage/csv.h"
+#include "cli/csv.h"
 #include "tests/simulator/app_publish_fixture.h"
 
 namespace fdi::simulator {
@@ -22,7 +22,7 @@ using AppPublishTest = PublishTest;
 
 TEST_F(AppPublishTest, AReplayedCsvArrivesInOrderBitForBit) {
   const std::string file = MakeCsv("300");
-  const storage::CsvTable table = storage::ReadCsvFile(file);
+  const cli::CsvTable table = cli::ReadCsvFile(file);
   Reader reader(domain_);
 
   Process process(With({"replay", "--csv", file, "--valve", "LC1", "--speed",

@@ -6,9 +6,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "cli/csv.h"
+#include "diagnosis/fault_catalogue.h"
 #include "simulator/app/scenario_toml.h"
-#include "storage/csv.h"
-#include "storage/runs.h"
+#include "storage/runs/runs.h"
 #include "tests/simulator/app_process.h"
 
 // The binary without DDS: what it computes, stores and refuses.
@@ -109,7 +110,7 @@ TEST_F(AppRunTest, TheExportedCsvHasTheBitsOfTheRun) {
       Record({"--duration", "50", "--export", file, "--fault",
               "f19:abrupt@20:strength=-0.5"});
 
-  const storage::CsvTable table = storage::ReadCsvFile(file);
+  const cli::CsvTable table = cli::ReadCsvFile(file);
 
   ASSERT_EQ(table.runs.size(), 1U);
   ASSERT_EQ(table.runs[0].samples.size(), run.samples.size());
@@ -138,7 +139,7 @@ TEST_F(AppRunTest, WhatItRefusesItNamesWithWhatIsAccepted) {
                                      "2,50,50\n9,50,50\n10,50,50\n");
   const std::string empty = WriteFile(folder_.path() / "empty.csv", "");
   const std::vector<Refusal> refusals = {
-      {{"run", "--no-publish", "--fault", "f20:abrupt@3"}, 2, {"f1..f19"}},
+      {{"run", "--no-publish", "--fault", "f99:abrupt@3"}, 2, {"f1..f19"}},
       {{"run", "--no-publish", "--fault", "f1:sudden@3"}, 2, {"abrupt"}},
       {{"run", "--no-publish", "--excitation", "x"}, 2, {"level-loop"}},
       {{"run", "--no-publish", "--excitation", "csv:" + text}, 3, {"P1_kPa"}},
@@ -194,7 +195,7 @@ TEST_F(AppRunTest, TheFaultsAreListed) {
   EXPECT_THAT(text.out, AllOf(HasSubstr("f19"), HasSubstr("flow reading x 0"),
                               HasSubstr("F5")));
   const auto faults = nlohmann::json::parse(json.out)["faults"];
-  ASSERT_EQ(faults.size(), 22U);
+  ASSERT_EQ(faults.size(), std::size_t{kLastFault});
   EXPECT_EQ(faults[6]["name"], "f7");
   EXPECT_EQ(faults[6]["paper_name"], "F4");
   EXPECT_EQ(faults[3]["strength_min"], -1.0);

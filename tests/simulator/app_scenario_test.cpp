@@ -159,7 +159,7 @@ TEST(ScenarioTomlTest, ARefusalNamesPlaceKeyAndWhatIsAccepted) {
   EXPECT_THAT(RefusalOf("excitation = 'csv'"), HasSubstr("csv:FILE"));
   EXPECT_THAT(RefusalOf("parameters = 'mine'"),
               AllOf(HasSubstr("paper-operating-point"), HasSubstr(".toml")));
-  EXPECT_THAT(RefusalOf("faults = ['f20:abrupt@3']"),
+  EXPECT_THAT(RefusalOf("faults = ['f99:abrupt@3']"),
               AllOf(HasSubstr("test.toml:1"), HasSubstr("f1..f19")));
   EXPECT_THAT(RefusalOf("faults = ['f1:abrupt@3:strength=2']"),
               AllOf(HasSubstr("strength"), HasSubstr("1")));

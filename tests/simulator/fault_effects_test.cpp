@@ -49,7 +49,7 @@ TEST(FaultEffectsTest, SignOfPressureFaultChoosesTheSide) {
 TEST(FaultEffectsTest, RefusesUnknownFaultsAndStrengths) {
   FaultEffects effects;
   EXPECT_THROW(ApplyFault(0, 0.5, effects), std::invalid_argument);
-  EXPECT_THROW(ApplyFault(23, 0.5, effects), std::invalid_argument);
+  EXPECT_THROW(ApplyFault(kLastFault + 1, 0.5, effects), std::invalid_argument);
   EXPECT_THROW(ApplyFault(1, -0.5, effects), std::invalid_argument);
   EXPECT_THROW(ApplyFault(19, 1.5, effects), std::invalid_argument);
 }

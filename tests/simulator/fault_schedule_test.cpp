@@ -71,7 +71,7 @@ TEST(FaultScheduleTest, TextReadsBackAsTheSameSchedule) {
 }
 
 TEST(FaultScheduleTest, MessagesNameTheReasonAndTheAcceptedForm) {
-  EXPECT_THAT(MessageFor("f20:abrupt@50"), HasSubstr("f1..f19"));
+  EXPECT_THAT(MessageFor("f99:abrupt@50"), HasSubstr("f1..f19"));
   EXPECT_THAT(MessageFor("f1"), HasSubstr("profile is missing"));
   EXPECT_THAT(MessageFor("f1:sudden@50"), HasSubstr("'sudden'"));
   EXPECT_THAT(MessageFor("f1:abrupt"), HasSubstr("start time"));

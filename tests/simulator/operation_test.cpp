@@ -1,5 +1,3 @@
-#include "simulator/operation.h"
-
 #include <string>
 #include <vector>
 

@@ -7,8 +7,7 @@
 
 #include "simulator/random.h"
 #include "simulator/valve_equations.h"
-#include "simulator/valve_unknowns.h"
-#include "simulator/water.h"
+#include "simulator/valve_identification.h"
 
 namespace fdi::simulator {
 namespace {

@@ -1,6 +1,6 @@
-#include "simulator/water.h"
-
 #include <gtest/gtest.h>
+
+#include "simulator/valve_equations.h"
 
 namespace fdi::simulator {
 namespace {

@@ -1,8 +1,8 @@
-#include "storage/alarm_statistics.h"
-
 #include <limits>
 
 #include <gmock/gmock.h>
+
+#include "storage/history/alarm.h"
 
 namespace fdi::storage {
 namespace {

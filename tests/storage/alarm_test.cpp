@@ -1,4 +1,4 @@
-#include "storage/alarm.h"
+#include "storage/history/alarm.h"
 
 #include <gtest/gtest.h>
 

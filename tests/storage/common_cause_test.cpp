@@ -1,4 +1,4 @@
-#include "storage/common_cause.h"
+#include "storage/history/common_cause.h"
 
 #include <gtest/gtest.h>
 
@@ -34,11 +34,13 @@ class CommonCauseTest : public HistoryFixture {
   std::vector<CauseChange> Isolate(const std::string& valve, double at_s,
                                    FaultSet faults = 4) {
     std::vector<CauseChange> changes;
-    writer_->Together([&] {
+    writer_->CommitBatch([&] {
       writer_->Record(
-          Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve));
+          Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve),
+          kDetected);
       writer_->Record(Event(TransitionKind::kIsolated, at_s, faults, 0.8,
-                            EndReason::kNone, valve));
+                            EndReason::kNone, valve),
+                      kDetected);
       changes =
           book_->Isolated(EpisodeIdText(Id(valve)), valve,
                           kDetected + static_cast<std::int64_t>(at_s * 1e9));
@@ -47,9 +49,10 @@ class CommonCauseTest : public HistoryFixture {
   }
   std::vector<CauseChange> Close(const std::string& valve, double at_s) {
     std::vector<CauseChange> changes;
-    writer_->Together([&] {
+    writer_->CommitBatch([&] {
       writer_->Record(Event(TransitionKind::kClosed, at_s, 4, 0.1,
-                            EndReason::kCleared, valve));
+                            EndReason::kCleared, valve),
+                      kDetected);
       changes = book_->Ended(EpisodeIdText(Id(valve)));
     });
     return changes;
@@ -127,10 +130,11 @@ TEST_F(CommonCauseTest, WhatEndedWhileNobodyLookedIsEndedLater) {
   }
   for (const char* valve : {"A-1", "A-2", "A-3"}) {
     writer_->Record(
-        Event(TransitionKind::kClosed, 90, 4, 0.1, EndReason::kCleared, valve));
+        Event(TransitionKind::kClosed, 90, 4, 0.1, EndReason::kCleared, valve),
+        kDetected);
   }
   std::vector<CauseChange> changes;
-  writer_->Together([&] { changes = book_->EndThoseThatAreOver(); });
+  writer_->CommitBatch([&] { changes = book_->EndFinished(); });
   EXPECT_EQ(changes.at(0).kind, Kind::kEnded);
   EXPECT_EQ(Causes().at(0).ended_ns, kDetected + 90 * kSecond);
 }

@@ -9,9 +9,12 @@
 #include <unistd.h>
 
 #include "diagnosis/error.h"
-#include "storage/data_directory.h"
-#include "storage/history.h"
-#include "storage/runs.h"
+#include "storage/database/data_directory.h"
+#include "storage/history/history_database.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/history_writer.h"
+#include "storage/runs/run_recorder.h"
+#include "storage/runs/runs.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::storage {

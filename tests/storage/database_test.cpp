@@ -1,4 +1,4 @@
-#include "storage/database.h"
+#include "storage/database/database.h"
 
 #include <fstream>
 
@@ -8,9 +8,8 @@
 #include <unistd.h>
 
 #include "diagnosis/error.h"
-#include "storage/data_directory.h"
-#include "storage/exclusive_lock.h"
-#include "storage/write_gate.h"
+#include "storage/database/data_directory.h"
+#include "storage/database/locks.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::storage {

@@ -12,9 +12,9 @@ class FdiStoreHistoryTest : public FdiStoreTest {
  protected:
   FdiStoreHistoryTest() {
     HistoryWriter writer(path_);
-    writer.Record(Event(TransitionKind::kDetected, 0, 0, 0.3));
+    writer.Record(Event(TransitionKind::kDetected, 0, 0, 0.3), kDetected);
     writer.AppendTrace(Id(), Instants(100, -20));
-    writer.Record(Event(TransitionKind::kIsolated, 20, 0b010, 0.8));
+    writer.Record(Event(TransitionKind::kIsolated, 20, 0b010, 0.8), kDetected);
     writer.EndSession(kDetected, true);
   }
 };
@@ -46,7 +46,7 @@ TEST_F(FdiStoreHistoryTest, FiltersReachTheQuery) {
   EXPECT_EQ(count("--until 2026-11-20T14:56:12Z"), 1U);
   EXPECT_EQ(count("--state isolated"), 1U);
   EXPECT_EQ(Store("history list --state odd").code, 2);
-  EXPECT_EQ(Store("history list --fault f20").code, 2);
+  EXPECT_EQ(Store("history list --fault f99").code, 2);
 }
 
 TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
@@ -60,9 +60,11 @@ TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
   EXPECT_EQ(shown["trace_instants"], 100);
   {
     HistoryWriter writer(path_);
-    CoverageCount count{"LV-1", 20'000, 1.0, {}};
+    CoverageDay count{"LV-1", 20'000, 1.0, {}};
     count.samples.Add(Quality::kLive, 7200);
-    writer.Keep(std::vector{count}, {});
+    Checkpoint checkpoint;
+    checkpoint.coverage = {count};
+    writer.CommitCheckpoint(checkpoint);
   }
   EXPECT_EQ(StoreJson("history stats")["hours"]["LV-1"]["LIVE"], 2.0);
   EXPECT_THAT(Store("history stats").out,
@@ -240,6 +242,53 @@ TEST_F(FdiStoreHistoryTest, DoctorExitsWithThreeOnADamagedFile) {
 
   EXPECT_EQ(outcome.code, 3);
   EXPECT_EQ(json::parse(outcome.out)["sound"], false);
+}
+
+// Such an id is valid text to SQLite, but the event cannot be sent.
+TEST_F(FdiStoreHistoryTest, DoctorFindsADamagedIdInTheOutbox) {
+  {
+    Database database(path_, HistorySchema(), Access::kOccasionalWriter);
+    Transaction transaction(database);
+    database.Run(
+        "INSERT INTO episode (episode_id, session_id, valve_id, source_id, "
+        "detected_ns, peak_factor, strength, model_set, model_hash, flow_unit, "
+        "channels, faults) SELECT 'zzzzzzzzzzzzzzzz', session_id, valve_id, "
+        "source_id, detected_ns, peak_factor, strength, model_set, model_hash, "
+        "flow_unit, channels, faults FROM episode");
+    database.Run(
+        "INSERT INTO episode_event (event_id, episode_id, kind, stamp_ns, "
+        "recorded_ns) VALUES (99, 'zzzzzzzzzzzzzzzz', 'DETECTED', 1, 1)");
+    database.Run("INSERT INTO event_outbox VALUES (99)");
+    transaction.Commit();
+  }
+
+  const Outcome outcome = Store("doctor --json");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(json::parse(outcome.out)["databases"][2]["troubles"],
+            json::array({"episode 'zzzzzzzzzzzzzzzz': its id is not 16 hex "
+                         "digits",
+                         "episode_event 99: its episode id 'zzzzzzzzzzzzzzzz' "
+                         "is not 16 hex digits (in event_outbox, not sent)"}));
+  EXPECT_THAT(Store("doctor").out, HasSubstr("not 16 hex digits"));
+}
+
+// gnuplot does not accept two single quotes at the beginning of a string.
+TEST_F(FdiStoreHistoryTest, PictureOfAValveWhoseIdBeginsWithAQuote) {
+  if (std::system("gnuplot --version >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "gnuplot is not installed";
+  }
+  {
+    HistoryWriter writer(path_);
+    RecordEpisode(writer, 0b001, "'1\"");
+    writer.AppendTrace(Id("'1\""), Instants(50, -10));
+    writer.EndSession(kDetected, true);
+  }
+  const std::string id = EpisodeIdText(Id("'1\""));
+
+  EXPECT_EQ(Store("history plot " + id + " -o a.svg").code, 0);
+
+  EXPECT_THAT(Slurp(directory_.path() / "a.svg"), HasSubstr("'1\":  f1"));
 }
 
 TEST_F(FdiStoreHistoryTest, PruneTellsWhatWentAndNeedsALimit) {

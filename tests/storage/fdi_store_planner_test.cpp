@@ -25,7 +25,9 @@ class FdiStorePlannerTest : public FdiStoreTest {
       hour.bins[7] = {{3600, 3600 * residual, 0, 3600 * 71'000}};
       hours.push_back(hour);
     }
-    writer.Keep({}, {}, hours);
+    Checkpoint checkpoint;
+    checkpoint.health = hours;
+    writer.CommitCheckpoint(checkpoint);
   }
 };
 

@@ -4,8 +4,8 @@
 
 #include <gmock/gmock.h>
 
-#include "storage/models.h"
-#include "storage/runs.h"
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
 #include "tests/storage/model_set_fixture.h"
 #include "tests/storage/store_program_fixture.h"
 
@@ -250,6 +250,41 @@ TEST_F(FdiStoreTest, BaselinesOfEpochsAreShownSideBySide) {
   EXPECT_EQ(StoreJson("types show globe")["bytes"], 7);
   EXPECT_EQ(Store("types delete globe").code, 0);
   EXPECT_EQ(Store("types show globe").code, 5);
+}
+
+// T1 of a water loop is one number all day: a variance of nothing but rounding.
+TEST_F(FdiStoreTest, OutputThatStoodStillHasNoVaf) {
+  {
+    ModelSet models = RandomModelSet("still", 2, 1);
+    models.observers[0].channels[1].validation.vaf = -1.3e29;
+    ModelStore(directory_.path() / "models.db", Access::kOccasionalWriter)
+        .Save(models);
+  }
+
+  EXPECT_TRUE(
+      StoreJson("models list")["model_sets"][0]["lowest_vaf"].is_null());
+  EXPECT_THAT(Store("models list").out,
+              testing::Not(HasSubstr("0000000000000000000")));
+  EXPECT_THAT(Store("models show still").out,
+              HasSubstr("the output did not vary in the validation data, so "
+                        "there is no variance to account for (F of normal)"));
+  const json shown = StoreJson("models show still");
+  EXPECT_TRUE(shown["observers"][0]["channels"][1]["vaf"].is_null());
+  EXPECT_TRUE(shown["observers"][0]["channels"][0]["vaf"].is_number());
+}
+
+TEST_F(FdiStoreTest, WhatTakesOutputTakesMinusO) {
+  Write("a.csv", header_ + Rows(5));
+  const std::string id = StoreJson("runs import a.csv --valve LV-1")["run_id"];
+  ModelStore(directory_.path() / "models.db", Access::kOccasionalWriter)
+      .Save(RandomModelSet("pump", 2, 1));
+  { HistoryWriter writer(path_); }
+
+  EXPECT_EQ(Store("runs export " + id + " -o run.csv").code, 0);
+  EXPECT_EQ(Slurp(directory_.path() / "run.csv"), header_ + Rows(5));
+  EXPECT_EQ(Store("models export pump -o pump.fdm").code, 0);
+  EXPECT_EQ(Store("models import pump.fdm").code, 0);
+  EXPECT_EQ(Store("history export -o history.csv").code, 0);
 }
 
 }  // namespace

@@ -4,72 +4,146 @@
 
 #include <gmock/gmock.h>
 
+#include "cli/plot/episode_figure.h"
+#include "cli/plot/gnuplot.h"
+#include "cli/plot/run_figure.h"
 #include "diagnosis/error.h"
-#include "storage/plot/episode_figure.h"
-#include "storage/plot/figure_data.h"
-#include "storage/plot/run_figure.h"
 #include "tests/storage/history_fixture.h"
 #include "tests/storage/message_of.h"
 
-namespace fdi::storage {
+namespace fdi::plot {
 namespace {
 
+using storage::HistoryFixture;
+using storage::HistoryReader;
+using storage::HistoryWriter;
+using storage::MessageOf;
+using storage::StoredRun;
+using storage::StoredSample;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-std::string Points(const TimeFigure& figure,
-                   const std::vector<double>& values) {
-  std::ostringstream out;
-  WritePoints(figure, values, 1.0, out);
-  return out.str();
+// The data of the only series of a figure, as the script has them.
+std::string Points(const Figure& figure) {
+  const std::string script = GnuplotScript(figure, Format::kSvg, "x.svg");
+  const std::string begin = "$p0s0 << EOD\n";
+  const std::size_t from = script.find(begin) + begin.size();
+  return script.substr(from, script.find("EOD\n", from) - from);
 }
 
-std::vector<std::string> TextsOf(const std::vector<FigureMark>& marks) {
+std::vector<std::string> TextsOf(const std::vector<Mark>& marks) {
   std::vector<std::string> texts;
-  for (const FigureMark& mark : marks) {
+  for (const Mark& mark : marks) {
     texts.push_back(mark.text);
   }
   return texts;
 }
 
 TEST(FigureDataTest, LinesBreakAtGapsAndWhereNothingIs) {
-  TimeFigure figure;
-  figure.t_s = {0, 1, 5, 6};
+  Figure figure;
+  figure.x = {0, 1, 5, 6};
+  figure.gap = 1.5;
+  figure.panels = {{"a", {{.y = {1, 2, 3, kNone}}}}};
 
-  EXPECT_EQ(Points(figure, {1, 2, 3, kNone}), "0 1\n1 2\n5 NaN\n5 3\n6 NaN\n");
+  EXPECT_EQ(Points(figure), "0 1\n1 2\n5 NaN\n5 3\n6 NaN\n");
 }
 
 TEST(FigureDataTest, ThinningKeepsTheOneSampleThatStandsOut) {
-  TimeFigure figure;
+  Figure figure;
   std::vector<double> values;
   for (int i = 0; i < 100'000; ++i) {
-    figure.t_s.push_back(i);
+    figure.x.push_back(i);
     values.push_back(i == 77'777 ? -5.0 : 1.0);
   }
 
-  const std::string points = Points(figure, values);
+  figure.panels = {{"a", {{.y = values}}}};
+
+  const std::string points = Points(figure);
 
   EXPECT_THAT(points, HasSubstr("\n77777 -5\n"));
   EXPECT_LT(std::count(points.begin(), points.end(), '\n'), 4000);
 }
 
-TEST(FigureScriptTest, QuotesAndEmptyPanelsDoNotReachGnuplot) {
-  TimeFigure figure;
-  figure.title = "O'Hara\nvalve";
-  figure.t_s = {0, 1};
-  figure.panels = {
-      {"a", {{"full", ink::kBlack, 1, Dash::kSolid, {1, 2}}}, {}},
-      {"b", {{"void", ink::kBlack, 1, Dash::kSolid, {kNone, kNone}}}, {}}};
+// Both kinds of quotes, a command in backquotes, and a quote at the beginning,
+// which gnuplot does not accept doubled.
+TEST(FigureScriptTest, AnyNameIsDrawnAsItIs) {
+  for (const std::string name :
+       {"'1\" O'Hara `echo ran`\\n", "\"quoted\"", "''", "`17`8", "a\nb"}) {
+    Figure figure{name};
+    figure.x = {0, 1};
+    figure.panels = {{name, {{.title = name, .y = {1, 2}}}}};
+    figure.marks = {{0.5, name}};
+    if (!HaveGnuplot()) {
+      GTEST_SKIP() << "gnuplot is not installed";
+    }
 
-  const std::string script = GnuplotScript(figure, "x.svg");
+    const std::string svg = DrawFigure(figure, Format::kSvg);
 
-  EXPECT_THAT(script, HasSubstr("'O''Hara valve'"));
-  EXPECT_THAT(script, Not(HasSubstr("void")));
+    EXPECT_EQ(svg.find(">ran"), std::string::npos);
+    EXPECT_THAT(svg, HasSubstr(name == "a\nb" ? "a b" : name));
+  }
+}
+
+TEST(FigureScriptTest, SeriesAndPanelsWithoutNumbersDoNotReachGnuplot) {
+  Figure figure;
+  figure.x = {0, 1};
+  figure.panels = {{"a", {{.title = "full", .y = {1, 2}}}},
+                   {"b", {{.title = "void", .y = {kNone, kNone}}}}};
+
+  EXPECT_THAT(GnuplotScript(figure, Format::kSvg, "x.svg"),
+              Not(HasSubstr("void")));
   figure.panels.erase(figure.panels.begin());
-  EXPECT_THROW(GnuplotScript(figure, "x.svg"), DataError);
+  EXPECT_THROW(GnuplotScript(figure, Format::kSvg, "x.svg"), DataError);
+}
+
+// The stem of a mark reaches up to its name, and would strike out a name to the
+// left of it in a lower row.
+TEST(FigureScriptTest, NamesOfMarksStandAboveThoseFurtherRight) {
+  Figure figure;
+  figure.x = {0, 1000};
+  figure.panels = {{"a", {{.y = {1, 2}}}}};
+  figure.marks = {{0, "start"}, {1, "detected"}, {900, "closed"}};
+
+  const std::string script = GnuplotScript(figure, Format::kSvg, "x.svg");
+
+  const auto height_of = [&script](const std::string& name) {
+    const std::size_t at = script.find("screen ", script.find('"' + name));
+    return std::stod(script.substr(at + 7));
+  };
+  EXPECT_GT(height_of("start"), height_of("detected"));
+  EXPECT_EQ(height_of("detected"), height_of("closed"));
+}
+
+TEST(FigureScriptTest, StripsBarsStepsAndNotesAreDrawn) {
+  if (!HaveGnuplot()) {
+    GTEST_SKIP() << "gnuplot is not installed";
+  }
+  Figure figure;
+  figure.x_label = "X [%]";
+  figure.panels = {{.label = "share [%]",
+                    .series = {{.title = "bars",
+                                .y = {1, 2, 3},
+                                .x = {10, 20, 30},
+                                .shape = Shape::kBars},
+                               {.title = "steps",
+                                .y = {3, 2, 1},
+                                .x = {10, 20, 30},
+                                .shape = Shape::kSteps}},
+                    .notes = {"90 residuals"}},
+                   {.label = "isolated",
+                    .bands = {{12, 28, "f19", ink::kGreen}},
+                    .height = 18.0}};
+
+  const std::string svg = DrawFigure(figure, Format::kSvg);
+
+  for (const char* text :
+       {"bars", "steps", "90 residuals", "f19", "isolated"}) {
+    EXPECT_THAT(svg, HasSubstr(text));
+  }
+  EXPECT_EQ(DrawFigure(figure, Format::kPng).substr(1, 3), "PNG");
 }
 
 TEST(FigureScriptTest, OnlyPngAndSvgInAFolderThatIsThere) {
@@ -98,19 +172,19 @@ class EpisodeFigureTest : public HistoryFixture {
 };
 
 TEST_F(EpisodeFigureTest, HasTheMarksOfTheEpisodeAndTheGapsOfTheValve) {
-  const TimeFigure figure = EpisodeFigure(Evidence());
+  const Figure figure = EpisodeFigure(Evidence());
 
   EXPECT_THAT(
       TextsOf(figure.marks),
       ElementsAre("start", "detected", "isolated f7", "cleared", "closed"));
-  EXPECT_NEAR(figure.marks[2].t_s, 20.0, 1e-9);
+  EXPECT_NEAR(figure.marks[2].x, 20.0, 1e-9);
   ASSERT_EQ(figure.bands.size(), 1U);
   EXPECT_EQ(figure.bands[0].text, "monitor_down");
-  EXPECT_NEAR(figure.bands[0].to_s, 45.0, 1e-9);
+  EXPECT_NEAR(figure.bands[0].to, 45.0, 1e-9);
   // Flow, travel, two residuals, factors.
   ASSERT_EQ(figure.panels.size(), 5U);
-  EXPECT_EQ(figure.panels[4].curves[0].title, "f7 (isolated)");
-  EXPECT_NEAR(figure.t_s.front(), -30.0, 1e-9);
+  EXPECT_EQ(figure.panels[4].series[0].title, "f7 (isolated)");
+  EXPECT_NEAR(figure.x.front(), -30.0, 1e-9);
   EXPECT_THAT(figure.footnote, HasSubstr("thresholds are not shown"));
 }
 
@@ -120,22 +194,61 @@ TEST_F(EpisodeFigureTest, ThresholdsAreThoseOfTheSetThatGaveTheAnswer) {
   models_.channels[1].upper_threshold = 3.5;
   evidence.models = models_;
 
-  const TimeFigure figure = EpisodeFigure(evidence);
+  const Figure figure = EpisodeFigure(evidence);
 
-  EXPECT_EQ(figure.panels[3].levels[0].value, 3.5);
-  EXPECT_EQ(figure.panels[3].levels[1].value, -2.5);
-  EXPECT_EQ(figure.panels[4].levels[0].value, 0.7);
+  EXPECT_EQ(figure.panels[3].limits[0].value, 3.5);
+  EXPECT_EQ(figure.panels[3].limits[1].value, -2.5);
+  EXPECT_EQ(figure.panels[4].limits[0].value, 0.7);
 }
 
 TEST_F(EpisodeFigureTest, FaultsHaveFactorsFromTheDetectionOn) {
-  const TimeFigure figure = EpisodeFigure(Evidence());
+  const Figure figure = EpisodeFigure(Evidence());
 
-  const std::vector<double>& fault = figure.panels[4].curves[0].values;
-  const std::vector<double>& normal = figure.panels[4].curves.back().values;
+  const std::vector<double>& fault = figure.panels[4].series[0].y;
+  const std::vector<double>& normal = figure.panels[4].series.back().y;
   ASSERT_EQ(fault.size(), 150U);
   EXPECT_TRUE(std::isnan(fault[29]));
   EXPECT_FALSE(std::isnan(fault[30]));
   EXPECT_FALSE(std::isnan(normal[29]));
+}
+
+// Of F(CV) the residual is small, and only its mean over 30 samples passes a
+// limit when the episode begins.
+TEST_F(EpisodeFigureTest, TheWindowThatMadeTheDetectionIsDrawnWithItsLimits) {
+  EpisodeEvidence evidence = Evidence();
+  evidence.episode.channels[1] = "F(CV)";
+  models_.channels[1].name = "F(CV)";
+  models_.channels[1].output = Signal::kF;
+  models_.channels[1].lower_threshold = -100.0;
+  models_.channels[1].upper_threshold = 100.0;
+  WindowLimits limits;
+  limits.length = 30;
+  limits.lower_mean = -1.4;
+  limits.upper_mean = 1.4;
+  limits.upper_log_rms = 10.0;
+  models_.channels[1].windows = {limits};
+  models_.channels[0].windows = {limits};
+  evidence.models = models_;
+
+  const Figure figure = EpisodeFigure(evidence);
+
+  ASSERT_EQ(figure.panels.size(), 6U);
+  EXPECT_EQ(figure.panels[3].label, "residual of F(CV) [m3/h]");
+  EXPECT_EQ(figure.panels[4].label, "mean residual of F(CV) [m3/h]");
+  EXPECT_EQ(figure.panels[4].series[0].title, "mean over 30 samples");
+  EXPECT_NEAR(figure.panels[4].series[0].y[30], -1.5, 0.06);
+  EXPECT_EQ(figure.panels[4].limits[1].value, -1.4);
+  EXPECT_EQ(figure.panels[5].label, "decision factor d [-]");
+}
+
+TEST_F(EpisodeFigureTest, ChannelsOfSeveralSignalsHaveTheUnitOfTheirOutput) {
+  EpisodeEvidence evidence = Evidence();
+  evidence.episode.channels = {"X(CV)", "F(CV)"};
+
+  const Figure figure = EpisodeFigure(evidence);
+
+  EXPECT_EQ(figure.panels[2].label, "residual of X(CV) [%]");
+  EXPECT_EQ(figure.panels[3].label, "residual of F(CV) [m3/h]");
 }
 
 TEST_F(EpisodeFigureTest, TimeIsCutToWhatIsAskedFor) {
@@ -143,10 +256,10 @@ TEST_F(EpisodeFigureTest, TimeIsCutToWhatIsAskedFor) {
   options.from_s = -10.0;
   options.to_s = 50.0;
 
-  const TimeFigure figure = EpisodeFigure(Evidence(), options);
+  const Figure figure = EpisodeFigure(Evidence(), options);
 
-  EXPECT_NEAR(figure.t_s.front(), -10.0, 1e-9);
-  EXPECT_NEAR(figure.t_s.back(), 50.0, 1e-9);
+  EXPECT_NEAR(figure.x.front(), -10.0, 1e-9);
+  EXPECT_NEAR(figure.x.back(), 50.0, 1e-9);
 }
 
 TEST(RunFigureTest, ShadesTheTruthAndLeavesRefusedSamplesOut) {
@@ -161,15 +274,15 @@ TEST(RunFigureTest, ShadesTheTruthAndLeavesRefusedSamplesOut) {
     run.samples.push_back(stored);
   }
 
-  const TimeFigure figure = RunFigure(run);
+  const Figure figure = RunFigure(run);
 
-  EXPECT_EQ(figure.t_s.size(), 9U);
+  EXPECT_EQ(figure.x.size(), 9U);
   EXPECT_THAT(figure.footnote, HasSubstr("1 range"));
   ASSERT_EQ(figure.bands.size(), 1U);
-  EXPECT_EQ(figure.bands[0].from_s, 4.0);
+  EXPECT_EQ(figure.bands[0].from, 4.0);
   EXPECT_EQ(figure.bands[0].text, "f19 0.70");
   EXPECT_THAT(TextsOf(figure.marks), ElementsAre("model set"));
 }
 
 }  // namespace
-}  // namespace fdi::storage
+}  // namespace fdi::plot

@@ -1,14 +1,12 @@
-#include "storage/health_rows.h"
-
 #include <random>
 
 #include <gtest/gtest.h>
 
 #include "diagnosis/error.h"
-#include "storage/health_codec.h"
-#include "storage/health_retention.h"
-#include "storage/history_schema.h"
-#include "storage/history_writer.h"
+#include "storage/history/health.h"
+#include "storage/history/history_database.h"
+#include "storage/history/history_writer.h"
+#include "storage/history/retention.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::storage {
@@ -99,7 +97,9 @@ TEST_F(HealthRowsTest, MinutesOfAnHourAddUpExactly) {
   }
 
   for (const HealthHour& part : parts) {
-    writer_.Keep({}, {}, std::span(&part, 1));
+    Checkpoint checkpoint;
+    checkpoint.health = {part};
+    writer_.CommitCheckpoint(checkpoint);
   }
 
   EXPECT_EQ(Stored(), std::vector<HealthHour>{whole});
@@ -111,7 +111,9 @@ TEST_F(HealthRowsTest, HoursComeByTimeWithinTheWindow) {
     hours.push_back(Typical("V1", hour, 1, random_));
   }
   hours.push_back(Typical("V2", 4, 1, random_));
-  writer_.Keep({}, {}, hours);
+  Checkpoint checkpoint;
+  checkpoint.health = hours;
+  writer_.CommitCheckpoint(checkpoint);
 
   const auto read =
       ReadHealth(writer_.database(), {"V1", 3 * kHourNs + 1, 6 * kHourNs});
@@ -130,7 +132,9 @@ TEST_F(HealthRowsTest, PruningTakesWhatIsOldAndNothingElse) {
     hours.push_back(Typical("V1", hour, 1, random_));
     hours.push_back(Typical("V2", hour, 1, random_));
   }
-  writer_.Keep({}, {}, hours);
+  Checkpoint checkpoint;
+  checkpoint.health = hours;
+  writer_.CommitCheckpoint(checkpoint);
   const auto path = directory_.path() / "history.db";
 
   RetentionLimits limits;
@@ -157,7 +161,9 @@ TEST_F(HealthRowsTest, AnHourOfAValveTakesLessThan152Bytes) {
       hours.push_back(Typical("FV-" + std::to_string(1000 + v), 480'000 + hour,
                               1 + v % 3, random_));
     }
-    writer_.Keep({}, {}, hours);
+    Checkpoint checkpoint;
+    checkpoint.health = hours;
+    writer_.CommitCheckpoint(checkpoint);
   }
   const double bytes =
       static_cast<double>(writer_.database().UsedBytes() - before) /

@@ -1,4 +1,4 @@
-#include "storage/history_editor.h"
+#include "storage/history/history_editor.h"
 
 #include <gmock/gmock.h>
 
@@ -18,13 +18,14 @@ class HistoryEditorTest : public HistoryFixture {
     RecordEpisode(writer_, 0b010, "LV-1");
     RecordEpisode(writer_, 0b101, "LV-2");
     writer_.Record(
-        Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "open"));
+        Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "open"),
+        kDetected);
   }
 
-  std::vector<EpisodeEvent> Notes(const std::string& valve) {
+  std::vector<HistoryEntry> Notes(const std::string& valve) {
     auto events = HistoryReader(path_).Events(Id(valve));
     std::erase_if(events,
-                  [](const EpisodeEvent& event) { return event.who.empty(); });
+                  [](const HistoryEntry& event) { return event.who.empty(); });
     return events;
   }
   std::string IdText(const std::string& valve) const {

@@ -2,13 +2,17 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "storage/data_directory.h"
-#include "storage/history.h"
+#include "storage/database/data_directory.h"
+#include "storage/history/history_database.h"
+#include "storage/history/history_editor.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/history_writer.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::storage {
@@ -31,9 +35,9 @@ class HistoryFixture : public testing::Test {
     models_.faults = {1, 7, 19};
   }
 
-  NewEvent Event(TransitionKind kind, double after_s, FaultSet faults = 0,
-                 double factor = 0.0, EndReason reason = EndReason::kNone,
-                 const std::string& valve = "LV-1") const {
+  FaultEvent Event(TransitionKind kind, double after_s, FaultSet faults = 0,
+                   double factor = 0.0, EndReason reason = EndReason::kNone,
+                   const std::string& valve = "LV-1") const {
     Transition transition;
     transition.kind = kind;
     transition.stamp_ns = kDetected + static_cast<std::int64_t>(after_s * 1e9);
@@ -42,8 +46,13 @@ class HistoryFixture : public testing::Test {
     transition.factor = factor;
     transition.strength = 0.5;
     transition.reason = reason;
-    return {valve,       kSource, transition, &models_, transition.stamp_ns + 1,
-            std::nullopt};
+    FaultEvent event;
+    event.valve_id = valve;
+    event.source_id = kSource;
+    event.episode_id = Id(valve);
+    event.transition = transition;
+    event.models = {std::shared_ptr<void>(), &models_};  // Not owned.
+    return event;
   }
 
   static OperatorNote By(const std::string& who, std::int64_t now_ns,
@@ -55,22 +64,35 @@ class HistoryFixture : public testing::Test {
     return EpisodeId(valve, kSource, kDetected);
   }
 
+  /// The end of an episode that no engine knows any more.
+  static FaultEvent End(std::uint64_t episode_id, std::int64_t stamp_ns) {
+    FaultEvent event;
+    event.episode_id = episode_id;
+    event.transition.kind = TransitionKind::kClosed;
+    event.transition.stamp_ns = stamp_ns;
+    event.transition.reason = EndReason::kUnknown;
+    return event;
+  }
+
   /// The whole life of an episode that ends as fault bits `faults`.
   void RecordEpisode(HistoryWriter& writer, FaultSet faults,
                      const std::string& valve = "LV-1") {
     using Kind = TransitionKind;
     const auto none = EndReason::kNone;
-    writer.Record(Event(Kind::kDetected, 0, 0, 0.3, none, valve));
-    writer.Record(Event(Kind::kIsolated, 20, faults, 0.8, none, valve));
-    writer.Record(Event(Kind::kCleared, 90, faults, 0.1, none, valve));
+    writer.Record(Event(Kind::kDetected, 0, 0, 0.3, none, valve), kDetected);
+    writer.Record(Event(Kind::kIsolated, 20, faults, 0.8, none, valve),
+                  kDetected);
+    writer.Record(Event(Kind::kCleared, 90, faults, 0.1, none, valve),
+                  kDetected);
     writer.Record(
-        Event(Kind::kClosed, 91, faults, 0.1, EndReason::kCleared, valve));
+        Event(Kind::kClosed, 91, faults, 0.1, EndReason::kCleared, valve),
+        kDetected);
   }
 
   /// Plausible instant k, 1 Hz from `first_s` before or after detection.
-  TraceInstant Instant(int k, double first_s = 0.0) const {
-    TraceInstant instant;
-    Sample& sample = instant.received.sample;
+  TracePoint Instant(int k, double first_s = 0.0) const {
+    TracePoint instant;
+    Sample& sample = instant.sample;
     sample.stamp_ns =
         kDetected + static_cast<std::int64_t>(first_s * 1e9) + k * kSecond;
     sample.source_id = kSource;
@@ -83,11 +105,11 @@ class HistoryFixture : public testing::Test {
         sample.stamp_ns < kDetected ? State::kNormal : State::kDetected;
     instant.normal_factor = std::exp(-0.02 * k);
     instant.residuals = {0.01 * std::cos(k), -0.1 * k};
-    instant.fault_factors = {0.0, std::min(1.0, 0.001 * k), 1.0 / (k + 3.0)};
+    instant.factors = {0.0, std::min(1.0, 0.001 * k), 1.0 / (k + 3.0)};
     return instant;
   }
-  std::vector<TraceInstant> Instants(int count, double first_s) const {
-    std::vector<TraceInstant> instants;
+  std::vector<TracePoint> Instants(int count, double first_s) const {
+    std::vector<TracePoint> instants;
     for (int k = 0; k < count; ++k) {
       instants.push_back(Instant(k, first_s));
     }

@@ -1,7 +1,6 @@
-#include "storage/history_query.h"
-
 #include <gmock/gmock.h>
 
+#include "storage/history/history_reader.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {

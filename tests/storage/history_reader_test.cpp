@@ -1,4 +1,4 @@
-#include "storage/history_reader.h"
+#include "storage/history/history_reader.h"
 
 #include <algorithm>
 
@@ -22,12 +22,13 @@ class HistoryReaderTest : public HistoryFixture {
     RecordEpisode(writer_, 0b010, "LV-1");
     RecordEpisode(writer_, 0b101, "LV-2");
     const auto none = EndReason::kNone;
-    writer_.Record(Event(Kind::kDetected, 0, 0, 0.3, none, "PV-1"));
+    writer_.Record(Event(Kind::kDetected, 0, 0, 0.3, none, "PV-1"), kDetected);
     writer_.Record(
-        Event(Kind::kClosed, 60, 0, 0.3, EndReason::kStaleTimeout, "PV-1"));
-    NewEvent later = Event(Kind::kDetected, 500, 0, 0.3, none, "PV-2");
+        Event(Kind::kClosed, 60, 0, 0.3, EndReason::kStaleTimeout, "PV-1"),
+        kDetected);
+    FaultEvent later = Event(Kind::kDetected, 500, 0, 0.3, none, "PV-2");
     later.transition.detection_stamp_ns += 500 * kSecond;
-    writer_.Record(later);
+    writer_.Record(later, kDetected);
   }
 
   std::vector<std::string> Valves(const EpisodeFilter& filter) {
@@ -100,7 +101,8 @@ TEST_F(HistoryReaderTest, BeginningThatSeveralIdsShareIsRefused) {
   std::string digits;
   for (int valve = 0; valve < 17; ++valve) {  // Two must share a first digit.
     const std::string id = "TV-" + std::to_string(valve);
-    writer_.Record(Event(Kind::kDetected, 0, 0, 0.3, EndReason::kNone, id));
+    writer_.Record(Event(Kind::kDetected, 0, 0, 0.3, EndReason::kNone, id),
+                   kDetected);
     digits += EpisodeIdText(Id(id)).front();
   }
   std::sort(digits.begin(), digits.end());

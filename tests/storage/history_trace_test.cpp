@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 
 #include "diagnosis/error.h"
-#include "storage/history_writer.h"
+#include "storage/history/history_writer.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {
@@ -15,7 +15,7 @@ TEST_F(HistoryTraceTest, TraceReadsBackBitForBitAcrossChunks) {
   const auto before = Instants(1800, -1800);
   {
     HistoryWriter writer(path_);
-    writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+    writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
     ASSERT_TRUE(writer.AppendTrace(Id(), before));
     for (int k = 0; k < 310; ++k) {  // As it goes: one instant per commit.
       ASSERT_TRUE(writer.AppendTrace(Id(), std::vector{Instant(k)}));
@@ -30,13 +30,11 @@ TEST_F(HistoryTraceTest, TraceReadsBackBitForBitAcrossChunks) {
   ASSERT_EQ(trace.size(), 2110U);
   for (int i = 0; i < 2110; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    const TraceInstant expected = i < 1800 ? before[at] : Instant(i - 1800);
-    ASSERT_EQ(trace[at].received.sample.stamp_ns,
-              expected.received.sample.stamp_ns);
-    ASSERT_EQ(trace[at].received.sample.values,
-              expected.received.sample.values);
+    const TracePoint expected = i < 1800 ? before[at] : Instant(i - 1800);
+    ASSERT_EQ(trace[at].sample.stamp_ns, expected.sample.stamp_ns);
+    ASSERT_EQ(trace[at].sample.values, expected.sample.values);
     ASSERT_EQ(trace[at].residuals, expected.residuals);
-    ASSERT_EQ(trace[at].fault_factors, expected.fault_factors);
+    ASSERT_EQ(trace[at].factors, expected.factors);
     ASSERT_EQ(trace[at].normal_factor, expected.normal_factor);
     ASSERT_EQ(trace[at].state, expected.state);
   }
@@ -45,9 +43,9 @@ TEST_F(HistoryTraceTest, TraceReadsBackBitForBitAcrossChunks) {
 
 TEST_F(HistoryTraceTest, TraceOfAnotherModelSetIsNotTaken) {
   HistoryWriter writer(path_);
-  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
-  TraceInstant other = Instant(0);
-  other.fault_factors.push_back(0.5);
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
+  TracePoint other = Instant(0);
+  other.factors.push_back(0.5);
 
   EXPECT_FALSE(writer.AppendTrace(Id(), std::vector{other}));
   EXPECT_THROW(writer.AppendTrace(7, {}), NotFoundError);
@@ -55,13 +53,13 @@ TEST_F(HistoryTraceTest, TraceOfAnotherModelSetIsNotTaken) {
 
 TEST_F(HistoryTraceTest, PeakFactorIsTheLargestOfTheIsolatedSetInTheTrace) {
   HistoryWriter writer(path_);
-  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
-  writer.Record(Event(Kind::kIsolated, 20, 0b010, 0.8));
-  TraceInstant high = Instant(30);
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
+  writer.Record(Event(Kind::kIsolated, 20, 0b010, 0.8), kDetected);
+  TracePoint high = Instant(30);
   high.isolated = 0b010;
-  high.fault_factors = {0.99, 0.93, 0.1};  // f1 is higher, but not isolated.
-  TraceInstant early = Instant(10);  // Before isolation: another question.
-  early.fault_factors = {0.0, 0.97, 0.0};
+  high.factors = {0.99, 0.93, 0.1};  // f1 is higher, but not isolated.
+  TracePoint early = Instant(10);    // Before isolation: another question.
+  early.factors = {0.0, 0.97, 0.0};
 
   writer.AppendTrace(Id(), std::vector{early, high});
   writer.Commit(kDetected);
@@ -72,7 +70,7 @@ TEST_F(HistoryTraceTest, PeakFactorIsTheLargestOfTheIsolatedSetInTheTrace) {
 TEST_F(HistoryTraceTest, DamagedTraceIsRefusedByName) {
   {
     HistoryWriter writer(path_);
-    writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+    writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
     writer.AppendTrace(Id(), Instants(10, 0));
     writer.Commit(kDetected);
   }

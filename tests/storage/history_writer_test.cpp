@@ -1,4 +1,4 @@
-#include "storage/history_writer.h"
+#include "storage/history/history_writer.h"
 
 #include <gmock/gmock.h>
 
@@ -49,11 +49,12 @@ TEST_F(HistoryWriterTest, ViewHasTheColumnsOfTheContractInOrder) {
 
 TEST_F(HistoryWriterTest, FaultIsNullUntilIsolatedAndUnknownIfItNeverWas) {
   HistoryWriter writer(path_);
-  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
   EXPECT_EQ(Sql("SELECT fault FROM fault_history"), "NULL");
   EXPECT_EQ(Sql("SELECT isolated_utc FROM fault_history"), "NULL");
 
-  writer.Record(Event(Kind::kClosed, 50, 0, 0.3, EndReason::kStreamEnded));
+  writer.Record(Event(Kind::kClosed, 50, 0, 0.3, EndReason::kStreamEnded),
+                kDetected);
 
   EXPECT_EQ(Sql("SELECT fault FROM fault_history"), "unknown");
   EXPECT_EQ(Sql("SELECT end_reason FROM fault_history"), "stream_ended");
@@ -62,9 +63,9 @@ TEST_F(HistoryWriterTest, FaultIsNullUntilIsolatedAndUnknownIfItNeverWas) {
 
 TEST_F(HistoryWriterTest, ReisolationReplacesTheAnswerAndKeepsTheFirstTime) {
   HistoryWriter writer(path_);
-  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
-  writer.Record(Event(Kind::kIsolated, 20, 0b001, 0.9));
-  writer.Record(Event(Kind::kReisolated, 60, 0b110, 0.75));
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
+  writer.Record(Event(Kind::kIsolated, 20, 0b001, 0.9), kDetected);
+  writer.Record(Event(Kind::kReisolated, 60, 0b110, 0.75), kDetected);
 
   EXPECT_EQ(Sql("SELECT fault FROM fault_history"), "f7|f19");
   EXPECT_EQ(Sql("SELECT isolated_utc FROM fault_history"),
@@ -78,9 +79,9 @@ TEST_F(HistoryWriterTest, RecordingTwiceIsANoOp) {
   RecordEpisode(writer, 0b010);
   const std::string before = Sql(kView);
 
-  EXPECT_EQ(writer.Record(Event(Kind::kDetected, 0, 0, 0.9)), std::nullopt);
-  EXPECT_EQ(writer.Record(Event(Kind::kIsolated, 20, 0b100, 0.9)),
-            std::nullopt);
+  EXPECT_FALSE(writer.Record(Event(Kind::kDetected, 0, 0, 0.9), kDetected));
+  EXPECT_FALSE(
+      writer.Record(Event(Kind::kIsolated, 20, 0b100, 0.9), kDetected));
   RecordEpisode(writer, 0b100);
 
   EXPECT_EQ(Sql(kView), before);
@@ -108,9 +109,9 @@ TEST_F(HistoryWriterTest, TransitionIsOnTheDiskWhenTheWriterDies) {
   {
     HistoryWriter writer(path_);
     writer.BeginSession(kDetected, "0.1.0+abc", "domain = 0");
-    writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+    writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
     writer.AppendTrace(Id(), Instants(1800, -1800));
-    writer.Record(Event(Kind::kIsolated, 20, 0b010, 0.8));
+    writer.Record(Event(Kind::kIsolated, 20, 0b010, 0.8), kDetected);
     writer.AppendTrace(Id(), Instants(5, 0));  // Never committed.
   }
   HistoryWriter writer(path_);
@@ -118,10 +119,14 @@ TEST_F(HistoryWriterTest, TransitionIsOnTheDiskWhenTheWriterDies) {
   EXPECT_TRUE(writer.database().Check().empty());
   const auto open = writer.OpenEpisodes();
   ASSERT_EQ(open.size(), 1U);
-  EXPECT_EQ(open[0].id, Id());
-  EXPECT_EQ(open[0].fault, "f7");
-  EXPECT_EQ(open[0].detected_ns, kDetected);
-  EXPECT_EQ(open[0].trace_end_ns, kDetected - kSecond);
+  EXPECT_EQ(open[0].episode_id, Id());
+  ASSERT_EQ(open[0].candidates.size(), 1U);
+  EXPECT_EQ(open[0].candidates[0].fault, 7);
+  EXPECT_EQ(open[0].detection_stamp_ns, kDetected);
+  // Its isolation is later than what there is of its trace.
+  EXPECT_EQ(open[0].last_stamp_ns, kDetected + 20 * kSecond);
+  EXPECT_EQ(HistoryReader(path_).Show("last").trace_end_ns,
+            kDetected - kSecond);
 }
 
 TEST_F(HistoryWriterTest, SessionThatDidNotEndIsFoundAtItsLastSignOfLife) {
@@ -143,32 +148,28 @@ TEST_F(HistoryWriterTest, SessionThatDidNotEndIsFoundAtItsLastSignOfLife) {
 }
 
 TEST_F(HistoryWriterTest, EpisodeOfADeadMonitorCanBeClosedOnce) {
-  { HistoryWriter(path_).Record(Event(Kind::kDetected, 0, 0, 0.3)); }
+  { HistoryWriter(path_).Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected); }
   HistoryWriter writer(path_);
 
-  const auto event = writer.Close(Id(), kDetected + 60 * kSecond,
-                                  EndReason::kUnknown, kDetected);
-  const auto again = writer.Close(Id(), kDetected + 61 * kSecond,
-                                  EndReason::kUnknown, kDetected);
+  EXPECT_TRUE(writer.Record(End(Id(), kDetected + 60 * kSecond), kDetected));
+  EXPECT_FALSE(writer.Record(End(Id(), kDetected + 61 * kSecond), kDetected));
 
-  EXPECT_TRUE(event.has_value());
-  EXPECT_EQ(again, std::nullopt);
   EXPECT_EQ(Sql("SELECT fault || end_reason FROM fault_history"),
             "unknownunknown");
   EXPECT_TRUE(writer.OpenEpisodes().empty());
-  EXPECT_THROW(writer.Close(42, 0, EndReason::kUnknown, 0), NotFoundError);
+  EXPECT_THROW(writer.Record(End(42, 0), kDetected), NotFoundError);
 }
 
 TEST_F(HistoryWriterTest, ResumedEpisodeGoesOnUnderItsOldId) {
-  { HistoryWriter(path_).Record(Event(Kind::kDetected, 0, 0, 0.3)); }
+  { HistoryWriter(path_).Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected); }
   HistoryWriter writer(path_);
   writer.Resume(Id(), kDetected + 60 * kSecond, kDetected);
-  NewEvent isolated = Event(Kind::kIsolated, 80, 0b100, 0.9);
+  FaultEvent isolated = Event(Kind::kIsolated, 80, 0b100, 0.9);
   isolated.source_id = 99;  // The publisher was restarted too.
   isolated.transition.detection_stamp_ns = kDetected + 60 * kSecond;
-  isolated.resumed_episode = Id();
+  isolated.episode_id = Id();
 
-  EXPECT_TRUE(writer.Record(isolated).has_value());
+  EXPECT_TRUE(writer.Record(isolated, kDetected));
 
   EXPECT_EQ(Sql("SELECT count(*) FROM episode"), "1");
   EXPECT_EQ(Sql("SELECT fault FROM fault_history"), "f19");
@@ -181,10 +182,10 @@ TEST_F(HistoryWriterTest, ResumedEpisodeGoesOnUnderItsOldId) {
 TEST_F(HistoryWriterTest, EventsNotMarkedAsSentAreFoundAtTheNextStart) {
   {
     HistoryWriter writer(path_);
-    const auto detected = writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
-    writer.Record(Event(Kind::kIsolated, 20, 0b101, 0.8));
-    ASSERT_TRUE(detected.has_value());
-    writer.MarkSent(*detected);
+    const FaultEvent detected = Event(Kind::kDetected, 0, 0, 0.3);
+    writer.Record(detected, kDetected);
+    writer.Record(Event(Kind::kIsolated, 20, 0b101, 0.8), kDetected);
+    writer.MarkSent(detected);
     writer.Commit(kDetected);
   }
   HistoryWriter writer(path_);
@@ -201,15 +202,21 @@ TEST_F(HistoryWriterTest, EventsNotMarkedAsSentAreFoundAtTheNextStart) {
   EXPECT_EQ(unsent[0].transition.faults, 0b101U);
   EXPECT_EQ(unsent[0].transition.factor, 0.8);
   EXPECT_EQ(unsent[0].transition.reason, EndReason::kNone);
-  EXPECT_THAT(unsent[0].faults, ElementsAre(1, 19));
-  EXPECT_EQ(unsent[0].model_set, "demo@3");
+  ASSERT_EQ(unsent[0].candidates.size(), 2U);
+  EXPECT_EQ(unsent[0].candidates[0].fault, 1);
+  EXPECT_EQ(unsent[0].candidates[1].fault, 19);
+  EXPECT_EQ(unsent[0].candidates[1].factor, 0.8);
+  EXPECT_TRUE(unsent[0].candidates[1].isolated);
+  EXPECT_EQ(unsent[0].model_set, "demo");
+  EXPECT_EQ(unsent[0].model_version, 3);
+  EXPECT_TRUE(unsent[0].persisted);
   EXPECT_EQ(unsent[0].model_hash, models_.content_hash);
 }
 
 TEST_F(HistoryWriterTest, IsolationWithoutItsDetectionStillMakesTheEpisode) {
   HistoryWriter writer(path_);
 
-  EXPECT_TRUE(writer.Record(Event(Kind::kIsolated, 20, 0b010, 0.8)));
+  EXPECT_TRUE(writer.Record(Event(Kind::kIsolated, 20, 0b010, 0.8), kDetected));
 
   EXPECT_EQ(Sql("SELECT detected_utc || ' ' || fault FROM fault_history"),
             "2026-11-20T14:56:11.000Z f7");
@@ -219,19 +226,20 @@ TEST_F(HistoryWriterTest, WhatIsRecordedTogetherIsThereAsAWholeOrNotAtAll) {
   HistoryWriter writer(path_);
   writer.BeginSession(kDetected, "test", "");
   const auto record_both = [&] {
-    writer.Record(Event(TransitionKind::kDetected, 0));
+    writer.Record(Event(TransitionKind::kDetected, 0), kDetected);
     writer.Record(
-        Event(TransitionKind::kDetected, 0, 0, 0.0, EndReason::kNone, "LV-2"));
+        Event(TransitionKind::kDetected, 0, 0, 0.0, EndReason::kNone, "LV-2"),
+        kDetected);
   };
 
-  EXPECT_THROW(writer.Together([&] {
+  EXPECT_THROW(writer.CommitBatch([&] {
     record_both();
     throw std::runtime_error("the disk");
   }),
                std::runtime_error);
   EXPECT_EQ(Sql("SELECT count(*) FROM episode"), "0");
-  writer.Together(record_both);
-  writer.Together(record_both);
+  writer.CommitBatch(record_both);
+  writer.CommitBatch(record_both);
 
   EXPECT_EQ(Sql("SELECT count(*) FROM episode"), "2");
   EXPECT_EQ(Sql("SELECT count(*) FROM episode_event"), "2");
@@ -240,11 +248,10 @@ TEST_F(HistoryWriterTest, WhatIsRecordedTogetherIsThereAsAWholeOrNotAtAll) {
 
 TEST_F(HistoryWriterTest, AnEpisodeThatIsNotThereSpoilsNothingBesideIt) {
   HistoryWriter writer(path_);
-  writer.Together([&] {
-    writer.Record(Event(TransitionKind::kDetected, 0));
+  writer.CommitBatch([&] {
+    writer.Record(Event(TransitionKind::kDetected, 0), kDetected);
     EXPECT_THROW(writer.Resume(1, kDetected, kDetected), NotFoundError);
-    EXPECT_THROW(writer.Close(1, kDetected, EndReason::kUnknown, kDetected),
-                 NotFoundError);
+    EXPECT_THROW(writer.Record(End(1, kDetected), kDetected), NotFoundError);
   });
 
   EXPECT_EQ(Sql("SELECT count(*) FROM episode"), "1");
@@ -268,7 +275,7 @@ TEST_F(HistoryWriterTest, SameGapTwiceIsOneGap) {
 
 TEST_F(HistoryWriterTest, FailedCommitKeepsWhatIsPending) {
   HistoryWriter writer(path_);
-  writer.Record(Event(Kind::kDetected, 0, 0, 0.3));
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
   writer.AppendTrace(Id(), Instants(700, 0));
   // 700 instants need three chunks; a full disk is a limit on pages.
   const auto pages =
@@ -286,13 +293,16 @@ TEST_F(HistoryWriterTest, FailedCommitKeepsWhatIsPending) {
 
 TEST_F(HistoryWriterTest, TimeAddsUpByDayAndQuality) {
   HistoryWriter writer(path_);
-  CoverageCount day{"LV-1", 20'000, 2.0, {}};
+  CoverageDay day{"LV-1", 20'000, 2.0, {}};
   day.samples.Add(Quality::kLive, 1800);
   day.samples.Add(Quality::kUncovered, 900);
-  CoverageCount next = day;
+  CoverageDay next = day;
   next.day = 20'001;
-  writer.Keep(std::vector{day, next}, {});
-  writer.Keep(std::vector{day}, {});
+  Checkpoint checkpoint;
+  checkpoint.coverage = {day, next};
+  writer.CommitCheckpoint(checkpoint);
+  checkpoint.coverage = {day};
+  writer.CommitCheckpoint(checkpoint);
 
   HistoryReader reader(path_);
   auto times = reader.Coverage();
@@ -313,10 +323,12 @@ TEST_F(HistoryWriterTest, TimeAddsUpByDayAndQuality) {
 TEST_F(HistoryWriterTest, TheNewestAccumulatorOfAValveIsKept) {
   HistoryWriter writer(path_);
   const std::vector<std::byte> bytes{std::byte{1}, std::byte{0}};
-  writer.Keep({}, std::vector{StoredAccumulator{"A", 1, 2, 3, {}},
-                              StoredAccumulator{"B", 4, 5, 6, bytes}});
+  Checkpoint checkpoint;
+  checkpoint.accumulators = {{"A", 1, 2, 3, {}}, {"B", 4, 5, 6, bytes}};
+  writer.CommitCheckpoint(checkpoint);
   const std::uint64_t large = 0xFFFF'FFFF'FFFF'FFFFULL;
-  writer.Keep({}, std::vector{StoredAccumulator{"A", large, 7, 8, bytes}});
+  checkpoint.accumulators = {{"A", large, 7, 8, bytes}};
+  writer.CommitCheckpoint(checkpoint);
   const auto kept = HistoryWriter(path_).Accumulators();
   ASSERT_EQ(kept.size(), 2U);
   EXPECT_EQ(kept[0].source_id, large);
@@ -328,16 +340,66 @@ TEST_F(HistoryWriterTest, TheNewestAccumulatorOfAValveIsKept) {
 TEST_F(HistoryWriterTest, UnknownSaysWhyUntilAFaultIsIsolated) {
   HistoryWriter writer(path_);
   HistoryReader reader(path_);
-  NewEvent detected = Event(Kind::kDetected, 0);
+  FaultEvent detected = Event(Kind::kDetected, 0);
   detected.transition.unknown = Unknown::kTooEarly;
-  writer.Record(detected);
+  writer.Record(detected, kDetected);
   EXPECT_EQ(reader.Show("last").unknown_kind, "too_early");
-  NewEvent cleared = Event(Kind::kCleared, 50);
+  FaultEvent cleared = Event(Kind::kCleared, 50);
   cleared.transition.unknown = Unknown::kOutsideKnown;
-  writer.Record(cleared);
+  writer.Record(cleared, kDetected);
   EXPECT_EQ(reader.Show("last").unknown_kind, "outside_known");
-  writer.Record(Event(Kind::kIsolated, 60, 1, 0.9));
+  writer.Record(Event(Kind::kIsolated, 60, 1, 0.9), kDetected);
   EXPECT_EQ(reader.Show("last").unknown_kind, std::nullopt);
+}
+
+// Written behind the back of SQLite's keys, as a disk or a person would.
+class DamagedIdTest : public HistoryFixture {
+ protected:
+  DamagedIdTest() {
+    {
+      HistoryWriter writer(path_);
+      writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
+      writer.Record(Event(Kind::kDetected, 0, 0, 0.3, EndReason::kNone, "LV-2"),
+                    kDetected);
+    }
+    Database database(path_, HistorySchema(), Access::kOccasionalWriter);
+    Transaction transaction(database);
+    database.Run("DROP TRIGGER episode_event_keeps");
+    database.QueryInt64("PRAGMA defer_foreign_keys = ON");
+    for (const char* table : {"episode", "episode_event"}) {
+      database.Run(std::string("UPDATE ") + table +
+                       " SET episode_id = 'zz not hex digit' "
+                       "WHERE episode_id = ?",
+                   EpisodeIdText(Id()));
+    }
+    transaction.Commit();
+  }
+};
+
+TEST_F(DamagedIdTest, TheOthersAreReadAndTheRowIsNamed) {
+  HistoryWriter writer(path_);
+  std::vector<std::string> damaged;
+
+  const auto unsent = writer.UnsentEvents(&damaged);
+
+  ASSERT_EQ(unsent.size(), 1U);
+  EXPECT_EQ(unsent[0].valve_id, "LV-2");
+  EXPECT_THAT(damaged, ElementsAre("event_outbox, event 1: episode id 'zz not "
+                                   "hex digit' is damaged: it is not 16 hex "
+                                   "digits"));
+  EXPECT_EQ(writer.OpenEpisodes(&damaged).size(), 1U);
+  EXPECT_EQ(damaged.size(), 2U);
+  EXPECT_THROW(writer.UnsentEvents(), DataError);
+}
+
+TEST_F(DamagedIdTest, TheCheckOfTheFileFindsIt) {
+  HistoryReader reader(path_);
+
+  EXPECT_THAT(
+      reader.database().Check(),
+      ElementsAre("episode 'zz not hex digit': its id is not 16 hex digits",
+                  "episode_event 1: its episode id 'zz not hex digit' is not "
+                  "16 hex digits (in event_outbox, not sent)"));
 }
 
 }  // namespace

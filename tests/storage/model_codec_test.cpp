@@ -1,4 +1,4 @@
-#include "storage/model_codec.h"
+#include "storage/models/model_codec.h"
 
 #include <bit>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "storage/models.h"
+#include "storage/models/models.h"
 
 #include <cmath>
 #include <fstream>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/error.h"
-#include "storage/model_codec.h"
+#include "storage/models/model_codec.h"
 #include "tests/storage/message_of.h"
 #include "tests/storage/model_set_fixture.h"
 #include "tests/storage/temporary_directory.h"

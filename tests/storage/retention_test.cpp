@@ -1,10 +1,11 @@
-#include "storage/retention.h"
+#include "storage/history/retention.h"
 
 #include <thread>
 
 #include <gmock/gmock.h>
 
-#include "storage/runs.h"
+#include "storage/runs/run_recorder.h"
+#include "storage/runs/runs.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {
@@ -19,7 +20,8 @@ class HistoryRetentionTest : public HistoryFixture {
       RecordEpisode(writer_, 0b010, valve);
     }
     writer_.Record(
-        Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "open"));
+        Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "open"),
+        kDetected);
     MarkAllSent();
     HistoryEditor editor(path_);
     for (const char* valve : {"acked", "labelled", "late", "open"}) {
@@ -29,8 +31,8 @@ class HistoryRetentionTest : public HistoryFixture {
   }
 
   void MarkAllSent() {
-    for (const UnsentEvent& event : writer_.UnsentEvents()) {
-      writer_.MarkSent(event.event_id);
+    for (const FaultEvent& event : writer_.UnsentEvents()) {
+      writer_.MarkSent(event);
     }
     writer_.Commit(kDetected);
   }
@@ -147,12 +149,12 @@ TEST_F(RunRetentionTest, TheOldestRecordedRunsGoUntilTheSizeFits) {
       recorder.End(keys.back());
     }
   }
+  const std::string first = recorder.Id(keys[0]);
   const auto simulated = recorder.Begin(RunOn(5, RunOrigin::kSimulated));
   Append(recorder, simulated, 5);
   recorder.End(simulated);
   recorder.Commit();
-  RunStore(file_, Access::kOccasionalWriter)
-      .Label(recorder.Id(keys[0]), 7, 0.5);
+  RunStore(file_, Access::kOccasionalWriter).Label(first, 7, 0.5);
 
   const auto pages = recorder.database().QueryInt64("PRAGMA page_count");
   RetentionLimits limits;

@@ -1,3 +1,5 @@
+#include "storage/runs/run_recorder.h"
+
 #include <gmock/gmock.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -18,15 +20,16 @@ TEST_F(RunRecorderTest, RecordedSamplesReadBackInOrderThroughTailAndChunks) {
   constexpr int kSamples = 137;
   RunRecorder recorder(file_, {50});
   const auto a = recorder.Begin(RunOf("V1"));
+  const std::string id_a = recorder.Id(a);
   const auto b = recorder.Begin(RunOf("V2"));
+  const std::string id_b = recorder.Id(b);
   for (int k = 0; k < kSamples; ++k) {
     recorder.Append(a, SampleAt(k));
     recorder.Append(b, SampleAt(k, 1));
     recorder.Commit();
 
     // At every moment all that was committed is there, chunk or tail.
-    ASSERT_EQ(Positions(recorder.Id(a)).size(),
-              static_cast<std::size_t>(k + 1));
+    ASSERT_EQ(Positions(id_a).size(), static_cast<std::size_t>(k + 1));
   }
   EXPECT_GT(Query("SELECT count(*) FROM tail"), 0);
   recorder.Close();
@@ -35,7 +38,7 @@ TEST_F(RunRecorderTest, RecordedSamplesReadBackInOrderThroughTailAndChunks) {
   EXPECT_EQ(Query("SELECT max(count) FROM chunk"), 50);
   EXPECT_EQ(Query("SELECT sum(count) FROM chunk"), 2 * kSamples);
   RunStore store(file_);
-  const StoredRun run = store.Load(recorder.Id(b));
+  const StoredRun run = store.Load(id_b);
   ASSERT_THAT(run.samples, SizeIs(kSamples));
   for (int k = 0; k < kSamples; ++k) {
     const Sample& s = run.samples[static_cast<std::size_t>(k)].sample;
@@ -49,6 +52,7 @@ TEST_F(RunRecorderTest, RecordedSamplesReadBackInOrderThroughTailAndChunks) {
 TEST_F(RunRecorderTest, CountersTellWhatBecameOfTheSamples) {
   RunRecorder recorder(file_);
   const auto key = recorder.Begin(RunOf("V1"));
+  const std::string id = recorder.Id(key);
   for (int i = 0; i < kIntakeCount; ++i) {
     for (int n = 0; n <= i; ++n) {
       StoredSample sample = SampleAt(10 * i + n);
@@ -60,7 +64,7 @@ TEST_F(RunRecorderTest, CountersTellWhatBecameOfTheSamples) {
   recorder.Close();
 
   RunStore store(file_);
-  const RunInfo info = store.Info(recorder.Id(key));
+  const RunInfo info = store.Info(id);
   for (int i = 0; i < kIntakeCount; ++i) {
     EXPECT_EQ(info.intake[static_cast<std::size_t>(i)], i + 1);
   }
@@ -131,22 +135,24 @@ TEST_F(RunRecorderTest, KillingTheRecorderLosesNothingCommitted) {
 TEST_F(RunRecorderTest, ALivingRecorderIsLeftAloneByTheNext) {
   RunRecorder first(file_);
   const auto key = first.Begin(RunOf("V1"));
+  const std::string id = first.Id(key);
   first.Append(key, SampleAt(0));
   first.Commit();
   RunRecorder second(file_);
 
-  EXPECT_EQ(RunStore(file_).Info(first.Id(key)).state, RunState::kRecording);
+  EXPECT_EQ(RunStore(file_).Info(id).state, RunState::kRecording);
   RunStore store(file_, Access::kOccasionalWriter);
-  EXPECT_THAT(MessageOf<DataError>([&] { store.Delete(first.Id(key)); }),
+  EXPECT_THAT(MessageOf<DataError>([&] { store.Delete(id); }),
               HasSubstr("is being recorded"));
   first.Append(key, SampleAt(1));
   first.Close();
-  EXPECT_THAT(Positions(first.Id(key)), ElementsAre(0, 1));
+  EXPECT_THAT(Positions(id), ElementsAre(0, 1));
 }
 
 TEST_F(RunRecorderTest, PendingSamplesSurviveACommitThatFails) {
   RunRecorder recorder(file_);
   const auto key = recorder.Begin(RunOf("V1"));
+  const std::string id = recorder.Id(key);
   recorder.Append(key, SampleAt(0));
   recorder.database().Prepare("PRAGMA query_only = ON").Step();
   EXPECT_THROW(recorder.Commit(), SqliteError);
@@ -156,7 +162,23 @@ TEST_F(RunRecorderTest, PendingSamplesSurviveACommitThatFails) {
   recorder.Append(key, SampleAt(1));
   recorder.Close();
   EXPECT_EQ(recorder.recorded(), 2);
-  EXPECT_THAT(Positions(recorder.Id(key)), ElementsAre(0, 1));
+  EXPECT_THAT(Positions(id), ElementsAre(0, 1));
+}
+
+TEST_F(RunRecorderTest, NothingIsHeldOfARunWhoseEndIsCommitted) {
+  RunRecorder recorder(file_);
+  for (int day = 0; day < 3; ++day) {
+    const auto key = recorder.Begin(RunOf("V1"));
+    recorder.Append(key, SampleAt(day));
+    recorder.End(key);
+    EXPECT_EQ(recorder.active_runs(), 1U);
+    recorder.Commit();
+
+    EXPECT_EQ(recorder.active_runs(), 0U);
+    EXPECT_THROW(recorder.Id(key), std::invalid_argument);
+    EXPECT_NO_THROW(recorder.End(key));  // Again: a no-op.
+  }
+  EXPECT_EQ(recorder.recorded(), 3);
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "storage/runs.h"
+#include "storage/runs/runs.h"
 #include "tests/storage/message_of.h"
 #include "tests/storage/temporary_directory.h"
 

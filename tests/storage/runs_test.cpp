@@ -5,7 +5,9 @@
 
 #include <gmock/gmock.h>
 
+#include "cli/csv.h"
 #include "diagnosis/error.h"
+#include "storage/runs/run_recorder.h"
 #include "tests/storage/runs_fixture.h"
 
 namespace fdi::storage {
@@ -19,23 +21,24 @@ using ::testing::SizeIs;
 
 using RunsTest = RunsFixture;
 
-CsvTable TableOf(const std::string& text, bool split_gaps = false) {
-  CsvOptions options;
+std::vector<SampleSeries> TableOf(const std::string& text,
+                                  bool split_gaps = false) {
+  cli::CsvOptions options;
   options.required = 0;
   options.start_ns = kStart;
   options.split_gaps = split_gaps;
   std::istringstream input(text);
-  return ReadCsv(input, options);
+  return cli::ReadCsv(input, options).runs;
 }
 
 TEST_F(RunsTest, AStretchIsHalfOpenAndInSecondsFromTheStart) {
   RunRecorder recorder(file_, {4});
   const auto key = recorder.Begin(RunOf("V1"));
+  const std::string id = recorder.Id(key);
   for (int k = 0; k < 10; ++k) {
     recorder.Append(key, SampleAt(k));
   }
   recorder.Close();
-  const std::string id = recorder.Id(key);
 
   EXPECT_THAT(Positions(id + "@2:5"), ElementsAre(2, 3, 4));
   EXPECT_THAT(Positions(id + "@7.5:"), ElementsAre(8, 9));
@@ -57,7 +60,7 @@ TEST_F(RunsTest, SelectorsThatSayNothingAreUsageErrors) {
 
 TEST_F(RunsTest, AUniqueBeginningOfAnIdSelectsTheRun) {
   RunStore store(file_, Access::kOccasionalWriter);
-  const CsvTable table = TableOf("t_s,CV_pct,X_pct\n0,1,2\n1,1,2\n");
+  const auto table = TableOf("t_s,CV_pct,X_pct\n0,1,2\n1,1,2\n");
   // 17 runs: two at least begin alike.
   std::vector<std::string> ids;
   for (int i = 0; i < 17; ++i) {
@@ -99,8 +102,8 @@ TEST_F(RunsTest, ImportKeepsTruthAndSplitTablesBecomeRunsOfTheirOwn) {
 
 TEST_F(RunsTest, AnImportThatFailsStoresNothing) {
   RunStore store(file_, Access::kOccasionalWriter);
-  CsvTable table = TableOf("t_s,CV_pct,X_pct\n0,1,2\n1,1,2\n5,1,2\n", true);
-  table.runs[1].period_s = -1.0;  // refused by the schema, after run 1
+  auto table = TableOf("t_s,CV_pct,X_pct\n0,1,2\n1,1,2\n5,1,2\n", true);
+  table[1].period_s = -1.0;  // refused by the schema, after run 1
 
   EXPECT_THROW(store.Import(table, RunOf("V")), SqliteError);
   EXPECT_THAT(store.List(), IsEmpty());
@@ -228,9 +231,9 @@ TEST_F(RunsTest, PlantRecordImportsWellWithinASecondAndReadsBackExactly) {
   const auto csv = std::filesystem::path(reference) / "plant" /
                    "lublin_actuator3_2001-10-11_first40min.csv";
   const auto before = std::chrono::steady_clock::now();
-  const CsvTable table = ReadCsvFile(csv);
+  const auto table = cli::ReadCsvFile(csv);
   RunStore store(file_, Access::kOccasionalWriter);
-  const std::string id = store.Import(table, RunOf("V"))[0];
+  const std::string id = store.Import(table.runs, RunOf("V"))[0];
   const std::chrono::duration<double> taken =
       std::chrono::steady_clock::now() - before;
 

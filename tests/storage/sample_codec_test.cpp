@@ -1,4 +1,4 @@
-#include "storage/sample_codec.h"
+#include "storage/runs/sample_codec.h"
 
 #include <bit>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/error.h"
-#include "storage/bytes.h"
-#include "storage/column_codec.h"
+#include "storage/database/bytes.h"
+#include "storage/runs/column_codec.h"
 
 namespace fdi::storage {
 namespace {

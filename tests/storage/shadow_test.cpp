@@ -1,9 +1,10 @@
-#include "storage/shadow.h"
+#include "storage/history/shadow.h"
 
 #include <gmock/gmock.h>
 
-#include "storage/history.h"
-#include "storage/shadow_retention.h"
+#include "storage/history/history_database.h"
+#include "storage/history/history_writer.h"
+#include "storage/history/retention.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {
@@ -26,15 +27,17 @@ class ShadowTest : public HistoryFixture {
     d.samples = samples;
     d.active_set = "demo@3";
     d.active_hash = 0xFEDC'BA98'7654'3210ULL;
-    d.active_state = "ISOLATED";
-    d.active_fault = "f1|f7";
+    d.active.state = State::kIsolated;
+    d.active.fault = "f1|f7";
     d.candidate_set = "demo@4";
     d.candidate_hash = 4;
-    d.candidate_state = "DETECTED";
+    d.candidate.state = State::kDetected;
     return d;
   }
   void Keep(const std::vector<ShadowDifference>& stretches) {
-    KeepShadow(database_, stretches, {});
+    Transaction transaction(database_);
+    StoreShadow(database_, stretches);
+    transaction.Commit();
   }
 
   Database database_{path_, HistorySchema(), Access::kOccasionalWriter};
@@ -50,9 +53,9 @@ TEST_F(ShadowTest, StretchReadsBackWhole) {
   EXPECT_EQ(read[0].source_id, d.source_id);
   EXPECT_EQ(read[0].to_ns, d.to_ns);
   EXPECT_EQ(read[0].active_hash, d.active_hash);
-  EXPECT_EQ(read[0].active_fault, "f1|f7");
-  EXPECT_EQ(read[0].candidate_state, "DETECTED");
-  EXPECT_EQ(read[0].candidate_fault, "");
+  EXPECT_EQ(read[0].active.fault, "f1|f7");
+  EXPECT_EQ(read[0].candidate.state, State::kDetected);
+  EXPECT_EQ(read[0].candidate.fault, "");
 }
 
 TEST_F(ShadowTest, StretchGrowsAndNeverShrinks) {
@@ -104,13 +107,15 @@ TEST_F(ShadowTest, OldStretchesArePruned) {
 TEST_F(ShadowTest, AccumulatorsAreThoseKeptLast) {
   const std::vector<std::byte> old(3, std::byte{1});
   const std::vector<std::byte> fresh(5, std::byte{2});
-  KeepShadow(database_, {},
-             std::vector<StoredAccumulator>{{"LV-1", 1, 0x9999, 10, old}});
-  KeepShadow(database_, {},
-             std::vector<StoredAccumulator>{
-                 {"LV-1", 2, 0xFFFF'0000'0000'0000ULL, 20, fresh}});
+  HistoryWriter writer(path_);
+  Checkpoint checkpoint;
+  checkpoint.shadow_accumulators = {{"LV-1", 1, 0x9999, 10, old}};
+  writer.CommitCheckpoint(checkpoint);
+  checkpoint.shadow_accumulators = {
+      {"LV-1", 2, 0xFFFF'0000'0000'0000ULL, 20, fresh}};
+  writer.CommitCheckpoint(checkpoint);
 
-  const auto read = ShadowAccumulators(database_);
+  const auto read = writer.ShadowAccumulators();
 
   ASSERT_THAT(read, SizeIs(1));
   EXPECT_EQ(read[0].model_hash, 0xFFFF'0000'0000'0000ULL);

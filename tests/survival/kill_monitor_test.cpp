@@ -13,9 +13,10 @@
 #include <unistd.h>
 
 #include "idl/endpoint.h"
-#include "storage/history.h"
-#include "storage/models.h"
-#include "storage/runs.h"
+#include "storage/history/history_database.h"
+#include "storage/history/history_reader.h"
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/temporary_directory.h"
 #include "tests/survival/faulty_plant.h"
@@ -73,15 +74,15 @@ class KilledMonitor : public testing::Test {
          },
          {}},
         milliseconds(5));
-    events_->Take(
-        {[this](const idl::FaultEventMessage& m, const idl::Reception&) {
-           (m.persisted ? persisted_ : unpersisted_)
-               .emplace(m.episode_id,
-                        std::string(TransitionName(m.transition.kind)),
-                        m.transition.stamp_ns);
-         },
-         {}},
-        milliseconds(0));
+    events_->Take({[this](const FaultEvent& m, const idl::Reception&) {
+                     (m.persisted ? persisted_ : unpersisted_)
+                         .emplace(
+                             m.episode_id,
+                             std::string(TransitionName(m.transition.kind)),
+                             m.transition.stamp_ns);
+                   },
+                   {}},
+                  milliseconds(0));
   }
   void TakeFor(milliseconds time) {
     for (const auto end = Clock::now() + time; Clock::now() < end;) {
@@ -111,7 +112,7 @@ class KilledMonitor : public testing::Test {
   storage::TemporaryDirectory directory_;
   std::optional<idl::Participant> participant_;
   std::optional<idl::Subscriber<idl::DecisionMessage>> decisions_;
-  std::optional<idl::Subscriber<idl::FaultEventMessage>> events_;
+  std::optional<idl::Subscriber<FaultEvent>> events_;
   std::optional<FaultyPlant> plant_;
   std::int64_t started_ns_{0};
   // Since the monitor was started: which sample it had answered when.
@@ -132,7 +133,7 @@ void KilledMonitor::ExpectPersistedOnce() const {
   storage::HistoryReader history(directory_.path() / "history.db");
   std::map<Step, int> stored;
   for (const storage::Episode& episode : history.List()) {
-    for (const storage::EpisodeEvent& event : history.Events(episode.id)) {
+    for (const storage::HistoryEntry& event : history.Events(episode.id)) {
       ++stored[{episode.id, event.kind, event.stamp_ns}];
     }
   }
@@ -218,10 +219,10 @@ void KilledMonitor::ExpectEpisodesInOrder() const {
 // before anything else happens to it, or closed for a reason.
 void KilledMonitor::ExpectOutagesNoted(std::size_t outages) const {
   storage::HistoryReader history(directory_.path() / "history.db");
-  const std::vector<storage::DataGap> gaps = history.Gaps();
+  const std::vector<DataGap> gaps = history.Gaps();
   for (const std::int64_t killed_ns : killed_ns_) {
-    EXPECT_TRUE(std::any_of(
-        gaps.begin(), gaps.end(), [killed_ns](const storage::DataGap& gap) {
+    EXPECT_TRUE(
+        std::any_of(gaps.begin(), gaps.end(), [killed_ns](const DataGap& gap) {
           return gap.valve_id.empty() && gap.reason == "monitor_down" &&
                  gap.from_ns <= killed_ns && gap.to_ns >= killed_ns;
         }));
@@ -231,7 +232,7 @@ void KilledMonitor::ExpectOutagesNoted(std::size_t outages) const {
   int unknown = 0;
   for (const storage::Episode& episode : history.List()) {
     std::size_t session = 0;
-    for (const storage::EpisodeEvent& event : history.Events(episode.id)) {
+    for (const storage::HistoryEntry& event : history.Events(episode.id)) {
       const auto died = std::lower_bound(killed_ns_.begin(), killed_ns_.end(),
                                          event.recorded_ns);
       const auto now = static_cast<std::size_t>(died - killed_ns_.begin());

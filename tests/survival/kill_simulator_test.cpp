@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #include "idl/endpoint.h"
-#include "storage/runs.h"
+#include "storage/runs/runs.h"
 #include "tests/storage/temporary_directory.h"
 #include "tests/survival/kill_rounds.h"
 #include "tests/system/monitor_process.h"

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "storage/models.h"
-#include "storage/runs.h"
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
 #include "tests/storage/temporary_directory.h"
 #include "tests/survival/kill_rounds.h"
 

@@ -10,8 +10,8 @@
 #include <sys/mount.h>
 #include <sys/resource.h>
 
-#include "storage/history.h"
-#include "storage/runs.h"
+#include "storage/history/history_reader.h"
+#include "storage/runs/runs.h"
 #include "tests/system/monitor_fixture.h"
 
 namespace fdi::monitor {
@@ -99,13 +99,13 @@ class DiskFullTest : public MonitorFixture {
     const auto episodes = history.List();
     ASSERT_EQ(episodes.size(), 1U);
     std::vector<std::string> kinds;
-    for (const storage::EpisodeEvent& event : history.Events(episodes[0].id)) {
+    for (const storage::HistoryEntry& event : history.Events(episodes[0].id)) {
       kinds.push_back(event.kind);
     }
     EXPECT_THAT(kinds, testing::ElementsAre("DETECTED", "ISOLATED", "CLEARED",
                                             "CLOSED"));
     std::vector<std::string> reasons;
-    for (const storage::DataGap& gap : history.Gaps()) {
+    for (const DataGap& gap : history.Gaps()) {
       reasons.push_back(gap.reason);
     }
     EXPECT_THAT(reasons, testing::Contains("persistence_degraded"));

@@ -7,7 +7,7 @@
 
 #include <gmock/gmock.h>
 
-#include "storage/history.h"
+#include "storage/history/history_reader.h"
 #include "tests/system/monitor_fixture.h"
 
 namespace fdi::monitor {
@@ -136,7 +136,7 @@ TEST_F(HostilePublishersTest, GapsOfAnyLengthSettleAndLongOnesAreKept) {
     EXPECT_EQ(vectors_[40 * i + 39].verdict.quality, Quality::kLive);
   }
   std::vector<std::int64_t> lengths_s;
-  for (const storage::DataGap& gap :
+  for (const DataGap& gap :
        storage::HistoryReader(data_ / "history.db").Gaps()) {
     if (gap.valve_id == "V1") {
       lengths_s.push_back((gap.to_ns - gap.from_ns) / 1'000'000'000);

@@ -10,8 +10,8 @@
 
 #include <gmock/gmock.h>
 
-#include "storage/history.h"
-#include "storage/runs.h"
+#include "storage/history/history_reader.h"
+#include "storage/runs/runs.h"
 #include "tests/system/monitor_fixture.h"
 
 namespace fdi::monitor {

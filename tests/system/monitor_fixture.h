@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #include "idl/endpoint.h"
-#include "storage/models.h"
+#include "storage/models/models.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/temporary_directory.h"
 #include "tests/system/monitor_process.h"
@@ -93,11 +93,10 @@ class MonitorFixture : public testing::Test {
                         },
                         {}},
                        std::chrono::milliseconds(10));
-      events_->Take({[this](const idl::FaultEventMessage& m, const auto&) {
-                       faults_.push_back(m);
-                     },
-                     {}},
-                    std::chrono::milliseconds(0));
+      events_->Take(
+          {[this](const FaultEvent& m, const auto&) { faults_.push_back(m); },
+           {}},
+          std::chrono::milliseconds(0));
       status_->Take({[this](const idl::MonitorStatusMessage& m, const auto&) {
                        counters_ = {m.counters.begin(), m.counters.end()};
                        health_ = m.health;
@@ -122,10 +121,10 @@ class MonitorFixture : public testing::Test {
   std::optional<idl::Participant> participant_;
   std::optional<idl::Publisher<idl::ValveSampleMessage>> samples_;
   std::optional<idl::Subscriber<idl::DecisionMessage>> decisions_;
-  std::optional<idl::Subscriber<idl::FaultEventMessage>> events_;
+  std::optional<idl::Subscriber<FaultEvent>> events_;
   std::optional<idl::Subscriber<idl::MonitorStatusMessage>> status_;
   std::vector<idl::DecisionMessage> vectors_;
-  std::vector<idl::FaultEventMessage> faults_;
+  std::vector<FaultEvent> faults_;
   std::map<std::string, std::uint64_t> counters_;
   idl::Health health_{idl::Health::kOk};
 };

@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "storage/history.h"
-#include "storage/runs.h"
+#include "storage/history/history_reader.h"
+#include "storage/runs/runs.h"
 #include "tests/system/monitor_fixture.h"
 
 namespace fdi::monitor {
@@ -74,13 +74,13 @@ TEST_F(MonitorSystemTest, KilledInAnEpisodeItGoesOnWithItAndNotesTheOutage) {
   EXPECT_EQ(episodes[0].end_reason, "cleared");
   EXPECT_EQ(episodes[0].fault, "f7");
   std::vector<std::string> kinds;
-  for (const storage::EpisodeEvent& event : history.Events(episodes[0].id)) {
+  for (const storage::HistoryEntry& event : history.Events(episodes[0].id)) {
     kinds.push_back(event.kind);
   }
   EXPECT_THAT(kinds, testing::ElementsAre("DETECTED", "ISOLATED", "RESUMED",
                                           "CLEARED", "CLOSED"));
   bool outage_of_the_valve = false;
-  for (const storage::DataGap& gap : history.Gaps()) {
+  for (const DataGap& gap : history.Gaps()) {
     outage_of_the_valve =
         outage_of_the_valve ||
         (gap.valve_id == "V1" && gap.reason == "monitor_down" &&

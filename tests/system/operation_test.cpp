@@ -12,7 +12,7 @@
 #include "diagnosis/quality_count.h"
 #include "simulator/app/scenario_toml.h"
 #include "trainer/evaluation.h"
-#include "trainer/onboarding/signal_subset.h"
+#include "trainer/onboarding/onboarding.h"
 
 namespace fdi {
 namespace {

@@ -1,11 +1,11 @@
 // A candidate beside the active set in the built monitor, over DDS.
-#include "storage/shadow.h"
+#include "storage/history/shadow.h"
 
 #include <csignal>
 
 #include <gmock/gmock.h>
 
-#include "storage/history.h"
+#include "storage/history/history_reader.h"
 #include "tests/system/monitor_fixture.h"
 
 namespace fdi::monitor {
@@ -27,7 +27,7 @@ class ShadowTest : public MonitorFixture {
                               storage::Access::kOccasionalWriter);
     store.Save(candidate);
   }
-  std::vector<storage::ShadowDifference> Stretches() const {
+  std::vector<ShadowDifference> Stretches() const {
     storage::HistoryReader history(data_ / "history.db");
     return storage::ListShadow(history.database());
   }
@@ -43,14 +43,14 @@ TEST_F(ShadowTest, DifferencesAreRecordedOverARestartAndNotPublished) {
   EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
 
   ASSERT_THAT(Stretches(), SizeIs(1));
-  const storage::ShadowDifference first = Stretches()[0];
+  const ShadowDifference first = Stretches()[0];
   EXPECT_EQ(first.valve_id, "V1");
   EXPECT_EQ(first.active_set, "linear@1");
-  EXPECT_EQ(first.active_state, "ISOLATED");
-  EXPECT_EQ(first.active_fault, "f7");
+  EXPECT_EQ(first.active.state, State::kIsolated);
+  EXPECT_EQ(first.active.fault, "f7");
   EXPECT_EQ(first.candidate_set, "linear@2");
-  EXPECT_EQ(first.candidate_state, "DETECTED");
-  EXPECT_EQ(first.candidate_fault, "");
+  EXPECT_EQ(first.candidate.state, State::kDetected);
+  EXPECT_EQ(first.candidate.fault, "");
   for (const auto& event : faults_) {
     EXPECT_EQ(event.model_hash, first.active_hash);
   }
@@ -63,7 +63,7 @@ TEST_F(ShadowTest, DifferencesAreRecordedOverARestartAndNotPublished) {
   EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
   ASSERT_THAT(Stretches(), SizeIs(2));
   EXPECT_EQ(Stretches()[0].samples, first.samples);
-  EXPECT_EQ(Stretches()[1].active_fault, "f7");
+  EXPECT_EQ(Stretches()[1].active.fault, "f7");
 }
 
 TEST_F(ShadowTest, CandidateThatIsNotThereEndsTheProgram) {

@@ -1,5 +1,3 @@
-#include "trainer/antecedent_projection.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -7,6 +5,8 @@
 #include <stdexcept>
 
 #include <gtest/gtest.h>
+
+#include "trainer/cluster_antecedents.h"
 
 namespace fdi::trainer {
 namespace {

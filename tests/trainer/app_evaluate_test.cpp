@@ -8,8 +8,9 @@
 #include <gmock/gmock.h>
 
 #include "diagnosis/valve_engine.h"
-#include "storage/models.h"
-#include "storage/runs.h"
+#include "storage/models/models.h"
+#include "storage/runs/run_recorder.h"
+#include "storage/runs/runs.h"
 #include "tests/trainer/app_fixture.h"
 
 namespace fdi::trainer {
@@ -41,6 +42,7 @@ class AppEvaluateTest : public TrainerProgram {
     storage::StoredRun normal = storage::RunStore(Runs()).Load(RunOf(900));
     storage::RunRecorder recorder(Runs());
     const auto key = recorder.Begin(normal.info.run);
+    const std::string id = recorder.Id(key);
     for (storage::StoredSample& stored : normal.samples) {
       if (stored.sample.seq >= 600) {
         stored.sample.Set(Signal::kF, 0.5 * stored.sample[Signal::kF]);
@@ -49,7 +51,7 @@ class AppEvaluateTest : public TrainerProgram {
       recorder.Append(key, stored);
     }
     recorder.Close();
-    return recorder.Id(key);
+    return id;
   }
   std::vector<std::string> Lines(const std::string& name) const {
     std::istringstream text(Read(name));
@@ -118,6 +120,7 @@ TEST_F(AppEvaluateTest, RescoringARecordedRunRepeatsTheLiveVectorsBitForBit) {
   storage::NewRun row = source.info.run;
   row.origin = storage::RunOrigin::kRecorded;
   const auto key = recorder.Begin(row);
+  const std::string id = recorder.Id(key);
   std::vector<std::string> expected;
   const auto receive = [&](Sample sample, bool swapped) {
     if (swapped) {
@@ -130,7 +133,7 @@ TEST_F(AppEvaluateTest, RescoringARecordedRunRepeatsTheLiveVectorsBitForBit) {
     stored.initialised = verdict.initialised;
     stored.model_swapped = swapped;
     recorder.Append(key, stored);
-    expected.push_back(LineOf(recorder.Id(key), verdict));
+    expected.push_back(LineOf(id, verdict));
   };
   for (std::size_t k = 0; k < source.samples.size(); ++k) {
     Sample sample = source.samples[k].sample;
@@ -151,8 +154,8 @@ TEST_F(AppEvaluateTest, RescoringARecordedRunRepeatsTheLiveVectorsBitForBit) {
   }
   recorder.Close();
 
-  const Outcome outcome = Run("evaluate --model-set quick --runs " +
-                              recorder.Id(key) + " --vectors v.csv");
+  const Outcome outcome =
+      Run("evaluate --model-set quick --runs " + id + " --vectors v.csv");
 
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   std::vector<std::string> lines = Lines("v.csv");
@@ -169,13 +172,13 @@ TEST_F(AppEvaluateTest, RunWithoutTruthIsScoredButNotCounted) {
   storage::StoredRun normal = storage::RunStore(Runs()).Load(RunOf(900));
   storage::RunRecorder recorder(Runs());
   const auto key = recorder.Begin(normal.info.run);
+  const std::string id = recorder.Id(key);
   for (storage::StoredSample& stored : normal.samples) {
     stored.truth.reset();
     recorder.Append(key, stored);
   }
   recorder.Close();
-  const std::string call =
-      "evaluate --model-set quick --runs " + recorder.Id(key);
+  const std::string call = "evaluate --model-set quick --runs " + id;
 
   const json result = RunJson(call);
   EXPECT_TRUE(result["runs"][0]["fault"].is_null());
@@ -218,15 +221,15 @@ TEST_F(AppEvaluateTest, BadInputIsNamedWithItsExitCode) {
   run.info.run.flow_unit = FlowUnit::kTPerHour;
   storage::RunRecorder recorder(Runs());
   const auto key = recorder.Begin(run.info.run);
+  const std::string tonnes = recorder.Id(key);
   for (storage::StoredSample& stored : run.samples) {
     stored.sample.flow_unit = FlowUnit::kTPerHour;
     recorder.Append(key, stored);
   }
   recorder.Close();
-  const Outcome unit =
-      Run("evaluate --model-set quick --runs " + recorder.Id(key));
+  const Outcome unit = Run("evaluate --model-set quick --runs " + tonnes);
   EXPECT_EQ(unit.code, 3);
-  EXPECT_THAT(unit.err, AllOf(HasSubstr(recorder.Id(key)), HasSubstr("t/h"),
+  EXPECT_THAT(unit.err, AllOf(HasSubstr(tonnes), HasSubstr("t/h"),
                               HasSubstr("m3/h"), HasSubstr("quick@1")));
 }
 

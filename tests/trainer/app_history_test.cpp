@@ -4,8 +4,8 @@
 
 #include <gmock/gmock.h>
 
-#include "storage/csv.h"
-#include "storage/runs.h"
+#include "cli/csv.h"
+#include "storage/runs/runs.h"
 #include "tests/trainer/app_fixture.h"
 
 namespace fdi::trainer {
@@ -45,8 +45,8 @@ class AppHistoryTest : public TrainerProgram {
     const std::vector<LabelledSample> part(
         samples_.begin() + static_cast<std::ptrdiff_t>(from),
         samples_.begin() + static_cast<std::ptrdiff_t>(to));
-    storage::WriteCsv(text, part, part[0].sample.flow_unit,
-                      part[0].sample.stamp_ns);
+    cli::WriteCsv(text, part, part[0].sample.flow_unit,
+                  part[0].sample.stamp_ns);
     Write(name, text.str());
   }
   void WriteOrders(const std::string& rows) const {

@@ -1,8 +1,8 @@
 // Runs the built program: faults put onto stored runs and files.
 #include <gmock/gmock.h>
 
-#include "storage/csv.h"
-#include "storage/runs.h"
+#include "cli/csv.h"
+#include "storage/runs/runs.h"
 #include "tests/trainer/app_fixture.h"
 
 namespace fdi::trainer {
@@ -22,7 +22,7 @@ class AppInjectTest : public TrainerProgram {
     Write("healthy.csv", text);
   }
   std::vector<LabelledSample> Samples(const std::string& file) const {
-    return storage::ReadCsvFile(Path(file)).runs.front().samples;
+    return cli::ReadCsvFile(Path(file)).runs.front().samples;
   }
 };
 

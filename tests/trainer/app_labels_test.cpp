@@ -5,9 +5,9 @@
 
 #include <gmock/gmock.h>
 
-#include "storage/history_editor.h"
-#include "storage/models.h"
-#include "storage/runs.h"
+#include "storage/history/history_editor.h"
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
 #include "tests/trainer/app_fixture.h"
 #include "tests/trainer/recorded_episodes.h"
 

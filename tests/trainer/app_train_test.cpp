@@ -8,8 +8,9 @@
 #include <spawn.h>
 #include <unistd.h>
 
-#include "storage/models.h"
-#include "storage/runs.h"
+#include "storage/models/models.h"
+#include "storage/runs/run_recorder.h"
+#include "storage/runs/runs.h"
 #include "tests/trainer/app_fixture.h"
 
 extern char** environ;
@@ -48,6 +49,7 @@ class AppTrainTest : public TrainerProgram {
     run.period_s = period_s;
     run.flow_unit = unit;
     const auto key = recorder.Begin(run);
+    const std::string id = recorder.Id(key);
     for (int k = 0; k < 400; ++k) {
       storage::StoredSample stored;
       Sample& sample = stored.sample;
@@ -65,7 +67,7 @@ class AppTrainTest : public TrainerProgram {
       recorder.Append(key, stored);
     }
     recorder.Close();
-    return recorder.Id(key);
+    return id;
   }
 };
 
@@ -78,9 +80,9 @@ TEST_F(AppTrainTest, CampaignIsSimulatedTrainedAndStoredWithTheKeysOfJson) {
   for (const auto& [key, value] : set.items()) {
     keys.push_back(key);
   }
-  EXPECT_THAT(keys,
-              UnorderedElementsAre("model_set", "version", "content_hash",
-                                   "observers", "groups", "undetectable"));
+  EXPECT_THAT(keys, UnorderedElementsAre("model_set", "version", "content_hash",
+                                         "channels", "observers", "groups",
+                                         "undetectable"));
   EXPECT_EQ(set["model_set"], "quick");
   EXPECT_EQ(set["version"], 1);
   ASSERT_EQ(set["observers"].size(), 2U);
@@ -125,6 +127,23 @@ TEST_F(AppTrainTest, RunsAreReusedAndTheFirstVersionStaysActive) {
 
   RunJson("train --campaign c.toml --activate");
   EXPECT_TRUE(Stored()[2].active);
+}
+
+// Such a VAF comes from dividing by what rounding leaves of a variance.
+TEST_F(AppTrainTest, FitOfAnOutputThatDidNotVaryHasNoVaf) {
+  Write("c.toml", Quick() + TwoConditions());
+  RunJson("train --campaign c.toml");
+  storage::ModelStore store(Path("data") / "models.db",
+                            storage::Access::kOccasionalWriter);
+  ModelSet models = store.Load("quick");
+  models.observers[0].channels[1].validation.vaf = -1.3e29;
+  store.Save(models);
+
+  const json set = RunJson("show quick@2");
+
+  EXPECT_TRUE(set["observers"][0]["channels"][1]["vaf"].is_null());
+  EXPECT_TRUE(set["observers"][0]["channels"][0]["vaf"].is_number());
+  EXPECT_THAT(Run("show quick@2").out, testing::Not(HasSubstr("-13000")));
 }
 
 TEST_F(AppTrainTest, PrintedCampaignRebuildsTheSameSet) {

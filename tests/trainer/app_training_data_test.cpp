@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include "storage/models.h"
+#include "storage/models/models.h"
 #include "tests/trainer/app_fixture.h"
 
 namespace fdi::trainer {

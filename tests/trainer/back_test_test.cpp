@@ -1,4 +1,4 @@
-#include "trainer/app/back_test.h"
+#include "trainer/evaluation/back_test.h"
 
 #include <gmock/gmock.h>
 

@@ -7,7 +7,6 @@
 
 #include "diagnosis/residual_windows.h"
 #include "tests/trainer/gaussian.h"
-#include "trainer/tail_fit.h"
 
 namespace fdi::trainer {
 namespace {

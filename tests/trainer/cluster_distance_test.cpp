@@ -1,12 +1,11 @@
-#include "trainer/cluster_distance.h"
-
 #include <cmath>
 #include <stdexcept>
 
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
-#include "trainer/rule_prediction.h"
+#include "trainer/gustafson_kessel.h"
+#include "trainer/takagi_sugeno_fit.h"
 
 namespace fdi::trainer {
 namespace {

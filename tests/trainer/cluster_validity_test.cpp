@@ -1,8 +1,8 @@
-#include "trainer/cluster_validity.h"
-
 #include <stdexcept>
 
 #include <gtest/gtest.h>
+
+#include "trainer/gustafson_kessel.h"
 
 namespace fdi::trainer {
 namespace {

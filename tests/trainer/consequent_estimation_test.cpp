@@ -1,11 +1,11 @@
-#include "trainer/consequent_estimation.h"
-
 #include <cmath>
 #include <random>
 #include <stdexcept>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
+
+#include "trainer/takagi_sugeno_fit.h"
 
 namespace fdi::trainer {
 namespace {

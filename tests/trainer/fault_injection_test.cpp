@@ -1,4 +1,4 @@
-#include "trainer/app/fault_injection.h"
+#include "trainer/injection/fault_injection.h"
 
 #include <cmath>
 #include <limits>

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/trainer/reference_data.h"
-#include "trainer/structure_search.h"
+#include "trainer/channel_training.h"
 #include "trainer/takagi_sugeno_fit.h"
 
 namespace fdi::trainer {

@@ -9,7 +9,6 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
-#include "trainer/onboarding/signal_subset.h"
 
 namespace fdi::trainer {
 namespace {

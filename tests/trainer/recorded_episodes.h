@@ -6,8 +6,10 @@
 #include <vector>
 
 #include "diagnosis/valve_engine.h"
-#include "storage/history.h"
-#include "storage/run_types.h"
+#include "storage/history/history_database.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/history_writer.h"
+#include "storage/runs/runs.h"
 
 namespace fdi::trainer {
 
@@ -23,18 +25,35 @@ inline std::vector<std::string> RecordEpisodes(
   ValveEngine engine(models);
   engine.HoldIsolation(held);
   std::vector<std::string> ids;
-  std::vector<storage::TraceInstant> trace;
+  std::vector<TracePoint> trace;
   std::uint64_t episode = 0;
   for (const storage::StoredSample& stored : run.samples) {
     const Verdict& verdict = engine.Step(stored.sample);
-    trace.push_back(storage::MakeTraceInstant(stored, verdict, *models));
+    TracePoint& point = trace.emplace_back();
+    point.sample = stored.sample;
+    point.intake = stored.intake;
+    point.initialised = stored.initialised;
+    point.quality = verdict.quality;
+    point.state = verdict.state;
+    point.isolated = verdict.isolated;
+    point.normal_factor = verdict.normal_factor;
+    const auto head = [](const auto& values, std::size_t count) {
+      const auto length = static_cast<std::ptrdiff_t>(count);
+      return std::vector<double>(values.begin(), values.begin() + length);
+    };
+    point.residuals = head(verdict.residuals, models->channels.size());
+    point.factors = head(verdict.fault_factors, models->faults.size());
     for (const Transition& transition : verdict.Transitions()) {
-      const storage::NewEvent event{
-          run.info.run.valve_id, stored.sample.source_id, transition,
-          models.get(),          transition.stamp_ns,     {}};
-      writer.Record(event);
+      FaultEvent event;
+      event.valve_id = run.info.run.valve_id;
+      event.source_id = stored.sample.source_id;
+      event.transition = transition;
+      event.models = models;
+      event.episode_id = EpisodeId(event.valve_id, event.source_id,
+                                   transition.detection_stamp_ns);
+      writer.Record(event, transition.stamp_ns);
       if (transition.kind == TransitionKind::kDetected) {
-        episode = storage::EpisodeIdOf(event);
+        episode = event.episode_id;
         ids.push_back(storage::EpisodeIdText(episode));
       }
     }

@@ -1,8 +1,8 @@
-#include "trainer/sign_test.h"
-
 #include <limits>
 
 #include <gtest/gtest.h>
+
+#include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {

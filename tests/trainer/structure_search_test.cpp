@@ -1,5 +1,3 @@
-#include "trainer/structure_search.h"
-
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -7,6 +5,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "trainer/channel_training.h"
 
 namespace fdi::trainer {
 namespace {

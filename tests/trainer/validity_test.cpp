@@ -1,6 +1,6 @@
-#include "trainer/validity.h"
-
 #include <gtest/gtest.h>
+
+#include "trainer/model_set_description.h"
 
 namespace fdi::trainer {
 namespace {

@@ -1,8 +1,8 @@
-#include "trainer/wilson_interval.h"
-
 #include <stdexcept>
 
 #include <gtest/gtest.h>
+
+#include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {

@@ -1,14 +1,257 @@
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+
 #include <CLI/CLI.hpp>
 
+#include "cli/logging.h"
+#include "cli/output_folder.h"
 #include "diagnosis/error.h"
-#include "trainer/app/evaluate_options.h"
+#include "diagnosis/fault_catalogue.h"
+#include "storage/database/data_directory.h"
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
 #include "trainer/app/verbs.h"
-#include "trainer/baselines/baseline.h"
+#include "trainer/campaign/campaign_runs.h"
+#include "trainer/campaign/file_runs.h"
+#include "trainer/campaign/run_input.h"
+#include "trainer/evaluation/back_test.h"
+#include "trainer/evaluation/evaluation_report.h"
+#include "trainer/evaluation/report_page.h"
+#include "trainer/evaluation/studies.h"
+#include "trainer/model_reduction.h"
 
 namespace fdi::trainer {
 namespace {
 
-int Evaluate(const EvaluateOptions& options, const cli::Context& context) {
+constexpr double kDayS = 86400.0;
+
+struct EvaluateOptions {
+  std::string model_set;
+  std::string valve;
+  RunSelection selection;
+  std::vector<std::string> without;           // Faults.
+  std::vector<std::string> without_channels;  // Names.
+  bool leave_one_out{false};
+  int seeds{0};                          // 0: those of the campaign alone.
+  std::vector<std::string> verdicts;     // Files, one per run.
+  std::string baseline;                  // Of BaselineNames(); empty: none.
+  std::vector<std::string> train_runs;   // Of the baseline.
+  std::vector<std::string> train_files;  // Of the baseline.
+  std::string history;                   // Folder or pattern of CSV files.
+  std::filesystem::path work_orders;
+  double horizon_days{30.0};  // Between an episode and its work order.
+  std::filesystem::path vectors;
+  std::filesystem::path report;
+  bool assume_normal{false};
+  bool csv{false};
+};
+
+// The model set asked for, or the one that is assigned to `valve`, without the
+// faults and channels that it is to do without.
+std::shared_ptr<const ModelSet> LoadModels(const EvaluateOptions& options,
+                                           const std::string& valve,
+                                           const cli::Context& context) {
+  if (options.model_set.empty() == valve.empty()) {
+    throw ConfigError("either --model-set NAME[@VERSION] or --valve ID");
+  }
+  const storage::DataDirectory directory{context.options.data_dir};
+  storage::ModelStore store(directory.models());
+  ModelSet models;
+  if (!options.model_set.empty()) {
+    models = store.Load(options.model_set);
+  } else if (const auto assigned = store.AssignedModelSet(valve)) {
+    models = store.Load(*assigned);
+  } else {
+    throw NotFoundError("no model set is assigned to valve " + valve +
+                        ": see fdi-store valves assign");
+  }
+  std::vector<int> faults;
+  for (const std::string& name : options.without) {
+    faults.push_back(RequireFault(name));
+  }
+  return std::make_shared<const ModelSet>(WithoutChannels(
+      WithoutFaults(std::move(models), faults), options.without_channels));
+}
+
+// The runs named for the baseline, else those that the campaign trains on.
+std::vector<TrainingRun> TrainingRuns(const EvaluateOptions& options,
+                                      const cli::Context& context) {
+  std::vector<storage::StoredRun> stored;
+  if (options.train_runs.empty() && options.train_files.empty()) {
+    if (options.selection.campaign.empty()) {
+      throw ConfigError(
+          "what to fit the baseline to: --train-runs ID,..., --train-file "
+          "FILE.csv or a --campaign with [[run]]");
+    }
+    stored = LoadCampaignRuns(LoadCampaign(options.selection.campaign).runs,
+                              context);
+  }
+  if (!options.train_runs.empty()) {
+    const storage::DataDirectory directory{context.options.data_dir};
+    storage::RunStore store(directory.runs());
+    for (const std::string& selector : options.train_runs) {
+      stored.push_back(store.Load(selector));
+    }
+  }
+  const auto map = options.selection.ReadMap();
+  for (const std::string& file : options.train_files) {
+    stored.push_back(ReadRunFile(file, map, kBasicSignals));
+  }
+  std::vector<TrainingRun> runs;
+  for (const storage::StoredRun& run : stored) {
+    runs.push_back(ToTrainingRun(run, options.assume_normal));
+  }
+  return runs;
+}
+
+// Scores with the monitor's engine, and writes the vectors and the page.
+std::vector<EvaluatedRun> EvaluateAndWrite(const EvaluateOptions& options,
+                                           const cli::Context& context,
+                                           const Detector& detector,
+                                           const ModelSet& models,
+                                           const std::vector<ScoredRun>& runs) {
+  EvaluationSettings settings{options.assume_normal};
+  std::optional<ReportPage> page;
+  if (!options.report.empty()) {
+    page.emplace(models, runs.size());
+    settings.watch = [&](const ScoredRun& run) { return page->Watch(run); };
+    settings.scored = [&](const ScoredRun& run, const EvaluatedRun& result,
+                          const std::vector<Indication>& indications) {
+      page->Draw(run, result, indications);
+    };
+  }
+  std::vector<EvaluatedRun> results;
+  if (options.vectors.empty()) {
+    results = Evaluate(detector, runs, settings);
+  } else {
+    cli::WriteOutput(options.vectors, [&](std::ostream& out) {
+      VectorsCsv vectors(out, models);
+      settings.threads = 1;  // One file: in the order of the runs.
+      settings.watch = [&](const ScoredRun& run) -> VerdictSink {
+        return [&, draw = page ? page->Watch(run) : VerdictSink{}](
+                   const Sample& sample, const Verdict& verdict) {
+          vectors.Add(run.name, verdict);
+          if (draw) {
+            draw(sample, verdict);
+          }
+        };
+      };
+      results = Evaluate(detector, runs, settings);
+    });
+  }
+  if (page) {
+    cli::WriteFile(options.report / "index.html",
+                   page->Html(results, context.software, context.command_line));
+  }
+  return results;
+}
+
+// Scores the selected runs with any detector. @param models those of an engine.
+cli::Report EvaluateRuns(const EvaluateOptions& options,
+                         const cli::Context& context, const Detector& detector,
+                         const ModelSet* models = nullptr) {
+  const auto runs =
+      LoadScoredRuns(options.selection, detector.required, context);
+  if (!options.verdicts.empty() && runs.size() != options.verdicts.size()) {
+    throw ConfigError(std::to_string(options.verdicts.size()) +
+                      " files of verdicts for " + std::to_string(runs.size()) +
+                      " runs: one for each is needed, in the same order");
+  }
+  std::vector<EvaluatedRun> results;
+  if (options.report.empty() && options.vectors.empty()) {
+    results = Evaluate(detector, runs, {options.assume_normal});
+  } else {
+    results = EvaluateAndWrite(options, context, detector, *models, runs);
+  }
+  if (options.csv) {
+    WriteEvaluationCsv(std::cout, results);
+    return {};
+  }
+  return EvaluationReport(detector, results);
+}
+
+cli::Report EvaluateBaseline(const EvaluateOptions& options,
+                             const cli::Context& context) {
+  const std::vector<TrainingRun> training = TrainingRuns(options, context);
+  DatasetOptions dataset;
+  dataset.assume_normal = options.assume_normal;
+  return EvaluateRuns(options, context,
+                      FittedBaseline(FitBaseline(
+                          options.baseline, BuildConditions(training, dataset),
+                          training.front().period_s, {})));
+}
+
+cli::Report EvaluateHistory(const EvaluateOptions& options,
+                            const cli::Context& context) {
+  const std::vector<WorkOrder> orders = ReadWorkOrders(options.work_orders);
+  const auto map = options.selection.ReadMap();
+  std::vector<PastRecord> records;
+  for (const ValveFiles& files : FindHistory(options.history, options.valve)) {
+    const auto models = LoadModels(
+        options, options.model_set.empty() ? files.valve : "", context);
+    records.push_back(FollowHistory(
+        files, models, map, [&](const std::filesystem::path& file) {
+          context.log(
+              LogLevel::kInfo,
+              cli::EventLine("history_file", {{"valve", files.valve},
+                                              {"file", file.string()}}));
+        }));
+  }
+  return BackTestReport(
+      JudgeHistory(records, orders, options.horizon_days * kDayS), records,
+      context.options.utc);
+}
+
+// " without f6, channel T1", or empty.
+std::string ReductionText(const EvaluateOptions& options) {
+  std::string text;
+  for (const std::string& fault : options.without) {
+    text += (text.empty() ? " without " : ", ") + fault;
+  }
+  for (const std::string& channel : options.without_channels) {
+    text += (text.empty() ? " without channel " : ", channel ") + channel;
+  }
+  return text;
+}
+
+cli::Report EvaluateModels(const EvaluateOptions& options,
+                           const cli::Context& context) {
+  if (!options.report.empty()) {
+    cli::EnsureFolder(options.report);
+  }
+  const auto models = LoadModels(options, options.valve, context);
+  Detector detector = EngineDetector(models);
+  if (options.leave_one_out) {
+    return LeaveOneOut(
+        *models, LoadScoredRuns(options.selection, detector.required, context),
+        {options.assume_normal});
+  }
+  if (options.seeds > 0) {
+    return SeedReport(
+        detector, RepeatWithSeeds(detector, options.selection, options.seeds));
+  }
+  const std::string reduction = ReductionText(options);
+  if (!reduction.empty()) {
+    detector.preface = detector.name + "@" + std::to_string(detector.version) +
+                       reduction + '\n';
+  }
+  cli::Report report = EvaluateRuns(options, context, detector, models.get());
+  if (report.document.contains("summary")) {
+    cli::Json& summary = report.document["summary"];
+    if (!options.without.empty()) {
+      summary["without"] = options.without;
+    }
+    if (!options.without_channels.empty()) {
+      summary["without_channels"] = options.without_channels;
+    }
+  }
+  return report;
+}
+
+cli::Report RunEvaluate(const EvaluateOptions& options,
+                        const cli::Context& context) {
   if (options.csv && context.options.json) {
     throw ConfigError("either --json or --csv");
   }
@@ -16,14 +259,8 @@ int Evaluate(const EvaluateOptions& options, const cli::Context& context) {
       options.train_files.empty() && options.history.empty()) {
     throw ConfigError("--map is of --file, --train-file or --history");
   }
-  if (options.leave_one_out) {
-    return EvaluateLeaveOneOut(options, context);
-  }
-  if (options.seeds > 0) {
-    return EvaluateSeeds(options, context);
-  }
   if (!options.verdicts.empty()) {
-    return EvaluateVerdicts(options, context);
+    return EvaluateRuns(options, context, VerdictFiles(options.verdicts));
   }
   if (!options.baseline.empty()) {
     return EvaluateBaseline(options, context);
@@ -87,7 +324,8 @@ CLI::Option* AddHistory(CLI::App& verb, EvaluateOptions& options) {
   return history;
 }
 
-// What scores otherwise; each excludes the others and the outputs it lacks.
+// Ways of scoring other than by the model set; each excludes the others and the
+// outputs it lacks.
 void AddWays(CLI::App& verb, EvaluateOptions& options) {
   CLI::Option* leave =
       verb.add_flag("--leave-one-out", options.leave_one_out,
@@ -148,11 +386,11 @@ void AddEvaluateVerb(cli::Program& program) {
   CLI::App& verb = program.AddVerb(
       "evaluate",
       "Score runs with the monitor's engine: indices, confusion matrix, report",
-      [options](const cli::Context& context) {
-        return Evaluate(*options, context);
+      [options](const cli::Context& context) -> cli::Report {
+        return RunEvaluate(*options, context);
       });
   AddModels(verb, *options);
-  AddRunSelection(verb, options->selection);
+  options->selection.AddTo(verb);
   AddOutputs(verb, *options);
   AddWays(verb, *options);
 }

@@ -1,22 +1,23 @@
-#include <iostream>
+#include <cstdio>
 #include <memory>
-#include <sstream>
 
 #include <CLI/CLI.hpp>
 
+#include "cli/csv.h"
+#include "cli/output_folder.h"
+#include "cli/program.h"
+#include "cli/report.h"
+#include "cli/tag_map.h"
+#include "cli/time_text.h"
 #include "diagnosis/error.h"
 #include "simulator/app/scenario_toml.h"
-#include "storage/cli/json_output.h"
-#include "storage/cli/output_folder.h"
-#include "storage/cli/program.h"
-#include "storage/cli/tag_map.h"
-#include "storage/cli/time_text.h"
-#include "storage/csv.h"
-#include "storage/data_directory.h"
-#include "storage/runs.h"
-#include "trainer/app/file_runs.h"
-#include "trainer/app/injected_run.h"
+#include "storage/database/data_directory.h"
+#include "storage/runs/run_recorder.h"
+#include "storage/runs/runs.h"
 #include "trainer/app/verbs.h"
+#include "trainer/campaign/file_runs.h"
+#include "trainer/injection/fault_injection.h"
+#include "trainer/learning/label_plan.h"
 
 namespace fdi::trainer {
 namespace {
@@ -34,15 +35,12 @@ struct InjectOptions {
 };
 
 SignalRange ParseRange(const std::string& text) {
-  try {
-    std::size_t used = 0;
-    const double low = std::stod(text, &used);
-    const std::string rest = text.substr(used);
-    const double high = std::stod(rest.substr(1), &used);
-    if (rest.front() == ':' && used + 1 == rest.size() && low < high) {
-      return {low, high};
-    }
-  } catch (const std::logic_error&) {
+  SignalRange range{};
+  int used = 0;
+  if (std::sscanf(text.c_str(), "%lf:%lf%n", &range.minimum, &range.maximum,
+                  &used) == 2 &&
+      text.c_str()[used] == '\0' && range.minimum < range.maximum) {
+    return range;
   }
   throw ConfigError("--flow-range " + text +
                     ": expected LOW:HIGH in the unit of the flow, LOW < HIGH");
@@ -60,33 +58,23 @@ FaultInjection InjectionOf(const InjectOptions& options) {
     injection.valve.instruments.flow.low = range.minimum;
     injection.valve.instruments.flow.high = range.maximum;
   }
-  SignalsFor(injection);
   return injection;
 }
 
-storage::StoredRun LoadRun(const InjectOptions& options,
-                           const FaultInjection& injection,
+storage::StoredRun LoadRun(const InjectOptions& options, SignalMask signals,
                            const storage::DataDirectory& directory) {
   if (options.run.empty() == options.file.empty()) {
     throw ConfigError(
-        "what to put the fault onto: --run ID or --file FILE.csv");
+        "choose the record to put the fault onto: --run ID or --file FILE.csv");
   }
   if (!options.run.empty()) {
     return storage::RunStore(directory.runs()).Load(options.run);
   }
-  std::optional<storage::ColumnMap> map;
+  std::optional<cli::ColumnMap> map;
   if (!options.map.empty()) {
     map = cli::ReadTagMap(options.map);
   }
-  return ReadRunFile(options.file, map, SignalsFor(injection));
-}
-
-std::string Joined(const std::vector<std::string>& parts) {
-  std::string text;
-  for (const std::string& part : parts) {
-    text += (text.empty() ? "" : ", ") + part;
-  }
-  return text;
+  return ReadRunFile(options.file, map, signals);
 }
 
 // Returns the id of the new run.
@@ -99,23 +87,24 @@ std::string Store(const InjectedRun& injected, const InjectOptions& options,
   if (row.valve_id.empty()) {
     throw ConfigError("a stored run belongs to a valve: --valve ID");
   }
-  // The time of a file has no date.
+  // The times of a file have no date: it becomes a record that starts now.
   const std::int64_t shift =
       options.file.empty() ? 0 : cli::NowNs() / kSecond * kSecond;
-  row.start_ns = StartOf(injected.run) + shift;
+  row.start_ns = injected.run.samples.front().sample.stamp_ns + shift;
   row.origin = storage::RunOrigin::kImported;
   row.scenario = injected.source + " with " + Joined(injected.faults);
   row.software = context.software;
   storage::EnsureExists(directory);
   storage::RunRecorder recorder(directory.runs());
   const auto key = recorder.Begin(row);
+  const std::string id = recorder.Id(key);
   for (storage::StoredSample stored : injected.run.samples) {
     stored.sample.stamp_ns += shift;
     recorder.Append(key, stored);
   }
   recorder.End(key);
   recorder.Close();
-  return recorder.Id(key);
+  return id;
 }
 
 void Write(const InjectedRun& injected, const std::filesystem::path& path) {
@@ -125,68 +114,63 @@ void Write(const InjectedRun& injected, const std::filesystem::path& path) {
       samples.push_back({stored.sample, stored.truth});
     }
   }
-  std::ostringstream text;
-  storage::WriteCsv(text, samples, injected.run.info.run.flow_unit,
-                    StartOf(injected.run));
-  cli::WriteFile(path, text.str());
+  cli::WriteOutput(path, [&](std::ostream& out) {
+    cli::WriteCsv(out, samples, injected.run.info.run.flow_unit,
+                  injected.run.samples.front().sample.stamp_ns);
+  });
 }
 
-void Print(std::ostream& out, const InjectedRun& injected,
-           const std::string& id, const std::filesystem::path& file) {
-  if (!id.empty()) {
-    out << "run " << id << ": ";
-  } else {
-    out << file.string() << ": ";
-  }
-  out << Joined(injected.faults) << " on " << injected.faulty << " of "
-      << injected.run.samples.size() << " samples of " << injected.source
-      << '\n';
+cli::Report ReportOf(const InjectedRun& injected, const std::string& id,
+                     const std::string& file) {
+  cli::Report report;
+  report.document = {{"run_id", id.empty() ? cli::Json() : cli::Json(id)},
+                     {"file", file.empty() ? cli::Json() : cli::Json(file)},
+                     {"source", injected.source},
+                     {"samples", injected.run.samples.size()},
+                     {"faults", injected.faults},
+                     {"faulty_samples", injected.faulty},
+                     {"samples_at_flow_limit", injected.at_limit},
+                     {"left_out", injected.left_out}};
+  report.Line((id.empty() ? file : "run " + id) + ": " +
+              Joined(injected.faults) + " on " +
+              std::to_string(injected.faulty) + " of " +
+              std::to_string(injected.run.samples.size()) + " samples of " +
+              injected.source);
   for (const std::string& what : injected.left_out) {
-    out << "left out: " << what << '\n';
+    report.Line("left out: " + what);
   }
   if (injected.at_limit > 0) {
-    out << "the flow reads a limit of its transmitter in " << injected.at_limit
-        << " of the samples with a fault\n";
+    report.Line("the flow reads a limit of its transmitter in " +
+                std::to_string(injected.at_limit) +
+                " of the samples with a fault");
   }
+  return report;
 }
 
-int Inject(const InjectOptions& options, const cli::Context& context) {
+cli::Report Inject(const InjectOptions& options, const cli::Context& context) {
   const FaultInjection injection = InjectionOf(options);
   const storage::DataDirectory directory{context.options.data_dir};
   const InjectedRun injected =
-      InjectInto(LoadRun(options, injection, directory), injection,
+      InjectInto(LoadRun(options, SignalsFor(injection), directory), injection,
                  !options.flow_range.empty());
   if (!options.output.empty()) {
     Write(injected, options.output);
   }
-  const std::string id = options.output.empty() || options.store
-                             ? Store(injected, options, context)
-                             : std::string();
-  if (!context.options.json) {
-    Print(std::cout, injected, id, options.output);
-    return cli::kExitOk;
-  }
-  cli::Json json;
-  json["run_id"] = id.empty() ? cli::Json() : cli::Json(id);
-  json["file"] =
-      options.output.empty() ? cli::Json() : cli::Json(options.output.string());
-  json["source"] = injected.source;
-  json["samples"] = injected.run.samples.size();
-  json["faults"] = injected.faults;
-  json["faulty_samples"] = injected.faulty;
-  json["samples_at_flow_limit"] = injected.at_limit;
-  json["left_out"] = injected.left_out;
-  cli::PrintJson(std::cout, json);
-  return cli::kExitOk;
+  const bool store = options.output.empty() || options.store;
+  return ReportOf(injected,
+                  store ? Store(injected, options, context) : std::string(),
+                  options.output.string());
 }
 
 void AddOptions(CLI::App& verb, InjectOptions& options) {
-  CLI::Option* run = verb.add_option("--run", options.run, "A healthy run [s]")
+  CLI::Option* run = verb.add_option("--run", options.run,
+                                     "A healthy run, or a stretch of it [s]")
                          ->type_name("ID[@from:to]");
-  CLI::Option* file = verb.add_option("--file", options.file,
-                                      "A healthy record in a CSV file [s]")
-                          ->excludes(run)
-                          ->type_name("FILE.csv[@from:to]");
+  CLI::Option* file =
+      verb.add_option("--file", options.file,
+                      "A healthy record in a CSV file, or a stretch of it [s]")
+          ->excludes(run)
+          ->type_name("FILE.csv[@from:to]");
   verb.add_option("--fault", options.faults,
                   "Times in s from the first sample; repeatable: " +
                       std::string(simulator::kFaultForms))
@@ -195,23 +179,25 @@ void AddOptions(CLI::App& verb, InjectOptions& options) {
       ->required()
       ->type_name("FAULT");
   verb.add_option("--parameters", options.parameters,
-                  "Flow equation and ranges of transmitters: a name or "
-                  "FILE.toml")
-      ->type_name("NAME");
+                  "Parameters with the flow equation and the ranges of the "
+                  "transmitters")
+      ->type_name("NAME|FILE.toml");
   verb.add_option("--flow-range", options.flow_range,
-                  "What the flow transmitter reads, in the unit of the run "
-                  "(default: the parameters')")
+                  "Range of the flow transmitter in the unit of the run "
+                  "(default: that of the parameters)")
       ->type_name("LOW:HIGH");
   verb.add_option("--map", options.map,
-                  "TOML file: names, units, scale, offset, sense of columns")
+                  "Names, units, scales, offsets and senses of the columns of "
+                  "--file")
       ->type_name("FILE.toml")
       ->needs(file);
   verb.add_option("-o,--output", options.output,
-                  "Write the result there instead of storing it")
+                  "Write the result to this file instead of storing it")
       ->type_name("FILE.csv");
-  verb.add_flag("--store", options.store, "Store it beside --output too");
+  verb.add_flag("--store", options.store,
+                "Store the result as well as writing it to --output");
   verb.add_option("--valve", options.valve,
-                  "Of the stored run (default: that of --run)")
+                  "Valve of the stored run (default: that of --run)")
       ->type_name("ID");
 }
 
@@ -223,10 +209,18 @@ void AddInjectVerb(cli::Program& program) {
       "inject",
       "Put a fault exactly onto a recorded healthy run: f5 f6 f7 f18 f19 t1 "
       "p1 p2",
-      [options](const cli::Context& context) {
+      [options](const cli::Context& context) -> cli::Report {
         return Inject(*options, context);
       });
   AddOptions(verb, *options);
+  program.AddExamples(
+      {{"inject",
+        {{"What a worn seat would have looked like in this record",
+          "fdi-trainer inject --run 1a2b --fault f6:abrupt@600:strength=0.5 "
+          "-o f6.csv"},
+         {"On a file of the plant",
+          "fdi-trainer inject --file day.csv --fault "
+          "f19:incipient@300+600:strength=0.4 -o f19.csv"}}}});
 }
 
 }  // namespace fdi::trainer

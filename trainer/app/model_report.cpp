@@ -1,174 +1,212 @@
 #include "trainer/app/model_report.h"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
+#include <map>
+#include <sstream>
 
 #include "diagnosis/fault_catalogue.h"
-#include "storage/cli/text_table.h"
-#include "trainer/app/rule_text.h"
+#include "storage/models/model_codec.h"
+#include "trainer/rule_text.h"
 
 namespace fdi::trainer {
 namespace {
 
 using cli::Align;
 using cli::FormatNumber;
+using cli::Json;
 
-std::string RegressorsText(const TsModel& model) {
+std::string FaultList(const std::vector<int>& faults, const char* separator) {
   std::string text;
-  for (const Regressor& regressor : model.regressors) {
-    text += text.empty() ? "" : ", ";
-    text += RegressorText(regressor);
+  for (const int fault : faults) {
+    text += (text.empty() ? "" : separator) + FaultName(fault);
   }
   return text;
 }
 
-void PrintChannels(std::ostream& out, const ModelSet& models) {
-  cli::TextTable table({{"channel"},
-                        {"unit"},
-                        {"lower threshold", Align::kRight},
-                        {"upper threshold", Align::kRight},
-                        {"regressors"}});
-  for (std::size_t c = 0; c < models.channels.size(); ++c) {
-    const ChannelSpec& channel = models.channels[c];
-    table.AddRow({channel.name, UnitOf(channel.output, models.flow_unit),
-                  FormatNumber(channel.lower_threshold, 3),
-                  FormatNumber(channel.upper_threshold, 3),
-                  RegressorsText(models.observers[0].channels[c].model)});
+Json RegressorsJson(const TsModel& model) {
+  Json regressors = Json::array();
+  for (const Regressor& regressor : model.regressors) {
+    regressors.push_back(RegressorText(regressor));
   }
-  table.Print(out);
+  return regressors;
 }
 
-// Limits on windows, if there are any.
-void PrintWindows(std::ostream& out, const ModelSet& models) {
+Json ChannelJson(const ChannelSpec& channel, const ModelSet& models) {
+  Json windows = Json::array();
+  for (const WindowLimits& window : channel.windows) {
+    windows.push_back({{"length", window.length},
+                       {"lower_mean", window.lower_mean},
+                       {"upper_mean", window.upper_mean},
+                       {"upper_log_rms", window.upper_log_rms},
+                       {"activity_slope", window.activity_slope},
+                       {"log_activity", window.log_activity}});
+  }
+  return {{"name", channel.name},
+          {"output", SignalName(channel.output)},
+          {"unit", UnitOf(channel.output, models.flow_unit)},
+          {"lower_threshold", channel.lower_threshold},
+          {"upper_threshold", channel.upper_threshold},
+          {"windows", std::move(windows)}};
+}
+
+Json ObserverJson(const Observer& observer, const ModelSet& models) {
+  Json channels = Json::array();
+  for (std::size_t c = 0; c < observer.channels.size(); ++c) {
+    const ChannelObserver& channel = observer.channels[c];
+    channels.push_back({{"name", models.channels[c].name},
+                        {"regressors", RegressorsJson(channel.model)},
+                        {"rules", channel.model.rules.size()},
+                        {"mse", channel.validation.mse},
+                        {"vaf", VafJson(channel.validation.vaf)},
+                        {"bias", channel.validation.bias},
+                        {"samples", channel.validation.samples}});
+  }
+  return {{"name", observer.name},
+          {"fault", FaultName(observer.fault)},
+          {"strength", observer.strength},
+          {"channels", std::move(channels)}};
+}
+
+// A figure of one channel in a table with one row per observer.
+cli::Column OfChannel(std::size_t c, std::string heading, const char* key,
+                      int decimals) {
+  const auto text = [=](const Json& row) {
+    const Json& value = row["channels"][c][key];
+    return value.is_number_integer() ? value.dump()
+           : value.is_null()         ? "-"
+                                     : FormatNumber(value, decimals);
+  };
+  return {.heading = std::move(heading),
+          .key = "",
+          .text = text,
+          .align = Align::kRight};
+}
+
+// One line per channel and window, which no array of the document has.
+std::string WindowsText(const ModelSet& models) {
   cli::TextTable table({{"channel"},
                         {"window [samples]", Align::kRight},
                         {"mean below", Align::kRight},
                         {"mean above", Align::kRight},
                         {"deviation above", Align::kRight}});
-  bool any = false;
   for (const ChannelSpec& channel : models.channels) {
     for (const WindowLimits& window : channel.windows) {
-      any = true;
       table.AddRow({channel.name, std::to_string(window.length),
                     FormatNumber(window.lower_mean, 3),
                     FormatNumber(window.upper_mean, 3),
                     FormatNumber(std::exp(window.upper_log_rms), 3)});
     }
   }
-  if (any) {
-    out << '\n';
-    table.Print(out);
+  std::ostringstream text;
+  if (!table.empty()) {
+    text << '\n';
+    table.Print(text);
   }
+  return text.str();
 }
 
-void PrintObservers(std::ostream& out, const ModelSet& models) {
-  std::vector<cli::TextTable::Column> columns{{"observer"}};
-  for (const ChannelSpec& channel : models.channels) {
-    const std::string unit = UnitOf(channel.output, models.flow_unit);
-    columns.push_back({channel.name + ": rules", Align::kRight});
-    columns.push_back({"MSE [(" + unit + ")^2]", Align::kRight});
-    columns.push_back({"VAF [%]", Align::kRight});
-    columns.push_back({"bias [" + unit + "]", Align::kRight});
-  }
-  cli::TextTable table(std::move(columns));
-  for (const Observer& observer : models.observers) {
-    std::vector<std::string> row{observer.name};
-    for (const ChannelObserver& channel : observer.channels) {
-      row.push_back(std::to_string(channel.model.rules.size()));
-      row.push_back(FormatNumber(channel.validation.mse, 4));
-      row.push_back(FormatNumber(channel.validation.vaf, 1));
-      row.push_back(FormatNumber(channel.validation.bias, 3));
-    }
-    table.AddRow(std::move(row));
-  }
-  table.Print(out);
+}  // namespace
+
+std::string FaultsText(const std::vector<int>& faults) {
+  return faults.empty() ? "none" : FaultList(faults, ", ");
 }
 
-cli::Json ChannelJson(const ChannelSpec& spec, const ChannelObserver& channel) {
-  cli::Json regressors = cli::Json::array();
-  for (const Regressor& regressor : channel.model.regressors) {
-    regressors.push_back(RegressorText(regressor));
+std::string GroupsText(const ModelSet& models) {
+  std::string text;
+  for (const std::vector<int>& group : models.groups) {
+    text += (text.empty() ? "" : ", ") + FaultList(group, "|");
   }
-  return {{"name", spec.name},
-          {"regressors", std::move(regressors)},
-          {"rules", channel.model.rules.size()},
-          {"mse", channel.validation.mse},
-          {"vaf", channel.validation.vaf},
-          {"bias", channel.validation.bias}};
+  return text.empty() ? "none" : text;
 }
 
-cli::Json FaultNames(const std::vector<int>& faults) {
-  cli::Json names = cli::Json::array();
+cli::Json FaultsJson(const std::vector<int>& faults) {
+  Json names = Json::array();
   for (const int fault : faults) {
     names.push_back(FaultName(fault));
   }
   return names;
 }
 
-}  // namespace
-
-std::string HashText(std::uint64_t hash) {
-  std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016llx",
-                static_cast<unsigned long long>(hash));
-  return text.data();
-}
-
-std::string FaultsText(const std::vector<int>& faults) {
-  std::string text;
-  for (const int fault : faults) {
-    text += text.empty() ? "" : ", ";
-    text += FaultName(fault);
-  }
-  return text.empty() ? "none" : text;
-}
-
-std::string GroupsText(const ModelSet& models) {
-  std::string text;
-  for (const std::vector<int>& group : models.groups) {
-    std::string names;
-    for (const int fault : group) {
-      names += names.empty() ? "" : "|";
-      names += FaultName(fault);
-    }
-    text += text.empty() ? "" : ", ";
-    text += names;
-  }
-  return text.empty() ? "none" : text;
-}
-
-void PrintModels(std::ostream& out, const ModelSet& models) {
-  PrintChannels(out, models);
-  PrintWindows(out, models);
-  out << '\n';
-  PrintObservers(out, models);
-  out << "\nnot told apart: " << GroupsText(models)
-      << "\nundetectable: " << FaultsText(models.undetectable) << '\n';
+Json VafJson(double vaf) {
+  constexpr double kLeast = -1e9;  // %
+  return vaf > kLeast ? Json(vaf) : Json();
 }
 
 cli::Json ModelsJson(const ModelSet& models) {
-  cli::Json observers = cli::Json::array();
+  Json json = {{"model_set", models.name},
+               {"version", models.version},
+               {"content_hash", storage::HashHex(models.content_hash)},
+               {"channels", Json::array()},
+               {"observers", Json::array()},
+               {"groups", Json::array()},
+               {"undetectable", FaultsJson(models.undetectable)}};
+  for (const ChannelSpec& channel : models.channels) {
+    json["channels"].push_back(ChannelJson(channel, models));
+  }
   for (const Observer& observer : models.observers) {
-    cli::Json channels = cli::Json::array();
-    for (std::size_t c = 0; c < observer.channels.size(); ++c) {
-      channels.push_back(ChannelJson(models.channels[c], observer.channels[c]));
-    }
-    observers.push_back({{"name", observer.name},
-                         {"fault", FaultName(observer.fault)},
-                         {"strength", observer.strength},
-                         {"channels", std::move(channels)}});
+    json["observers"].push_back(ObserverJson(observer, models));
   }
-  cli::Json groups = cli::Json::array();
   for (const std::vector<int>& group : models.groups) {
-    groups.push_back(FaultNames(group));
+    json["groups"].push_back(FaultsJson(group));
   }
-  return {{"model_set", models.name},
-          {"version", models.version},
-          {"content_hash", HashText(models.content_hash)},
-          {"observers", std::move(observers)},
-          {"groups", std::move(groups)},
-          {"undetectable", FaultNames(models.undetectable)}};
+  return json;
+}
+
+void AddModelTables(const ModelSet& models, cli::Report& report) {
+  std::map<std::string, std::string> regressors;
+  std::vector<cli::Column> figures = {{"observer", "name"}};
+  for (std::size_t c = 0; c < models.channels.size(); ++c) {
+    const std::string& name = models.channels[c].name;
+    const std::string unit =
+        UnitOf(models.channels[c].output, models.flow_unit);
+    for (const Regressor& regressor :
+         models.observers.front().channels[c].model.regressors) {
+      std::string& text = regressors[name];
+      text += (text.empty() ? "" : ", ") + RegressorText(regressor);
+    }
+    figures.push_back(OfChannel(c, name + ": rules", "rules", 0));
+    figures.push_back(OfChannel(c, "MSE [(" + unit + ")^2]", "mse", 4));
+    figures.push_back(OfChannel(c, "VAF [%]", "vaf", 1));
+    figures.push_back(OfChannel(c, "bias [" + unit + "]", "bias", 3));
+  }
+  const auto regressors_of = [regressors](const Json& row) {
+    return regressors.at(row["name"]);
+  };
+  report.Table(
+      "channels",
+      {{"channel", "name"},
+       {"unit", "unit"},
+       {.heading = "lower threshold", .key = "lower_threshold", .decimals = 3},
+       {.heading = "upper threshold", .key = "upper_threshold", .decimals = 3},
+       {.heading = "regressors", .key = "", .text = regressors_of}});
+  report.Line(WindowsText(models));
+  report.Table("observers", std::move(figures));
+  report.Line("\nnot told apart: " + GroupsText(models) +
+              "\nundetectable: " + FaultsText(models.undetectable));
+}
+
+cli::Column StrengthColumn() {
+  const auto text = [](const Json& row) -> std::string {
+    const bool faulty =
+        row["fault"].is_string() && row["fault"] != FaultName(0);
+    return faulty ? FormatNumber(row["strength"], 2) : "-";
+  };
+  return {.heading = "strength [-]",
+          .key = "strength",
+          .text = text,
+          .align = Align::kRight};
+}
+
+void AddEpisodeTable(cli::Report& report) {
+  report.Table("lineage/episodes", {{"episode", "episode_id"},
+                                    {"valve", "valve_id"},
+                                    {"label", "label"},
+                                    {"by", "labelled_by"},
+                                    {"at", "labelled_utc", cli::Format::kTime},
+                                    {"taken as", "fault"},
+                                    StrengthColumn(),
+                                    {"samples", "samples"},
+                                    {"run", "run"}});
 }
 
 }  // namespace fdi::trainer

@@ -1,27 +1,39 @@
 #pragma once
 
-#include <ostream>
 #include <string>
+#include <vector>
 
+#include "cli/report.h"
 #include "diagnosis/model_set.h"
-#include "storage/cli/json_output.h"
 
 namespace fdi::trainer {
 
-/// "0123456789abcdef".
-std::string HashText(std::uint64_t hash);
-
-/// "f3|f6, f1|f10"; "none" where there is none.
+/// "f3|f6, f1|f10"; "none" if there is no group.
 std::string GroupsText(const ModelSet& models);
 /// "f8, f14"; "none".
 std::string FaultsText(const std::vector<int>& faults);
+/// ["f8", "f14"]
+cli::Json FaultsJson(const std::vector<int>& faults);
 
-/// Channels with thresholds and regressors, then every observer with rules,
-/// MSE, VAF and bias per channel, groups and undetectable faults.
-void PrintModels(std::ostream& out, const ModelSet& models);
+/// Null for the VAF [%] of an output that did not vary in the validation data:
+/// it divides by what rounding leaves of the variance, and says nothing.
+cli::Json VafJson(double vaf);
 
-/// The object of `train --json`: model_set, version, content_hash, observers,
-/// groups, undetectable.
+/// The object that `train`, `onboard` and `show` have in common: model_set,
+/// version, content_hash, channels, observers, groups, undetectable.
 cli::Json ModelsJson(const ModelSet& models);
+
+/// Shows the ModelsJson() that the report's document holds: channels with
+/// thresholds and regressors, limits on windows, every observer with rules,
+/// MSE, VAF and bias per channel, and which faults the set cannot tell.
+void AddModelTables(const ModelSet& models, cli::Report& report);
+
+/// The strength of the fault of a labelled episode; "-" if it is normal
+/// operation or was refused.
+cli::Column StrengthColumn();
+
+/// The labelled episodes of `lineage` in the document, as cli::LineageJson()
+/// gives them; nothing if there are none.
+void AddEpisodeTable(cli::Report& report);
 
 }  // namespace fdi::trainer

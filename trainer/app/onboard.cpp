@@ -1,44 +1,272 @@
+#include <algorithm>
+#include <charconv>
 #include <chrono>
-#include <iostream>
+#include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include <CLI/CLI.hpp>
 
+#include "cli/program.h"
+#include "cli/progress.h"
+#include "cli/report.h"
+#include "cli/signal_list.h"
+#include "cli/stop_signals.h"
+#include "cli/time_text.h"
+#include "cli/toml_reader.h"
 #include "diagnosis/error.h"
-#include "storage/cli/program.h"
-#include "storage/cli/progress.h"
-#include "storage/cli/signal_list.h"
-#include "storage/cli/stop_signals.h"
-#include "storage/cli/time_text.h"
-#include "storage/data_directory.h"
-#include "storage/models.h"
-#include "storage/runs.h"
-#include "trainer/app/campaign_runs.h"
-#include "trainer/app/file_runs.h"
-#include "trainer/app/onboarding_report.h"
-#include "trainer/app/run_input.h"
-#include "trainer/app/valve_types.h"
+#include "diagnosis/fault_catalogue.h"
+#include "simulator/app/scenario_toml.h"
+#include "storage/database/data_directory.h"
+#include "storage/models/model_codec.h"
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
+#include "trainer/app/model_report.h"
 #include "trainer/app/verbs.h"
-#include "trainer/onboarding/signal_subset.h"
+#include "trainer/campaign/campaign_runs.h"
+#include "trainer/campaign/file_runs.h"
+#include "trainer/campaign/run_input.h"
+#include "trainer/learning/labelled_episodes.h"
+#include "trainer/onboarding/onboarding.h"
+#include "trainer/rule_text.h"
+#include "trainer/statistics.h"
+
+// The verbs `onboard` and `coverage`: both make difference observers for a
+// valve type, one from the data of a valve, the other from a simulation.
 
 namespace fdi::trainer {
 namespace {
 
-struct OnboardOptions {
+constexpr auto kPlain = cli::Format::kPlain;
+using cli::Align;
+using cli::FormatNumber;
+using cli::Json;
+
+// What the two verbs have in common.
+struct TypeOptions {
+  std::vector<std::string> signals;
+  std::string type{"lublin-actuator-3"};
+  int threads{0};
+};
+
+struct CoverageOptions : TypeOptions {
+  bool gains{true};
+};
+
+struct OnboardOptions : TypeOptions {
   std::string valve;
   std::vector<std::string> runs;
   std::vector<std::string> files;
-  std::string type{"lublin-actuator-3"};
   std::string save_type;
   std::string name;
-  std::vector<std::string> signals;
   double false_alarms_per_hour{1e-3};
   bool fit{true};
   bool assess{true};
   bool gains{false};
-  int threads{0};
 };
+
+std::string Shortest(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
+
+struct FoundType {
+  ValveType type;
+  bool stored{false};  // In models.db: made for this type, taken as it is.
+};
+
+// A stored type is a scenario in TOML that has the parameters, behind a line
+// `levels = [CV, P1, P2, T1]`. A sine is the one excitation that may be
+// continuous without a file.
+std::string TypeText(const ValveType& type) {
+  simulator::Scenario scenario;
+  scenario.config.parameters = type.parameters;
+  scenario.config.excitation = simulator::SineExcitation{};
+  scenario.config.continuous_inputs = type.interpolated_command;
+  const simulator::InputRow& levels = type.levels;
+  return "levels = [" + Shortest(levels.cv_pct) + ", " +
+         Shortest(levels.p1_kpa) + ", " + Shortest(levels.p2_kpa) + ", " +
+         Shortest(levels.t1_degc) + "]\n" + ScenarioText(scenario);
+}
+
+ValveType ParseType(const std::string& text, const std::string& name) {
+  cli::TomlReader reader(text, "valve type " + name);
+  const std::vector<double> levels = reader.Numbers("levels");
+  if (levels.size() != 4) {
+    throw DataError("valve type " + name + ": levels must be 4 numbers");
+  }
+  simulator::Scenario scenario;
+  ApplyScenario(reader, {}, scenario);
+  reader.Finish();
+  return {name,
+          scenario.config.parameters,
+          scenario.config.continuous_inputs,
+          {levels[0], levels[1], levels[2], levels[3]}};
+}
+
+// The type called `name`: one stored in models.db, a shipped parameter set, or
+// the parameters in FILE.toml.
+FoundType FindType(const std::string& name, storage::ModelStore& store) {
+  for (const storage::ValveType& stored : store.ListTemplates()) {
+    if (stored.name == name) {
+      const std::vector<std::byte> bytes = store.LoadTemplate(name).bytes;
+      return {
+          ParseType({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
+                    name),
+          true};
+    }
+  }
+  ValveType type;
+  type.name = name;
+  type.parameters = simulator::FindParameters(name);
+  return {std::move(type), false};
+}
+
+void SaveType(const ValveType& type, storage::ModelStore& store) {
+  const std::string text = TypeText(type);
+  store.SaveTemplate(type.name, std::as_bytes(std::span(text)),
+                     type.parameters.name + ", Kv " +
+                         Shortest(type.parameters.trim.kv_m3_h) +
+                         " m3/h, command " +
+                         (type.interpolated_command ? "interpolated" : "held"));
+}
+
+Json CoverageJson(const CoverageTable& table) {
+  Json json = {{"signals", cli::SignalsJson(table.signals)},
+               {"seconds", table.seconds},
+               {"faults", Json::array()},
+               {"gains", Json::array()}};
+  for (const FaultCoverage& coverage : table.faults) {
+    const double direction = coverage.negative ? -1.0 : 1.0;
+    const auto strength = [direction](const std::optional<double>& smallest) {
+      return smallest ? Json(direction * *smallest) : Json();
+    };
+    json["faults"].push_back(
+        {{"fault", FaultName(coverage.fault)},
+         {"description", FaultFactsOf(coverage.fault).description},
+         {"direction", coverage.negative ? -1 : 1},
+         {"detectable_from", strength(coverage.detectable)},
+         {"isolable_from", strength(coverage.isolable)},
+         {"look_alikes", FaultsJson(coverage.look_alikes)}});
+  }
+  for (const TransmitterGain& gain : table.gains) {
+    json["gains"].push_back({{"signal", SignalName(gain.signal)},
+                             {"detectable", FaultsJson(gain.detectable)},
+                             {"isolable", FaultsJson(gain.isolable)}});
+  }
+  return json;
+}
+
+// Shows the CoverageJson() that stands at `path` of the document.
+void AddCoverage(const CoverageTable& table, const std::string& path,
+                 cli::Report& report) {
+  const auto directed = [](const Json& row) {
+    return row["fault"].get<std::string>() +
+           (row["direction"] == -1 ? " (-)" : "");
+  };
+  report.Line("coverage with " + cli::SignalsText(table.signals) +
+              ", each fault given " + FormatNumber(table.seconds, 0) +
+              " s to show; smallest strength");
+  report.Table(path + "faults",
+               {{.heading = "fault", .key = "fault", .text = directed},
+                {"description", "description"},
+                {"detected from", "detectable_from"},
+                {"isolated from", "isolable_from"},
+                {"looks like", "look_alikes"}});
+  report.Line("isolated: named in a set of at most two");
+  report.Table(path + "gains", {{"one more transmitter", "signal"},
+                                {"detects also", "detectable"},
+                                {"isolates also", "isolable"}});
+}
+
+Json OnboardingJson(const Onboarding& onboarding) {
+  Json json = ModelsJson(onboarding.models);
+  json["hours"] = onboarding.hours;
+  json["parameters"] = Json::array();
+  if (onboarding.fit) {
+    for (const simulator::FittedParameter& value : onboarding.fit->values) {
+      json["parameters"].push_back({{"name", value.name},
+                                    {"nominal", value.nominal},
+                                    {"value", value.value},
+                                    {"relative_sd", value.relative_sd},
+                                    {"identified", value.identified}});
+    }
+  }
+  json["fit"] = Json::array();
+  for (const ChannelFit& fit : onboarding.channels) {
+    json["fit"].push_back(
+        {{"channel", fit.name},
+         {"unit", UnitOf(fit.output, onboarding.models.flow_unit)},
+         {"rmse", fit.rmse},
+         {"bias", fit.bias},
+         {"vaf", VafJson(fit.vaf)},
+         {"naive_rmse", fit.naive_rmse}});
+  }
+  if (onboarding.coverage) {
+    json["coverage"] = CoverageJson(*onboarding.coverage);
+  }
+  return json;
+}
+
+void AddFit(const simulator::ValveFit& fit, cli::Report& report) {
+  // Coefficients of a relay are small, pressures large.
+  const auto significant = [](const char* heading, const char* key) {
+    return cli::Column{
+        .heading = heading,
+        .key = key,
+        .text = [key](const Json& row) { return Digits(row[key], 4); },
+        .align = Align::kRight};
+  };
+  report.Table("parameters", {{"parameter", "name"},
+                              significant("nominal", "nominal"),
+                              significant("fitted", "value"),
+                              {"sd", "relative_sd", cli::Format::kPercent},
+                              {"identified", "identified"}});
+  report.Line(std::string("What is not identified stays nominal. Command ") +
+              (fit.interpolated_command ? "interpolated" : "held") +
+              " from sample to sample; simulation against record: X RMSE " +
+              FormatNumber(fit.nominal.x_rmse_pct, 3) + " -> " +
+              FormatNumber(fit.fitted.x_rmse_pct, 3) + " %, F RMSE " +
+              FormatNumber(fit.nominal.flow_rmse, 3) + " -> " +
+              FormatNumber(fit.fitted.flow_rmse, 3) + "\n");
+}
+
+// Physical parameters, fit of the normal observer against a naive model, model
+// set, coverage.
+cli::Report ReportOf(const Onboarding& onboarding, const std::string& title) {
+  const ModelSet& models = onboarding.models;
+  cli::Report report;
+  report.document = OnboardingJson(onboarding);
+  report.Line(title + "\n");
+  if (onboarding.fit) {
+    AddFit(*onboarding.fit, report);
+  }
+  report.Table("fit",
+               {{"channel", "channel"},
+                {"unit", "unit"},
+                {.heading = "RMSE", .key = "rmse", .decimals = 3},
+                {.heading = "bias", .key = "bias", .decimals = 3},
+                {.heading = "VAF [%]", .key = "vaf", .decimals = 1},
+                {.heading = "naive RMSE", .key = "naive_rmse", .decimals = 3}});
+  report.Line(
+      "normal observer on data it was not fitted to; naive: X = CV, else the "
+      "mean\n");
+  report.Line("model set " + NameOf(models) + ", hash " +
+              storage::HashHex(models.content_hash) + ", " +
+              std::to_string(models.observers.size()) +
+              " observers; thresholds for " +
+              FormatNumber(models.false_alarms_per_hour * kHoursPerYear, 1) +
+              " false alarms per valve-year from " +
+              FormatNumber(models.threshold_hours, 2) + " h");
+  report.Line("not told apart: " + GroupsText(models) +
+              "; not seen at half their strengths: " +
+              FaultsText(models.undetectable) + "\n");
+  if (onboarding.coverage) {
+    AddCoverage(*onboarding.coverage, "coverage/", report);
+  }
+  return report;
+}
 
 std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
                                   const storage::DataDirectory& directory) {
@@ -87,7 +315,33 @@ std::uint32_t EpochOf(const std::string& valve, const Onboarding& onboarding,
   return entry.epoch;
 }
 
-// Stops the work where the user asked to.
+// Stores the set, assigns it to the valve, and keeps how the valve was found
+// beside earlier onboardings.
+void Store(const OnboardOptions& options, Onboarding& onboarding,
+           storage::ModelStore& store) {
+  onboarding.models =
+      store.Save(onboarding.models, storage::Activation::kAlways);
+  if (!options.save_type.empty()) {
+    onboarding.type.name = options.save_type;
+    SaveType(onboarding.type, store);
+  }
+  storage::BaselineRecord record;
+  record.epoch = EpochOf(options.valve, onboarding, store);
+  record.model_set = onboarding.models.name;
+  record.version = onboarding.models.version;
+  record.hours = onboarding.hours;
+  if (onboarding.fit) {
+    for (const simulator::FittedParameter& value : onboarding.fit->values) {
+      record.parameters.emplace_back(value.name, value.value);
+    }
+  }
+  for (const ChannelFit& fit : onboarding.channels) {
+    record.channels.push_back({fit.name, fit.rmse, fit.bias, fit.vaf});
+  }
+  store.SetBaseline(options.valve, record);
+}
+
+// Moves the bar, and ends the work where the user asked for it.
 Progress Reporting(cli::Progress& bar, const cli::StopSignals& signals) {
   return [&](double share, std::string_view stage) {
     if (signals.stop_requested()) {
@@ -97,19 +351,8 @@ Progress Reporting(cli::Progress& bar, const cli::StopSignals& signals) {
   };
 }
 
-void Store(const OnboardOptions& options, Onboarding& onboarding,
-           storage::ModelStore& store) {
-  onboarding.models =
-      store.Save(onboarding.models, storage::Activation::kAlways);
-  if (!options.save_type.empty()) {
-    onboarding.type.name = options.save_type;
-    SaveType(onboarding.type, store);
-  }
-  const std::uint32_t epoch = EpochOf(options.valve, onboarding, store);
-  store.SetBaseline(options.valve, BaselineOf(onboarding, epoch));
-}
-
-int OnboardValve(const OnboardOptions& options, const cli::Context& context) {
+cli::Report OnboardValve(const OnboardOptions& options,
+                         const cli::Context& context) {
   const storage::DataDirectory directory{context.options.data_dir};
   const std::vector<TrainingRun> runs = LoadRuns(options, directory);
   storage::EnsureExists(directory);
@@ -137,69 +380,126 @@ int OnboardValve(const OnboardOptions& options, const cli::Context& context) {
   }
   bar.Finish();
   Store(options, onboarding, store);
-  if (context.options.json) {
-    cli::PrintJson(std::cout, OnboardingJson(onboarding));
-    return cli::kExitOk;
-  }
   const std::chrono::duration<double> seconds =
       std::chrono::steady_clock::now() - start;
-  std::cout << "valve " << options.valve << ": " << onboarding.hours
-            << " h of healthy data, onboarded in "
-            << std::lround(seconds.count()) << " s\n\n";
-  PrintOnboarding(std::cout, onboarding);
-  return cli::kExitOk;
+  return ReportOf(onboarding, "valve " + options.valve + ": " +
+                                  FormatNumber(onboarding.hours, 2) +
+                                  " h of healthy data, onboarded in " +
+                                  std::to_string(std::lround(seconds.count())) +
+                                  " s");
+}
+
+cli::Report Assess(const CoverageOptions& options,
+                   const cli::Context& context) {
+  const SignalMask signals = cli::ParseSignals(options.signals, kBasicSignals);
+  const storage::DataDirectory directory{context.options.data_dir};
+  storage::EnsureExists(directory);
+  storage::ModelStore store(directory.models(),
+                            storage::Access::kOccasionalWriter);
+  OnboardingOptions settings;
+  settings.name = "coverage";
+  settings.threads = options.threads;
+  const cli::StopSignals stop;
+  cli::Progress bar("coverage");
+  const CoverageTable table =
+      AssessType(FindType(options.type, store).type, signals, options.gains,
+                 settings, Reporting(bar, stop));
+  bar.Finish();
+  cli::Report report;
+  report.document = CoverageJson(table);
+  AddCoverage(table, "", report);
+  return report;
+}
+
+CLI::Option* AddTypeOptions(CLI::App& verb, const char* signals,
+                            const char* type, TypeOptions& options) {
+  verb.add_option("--type", options.type, type)
+      ->type_name("NAME|FILE.toml")
+      ->capture_default_str();
+  verb.add_option("--threads", options.threads,
+                  "Number of threads; 0 uses all cores")
+      ->check(CLI::Range(0, 1024))
+      ->type_name("N");
+  return verb.add_option("--signals", options.signals, signals)
+      ->delimiter(',')
+      ->type_name("CV,X,...");
 }
 
 void AddOptions(CLI::App& verb, OnboardOptions& options) {
-  verb.add_option("--valve", options.valve, "Id that the set is assigned to")
+  verb.add_option("--valve", options.valve,
+                  "Id of the valve that the set is assigned to")
       ->required()
       ->type_name("ID");
-  verb.add_option("--runs", options.runs, "Healthy runs, or stretches [s]")
+  verb.add_option("--runs", options.runs,
+                  "Healthy runs, or stretches of them [s]")
       ->delimiter(',')
       ->type_name("ID[@from:to],...");
   verb.add_option("--file", options.files,
                   "Healthy CSV file, not stored; repeatable")
       ->type_name("FILE.csv[@from:to]");
-  verb.add_option("--type", options.type,
-                  "Valve type: a stored one, whose fault effects are taken as "
-                  "they are, or parameters that are fitted to the valve")
-      ->type_name("NAME|FILE.toml")
-      ->capture_default_str();
+  AddTypeOptions(verb,
+                 "Use these signals alone, as if the others were not measured",
+                 "Valve type: a stored one, whose fault effects are taken as "
+                 "they are, or parameters that are fitted to the valve",
+                 options);
   verb.add_option("--save-type", options.save_type,
-                  "Store what was fitted as a valve type for its like")
+                  "Store the fitted parameters as a valve type for others of "
+                  "its kind")
       ->type_name("NAME");
-  verb.add_option("--name", options.name, "Of the model set; default: the id")
+  verb.add_option("--name", options.name,
+                  "Name of the model set (default: the id of the valve)")
       ->type_name("NAME");
-  verb.add_option("--signals", options.signals,
-                  "Use these alone, as if the others were not measured")
-      ->delimiter(',')
-      ->type_name("CV,X,...");
   verb.add_option("--false-alarms-per-hour", options.false_alarms_per_hour,
                   "Rate that the thresholds are set for")
       ->check(CLI::Range(1e-9, 3600.0))
       ->type_name("R");
   verb.add_flag("!--no-fit", options.fit,
                 "Take the parameters of the type as they are");
-  verb.add_flag("!--no-coverage", options.assess, "Do not score every fault");
+  verb.add_flag("!--no-coverage", options.assess,
+                "Leave out the table of faults that can be detected");
   verb.add_flag("--gains", options.gains,
-                "Say what each transmitter that is missing would buy; takes "
-                "the time of an onboarding for each");
-  verb.add_option("--threads", options.threads, "0: all of the machine")
-      ->check(CLI::Range(0, 1024))
-      ->type_name("N");
+                "Compute what each missing transmitter would add; takes the "
+                "time of an onboarding for each");
 }
 
 }  // namespace
 
 void AddOnboardVerb(cli::Program& program) {
   auto options = std::make_shared<OnboardOptions>();
-  CLI::App& verb = program.AddVerb("onboard",
-                                   "Make models for a valve that has only ever "
-                                   "been healthy, and assign them",
-                                   [options](const cli::Context& context) {
-                                     return OnboardValve(*options, context);
-                                   });
+  CLI::App& verb = program.AddVerb(
+      "onboard",
+      "Make models for a valve that has only ever been healthy, and assign "
+      "them",
+      [options](const cli::Context& context) -> cli::Report {
+        return OnboardValve(*options, context);
+      });
   AddOptions(verb, *options);
+  program.AddExamples(
+      {{"onboard",
+        {{"A valve of the plant that has only ever been healthy",
+          "fdi-trainer onboard --valve FV-101 --runs 1a2b,3c4d"},
+         {"From a CSV file, with what it would gain by more transmitters",
+          "fdi-trainer onboard --valve FV-101 --file fv101.csv --gains"}}}});
+}
+
+void AddCoverageVerb(cli::Program& program) {
+  auto options = std::make_shared<CoverageOptions>();
+  CLI::App& verb = program.AddVerb(
+      "coverage",
+      "Show which faults of a valve type can be seen with some transmitters",
+      [options](const cli::Context& context) -> cli::Report {
+        return Assess(*options, context);
+      });
+  AddTypeOptions(verb, "Signals that the valve measures", "Valve type",
+                 *options)
+      ->required();
+  verb.add_flag("!--no-gains", options->gains,
+                "Leave out what one more transmitter would add");
+  program.AddExamples({{"coverage",
+                        {{"What a valve with three transmitters can tell",
+                          "fdi-trainer coverage --signals CV,X,F"},
+                         {"Without what one more transmitter would add",
+                          "fdi-trainer coverage --signals CV,X --no-gains"}}}});
 }
 
 }  // namespace fdi::trainer

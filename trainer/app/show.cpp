@@ -1,25 +1,321 @@
+#include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <filesystem>
-#include <iostream>
 #include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
-#include "storage/cli/lineage_text.h"
-#include "storage/cli/logging.h"
-#include "storage/cli/output_folder.h"
-#include "storage/cli/program.h"
-#include "storage/cli/text_table.h"
-#include "storage/cli/time_text.h"
-#include "storage/data_directory.h"
-#include "storage/models.h"
-#include "trainer/app/model_pictures.h"
+#include "cli/logging.h"
+#include "cli/models/lineage_text.h"
+#include "cli/output_folder.h"
+#include "cli/plot/figure.h"
+#include "cli/program.h"
+#include "cli/report.h"
+#include "cli/time_text.h"
+#include "diagnosis/error.h"
+#include "diagnosis/log.h"
+#include "diagnosis/model_set.h"
+#include "storage/database/data_directory.h"
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
 #include "trainer/app/model_report.h"
-#include "trainer/app/rule_text.h"
-#include "trainer/app/training_residuals.h"
 #include "trainer/app/verbs.h"
+#include "trainer/campaign/campaign_fields.h"
+#include "trainer/campaign/run_input.h"
+#include "trainer/learning/labelled_episodes.h"
+#include "trainer/regression.h"
+#include "trainer/rule_text.h"
+#include "trainer/training.h"
 
 namespace fdi::trainer {
 namespace {
+
+using cli::Json;
+
+constexpr std::size_t kFewResiduals = 20;  // As in the calibration.
+constexpr double kSameStrength = 1e-3;
+constexpr int kPoints = 561;  // Of a fuzzy set.
+constexpr int kBars = 56;
+
+// The runs of ModelSet::training_runs that can be read; `missing` tells why
+// others cannot.
+std::vector<storage::StoredRun> LoadRuns(
+    const ModelSet& models, const storage::DataDirectory& directory,
+    std::vector<std::string>& missing) {
+  std::vector<storage::StoredRun> runs;
+  std::optional<storage::RunStore> store;
+  for (const std::string& run : models.training_runs) {
+    try {
+      if (!store) {
+        store.emplace(directory.runs());
+      }
+      runs.push_back(store->Load(run));
+    } catch (const std::exception& error) {
+      missing.push_back("run " + run + ": " + error.what());
+    }
+  }
+  return runs;
+}
+
+std::vector<Condition> ConditionsOf(const std::vector<storage::StoredRun>& runs,
+                                    DatasetOptions options,
+                                    std::vector<std::string>& missing) {
+  if (runs.empty()) {
+    return {};
+  }
+  std::vector<TrainingRun> training;
+  for (const storage::StoredRun& run : runs) {
+    options.assume_normal |= !HasTruth(run);
+  }
+  for (const storage::StoredRun& run : runs) {
+    training.push_back(ToTrainingRun(run, options.assume_normal));
+  }
+  try {
+    return BuildConditions(training, options);
+  } catch (const DataError& error) {
+    missing.push_back(std::string("training data: ") + error.what());
+    return {};
+  }
+}
+
+// The residuals that the membership of an observer came from: of a fault those
+// of the validation stretches, or of all stretches if those are short; of
+// normal operation those of all stretches, as its membership rests on
+// cross-validation over them.
+std::vector<double> ResidualsOf(const TsModel& model,
+                                const Condition& condition, int settling) {
+  std::vector<double> residuals =
+      RunResiduals(model, condition.validation, settling);
+  if (condition.fault == 0 || residuals.size() < kFewResiduals) {
+    const std::vector<double> more =
+        RunResiduals(model, condition.training, settling);
+    residuals.insert(residuals.end(), more.begin(), more.end());
+  }
+  std::erase_if(residuals, [](double r) { return !std::isfinite(r); });
+  return residuals;
+}
+
+// The data of a training, cut again as the preset of the set cuts them; a
+// campaign may have cut them otherwise.
+class TrainingData {
+ public:
+  TrainingData(const ModelSet& models, const storage::DataDirectory& directory,
+               std::vector<std::string>& missing) {
+    TrainingOptions options;
+    try {
+      options = PresetOptions(models.preset);
+    } catch (const ConfigError&) {
+      // Not made by `fdi-trainer train`: the defaults serve.
+    }
+    settling_ = options.fit.settling;
+    conditions_ = ConditionsOf(LoadRuns(models, directory, missing),
+                               options.dataset, missing);
+  }
+
+  // Empty if the data of the observer's condition are gone.
+  std::vector<double> Residuals(const Observer& observer, std::size_t c) const {
+    const auto found =
+        std::find_if(conditions_.begin(), conditions_.end(),
+                     [&](const Condition& condition) {
+                       return condition.fault == observer.fault &&
+                              std::abs(condition.strength - observer.strength) <
+                                  kSameStrength;
+                     });
+    return found == conditions_.end()
+               ? std::vector<double>()
+               : ResidualsOf(observer.channels[c].model, *found, settling_);
+  }
+
+ private:
+  int settling_{0};
+  std::vector<Condition> conditions_;
+};
+
+double Membership(const FuzzySet& set, double x) {
+  const double left = (set.left_center - x) / set.left_width;
+  const double right = (x - set.right_center) / set.right_width;
+  const double beyond = std::max({left, right, 0.0});
+  return std::exp(-0.5 * beyond * beyond);
+}
+
+plot::Figure MakeFigure(std::string title, std::string x_label,
+                        plot::Range range) {
+  plot::Figure figure;
+  figure.title = std::move(title);
+  figure.x_label = std::move(x_label);
+  figure.x_range = range;
+  figure.width = 900.0;
+  figure.legend_width = 300.0;
+  figure.panels.push_back({.label = "membership [-]",
+                           .range = plot::Range{0.0, 1.05},
+                           .height = 260.0});
+  return figure;
+}
+
+// The antecedent sets of all rules on regressor `j`, each in the words of
+// RulesText().
+plot::Figure MembershipFigure(const TsModel& model, std::size_t j,
+                              FlowUnit flow_unit, const std::string& title) {
+  const double low = model.regressor_min[j];
+  const double high = std::max(model.regressor_max[j], low + 1e-9);
+  const Regressor& regressor = model.regressors[j];
+  plot::Figure figure =
+      MakeFigure(title,
+                 RegressorText(regressor) + " [" +
+                     UnitOf(regressor.signal, flow_unit) + "]",
+                 {low, high});
+  for (int i = 0; i < kPoints; ++i) {
+    figure.x.push_back(low + (high - low) * i / (kPoints - 1));
+  }
+  for (std::size_t r = 0; r < model.rules.size(); ++r) {
+    const std::string words =
+        AntecedentWords(model, model.rules[r], j, flow_unit);
+    plot::Series series{.title = "rule " + std::to_string(r + 1) + ": " +
+                                 (words.empty() ? "any" : words),
+                        .colour = plot::SeriesColour(r),
+                        .width = 2.0,
+                        .y = {}};
+    for (const double x : figure.x) {
+      series.y.push_back(Membership(model.rules[r].antecedents[j], x));
+    }
+    figure.panels[0].series.push_back(std::move(series));
+  }
+  return figure;
+}
+
+// Shares of `residuals` in kBars equal bins over the range.
+std::vector<double> Histogram(const std::vector<double>& residuals,
+                              plot::Range range) {
+  std::vector<double> shares(kBars);
+  for (const double residual : residuals) {
+    const double at = (residual - range.from) / (range.to - range.from) * kBars;
+    const double bin = std::clamp(std::floor(at), 0.0, kBars - 1.0);
+    shares[static_cast<std::size_t>(bin)] +=
+        1.0 / static_cast<double>(residuals.size());
+  }
+  return shares;
+}
+
+// The membership of an observer's residual in channel `c` over the histogram
+// of `residuals`, whose tallest bar is as high as the plot.
+plot::Figure ResidualFigure(const ModelSet& models, const Observer& observer,
+                            std::size_t c,
+                            const std::vector<double>& residuals) {
+  const Trapezoid& membership = observer.channels[c].membership;
+  plot::Range range{membership.a, membership.d};
+  for (const double residual : residuals) {
+    range.from = std::min(range.from, residual);
+    range.to = std::max(range.to, residual);
+  }
+  const double margin = std::max(0.05 * (range.to - range.from), 1e-9);
+  range = {range.from - margin, range.to + margin};
+  plot::Figure figure = MakeFigure(
+      "Observer " + observer.name + ", channel " + models.channels[c].name,
+      "residual r = y - ŷ [" +
+          UnitOf(models.channels[c].output, models.flow_unit) + "]",
+      range);
+  plot::Panel& panel = figure.panels[0];
+  panel.notes = {
+      "1 from " + Digits(membership.b, 4) + " to " + Digits(membership.c, 4),
+      "0 beyond " + Digits(membership.a, 4) + ", " + Digits(membership.d, 4)};
+  if (residuals.empty()) {
+    panel.notes.emplace_back("no residuals: training runs missing");
+  } else {
+    plot::Series bars{.title = "residuals in training",
+                      .colour = plot::ink::kPale,
+                      .y = Histogram(residuals, range),
+                      .shape = plot::Shape::kBars};
+    const double tallest = *std::max_element(bars.y.begin(), bars.y.end());
+    for (std::size_t i = 0; i < bars.y.size(); ++i) {
+      bars.y[i] /= tallest;
+      bars.x.push_back(range.from + (range.to - range.from) *
+                                        (static_cast<double>(i) + 0.5) / kBars);
+    }
+    panel.series.push_back(std::move(bars));
+    panel.notes.push_back(std::to_string(residuals.size()) + " residuals");
+    panel.notes.push_back("tallest bar: " + Digits(100.0 * tallest, 4) + " %");
+  }
+  panel.series.push_back(
+      {.title = "membership",
+       .colour = plot::ink::kVermilion,
+       .width = 2.0,
+       .y = {0.0, 1.0, 1.0, 0.0},
+       .x = {membership.a, membership.b, membership.c, membership.d}});
+  return figure;
+}
+
+// Letters, digits, points and signs; "CV(k-1)" gives "CV_k-1".
+std::string FileName(const std::string& text) {
+  std::string name;
+  for (const char c : text) {
+    const bool kept = std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+                      c == '.' || c == '-';
+    if (kept || (!name.empty() && name.back() != '_')) {
+      name += kept ? c : '_';
+    }
+  }
+  return name.ends_with('_') ? name.substr(0, name.size() - 1) : name;
+}
+
+// Draws to a file of the folder; a number tells equal names apart.
+void Write(const std::filesystem::path& folder, const std::string& name,
+           const plot::Figure& figure, std::set<std::string>& names) {
+  std::string unique = FileName(name);
+  for (int n = 2; !names.insert(unique).second; ++n) {
+    unique = FileName(name) + '_' + std::to_string(n);
+  }
+  plot::DrawFigure(figure, folder / (unique + ".svg"));
+}
+
+// Writes membership_CHANNEL_REGRESSOR.svg, the fuzzy sets of the rules, for
+// every regressor of the normal observer, and residual_OBSERVER_CHANNEL.svg,
+// the membership over the histogram of the training residuals, for every
+// observer and channel. The residuals are computed anew; runs that are gone
+// are logged, and their histograms left out.
+// @throws DataError naming what cannot be written; std::runtime_error if
+//   gnuplot is missing or fails.
+void WriteModelPictures(const ModelSet& models,
+                        const storage::DataDirectory& directory,
+                        const std::filesystem::path& folder,
+                        const LogSink& log) {
+  cli::EnsureFolder(folder);
+  std::set<std::string> names;
+  std::vector<std::string> missing;
+  const TrainingData data(models, directory, missing);
+  for (const std::string& reason : missing) {
+    log(LogLevel::kWarning,
+        cli::EventLine("residuals_missing", {{"reason", reason}}));
+  }
+  for (std::size_t c = 0; c < models.channels.size(); ++c) {
+    const std::string& channel = models.channels[c].name;
+    const TsModel& model = models.observers.front().channels[c].model;
+    for (std::size_t j = 0; j < model.regressors.size(); ++j) {
+      const std::string regressor = RegressorText(model.regressors[j]);
+      Write(folder, "membership " + channel + ' ' + regressor,
+            MembershipFigure(model, j, models.flow_unit,
+                             "Normal observer, channel " + channel +
+                                 ": sets of the rules on " + regressor),
+            names);
+    }
+  }
+  for (const Observer& observer : models.observers) {
+    for (std::size_t c = 0; c < models.channels.size(); ++c) {
+      Write(folder, "residual " + observer.name + ' ' + models.channels[c].name,
+            ResidualFigure(models, observer, c, data.Residuals(observer, c)),
+            names);
+    }
+  }
+  log(LogLevel::kInfo,
+      cli::EventLine("pictures_written",
+                     {{"folder", folder.string()},
+                      {"pictures", std::to_string(names.size())}}));
+}
 
 struct ShowOptions {
   std::string model_set;
@@ -28,9 +324,7 @@ struct ShowOptions {
 };
 
 std::string Text(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
+  return Digits(value, 6);
 }
 
 std::string DecisionText(const DecisionParameters& d) {
@@ -53,77 +347,8 @@ std::string TrainingRunsText(const ModelSet& models) {
   return text;
 }
 
-void PrintSummary(std::ostream& out, const ModelSet& models,
-                  const storage::Lineage& lineage, bool active, bool utc) {
-  cli::TextTable table({{"model set"},
-                        {models.name + "@" + std::to_string(models.version) +
-                         (active ? " (active)" : "")}});
-  const auto add = [&table](const char* key, const std::string& value) {
-    table.AddRow({key, value});
-  };
-  add("content hash", HashText(models.content_hash));
-  add("created", cli::FormatTime(models.created_ns, utc));
-  add("software", models.software);
-  add("preset", models.preset);
-  add("sample period", Text(models.sample_period_s) + " s");
-  add("flow unit", std::string(FlowUnitName(models.flow_unit)));
-  add("commands", Text(models.validity.cv.minimum) + ".." +
-                      Text(models.validity.cv.maximum) + " %");
-  add("faults", FaultsText(models.faults));
-  add("thresholds", "for " + Text(models.false_alarms_per_hour) +
-                        " false alarms per hour, from " +
-                        Text(models.threshold_hours) + " h without fault");
-  add("decision", DecisionText(models.decision));
-  add("built on", cli::ParentText(lineage));
-  add("training runs", TrainingRunsText(models));
-  table.Print(out);
-  out << '\n';
-  if (!lineage.episodes.empty()) {
-    cli::PrintEpisodes(out, lineage, utc);
-    out << '\n';
-  }
-}
-
-void PrintRules(std::ostream& out, const ModelSet& models) {
-  out << "\nRules. (k-1) of the output itself is the model's own prediction.\n";
-  for (const Observer& observer : models.observers) {
-    for (std::size_t c = 0; c < observer.channels.size(); ++c) {
-      out << '\n'
-          << observer.name << ", " << models.channels[c].name << ":\n"
-          << RulesText(observer.channels[c].model, models.flow_unit);
-    }
-  }
-}
-
-cli::Json DecisionJson(const DecisionParameters& d) {
-  return {{"isolation_threshold", d.isolation_threshold},
-          {"detection_samples", d.detection_samples},
-          {"isolation_samples", d.isolation_samples},
-          {"isolation_fraction", d.isolation_fraction},
-          {"join_fraction", d.join_fraction},
-          {"reisolation_samples", d.reisolation_samples},
-          {"clearing_samples", d.clearing_samples},
-          {"settling_samples", d.settling_samples},
-          {"evidence_window", d.evidence_window},
-          {"evidence_core", d.evidence_core},
-          {"evidence_support", d.evidence_support}};
-}
-
-cli::Json WindowsJson(const ChannelSpec& channel) {
-  cli::Json windows = cli::Json::array();
-  for (const WindowLimits& window : channel.windows) {
-    windows.push_back({{"length", window.length},
-                       {"lower_mean", window.lower_mean},
-                       {"upper_mean", window.upper_mean},
-                       {"upper_log_rms", window.upper_log_rms},
-                       {"activity_slope", window.activity_slope},
-                       {"log_activity", window.log_activity}});
-  }
-  return windows;
-}
-
-cli::Json RuleJson(const TsRule& rule) {
-  cli::Json sets = cli::Json::array();
+Json RuleJson(const TsRule& rule) {
+  Json sets = Json::array();
   for (const FuzzySet& set : rule.antecedents) {
     sets.push_back({{"left_center", set.left_center},
                     {"right_center", set.right_center},
@@ -135,23 +360,8 @@ cli::Json RuleJson(const TsRule& rule) {
           {"intercept", rule.intercept},    {"data_share", rule.data_share}};
 }
 
-void AddRules(const ModelSet& models, cli::Json& json) {
-  for (std::size_t o = 0; o < models.observers.size(); ++o) {
-    for (std::size_t c = 0; c < models.channels.size(); ++c) {
-      const TsModel& model = models.observers[o].channels[c].model;
-      cli::Json& channel = json["observers"][o]["channels"][c];
-      channel["regressor_min"] = model.regressor_min;
-      channel["regressor_max"] = model.regressor_max;
-      channel["rule_list"] = cli::Json::array();
-      for (const TsRule& rule : model.rules) {
-        channel["rule_list"].push_back(RuleJson(rule));
-      }
-    }
-  }
-}
-
-cli::Json SetJson(const ModelSet& models, bool active, bool rules) {
-  cli::Json json = ModelsJson(models);
+Json SetJson(ModelSet models, bool active, const storage::Lineage& lineage) {
+  Json json = ModelsJson(models);
   json["active"] = active;
   json["created_utc"] = cli::FormatTime(models.created_ns, true);
   json["software"] = models.software;
@@ -159,75 +369,100 @@ cli::Json SetJson(const ModelSet& models, bool active, bool rules) {
   json["sample_period_s"] = models.sample_period_s;
   json["flow_unit"] = FlowUnitName(models.flow_unit);
   json["trained_cv"] = {models.validity.cv.minimum, models.validity.cv.maximum};
+  json["faults"] = FaultsJson(models.faults);
   json["threshold_hours"] = models.threshold_hours;
   json["false_alarms_per_hour"] = models.false_alarms_per_hour;
-  json["decision"] = DecisionJson(models.decision);
+  VisitDecision(models.decision,
+                [&json](const char* key, const auto& field, auto...) {
+                  json["decision"][key] = field;
+                });
   json["training_runs"] = models.training_runs;
-  json["channels"] = cli::Json::array();
-  for (const ChannelSpec& channel : models.channels) {
-    json["channels"].push_back(
-        {{"name", channel.name},
-         {"output", SignalName(channel.output)},
-         {"unit", UnitOf(channel.output, models.flow_unit)},
-         {"lower_threshold", channel.lower_threshold},
-         {"upper_threshold", channel.upper_threshold},
-         {"windows", WindowsJson(channel)}});
-  }
-  if (rules) {
-    AddRules(models, json);
-  }
+  json["lineage"] = cli::LineageJson(lineage);
   return json;
 }
 
-void DrawPictures(const ModelSet& models, const std::filesystem::path& folder,
-                  const storage::DataDirectory& directory,
-                  const cli::Context& context) {
-  cli::EnsureFolder(folder);
-  const TrainingResiduals residuals =
-      RepeatTrainingResiduals(models, directory);
-  for (const std::string& missing : residuals.missing) {
-    context.log(LogLevel::kWarning,
-                cli::EventLine("residuals_missing", {{"reason", missing}}));
+void AddSummary(const ModelSet& models, const storage::Lineage& lineage,
+                bool active, cli::Report& report) {
+  const auto field = [](std::string heading, std::string text) {
+    return cli::Column{.heading = std::move(heading),
+                       .key = "",
+                       .text = [text](const Json&) { return text; }};
+  };
+  report.Fields(
+      "", {field("model set", NameOf(models) + (active ? " (active)" : "")),
+           {"content hash", "content_hash"},
+           {"created", "created_utc", cli::Format::kTime},
+           {"software", "software"},
+           {"preset", "preset"},
+           field("sample period", Text(models.sample_period_s) + " s"),
+           {"flow unit", "flow_unit"},
+           field("commands", Text(models.validity.cv.minimum) + ".." +
+                                 Text(models.validity.cv.maximum) + " %"),
+           field("faults", FaultsText(models.faults)),
+           field("thresholds", "for " + Text(models.false_alarms_per_hour) +
+                                   " false alarms per hour, from " +
+                                   Text(models.threshold_hours) +
+                                   " h without fault"),
+           field("decision", DecisionText(models.decision)),
+           field("built on", cli::ParentText(lineage)),
+           field("training runs", TrainingRunsText(models))});
+  report.Line("");
+  if (!lineage.episodes.empty()) {
+    AddEpisodeTable(report);
+    report.Line("");
   }
-  const int count = WriteModelPictures(models, residuals, folder);
-  context.log(LogLevel::kInfo,
-              cli::EventLine("pictures_written",
-                             {{"folder", folder.string()},
-                              {"pictures", std::to_string(count)}}));
 }
 
-int Show(const ShowOptions& options, const cli::Context& context) {
+void AddRules(const ModelSet& models, cli::Report& report) {
+  report.Line(
+      "\nRules. (k-1) of the output itself is the model's own prediction.");
+  for (std::size_t o = 0; o < models.observers.size(); ++o) {
+    for (std::size_t c = 0; c < models.channels.size(); ++c) {
+      const TsModel& model = models.observers[o].channels[c].model;
+      Json& channel = report.document["observers"][o]["channels"][c];
+      channel["regressor_min"] = model.regressor_min;
+      channel["regressor_max"] = model.regressor_max;
+      channel["rule_list"] = Json::array();
+      for (const TsRule& rule : model.rules) {
+        channel["rule_list"].push_back(RuleJson(rule));
+      }
+      std::string rules = RulesText(model, models.flow_unit);
+      rules.pop_back();  // The line ends by itself.
+      report.Line("\n" + models.observers[o].name + ", " +
+                  models.channels[c].name + ":\n" + rules);
+    }
+  }
+}
+
+cli::Report Show(const ShowOptions& options, const cli::Context& context) {
   const storage::DataDirectory directory{context.options.data_dir};
   storage::ModelStore store(directory.models());
   const ModelSet models = store.Load(options.model_set);
-  const bool active = store.Summary({models.name, models.version}).active;
+  const storage::ModelReference reference{models.name, models.version};
   if (!options.pictures.empty()) {
-    DrawPictures(models, options.pictures, directory, context);
+    WriteModelPictures(models, directory, options.pictures, context.log);
   }
-  const storage::Lineage lineage =
-      store.LineageOf({models.name, models.version});
-  if (context.options.json) {
-    cli::Json json = SetJson(models, active, options.rules);
-    json["lineage"] = cli::LineageJson(lineage);
-    cli::PrintJson(std::cout, json);
-    return cli::kExitOk;
-  }
-  PrintSummary(std::cout, models, lineage, active, context.options.utc);
-  PrintModels(std::cout, models);
+  const storage::Lineage lineage = store.LineageOf(reference);
+  const bool active = store.Summary(reference).active;
+  cli::Report report;
+  report.document = SetJson(models, active, lineage);
+  AddSummary(models, lineage, active, report);
+  AddModelTables(models, report);
   if (options.rules) {
-    PrintRules(std::cout, models);
+    AddRules(models, report);
   }
-  return cli::kExitOk;
+  return report;
 }
 
 }  // namespace
 
 void AddShowVerb(cli::Program& program) {
   auto options = std::make_shared<ShowOptions>();
-  CLI::App& verb = program.AddVerb("show", "Show a model set, and its rules",
-                                   [options](const cli::Context& context) {
-                                     return Show(*options, context);
-                                   });
+  CLI::App& verb =
+      program.AddVerb("show", "Show a model set, and its rules",
+                      [options](const cli::Context& context) -> cli::Report {
+                        return Show(*options, context);
+                      });
   verb.add_option("model-set", options->model_set,
                   "NAME (its active version) or NAME@VERSION")
       ->required()
@@ -237,6 +472,10 @@ void AddShowVerb(cli::Program& program) {
                   "Write SVG files: fuzzy sets of the normal models, residual "
                   "memberships of all observers over their residuals")
       ->type_name("DIR");
+  program.AddExamples(
+      {{"show",
+        {{"Fit of every observer", "fdi-trainer show paper"},
+         {"Its rules in words", "fdi-trainer show paper@2 --rules"}}}});
 }
 
 }  // namespace fdi::trainer

@@ -1,11 +1,54 @@
 #include "trainer/onboarding/fault_synthesis.h"
 
 #include <algorithm>
+#include <array>
 
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "simulator/valve_simulation.h"
 
 namespace fdi::trainer {
+namespace {
+
+constexpr std::array kStrengths{0.1, 0.25, 0.5, 0.75, 1.0};
+constexpr std::array kSignedStrengths{0.1, 0.25, 0.5, 0.75};
+// Of the span: faults of transmitters are steps.
+constexpr std::array kTransmitterStrengths{0.02, 0.1, 0.5, 1.0};
+
+void Add(int fault, const auto& strengths, bool both_ways,
+         std::vector<FaultCondition>& faults) {
+  for (const double strength : strengths) {
+    faults.push_back({fault, strength});
+    if (both_ways) {
+      faults.push_back({fault, -strength});
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<FaultCondition> OnboardingFaults(SignalMask signals) {
+  const auto measured = [&](Signal signal) {
+    return (signals & MaskOf(signal)) != 0;
+  };
+  std::vector<FaultCondition> faults;
+  for (int fault = 1; fault <= kLastFault; ++fault) {
+    if (fault == 14 || (fault == 19 && !measured(Signal::kF))) {
+      continue;
+    }
+    if (const auto transmitter = TransmitterOf(fault)) {
+      if (measured(*transmitter)) {
+        Add(fault, kTransmitterStrengths, true, faults);
+      }
+    } else if (FaultFactsOf(fault).is_signed && fault != 4) {
+      Add(fault, kSignedStrengths, true, faults);
+    } else {  // f4 too: there is no less play than none.
+      Add(fault, kStrengths, false, faults);
+    }
+  }
+  return faults;
+}
+
 namespace {
 
 using simulator::Transmitter;

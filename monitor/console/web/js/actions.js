@@ -2,17 +2,13 @@
 // that asks who and why; the token is asked for once a session.
 
 import {path, post, token} from './api.js';
-import {h, replace} from './dom.js';
+import {button, field, h, replace, select, showDialog} from './dom.js';
 import {faultTitle, members} from './faults.js';
 import {settings} from './settings.js';
 import {store} from './store.js';
 
 /** Whether the monitor takes actions at all. */
 export const canAct = () => store.status?.write === true;
-
-function field(text, input) {
-  return h('label', {class: 'field'}, h('span', {}, text), input);
-}
 
 /**
  * A dialog with who and comment; `send` gets both and may throw.
@@ -32,10 +28,9 @@ function ask({title, subject, fields, verb, commentNeeded, send}) {
       field(commentNeeded ? 'Reason' : 'Comment', comment),
       secret ? field('Token of the monitor (file of --console-write)',
           secret) : null, wrong,
-      h('div', {class: 'buttons'}, h('button', {type: 'button',
-        onclick: () => dialog.close()}, 'Cancel'), submit));
-  const dialog = h('dialog', {'aria-labelledby': 'dialog-title'},
-      h('h2', {id: 'dialog-title'}, title), form);
+      h('div', {class: 'buttons'},
+          button('Cancel', () => dialog.close()), submit));
+  const dialog = h('dialog', {}, h('h2', {}, title), form);
   return new Promise((resolve) => {
     let sent = false;
     form.addEventListener('submit', async (event) => {
@@ -56,12 +51,8 @@ function ask({title, subject, fields, verb, commentNeeded, send}) {
         submit.disabled = false;
       }
     });
-    dialog.addEventListener('close', () => {
-      dialog.remove();
-      resolve(sent);
-    });
-    document.body.append(dialog);
-    dialog.showModal();
+    dialog.addEventListener('close', () => resolve(sent));
+    showDialog(dialog);
     (who.value ? comment : who).focus();
   });
 }
@@ -90,13 +81,12 @@ const kShelfTimes = [
 ];
 
 export function shelve(row) {
-  const minutes = h('select', {}, kShelfTimes.map(([value, text]) =>
-    h('option', {value}, text)));
-  minutes.value = '480';
-  const scope = h('select', {},
-      row.fault && row.fault !== 'unknown' ?
-        h('option', {value: row.fault}, `Only ${faultTitle(row.fault)}`) : null,
-      h('option', {value: ''}, 'Every alarm of this valve'));
+  const minutes = select(kShelfTimes, '480');
+  const own = row.fault && row.fault !== 'unknown' ? row.fault : null;
+  const scope = select([
+    ...(own ? [[own, `Only ${faultTitle(own)}`]] : []),
+    ['', 'Every alarm of this valve'],
+  ], own ?? '');
   return ask({
     title: 'Shelve', verb: 'Shelve', subject: row.valve, commentNeeded: true,
     fields: [field('For', minutes), field('What', scope)],
@@ -117,13 +107,13 @@ export function unshelve(row) {
 
 export function label(row) {
   const own = members(row.fault);
-  const choice = h('select', {},
-      h('option', {value: 'true'}, own.length > 0 ?
-        `True: it was ${faultTitle(row.fault)}` : 'True: there was a fault'),
-      h('option', {value: 'false'}, 'False alarm'),
-      [...store.faults.keys()].map((fault) => h('option', {value: fault},
-          `It was ${faultTitle(fault)}`)));
-  if (row.label) choice.value = row.label;
+  const choice = select([
+    ['true', own.length > 0 ? `True: it was ${faultTitle(row.fault)}` :
+      'True: there was a fault'],
+    ['false', 'False alarm'],
+    ...[...store.faults.keys()].map((fault) =>
+      [fault, `It was ${faultTitle(fault)}`]),
+  ], row.label ?? 'true');
   return ask({
     title: 'Label', verb: 'Label', subject: describe([row]),
     fields: [field('What was it?', choice)],
@@ -136,15 +126,14 @@ export function label(row) {
 /** Buttons for what can be done to an alarm now; `done` after each. */
 export function actionButtons(row, done) {
   if (!canAct()) return [];
-  const button = (text, action, target) => h('button', {
-    'type': 'button', 'aria-label': `${text} ${row.valve}`,
-    'onclick': async () => await action(target) && done?.(),
-  }, text);
+  const acting = (text, action, target) =>
+    button(text, async () => await action(target) && done?.(),
+        {'aria-label': `${text} ${row.valve}`});
   const open = row.isa === 'UNACK' || row.isa === 'RTN_UNACK';
   return [
-    open ? button('Acknowledge', acknowledge, [row]) : null,
-    row.shelved ? button('Unshelve', unshelve, row) :
-      row.state !== 'CLOSED' ? button('Shelve', shelve, row) : null,
-    button('Label', label, row),
+    open ? acting('Acknowledge', acknowledge, [row]) : null,
+    row.shelved ? acting('Unshelve', unshelve, row) :
+      row.state !== 'CLOSED' ? acting('Shelve', shelve, row) : null,
+    acting('Label', label, row),
   ];
 }

@@ -1,5 +1,7 @@
 // The monitor's HTTP interface.
 
+import {queryText} from './route.js';
+
 const kBase = 'api/v1';
 const kTokenKey = 'fdi.token';
 
@@ -11,16 +13,7 @@ export class ApiError extends Error {
   }
 }
 
-export function url(path, query = {}) {
-  const parameters = new URLSearchParams();
-  for (const [name, value] of Object.entries(query)) {
-    if (value !== null && value !== undefined && value !== '') {
-      parameters.set(name, value);
-    }
-  }
-  const text = parameters.toString();
-  return kBase + path + (text ? '?' + text : '');
-}
+export const url = (path, query = {}) => kBase + path + queryText(query);
 
 /** "/valves/FV%2F1/trend" from ['valves', 'FV/1', 'trend'] */
 export function path(...words) {

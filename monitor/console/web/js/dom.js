@@ -37,6 +37,32 @@ export function svg(tag, attributes = {}, ...children) {
   return node;
 }
 
+export function button(text, onclick, attributes = {}) {
+  return h('button', {type: 'button', onclick, ...attributes}, text);
+}
+
+/** `options`: [[value, text]]. */
+export function select(options, value, attributes = {}) {
+  const node = h('select', attributes, options.map(([key, text]) =>
+    h('option', {value: key}, text)));
+  node.value = value;
+  return node;
+}
+
+export function field(text, input) {
+  return h('label', {class: 'field'}, h('span', {}, text), input);
+}
+
+/** `facts`: [[name, value]]. */
+export function factList(facts) {
+  return h('dl', {class: 'facts'}, facts.map(([name, value]) =>
+    h('div', {}, h('dt', {}, name), h('dd', {}, value))));
+}
+
+export function errorNote(error) {
+  return h('p', {class: 'note', role: 'alert'}, error.message);
+}
+
 export function replace(node, ...children) {
   node.replaceChildren();
   append(node, children);
@@ -47,8 +73,14 @@ export function setText(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
-export function setClass(node, name) {
-  if (node.className !== name) node.className = name;
+/** Shows a dialog until it is closed; it is named by its first heading. */
+export function showDialog(dialog) {
+  const heading = dialog.querySelector('h2');
+  heading.id = 'dialog-title';
+  dialog.setAttribute('aria-labelledby', heading.id);
+  dialog.addEventListener('close', () => dialog.remove());
+  document.body.append(dialog);
+  dialog.showModal();
 }
 
 /** Value of a CSS variable, for canvases. */

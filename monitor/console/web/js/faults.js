@@ -1,5 +1,7 @@
 // Faults in the words of the catalogue, and how alarms are ranked.
 
+import {svg} from './dom.js';
+import {timeText} from './format.js';
 import {store} from './store.js';
 
 /** Members of "f19|f3". */
@@ -27,20 +29,23 @@ export function faultTitle(fault) {
 
 const kPriority = {critical: 1, high: 2, medium: 3, low: 4};
 
-/** Level of the catalogue's bands at a strength (0..1). */
-function levelAt(bands, strength) {
+/** Priority of a fault of the catalogue at a strength (0..1). */
+function priorityAt(fault, strength) {
   const size = Math.abs(strength ?? 0);
-  return bands.filter((band) => band.from <= size).at(-1)?.level;
+  const bands = store.faults.get(fault)?.severity ?? [];
+  return kPriority[bands.filter((band) => band.from <= size).at(-1)?.level] ??
+      kPriority.medium;
 }
 
-/** 1 (critical) to 4 (low); what is not isolated yet counts as medium. */
+/**
+ * 1 (critical) to 4 (low). Of a set of faults that cannot be told apart it is
+ * that of the gravest, in a tile as in the alarm list.
+ */
 export function priorityOf(row) {
-  const fault = row.fault ?? row.faults?.join('|');
-  const severity = row.severity ??
-      store.faults.get(members(fault)[0])?.severity;
-  const level = Array.isArray(severity) ?
-    levelAt(severity, row.strength) : severity;
-  return kPriority[level] ?? 3;
+  if (row.severity) return kPriority[row.severity] ?? kPriority.medium;
+  const own = members(row.fault ?? row.faults?.join('|'));
+  return Math.min(...(own.length > 0 ? own : ['unknown']).map((fault) =>
+    priorityAt(fault, row.strength)));
 }
 
 export const priorityNames =
@@ -70,21 +75,20 @@ export function compareAlarms(a, b) {
       b.detected_ms - a.detected_ms || (a.episode < b.episode ? -1 : 1);
 }
 
-const namur = {
-  F: 'failure', C: 'check function', S: 'out of specification',
-  M: 'maintenance required',
-};
-
 /** NE 107 class in words. */
-export function namurText(code) {
-  return code ? namur[code] ?? String(code).replaceAll('_', ' ') : '–';
-}
+export const namurText = (name) => name ? plain(name) : '–';
+
+/** Whether a fault is detected; a valve that is not judged is in none. */
+export const inAlarm = ({state}) => state !== 'NORMAL' && state !== 'NOT_JUDGED';
 
 const kStateWords = {
-  NORMAL: 'normal', DETECTED: 'fault detected', ISOLATED: 'fault isolated',
-  REISOLATED: 'isolated anew', CLEARED: 'cleared', CLOSED: 'closed',
+  NORMAL: 'normal', NOT_JUDGED: 'not judged', DETECTED: 'fault detected',
+  ISOLATED: 'fault isolated', REISOLATED: 'isolated anew', CLEARED: 'cleared',
+  CLOSED: 'closed',
 };
 export const stateWord = (state) => kStateWords[state] ?? state;
+
+const plain = (word) => String(word).toLowerCase().replaceAll('_', ' ');
 
 const kQualityWords = {
   LIVE: 'live', STALE: 'no data', BAD_INPUT: 'bad input',
@@ -92,12 +96,38 @@ const kQualityWords = {
   MODEL_UNSUITED: 'model unsuited', UNASSIGNED: 'no model set',
   ENDED: 'stream ended',
 };
-export const qualityWord = (quality) =>
-  kQualityWords[quality] ?? String(quality).toLowerCase().replaceAll('_', ' ');
+/** Why a valve is not judged; empty if it is. */
+export function qualityText({quality, stamp_ms: stamp, reasons, missing}) {
+  if (quality === 'LIVE') return '';
+  return (kQualityWords[quality] ?? plain(quality)) +
+      (quality === 'STALE' && stamp ? ` since ${timeText(stamp)}` : '') +
+      (quality === 'BAD_INPUT' && missing?.length ?
+        `: no ${missing.join(', ')}` : '') +
+      (reasons ? `: ${reasons.replaceAll('|', ', ')}` : '');
+}
 
 const kMarkWords = {
   REISOLATED: 'isolated anew', ACK: 'acknowledged', LABEL: 'labelled',
 };
 export const markWord = (kind) =>
-  kMarkWords[String(kind).toUpperCase()] ??
-    String(kind).toLowerCase().replaceAll('_', ' ');
+  kMarkWords[String(kind).toUpperCase()] ?? plain(kind);
+
+// Signs of alarms: shape, number and text say what the colour says.
+const kShapes = {
+  1: 'M2 2h16v16H2z',
+  2: 'M10 1l9.5 17H.5z',
+  3: 'M.5 2h19L10 19z',
+  4: 'M10 1a9 9 0 1 0 0 18a9 9 0 1 0 0-18z',
+};
+const kTextY = {1: 14, 2: 16, 3: 11.5, 4: 14};
+
+/** Square, triangle, triangle on its tip, circle; hollow until isolated. */
+export function prioritySign(priority, isolated = true) {
+  return svg('svg', {
+    'class': `sign p${priority}${isolated ? '' : ' hollow'}`,
+    'viewBox': '0 0 20 20', 'aria-hidden': 'true', 'focusable': 'false',
+  },
+  svg('path', {d: kShapes[priority]}),
+  svg('text', {x: 10, y: kTextY[priority], 'text-anchor': 'middle'},
+      isolated ? String(priority) : '?'));
+}

@@ -1,10 +1,9 @@
 // Starts the page: what is on top, which view a link means.
 
-import {startAnnouncements} from './announce.js';
 import {replace} from './dom.js';
 import {parseRoute} from './route.js';
 import {applyTheme, settings} from './settings.js';
-import {createShell} from './shell.js';
+import {createShell, startAnnouncements} from './shell.js';
 import {startShortcuts} from './shortcuts.js';
 import {store} from './store.js';
 import {alarmsView} from './views/alarms.js';
@@ -14,10 +13,12 @@ import {plantView} from './views/plant.js';
 import {valveView} from './views/valve.js';
 import {worklistView} from './views/worklist.js';
 
-const kViews = {
-  '': plantView, 'valve': valveView, 'alarms': alarmsView,
-  'episode': episodeView, 'history': historyView, 'worklist': worklistView,
-};
+// A map: a link may say "__proto__".
+const kViews = new Map([
+  ['', plantView], ['valve', valveView], ['alarms', alarmsView],
+  ['episode', episodeView], ['history', historyView],
+  ['worklist', worklistView],
+]);
 
 const main = document.getElementById('main');
 let current = null;
@@ -25,9 +26,8 @@ let current = null;
 /** Shows what the address says; `byUser` moves the focus there, too. */
 function show(byUser) {
   const route = parseRoute(location.hash);
-  if (current?.stays?.(route)) return;
   current?.destroy?.();
-  const view = kViews[route.name] ?? plantView;
+  const view = kViews.get(route.name) ?? plantView;
   store.watch(view === valveView ? route.id : null);
   current = view(route);
   replace(main, current.element);

@@ -1,14 +1,14 @@
 // What stands above every view: where one is, how many alarms, whether the data
 // are fresh, the clock.
 
-import {h, replace, setText} from './dom.js';
-import {groups, groupOf, priorityOf, priorityNames} from './faults.js';
+import {button, h, replace, setText} from './dom.js';
+import {faultTitle, groups, groupOf, priorityNames, priorityOf, prioritySign}
+  from './faults.js';
 import {clockText, dateText, durationText, timeText, zoneName}
   from './format.js';
 import {nextTheme, settings} from './settings.js';
 import {showHelp} from './shortcuts.js';
 import {store} from './store.js';
-import {prioritySign} from './symbols.js';
 
 const kEntries = [
   {name: '', text: 'Plant', key: '1'},
@@ -16,6 +16,7 @@ const kEntries = [
   {name: 'history', text: 'History', key: '3'},
   {name: 'worklist', text: 'Work list', key: '4'},
 ];
+const kPauseMs = 1000;  // In which new alarms are counted, not named.
 const kGraceMs = 2000;  // A change of view reconnects; that is no news.
 
 function countAlarms() {
@@ -62,12 +63,10 @@ export function createShell(top, banner) {
   const summary = h('a', {class: 'summary', href: '#/alarms'});
   const health = h('span', {class: 'health'});
   const clock = h('span', {class: 'clock'});
-  const theme = h('button', {type: 'button', title: 'Light or dark (key T)',
-    onclick: () => nextTheme()});
-  const utc = h('button', {type: 'button', title: 'Local time or UTC (key U)',
-    onclick: () => settings.set('utc', !settings.get('utc'))});
-  const help = h('button', {type: 'button', title: 'Keys (key ?)',
-    onclick: showHelp}, 'Keys');
+  const theme = button('', nextTheme, {title: 'Light or dark (key T)'});
+  const utc = button('', () => settings.set('utc', !settings.get('utc')),
+      {title: 'Local time or UTC (key U)'});
+  const help = button('Keys', showHelp, {title: 'Keys (key ?)'});
   replace(top, h('span', {class: 'brand'}, 'Valves'),
       h('nav', {'aria-label': 'Views'}, links), summary,
       h('div', {class: 'tools'}, health, clock, utc, theme, help));
@@ -127,4 +126,20 @@ export function createShell(top, banner) {
       showSummary();
     },
   };
+}
+
+/** Says new alarms to screen readers; many at once become a number. */
+export function startAnnouncements(node) {
+  let waiting = [];
+  const say = () => {
+    const text = waiting.length > 3 ? `${waiting.length} new alarms` :
+      waiting.map((row) => `New alarm: ${row.valve}, ${faultTitle(row.fault)}`)
+          .join('. ');
+    waiting = [];
+    node.replaceChildren(document.createTextNode(text));
+  };
+  store.addEventListener('alarms', ({detail}) => {
+    if (!detail?.isNew || detail.row.isa !== 'UNACK') return;
+    if (waiting.push(detail.row) === 1) setTimeout(say, kPauseMs);
+  });
 }

@@ -1,7 +1,7 @@
 // Single keys, which can be switched off, and the list of them. Views add
 // theirs by onKey(), which returns what takes them away again.
 
-import {h} from './dom.js';
+import {button, h, showDialog} from './dom.js';
 import {nextTheme, settings} from './settings.js';
 
 const keys = new Map();
@@ -22,20 +22,16 @@ function isTyping(target) {
 export function showHelp() {
   const on = h('input', {type: 'checkbox', checked: settings.get('shortcuts'),
     onchange: () => settings.set('shortcuts', on.checked)});
-  const dialog = h('dialog', {'class': 'help', 'aria-labelledby': 'help-title'},
-      h('h2', {id: 'help-title'}, 'Keys'),
+  const dialog = h('dialog', {class: 'help'}, h('h2', {}, 'Keys'),
       h('table', {},
           h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Key'),
               h('th', {scope: 'col'}, 'What it does'))),
           h('tbody', {}, [...keys].map(([key, {text}]) => h('tr', {},
               h('td', {}, h('kbd', {}, key)), h('td', {}, text))))),
       h('label', {class: 'check'}, on, ' Single keys are switched on'),
-      h('div', {class: 'buttons'}, h('button', {
-        type: 'button', class: 'primary', onclick: () => dialog.close(),
-      }, 'Close')));
-  dialog.addEventListener('close', () => dialog.remove());
-  document.body.append(dialog);
-  dialog.showModal();
+      h('div', {class: 'buttons'},
+          button('Close', () => dialog.close(), {class: 'primary'})));
+  showDialog(dialog);
 }
 
 export function startShortcuts() {

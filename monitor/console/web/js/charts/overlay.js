@@ -38,25 +38,28 @@ function clipped(u, draw) {
 
 const xOf = (u, ms) => u.valToPos(ms, 'x', true);
 
-function drawBand(u, ctx, {left, width}, {low, high}) {
-  const top = u.valToPos(high, 'y', true);
-  const bottom = u.valToPos(low, 'y', true);
-  ctx.fillStyle = cssColor('--band');
-  ctx.fillRect(left, top, width, bottom - top);
-  drawLevel(u, ctx, left, width, high);
-  drawLevel(u, ctx, left, width, low);
+function drawLine(ctx, [fromX, fromY], [toX, toY], dash) {
+  ctx.setLineDash(dash.map((d) => d * devicePixelRatio));
+  ctx.beginPath();
+  ctx.moveTo(fromX, fromY);
+  ctx.lineTo(toX, toY);
+  ctx.stroke();
+  ctx.setLineDash([]);
 }
 
-function drawLevel(u, ctx, left, width, value) {
+function drawLevel(u, ctx, {left, width}, value) {
   const y = u.valToPos(value, 'y', true);
   ctx.strokeStyle = cssColor('--ink-soft');
   ctx.lineWidth = devicePixelRatio;
-  ctx.setLineDash([5 * devicePixelRatio, 4 * devicePixelRatio]);
-  ctx.beginPath();
-  ctx.moveTo(left, y);
-  ctx.lineTo(left + width, y);
-  ctx.stroke();
-  ctx.setLineDash([]);
+  drawLine(ctx, [left, y], [left + width, y], [5, 4]);
+}
+
+function drawBand(u, ctx, box, {low, high}) {
+  const top = u.valToPos(high, 'y', true);
+  ctx.fillStyle = cssColor('--band');
+  ctx.fillRect(box.left, top, box.width, u.valToPos(low, 'y', true) - top);
+  drawLevel(u, ctx, box, high);
+  drawLevel(u, ctx, box, low);
 }
 
 function drawGaps(u, ctx, {left, top, width, height}, gaps, first) {
@@ -103,12 +106,8 @@ function drawMarks(u, ctx, {left, top, width, height}, marks, first) {
     if (x < left || x > left + width) continue;
     ctx.strokeStyle = ctx.fillStyle = cssColor('--ink');
     ctx.lineWidth = 1.5 * ratio;
-    ctx.setLineDash(mark.kind === 'DETECTED' ? [4 * ratio, 3 * ratio] : []);
-    ctx.beginPath();
-    ctx.moveTo(x, top);
-    ctx.lineTo(x, top + height);
-    ctx.stroke();
-    ctx.setLineDash([]);
+    drawLine(ctx, [x, top], [x, top + height],
+        mark.kind === 'DETECTED' ? [4, 3] : []);
     if (!first) continue;
     const text = markWord(mark.kind);
     const room = ctx.measureText(text).width + 8 * ratio;
@@ -129,8 +128,7 @@ export function overlayHooks(panel, scene, isFirst) {
   return {
     drawClear: [(u) => clipped(u, (ctx, box) => {
       if (panel.band) drawBand(u, ctx, box, panel.band);
-      if (panel.threshold) drawLevel(u, ctx, box.left, box.width,
-          panel.threshold);
+      if (panel.threshold) drawLevel(u, ctx, box, panel.threshold);
       drawGaps(u, ctx, box, scene.gaps, isFirst);
     })],
     draw: [(u) => clipped(u, (ctx, box) => {

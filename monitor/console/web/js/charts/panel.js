@@ -62,12 +62,12 @@ function rangeOf(panel, scale) {
   };
 }
 
-export class Panel {
+class Panel {
   legend = h('div', {class: 'legend'});
   plotBox = h('div', {class: 'plot'});
   #entries = [];
 
-  /** `handlers`: cursor(index), mousedown(u, event), zoomed(u), reset(). */
+  /** `handlers`: mousedown(u, event), zoomed(u), reset(). */
   constructor(panel, scene, {isFirst, isLast, width, syncKey, handlers}) {
     this.panel = panel;
     this.scene = scene;
@@ -178,5 +178,43 @@ export class Panel {
 
   destroy() {
     this.u.destroy();
+  }
+}
+
+/** Panels below each other on one axis of time, as wide as there is room. */
+export class PanelStack {
+  element = h('div', {class: 'panels'});
+  panels = [];
+  #resize = new ResizeObserver(() => this.#fit());
+
+  constructor() {
+    this.#resize.observe(this.element);
+  }
+
+  /** `list`: what panelsOf() gives; `handlers` as for Panel. */
+  show(list, scene, syncKey, handlers) {
+    this.#clear();
+    const width = Math.max(280, this.element.clientWidth || 800);
+    this.panels = list.map((panel, i) => new Panel(panel, scene, {
+      isFirst: i === 0, isLast: i === list.length - 1, width, syncKey,
+      handlers}));
+    this.element.replaceChildren(...this.panels.map((panel) => panel.element));
+  }
+
+  destroy() {
+    this.#resize.disconnect();
+    this.#clear();
+  }
+
+  #clear() {
+    this.panels.forEach((panel) => panel.destroy());
+    this.panels = [];
+  }
+
+  #fit() {
+    const width = this.element.clientWidth;
+    for (const {u} of this.panels) {
+      if (Math.abs(u.width - width) > 1) u.setSize({width, height: u.height});
+    }
   }
 }

@@ -1,11 +1,11 @@
 // Panels of a trend on one axis of time: zoom by dragging, pan by Shift and
 // dragging, both by keys and buttons; follows the newest until told otherwise.
 
-import {h, replace, setText} from '../dom.js';
+import {button, h, replace, setText} from '../dom.js';
 import {markWord} from '../faults.js';
 import {durationText, timeText} from '../format.js';
 import {reasonText} from './overlay.js';
-import {Panel} from './panel.js';
+import {PanelStack} from './panel.js';
 import {panelsOf} from './panels.js';
 
 const kLeastSpanMs = 5000;
@@ -13,17 +13,17 @@ let count = 0;
 
 export class Timeline {
   element;
-  #panels = [];
+  #stack = new PanelStack();
   #scene = {table: {t: []}, gaps: [], marks: []};
-  #panelBox = h('div', {class: 'panels'});
-  #buttons;
+  #panelBox = this.#stack.element;
+  #buttons = h('div', {
+    'class': 'chart-tools', 'role': 'group', 'aria-label': 'Time shown'});
   #summary = h('p', {class: 'hint trend-summary'});
   #spanMs;  // Of the window that follows; null: all.
   #window = null;  // What the user looks at; null: follow.
   #setting = false;
   #syncKey = `trend${++count}`;
   #hidden = new Set(['process']);
-  #resize = new ResizeObserver(() => this.#fit());
   #data;
 
   /**
@@ -36,8 +36,6 @@ export class Timeline {
     this.live = live;
     this.nowMs = nowMs;
     this.silentMs = silentMs;
-    this.#buttons = h('div', {
-      'class': 'chart-tools', 'role': 'group', 'aria-label': 'Time shown'});
     this.#panelBox.tabIndex = 0;
     this.#panelBox.setAttribute('role', 'application');
     this.#panelBox.setAttribute('aria-roledescription', 'trend');
@@ -48,47 +46,38 @@ export class Timeline {
     this.element = h('div', {class: 'timeline'}, this.#buttons, this.#panelBox,
         this.#summary);
     this.#makeButtons();
-    this.#resize.observe(this.#panelBox);
   }
 
   destroy() {
-    this.#resize.disconnect();
-    this.#panels.forEach((panel) => panel.destroy());
+    this.#stack.destroy();
   }
 
   /** Channels or faults are others: panels anew. */
   rebuild() {
-    this.#panels.forEach((panel) => panel.destroy());
-    this.#panels = [];
     this.#readScene();
     const all = panelsOf(this.#data, this.#scene.table);
-    const shown = all.filter((panel) => !this.#hidden.has(panel.key));
     this.hasProcess = all.some((panel) => panel.key === 'process');
-    const width = Math.max(280, this.#panelBox.clientWidth || 800);
-    this.#panels = shown.map((panel, i) => new Panel(panel, this.#scene, {
-      isFirst: i === 0, isLast: i === shown.length - 1, width,
-      syncKey: this.#syncKey, handlers: {
-        mousedown: (u, event) => this.#pan(u, event),
-        zoomed: (u) => this.#zoomed(u),
-        reset: () => this.showAll(),
-      },
-    }));
-    replace(this.#panelBox, this.#panels.map((panel) => panel.element));
+    this.#stack.show(all.filter((panel) => !this.#hidden.has(panel.key)),
+        this.#scene, this.#syncKey, {
+          mousedown: (u, event) => this.#pan(u, event),
+          zoomed: (u) => this.#zoomed(u),
+          reset: () => this.showAll(),
+        });
     this.#makeButtons();
     this.update();
   }
 
   /** Instants, gaps or marks have changed. */
   update() {
-    if (this.#panels.length === 0) return;
+    if (this.panels.length === 0) return;
     this.#readScene();
     this.#summarise();
-    this.#panels.forEach((panel) => panel.update());
+    this.panels.forEach((panel) => panel.update());
     this.#apply(this.#window ?? this.#following());
   }
 
   get panels() {
-    return this.#panels;
+    return this.#stack.panels;
   }
 
   showAll() {
@@ -141,14 +130,14 @@ export class Timeline {
 
   #apply([min, max]) {
     this.#setting = true;
-    for (const {u} of this.#panels) u.setScale('x', {min, max});
+    for (const {u} of this.panels) u.setScale('x', {min, max});
     // Scales are set at the end of the task.
     queueMicrotask(() => this.#setting = false);
   }
 
   #zoomed(u) {
     const {min, max} = u.scales.x;
-    if (this.#setting || this.#panels.length === 0 || min === null) return;
+    if (this.#setting || this.panels.length === 0 || min === null) return;
     this.#look([min, max]);
   }
 
@@ -200,7 +189,7 @@ export class Timeline {
       this.shift(Math.sign(event.deltaY || event.deltaX) * 0.1);
       return;
     }
-    const u = this.#panels[0]?.u;
+    const u = this.panels[0]?.u;
     if (!u) return;
     const {left} = u.over.getBoundingClientRect();
     this.zoom(event.deltaY > 0 ? 1.25 : 0.8,
@@ -223,23 +212,22 @@ export class Timeline {
   #makeButtons() {
     const focused = this.#buttons.contains(document.activeElement) ?
       document.activeElement.title : null;
-    const button = (text, action, title, pressed) => h('button', {
-      'type': 'button', title, 'onclick': action,
-      'aria-label': /\w/.test(text) ? null : title,
-      'aria-pressed': pressed === undefined ? null : String(pressed)}, text);
+    const tool = (text, action, title, pressed) => button(text, action, {
+      title, 'aria-label': /\w/.test(text) ? null : title,
+      'aria-pressed': pressed === undefined ? null : String(pressed)});
     const following = this.#window === null;
     const minutes = this.live ? [5, 15, 60] : [];
     replace(this.#buttons,
-        minutes.map((m) => button(`${m} min`, () => this.follow(m * 60000),
+        minutes.map((m) => tool(`${m} min`, () => this.follow(m * 60000),
             `Follow the last ${m} minutes`,
             following && this.#spanMs === m * 60000)),
-        button('All', () => this.showAll(), 'Show all there is',
+        tool('All', () => this.showAll(), 'Show all there is',
             following && this.#spanMs === null),
-        button('◀', () => this.shift(-0.2), 'Earlier (key ←)'),
-        button('▶', () => this.shift(0.2), 'Later (key →)'),
-        button('+', () => this.zoom(0.5), 'Zoom in (key +, Ctrl and wheel)'),
-        button('−', () => this.zoom(2), 'Zoom out (key −, Ctrl and wheel)'),
-        this.hasProcess ? button('P1 P2 T1', () => this.#toggleProcess(),
+        tool('◀', () => this.shift(-0.2), 'Earlier (key ←)'),
+        tool('▶', () => this.shift(0.2), 'Later (key →)'),
+        tool('+', () => this.zoom(0.5), 'Zoom in (key +, Ctrl and wheel)'),
+        tool('−', () => this.zoom(2), 'Zoom out (key −, Ctrl and wheel)'),
+        this.hasProcess ? tool('P1 P2 T1', () => this.#toggleProcess(),
             'Show pressures and temperature',
             !this.#hidden.has('process')) : null,
         following || !this.live ? null :
@@ -252,14 +240,5 @@ export class Timeline {
   #toggleProcess() {
     if (!this.#hidden.delete('process')) this.#hidden.add('process');
     this.rebuild();
-  }
-
-  #fit() {
-    const width = this.#panelBox.clientWidth;
-    for (const {u} of this.#panels) {
-      if (Math.abs(u.width - width) > 1) {
-        u.setSize({width, height: u.height});
-      }
-    }
   }
 }

@@ -3,12 +3,12 @@
 
 import {acknowledge, actionButtons, canAct, label, shelve}
   from '../actions.js';
-import {h, replace, setText} from '../dom.js';
+import {button, h, replace, setText} from '../dom.js';
 import {compareAlarms, groupOf, groups} from '../faults.js';
 import {link, rememberQuery} from '../route.js';
-import {onKey} from '../shortcuts.js';
 import {store} from '../store.js';
-import {bodyRow, cardTable, columns, headRow, scrollable} from './table.js';
+import {bodyRow, columns, dataTable, headRow} from './table.js';
+import {oncePerFrame, View} from './view.js';
 
 const kColumns = [
   columns.priority, columns.detected, columns.valve, columns.fault,
@@ -16,9 +16,8 @@ const kColumns = [
   columns.discipline, columns.namur,
 ];
 
-class Alarms {
+class Alarms extends View {
   title = 'Alarms';
-  #abort = new AbortController();
   #selected = new Set();
   #current = null;  // Episode that the keys act upon.
   #group;
@@ -26,44 +25,33 @@ class Alarms {
   #head = h('thead', {role: 'rowgroup'});
   #chips = new Map();
   #nothing = h('p', {class: 'nothing', hidden: true});
-  #bulk = h('button', {'type': 'button', 'class': 'primary', 'hidden': true,
-    'onclick': () => this.#acknowledgeSelected()});
+  #bulk = button('', () => this.#acknowledgeSelected(),
+      {class: 'primary', hidden: true});
   #readOnly = h('p', {class: 'note', hidden: true}, 'Read-only: the monitor ' +
     'was started without --console-write.');
-  #removeKeys;
-  #timer;
-  #frame = 0;
 
   constructor({query}) {
+    super();
     this.#group = query.get('group') ?? '';
     this.element = h('section', {class: 'live'},
         h('div', {class: 'controls'}, h('h1', {}, 'Alarms'), this.#makeChips(),
             this.#bulk), this.#readOnly, this.#nothing,
-        scrollable('Alarms', cardTable('Alarms, worst first',
-            this.#head, this.#body)));
-    const {signal} = this.#abort;
-    for (const type of ['alarms', 'status']) {
-      store.addEventListener(type, () => this.#later(), {signal});
-    }
-    this.#timer = setInterval(() => this.#showLasted(), 1000);
-    this.#removeKeys = [
-      onKey('j', 'Next alarm', () => this.#move(1)),
-      onKey('k', 'Alarm before', () => this.#move(-1)),
-      onKey('a', 'Acknowledge the alarm', () => this.#act((row) =>
-        row.isa !== 'ACKED' && acknowledge([row]))),
-      onKey('s', 'Shelve the alarm', () => this.#act((row) =>
-        !row.shelved && shelve(row))),
-      onKey('l', 'Label the alarm', () => this.#act(label)),
-      onKey('x', 'Select the alarm', () => this.#toggle(this.#current)),
-    ];
+        dataTable('Alarms, worst first', kColumns, [],
+            {layout: 'cards', head: this.#head, body: this.#body}));
+    // A flood of alarms costs one table a frame.
+    const showSoon = oncePerFrame(this, () => this.#show());
+    this.on(store, 'alarms', showSoon);
+    this.on(store, 'status', showSoon);
+    this.every(1000, () => this.#showLasted());
+    this.key('j', 'Next alarm', () => this.#move(1));
+    this.key('k', 'Alarm before', () => this.#move(-1));
+    this.key('a', 'Acknowledge the alarm', () => this.#act((row) =>
+      row.isa !== 'ACKED' && acknowledge([row])));
+    this.key('s', 'Shelve the alarm', () => this.#act((row) =>
+      !row.shelved && shelve(row)));
+    this.key('l', 'Label the alarm', () => this.#act(label));
+    this.key('x', 'Select the alarm', () => this.#toggle(this.#current));
     this.#show();
-  }
-
-  destroy() {
-    this.#abort.abort();
-    clearInterval(this.#timer);
-    cancelAnimationFrame(this.#frame);
-    this.#removeKeys.forEach((remove) => remove());
   }
 
   #makeChips() {
@@ -71,23 +59,14 @@ class Alarms {
     return h('div', {'class': 'chips', 'role': 'group', 'aria-label': 'Group'},
         all.map(({key, name, text}) => {
           const count = h('span', {class: 'chip-count'});
-          const button = h('button', {'type': 'button', 'class': 'chip',
-            'title': text, 'onclick': () => {
-              this.#group = key;
-              rememberQuery('alarms', '', {group: key});
-              this.#show();
-            }}, name, ' ', count);
-          this.#chips.set(key, {button, count});
-          return button;
+          const chip = button([name, ' ', count], () => {
+            this.#group = key;
+            rememberQuery('alarms', '', {group: key});
+            this.#show();
+          }, {class: 'chip', title: text});
+          this.#chips.set(key, {chip, count});
+          return chip;
         }));
-  }
-
-  // A flood of alarms costs one table a frame.
-  #later() {
-    this.#frame ||= requestAnimationFrame(() => {
-      this.#frame = 0;
-      this.#show();
-    });
   }
 
   #rows() {
@@ -129,10 +108,10 @@ class Alarms {
 
   #showCounts(rows) {
     const all = [...store.alarms.values()];
-    for (const [key, {button, count}] of this.#chips) {
+    for (const [key, {chip, count}] of this.#chips) {
       setText(count, String(all.filter((row) =>
         !key || groupOf(row) === key).length));
-      button.setAttribute('aria-pressed', String(this.#group === key));
+      chip.setAttribute('aria-pressed', String(this.#group === key));
     }
     this.#nothing.hidden = rows.length > 0;
     setText(this.#nothing, all.length === 0 ?

@@ -6,14 +6,15 @@ import {get, path, url} from '../api.js';
 import {exportPng} from '../charts/export.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
-import {h, replace, setText} from '../dom.js';
+import {button, errorNote, factList, h, replace, setText} from '../dom.js';
 import {faultTitle, groupName, markWord, members, namurText, priorityNames,
-  priorityOf, stateWord} from '../faults.js';
+  priorityOf, prioritySign, stateWord} from '../faults.js';
 import {durationText, factorText, percentText, zoneName} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
-import {prioritySign} from '../symbols.js';
-import {labelText, lastedText, scrollable, timeCell} from './table.js';
+import {dataTable, labelText, lastedText, timeCell, valveLink}
+  from './table.js';
+import {View} from './view.js';
 
 const kEndWords = {
   cleared: 'normal again', stream_ended: 'the publisher ended its stream',
@@ -23,7 +24,7 @@ const kEndWords = {
 
 function facts({episode: row, model_hash: hash}) {
   return [
-    ['Valve', h('a', {href: link('valve', row.valve)}, row.valve)],
+    ['Valve', valveLink(row.valve)],
     ['Fault', h('span', {class: 'with-sign'},
         prioritySign(priorityOf(row), members(row.fault).length > 0),
         faultTitle(row.fault))],
@@ -61,54 +62,45 @@ function eventText(event) {
   ].filter(Boolean).join(', ');
 }
 
-function eventTable(events) {
-  const head = ['Time', 'What', 'Details', 'Who', 'From where'];
-  return h('table', {class: 'small'}, h('caption', {}, 'What happened'),
-      h('thead', {}, h('tr', {}, head.map((text) =>
-        h('th', {scope: 'col'}, text)))),
-      h('tbody', {}, events.map((event) => h('tr', {},
-          h('td', {}, timeCell(event.at_ms)),
-          h('th', {scope: 'row'}, markWord(event.kind)),
-          h('td', {class: 'remark'}, eventText(event)),
-          h('td', {}, event.who ?? ''), h('td', {}, event.origin ?? '')))));
-}
+const kEventColumns = [
+  {text: 'Time', cell: (event) => timeCell(event.at_ms)},
+  {text: 'What', header: true, cell: (event) => markWord(event.kind)},
+  {text: 'Details', class: 'remark', cell: eventText},
+  {text: 'Who', cell: (event) => event.who ?? ''},
+  {text: 'From where', cell: (event) => event.origin ?? ''},
+];
 
-class EpisodePage {
+class EpisodePage extends View {
   title = 'Episode';
-  #abort = new AbortController();
   #content = h('div', {});
   #timeline = null;
   #data = new TrendData();
   #row = null;
 
+  #actions = h('div', {class: 'actions'});
+
   constructor({id}) {
+    super();
     this.id = id;
     this.element = h('article', {class: 'episode'}, this.#content);
     replace(this.#content, h('h1', {}, 'Episode'), h('p', {}, 'Loading …'));
-    store.addEventListener('alarms', ({detail}) => {
-      if (detail?.row.episode === this.id) this.#load();
-    }, {signal: this.#abort.signal});
-    store.addEventListener('status', () => this.#showActions(),
-        {signal: this.#abort.signal});
+    this.on(store, 'alarms', (change) => {
+      if (change?.row.episode === this.id) this.#load();
+    });
+    this.on(store, 'status', () => this.#showActions());
+    this.atEnd(() => this.#timeline?.destroy());
     this.#load();
-  }
-  #actions = h('div', {class: 'actions'});
-
-  destroy() {
-    this.#abort.abort();
-    this.#timeline?.destroy();
   }
 
   async #load() {
     try {
       const found = await get(path('episodes', this.id));
-      if (this.#abort.signal.aborted) return;
+      if (this.gone) return;
       this.id = found.episode.episode;  // It may be asked for as the last one.
       this.#show(found);
     } catch (error) {
-      if (this.#abort.signal.aborted) return;
-      replace(this.#content, h('h1', {}, 'Episode'),
-          h('p', {class: 'note', role: 'alert'}, error.message));
+      if (this.gone) return;
+      replace(this.#content, h('h1', {}, 'Episode'), errorNote(error));
     }
   }
 
@@ -129,22 +121,19 @@ class EpisodePage {
     replace(this.#content,
         h('div', {class: 'controls'}, h('h1', {}, this.title), this.#actions),
         h('div', {class: 'row-end'},
-            h('button', {type: 'button', onclick: () => this.#copy(copied)},
-                'Copy the link'), copied,
-            this.#timeline ? h('button', {type: 'button', onclick: () =>
-              exportPng(this.#timeline, `${this.title}, episode ${this.id}`)},
-            'Save as PNG') : null,
+            button('Copy the link', () => this.#copy(copied)), copied,
+            this.#timeline ? button('Save as PNG', () => exportPng(
+                this.#timeline, `${this.title}, episode ${this.id}`)) : null,
             h('a', {'class': 'button', 'download': `${this.id}.csv`,
               'href': url(path('episodes', `${this.id}.csv`))},
             'Save as CSV')),
-        h('dl', {class: 'facts'}, facts(found).map(([name, value]) =>
-          h('div', {}, h('dt', {}, name), h('dd', {}, value)))),
+        factList(facts(found)),
         this.#data.words ? h('p', {class: 'words'}, this.#data.words) : null,
         checks.map(({name, check}) => h('p', {class: 'checks'},
             h('strong', {}, `Check for ${name}: `), check)),
         this.#timeline ? this.#timeline.element :
           h('p', {class: 'note'}, 'There is no recording of this episode.'),
-        scrollable('What happened', eventTable(found.events)),
+        dataTable('What happened', kEventColumns, found.events),
         h('p', {class: 'hint'}, `Times are ${zoneName()}.`));
     if (this.#timeline) this.#timeline.rebuild();
   }

@@ -2,11 +2,11 @@
 // alarm, and how long until a limit where a trend is significant.
 
 import {getOptional, path} from '../api.js';
-import {Panel} from '../charts/panel.js';
+import {PanelStack} from '../charts/panel.js';
 import {unitText} from '../charts/panels.js';
 import {h} from '../dom.js';
 import {numberText} from '../format.js';
-import {scrollable} from './table.js';
+import {dataTable} from './table.js';
 
 const kLeastDays = 2;
 
@@ -41,25 +41,19 @@ function tableOf(health) {
   return table;
 }
 
-function trendTable(trends) {
-  const heads = ['Limit', 'Now', 'A day', 'Reaches it'];
-  const withUnit = (value, {unit}) => value === null ? '–' :
-    `${numberText(value)} ${unitText(unit)}`;
-  return scrollable('Trends to limits', h('table', {class: 'small'},
-      h('caption', {}, 'Trends to limits'),
-      h('thead', {}, h('tr', {}, heads.map((text) =>
-        h('th', {scope: 'col'}, text)))),
-      h('tbody', {}, trends.map((trend) => h('tr', {},
-          h('th', {scope: 'row'}, trend.limit.replace('=', ' = ')),
-          h('td', {}, withUnit(trend.now, trend)),
-          h('td', {}, withUnit(trend.per_day, trend)),
-          h('td', {}, trend.text))))));
-}
+const withUnit = (value, {unit}) => value === null ? '–' :
+  `${numberText(value)} ${unitText(unit)}`;
+
+const kTrendColumns = [
+  {text: 'Limit', header: true, cell: (row) => row.limit.replace('=', ' = ')},
+  {text: 'Now', cell: (row) => withUnit(row.now, row)},
+  {text: 'A day', cell: (row) => withUnit(row.per_day, row)},
+  {text: 'Reaches it', cell: (row) => row.text},
+];
 
 export class HealthSection {
   element = h('section', {});
-  #panels = [];
-  #resize = new ResizeObserver(() => this.#fit());
+  #stack = new PanelStack();
   #gone = false;
 
   constructor(valve) {
@@ -68,8 +62,7 @@ export class HealthSection {
 
   destroy() {
     this.#gone = true;
-    this.#resize.disconnect();
-    this.#panels.forEach((panel) => panel.destroy());
+    this.#stack.destroy();
   }
 
   async #load(valve) {
@@ -80,36 +73,18 @@ export class HealthSection {
       return;  // The rest of the page says what is wrong.
     }
     if (health === null || health.t_ms.length === 0 || this.#gone) return;
-    this.element.append(h('h2', {}, 'Months'), trendTable(health.trends));
+    this.element.append(h('h2', {}, 'Months'),
+        dataTable('Trends to limits', kTrendColumns, health.trends));
     if (health.t_ms.length < kLeastDays) {
       this.element.append(h('p', {class: 'hint'},
           'Charts come with the second day.'));
       return;
     }
-    this.#draw(health);
-  }
-
-  #draw(health) {
-    const box = h('div', {class: 'panels'});
-    this.element.append(box);
+    this.element.append(this.#stack.element);
     const scene = {table: tableOf(health), gaps: [], marks: []};
-    const panels = panelsOf(health);
-    const width = Math.max(280, box.clientWidth || 800);
-    this.#panels = panels.map((panel, i) => new Panel(panel, scene, {
-      isFirst: i === 0, isLast: i === panels.length - 1, width,
-      syncKey: `health-${health.valve}`,
-      handlers: {mousedown() {}, zoomed() {}, reset: () => this.#panels.forEach(
-          ({u}) => u.setData(u.data))},
-    }));
-    box.append(...this.#panels.map((panel) => panel.element));
-    this.#panels.forEach((panel) => panel.showValues(null));
-    this.#resize.observe(box);
-  }
-
-  #fit() {
-    for (const {u, element} of this.#panels) {
-      const width = element.clientWidth;
-      if (Math.abs(u.width - width) > 1) u.setSize({width, height: u.height});
-    }
+    this.#stack.show(panelsOf(health), scene, `health-${health.valve}`, {
+      mousedown() {}, zoomed() {}, reset: () => this.#stack.panels.forEach(
+          ({u}) => u.setData(u.data))});
+    this.#stack.panels.forEach((panel) => panel.showValues(null));
   }
 }

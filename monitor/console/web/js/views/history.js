@@ -2,13 +2,15 @@
 // the alarms of that time. The question is in the address: it can be sent.
 
 import {get} from '../api.js';
-import {download, h, replace, setText} from '../dom.js';
+import {button, download, errorNote, field, h, replace, select, setText}
+  from '../dom.js';
 import {faultTitle} from '../faults.js';
 import {fromInput, toInput, zoneName} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {statisticsSection} from './statistics.js';
-import {bodyRow, cardTable, columns, headRow, scrollable} from './table.js';
+import {bodyRow, columns, dataTable} from './table.js';
+import {View} from './view.js';
 
 const kPage = 100;
 const kDayMs = 86400000;
@@ -25,10 +27,6 @@ const kColumns = [
   columns.label,
 ];
 
-function field(text, input) {
-  return h('label', {class: 'field'}, h('span', {}, text), input);
-}
-
 function csvOf(rows) {
   const names = ['episode', 'valve', 'fault', 'name', 'state', 'isa',
     'detected_ms', 'isolated_ms', 'cleared_ms', 'ended_ms', 'end_reason',
@@ -41,37 +39,30 @@ function csvOf(rows) {
     names.map((name) => quote(row[name])).join(','))].join('\n') + '\n';
 }
 
-class History {
+class History extends View {
   title = 'History';
-  #abort = new AbortController();
   #rows = [];
   #inputs;
   #body = h('tbody', {role: 'rowgroup'});
   #found = h('p', {class: 'note', role: 'status'});
-  #more = h('button', {type: 'button', hidden: true,
-    onclick: () => this.#fetchRows(true)}, 'Older ones');
+  #more = button('Older ones', () => this.#fetchRows(true), {hidden: true});
   #statistics = h('div', {});
 
   constructor({query}) {
+    super();
     this.#makeInputs(query);
     this.element = h('section', {class: 'history', 'aria-label': 'History'},
         h('div', {class: 'controls'}, h('h1', {}, 'History')), this.#form(),
         this.#statistics,
         h('div', {class: 'controls'}, h('h2', {}, 'Episodes'), this.#found,
-            h('button', {type: 'button', onclick: () => download(
-                'episodes.csv', new Blob([csvOf(this.#rows)],
-                    {type: 'text/csv'}))}, 'Save as CSV')),
-        scrollable('Episodes', cardTable('Episodes, newest first',
-            h('thead', {role: 'rowgroup'}, headRow(kColumns)), this.#body)),
-        this.#more);
-    store.addEventListener('tiles', ({detail}) => {
-      if (detail === null) this.#fillFaults(query.get('fault') ?? '');
-    }, {signal: this.#abort.signal});
+            button('Save as CSV', () => download('episodes.csv',
+                new Blob([csvOf(this.#rows)], {type: 'text/csv'})))),
+        dataTable('Episodes, newest first', kColumns, [],
+            {layout: 'cards', body: this.#body}), this.#more);
+    this.on(store, 'tiles', (ids) => {
+      if (ids === null) this.#fillFaults(query.get('fault') ?? '');
+    });
     this.#fetch();
-  }
-
-  destroy() {
-    this.#abort.abort();
   }
 
   #makeInputs(query) {
@@ -81,11 +72,9 @@ class History {
       valve: h('input', {value: query.get('valve') ?? '',
         placeholder: 'all, or FV-1*', list: 'valve-names'}),
       fault: h('select', {}),
-      state: h('select', {}, kStates.map(([value, text]) =>
-        h('option', {value}, text))),
+      state: select(kStates, query.get('state') ?? ''),
       since: time('since'), until: time('until'),
     };
-    this.#inputs.state.value = query.get('state') ?? '';
     this.#fillFaults(query.get('fault') ?? '');
   }
 
@@ -144,11 +133,10 @@ class History {
       const time = this.#time();
       const figures = await get('/statistics', {
         ...time, valve: valve.value.trim(), fault: fault.value});
-      if (this.#abort.signal.aborted) return;
+      if (this.gone) return;
       replace(this.#statistics, statisticsSection(figures, time));
     } catch (error) {
-      replace(this.#statistics, h('p', {class: 'note', role: 'alert'},
-          error.message));
+      replace(this.#statistics, errorNote(error));
     }
     await rows;
   }
@@ -161,7 +149,7 @@ class History {
         state: state.value, limit: kPage,
         before_ms: older ? this.#rows.at(-1)?.detected_ms : null,
       });
-      if (this.#abort.signal.aborted) return;
+      if (this.gone) return;
       this.#rows.push(...episodes);
       this.#body.append(...episodes.map((row) => bodyRow(kColumns, row)));
       this.#more.hidden = !more;

@@ -1,14 +1,14 @@
 // Every valve as a tile. Thousands of them: only the rows in sight are in the
 // document, only what changed is touched, a few milliseconds of it a frame.
 
-import {cssColor, h, setText} from '../dom.js';
-import {faultTitle} from '../faults.js';
+import {button, cssColor, h, select, setText} from '../dom.js';
+import {faultTitle, inAlarm} from '../faults.js';
 import {compareNames} from '../format.js';
 import {rememberQuery} from '../route.js';
 import {settings} from '../settings.js';
-import {onKey} from '../shortcuts.js';
 import {store} from '../store.js';
 import {rankOf, Tile} from './tile.js';
+import {oncePerFrame, View} from './view.js';
 
 const kFrameBudgetMs = 4;
 const kReorderPeriodMs = 500;
@@ -16,20 +16,20 @@ const kRowsBeyond = 3;  // Above and below what is in sight.
 
 const kFilters = [
   {key: 'all', text: 'All', test: () => true},
-  {key: 'alarm', text: 'In alarm', test: (t) => t.state !== 'NORMAL'},
+  {key: 'alarm', text: 'In alarm', test: inAlarm},
   {key: 'unack', text: 'Unacknowledged', test: (t) => t.unacked},
   {key: 'silent', text: 'Not live', test: (t) => t.quality !== 'LIVE'},
 ];
 
 function matches(tile, words) {
   if (words.length === 0) return true;
-  const text = `${tile.id} ${tile.state === 'NORMAL' ? '' :
-    faultTitle(tile.faults.join('|'))} ${tile.quality} ${tile.model_set ?? ''}`
+  const fault = inAlarm(tile) ? faultTitle(tile.faults.join('|')) : '';
+  const text = `${tile.id} ${fault} ${tile.quality} ${tile.model_set ?? ''}`
       .toLowerCase();
   return words.every((word) => text.includes(word));
 }
 
-class Plant {
+class Plant extends View {
   title = 'Plant';
   #ids = [];  // By name.
   #ranks = new Map();  // id -> number; smaller is worse.
@@ -38,43 +38,32 @@ class Plant {
   #inDocument = new Set();
   #dirty = new Set();
   #needsOrder = true;
-  #frame = 0;
-  #placeFrame = 0;
   #color = cssColor('--ink-soft');
   #filter;
   #words;
   #order;
   #search;
   #buttons = new Map();
-  #abort = new AbortController();
   #grid = h('ul', {class: 'tiles', role: 'list'});
   #nothing = h('p', {class: 'nothing', hidden: true});
-  #timer = setInterval(() => this.#needsOrder && this.#reorder(),
-      kReorderPeriodMs);
-  #removeKey = onKey('/', 'Search the valves', () => this.#search.focus());
+  #workSoon = oncePerFrame(this, () => this.#work());
+  #placeSoon = oncePerFrame(this, () => this.#place());
 
   constructor({query}) {
+    super();
     this.#filter = query.get('show') ?? 'all';
     this.#order = query.get('order') ?? 'worst';
     this.#setWords(query.get('q') ?? '');
     this.element = h('section', {'class': 'plant', 'aria-label': 'Plant'},
         this.#controls(query.get('q') ?? ''), this.#nothing, this.#grid);
-    const {signal} = this.#abort;
-    store.addEventListener('tiles', ({detail}) => this.#changed(detail),
-        {signal});
-    settings.addEventListener('change', () => this.#showDensity(), {signal});
-    addEventListener('scroll', this.#placeSoon, {signal, passive: true});
-    addEventListener('resize', this.#placeSoon, {signal});
+    this.on(store, 'tiles', (ids) => this.#changed(ids));
+    this.on(settings, 'change', () => this.#showDensity());
+    this.on(window, 'scroll', this.#placeSoon);
+    this.on(window, 'resize', this.#placeSoon);
+    this.every(kReorderPeriodMs, () => this.#needsOrder && this.#reorder());
+    this.key('/', 'Search the valves', () => this.#search.focus());
     this.#showDensity();
     this.#changed(null);
-  }
-
-  destroy() {
-    this.#abort.abort();
-    clearInterval(this.#timer);
-    cancelAnimationFrame(this.#frame);
-    cancelAnimationFrame(this.#placeFrame);
-    this.#removeKey();
   }
 
   #controls(text) {
@@ -86,25 +75,22 @@ class Plant {
       }});
     const filters = kFilters.map(({key, text: name}) => {
       const count = h('span', {class: 'chip-count'});
-      const button = h('button', {
-        type: 'button', class: 'chip', onclick: () => {
-          this.#filter = key;
-          this.#refilter();
-        }}, name, ' ', count);
-      this.#buttons.set(key, {button, count});
-      return button;
+      const chip = button([name, ' ', count], () => {
+        this.#filter = key;
+        this.#refilter();
+      }, {class: 'chip'});
+      this.#buttons.set(key, {chip, count});
+      return chip;
     });
-    const order = h('select', {'aria-label': 'Order', 'onchange': () => {
-      this.#order = order.value;
-      this.#refilter();
-    }}, h('option', {value: 'worst'}, 'Worst first'),
-    h('option', {value: 'name'}, 'By name'));
-    order.value = this.#order;
-    const density = h('select', {'aria-label': 'Size of the tiles',
-      'onchange': () => settings.set('density', density.value)},
-    h('option', {value: 'comfortable'}, 'Large tiles'),
-    h('option', {value: 'compact'}, 'Small tiles'));
-    density.value = settings.get('density');
+    const order = select([['worst', 'Worst first'], ['name', 'By name']],
+        this.#order, {'aria-label': 'Order', 'onchange': () => {
+          this.#order = order.value;
+          this.#refilter();
+        }});
+    const density = select(
+        [['comfortable', 'Large tiles'], ['compact', 'Small tiles']],
+        settings.get('density'), {'aria-label': 'Size of the tiles',
+          'onchange': () => settings.set('density', density.value)});
     return h('div', {class: 'controls'}, h('h1', {}, 'Plant'), this.#search,
         h('div', {'class': 'chips', 'role': 'group', 'aria-label': 'Filter'},
             filters), order, density);
@@ -133,7 +119,7 @@ class Plant {
       if (this.#inDocument.has(id)) this.#dirty.add(id);
     }
     if (ids === null) this.#reorder();
-    this.#frame ||= requestAnimationFrame(() => this.#work());
+    this.#workSoon();
   }
 
   // As much as the budget of one frame allows; the rest in the next ones.
@@ -145,9 +131,8 @@ class Plant {
       if (data && this.#inDocument.has(id)) this.#tiles.get(id).update(data);
       if (performance.now() > end) break;
     }
-    const done = this.#dirty.size === 0;
-    this.#frame = done ? 0 : requestAnimationFrame(() => this.#work());
-    if (done) this.#count();
+    if (this.#dirty.size > 0) this.#workSoon();
+    else this.#count();
   }
 
   #shows(tile) {
@@ -168,9 +153,9 @@ class Plant {
   #count() {
     const tiles = [...store.tiles.values()];
     for (const {key, test} of kFilters) {
-      const {button, count} = this.#buttons.get(key);
+      const {chip, count} = this.#buttons.get(key);
       setText(count, String(tiles.filter(test).length));
-      button.setAttribute('aria-pressed', String(this.#filter === key));
+      chip.setAttribute('aria-pressed', String(this.#filter === key));
     }
     this.#nothing.hidden = this.#shown.length > 0;
     setText(this.#nothing, tiles.length === 0 ?
@@ -186,14 +171,9 @@ class Plant {
     this.#placeSoon();
   }
 
-  #placeSoon = () => {
-    this.#placeFrame ||= requestAnimationFrame(() => this.#place());
-  };
-
   // All tiles are of one size: which are in sight follows from where the grid
   // stands. Those elsewhere are room above and below.
   #place() {
-    this.#placeFrame = 0;
     const {top} = this.#grid.getBoundingClientRect();
     const style = getComputedStyle(this.#grid);
     const pitch = parseFloat(style.gridAutoRows) + parseFloat(style.rowGap);

@@ -1,11 +1,10 @@
 // Figures of the alarms of a time.
 
 import {barCell, barChart} from '../charts/bars.js';
-import {h} from '../dom.js';
+import {factList, h} from '../dom.js';
 import {faultTitle} from '../faults.js';
 import {dateText, durationText} from '../format.js';
-import {link} from '../route.js';
-import {scrollable, timeCell} from './table.js';
+import {dataTable, timeCell, valveLink} from './table.js';
 
 const kDayMs = 86400000;
 const kMostDays = 120;
@@ -24,43 +23,40 @@ function everyDay(perDay, {since_ms: since, until_ms: until}) {
   return days;
 }
 
-function table(caption, heads, rows) {
-  return scrollable(caption, h('table', {class: 'small'},
-      h('caption', {}, caption),
-      h('thead', {}, h('tr', {}, heads.map((text) =>
-        h('th', {scope: 'col'}, text)))),
-      h('tbody', {}, rows)));
-}
-
-function valveTable(valves) {
-  const top = [...valves].sort((a, b) => b.episodes - a.episodes)
-      .slice(0, kTopRows);
-  const mostEpisodes = Math.max(0, ...top.map((v) => v.episodes));
-  const mostTime = Math.max(0, ...top.map((v) => v.alarm_s));
-  return table('Most frequent valves', ['Valve', 'Episodes', 'Time in alarm',
-    'Chattering', 'Standing', 'Last'], top.map((v) => h('tr', {},
-      h('th', {scope: 'row'}, h('a', {href: link('valve', v.valve)}, v.valve)),
-      h('td', {}, barCell(v.episodes, mostEpisodes, String(v.episodes))),
-      h('td', {}, barCell(v.alarm_s, mostTime,
-          durationText(1000 * v.alarm_s))),
-      h('td', {class: 'num'}, countText(v.chattering)),
-      h('td', {class: 'num'}, countText(v.standing)),
-      h('td', {}, timeCell(v.last_ms)))));
-}
-
 const countText = (n) => Number(n) > 0 ? String(Number(n)) : '–';
 
+const countColumn = (text, name) =>
+  ({text, class: 'num', cell: (row) => countText(row[name])});
+
+// A column of numbers with bars, each a share of the greatest.
+function barColumn(text, rows, name, textOf = String) {
+  const most = Math.max(0, ...rows.map((row) => row[name]));
+  return {text, cell: (row) => barCell(row[name], most, textOf(row[name]))};
+}
+
+const mostFrequent = (rows) =>
+  [...rows].sort((a, b) => b.episodes - a.episodes).slice(0, kTopRows);
+
+function valveTable(valves) {
+  const top = mostFrequent(valves);
+  return dataTable('Most frequent valves', [
+    {text: 'Valve', header: true, cell: (row) => valveLink(row.valve)},
+    barColumn('Episodes', top, 'episodes'),
+    barColumn('Time in alarm', top, 'alarm_s', (s) => durationText(1000 * s)),
+    countColumn('Chattering', 'chattering'),
+    countColumn('Standing', 'standing'),
+    {text: 'Last', cell: (row) => timeCell(row.last_ms)},
+  ], top);
+}
+
 function faultTable(faults) {
-  const top = [...faults].sort((a, b) => b.episodes - a.episodes)
-      .slice(0, kTopRows);
-  const most = Math.max(0, ...top.map((f) => f.episodes));
-  return table('Most frequent faults',
-      ['Fault', 'Episodes', 'Labelled right', 'Labelled wrong'],
-      top.map((f) => h('tr', {},
-          h('th', {scope: 'row'}, faultTitle(f.fault)),
-          h('td', {}, barCell(f.episodes, most, String(f.episodes))),
-          h('td', {class: 'num'}, countText(f.right)),
-          h('td', {class: 'num'}, countText(f.wrong)))));
+  const top = mostFrequent(faults);
+  return dataTable('Most frequent faults', [
+    {text: 'Fault', header: true, cell: (row) => faultTitle(row.fault)},
+    barColumn('Episodes', top, 'episodes'),
+    countColumn('Labelled right', 'right'),
+    countColumn('Labelled wrong', 'wrong'),
+  ], top);
 }
 
 function keyFigures(figures, days) {
@@ -68,7 +64,7 @@ function keyFigures(figures, days) {
   const episodes = days.reduce((sum, day) => sum + day.episodes, 0);
   const sum = (name) => valves.reduce((n, v) => n + Number(v[name] ?? 0), 0);
   const judged = labelled.true + labelled.false;
-  const facts = [
+  return factList([
     ['Episodes', String(episodes)],
     ['A day', days.length > 0 ? (episodes / days.length).toFixed(1) : '–'],
     ['Time in alarm', durationText(1000 * sum('alarm_s'))],
@@ -81,9 +77,7 @@ function keyFigures(figures, days) {
     ['Not labelled', String(labelled.none)],
     ['Gaps in the data', gaps?.length ? `${gaps.length}, ${durationText(
         gaps.reduce((n, g) => n + g.to_ms - g.from_ms, 0))}` : 'none'],
-  ];
-  return h('dl', {class: 'facts'}, facts.map(([name, value]) =>
-    h('div', {}, h('dt', {}, name), h('dd', {}, value))));
+  ]);
 }
 
 export function statisticsSection(figures, time) {

@@ -1,12 +1,40 @@
-// Tables of alarms, as the alarm list and the history show them.
+// Tables by declaration of their columns: {text, cell(row), class, header}.
 
 import {h} from '../dom.js';
 import {faultName, faultTitle, groupName, members, namurText, priorityOf,
-  priorityNames} from '../faults.js';
+  priorityNames, prioritySign} from '../faults.js';
 import {durationText, factorText, percentText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
-import {prioritySign} from '../symbols.js';
+
+export function headRow(list) {
+  return h('tr', {role: 'row'}, list.map(({text, class: name}) =>
+    h('th', {scope: 'col', role: 'columnheader', class: name}, text)));
+}
+
+export function bodyRow(list, row, attributes = {}) {
+  return h('tr', {role: 'row', ...attributes}, list.map(
+      ({header, cell, class: name}) => h(header ? 'th' : 'td', {
+        class: name, scope: header ? 'row' : null,
+        role: header ? 'rowheader' : 'cell'}, cell(row))));
+}
+
+/**
+ * A table in a box that scrolls by itself where it is wider than the window.
+ * `layout`: 'small', or 'cards' for rows that become cards where there is no
+ * room for columns. `attributesOf(row)` are those of its line.
+ */
+export function dataTable(caption, list, rows,
+    {layout = 'small', attributesOf = () => ({}), head, body} = {}) {
+  const hidden = layout !== 'small';
+  return h('div', {'class': 'table-box', 'role': 'region',
+    'aria-label': caption, 'tabindex': 0},
+  h('table', {class: layout, role: 'table'},
+      h('caption', {class: hidden ? 'sr-only' : null}, caption),
+      head ?? h('thead', {role: 'rowgroup'}, headRow(list)),
+      body ?? h('tbody', {role: 'rowgroup'}, rows.map((row) =>
+        bodyRow(list, row, attributesOf(row))))));
+}
 
 /** A cell of time that machines can read, too. */
 export function timeCell(ms) {
@@ -14,14 +42,14 @@ export function timeCell(ms) {
     h('time', {datetime: new Date(ms).toISOString()}, timeText(ms));
 }
 
-export function priorityCell(row) {
+function priorityCell(row) {
   const priority = priorityOf(row);
   return h('span', {class: 'with-sign'},
       prioritySign(priority, members(row.fault).length > 0),
       h('span', {class: 'sr-only'}, priorityNames[priority]));
 }
 
-export function faultCell(row) {
+function faultCell(row) {
   const name = faultName(row.fault);
   const numbers = members(row.fault).join(', ');
   return h('a', {href: link('episode', row.episode), title: faultTitle(
@@ -52,12 +80,13 @@ function personText(row) {
   return row.acked_by ? `${row.acked_by}, ${timeText(row.acked_ms)}` : '';
 }
 
-/** {text, cell(row), class} of what both lists show. */
+export const valveLink = (valve) => h('a', {href: link('valve', valve)}, valve);
+
+/** The columns of alarms. */
 export const columns = {
-  priority: {text: 'Priority', short: 'P', cell: priorityCell},
+  priority: {text: 'Priority', cell: priorityCell},
   detected: {text: 'Detected', cell: (row) => timeCell(row.detected_ms)},
-  valve: {text: 'Valve', header: true, cell: (row) =>
-    h('a', {href: link('valve', row.valve)}, row.valve)},
+  valve: {text: 'Valve', header: true, cell: (row) => valveLink(row.valve)},
   fault: {text: 'Fault', class: 'fault', cell: faultCell},
   group: {text: 'State', class: 'remark', cell: (row) => [
     groupName(row), h('div', {class: 'number'}, personText(row))]},
@@ -71,27 +100,3 @@ export const columns = {
   namur: {text: 'NE 107', class: 'wider', cell: (row) => namurText(row.namur)},
   label: {text: 'Label', class: 'wide', cell: (row) => labelText(row.label)},
 };
-
-export function headRow(list) {
-  return h('tr', {role: 'row'}, list.map(({text, class: name}) =>
-    h('th', {scope: 'col', role: 'columnheader', class: name}, text)));
-}
-
-export function bodyRow(list, row, attributes = {}) {
-  return h('tr', {role: 'row', ...attributes}, list.map(
-      ({header, cell, class: name}) => h(header ? 'th' : 'td', {
-        class: name, scope: header ? 'row' : null,
-        role: header ? 'rowheader' : 'cell'}, cell(row))));
-}
-
-/** A table of rows that become cards where there is no room for columns. */
-export function cardTable(caption, head, body) {
-  return h('table', {class: 'cards', role: 'table'},
-      h('caption', {class: 'sr-only'}, caption), head, body);
-}
-
-/** Tables wider than the window scroll by themselves. */
-export function scrollable(name, table) {
-  return h('div', {'class': 'table-box', 'role': 'region', 'aria-label': name,
-    'tabindex': 0}, table);
-}

@@ -1,38 +1,28 @@
 // One valve of the plant view.
 
 import {drawSparkline} from '../charts/sparkline.js';
-import {h, setClass, setText} from '../dom.js';
-import {faultName, faultTitle, priorityOf, priorityNames, qualityWord,
-  stateWord} from '../faults.js';
+import {h, setText} from '../dom.js';
+import {faultName, faultTitle, inAlarm, priorityNames, priorityOf,
+  prioritySign, qualityText, stateWord} from '../faults.js';
 import {clockText, factorText} from '../format.js';
 import {link} from '../route.js';
-import {prioritySign} from '../symbols.js';
 
 /** How bad it is: [class, priority]; smaller is worse. */
 export function rankOf(tile) {
-  const inAlarm = tile.state !== 'NORMAL';
   const shelved = tile.shelved_until_ms !== null;
-  if (inAlarm && tile.unacked && !shelved) return [0, priorityOf(tile)];
-  if (inAlarm && !shelved) return [1, priorityOf(tile)];
-  if (inAlarm) return [2, priorityOf(tile)];
-  if (tile.unacked) return [3, 0];
-  return tile.quality === 'LIVE' ? [5, 0] : [4, 0];
+  if (inAlarm(tile)) {
+    return [shelved ? 2 : tile.unacked ? 0 : 1, priorityOf(tile)];
+  }
+  return [tile.unacked ? 3 : tile.quality === 'LIVE' ? 5 : 4, 0];
 }
 
 function whatText(tile) {
   if (tile.state === 'DETECTED' && tile.faults.length === 0) {
     return 'Fault detected, not isolated yet';
   }
-  if (tile.state !== 'NORMAL') return faultName(tile.faults.join('|'));
-  return tile.unacked ? 'Returned, unacknowledged' : '';
-}
-
-function qualityText(tile) {
-  if (tile.quality === 'LIVE') return '';
-  const since = tile.quality === 'STALE' && tile.stamp_ms ?
-    ` since ${clockText(tile.stamp_ms)}` : '';
-  const reasons = tile.reasons ? `: ${tile.reasons.replaceAll('|', ', ')}` : '';
-  return qualityWord(tile.quality) + since + reasons;
+  if (inAlarm(tile)) return faultName(tile.faults.join('|'));
+  if (tile.unacked) return 'Returned, unacknowledged';
+  return tile.state === 'NOT_JUDGED' ? 'Not judged' : '';
 }
 
 export class Tile {
@@ -59,22 +49,22 @@ export class Tile {
   }
 
   update(tile) {
-    const inAlarm = tile.state !== 'NORMAL';
+    const alarm = inAlarm(tile);
     const [rank, priority] = rankOf(tile);
     const what = whatText(tile);
     const quality = qualityText(tile);
-    setClass(this.element, 'tile' + (inAlarm ? ` alarm p${priority}` : '') +
-        ` rank${rank}` + (tile.quality === 'LIVE' ? '' : ' not-live'));
-    this.#showSign(inAlarm ? priority : 0, tile.state === 'ISOLATED');
+    this.element.className = 'tile' + (alarm ? ` alarm p${priority}` : '') +
+        ` rank${rank}` + (tile.quality === 'LIVE' ? '' : ' not-live');
+    this.#showSign(alarm ? priority : 0, tile.state === 'ISOLATED');
     setText(this.#what, what);
-    setText(this.#factor, inAlarm && tile.factor !== null ?
+    setText(this.#factor, alarm && tile.factor !== null ?
       factorText(tile.factor) : '');
     setText(this.#quality, tile.shelved_until_ms === null ? quality :
       `shelved until ${clockText(tile.shelved_until_ms)}`);
-    setText(this.#spoken, inAlarm ? `, ${priorityNames[priority]}, ` +
+    setText(this.#spoken, alarm ? `, ${priorityNames[priority]}, ` +
       stateWord(tile.state) + (tile.unacked ? ', unacknowledged' : '') :
       what ? '' : ', normal');
-    this.#what.title = inAlarm ? faultTitle(tile.faults.join('|')) : '';
+    this.#what.title = alarm ? faultTitle(tile.faults.join('|')) : '';
     drawSparkline(this.#canvas, tile.spark ?? [], this.color);
   }
 

@@ -4,30 +4,30 @@ import {getOptional, path} from '../api.js';
 import {barCell} from '../charts/bars.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
-import {h, replace, setText} from '../dom.js';
-import {faultName, faultTitle, priorityNames, priorityOf, qualityWord,
-  stateWord} from '../faults.js';
+import {button, h, replace, setText} from '../dom.js';
+import {faultName, faultTitle, inAlarm, priorityNames, priorityOf,
+  prioritySign, qualityText, stateWord} from '../faults.js';
 import {durationText, factorText, numberText, percentText, timeText}
   from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
-import {prioritySign} from '../symbols.js';
 import {actionButtons} from '../actions.js';
 import {unitText} from '../charts/panels.js';
 import {exportPng} from '../charts/export.js';
 import {HealthSection} from './health.js';
+import {dataTable} from './table.js';
+import {View} from './view.js';
 
 const kTrendSeconds = 900;  // What the monitor keeps.
 const kWordsPeriodMs = 2000;
 
 function stateLine(tile) {
   if (!tile) return ['not heard of yet'];
-  const inAlarm = tile.state !== 'NORMAL';
-  const quality = tile.quality === 'LIVE' ? null :
-    h('span', {class: 'tag dashed'}, qualityWord(tile.quality) +
-      (tile.quality === 'STALE' ? ` since ${timeText(tile.stamp_ms)}` : '') +
-      (tile.reasons ? `: ${tile.reasons.replaceAll('|', ', ')}` : ''));
-  if (!inAlarm) return [h('span', {class: 'tag'}, 'normal'), quality];
+  const reason = qualityText(tile);
+  const quality = reason && h('span', {class: 'tag dashed'}, reason);
+  if (!inAlarm(tile)) {
+    return [h('span', {class: 'tag'}, stateWord(tile.state)), quality];
+  }
   const priority = priorityOf(tile);
   return [
     h('span', {class: 'tag strong'},
@@ -46,42 +46,46 @@ function stateLine(tile) {
   ];
 }
 
+function judged({residual, low, high}) {
+  if (residual === null || residual === undefined) return 'abstains';
+  return residual > high ? 'above' : residual < low ? 'below' : 'within';
+}
+
+const kResidualColumns = [
+  {text: 'Channel', header: true, cell: (row) => row.name},
+  {text: 'Residual', class: 'num', cell: (row) => numberText(row.residual)},
+  {text: 'Thresholds', class: 'num', cell: ({low, high}) =>
+    `${numberText(low)} … ${numberText(high)}`},
+  {text: 'Unit', cell: (row) => unitText(row.unit)},
+  {text: 'Judged', cell: judged},
+];
+const kFactorColumns = [
+  {text: 'Condition', header: true, cell: ({fault}) =>
+    fault ? faultTitle(fault) : 'normal'},
+  {text: 'Factor', cell: ({d}) => barCell(d ?? 0, 1, factorText(d))},
+];
+
 /** Residuals against their thresholds, factors of the faults: the numbers. */
 function nowTables(data) {
   const {channels, faults, T} = data.meta;
   const last = (name) => data.columns[name].at(-1);
+  const residuals =
+    channels.map((channel, c) => ({...channel, residual: last(`r${c}`)}));
   const ranked = faults.map((fault, f) => ({fault, d: last(`d${f + 1}`)}))
       .filter(({d}) => d !== null && d !== undefined)
       .sort((a, b) => b.d - a.d).slice(0, 6);
-  const residuals = channels.map(({name, unit, low, high}, c) => {
-    const r = last(`r${c}`);
-    const text = r === null || r === undefined ? 'abstains' :
-      r > high ? 'above' : r < low ? 'below' : 'within';
-    return h('tr', {class: text === 'above' || text === 'below' ? 'out' : ''},
-        h('th', {scope: 'row'}, name), h('td', {class: 'num'},
-            numberText(r)), h('td', {class: 'num'},
-            `${numberText(low)} … ${numberText(high)}`),
-        h('td', {}, unitText(unit)), h('td', {}, text));
-  });
+  const out = (is) => ({class: is ? 'out' : ''});
   return [
-    h('table', {class: 'small'}, h('caption', {}, 'Residuals now'),
-        h('thead', {}, h('tr', {}, ['Channel', 'Residual', 'Thresholds',
-          'Unit', 'Judged'].map((text) => h('th', {scope: 'col'}, text)))),
-        h('tbody', {}, residuals)),
-    h('table', {class: 'small'},
-        h('caption', {}, `What explains the data now (T = ${T})`),
-        h('thead', {}, h('tr', {}, ['Condition', 'Factor']
-            .map((text) => h('th', {scope: 'col'}, text)))),
-        h('tbody', {}, [{fault: null, d: last('d0')}, ...ranked].map(
-            ({fault, d}) => h('tr', {class: d >= T && fault ? 'out' : ''},
-                h('th', {scope: 'row'}, fault ? faultTitle(fault) : 'normal'),
-                h('td', {}, barCell(d ?? 0, 1, factorText(d))))))),
+    dataTable('Residuals now', kResidualColumns, residuals, {attributesOf:
+      (row) => out(['above', 'below'].includes(judged(row)))}),
+    dataTable(`What explains the data now (T = ${T})`, kFactorColumns,
+        [{fault: null, d: last('d0')}, ...ranked],
+        {attributesOf: ({fault, d}) => out(fault && d >= T)}),
   ];
 }
 
-class ValvePage {
+class ValvePage extends View {
   #data = new TrendData();
-  #abort = new AbortController();
   #state = h('div', {class: 'state-line'});
   #words = h('p', {class: 'words'});
   #now = h('div', {class: 'now-tables'});
@@ -93,10 +97,14 @@ class ValvePage {
   #retry = 0;
   #news = '';
 
+  #timeline;
+  #shownState = '';
+
   constructor({id}) {
+    super();
     this.id = id;
     this.title = id;
-    this.#health = new HealthSection(id);
+    const health = new HealthSection(id);
     this.#timeline = new Timeline(this.#data, {
       live: true, nowMs: () => store.nowMs(), silentMs: () =>
         store.stream.connected ? 0 : Date.now() - store.stream.heardMs,
@@ -107,24 +115,24 @@ class ValvePage {
             this.#actions),
         h('div', {class: 'live'}, this.#words, this.#checks, this.#now),
         this.#note,
-        h('div', {class: 'row-end'}, h('button', {type: 'button',
-          onclick: () => exportPng(this.#timeline, id)}, 'Save as PNG'),
-        h('a', {href: link('history', '', {valve: id})},
+        h('div', {class: 'row-end'}, button('Save as PNG', () =>
+          exportPng(this.#timeline, id)), h('a', {href: link('history', '', {valve: id})},
             'Episodes of this valve')),
         this.#timeline.element,
         h('p', {class: 'hint'}, 'Drag to zoom, Shift and drag to pan, double ' +
           'click for all; Ctrl and wheel zoom, Shift and wheel pan.'),
-        this.#health.element);
+        health.element);
+    this.atEnd(() => {
+      clearTimeout(this.#retry);
+      this.#timeline.destroy();
+      health.destroy();
+    });
     this.#listen();
     this.#load(false);
   }
-  #timeline;
-  #health;
 
   #listen() {
-    const {signal} = this.#abort;
-    const on = (type, action) =>
-      store.addEventListener(type, ({detail}) => action(detail), {signal});
+    const on = (type, action) => this.on(store, type, action);
     on('tiles', (ids) => {
       if (ids === null || ids.includes(this.id)) this.#showState();
     });
@@ -136,15 +144,13 @@ class ValvePage {
     });
     on('connection', () => this.#connection());
     on('resync', (detail) => this.#resync(detail));
-    this.#timer = setInterval(() => {
+    this.every(1000, () => {
       this.#showState();
       if (this.#data.openGapFromMs !== null) this.#timeline.update();
-    }, 1000);
-    this.#wordsTimer = setInterval(() => this.#refreshWords(), kWordsPeriodMs);
+    });
+    this.every(kWordsPeriodMs, () => this.#refreshWords());
     this.#showState();
   }
-  #timer;
-  #wordsTimer;
 
   // The stream has numbers; the words are the monitor's.
   async #refreshWords() {
@@ -152,7 +158,7 @@ class ValvePage {
     try {
       const trend = await getOptional(path('valves', this.id, 'trend'),
           {seconds: 1});
-      if (trend && !this.#abort.signal.aborted) {
+      if (trend && !this.gone) {
         this.#data.words = trend.words ?? '';
         setText(this.#words, this.#data.words);
       }
@@ -161,22 +167,13 @@ class ValvePage {
     }
   }
 
-  destroy() {
-    this.#abort.abort();
-    clearInterval(this.#timer);
-    clearInterval(this.#wordsTimer);
-    clearTimeout(this.#retry);
-    this.#timeline.destroy();
-    this.#health.destroy();
-  }
-
   async #load(keep) {
     this.#loading = true;
     clearTimeout(this.#retry);
     try {
       const trend = await getOptional(path('valves', this.id, 'trend'),
           {seconds: kTrendSeconds});
-      if (this.#abort.signal.aborted) return;
+      if (this.gone) return;
       if (trend === null) {
         this.#wait(keep, `${this.id} has sent nothing to this monitor yet.`);
         return;
@@ -185,7 +182,7 @@ class ValvePage {
       setText(this.#note, this.#news);
       this.#show(trend, keep);
     } catch (error) {
-      if (!this.#abort.signal.aborted) this.#wait(keep, error.message);
+      if (!this.gone) this.#wait(keep, error.message);
     }
   }
 
@@ -243,12 +240,9 @@ class ValvePage {
   }
 
   #showNow() {
-    const words = this.#data.words;
-    setText(this.#words, words);
+    setText(this.#words, this.#data.words);
     if (this.#data.size > 0) replace(this.#now, nowTables(this.#data));
   }
-
-  #shownState = '';
 
   #showState() {
     const tile = store.tiles.get(this.id);

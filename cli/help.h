@@ -1,0 +1,22 @@
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+namespace fdi::cli {
+
+/// Gives the program `root` and its verbs help that reads like a manual page:
+///
+///     -h, --help           Print this help and exit
+///     --domain 0..232      DDS domain (default 0)
+///     --record[=on|off]    Store the samples (without a value: on)
+///
+/// What an option accepts, its default and what it excludes are taken from the
+/// parser. Call it once, after the last option was added.
+void PrepareHelp(CLI::App& root);
+
+/// The files and folders that options name need not exist any more.
+void AllowMissingFiles(CLI::App& root);
+
+}  // namespace fdi::cli

@@ -1,0 +1,78 @@
+#include "cli/models/lineage_text.h"
+
+#include <cstdio>
+
+#include "cli/text_table.h"
+#include "cli/time_text.h"
+#include "diagnosis/fault_catalogue.h"
+
+namespace fdi::cli {
+namespace {
+
+std::string HashText(std::uint64_t hash) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx",
+                static_cast<unsigned long long>(hash));
+  return text;
+}
+
+}  // namespace
+
+Json LineageJson(const storage::Lineage& lineage) {
+  Json json;
+  json["parent"] = Json();
+  if (lineage.parent) {
+    json["parent"] = {{"model_set", lineage.parent->name},
+                      {"version", lineage.parent->version},
+                      {"content_hash", HashText(lineage.parent->content_hash)}};
+  }
+  const Json settings = Json::parse(lineage.settings, nullptr, false);
+  json["settings"] = settings.is_discarded() ? Json() : settings;
+  json["episodes"] = Json::array();
+  for (const storage::TrainingEpisode& e : lineage.episodes) {
+    json["episodes"].push_back(
+        {{"episode_id", e.episode_id},
+         {"valve_id", e.valve_id},
+         {"label", e.label},
+         {"labelled_by", e.labelled_by},
+         {"labelled_utc", FormatTime(e.labelled_ns, true)},
+         {"fault", FaultName(e.fault)},
+         {"strength", e.strength},
+         {"run", e.run},
+         {"samples", e.samples}});
+  }
+  return json;
+}
+
+std::string ParentText(const storage::Lineage& lineage) {
+  if (!lineage.parent) {
+    return "none";
+  }
+  return lineage.parent->name + "@" + std::to_string(lineage.parent->version) +
+         ", hash " + HashText(lineage.parent->content_hash);
+}
+
+void PrintEpisodes(std::ostream& out, const storage::Lineage& lineage,
+                   bool utc) {
+  if (lineage.episodes.empty()) {
+    return;
+  }
+  TextTable table({{"episode"},
+                   {"valve"},
+                   {"label"},
+                   {"by"},
+                   {"at"},
+                   {"taken as"},
+                   {"strength [-]", Align::kRight},
+                   {"samples", Align::kRight},
+                   {"run"}});
+  for (const storage::TrainingEpisode& e : lineage.episodes) {
+    table.AddRow({e.episode_id, e.valve_id, e.label, e.labelled_by,
+                  FormatTime(e.labelled_ns, utc), FaultName(e.fault),
+                  e.fault != 0 ? FormatNumber(e.strength, 2) : "-",
+                  std::to_string(e.samples), e.run});
+  }
+  table.Print(out);
+}
+
+}  // namespace fdi::cli

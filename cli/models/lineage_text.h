@@ -1,0 +1,22 @@
+#pragma once
+
+#include <ostream>
+
+#include "cli/json_output.h"
+#include "storage/models/models.h"
+
+namespace fdi::cli {
+
+/// {"parent": {"model_set", "version", "content_hash"} or null, "settings":
+/// {...} or null, "episodes": [{episode_id, valve_id, label, labelled_by,
+/// labelled_utc, fault, strength, run, samples}]}.
+Json LineageJson(const storage::Lineage& lineage);
+
+/// "NAME@VERSION, hash 0123456789abcdef"; "none".
+std::string ParentText(const storage::Lineage& lineage);
+
+/// The episodes as a table; nothing if there are none.
+void PrintEpisodes(std::ostream& out, const storage::Lineage& lineage,
+                   bool utc);
+
+}  // namespace fdi::cli

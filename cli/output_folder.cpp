@@ -1,0 +1,79 @@
+#include "cli/output_folder.h"
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iostream>
+#include <string>
+#include <system_error>
+
+#include <unistd.h>
+
+#include "diagnosis/error.h"
+
+namespace fdi::cli {
+
+void EnsureFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error)) {
+    // Only the last part is made: a mistyped path should not grow a tree. The
+    // empty part at the end lets "report" and "report/" have the same parent.
+    const std::filesystem::path whole =
+        std::filesystem::absolute(folder / "").lexically_normal();
+    const std::filesystem::path parent = whole.parent_path().parent_path();
+    if (!std::filesystem::is_directory(parent, error)) {
+      throw DataError("cannot make folder " + folder.string() +
+                      ": there is no folder " + parent.string());
+    }
+    error.clear();
+    std::filesystem::create_directory(folder, error);
+    if (error) {
+      throw DataError("cannot make folder " + folder.string() + ": " +
+                      error.message());
+    }
+    if (!std::filesystem::is_directory(folder, error)) {
+      throw DataError(folder.string() + " is a file, not a folder");
+    }
+  }
+  // Before hours of work, not after them.
+  if (access(folder.c_str(), W_OK | X_OK) != 0) {
+    throw DataError("cannot write to folder " + folder.string() + ": " +
+                    std::strerror(errno));
+  }
+}
+
+void WriteOutput(const std::filesystem::path& path,
+                 const std::function<void(std::ostream&)>& write) {
+  if (path == "-") {
+    write(std::cout);
+    return;
+  }
+  // Renamed when it is complete: readers see the old file or the new one.
+  std::filesystem::path part = path;
+  part += ".part";
+  std::ofstream file(part, std::ios::binary | std::ios::trunc);
+  std::error_code error;
+  try {
+    if (file) {
+      write(file);
+      file.close();
+    }
+  } catch (...) {
+    std::filesystem::remove(part, error);
+    throw;
+  }
+  if (file) {
+    std::filesystem::rename(part, path, error);
+  }
+  if (!file || error) {
+    const std::string reason = error ? error.message() : std::strerror(errno);
+    std::filesystem::remove(part, error);
+    throw DataError("cannot write " + path.string() + ": " + reason);
+  }
+}
+
+void WriteFile(const std::filesystem::path& path, std::string_view text) {
+  WriteOutput(path, [text](std::ostream& file) { file << text; });
+}
+
+}  // namespace fdi::cli

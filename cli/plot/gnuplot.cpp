@@ -1,0 +1,138 @@
+#include "cli/plot/gnuplot.h"
+
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern char** environ;
+
+namespace fdi::plot {
+namespace {
+
+// A temporary folder that is removed with everything in it.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    // mkdtemp() puts letters of its own in place of the last six.
+    std::string name =
+        (std::filesystem::temp_directory_path() / "fdi-plot-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw std::system_error(errno, std::generic_category(), name);
+    }
+    path_ = name;
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+void RunScript(const std::filesystem::path& script) {
+  std::string name = "gnuplot";
+  std::string argument = script.string();
+  const std::array<char*, 3> arguments{name.data(), argument.data(), nullptr};
+  pid_t child = 0;
+  const int code = posix_spawnp(&child, "gnuplot", nullptr, nullptr,
+                                arguments.data(), environ);
+  if (code != 0) {
+    throw std::runtime_error(std::string("gnuplot cannot run: ") +
+                             std::strerror(code) +
+                             "; on Debian it is in gnuplot-nox");
+  }
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
+    throw std::runtime_error("gnuplot failed, see above");
+  }
+}
+
+}  // namespace
+
+bool HaveGnuplot() {
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path == nullptr ? "" : path);
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    if (access((std::filesystem::path(folder) / "gnuplot").c_str(), X_OK) ==
+        0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+std::string RunGnuplot(
+    const std::function<std::string(const std::filesystem::path& output)>&
+        script_for) {
+  const ScratchFolder scratch;
+  const std::filesystem::path script = scratch.path() / "plot.gp";
+  const std::filesystem::path output = scratch.path() / "picture";
+  std::ofstream out(script);
+  out << script_for(output);
+  out.close();
+  if (!out) {
+    throw std::runtime_error("cannot write " + script.string());
+  }
+  RunScript(script);
+  std::ifstream picture(output, std::ios::binary);
+  if (!picture) {
+    throw std::runtime_error("gnuplot drew nothing, see above");
+  }
+  return {std::istreambuf_iterator<char>(picture), {}};
+}
+
+// In single quotes a quote is written twice, but gnuplot 5.4 does not accept
+// such a pair at the beginning of a string. In double quotes gnuplot runs what
+// stands between backquotes as a command, which are therefore written as octal
+// numbers. It reads any digits that follow as part of such a number.
+std::string GnuplotText(std::string_view text) {
+  std::string result = "\"";
+  bool after_number = false;
+  for (const char c : text) {
+    if (c == '`' || (after_number && c >= '0' && c <= '9')) {
+      std::array<char, 8> octal{};
+      std::snprintf(octal.data(), octal.size(), "\\%03o",
+                    static_cast<unsigned>(c));
+      result += octal.data();
+      after_number = true;
+      continue;
+    }
+    if (c == '"' || c == '\\') {
+      result += '\\';
+    }
+    result += c >= '\0' && c < ' ' ? ' ' : c;
+    after_number = false;
+  }
+  return result + '"';
+}
+
+std::string GnuplotNumber(double value) {
+  if (!std::isfinite(value)) {
+    return "NaN";
+  }
+  std::ostringstream text;
+  text.precision(9);
+  text << value;
+  return text.str();
+}
+
+}  // namespace fdi::plot

@@ -1,0 +1,38 @@
+#include "cli/terminal.h"
+
+#include <cstdlib>
+#include <string_view>
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+namespace fdi::cli {
+namespace {
+
+std::string_view Environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+// COLUMNS, where it is set, overrules the terminal: as `less` and scripts do.
+std::size_t Columns() {
+  const long asked = std::strtol(Environment("COLUMNS").data(), nullptr, 10);
+  if (asked > 0) {
+    return static_cast<std::size_t>(asked);
+  }
+  winsize size{};
+  return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+}
+
+}  // namespace
+
+TextStyle StdoutStyle() {
+  if (isatty(STDOUT_FILENO) == 0) {
+    return {};
+  }
+  const bool colour =
+      Environment("NO_COLOR").empty() && Environment("TERM") != "dumb";
+  return {colour, Columns()};
+}
+
+}  // namespace fdi::cli

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fdi::cli {
+
+/// Reads a TOML file in which every key must be known: each getter marks its
+/// key as known, Finish() refuses the rest. All messages name file, line, key
+/// and what is accepted.
+///
+///     TomlReader file(path);
+///     config.seed = file.Integer("seed").value_or(config.seed);
+///     for (TomlReader& fault : file.Tables("fault")) { ...; }
+///     file.Finish();
+class TomlReader {
+ public:
+  /// @throws NotFoundError if there is no such file; ConfigError on a syntax
+  ///   error, with line and column.
+  explicit TomlReader(const std::filesystem::path& path);
+  /// Reads `text`; `name` stands for the file in messages.
+  TomlReader(std::string_view text, const std::string& name);
+  ~TomlReader();
+  TomlReader(TomlReader&&) noexcept;
+  TomlReader& operator=(TomlReader&&) noexcept;
+
+  /// Nothing if the key is absent. @throws ConfigError on another type.
+  std::optional<double> Number(std::string_view key);
+  std::optional<double> Number(std::string_view key, double minimum,
+                               double maximum);
+  std::optional<long long> Integer(std::string_view key);
+  std::optional<bool> Boolean(std::string_view key);
+  std::optional<std::string> Text(std::string_view key);
+  std::vector<double> Numbers(std::string_view key);
+  std::vector<std::string> Texts(std::string_view key);
+  /// The table [key]; nothing if absent. Its keys are checked by Finish() of
+  /// the file too.
+  std::optional<TomlReader> Table(std::string_view key);
+  /// The array of tables [[key]]; empty if absent.
+  std::vector<TomlReader> Tables(std::string_view key);
+  /// All keys of this table, in the order of the alphabet; marks none.
+  std::vector<std::string> Keys() const;
+  bool Has(std::string_view key) const;
+  bool IsTable(std::string_view key) const;
+
+  /// @throws ConfigError at `key`: "file:line: key: message".
+  [[noreturn]] void Refuse(std::string_view key,
+                           std::string_view message) const;
+  /// @throws ConfigError naming the first key that no getter asked for and the
+  ///   ones of its table that were.
+  void Finish() const;
+
+ private:
+  struct Document;
+  struct Place;
+  TomlReader(std::shared_ptr<Document> document, std::unique_ptr<Place> place);
+
+  std::shared_ptr<Document> document_;
+  std::unique_ptr<Place> place_;
+};
+
+}  // namespace fdi::cli

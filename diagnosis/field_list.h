@@ -1,0 +1,23 @@
+#pragma once
+
+/// One list of the fields of a record, for everything that treats them alike:
+///
+///     FDI_FOR_EACH(MACRO, sd, correlation)    is    MACRO(sd)
+///     MACRO(correlation)
+///
+/// The preprocessor expands no macro within itself. FDI_FOR_EACH_STEP therefore
+/// leaves the name of its next step unexpanded, and FDI_EXPAND reads the result
+/// again, 64 times: so many fields fit.
+#define FDI_FOR_EACH(MACRO, ...) \
+  __VA_OPT__(FDI_EXPAND(FDI_FOR_EACH_STEP(MACRO, __VA_ARGS__)))
+#define FDI_FOR_EACH_STEP(MACRO, FIRST, ...) \
+  MACRO(FIRST)                               \
+  __VA_OPT__(FDI_FOR_EACH_NEXT FDI_NO_ARGUMENTS(MACRO, __VA_ARGS__))
+#define FDI_FOR_EACH_NEXT() FDI_FOR_EACH_STEP
+#define FDI_NO_ARGUMENTS ()
+#define FDI_EXPAND(...) FDI_EXPAND_16(FDI_EXPAND_16(__VA_ARGS__))
+#define FDI_EXPAND_16(...) \
+  FDI_EXPAND_4(FDI_EXPAND_4(FDI_EXPAND_4(FDI_EXPAND_4(__VA_ARGS__))))
+#define FDI_EXPAND_4(...) \
+  FDI_EXPAND_1(FDI_EXPAND_1(FDI_EXPAND_1(FDI_EXPAND_1(__VA_ARGS__))))
+#define FDI_EXPAND_1(...) __VA_ARGS__

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+#include "diagnosis/verdict.h"
+
+namespace fdi {
+
+/// A fault that may explain an episode.
+struct FaultCandidate {
+  int fault{0};          ///< 1..22, see diagnosis/fault_catalogue.h.
+  double factor{0.0};    ///< Decision factor d at the transition [-].
+  double strength{0.0};  ///< Estimated; signed [-].
+  bool isolated{false};  ///< Member of the isolated set.
+};
+
+/// The faults of `verdict` that may explain an episode: the members of
+/// `isolated`, and those whose factor is at least half the isolation threshold;
+/// largest factor first.
+std::vector<FaultCandidate> CandidatesOf(const ModelSet& models,
+                                         const Verdict& verdict,
+                                         FaultSet isolated);
+
+/// A step in the life of an episode: what the history stores and what the topic
+/// FaultEvent carries.
+struct FaultEvent {
+  std::string valve_id;
+  std::uint64_t source_id{0};
+  std::uint64_t seq{0};  ///< Of the sample at the transition.
+  std::uint64_t episode_id{0};
+  Transition transition;
+  /// The faults that may explain the episode, largest factor first. At the end
+  /// of an episode that got no name: those that could explain it last; none if
+  /// it is outside all known faults.
+  std::vector<FaultCandidate> candidates;
+  std::string model_set;  ///< NAME, without the version.
+  int model_version{0};
+  std::uint64_t model_hash{0};
+  bool persisted{false};  ///< Committed to the history before it was published.
+  /// The model set that made the transition; null if an earlier session did.
+  /// Neither stored nor sent.
+  std::shared_ptr<const ModelSet> models{};
+};
+
+/// The members of FaultEvent that are stored and sent as they are, for
+/// everything that treats all of them alike.
+#define FDI_FAULT_EVENT_FIELDS(FIELD) \
+  FIELD(valve_id)                     \
+  FIELD(source_id)                    \
+  FIELD(seq)                          \
+  FIELD(episode_id)                   \
+  FIELD(model_set) FIELD(model_version) FIELD(model_hash) FIELD(persisted)
+
+/// An episode that the last session left open.
+struct OpenEpisode {
+  std::string valve_id;
+  std::uint64_t source_id{0};
+  std::uint64_t episode_id{0};
+  std::int64_t detection_stamp_ns{0};
+  std::int64_t last_stamp_ns{0};  ///< The last instant known of the valve.
+  FaultSet faults{0};             ///< The set that was isolated last, if any.
+  std::vector<FaultCandidate> candidates;  ///< Its members.
+  bool isolated{false};
+  std::string model_set;
+  int model_version{0};
+  std::uint64_t model_hash{0};
+};
+
+}  // namespace fdi

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <functional>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+
+namespace fdi {
+
+/// The field `Inner` of the record that is the field `Outer` of another one.
+template <auto Outer, auto Inner>
+struct Nested {
+  template <typename Record>
+  auto& operator()(Record& record) const {
+    return record.*Outer.*Inner;
+  }
+};
+
+/// A field of a record, with the name by which SQL, JSON and the wire know it.
+/// `member` is a pointer to a member, or Nested.
+template <typename Member>
+struct Field {
+  std::string_view name;
+  Member member;
+
+  template <typename Record>
+  auto& operator()(Record& record) const {
+    return std::invoke(member, record);
+  }
+};
+template <typename Member>
+Field(const char*, Member) -> Field<Member>;  // clang 14 needs it.
+template <typename Member>
+constexpr Field<Member> FieldOf(std::string_view name, Member member) {
+  return {name, member};
+}
+
+/// The fields of a flat record in the order in which they are stored: a tuple
+/// of Field, specialised beside the record. It is the only list of them.
+template <typename Record>
+inline constexpr std::tuple<> kFieldsOf{};
+
+/// Calls visit(name, value) for every field of `record`.
+template <typename Record, typename Visit>
+void ForEachField(Record& record, Visit&& visit) {
+  std::apply(
+      [&](const auto&... field) { (visit(field.name, field(record)), ...); },
+      kFieldsOf<std::remove_const_t<Record>>);
+}
+
+}  // namespace fdi
+
+/// FDI_FIELDS(fdi::DataGap, valve_id, from_ns, to_ns, reason), outside all
+/// namespaces, makes kFieldsOf<DataGap> of members of these names, 64 at most.
+/// The macros below apply a macro to every argument after the first.
+#define FDI_FIELDS(Record, ...)                  \
+  template <>                                    \
+  inline constexpr auto fdi::kFieldsOf<Record> = \
+      std::tuple{FDI_EXPAND(FDI_EACH(Record, __VA_ARGS__))};
+#define FDI_FIELD(Record, name) fdi::FieldOf(#name, &Record::name)
+#define FDI_EACH(Record, name, ...) \
+  FDI_FIELD(Record, name)           \
+  __VA_OPT__(, FDI_AGAIN FDI_NONE()()(Record, __VA_ARGS__))
+#define FDI_AGAIN() FDI_EACH
+#define FDI_NONE()
+#define FDI_EXPAND(...) FDI_EXPAND3(FDI_EXPAND3(FDI_EXPAND3(__VA_ARGS__)))
+#define FDI_EXPAND3(...) FDI_EXPAND2(FDI_EXPAND2(FDI_EXPAND2(__VA_ARGS__)))
+#define FDI_EXPAND2(...) FDI_EXPAND1(FDI_EXPAND1(FDI_EXPAND1(__VA_ARGS__)))
+#define FDI_EXPAND1(...) __VA_ARGS__

@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "diagnosis/health_hour.h"
+#include "diagnosis/quality_count.h"
+#include "diagnosis/records/fields.h"
+#include "diagnosis/verdict.h"
+
+/// What a monitor records beside episodes and samples.
+namespace fdi {
+
+/// A time in which a valve, or every valve if `valve_id` is empty, was not
+/// diagnosed or not recorded.
+struct DataGap {
+  std::string valve_id;
+  std::int64_t from_ns{0};
+  std::int64_t to_ns{0};
+  std::string reason;  ///< "monitor_down", "stream", "persistence_degraded".
+};
+/// Samples of one valve on one day by quality.
+struct CoverageDay {
+  std::string valve_id;
+  std::int64_t day{0};   ///< UTC, days since 1970-01-01.
+  double period_s{1.0};  ///< Of the samples.
+  QualityCount samples;
+};
+
+/// The slow accumulators of a valve's engine, as ValveEngine::Save() packs
+/// them.
+struct Accumulator {
+  std::string valve_id;
+  std::uint64_t source_id{0};
+  std::uint64_t model_hash{0};
+  std::int64_t stamp_ns{0};  ///< Of the last sample.
+  std::vector<std::byte> bytes;
+};
+/// The answer of one model set about a valve.
+struct ShadowAnswer {
+  State state{State::kNormal};
+  std::string fault;  ///< Names joined by |; empty unless isolated.
+
+  bool operator==(const ShadowAnswer&) const = default;
+};
+
+/// A stretch in which the candidate model set and the active one answered
+/// differently, each the same throughout. Its key is valve, source, start and
+/// candidate.
+struct ShadowDifference {
+  std::string valve_id;
+  std::uint64_t source_id{0};
+  std::int64_t from_ns{0};  ///< Stamps of the first and the last sample.
+  std::int64_t to_ns{0};
+  std::int64_t samples{0};
+  std::string active_set;  ///< NAME@VERSION
+  std::uint64_t active_hash{0};
+  ShadowAnswer active;
+  std::string candidate_set;
+  std::uint64_t candidate_hash{0};
+  ShadowAnswer candidate;
+};
+template <>
+inline constexpr auto kFieldsOf<ShadowDifference> = std::tuple{
+    Field{"valve_id", &ShadowDifference::valve_id},
+    Field{"source_id", &ShadowDifference::source_id},
+    Field{"from_ns", &ShadowDifference::from_ns},
+    Field{"to_ns", &ShadowDifference::to_ns},
+    Field{"samples", &ShadowDifference::samples},
+    Field{"active_set", &ShadowDifference::active_set},
+    Field{"active_hash", &ShadowDifference::active_hash},
+    Field{"active_state",
+          Nested<&ShadowDifference::active, &ShadowAnswer::state>{}},
+    Field{"active_fault",
+          Nested<&ShadowDifference::active, &ShadowAnswer::fault>{}},
+    Field{"candidate_set", &ShadowDifference::candidate_set},
+    Field{"candidate_hash", &ShadowDifference::candidate_hash},
+    Field{"candidate_state",
+          Nested<&ShadowDifference::candidate, &ShadowAnswer::state>{}},
+    Field{"candidate_fault",
+          Nested<&ShadowDifference::candidate, &ShadowAnswer::fault>{}}};
+
+/// What a monitor stores of all valves each minute.
+struct Checkpoint {
+  std::vector<CoverageDay> coverage;             ///< Since the one before.
+  std::vector<Accumulator> accumulators;         ///< Of the live valves.
+  std::vector<HealthHour> health;                ///< Since the one before.
+  std::vector<ShadowDifference> shadow;          ///< New or longer since then.
+  std::vector<Accumulator> shadow_accumulators;  ///< Of the candidate.
+
+  bool empty() const {
+    return coverage.empty() && accumulators.empty() && health.empty() &&
+           shadow.empty() && shadow_accumulators.empty();
+  }
+};
+
+}  // namespace fdi
+
+FDI_FIELDS(fdi::DataGap, valve_id, from_ns, to_ns, reason)
+
+FDI_FIELDS(fdi::Accumulator, valve_id, source_id, model_hash, stamp_ns, bytes)

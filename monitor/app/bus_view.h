@@ -1,0 +1,88 @@
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "cli/json_output.h"
+#include "cli/program.h"
+#include "idl/endpoint.h"
+
+namespace fdi::monitor {
+
+/// Settings of BusView.
+struct BusOptions {
+  std::string program;      ///< As other participants see it.
+  std::string valves{"*"};  ///< Glob: vectors and events of these only.
+  int max_valves{2000};
+  std::optional<idl::Profile> decisions{idl::Profile::kLive};  ///< None: no
+                                                               ///< vectors.
+};
+
+/// All that monitors publish, for programs that show it.
+class BusView {
+ public:
+  /// @throws TransportError
+  BusView(const BusOptions& options, const cli::Context& context, LogSink log);
+
+  /// Calls `on_message` with each message that has come, model sets first
+  /// because they explain decision vectors, and `on_ended` with the id of each
+  /// valve whose monitor ended it. Waits a moment if there is nothing.
+  template <typename OnMessage, typename OnEnded>
+  void Take(OnMessage on_message, OnEnded on_ended) {
+    constexpr std::chrono::milliseconds kNow{0};
+    constexpr std::chrono::milliseconds kMoment{50};
+    const auto all = [&](const auto& message, const auto&) {
+      on_message(message);
+    };
+    const auto matching = [&](const auto& message, const auto&) {
+      if (Matches(message.valve_id)) {
+        on_message(message);
+      }
+    };
+    models_.Take({all, {}}, kNow);
+    events_.Take({matching, {}}, decisions_ ? kNow : kMoment);
+    status_.Take({all, {}}, kNow);
+    if (decisions_) {
+      decisions_->Take(
+          {matching, [&](const auto& message,
+                         const auto&) { on_ended(message.valve_id); }},
+          kMoment, 1000);
+    }
+  }
+
+  /// Messages that were published and did not arrive.
+  std::uint64_t lost() const;
+
+ private:
+  bool Matches(const std::string& valve_id) const;
+
+  std::string valves_;
+  idl::Participant participant_;
+  idl::Subscriber<idl::ModelSetInfoMessage> models_;
+  idl::Subscriber<FaultEvent> events_;
+  idl::Subscriber<idl::MonitorStatusMessage> status_;
+  std::optional<idl::Subscriber<idl::DecisionMessage>> decisions_;
+};
+
+/// What the arrays of decision vectors mean, learnt from ModelSetInfo.
+class ModelNames {
+ public:
+  void Learn(const idl::ModelSetInfoMessage& info);
+  /// Null if it has not come yet.
+  const idl::ModelSetInfoMessage* Find(std::uint64_t hash) const;
+  /// Whether the factors of `message` have names, or are none.
+  bool Explains(const idl::DecisionMessage& message) const;
+
+  /// {"X": r, ...} by channel; null where it abstains. Without ModelSetInfo the
+  /// keys are "#1", "#2", ... in Residuals() and Factors().
+  cli::Json Residuals(const idl::DecisionMessage& message) const;
+  /// {"f1": d, ...} by fault.
+  cli::Json Factors(const idl::DecisionMessage& message) const;
+
+ private:
+  std::map<std::uint64_t, idl::ModelSetInfoMessage> infos_;
+};
+
+}  // namespace fdi::monitor

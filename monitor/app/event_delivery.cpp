@@ -1,0 +1,309 @@
+// The two ways in which an event leaves the monitor: a program of the user's, a
+// POST to a web server.
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <mutex>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <httplib.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/eventfd.h>
+#include <sys/mman.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "diagnosis/error.h"
+#include "monitor/app/event_hook.h"
+
+extern char** environ;
+
+namespace fdi::monitor {
+namespace {
+
+class File {
+ public:
+  explicit File(int fd) : fd_(fd) {}
+  ~File() {
+    if (fd_ >= 0) {
+      close(fd_);
+    }
+  }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+std::string Reason(const char* operation, int code) {
+  return std::string(operation) + ": " + std::strerror(code);
+}
+
+// A file in memory: a program that does not read it blocks nobody.
+int MakeInput(std::string_view text) {
+  const int fd = memfd_create("fdi-event", MFD_CLOEXEC);
+  if (fd >= 0 && (write(fd, text.data(), text.size()) !=
+                      static_cast<ssize_t>(text.size()) ||
+                  lseek(fd, 0, SEEK_SET) != 0)) {
+    close(fd);
+    return -1;
+  }
+  return fd;
+}
+
+// @returns the status of the child once it has ended.
+int Reap(pid_t pid) {
+  int status = 0;
+  while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  return status;
+}
+
+// The whole process group.
+void Kill(pid_t pid) {
+  kill(-pid, SIGKILL);
+  Reap(pid);
+}
+
+// What the child is to have: `input` as standard input, our standard error as
+// output, no other file, all signals as usual, a process group of its own.
+class SpawnPlan {
+ public:
+  explicit SpawnPlan(int input) {
+    posix_spawn_file_actions_init(&files_);
+    posix_spawn_file_actions_adddup2(&files_, input, STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&files_, STDERR_FILENO, STDOUT_FILENO);
+    posix_spawn_file_actions_addclosefrom_np(&files_, STDERR_FILENO + 1);
+    sigset_t none;
+    sigset_t all;
+    sigemptyset(&none);
+    sigfillset(&all);
+    posix_spawnattr_init(&attributes_);
+    posix_spawnattr_setsigmask(&attributes_, &none);
+    posix_spawnattr_setsigdefault(&attributes_, &all);
+    posix_spawnattr_setpgroup(&attributes_, 0);
+    posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK |
+                                               POSIX_SPAWN_SETSIGDEF |
+                                               POSIX_SPAWN_SETPGROUP);
+  }
+  ~SpawnPlan() {
+    posix_spawn_file_actions_destroy(&files_);
+    posix_spawnattr_destroy(&attributes_);
+  }
+  SpawnPlan(const SpawnPlan&) = delete;
+  SpawnPlan& operator=(const SpawnPlan&) = delete;
+
+  // @returns an error code, 0 for success.
+  int Spawn(const std::vector<std::string>& words, pid_t& pid) const {
+    std::vector<char*> arguments;
+    for (const std::string& word : words) {
+      arguments.push_back(const_cast<char*>(word.c_str()));
+    }
+    arguments.push_back(nullptr);
+    return posix_spawnp(&pid, arguments[0], &files_, &attributes_,
+                        arguments.data(), environ);
+  }
+
+ private:
+  posix_spawn_file_actions_t files_;
+  posix_spawnattr_t attributes_;
+};
+
+std::optional<std::string> StatusReason(int status) {
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+    return std::nullopt;
+  }
+  return WIFEXITED(status)
+             ? "exit status " + std::to_string(WEXITSTATUS(status))
+             : "signal " + std::to_string(WTERMSIG(status));
+}
+
+class ProgramDelivery : public EventDelivery {
+ public:
+  ProgramDelivery(std::vector<std::string> words,
+                  std::chrono::milliseconds limit)
+      : words_(std::move(words)),
+        limit_(limit),
+        stop_(eventfd(0, EFD_CLOEXEC)) {
+    if (stop_.get() < 0) {
+      throw std::system_error(errno, std::generic_category(), "eventfd");
+    }
+  }
+
+  std::optional<std::string> Deliver(const std::string& json) override {
+    const File input(MakeInput(json));
+    if (input.get() < 0) {
+      return Reason("memfd_create", errno);
+    }
+    pid_t pid = 0;
+    if (const int code = SpawnPlan(input.get()).Spawn(words_, pid); code != 0) {
+      return Reason(words_.front().c_str(), code);
+    }
+    return Await(pid);
+  }
+
+  void Interrupt() override { eventfd_write(stop_.get(), 1); }
+
+ private:
+  std::optional<std::string> Await(pid_t pid) const {
+    // The header of glibc 2.36 declares pidfd_open() for C alone.
+    const File process(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
+    if (process.get() < 0) {
+      // Without it nobody would notice its end before the limit.
+      const int code = errno;
+      Kill(pid);
+      return Reason("pidfd_open", code);
+    }
+    pollfd wanted[2] = {{process.get(), POLLIN, 0}, {stop_.get(), POLLIN, 0}};
+    const auto end = std::chrono::steady_clock::now() + limit_;
+    int ready = 0;
+    do {
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+          end - std::chrono::steady_clock::now());
+      ready = poll(wanted, 2,
+                   static_cast<int>(std::max<std::int64_t>(0, left.count())));
+    } while (ready < 0 && errno == EINTR);
+    const bool ended = ready > 0 && wanted[0].revents != 0;
+    if (ended) {
+      return StatusReason(Reap(pid));
+    }
+    Kill(pid);
+    return ready > 0 ? "the monitor stops"
+                     : "killed after " + std::to_string(limit_.count()) + " ms";
+  }
+
+  std::vector<std::string> words_;
+  std::chrono::milliseconds limit_;
+  File stop_;
+};
+
+constexpr std::string_view kScheme = "http://";
+
+[[noreturn]] void Refuse(const std::string& target, const std::string& why) {
+  throw ConfigError("--on-event '" + target + "': " + why +
+                    "; accepted are a command with its arguments and "
+                    "http://HOST[:PORT][/PATH]");
+}
+
+// Words are separated by blanks; within '...' or "..." a blank is part of the
+// word. Nothing else means anything, and nothing escapes.
+std::vector<std::string> SplitWords(const std::string& text) {
+  std::vector<std::string> words;
+  bool in_word = false;
+  char quote = '\0';
+  for (const char c : text) {
+    if (quote == '\0' && (c == ' ' || c == '\t')) {
+      in_word = false;
+      continue;
+    }
+    if (!std::exchange(in_word, true)) {
+      words.emplace_back();
+    }
+    if (c == quote) {
+      quote = '\0';
+    } else if (quote == '\0' && (c == '\'' || c == '"')) {
+      quote = c;
+    } else {
+      words.back() += c;
+    }
+  }
+  if (quote != '\0') {
+    Refuse(text, "a quote is not closed");
+  }
+  return words;
+}
+
+class UrlDelivery : public EventDelivery {
+ public:
+  UrlDelivery(std::string server, std::string path,
+              std::chrono::milliseconds limit)
+      : server_(std::move(server)), path_(std::move(path)), limit_(limit) {}
+
+  std::optional<std::string> Deliver(const std::string& json) override {
+    httplib::Client client(server_);
+    client.set_connection_timeout(limit_);
+    client.set_read_timeout(limit_);
+    client.set_write_timeout(limit_);
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopped_) {
+        return "the monitor stops";
+      }
+      client_ = &client;
+    }
+    const httplib::Result answer = client.Post(path_, json, "application/json");
+    {
+      const std::lock_guard lock(mutex_);
+      client_ = nullptr;
+    }
+    if (!answer) {
+      return httplib::to_string(answer.error());
+    }
+    return answer->status / 100 == 2
+               ? std::nullopt
+               : std::optional("HTTP status " + std::to_string(answer->status));
+  }
+
+  void Interrupt() override {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+    if (client_ != nullptr) {
+      client_->stop();
+    }
+  }
+
+ private:
+  std::string server_;  // http://HOST[:PORT]
+  std::string path_;
+  std::chrono::milliseconds limit_;
+  std::mutex mutex_;
+  bool stopped_{false};
+  httplib::Client* client_{nullptr};  // Under way.
+};
+
+}  // namespace
+
+std::unique_ptr<EventDelivery> DeliverToProgram(
+    std::vector<std::string> words, std::chrono::milliseconds limit) {
+  return std::make_unique<ProgramDelivery>(std::move(words), limit);
+}
+
+std::unique_ptr<EventDelivery> DeliverToUrl(const std::string& url,
+                                            std::chrono::milliseconds limit) {
+  const std::size_t slash = std::min(url.find('/', kScheme.size()), url.size());
+  if (!url.starts_with(kScheme) || slash == kScheme.size()) {
+    Refuse(url, "no host");
+  }
+  const std::string path = url.substr(slash);
+  const std::string server = url.substr(0, slash);
+  if (!httplib::Client(server).is_valid()) {
+    Refuse(url, "no host and port");
+  }
+  return std::make_unique<UrlDelivery>(server, path.empty() ? "/" : path,
+                                       limit);
+}
+
+std::unique_ptr<EventDelivery> MakeEventDelivery(
+    const std::string& target, std::chrono::milliseconds limit) {
+  if (target.starts_with(kScheme)) {
+    return DeliverToUrl(target, limit);
+  }
+  if (target.find("://") != std::string::npos &&
+      target.find("://") < target.find(' ')) {
+    Refuse(target, "only http is spoken");
+  }
+  std::vector<std::string> words = SplitWords(target);
+  if (words.empty()) {
+    Refuse(target, "nothing to run");
+  }
+  return DeliverToProgram(std::move(words), limit);
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <string>
+
+#include "cli/json_output.h"
+#include "monitor/app/bus_view.h"
+
+namespace fdi::monitor {
+
+/// A message of the bus: one JSON object, and one line for people.
+struct WatchRecord {
+  cli::Json object;
+  std::string line;
+};
+
+/// Turns messages into records. Decision vectors are arrays; ModelSetInfo says
+/// what they mean, and may come after the first of them, as it is another
+/// topic. Vectors without an explanation wait for it, in their order, at most
+/// kPatience; after that factors and residuals go by position: "#2".
+class WatchRecords {
+ public:
+  using Clock = std::chrono::steady_clock;
+  using Sink = std::function<void(const WatchRecord&)>;
+  static constexpr std::chrono::seconds kPatience{2};
+
+  /// @param utc times of lines in UTC, not in the local zone.
+  WatchRecords(bool utc, Sink sink) : utc_(utc), sink_(std::move(sink)) {}
+
+  void Add(const idl::DecisionMessage& message, Clock::time_point now);
+  void Add(const FaultEvent& message, Clock::time_point now);
+  void Add(const idl::MonitorStatusMessage& message, Clock::time_point now);
+  void Add(const idl::ModelSetInfoMessage& message, Clock::time_point now);
+
+  /// Hands out the vectors that wait, as far as they are due.
+  void Flush(Clock::time_point now);
+
+ private:
+  WatchRecord RecordOf(const idl::DecisionMessage& message) const;
+  std::string Start(std::int64_t stamp_ns, const std::string& who) const;
+
+  bool utc_;
+  Sink sink_;
+  ModelNames names_;
+  std::deque<std::pair<Clock::time_point, idl::DecisionMessage>> waiting_;
+};
+
+}  // namespace fdi::monitor

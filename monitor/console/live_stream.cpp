@@ -1,0 +1,234 @@
+#include "monitor/console/live_stream.h"
+
+#include <exception>
+#include <utility>
+
+namespace fdi::console {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kTick{250};
+constexpr milliseconds kTilePeriod{1000};
+// Latency of what other programs do to the history.
+constexpr milliseconds kAlarmPeriod{2000};
+constexpr std::size_t kUnstoredLimit = 1000;
+
+}  // namespace
+
+struct LiveStream::Client {
+  std::string valve;
+  std::uint64_t next_sample{0};  // The feeding thread alone uses it.
+  std::deque<Message> queue;
+  std::size_t bytes{0};
+  bool ended{false};
+};
+
+Message StreamEvent(const std::string& name, const std::string& data) {
+  std::string text = "event: ";
+  text.append(name).append("\ndata: ").append(data).append("\n\n");
+  return std::make_shared<const std::string>(std::move(text));
+}
+
+std::shared_ptr<LiveStream::Client> LiveStream::Admit(const std::string& valve,
+                                                      std::uint64_t next_sample,
+                                                      Message hello) {
+  const std::lock_guard lock(mutex_);
+  if (closed_ || clients_.size() >= options_.max_clients) {
+    ++counts_.refused;
+    return nullptr;
+  }
+  ++counts_.admitted;
+  clients_.push_back(
+      std::make_shared<Client>(Client{valve, next_sample, {}, 0, false}));
+  Push(*clients_.back(), hello);
+  return clients_.back();
+}
+
+void LiveStream::Release(const std::shared_ptr<Client>& client) {
+  const std::lock_guard lock(mutex_);
+  std::erase(clients_, client);
+}
+
+// With the mutex locked. One message may be larger than what may wait.
+void LiveStream::Push(Client& client, const Message& message) {
+  if (client.ended) {
+    return;
+  }
+  if (!client.queue.empty() &&
+      client.bytes + message->size() > options_.max_bytes) {
+    client.ended = true;
+    client.queue.clear();
+    ++counts_.dropped;
+  } else {
+    client.bytes += message->size();
+    client.queue.push_back(message);
+  }
+  changed_.notify_all();
+}
+
+LiveStream::Outcome LiveStream::Next(Client& client, milliseconds timeout,
+                                     Message& message) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, timeout, [&client] {
+    return client.ended || !client.queue.empty();
+  });
+  if (client.ended) {
+    return Outcome::kEnded;
+  }
+  if (client.queue.empty()) {
+    return Outcome::kTimeout;
+  }
+  message = std::move(client.queue.front());
+  client.queue.pop_front();
+  client.bytes -= message->size();
+  return Outcome::kMessage;
+}
+
+void LiveStream::Broadcast(const Message& message) {
+  const std::lock_guard lock(mutex_);
+  for (const auto& client : clients_) {
+    Push(*client, message);
+  }
+}
+
+StreamCounts LiveStream::counts() const {
+  const std::lock_guard lock(mutex_);
+  StreamCounts counts = counts_;
+  counts.clients = clients_.size();
+  return counts;
+}
+
+void LiveStream::Start(FeedParts parts) {
+  parts_ = std::make_unique<FeedParts>(std::move(parts));
+  parts_->alarms.Refresh(parts_->utc_now_ns());  // The alarms of before.
+  thread_ = std::thread([this] { Run(); });
+}
+
+void LiveStream::Close() {
+  const std::lock_guard lock(mutex_);
+  closed_ = true;
+  for (const auto& client : clients_) {
+    client->ended = true;
+  }
+  changed_.notify_all();
+}
+
+void LiveStream::Stop() {
+  Close();
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+void LiveStream::Wake() {
+  const std::lock_guard lock(mutex_);
+  woken_ = true;
+  changed_.notify_all();
+}
+
+void LiveStream::AddUnstored(const FaultEvent& event) {
+  const std::lock_guard lock(mutex_);
+  if (unstored_.size() < kUnstoredLimit) {
+    unstored_.push_back(event);
+  }
+  woken_ = true;
+  changed_.notify_all();
+}
+
+void LiveStream::Run() {
+  while (true) {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait_for(lock, kTick, [this] { return closed_ || woken_; });
+      if (closed_) {
+        return;
+      }
+      if (std::exchange(woken_, false)) {
+        next_alarms_ = {};
+      }
+    }
+    // A history that is busy now may answer next time.
+    try {
+      Step(std::chrono::steady_clock::now());
+    } catch (const std::exception& error) {
+      parts_->log(
+          LogLevel::kWarning,
+          std::string("console_feed_failed reason=\"") + error.what() + "\"");
+    }
+  }
+}
+
+void LiveStream::Step(std::chrono::steady_clock::time_point now) {
+  if (now >= next_alarms_) {
+    next_alarms_ = now + kAlarmPeriod;
+    SendAlarms();
+  }
+  if (counts().clients == 0) {
+    return;
+  }
+  SendSamples();
+  for (const DataGap& gap : parts_->board.TakeGaps()) {
+    Broadcast(StreamEvent("gap", Dump(GapJson(gap))));
+  }
+  if (now >= next_tiles_) {
+    next_tiles_ = now + kTilePeriod;
+    SendTiles();
+  }
+}
+
+void LiveStream::SendAlarms() {
+  std::vector<FaultEvent> unstored;
+  {
+    const std::lock_guard lock(mutex_);
+    unstored.swap(unstored_);
+  }
+  for (const FaultEvent& event : unstored) {
+    Broadcast(
+        StreamEvent("alarm", Dump(AlarmJson(AlarmOf(event), parts_->texts))));
+  }
+  for (const Json& row : parts_->alarms.Refresh(parts_->utc_now_ns())) {
+    Broadcast(StreamEvent("alarm", Dump(row)));
+  }
+}
+
+void LiveStream::SendSamples() {
+  std::vector<std::shared_ptr<Client>> clients;
+  {
+    const std::lock_guard lock(mutex_);
+    clients = clients_;
+  }
+  for (const auto& client : clients) {
+    const auto trend = parts_->board.Since(client->valve, client->next_sample);
+    if (!trend) {
+      continue;  // It wants none, or that valve was not seen yet.
+    }
+    client->next_sample = trend->next;
+    Json samples = Json::array();
+    for (const TracePoint& point : trend->points) {
+      samples.push_back(SampleJson(client->valve, point));
+    }
+    if (!samples.empty()) {
+      const Message message = StreamEvent("sample", Dump(samples));
+      const std::lock_guard lock(mutex_);
+      Push(*client, message);
+    }
+  }
+}
+
+void LiveStream::SendTiles() {
+  const auto alarms = parts_->alarms.ByValve();
+  Json tiles = Json::array();
+  for (const ValveState& valve : parts_->board.Valves(false)) {
+    const std::pair now{valve.version, AlarmFor(*alarms, valve.id)};
+    if (std::exchange(sent_[valve.id], now) != now) {
+      tiles.push_back(TileJson(valve, now.second, true));
+    }
+  }
+  if (!tiles.empty()) {
+    Broadcast(StreamEvent("tiles", Dump({{"now_ms", Ms(parts_->utc_now_ns())},
+                                         {"tiles", std::move(tiles)}})));
+  }
+}
+
+}  // namespace fdi::console

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "diagnosis/log.h"
+#include "monitor/console/alarm_book.h"
+#include "monitor/console/live_board.h"
+
+namespace fdi::console {
+
+/// A server-sent event: "event: NAME\ndata: DATA\n\n". `data` has no line ends,
+/// as compact JSON has none.
+using Message = std::shared_ptr<const std::string>;
+Message StreamEvent(const std::string& name, const std::string& data);
+
+/// Settings of LiveStream.
+struct StreamOptions {
+  std::size_t max_clients{16};
+  std::size_t max_bytes{4 << 20};  ///< That wait for one client.
+};
+
+/// What became of the clients.
+struct StreamCounts {
+  std::uint64_t clients{0};  ///< Now.
+  std::uint64_t admitted{0};
+  std::uint64_t refused{0};  ///< All places were taken.
+  std::uint64_t dropped{0};  ///< Too slow.
+};
+
+/// What the stream reads; all of it outlives the stream's thread.
+struct FeedParts {
+  LiveBoard& board;
+  AlarmBook& alarms;
+  const cli::FaultTexts& texts;
+  std::function<std::int64_t()> utc_now_ns;
+  LogSink log;
+};
+
+/// The pages that listen, and a thread that sends them what changes: tiles each
+/// second, samples of the valves that they show four times a second, alarms at
+/// once. Between that thread and the HTTP thread that writes to a page's socket
+/// is a bounded queue; a client whose queue is full is dropped, so that nothing
+/// ever waits for a client. While there is no client only the alarms are
+/// followed. Thread safe.
+class LiveStream {
+ public:
+  enum class Outcome : std::uint8_t { kMessage, kTimeout, kEnded };
+  struct Client;
+
+  explicit LiveStream(StreamOptions options = {}) : options_(options) {}
+  ~LiveStream() { Stop(); }
+  LiveStream(const LiveStream&) = delete;
+  LiveStream& operator=(const LiveStream&) = delete;
+
+  /// Starts the thread; changes from now on are sent. Once.
+  /// @throws storage::SqliteError, DataError
+  void Start(FeedParts parts);
+  /// Ends all clients and admits none. Does not wait.
+  void Close();
+  /// Closes, and waits for the thread.
+  void Stop();
+
+  /// @param valve whose samples the client wants, from `next_sample` of
+  ///   LiveBoard::Since() on; empty: of none.
+  /// @param hello its first message. @returns null if all places are taken or
+  ///   the stream is closed.
+  std::shared_ptr<Client> Admit(const std::string& valve,
+                                std::uint64_t next_sample, Message hello);
+  /// The next message of `client`. Messages that wait when it is ended are
+  /// dropped.
+  Outcome Next(Client& client, std::chrono::milliseconds timeout,
+               Message& message);
+  void Release(const std::shared_ptr<Client>& client);
+  void Broadcast(const Message& message);
+  StreamCounts counts() const;
+
+  /// The history changed: its alarms are sent at once.
+  void Wake();
+  /// An event that is not in the history.
+  void AddUnstored(const FaultEvent& event);
+
+ private:
+  void Run();
+  void Step(std::chrono::steady_clock::time_point now);
+  void SendAlarms();
+  void SendSamples();
+  void SendTiles();
+  void Push(Client& client, const Message& message);
+
+  const StreamOptions options_;
+  std::unique_ptr<FeedParts> parts_;
+  // Version and alarm of each valve as of the last tile that was sent.
+  std::map<std::string, std::pair<std::uint64_t, ValveAlarm>> sent_;
+  std::chrono::steady_clock::time_point next_tiles_;
+  std::chrono::steady_clock::time_point next_alarms_;
+
+  mutable std::mutex mutex_;  // Guards all below, and what is in clients.
+  std::condition_variable changed_;
+  std::vector<std::shared_ptr<Client>> clients_;
+  StreamCounts counts_;
+  std::vector<FaultEvent> unstored_;
+  bool woken_{false};
+  bool closed_{false};
+  std::thread thread_;
+};
+
+}  // namespace fdi::console

@@ -1,0 +1,397 @@
+#include "monitor/journal.h"
+
+#include <algorithm>
+#include <exception>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace fdi::monitor {
+namespace {
+
+// Bounds how long a commit takes, and so how long later events wait for it.
+constexpr std::size_t kRecordsPerCommit = 1'000;
+
+// Few and large transactions: the newest chunk of a trace is packed anew in
+// each of them.
+constexpr std::size_t kPointsPerCommit = 5'000;
+
+}  // namespace
+
+Journal::Journal(HistorySink& history, EventSink& bus,
+                 const MonitorContext& context, const JournalOptions& options)
+    : history_(history),
+      bus_(bus),
+      context_(context),
+      counters_(context.counters),
+      log_(context.log),
+      options_(options) {}
+
+Journal::~Journal() {
+  try {
+    Stop();
+  } catch (...) {
+    // Whoever wants to know calls Stop().
+  }
+}
+
+void Journal::Start() {
+  last_commit_ = Clock::now();
+  writer_.Start([this] { Write(); });
+  publisher_.Start([this] { PublishAll(); });
+}
+
+void Journal::Stop() {
+  if (!writer_.started()) {
+    return;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    stop_by_ = Clock::now() + options_.stop_limit;
+    work_.notify_one();
+  }
+  // The publisher ends after the writer, which may still commit what it waits
+  // for; then what it published last is marked by this thread.
+  FirstError errors;
+  errors.Try([this] { writer_.Join(); });
+  {
+    const std::lock_guard lock(mutex_);
+    publishing_ends_ = true;
+    unsent_changed_.notify_one();
+  }
+  errors.Try([this] { publisher_.Join(); });
+  WriteRecords();
+  for (const Record& record : std::exchange(records_, {})) {
+    if (std::holds_alternative<PendingEvent>(record)) {
+      counters_.Add(Counter::kEventsLost);
+    }
+  }
+  CommitBuffered();
+  errors.Rethrow();
+}
+
+void Journal::Event(FaultEvent event) {
+  if (event.transition.kind == TransitionKind::kDetected) {
+    counters_.Add(Counter::kEpisodes);
+  }
+  auto pending = std::make_shared<Pending>();
+  pending->event = std::move(event);
+  pending->deadline = Clock::now() + options_.patience;
+  const std::lock_guard lock(mutex_);
+  unsent_.push_back(pending);
+  unsent_changed_.notify_one();
+  const bool kept = AddLocked(pending);
+  if (!kept) {
+    counters_.Add(Counter::kEventsLost);
+  }
+  if (!kept || degraded_) {
+    SettleLocked(*pending, false);
+  }
+}
+
+void Journal::Evidence(EpisodeTrace trace) {
+  const std::lock_guard lock(mutex_);
+  const std::size_t points = trace.trace.size();
+  if (trace_points_ + points > options_.max_trace_points) {
+    counters_.Add(Counter::kTraceDropped, points);
+    return;
+  }
+  trace_points_ += points;
+  traces_.push_back(std::move(trace));
+  work_.notify_one();
+}
+
+void Journal::Gap(DataGap gap) {
+  counters_.Add(Counter::kGaps);
+  log_.Report(
+      LogId::kGap, "data_gap",
+      [&gap] { return "valve=" + gap.valve_id + " reason=" + gap.reason; },
+      LogLevel::kInfo);
+  const std::lock_guard lock(mutex_);
+  AddLocked(std::move(gap));
+}
+
+void Journal::Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) {
+  log_.Line(LogLevel::kInfo, "episode_resumed valve=" + episode.valve_id);
+  const std::lock_guard lock(mutex_);
+  AddLocked(Resumption{episode.episode_id, stamp_ns});
+}
+
+void Journal::Commit(Checkpoint checkpoint) {
+  const std::lock_guard lock(mutex_);
+  checkpoint_ = Merged(std::move(checkpoint_), std::move(checkpoint));
+  work_.notify_one();
+}
+
+bool Journal::AddLocked(Record record) {
+  if (records_.size() >= options_.max_records) {
+    log_.Report(
+        LogId::kHistoryLost, "history_dropped",
+        [this] { return "waiting=" + std::to_string(records_.size()); },
+        LogLevel::kError);
+    return false;
+  }
+  records_.push_back(std::move(record));
+  work_.notify_one();
+  return true;
+}
+
+void Journal::SettleLocked(Pending& pending, bool committed) {
+  pending.stage =
+      committed ? Pending::Stage::kCommitted : Pending::Stage::kFailed;
+  unsent_changed_.notify_one();
+}
+
+Journal::Backlog Journal::backlog() const {
+  const std::lock_guard lock(mutex_);
+  return {records_.size(), trace_points_};
+}
+
+void Journal::Write() {
+  const auto has_work = [this] {
+    return stopping_ || !records_.empty() || !checkpoint_.empty() ||
+           trace_points_ >= kPointsPerCommit;
+  };
+  while (true) {
+    bool last_attempt = false;
+    {
+      std::unique_lock lock(mutex_);
+      if (degraded_) {
+        work_.wait_for(lock, options_.retry_period,
+                       [this] { return stopping_; });
+      } else {
+        work_.wait_for(lock, options_.commit_period, has_work);
+      }
+      last_attempt = stopping_;
+    }
+    // While the history fails, a commit that succeeds tells that it answers.
+    const bool served = (!degraded_ || CommitBuffered()) && WriteWaiting();
+    if (!served) {
+      FailWaitingEvents();
+    } else if (degraded_) {
+      Recovered();
+    }
+    const std::lock_guard lock(mutex_);
+    const bool idle =
+        records_.empty() && traces_.empty() && checkpoint_.empty();
+    // An attempt that failed before Stop() was called is not the last one: the
+    // history may answer again.
+    if ((stopping_ && idle) || (last_attempt && !served)) {
+      return;
+    }
+  }
+}
+
+// Commits what waits, the evidence in its turn.
+// @returns false once the history fails.
+bool Journal::WriteWaiting() {
+  while (true) {
+    if (!WriteRecords() || !WriteCheckpoint()) {
+      return false;
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      const bool due = Clock::now() - last_commit_ >= options_.commit_period;
+      const bool wanted = (stopping_ || degraded_) && !traces_.empty();
+      if (!due && !wanted && trace_points_ < kPointsPerCommit) {
+        return true;
+      }
+    }
+    if (!WriteTraces()) {
+      return false;
+    }
+  }
+}
+
+bool Journal::WriteRecords() {
+  std::vector<const Record*> batch;
+  while (true) {
+    {
+      const std::lock_guard lock(mutex_);
+      // A deque: pointers stay valid, as only this thread takes from the front.
+      const std::size_t count = std::min(records_.size(), kRecordsPerCommit);
+      batch.clear();
+      for (std::size_t i = 0; i < count; ++i) {
+        batch.push_back(&records_[i]);
+      }
+    }
+    if (batch.empty()) {
+      return true;
+    }
+    if (!WriteBatch(batch)) {
+      return false;
+    }
+    const std::lock_guard lock(mutex_);
+    records_.erase(
+        records_.begin(),
+        records_.begin() + static_cast<std::ptrdiff_t>(batch.size()));
+  }
+}
+
+// Events and resumptions in one commit; gaps and marks are buffered once that
+// succeeded, so that a repetition buffers nothing twice.
+bool Journal::WriteBatch(const std::vector<const Record*>& batch) {
+  const bool any = std::ranges::any_of(batch, [](const Record* record) {
+    return std::holds_alternative<PendingEvent>(*record) ||
+           std::holds_alternative<Resumption>(*record);
+  });
+  const bool committed = !any || Attempt([&] {
+    history_.CommitBatch([&] {
+      for (const Record* record : batch) {
+        if (const auto* event = std::get_if<PendingEvent>(record)) {
+          history_.Record((*event)->event);
+        } else if (const auto* resumed = std::get_if<Resumption>(record)) {
+          history_.Resume(resumed->episode_id, resumed->stamp_ns);
+        }
+      }
+    });
+  });
+  {
+    const std::lock_guard lock(mutex_);
+    for (const Record* record : batch) {
+      if (const auto* event = std::get_if<PendingEvent>(record)) {
+        SettleLocked(**event, committed);
+      }
+    }
+  }
+  return committed && Attempt([&] {
+           for (const Record* record : batch) {
+             if (const auto* gap = std::get_if<DataGap>(record)) {
+               history_.AddGap(*gap);
+             } else if (const auto* sent = std::get_if<Sent>(record)) {
+               history_.MarkSent(sent->pending->event);
+             }
+           }
+         });
+}
+
+// One that fails is merged with the next.
+bool Journal::WriteCheckpoint() {
+  Checkpoint checkpoint;
+  {
+    const std::lock_guard lock(mutex_);
+    checkpoint = std::exchange(checkpoint_, {});
+  }
+  if (checkpoint.empty() ||
+      Attempt([&] { history_.CommitCheckpoint(checkpoint); })) {
+    return true;
+  }
+  const std::lock_guard lock(mutex_);
+  checkpoint_ = Merged(std::move(checkpoint), std::move(checkpoint_));
+  return false;
+}
+
+// Buffers evidence and commits it at once, so that no event waits for it.
+bool Journal::WriteTraces() {
+  last_commit_ = Clock::now();
+  std::size_t points = 0;
+  while (points < kPointsPerCommit) {
+    std::optional<EpisodeTrace> trace;
+    bool late = false;
+    {
+      const std::lock_guard lock(mutex_);
+      if (traces_.empty()) {
+        break;
+      }
+      trace = std::move(traces_.front());
+      traces_.pop_front();
+      trace_points_ -= trace->trace.size();
+      late = stopping_ && Clock::now() > stop_by_;
+    }
+    points += trace->trace.size();
+    if (late || !Attempt([&] { history_.AddTrace(*trace); })) {
+      counters_.Add(Counter::kTraceDropped, trace->trace.size());
+    }
+  }
+  return CommitBuffered();
+}
+
+bool Journal::CommitBuffered() {
+  return Attempt([this] { history_.Commit(); });
+}
+
+bool Journal::Attempt(const std::function<void()>& call) {
+  pulse_.Beat();
+  try {
+    call();
+    return true;
+  } catch (const std::exception& error) {
+    counters_.Add(Counter::kPersistFailures);
+    if (!degraded_.exchange(true)) {
+      degraded_since_ns_ = context_.utc_now_ns();
+    }
+    const std::string reason = error.what();
+    log_.Report(
+        LogId::kPersistence, "persistence_degraded",
+        [&reason] { return "reason=\"" + reason + "\""; }, LogLevel::kError);
+    return false;
+  }
+}
+
+// No event that waits behind a failed one needs to wait for its deadline.
+void Journal::FailWaitingEvents() {
+  const std::lock_guard lock(mutex_);
+  for (const Record& record : records_) {
+    if (const auto* event = std::get_if<PendingEvent>(&record)) {
+      SettleLocked(**event, false);
+    }
+  }
+}
+
+void Journal::Recovered() {
+  degraded_ = false;
+  log_.Line(LogLevel::kInfo, "persistence_recovered");
+  Gap({"", degraded_since_ns_, context_.utc_now_ns(), "persistence_degraded"});
+}
+
+void Journal::PublishAll() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    unsent_changed_.wait(
+        lock, [this] { return publishing_ends_ || !unsent_.empty(); });
+    if (unsent_.empty()) {
+      return;
+    }
+    const PendingEvent next = unsent_.front();
+    unsent_changed_.wait_until(lock, next->deadline, [this, &next] {
+      return publishing_ends_ || next->stage != Pending::Stage::kWaiting;
+    });
+    const bool persisted = next->stage == Pending::Stage::kCommitted;
+    unsent_.pop_front();
+    lock.unlock();
+    Publish(next, persisted);
+    lock.lock();
+  }
+}
+
+void Journal::Publish(const PendingEvent& pending, bool persisted) {
+  const FaultEvent& event = pending->event;
+  bool sent = false;
+  std::string reason = "refused";
+  try {
+    sent = bus_.Publish(event, persisted);
+  } catch (const std::exception& error) {
+    reason = error.what();
+  }
+  const auto fields = [&] {
+    return "valve=" + event.valve_id +
+           " transition=" + std::string(TransitionName(event.transition.kind));
+  };
+  if (!persisted) {
+    counters_.Add(Counter::kEventsUnpersisted);
+    log_.Report(LogId::kUnpersisted, "event_unpersisted", fields);
+  }
+  if (sent) {
+    counters_.Add(Counter::kEvents);
+    const std::lock_guard lock(mutex_);
+    AddLocked(Sent{pending});
+  } else {
+    counters_.Add(Counter::kEventsUnsent);
+    log_.Report(LogId::kUnsent, "publication_failed", [&] {
+      return "topic=FaultEvent " + fields() + " reason=\"" + reason + "\"";
+    });
+  }
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,149 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <variant>
+#include <vector>
+
+#include "diagnosis/concurrency/worker.h"
+#include "monitor/checkpoint.h"
+#include "monitor/counters.h"
+#include "monitor/episode_tracker.h"
+#include "monitor/heartbeat.h"
+#include "monitor/sinks.h"
+#include "monitor/throttled_log.h"
+
+namespace fdi::monitor {
+
+/// Settings of Journal.
+struct JournalOptions {
+  std::chrono::milliseconds patience{200};  ///< Of the bus for the disk.
+  std::chrono::milliseconds commit_period{1000};
+  std::chrono::milliseconds retry_period{1000};
+  std::chrono::milliseconds stop_limit{1000};  ///< Of evidence at the end.
+  std::size_t max_records{100'000};         ///< Events, gaps and marks waiting.
+  std::size_t max_trace_points{2'000'000};  ///< Evidence waiting.
+};
+
+/// Takes fault events to the history and to the bus, in this order, and
+/// evidence, gaps and checkpoints to the history. Never blocks the diagnosis.
+///
+/// Two threads, because a commit may take as long as it likes: the history
+/// thread commits, events before evidence, those that wait together at once;
+/// the publisher publishes the events in their order, each as soon as it is
+/// committed, or once committing failed, or 200 ms after it came, then as not
+/// persisted.
+///
+/// If the history fails, all is kept and tried again each second; what no
+/// longer fits is counted as lost, and the time becomes a data gap once the
+/// history answers again.
+///
+/// Built idle. Thread safe, but for Start() and Stop().
+class Journal : public EpisodeOutlet {
+ public:
+  Journal(HistorySink& history, EventSink& bus, const MonitorContext& context,
+          const JournalOptions& options);
+  ~Journal() override;
+  Journal(const Journal&) = delete;
+  Journal& operator=(const Journal&) = delete;
+
+  void Event(FaultEvent event) override;
+  void Evidence(EpisodeTrace trace) override;
+  void Gap(DataGap gap) override;
+  void Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) override;
+  /// Commits `checkpoint`, merged with one that still waits.
+  void Commit(Checkpoint checkpoint);
+
+  void Start();
+  /// Commits and publishes what is there and ends the threads; nothing if they
+  /// were not started. @throws what a thread ended with.
+  void Stop();
+
+  /// A thread ended with an exception.
+  bool failed() const { return writer_.failed() || publisher_.failed(); }
+  /// The history fails at present.
+  bool degraded() const { return degraded_; }
+  /// Of the history thread.
+  const Pulse& pulse() const { return pulse_; }
+
+  /// What waits for the history.
+  struct Backlog {
+    std::size_t records{0};
+    std::size_t trace_points{0};
+  };
+  Backlog backlog() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  // An event that has not been published, or not been marked as such.
+  struct Pending {
+    enum class Stage : std::uint8_t { kWaiting, kCommitted, kFailed };
+    FaultEvent event;
+    Clock::time_point deadline;
+    Stage stage{Stage::kWaiting};
+  };
+  using PendingEvent = std::shared_ptr<Pending>;
+  struct Resumption {
+    std::uint64_t episode_id;
+    std::int64_t stamp_ns;
+  };
+  struct Sent {  // The event is on the bus.
+    PendingEvent pending;
+  };
+  using Record = std::variant<PendingEvent, Resumption, DataGap, Sent>;
+
+  // Of callers. Those called Locked hold mutex_.
+  bool AddLocked(Record record);
+  void SettleLocked(Pending& pending, bool committed);
+
+  // Of the history thread.
+  void Write();
+  bool WriteWaiting();
+  bool WriteRecords();
+  bool WriteBatch(const std::vector<const Record*>& batch);
+  bool WriteCheckpoint();
+  bool WriteTraces();
+  bool CommitBuffered();
+  bool Attempt(const std::function<void()>& call);
+  void FailWaitingEvents();
+  void Recovered();
+
+  // Of the publisher.
+  void PublishAll();
+  void Publish(const PendingEvent& pending, bool persisted);
+
+  HistorySink& history_;
+  EventSink& bus_;
+  MonitorContext context_;
+  Counters& counters_;
+  ThrottledLog& log_;
+  JournalOptions options_;
+  Pulse pulse_;
+  std::atomic<bool> degraded_{false};
+  std::int64_t degraded_since_ns_{0};  // Of the history thread,
+  Clock::time_point last_commit_;      // as well.
+
+  mutable std::mutex mutex_;                // Guards what follows.
+  std::condition_variable work_;            // For the history thread,
+  std::condition_variable unsent_changed_;  // for the publisher.
+  std::deque<Record> records_;
+  std::deque<PendingEvent> unsent_;
+  std::deque<EpisodeTrace> traces_;
+  std::size_t trace_points_{0};
+  Checkpoint checkpoint_;
+  bool stopping_{false};
+  bool publishing_ends_{false};
+  Clock::time_point stop_by_;
+
+  Worker writer_;
+  Worker publisher_;
+};
+
+}  // namespace fdi::monitor

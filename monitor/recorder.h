@@ -1,0 +1,88 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+
+#include "diagnosis/concurrency/bounded_queue.h"
+#include "diagnosis/concurrency/worker.h"
+#include "monitor/counters.h"
+#include "monitor/heartbeat.h"
+#include "monitor/sinks.h"
+#include "monitor/throttled_log.h"
+
+namespace fdi::monitor {
+
+/// Settings of Recorder.
+struct RecorderOptions {
+  bool lossless{false};  ///< Full: Record() waits instead of dropping.
+  std::size_t queue_samples{16'384};
+  /// So that less than 1 s is lost with the process, whatever a commit takes.
+  std::chrono::milliseconds commit_period{750};
+  std::uint64_t commit_samples{100'000};  ///< Commit earlier with so many.
+  std::uint64_t max_pending{200'000};     ///< Kept while commits fail.
+};
+
+/// Stores samples as runs by a thread of its own. What is not stored is
+/// counted; while commits fail samples are kept up to a limit and then dropped,
+/// so that diagnosis goes on. The time in which samples were dropped becomes a
+/// data gap of all valves, "record_dropped", once a commit succeeds again.
+///
+/// Built idle.
+class Recorder {
+ public:
+  /// @param on_gap called by the recorder thread.
+  Recorder(SampleSink& sink, const MonitorContext& context,
+           const RecorderOptions& options, std::function<void(DataGap)> on_gap);
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  /// One thread.
+  void Record(ReceivedSample sample);
+
+  void Start();
+  /// Stores what is there, ends the runs and the thread; nothing if it was not
+  /// started. @throws what the thread ended with.
+  void Stop();
+
+  /// The thread ended with an exception.
+  bool failed() const { return worker_.failed(); }
+  bool degraded() const { return degraded_; }
+  /// Of the recorder thread.
+  const Pulse& pulse() const { return pulse_; }
+  /// Samples that wait for it.
+  std::size_t waiting() const { return queue_.size(); }
+
+ private:
+  void Run();
+  void Take(const ReceivedSample& sample);
+  void Commit();
+  void Close();
+  void CountRecorded();
+  void CountDropped(std::uint64_t samples);
+  void ReportMissing();
+  void Fail(const char* reason);
+
+  SampleSink& sink_;
+  MonitorContext context_;
+  RecorderOptions options_;
+  std::function<void(DataGap)> on_gap_;
+  std::atomic<bool> degraded_{false};
+  Pulse pulse_;
+  std::uint64_t pending_{0};
+  std::uint64_t recorded_{0};  // counted so far
+  std::chrono::steady_clock::time_point last_commit_;
+  BoundedQueue<ReceivedSample> queue_;
+
+  std::mutex missing_mutex_;        // Guards what follows.
+  std::optional<DataGap> missing_;  // Not yet reported.
+  bool missing_more_{false};        // Since the last commit.
+
+  Worker worker_;
+};
+
+}  // namespace fdi::monitor

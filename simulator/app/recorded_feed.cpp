@@ -1,0 +1,195 @@
+#include "simulator/app/recorded_feed.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <system_error>
+#include <utility>
+
+#include <poll.h>
+#include <unistd.h>
+
+#include "cli/logging.h"
+#include "cli/time_text.h"
+#include "diagnosis/error.h"
+
+namespace fdi::simulator {
+namespace {
+
+constexpr const char* kStdin = "stdin";
+constexpr std::size_t kMaxLine = 1U << 20U;
+
+void ThrowUnless(bool passing, const char* operation) {
+  if (!passing) {
+    throw std::system_error(errno, std::generic_category(), operation);
+  }
+}
+
+cli::CsvOptions CsvOptionsOf(const StreamOptions& options) {
+  cli::CsvOptions csv;
+  csv.source = kStdin;
+  csv.required = MaskOf(Signal::kCv);
+  csv.split_gaps = options.split_gaps;
+  return csv;
+}
+
+}  // namespace
+
+void Restamper::Apply(Sample& sample) {
+  sample.source_id = restamping_.source_id;
+  if (restamping_.keep) {
+    return;
+  }
+  if (!shift_ns_) {
+    shift_ns_ = restamping_.start() - sample.stamp_ns;
+  }
+  sample.stamp_ns += *shift_ns_;
+}
+
+void Restamper::StampByClock(std::int64_t now_ns, std::int64_t period_ns,
+                             Sample& sample) {
+  sample.source_id = restamping_.source_id;
+  if (!last_stamp_ns_) {
+    shift_ns_ = restamping_.keep ? 0 : restamping_.start() - now_ns;
+    last_stamp_ns_ = now_ns + *shift_ns_;
+  } else {
+    const double since =
+        static_cast<double>(now_ns + *shift_ns_ - *last_stamp_ns_);
+    const auto periods = std::llround(since / static_cast<double>(period_ns));
+    *last_stamp_ns_ += std::max<std::int64_t>(1, periods) * period_ns;
+  }
+  sample.stamp_ns = *last_stamp_ns_;
+}
+
+std::optional<FedSample> StoredFeed::Next() {
+  if (next_ == samples_.size()) {
+    return std::nullopt;
+  }
+  FedSample fed{0, samples_[next_++]};
+  restamper_.Apply(fed.labelled.sample);
+  return fed;
+}
+
+StreamFeed::StreamFeed(int descriptor, cli::StopSignals& signals,
+                       const StreamOptions& options, Restamping restamping,
+                       LogSink log)
+    : descriptor_(descriptor),
+      signals_(signals),
+      options_(options),
+      restamper_(std::move(restamping)),
+      log_(std::move(log)),
+      csv_(CsvOptionsOf(options)),
+      json_(kStdin, options.split_gaps) {}
+
+std::optional<FedSample> StreamFeed::Next() {
+  while (const auto line = NextLine()) {
+    if (const auto sample = TakeLine(*line)) {
+      return FedSample{0, {*sample, std::nullopt}};
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> StreamFeed::NextLine() {
+  std::size_t searched = begin_;
+  while (true) {
+    const std::size_t end = buffer_.find('\n', searched);
+    if (end != std::string::npos) {
+      std::string line = buffer_.substr(begin_, end - begin_);
+      begin_ = end + 1;
+      return line;
+    }
+    if (buffer_.size() - begin_ > kMaxLine) {
+      throw DataError("stdin: a line has more than 1 MiB");
+    }
+    buffer_.erase(0, begin_);
+    begin_ = 0;
+    searched = buffer_.size();
+    if (ended_ || !Fill()) {
+      break;
+    }
+  }
+  if (buffer_.empty() || signals_.stop_requested()) {
+    return std::nullopt;
+  }
+  return std::exchange(buffer_, {});  // The last one may lack its end.
+}
+
+// Waits for bytes. @returns false if a stop was requested.
+bool StreamFeed::Fill() {
+  std::array<pollfd, 2> entries{
+      {{descriptor_, POLLIN, 0}, {signals_.descriptor(), POLLIN, 0}}};
+  while (!signals_.stop_requested()) {
+    if (poll(entries.data(), entries.size(), -1) < 0) {
+      ThrowUnless(errno == EINTR, "poll of stdin");
+      continue;
+    }
+    if (entries[0].revents == 0) {
+      signals_.WaitFor(std::chrono::milliseconds(0));  // A reload: ignored.
+      continue;
+    }
+    std::array<char, 65536> bytes;
+    const ssize_t count = read(descriptor_, bytes.data(), bytes.size());
+    if (count < 0) {
+      ThrowUnless(errno == EINTR || errno == EAGAIN, "read of stdin");
+      continue;
+    }
+    ended_ = count == 0;
+    buffer_.append(bytes.data(), static_cast<std::size_t>(count));
+    return true;
+  }
+  return false;
+}
+
+std::optional<Sample> StreamFeed::TakeLine(const std::string& line) {
+  if (!is_json_) {
+    const std::size_t first = line.find_first_not_of(" \t\r");
+    if (first != std::string::npos) {
+      is_json_ = line[first] == '{';
+    }
+  }
+  if (!is_json_.value_or(false)) {
+    auto row = csv_.TakeLine(line);
+    ReportIgnored(csv_.header().ignored_columns);
+    if (!row) {
+      return std::nullopt;
+    }
+    restamper_.Apply(row->labelled.sample);
+    return row->labelled.sample;
+  }
+  auto row = json_.TakeLine(line);
+  ReportIgnored(json_.ignored_keys());
+  if (!row) {
+    return std::nullopt;
+  }
+  if (row->t_s) {
+    restamper_.Apply(row->sample);
+  } else {
+    restamper_.StampByClock(cli::NowNs(), std::llround(options_.period_s * 1e9),
+                            row->sample);
+  }
+  return row->sample;
+}
+
+void StreamFeed::ReportIgnored(const std::vector<std::string>& names) {
+  if (!reported_ && !names.empty()) {
+    LogIgnored(log_, kStdin, names);
+    reported_ = true;
+  }
+}
+
+void LogIgnored(const LogSink& log, const std::string& source,
+                const std::vector<std::string>& names) {
+  if (names.empty()) {
+    return;
+  }
+  std::string list;
+  for (const std::string& name : names) {
+    list += (list.empty() ? "" : ",") + name;
+  }
+  log(LogLevel::kInfo,
+      cli::EventLine("columns_ignored", {{"source", source}, {"names", list}}));
+}
+
+}  // namespace fdi::simulator

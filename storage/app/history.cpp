@@ -1,0 +1,378 @@
+// fdi-store history: list, show, export, plot. The other verbs of the group are
+// in figures.cpp and alarms.cpp.
+#include <array>
+#include <charconv>
+#include <map>
+
+#include "cli/csv_cells.h"
+#include "cli/fault_texts.h"
+#include "cli/plot/episode_figure.h"
+#include "cli/text_table.h"
+#include "storage/app/verbs.h"
+#include "storage/history/history_reader.h"
+
+namespace fdi::storage {
+namespace {
+
+using cli::Align;
+using cli::Column;
+using cli::Format;
+using cli::Tone;
+
+Tone ToneOf(AlarmState state) {
+  switch (state) {
+    case AlarmState::kUnacked:
+    case AlarmState::kAcked:
+      return Tone::kAlarm;
+    case AlarmState::kReturnedUnacked:
+      return Tone::kWarning;
+    case AlarmState::kNormal:
+      return Tone::kPlain;
+    case AlarmState::kShelved:
+      return Tone::kQuiet;
+  }
+  return Tone::kPlain;
+}
+
+// "20 s", or "-" while it has not happened.
+std::string After(std::int64_t from_ns, std::optional<std::int64_t> to_ns) {
+  return to_ns ? cli::FormatDuration(*to_ns - from_ns) : "-";
+}
+
+// What people see of an episode beside the columns of fault_history.
+struct EpisodeText {
+  AlarmState state;  // Shelved, or its own.
+  std::string fault_name;
+  std::string isolated_after;
+  std::string lasted;
+};
+using EpisodeTexts = std::map<std::string, EpisodeText>;  // By episode_id.
+
+EpisodeTexts TextsOf(const std::vector<Alarm>& alarms, const Context& context) {
+  const cli::FaultTexts words = cli::LoadFaultTexts(context.options);
+  EpisodeTexts texts;
+  for (const Alarm& alarm : alarms) {
+    const Episode& e = alarm.episode;
+    texts[e.episode_id] = {
+        alarm.shelf ? AlarmState::kShelved : alarm.state,
+        e.fault ? words.Words(*e.fault, e.strength).name : "-",
+        After(e.detected_ns, e.isolated_ns), After(e.detected_ns, e.ended_ns)};
+  }
+  return texts;
+}
+
+Report List(const EpisodeOptions& options, const Context& context) {
+  HistoryReader reader(DataOf(context).history());
+  auto episodes = reader.List(options.Filter(context));
+  Report report;
+  report.document["episodes"] = Rows(episodes, EpisodeJson);
+  report.Csv("episodes", EpisodeKeys());
+  const auto texts = std::make_shared<const EpisodeTexts>(
+      TextsOf(reader.Alarms(std::move(episodes), cli::NowNs()), context));
+  const auto of = [texts](const Json& row) -> const EpisodeText& {
+    return texts->at(row["episode_id"]);
+  };
+  Column alarm = TextColumn("alarm", [of](const Json& row) {
+    return std::string(AlarmStateName(of(row).state));
+  });
+  alarm.tone = [of](const Json& row) { return ToneOf(of(row).state); };
+  const auto end = [](const Json& row) {
+    return row["end_reason"].is_null() ? "open"
+                                       : row["end_reason"].get<std::string>();
+  };
+  return report.Table(
+      "episodes",
+      {{"episode", "episode_id"},
+       {"valve", "valve_id"},
+       {"detected", "detected_utc", Format::kTime},
+       alarm,
+       {"fault", "fault"},
+       TextColumn(
+           "which is", [of](const Json& row) { return of(row).fault_name; }, 2),
+       {"peak [-]", "peak_factor", Format::kPlain, 3, 4},
+       TextColumn(
+           "isolated after",
+           [of](const Json& row) { return of(row).isolated_after; }, 5,
+           Align::kRight),
+       TextColumn(
+           "lasted", [of](const Json& row) { return of(row).lasted; }, 3,
+           Align::kRight),
+       TextColumn("end", end, 1),
+       {"label", "label", Format::kPlain, 0, 6},
+       {"acked by", "acked_by", Format::kPlain, 0, 7},
+       {"model set", "model_set", Format::kPlain, 0, 8}},
+      "no episode matches");
+}
+
+// Transitions have faults and a factor, what people did has a who.
+Json EventJson(const HistoryEntry& event) {
+  const bool by_hand = !event.who.empty();
+  return {{"kind", event.kind},
+          {"stamp_utc", TimeJson(event.stamp_ns)},
+          {"recorded_utc", TimeJson(event.recorded_ns)},
+          {"faults", TextJson(event.faults)},
+          {"factor", by_hand ? Json() : NumberJson(event.factor)},
+          {"strength", by_hand ? Json() : NumberJson(event.strength)},
+          {"reason", TextJson(event.reason)},
+          {"who", TextJson(event.who)},
+          {"value", TextJson(event.value)},
+          {"comment", TextJson(event.comment)},
+          {"origin", TextJson(event.origin)}};
+}
+
+std::string NoteText(const HistoryEntry& event) {
+  if (event.who.empty()) {
+    return event.reason;
+  }
+  return event.value + (event.value.empty() ? "" : " ") + "by " + event.who +
+         (event.origin.empty() ? "" : " (" + event.origin + ")") +
+         (event.comment.empty() ? "" : ": " + event.comment);
+}
+
+void AddEvents(const std::vector<HistoryEntry>& events, const Context& context,
+               Report& report) {
+  report.document["events"] = Rows(events, EventJson);
+  cli::TextTable table({{"event"},
+                        {"at"},
+                        {"faults"},
+                        {"factor [-]", Align::kRight},
+                        {"strength [-]", Align::kRight},
+                        {"note"}});
+  for (const HistoryEntry& event : events) {
+    const bool by_hand = !event.who.empty();
+    table.AddRow({event.kind, TimeText(event.stamp_ns, context), event.faults,
+                  by_hand ? "" : cli::FormatNumber(event.factor, 3),
+                  by_hand ? "" : cli::FormatNumber(event.strength, 3),
+                  NoteText(event)});
+  }
+  AddTextTable(report, table);
+}
+
+// "f19: Flow transmitter wrong", "unknown (outside_known): ...".
+std::string FaultLine(const Episode& e, const std::string& name) {
+  const std::string why = e.unknown_kind ? " (" + *e.unknown_kind + ")" : "";
+  return e.fault ? *e.fault + why + ": " + name : "- (not isolated yet)" + why;
+}
+
+std::string AlarmLine(const Alarm& alarm, const Context& context) {
+  std::string line(AlarmStateName(alarm.state));
+  if (alarm.shelf) {
+    const Shelf& shelf = *alarm.shelf;
+    line += ", shelved by " + shelf.who + " until " +
+            TimeText(shelf.until_ns, context) +
+            (shelf.comment.empty() ? "" : ": " + shelf.comment);
+  }
+  return line;
+}
+
+std::vector<Column> EpisodeFields(const Alarm& alarm, const Context& context) {
+  const Episode& e = alarm.episode;
+  const cli::FaultWords words = cli::LoadFaultTexts(context.options)
+                                    .Words(e.fault.value_or(""), e.strength);
+  const auto when = [&](std::optional<std::int64_t> stamp_ns) {
+    return TimeText(stamp_ns, context) +
+           (stamp_ns ? ", after " + After(e.detected_ns, stamp_ns) : "");
+  };
+  return {
+      {"episode", "episode_id"},
+      {"valve", "valve_id"},
+      {"source", "source_id"},
+      TextField("fault", FaultLine(e, words.name)),
+      TextField("check", words.check),
+      TextField("severity", std::string(SeverityName(words.severity)) + " (" +
+                                words.discipline + "; NAMUR NE 107 " +
+                                std::string(NamurName(words.namur)) + ")"),
+      TextField("alarm", AlarmLine(alarm, context)),
+      {"detected", "detected_utc", Format::kTime},
+      TextField("isolated", when(e.isolated_ns)),
+      TextField("cleared", when(e.cleared_ns)),
+      TextField("ended", TimeText(e.ended_ns, context) + " " +
+                             e.end_reason.value_or("(open)")),
+      {"peak factor", "peak_factor", Format::kPlain, 3},
+      {"strength", "strength", Format::kPlain, 3},
+      TextField("model set", e.model_set + " " + Hex(e.model_hash)),
+      {"label", "label"},
+      {"acked by", "acked_by"},
+      TextColumn("trace", [](const Json& episode) {
+        return episode["trace_instants"].dump() + " instants";
+      })};
+}
+
+Report Show(const std::string& id, const Context& context) {
+  HistoryReader reader(DataOf(context).history());
+  const Alarm alarm = reader.Alarms({reader.Show(id)}, cli::NowNs()).front();
+  const Episode& e = alarm.episode;
+  Report report;
+  report.document = EpisodeJson(e);
+  report.document.update(
+      {{"source_id", Hex(e.source_id)},
+       {"model_hash", Hex(e.model_hash)},
+       {"strength", NumberJson(e.strength)},
+       {"unknown_kind", TextJson(e.unknown_kind)},
+       {"ended_utc", TimeJson(e.ended_ns)},
+       {"acked_utc", TimeJson(e.acked_ns)},
+       {"alarm_state", AlarmStateName(alarm.state)},
+       {"shelf", alarm.shelf ? ShelfJson(*alarm.shelf) : Json()},
+       {"trace_instants", reader.Trace(e.id).size()}});
+  report.Fields("", EpisodeFields(alarm, context));
+  AddEvents(reader.Events(e.id), context, report);
+  return report;
+}
+
+// Reads back as the same bits; "nan".
+std::string CsvNumber(double value) {
+  if (std::isnan(value)) {
+    return "nan";
+  }
+  std::array<char, 64> text{};
+  const auto end = std::to_chars(text.begin(), text.end(), value);
+  return {text.begin(), end.ptr};
+}
+
+// Heading of a signal, as in the CSV contract.
+std::string Heading(Signal signal, FlowUnit flow_unit) {
+  const std::string name(SignalName(signal));
+  if (signal == Signal::kF) {
+    return name + (flow_unit == FlowUnit::kM3PerHour ? "_m3_h" : "_t_h");
+  }
+  const std::string unit(SignalUnit(signal));
+  return name + (unit == "%" ? "_pct" : unit.empty() ? "" : "_" + unit);
+}
+
+// A row per instant: time, verdict, the signals that the valve has, residuals
+// by channel, decision factors. What is missing is nan.
+void WriteTrace(const Episode& episode, const std::vector<TracePoint>& trace,
+                std::ostream& out) {
+  SignalMask present = 0;
+  for (const TracePoint& instant : trace) {
+    present = static_cast<SignalMask>(present | instant.sample.present);
+  }
+  std::vector<Signal> signals;
+  std::vector<std::string> cells = {"t_s",    "stamp_ns", "seq",
+                                    "intake", "quality",  "state"};
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    if ((present & MaskOf(signal)) != 0) {
+      signals.push_back(signal);
+      cells.push_back(Heading(signal, episode.flow_unit));
+    }
+  }
+  for (const std::string& channel : episode.channels) {
+    cells.push_back("r_" + channel);
+  }
+  cells.emplace_back("d_0");
+  for (const std::string& fault : episode.faults) {
+    cells.push_back("d_" + fault);
+  }
+  cli::WriteCsvLine(out, cells);
+  for (const TracePoint& instant : trace) {
+    const Sample& sample = instant.sample;
+    cells = {
+        CsvNumber(static_cast<double>(sample.stamp_ns - episode.detected_ns) /
+                  1e9),
+        std::to_string(sample.stamp_ns),
+        std::to_string(sample.seq),
+        std::string(IntakeName(instant.intake)),
+        std::string(QualityName(instant.quality)),
+        std::string(StateName(instant.state))};
+    for (const Signal signal : signals) {
+      cells.push_back(
+          CsvNumber(sample.Has(signal) ? sample[signal] : std::nan("")));
+    }
+    for (const double residual : instant.residuals) {
+      cells.push_back(CsvNumber(residual));
+    }
+    cells.push_back(CsvNumber(instant.normal_factor));
+    for (const double factor : instant.factors) {
+      cells.push_back(CsvNumber(factor));
+    }
+    cli::WriteCsvLine(out, cells);
+  }
+}
+
+struct ExportOptions {
+  std::string id;
+  std::string output;
+  EpisodeOptions filter;
+};
+
+int Export(const ExportOptions& options, const Context& context) {
+  HistoryReader reader(DataOf(context).history());
+  if (options.id.empty()) {
+    const Report report = List(options.filter, context);
+    cli::WriteOutput(options.output,
+                     [&](std::ostream& out) { report.PrintCsv(out); });
+  } else {
+    const Episode episode = reader.Show(options.id);
+    const auto trace = reader.Trace(episode.id);
+    cli::WriteOutput(options.output, [&](std::ostream& out) {
+      WriteTrace(episode, trace, out);
+    });
+  }
+  return cli::kExitOk;
+}
+
+struct PlotOptions {
+  std::string id;
+  std::string output;
+  plot::EpisodeFigureOptions figure;
+};
+
+Report Plot(const PlotOptions& options, const Context& context) {
+  const DataDirectory data = DataOf(context);
+  HistoryReader reader(data.history());
+  const plot::EpisodeEvidence evidence =
+      plot::LoadEvidence(reader, options.id, data.models());
+  const Episode& episode = evidence.episode;
+  plot::EpisodeFigureOptions figure = options.figure;
+  figure.fault_name = cli::LoadFaultTexts(context.options)
+                          .Words(episode.fault.value_or(""), episode.strength)
+                          .name;
+  const std::filesystem::path path =
+      options.output.empty() ? episode.episode_id + ".png" : options.output;
+  plot::DrawFigure(plot::EpisodeFigure(evidence, figure), path);
+  Report report;
+  report.document = {{"episode_id", episode.episode_id},
+                     {"file", path.string()}};
+  return report.Line("drawn to " + path.string());
+}
+
+}  // namespace
+
+void AddHistoryVerbs(cli::Program& program) {
+  CLI::App& group = program.AddGroup(
+      "history", "Fault episodes: what happened, how sure, who knows of it");
+  auto [list, list_options] = AddVerb(
+      program, group, "list", "List the episodes, the newest last", List);
+  list_options.AddTo(list);
+  program.AllowCsv(list, "The columns of fault_history as CSV");
+
+  auto [show, shown] =
+      AddVerb(program, group, "show",
+              "Show an episode, what to check, and its events", Show);
+  AddEpisode(show, shown);
+  AddHistoryFigures(program, group);
+  AddAlarmVerbs(program, group);
+
+  auto exported = std::make_shared<ExportOptions>();
+  CLI::App& exporting = program.AddVerb(
+      group, "export",
+      "Write as CSV the list of episodes, or the trace of one of them",
+      [exported](const Context& c) { return Export(*exported, c); });
+  AddEpisode(exporting, exported->id, false);
+  AddOutput(exporting, exported->output);
+  exported->filter.AddTo(exporting);
+
+  auto [plot, plotted] = AddVerb(
+      program, group, "plot",
+      "Draw the evidence of an episode for a report, with gnuplot", Plot);
+  AddEpisode(plot, plotted.id);
+  plot.add_option("-o,--output", plotted.output,
+                  "FILE.png or FILE.svg (ID.png)");
+  plot.add_option("--from", plotted.figure.from_s,
+                  "From so many s after detection on");
+  plot.add_option("--to", plotted.figure.to_s,
+                  "Up to so many s after detection");
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,348 @@
+// fdi-store valves: list, show, add, assign, event, remove.
+#include <algorithm>
+
+#include "cli/signal_list.h"
+#include "diagnosis/error.h"
+#include "storage/app/verbs.h"
+#include "storage/history/history_reader.h"
+#include "storage/models/models.h"
+
+namespace fdi::storage {
+namespace {
+
+using cli::Align;
+using cli::Format;
+
+ModelStore OpenToChange(const Context& context) {
+  return ModelStore(WritableDataOf(context).models(),
+                    Access::kOccasionalWriter);
+}
+
+Json SetJson(const std::optional<ModelReference>& reference) {
+  return reference ? Json(ToString(*reference)) : Json();
+}
+
+// An entry stands for the valves whose ids match its pattern, so that it has no
+// valve_id of its own.
+Json EntryJson(const ValveEntry& entry) {
+  return {{"valve", entry.pattern},
+          {"type", entry.type},
+          {"flow_unit", FlowUnitName(entry.flow_unit)},
+          {"sense", entry.sense == Sense::kClosing ? "closing" : "opening"},
+          {"signals", cli::SignalsJson(entry.signals)},
+          {"period_s", entry.period_s},
+          {"epoch", entry.epoch},
+          {"baseline", BaselineStateName(entry.baseline())},
+          {"model_set", SetJson(entry.model_set)}};
+}
+
+Report List(const NoOptions&, const Context& context) {
+  Report report;
+  report.document["valves"] =
+      Rows(ModelStore(DataOf(context).models()).Valves(), EntryJson);
+  return report.Table("valves", {{"valve", "valve"},
+                                 {"type", "type"},
+                                 {"flow in", "flow_unit"},
+                                 {"% of", "sense"},
+                                 {"signals", "signals"},
+                                 {"Ts [s]", "period_s", Format::kPlain, 3},
+                                 {"epoch", "epoch"},
+                                 {"baseline", "baseline"},
+                                 {"model set", "model_set"}});
+}
+
+Json EventJson(const ValveEvent& event) {
+  return {{"epoch", event.epoch},
+          {"kind", ValveEventKindName(event.kind)},
+          {"at_utc", TimeJson(event.at_ns)},
+          {"who", event.who},
+          {"note", event.note}};
+}
+
+Json BaselineJson(const BaselineRecord& record) {
+  Json parameters = Json::object();
+  for (const auto& [name, value] : record.parameters) {
+    parameters[name] = value;
+  }
+  return {
+      {"epoch", record.epoch},
+      {"model_set", record.model_set + '@' + std::to_string(record.version)},
+      {"created_utc", TimeJson(record.created_ns)},
+      {"hours", record.hours},
+      {"parameters", parameters},
+      {"channels",
+       Rows(record.channels, [](const ChannelFigures& channel) -> Json {
+         return {{"name", channel.name},
+                 {"rmse", channel.rmse},
+                 {"bias", channel.bias},
+                 {"vaf", VafJson(channel.vaf)}};
+       })}};
+}
+
+// As found and as left: a column for the newest baseline of each epoch, a row
+// for every figure that one of them has.
+void AddComparison(const std::vector<BaselineRecord>& records, Report& report) {
+  std::vector<BaselineRecord> newest;
+  for (const BaselineRecord& record : records) {
+    if (!newest.empty() && newest.back().epoch == record.epoch) {
+      newest.back() = record;
+    } else {
+      newest.push_back(record);
+    }
+  }
+  if (newest.empty()) {
+    return;
+  }
+  std::vector<std::string> names;  // In the order in which they come.
+  std::vector<std::map<std::string, double>> figures(newest.size());
+  std::vector<cli::TextTable::Column> columns = {{"baseline"}};
+  for (std::size_t i = 0; i < newest.size(); ++i) {
+    const BaselineRecord& record = newest[i];
+    const auto add = [&](const std::string& name, double value) {
+      if (std::ranges::find(names, name) == names.end()) {
+        names.push_back(name);
+      }
+      figures[i][name] = value;
+    };
+    columns.push_back({"epoch " + std::to_string(record.epoch) + ": " +
+                           record.model_set + '@' +
+                           std::to_string(record.version),
+                       Align::kRight});
+    add("hours", record.hours);
+    for (const auto& [name, value] : record.parameters) {
+      add(name, value);
+    }
+    for (const ChannelFigures& channel : record.channels) {
+      add(channel.name + " rmse", channel.rmse);
+      add(channel.name + " bias", channel.bias);
+      if (VafSaysSomething(channel.vaf)) {
+        add(channel.name + " VAF [%]", channel.vaf);
+      }
+    }
+  }
+  cli::TextTable table(columns);
+  for (const std::string& name : names) {
+    std::vector<std::string> cells = {name};
+    for (const auto& of_epoch : figures) {
+      const auto found = of_epoch.find(name);
+      cells.push_back(
+          found == of_epoch.end() ? "-" : cli::FormatNumber(found->second, 4));
+    }
+    table.AddRow(cells);
+  }
+  report.Line("");
+  AddTextTable(report, table);
+}
+
+// Time by quality; nothing if no monitor has run here.
+std::vector<CoverageTime> CoverageOf(const std::string& valve_id,
+                                     const Context& context) {
+  const auto path = DataOf(context).history();
+  if (!std::filesystem::exists(path)) {
+    return {};
+  }
+  EpisodeFilter filter;
+  filter.valve_glob = valve_id;
+  return HistoryReader(path).Coverage(filter);
+}
+
+// `fields` come first: what counts for the valve whose entry it is.
+void AddEntry(ModelStore& store, const ValveEntry& entry,
+              std::vector<cli::Column> fields, Report& report) {
+  fields.insert(
+      fields.end(),
+      {{"entry", "valve"},
+       {"type", "type"},
+       {"flow in", "flow_unit"},
+       {"% of", "sense"},
+       {"signals", "signals"},
+       TextField("sample period", cli::FormatNumber(entry.period_s, 3) + " s"),
+       {"epoch", "epoch"},
+       {"baseline", "baseline"}});
+  report.Fields("", std::move(fields));
+  const auto events = store.ValveEvents(entry.pattern);
+  const auto baselines = store.Baselines(entry.pattern);
+  report.document["events"] = Rows(events, EventJson);
+  report.document["baselines"] = Rows(baselines, BaselineJson);
+  if (!events.empty()) {
+    report.Line("").Table("events", {{"epoch", "epoch"},
+                                     {"event", "kind"},
+                                     {"at", "at_utc", Format::kTime},
+                                     {"by", "who"},
+                                     {"note", "note"}});
+  }
+  AddComparison(baselines, report);
+}
+
+// What counts for one valve: the entry that matches it and the set it gets.
+Report Show(const std::string& valve_id, const Context& context) {
+  ModelStore store(DataOf(context).models());
+  const auto entry = store.FindValve(valve_id);
+  const auto assigned = store.AssignedModelSet(valve_id);
+  if (!entry && !assigned) {
+    throw NotFoundError("no entry and no active model set for valve '" +
+                        valve_id + "'");
+  }
+  Report report;
+  report.document = entry ? EntryJson(*entry) : Json::object();
+  report.document["valve_id"] = valve_id;
+  report.document["diagnosed_with"] = SetJson(assigned);
+  std::vector<cli::Column> fields = {
+      {"valve", "valve_id"},
+      TextField("diagnosed with",
+                assigned ? ToString(*assigned) : "UNASSIGNED")};
+  if (entry) {
+    AddEntry(store, *entry, std::move(fields), report);
+  } else {
+    report.Fields("", std::move(fields));
+  }
+  const auto coverage = CoverageOf(valve_id, context);
+  report.document["hours"] = HoursJson(coverage);
+  AddHours(report, coverage);
+  return report;
+}
+
+// The entry as it is after a change.
+Report Changed(const ValveEntry& entry) {
+  Report report;
+  report.document = EntryJson(entry);
+  return report.Line(entry.pattern + ": model set " +
+                     (entry.model_set ? ToString(*entry.model_set) : "-") +
+                     ", epoch " + std::to_string(entry.epoch) + ", baseline " +
+                     std::string(BaselineStateName(entry.baseline())));
+}
+
+struct AddOptions {
+  std::string pattern;
+  std::string type;
+  std::string flow_unit{"m3/h"};
+  std::string sense{"closing"};
+  std::string signals{"CV,P1,P2,T1,X,F"};
+  std::string model_set;
+  double period_s{1.0};
+  std::uint32_t epoch{0};
+};
+
+Report Add(const AddOptions& options, const Context& context) {
+  ValveEntry entry;
+  entry.pattern = options.pattern;
+  entry.type = options.type;
+  entry.flow_unit = *ParseFlowUnit(options.flow_unit);
+  entry.sense = options.sense == "opening" ? Sense::kOpening : Sense::kClosing;
+  entry.signals = cli::ParseSignals(options.signals);
+  entry.period_s = options.period_s;
+  entry.epoch = options.epoch;
+  ModelStore store = OpenToChange(context);
+  if (!options.model_set.empty()) {
+    entry.model_set = ParseModelReference(options.model_set);
+    store.Summary(*entry.model_set);  // It must exist.
+  }
+  store.PutValve(entry);
+  return Changed(entry);
+}
+
+struct AssignOptions {
+  std::string pattern;
+  std::string set;
+};
+
+Report Assign(const AssignOptions& options, const Context& context) {
+  ModelStore store = OpenToChange(context);
+  store.AssignModelSet(options.pattern,
+                       options.set == "none"
+                           ? std::nullopt
+                           : std::optional(ParseModelReference(options.set)));
+  const auto entries = store.Valves();
+  const auto entry =
+      std::ranges::find(entries, options.pattern, &ValveEntry::pattern);
+  if (entry == entries.end()) {
+    throw NotFoundError("no valve entry '" + options.pattern + "'");
+  }
+  return Changed(*entry);
+}
+
+struct EventOptions {
+  std::string pattern;
+  std::string kind;
+  std::string note;
+  std::string at;
+  std::string who{cli::UserName()};
+};
+
+// A replaced, repacked or recalibrated valve is another valve to its models.
+Report Event(const EventOptions& options, const Context& context) {
+  ValveEvent event;
+  event.kind = ParseValveEventKind(options.kind);
+  event.note = options.note;
+  event.at_ns =
+      options.at.empty() ? cli::NowNs() : cli::ParseTime(options.at, true);
+  event.who = options.who;
+  return Changed(OpenToChange(context).AddValveEvent(options.pattern, event));
+}
+
+Report Remove(const std::string& pattern, const Context& context) {
+  OpenToChange(context).RemoveValve(pattern);
+  Report report;
+  report.document["removed"] = pattern;
+  return report.Line(pattern + " removed");
+}
+
+void AddAdd(cli::Program& program, CLI::App& group) {
+  auto [verb, options] =
+      AddVerb(program, group, "add",
+              "Describe a valve, or all whose id matches a glob", Add);
+  verb.add_option("valve", options.pattern, "Id or glob")->required();
+  verb.add_option("--type", options.type, "Free text");
+  verb.add_option("--flow-unit", options.flow_unit, "m3/h or t/h")
+      ->check(CLI::IsMember({"m3/h", "t/h"}));
+  verb.add_option("--sense", options.sense,
+                  "Whether CV and X are in % of closing or of opening")
+      ->check(CLI::IsMember({"closing", "opening"}));
+  verb.add_option("--signals", options.signals, "Signals it delivers");
+  verb.add_option("--period", options.period_s, "Sample period in s")
+      ->check(CLI::PositiveNumber);
+  verb.add_option("--epoch", options.epoch,
+                  "Replacements and recalibrations so far");
+  verb.add_option("--model-set", options.model_set, "NAME[@VERSION]");
+}
+
+void AddEvent(cli::Program& program, CLI::App& group) {
+  auto [verb, options] = AddVerb(
+      program, group, "event",
+      "Note what was done to a valve: the next epoch, in which no fault is "
+      "isolated until the valve is onboarded again",
+      Event);
+  verb.add_option("valve", options.pattern, "Id, or the glob of an entry")
+      ->required();
+  verb.add_option("--kind", options.kind, "replaced, repacked, recalibrated")
+      ->required();
+  verb.add_option("--note", options.note, "Free text");
+  verb.add_option("--at", options.at, "When, RFC 3339 in UTC (default: now)")
+      ->type_name("UTC");
+  verb.add_option("--by", options.who, "Who says so");
+}
+
+}  // namespace
+
+void AddValvesVerbs(cli::Program& program) {
+  CLI::App& group = program.AddGroup("valves", "Valves and their model sets");
+  AddVerb(program, group, "list", "List the entries, first match first", List);
+  auto [show, shown] =
+      AddVerb(program, group, "show",
+              "Show which entry and model set a valve gets", Show);
+  show.add_option("valve", shown, "Id, or the glob of an entry")->required();
+  AddAdd(program, group);
+  auto [assign, assigned] =
+      AddVerb(program, group, "assign", "Assign a model set to a valve or glob",
+              Assign);
+  assign.add_option("valve", assigned.pattern, "Id or glob")->required();
+  assign.add_option("model-set", assigned.set, "NAME[@VERSION] or none")
+      ->required();
+  AddEvent(program, group);
+  auto [remove, removed] =
+      AddVerb(program, group, "remove", "Remove an entry", Remove);
+  remove.add_option("valve", removed, "Id, or the glob of an entry")
+      ->required();
+}
+
+}  // namespace fdi::storage

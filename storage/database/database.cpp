@@ -1,0 +1,515 @@
+#include "storage/database/database.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <utility>
+
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <sqlite3.h>
+#include <unistd.h>
+
+#include "diagnosis/error.h"
+#include "storage/database/data_directory.h"
+#include "storage/database/locks.h"
+
+namespace fdi::storage {
+namespace {
+
+/// Runs `call` and turns what SQLiteCpp throws into a SqliteError that names
+/// the operation.
+template <typename Call>
+auto SqliteCall(std::string_view operation, Call&& call) {
+  try {
+    return std::forward<Call>(call)();
+  } catch (const SQLite::Exception& error) {
+    const int extended = error.getExtendedErrorCode();
+    throw SqliteError(
+        extended > 0 ? extended : error.getErrorCode(),
+        std::string(error.what()) + " in: " + std::string(operation));
+  }
+}
+
+[[noreturn]] void Refuse(const std::filesystem::path& path,
+                         const std::string& reason) {
+  throw DataError("database " + path.string() + ": " + reason);
+}
+
+/// Names the reason that SQLite would hide behind "unable to open".
+void CheckReachable(const std::filesystem::path& path, Access access) {
+  std::error_code error;
+  const auto folder = path.has_parent_path() ? path.parent_path() : ".";
+  if (!std::filesystem::is_directory(folder, error)) {
+    Refuse(path, folder.string() +
+                     (error ? ": " + error.message() : " is not a directory"));
+  }
+  if (std::filesystem::is_directory(path, error)) {
+    Refuse(path, "is a directory, not a file");
+  }
+  const bool exists = std::filesystem::exists(path, error);
+  if (!exists && access != Access::kReader) {
+    return;
+  }
+  const int mode = access == Access::kReader ? R_OK : R_OK | W_OK;
+  if (::access(path.c_str(), mode) != 0) {
+    Refuse(path, std::strerror(errno));
+  }
+}
+
+std::unique_ptr<SQLite::Database> Connect(const std::filesystem::path& path,
+                                          Access access) {
+  const int flags = access == Access::kReader
+                        ? SQLite::OPEN_READONLY
+                        : SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
+  try {
+    return std::make_unique<SQLite::Database>(
+        path.string(), flags, static_cast<int>(kWritePatience.count()));
+  } catch (const SQLite::Exception& error) {
+    Refuse(path, error.what());
+  }
+}
+
+/// The first name like `<file>.v1.backup` that is free.
+std::filesystem::path FreeBackupName(const std::filesystem::path& path,
+                                     int version) {
+  const std::string stem = path.string() + ".v" + std::to_string(version);
+  std::string name = stem + ".backup";
+  for (int i = 2; std::filesystem::exists(name); ++i) {
+    name = stem + "-" + std::to_string(i) + ".backup";
+  }
+  return name;
+}
+
+// SQLiteCpp keeps the handle of a statement to itself: find it by its text.
+bool Writes(sqlite3* connection, const std::string& sql) {
+  for (sqlite3_stmt* s = sqlite3_next_stmt(connection, nullptr); s != nullptr;
+       s = sqlite3_next_stmt(connection, s)) {
+    if (sqlite3_sql(s) == sql) {
+      return sqlite3_stmt_readonly(s) == 0;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+void RefuseName(std::string_view name) {
+  throw DataError("the database holds an unknown name: " + std::string(name));
+}
+
+std::int64_t UtcNow() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+std::vector<std::string> SplitNames(std::string_view joined) {
+  std::vector<std::string> names;
+  while (!joined.empty()) {
+    const std::size_t bar = std::min(joined.find('|'), joined.size());
+    names.emplace_back(joined.substr(0, bar));
+    joined.remove_prefix(std::min(bar + 1, joined.size()));
+  }
+  return names;
+}
+
+std::string JoinNames(const std::vector<std::string>& names) {
+  std::string joined;
+  for (const std::string& name : names) {
+    joined += (joined.empty() ? "" : "|") + name;
+  }
+  return joined;
+}
+
+SqliteError::SqliteError(int code, const std::string& message)
+    : std::runtime_error("SQLite error " + std::to_string(code) + ": " +
+                         message),
+      code_(code) {}
+
+bool SqliteError::IsDiskProblem() const {
+  const int primary = code_ & 0xFF;
+  return primary == SQLITE_FULL || primary == SQLITE_IOERR;
+}
+
+bool SqliteError::IsBusy() const {
+  const int primary = code_ & 0xFF;
+  return primary == SQLITE_BUSY || primary == SQLITE_LOCKED;
+}
+
+Database::Database(const std::filesystem::path& path, const Schema& schema,
+                   Access access)
+    : path_(path), access_(access), checks_(schema.checks) {
+  CheckReachable(path, access);
+  if (access != Access::kReader) {
+    gate_ = std::make_unique<WriteGate>(path);
+  }
+  connection_ = Connect(path, access);
+  if (access == Access::kReader) {
+    version_ = CheckIdentity(schema);
+    const int current = static_cast<int>(schema.migrations.size());
+    if (version_ < current) {
+      Refuse(path_, "version " + std::to_string(version_) + " is older than " +
+                        std::to_string(current) +
+                        ", the version read here: run `fdi-store migrate`");
+    }
+    Configure(schema);
+    return;
+  }
+  const GateHolder holder(*gate_, path);
+  version_ = CheckIdentity(schema);
+  Configure(schema);
+  if (version_ < static_cast<int>(schema.migrations.size())) {
+    Migrate(schema, version_);
+  }
+}
+
+Database::~Database() = default;
+
+void Database::Execute(const std::string& script) {
+  SqliteCall(script, [&] { connection_->exec(script); });
+}
+
+int Database::CheckIdentity(const Schema& schema) {
+  std::int64_t id = 0;
+  std::int64_t version = 0;
+  std::int64_t objects = 0;
+  try {
+    id = connection_->execAndGet("PRAGMA application_id").getInt64();
+    version = connection_->execAndGet("PRAGMA user_version").getInt64();
+    objects = connection_->execAndGet("SELECT count(*) FROM sqlite_schema")
+                  .getInt64();
+  } catch (const SQLite::Exception& error) {
+    Refuse(path_, error.what());
+  }
+  const bool blank = id == 0 && version == 0 && objects == 0;
+  if (blank && access_ == Access::kReader) {
+    Refuse(path_,
+           "is empty: who made it was stopped before it was done; the next "
+           "program that writes, or fdi-store migrate, goes on with it");
+  }
+  if (id != schema.application_id && !blank) {
+    Refuse(path_, "is not a " + std::string(schema.kind) +
+                      " database: application_id " + std::to_string(id) +
+                      " instead of " + std::to_string(schema.application_id));
+  }
+  const auto accepted = static_cast<std::int64_t>(schema.migrations.size());
+  if (version < 0 || version > accepted) {
+    Refuse(path_, "version " + std::to_string(version) +
+                      " is newer than this program, which accepts up to " +
+                      std::to_string(accepted));
+  }
+  return static_cast<int>(version);
+}
+
+void Database::Configure(const Schema& schema) {
+  Execute("PRAGMA foreign_keys = ON");
+  Execute("PRAGMA trusted_schema = OFF");
+  Execute("PRAGMA journal_size_limit = 67108864");
+  Execute(schema.synchronous == Synchronous::kFull
+              ? "PRAGMA synchronous = FULL"
+              : "PRAGMA synchronous = NORMAL");
+  if (access_ == Access::kReader) {
+    Execute("PRAGMA query_only = ON");
+    return;
+  }
+  const std::string mode = SqliteCall("PRAGMA journal_mode = WAL", [this] {
+    return connection_->execAndGet("PRAGMA journal_mode = WAL").getString();
+  });
+  if (mode != "wal") {
+    Refuse(path_, "journal mode stays " + mode + ", WAL is needed");
+  }
+  if (access_ == Access::kOccasionalWriter) {
+    Execute("PRAGMA wal_autocheckpoint = 0");
+  } else {
+    // What a busy recorder touches in a few commits [KiB, pages of 4 KiB].
+    Execute("PRAGMA cache_size = -32768");
+    Execute("PRAGMA wal_autocheckpoint = 4000");
+  }
+}
+
+void Database::Migrate(const Schema& schema, int from) {
+  if (from > 0) {
+    migration_backup_ = FreeBackupName(path_, from);
+    BackupTo(*migration_backup_);
+  }
+  Execute("BEGIN IMMEDIATE");
+  try {
+    for (std::size_t v = static_cast<std::size_t>(from);
+         v < schema.migrations.size(); ++v) {
+      Execute(std::string(schema.migrations[v]));
+    }
+    const auto version = static_cast<int>(schema.migrations.size());
+    Execute("PRAGMA application_id = " + std::to_string(schema.application_id));
+    Execute("PRAGMA user_version = " + std::to_string(version));
+    if (Prepare("PRAGMA foreign_key_check").Step()) {
+      Refuse(path_, "rows without their parent after the migration");
+    }
+    Execute("COMMIT");
+    version_ = version;
+  } catch (...) {
+    connection_->tryExec("ROLLBACK");
+    throw;
+  }
+}
+
+Statement& Database::Cached(std::string_view sql) {
+  auto found = cached_.find(sql);
+  if (found == cached_.end()) {
+    found = cached_.emplace(sql, Prepare(sql)).first;
+  }
+  return found->second;
+}
+
+std::int64_t Database::LastInsertRowid() const {
+  return connection_->getLastInsertRowid();
+}
+
+int Database::Changes() const {
+  return connection_->getChanges();
+}
+
+std::int64_t Database::DataVersion() {
+  return *QueryInt64("PRAGMA data_version");
+}
+
+bool Database::InTransaction() const {
+  return sqlite3_get_autocommit(connection_->getHandle()) == 0;
+}
+
+bool Database::Checkpoint() {
+  if (access_ != Access::kWriter) {
+    throw std::logic_error("only the writer of " + path_.string() +
+                           " checkpoints");
+  }
+  const GateHolder holder(*gate_, path_);
+  sqlite3* handle = connection_->getHandle();
+  sqlite3_busy_timeout(handle, 0);  // A reader may stay for hours.
+  const int code = sqlite3_wal_checkpoint_v2(
+      handle, nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+  sqlite3_busy_timeout(handle, static_cast<int>(kWritePatience.count()));
+  if (code == SQLITE_BUSY) {
+    return false;
+  }
+  if (code != SQLITE_OK) {
+    throw SqliteError(
+        code, connection_->getErrorMsg() + std::string(" in: checkpoint"));
+  }
+  return true;
+}
+
+std::uintmax_t Database::WalBytes() const {
+  return storage::WalBytes(path_);
+}
+
+std::uintmax_t Database::FileBytes() const {
+  return storage::FileBytes(path_);
+}
+
+std::uintmax_t Database::UsedBytes() {
+  const std::int64_t pages =
+      *QueryInt64("PRAGMA page_count") - *QueryInt64("PRAGMA freelist_count");
+  return static_cast<std::uintmax_t>(pages * *QueryInt64("PRAGMA page_size"));
+}
+
+void Database::BackupTo(const std::filesystem::path& target) {
+  if (std::filesystem::exists(target)) {
+    throw DataError("database " + path_.string() + ": backup " +
+                    target.string() + " exists already");
+  }
+  // A copy is a write to SQLite: lift the lock of a reader for it.
+  const bool reader = access_ == Access::kReader;
+  try {
+    if (reader) {
+      Execute("PRAGMA query_only = OFF");
+    }
+    SqliteCall("VACUUM INTO", [&] {
+      SQLite::Statement statement(*connection_, "VACUUM INTO ?");
+      statement.bind(1, target.string());
+      statement.exec();
+    });
+    if (reader) {
+      Execute("PRAGMA query_only = ON");
+    }
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(target, ignored);
+    throw;
+  }
+}
+
+std::vector<std::string> Database::Check() {
+  std::vector<std::string> findings;
+  try {
+    Statement quick = Prepare("PRAGMA quick_check");
+    while (quick.Step()) {
+      if (quick.Text(0) != "ok") {
+        findings.push_back(quick.Text(0));
+      }
+    }
+    Statement keys = Prepare("PRAGMA foreign_key_check");
+    while (keys.Step()) {
+      findings.push_back("row " + keys.Text(1) + " of table " + keys.Text(0) +
+                         " has no parent in " + keys.Text(2));
+    }
+    for (const std::string_view check : checks_) {
+      Statement rows = Prepare(check);
+      while (rows.Step()) {
+        findings.push_back(rows.Text(0));
+      }
+    }
+  } catch (const SqliteError& error) {
+    if ((error.code() & 0xFF) != SQLITE_CORRUPT) {
+      throw;
+    }
+    findings.emplace_back(error.what());
+  }
+  return findings;
+}
+
+Statement::Statement(Database& database, std::string_view sql)
+    : database_(&database) {
+  const std::string text(sql);
+  SqliteCall(text, [&] {
+    statement_ =
+        std::make_unique<SQLite::Statement>(*database.connection_, text);
+  });
+  writes_ = Writes(database.connection_->getHandle(), text);
+}
+
+Statement::~Statement() = default;
+Statement::Statement(Statement&&) noexcept = default;
+Statement& Statement::operator=(Statement&&) noexcept = default;
+
+bool Statement::Step() {
+  if (writes_ && !database_->InTransaction()) {
+    throw std::logic_error("written outside a transaction: " +
+                           statement_->getQuery());
+  }
+  return SqliteCall(statement_->getQuery(),
+                    [this] { return statement_->executeStep(); });
+}
+
+void Statement::Run() {
+  while (Step()) {
+  }
+  Reset();
+}
+
+void Statement::Reset() {
+  // The result of a reset repeats the error of the step before: not an error.
+  statement_->tryReset();
+}
+
+void Statement::BindNull(int index) {
+  SqliteCall(statement_->getQuery(), [&] { statement_->bind(index); });
+}
+
+void Statement::BindInt64(int index, std::int64_t value) {
+  SqliteCall(statement_->getQuery(), [&] { statement_->bind(index, value); });
+}
+
+void Statement::BindDouble(int index, double value) {
+  SqliteCall(statement_->getQuery(), [&] { statement_->bind(index, value); });
+}
+
+void Statement::BindText(int index, std::string_view value) {
+  SqliteCall(statement_->getQuery(),
+             [&] { statement_->bind(index, std::string(value)); });
+}
+
+void Statement::BindBlob(int index, std::span<const std::byte> value) {
+  // A null pointer would bind NULL: an empty blob needs an address.
+  const void* data =
+      value.empty() ? "" : static_cast<const void*>(value.data());
+  SqliteCall(statement_->getQuery(), [&] {
+    statement_->bind(index, data, static_cast<int>(value.size()));
+  });
+}
+
+bool Statement::IsNull(int column) const {
+  return statement_->isColumnNull(column);
+}
+
+std::int64_t Statement::Int64(int column) const {
+  return statement_->getColumn(column).getInt64();
+}
+
+double Statement::Double(int column) const {
+  return statement_->getColumn(column).getDouble();
+}
+
+std::string Statement::Text(int column) const {
+  return statement_->getColumn(column).getString();
+}
+
+std::vector<std::byte> Statement::Blob(int column) const {
+  const SQLite::Column value = statement_->getColumn(column);
+  const auto* data = static_cast<const std::byte*>(value.getBlob());
+  return data == nullptr
+             ? std::vector<std::byte>{}
+             : std::vector<std::byte>(data, data + value.getBytes());
+}
+
+std::optional<std::int64_t> Statement::OptionalInt64(int column) const {
+  return IsNull(column) ? std::nullopt : std::optional(Int64(column));
+}
+
+std::optional<double> Statement::OptionalDouble(int column) const {
+  return IsNull(column) ? std::nullopt : std::optional(Double(column));
+}
+
+std::optional<std::string> Statement::OptionalText(int column) const {
+  return IsNull(column) ? std::nullopt : std::optional(Text(column));
+}
+
+int Statement::ColumnCount() const {
+  return statement_->getColumnCount();
+}
+
+std::string Statement::ColumnName(int column) const {
+  return statement_->getColumnName(column);
+}
+
+Transaction::Transaction(Database& database) : database_(database) {
+  if (database.gate_ == nullptr) {
+    throw std::logic_error(database.path().string() + " is open read only");
+  }
+  if (!database.gate_->Enter(kWritePatience)) {
+    throw SqliteError(SQLITE_BUSY, database.path().string() +
+                                       ": another process keeps writing");
+  }
+  try {
+    database.Execute("BEGIN IMMEDIATE");
+  } catch (...) {
+    database.gate_->Leave();
+    throw;
+  }
+}
+
+Transaction::~Transaction() {
+  if (open_) {
+    database_.connection_->tryExec("ROLLBACK");
+    database_.gate_->Leave();
+  }
+}
+
+void Transaction::Commit() {
+  database_.Execute("COMMIT");
+  open_ = false;
+  database_.gate_->Leave();
+}
+
+Snapshot::Snapshot(Database& database) : database_(database) {
+  database.Prepare("BEGIN").Run();
+}
+
+Snapshot::~Snapshot() {
+  try {
+    database_.Prepare("COMMIT").Run();
+  } catch (const std::exception&) {
+    // A read transaction that cannot end ends with its connection.
+  }
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,327 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+namespace SQLite {
+class Database;
+class Statement;
+}  // namespace SQLite
+
+namespace fdi::storage {
+
+class WriteGate;
+
+/// How an enumeration stands in a text column, e.g. FlowUnit as "m3/h".
+/// Specialised by who stores it, with
+///
+///     static constexpr auto name = FlowUnitName;    // of a value
+///     static constexpr auto last = FlowUnit::kTPerHour;
+///
+/// An enumeration without this is stored as its number.
+template <typename Enum>
+struct EnumText {};
+
+/// @throws DataError saying that the file has a name unknown to this program.
+[[noreturn]] void RefuseName(std::string_view name);
+
+/// ns UTC.
+std::int64_t UtcNow();
+
+/// Lists of names stand in one column, joined by |: "a|b" is {"a", "b"}, and
+/// "" is {}.
+std::vector<std::string> SplitNames(std::string_view joined);
+std::string JoinNames(const std::vector<std::string>& names);
+
+/// A failed call of SQLite while a database is in use. (What is wrong with a
+/// file when it is opened is a DataError.)
+class SqliteError : public std::runtime_error {
+ public:
+  SqliteError(int code, const std::string& message);
+  /// Extended SQLite result code.
+  int code() const { return code_; }
+  /// SQLITE_FULL or SQLITE_IOERR: the disk, not the data.
+  bool IsDiskProblem() const;
+  /// SQLITE_BUSY or SQLITE_LOCKED: another connection is writing.
+  bool IsBusy() const;
+
+ private:
+  int code_;
+};
+
+/// How a connection uses its file. SQLite before 3.51.3 may corrupt a WAL file
+/// if two connections write or checkpoint at the same moment. So every writing
+/// transaction passes a gate, a lock on `<file>.gate`, and only a kWriter
+/// checkpoints, inside the gate. (The last connection of a file folds the log
+/// in when it closes, as SQLite does under its own exclusive lock.)
+enum class Access {
+  kWriter,  ///< The service that records; creates, migrates, checkpoints.
+  kOccasionalWriter,  ///< A command that writes once; creates and migrates.
+  kReader,  ///< Read only; the file must exist in the current version.
+};
+
+enum class Synchronous {
+  kNormal,  ///< Power loss may take the last commits; never corrupts.
+  kFull,    ///< A commit is on the disk when it returns.
+};
+
+/// What a database file must be. Tables are STRICT.
+struct Schema {
+  std::string_view kind;           ///< For messages: "run", "model", "history".
+  std::int32_t application_id{0};  ///< Marks the file as this kind.
+  Synchronous synchronous{Synchronous::kFull};
+  /// migrations[v] is the SQL script from version v to v + 1; their number is
+  /// the current version. Never edit one that was released: append.
+  std::vector<std::string_view> migrations;
+  /// Queries of Check() beside those of SQLite: one finding per row, as text.
+  std::vector<std::string_view> checks{};
+};
+
+class Database;
+
+/// A prepared statement. Columns and parameters are typed at the call; columns
+/// count from 0. Must not outlive its Database.
+class Statement {
+ public:
+  Statement(Database& database, std::string_view sql);
+  ~Statement();
+  Statement(Statement&&) noexcept;
+  Statement& operator=(Statement&&) noexcept;
+
+  /// Resets, then binds all parameters in order. Takes integers, enums, bool,
+  /// double (NaN becomes NULL), text, std::span<const std::byte>, nullopt and
+  /// optionals of these. uint64 is stored as the int64 of the same bits.
+  template <typename... Args>
+  Statement& Bind(const Args&... args) {
+    Reset();
+    int index = 0;
+    (BindAny(++index, args), ...);
+    return *this;
+  }
+
+  /// Advances. @returns true if there is a row.
+  /// @throws std::logic_error if it writes outside a Transaction.
+  bool Step();
+  /// Runs to the end and resets; for what returns no rows.
+  void Run();
+  void Reset();
+
+  bool IsNull(int column) const;
+  std::int64_t Int64(int column) const;
+  int Int(int column) const { return static_cast<int>(Int64(column)); }
+  bool Bool(int column) const { return Int64(column) != 0; }
+  std::uint64_t Uint64(int column) const {
+    return static_cast<std::uint64_t>(Int64(column));
+  }
+  double Double(int column) const;
+  std::string Text(int column) const;  ///< Empty for NULL.
+  std::vector<std::byte> Blob(int column) const;
+  std::optional<std::int64_t> OptionalInt64(int column) const;
+  std::optional<double> OptionalDouble(int column) const;
+  std::optional<std::string> OptionalText(int column) const;
+
+  /// Copies the columns from `first` on into `fields`, by their types. NULL is
+  /// an empty text, 0, or nothing in an optional.
+  /// @throws DataError for the name of an enumeration that has no such value.
+  template <typename... Fields>
+  void Read(int first, Fields&... fields) const {
+    (Get(first++, fields), ...);
+  }
+
+  int ColumnCount() const;
+  std::string ColumnName(int column) const;
+
+ private:
+  template <typename T>
+  void Get(int column, std::optional<T>& field) const {
+    field.reset();
+    if (!IsNull(column)) {
+      Get(column, field.emplace());
+    }
+  }
+  void Get(int column, std::string& field) const { field = Text(column); }
+  void Get(int column, double& field) const { field = Double(column); }
+  void Get(int column, std::vector<std::byte>& field) const {
+    field = Blob(column);
+  }
+  void Get(int column, std::vector<std::string>& names) const {
+    names = SplitNames(Text(column));
+  }
+  template <typename T>
+  requires std::is_integral_v<T> || std::is_enum_v<T>
+  void Get(int column, T& field) const {
+    if constexpr (requires { EnumText<T>::last; }) {
+      const std::string text = Text(column);
+      for (int i = 0; i <= static_cast<int>(EnumText<T>::last); ++i) {
+        if (EnumText<T>::name(static_cast<T>(i)) == text) {
+          field = static_cast<T>(i);
+          return;
+        }
+      }
+      RefuseName(text);
+    } else {
+      field = static_cast<T>(Int64(column));
+    }
+  }
+
+  void BindNull(int index);
+  void BindInt64(int index, std::int64_t value);
+  void BindDouble(int index, double value);
+  void BindText(int index, std::string_view value);
+  void BindBlob(int index, std::span<const std::byte> value);
+
+  void BindAny(int index, std::nullopt_t) { BindNull(index); }
+  template <typename T>
+  void BindAny(int index, const std::optional<T>& value) {
+    value ? BindAny(index, *value) : BindNull(index);
+  }
+  template <typename T>
+  void BindAny(int index, const T& value) {
+    if constexpr (requires { EnumText<T>::last; }) {
+      BindText(index, EnumText<T>::name(value));
+    } else if constexpr (std::is_integral_v<T> || std::is_enum_v<T>) {
+      BindInt64(index, static_cast<std::int64_t>(value));
+    } else if constexpr (std::is_floating_point_v<T>) {
+      BindDouble(index, value);
+    } else if constexpr (std::is_convertible_v<const T&, std::string_view>) {
+      BindText(index, value);
+    } else {
+      BindBlob(index, value);
+    }
+  }
+
+  Database* database_;
+  std::unique_ptr<SQLite::Statement> statement_;
+  bool writes_{false};
+};
+
+/// One connection to one of the three databases. One thread at a time: it may
+/// be handed over, e.g. to a thread that is started later, but two threads that
+/// use it at once corrupt its statements.
+/// Set on every connection: foreign_keys, trusted_schema OFF, busy_timeout 5 s,
+/// WAL, journal_size_limit 64 MiB, synchronous as the schema says.
+class Database {
+ public:
+  /// Opens `path`; writers create it (not its folder) and migrate it forward
+  /// in one transaction, after a copy of an older file was left beside it.
+  /// @throws DataError naming file and reason: folder missing, no permission,
+  ///   not a database, another application_id, a newer version (naming both),
+  ///   or, for a reader, an older version.
+  /// @throws SqliteError if SQLite fails otherwise.
+  Database(const std::filesystem::path& path, const Schema& schema,
+           Access access);
+  ~Database();
+  Database(const Database&) = delete;
+  Database& operator=(const Database&) = delete;
+
+  Statement Prepare(std::string_view sql) { return {*this, sql}; }
+  /// The statement of this text, prepared at its first use; for those that are
+  /// run again and again. One user at a time, who runs it to its end.
+  Statement& Cached(std::string_view sql);
+  /// Runs one statement that returns nothing. Writes need a Transaction.
+  template <typename... Args>
+  void Run(std::string_view sql, const Args&... args) {
+    Prepare(sql).Bind(args...).Run();
+  }
+  /// First column of the first row, if there is a row and it is not NULL.
+  template <typename... Args>
+  std::optional<std::int64_t> QueryInt64(std::string_view sql,
+                                         const Args&... args) {
+    Statement statement = Prepare(sql);
+    return statement.Bind(args...).Step() ? statement.OptionalInt64(0)
+                                          : std::nullopt;
+  }
+
+  std::int64_t LastInsertRowid() const;
+  /// Rows changed by the last INSERT, UPDATE or DELETE.
+  int Changes() const;
+  /// Differs from the last call's value if another connection committed since.
+  std::int64_t DataVersion();
+
+  /// Folds the log into the file and truncates it. Readers may prevent that:
+  /// @returns false then, without waiting for them. For a kWriter;
+  /// @throws std::logic_error otherwise.
+  bool Checkpoint();
+  std::uintmax_t WalBytes() const;
+  std::uintmax_t FileBytes() const;
+  /// Of the file, the pages that hold something: those that are free are used
+  /// again before it grows.
+  std::uintmax_t UsedBytes();
+
+  /// A consistent copy (VACUUM INTO). @throws DataError if `target` exists.
+  void BackupTo(const std::filesystem::path& target);
+  /// quick_check, foreign_key_check and Schema::checks: one line per finding,
+  /// empty if sound.
+  std::vector<std::string> Check();
+
+  const std::filesystem::path& path() const { return path_; }
+  Access access() const { return access_; }
+  bool InTransaction() const;
+  int version() const { return version_; }
+  /// The copy that was made before a migration, if there was one.
+  const std::optional<std::filesystem::path>& migration_backup() const {
+    return migration_backup_;
+  }
+
+ private:
+  friend class Statement;
+  friend class Transaction;
+
+  void Configure(const Schema& schema);
+  /// @returns the user_version of the file.
+  int CheckIdentity(const Schema& schema);
+  void Migrate(const Schema& schema, int from);
+  void Execute(const std::string& script);
+
+  std::filesystem::path path_;
+  Access access_;
+  int version_{0};
+  std::vector<std::string_view> checks_;
+  std::optional<std::filesystem::path> migration_backup_;
+  std::unique_ptr<WriteGate> gate_;  // Null for a reader.
+  std::unique_ptr<SQLite::Database> connection_;
+  std::map<std::string, Statement, std::less<>> cached_;
+};
+
+/// A writing transaction: waits for the gate (up to 5 s), BEGIN IMMEDIATE,
+/// rolls back unless committed.
+class Transaction {
+ public:
+  /// @throws SqliteError (IsBusy) if another connection keeps writing.
+  explicit Transaction(Database& database);
+  ~Transaction();
+  Transaction(const Transaction&) = delete;
+  Transaction& operator=(const Transaction&) = delete;
+
+  void Commit();
+
+ private:
+  Database& database_;
+  bool open_{true};
+};
+
+/// A read transaction: all queries in its scope see one state of the file.
+/// Keep it short: it stops checkpoints.
+class Snapshot {
+ public:
+  explicit Snapshot(Database& database);
+  ~Snapshot();
+  Snapshot(const Snapshot&) = delete;
+  Snapshot& operator=(const Snapshot&) = delete;
+
+ private:
+  Database& database_;
+};
+
+}  // namespace fdi::storage

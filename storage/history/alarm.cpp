@@ -1,0 +1,212 @@
+#include "storage/history/alarm.h"
+
+#include <algorithm>
+#include <map>
+
+#include "storage/database/record.h"
+#include "storage/history/sql.h"
+
+namespace fdi::storage {
+namespace {
+
+constexpr std::int64_t kDayNs = 86'400'000'000'000;
+
+std::int64_t Nanoseconds(double seconds) {
+  return static_cast<std::int64_t>(seconds * 1e9);
+}
+
+// What falls into the time [from, to).
+struct Stretch {
+  std::int64_t from_ns;
+  std::int64_t to_ns;
+  double seconds() const {
+    return std::max(0.0, static_cast<double>(to_ns - from_ns) * 1e-9);
+  }
+};
+
+void AddDays(const Stretch& stretch, std::map<std::int64_t, DayAlarms>& days) {
+  for (std::int64_t from = stretch.from_ns; from < stretch.to_ns;) {
+    const std::int64_t day = from / kDayNs;
+    const std::int64_t to = std::min(stretch.to_ns, (day + 1) * kDayNs);
+    days[day].alarm_s += static_cast<double>(to - from) * 1e-9;
+    from = to;
+  }
+}
+
+void AddLabel(const AlarmSpan& span, AlarmStatistics& statistics) {
+  FaultAlarms& fault = statistics.faults[span.fault];
+  ++fault.episodes;
+  if (!span.label) {
+    ++statistics.unlabelled;
+    return;
+  }
+  const std::vector<std::string> answer = SplitNames(span.fault);
+  const bool right =
+      *span.label == "true" ||
+      std::find(answer.begin(), answer.end(), *span.label) != answer.end();
+  ++(right ? fault.right : fault.wrong);
+  ++(*span.label == "false" ? statistics.labelled_false
+                            : statistics.labelled_true);
+}
+
+// Episodes of one valve, detected at `stamps`, that came in a row of at least
+// `criteria.chattering_episodes` within the window.
+std::int64_t Chattering(const std::vector<std::int64_t>& stamps,
+                        const AlarmCriteria& criteria) {
+  const auto row = static_cast<std::size_t>(criteria.chattering_episodes);
+  const std::int64_t window_ns = Nanoseconds(criteria.chattering_window_s);
+  std::int64_t count = 0;
+  std::size_t counted = 0;  // Those before are counted.
+  for (std::size_t last = row - 1; row > 0 && last < stamps.size(); ++last) {
+    const std::size_t first = last + 1 - row;
+    if (stamps[last] - stamps[first] <= window_ns) {
+      const std::size_t fresh = std::max(first, counted);
+      count += static_cast<std::int64_t>(last + 1 - fresh);
+      counted = last + 1;
+    }
+  }
+  return count;
+}
+
+// The most stamps, which are in order, in any window.
+std::int64_t MostWithin(const std::vector<std::int64_t>& stamps,
+                        std::int64_t window_ns) {
+  std::size_t most = 0;
+  std::size_t first = 0;
+  for (std::size_t last = 0; last < stamps.size(); ++last) {
+    while (stamps[last] - stamps[first] >= window_ns) {
+      ++first;
+    }
+    most = std::max(most, last + 1 - first);
+  }
+  return static_cast<std::int64_t>(most);
+}
+
+}  // namespace
+
+bool InForce(const Shelf& shelf, std::int64_t now_ns) {
+  return shelf.from_ns <= now_ns && now_ns < shelf.until_ns &&
+         (!shelf.ended_ns || now_ns < *shelf.ended_ns);
+}
+
+bool Covers(const Shelf& shelf, const Episode& episode) {
+  return shelf.valve_id == episode.valve_id &&
+         (!shelf.fault || shelf.fault == episode.fault);
+}
+
+std::string_view AlarmStateName(AlarmState state) {
+  switch (state) {
+    case AlarmState::kUnacked:
+      return "UNACK";
+    case AlarmState::kAcked:
+      return "ACKED";
+    case AlarmState::kReturnedUnacked:
+      return "RTN_UNACK";
+    case AlarmState::kNormal:
+      return "NORMAL";
+    case AlarmState::kShelved:
+      return "SHELVED";
+  }
+  return "";
+}
+
+AlarmState AlarmStateOf(bool active, bool acknowledged, bool shelved) {
+  if (shelved) {
+    return AlarmState::kShelved;
+  }
+  if (active) {
+    return acknowledged ? AlarmState::kAcked : AlarmState::kUnacked;
+  }
+  return acknowledged ? AlarmState::kNormal : AlarmState::kReturnedUnacked;
+}
+
+AlarmState AlarmStateOf(const Episode& episode, bool shelved) {
+  const bool active = !episode.ended_ns && !episode.cleared_ns;
+  return AlarmStateOf(active, episode.acked_by.has_value(), shelved);
+}
+
+std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,
+                            const std::vector<Shelf>& shelves,
+                            std::int64_t now_ns) {
+  std::multimap<std::string, const Shelf*> in_force;
+  for (const Shelf& shelf : shelves) {
+    if (InForce(shelf, now_ns)) {
+      in_force.emplace(shelf.valve_id, &shelf);
+    }
+  }
+  std::vector<Alarm> alarms;
+  alarms.reserve(episodes.size());
+  for (Episode& episode : episodes) {
+    Alarm alarm;
+    alarm.state = AlarmStateOf(episode);
+    const auto [begin, end] = in_force.equal_range(episode.valve_id);
+    for (auto it = begin; it != end; ++it) {
+      const Shelf& shelf = *it->second;
+      if (Covers(shelf, episode) &&
+          (!alarm.shelf || shelf.until_ns > alarm.shelf->until_ns)) {
+        alarm.shelf = shelf;
+      }
+    }
+    alarm.episode = std::move(episode);
+    alarms.push_back(std::move(alarm));
+  }
+  return alarms;
+}
+
+std::vector<Shelf> ReadShelves(Database& database,
+                               std::optional<std::int64_t> in_force_at_ns) {
+  Statement rows = database.Prepare(SelectSql<Shelf>(
+      in_force_at_ns ? history_sql::shelves_in_force : history_sql::shelves));
+  if (in_force_at_ns) {
+    rows.Bind(*in_force_at_ns);
+  }
+  return ReadRecords<Shelf>(rows);
+}
+
+AlarmStatistics ComputeAlarmStatistics(const std::vector<AlarmSpan>& spans,
+                                       std::int64_t since_ns,
+                                       std::int64_t until_ns,
+                                       std::int64_t now_ns,
+                                       const AlarmCriteria& criteria) {
+  AlarmStatistics statistics;
+  std::map<std::int64_t, DayAlarms> days;
+  std::map<std::string, std::vector<std::int64_t>> by_valve;
+  std::vector<std::int64_t> all;
+  for (const AlarmSpan& span : spans) {
+    const std::int64_t end_ns =
+        std::max(span.detected_ns, span.ended_ns.value_or(std::max(
+                                       now_ns, span.last_ns.value_or(now_ns))));
+    if (end_ns < since_ns || span.detected_ns >= until_ns) {
+      continue;
+    }
+    const Stretch stretch{std::max(span.detected_ns, since_ns),
+                          std::min(end_ns, until_ns)};
+    ValveAlarms& valve = statistics.valves[span.valve_id];
+    valve.alarm_s += stretch.seconds();
+    AddDays(stretch, days);
+    valve.open += span.ended_ns ? 0 : 1;
+    valve.standing +=
+        end_ns - span.detected_ns > Nanoseconds(criteria.standing_s) ? 1 : 0;
+    if (span.detected_ns < since_ns) {
+      continue;
+    }
+    ++valve.episodes;
+    valve.last_detected_ns = std::max(valve.last_detected_ns, span.detected_ns);
+    ++days[span.detected_ns / kDayNs].episodes;
+    AddLabel(span, statistics);
+    by_valve[span.valve_id].push_back(span.detected_ns);
+    all.push_back(span.detected_ns);
+  }
+  for (auto& [day, alarms] : days) {
+    alarms.day = day;
+    statistics.days.push_back(alarms);
+  }
+  for (const auto& [valve, stamps] : by_valve) {
+    statistics.valves[valve].chattering = Chattering(stamps, criteria);
+  }
+  statistics.most_in_flood_window =
+      MostWithin(all, Nanoseconds(criteria.flood_window_s));
+  return statistics;
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,108 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/records/fields.h"
+#include "storage/database/database.h"
+
+namespace fdi::storage {
+
+/// Valves that something in common can bring down: an air header, a line.
+struct CauseGroup {
+  std::string name;
+  std::vector<std::string> valve_globs;
+  std::vector<std::string> faults{"f16", "f17"};  ///< Any of them counts.
+  int min_valves{3};                              ///< ≥ 2
+  std::int64_t within_ns{300'000'000'000};
+
+  bool Has(std::string_view valve_id) const;
+};
+
+/// An episode that has a cause in common with others.
+struct CauseMember {
+  std::string episode_id;
+  std::string valve_id;
+  std::string fault;            ///< What was isolated when it joined.
+  std::int64_t isolated_ns{0};  ///< Since when its fault of the group holds.
+  std::optional<std::int64_t> ended_ns;
+
+  bool operator==(const CauseMember&) const = default;
+};
+
+/// The parent of the episodes of several valves of one group.
+struct CommonCause {
+  std::string cause_id;  ///< 16 hex digits
+  std::string group;
+  std::int64_t opened_ns{0};  ///< Isolation of the member that made it one.
+  std::optional<std::int64_t> ended_ns;  ///< None while a member is open.
+  std::vector<CauseMember> members;      ///< By isolation.
+};
+
+struct CauseChange {
+  enum class Kind : std::uint8_t { kOpened, kGrown, kEnded };
+  Kind kind{Kind::kOpened};
+  CommonCause cause;  ///< As it is now.
+};
+
+/// "OPENED", "GROWN", "ENDED"
+std::string_view CauseChangeName(CauseChange::Kind kind);
+
+/// Finds common causes as episodes are recorded. Once at least min_valves
+/// valves of a group isolate one of its faults within within_ns of each other,
+/// a cause opens with all of them; while it is open, every further such valve
+/// of the group joins; it ends when all its episodes have ended.
+///
+/// All that it knows stands in the database: a restart changes nothing, and
+/// telling it twice is a no-op. Each call within a transaction.
+class CommonCauseBook {
+ public:
+  /// @throws std::invalid_argument for min_valves < 2 or within_ns ≤ 0.
+  CommonCauseBook(Database& database, std::vector<CauseGroup> groups);
+
+  /// The episode isolated another set at `stamp_ns`.
+  std::vector<CauseChange> Isolated(const std::string& episode_id,
+                                    const std::string& valve_id,
+                                    std::int64_t stamp_ns);
+  /// The episode has ended.
+  std::vector<CauseChange> Ended(const std::string& episode_id);
+  /// Ends causes whose episodes ended while nobody looked.
+  std::vector<CauseChange> EndFinished();
+
+ private:
+  std::vector<CauseChange> EndIfOver(Statement& causes);
+  std::optional<CauseChange> Join(const CauseGroup& group,
+                                  const std::string& cause_id,
+                                  const std::string& episode_id);
+  std::optional<CauseChange> Open(const CauseGroup& group,
+                                  const std::string& episode_id,
+                                  std::int64_t stamp_ns);
+  std::vector<CauseMember> Candidates(const CauseGroup& group,
+                                      std::int64_t from_ns, std::int64_t to_ns);
+  void Insert(const std::string& cause_id, const CauseMember& member);
+
+  Database& database_;
+  std::vector<CauseGroup> groups_;
+};
+
+/// Settings of ReadCommonCauses().
+struct CauseFilter {
+  std::string group_glob{"*"};
+  bool open_only{false};
+  std::int64_t since_ns{std::numeric_limits<std::int64_t>::min()};
+  std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
+  std::int64_t limit{0};  ///< The newest so many; 0: all.
+};
+
+/// By opening.
+std::vector<CommonCause> ReadCommonCauses(Database& database,
+                                          const CauseFilter& filter = {});
+
+}  // namespace fdi::storage
+
+FDI_FIELDS(fdi::storage::CauseMember, episode_id, valve_id, fault, isolated_ns,
+           ended_ns)

@@ -1,0 +1,77 @@
+#include "storage/history/episode.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cstdio>
+#include <utility>
+
+#include "diagnosis/error.h"
+#include "diagnosis/suggestion.h"
+
+namespace fdi::storage {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, EpisodeState>, 11> kStates = {{
+    {"any", EpisodeState::kAny},
+    {"open", EpisodeState::kOpen},
+    {"detected", EpisodeState::kDetected},
+    {"isolated", EpisodeState::kIsolated},
+    {"closed", EpisodeState::kClosed},
+    {"unacked", EpisodeState::kUnacked},
+    {"unack", EpisodeState::kAlarmUnacked},
+    {"acked", EpisodeState::kAlarmAcked},
+    {"rtn_unack", EpisodeState::kAlarmReturnedUnacked},
+    {"normal", EpisodeState::kAlarmNormal},
+    {"shelved", EpisodeState::kAlarmShelved},
+}};
+
+}  // namespace
+
+std::string EpisodeIdText(std::uint64_t episode_id) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx",
+                static_cast<unsigned long long>(episode_id));
+  return text;
+}
+
+std::optional<std::uint64_t> ParseEpisodeId(std::string_view text) {
+  std::uint64_t id = 0;
+  std::from_chars(text.data(), text.data() + text.size(), id, 16);
+  return EpisodeIdText(id) == text ? std::optional(id) : std::nullopt;
+}
+
+std::vector<std::string> EpisodeStateNames() {
+  std::vector<std::string> names;
+  for (const auto& [name, state] : kStates) {
+    names.emplace_back(name);
+  }
+  return names;
+}
+
+EpisodeState ParseEpisodeState(std::string_view name) {
+  const auto* found =
+      std::find_if(kStates.begin(), kStates.end(), [name](const auto& state) {
+        return std::equal(
+            name.begin(), name.end(), state.first.begin(), state.first.end(),
+            [](char a, char b) {
+              return std::tolower(static_cast<unsigned char>(a)) == b;
+            });
+      });
+  if (found == kStates.end()) {
+    std::string message = "unknown state '" + std::string(name) + "'";
+    if (const auto meant = Suggest(std::string(name), EpisodeStateNames())) {
+      message += " (did you mean '" + *meant + "'?)";
+    }
+    message += "; there are";
+    for (const auto& state : kStates) {
+      message += (&state == kStates.begin() ? " " : ", ");
+      message += state.first;
+    }
+    throw ConfigError(message);
+  }
+  return found->second;
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,157 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/records/fields.h"
+#include "diagnosis/verdict.h"
+
+namespace fdi::storage {
+
+/// "00c0ffee12345678": how an episode id is stored and shown.
+std::string EpisodeIdText(std::uint64_t episode_id);
+/// The inverse; nothing unless the text is 16 lower-case hex digits.
+std::optional<std::uint64_t> ParseEpisodeId(std::string_view text);
+
+/// A line of an episode's history: a transition, or what a person noted.
+struct HistoryEntry {
+  std::int64_t event_id{0};
+  std::string kind;  ///< TransitionName(), or RESUMED, ACK, LABEL.
+  std::int64_t stamp_ns{0};
+  std::int64_t recorded_ns{0};
+  std::string faults;  ///< Names joined by |.
+  FaultSet fault_bits{0};
+  double factor{0.0};
+  double strength{0.0};
+  std::string reason;
+  std::string value;  ///< Of LABEL.
+  std::string who;
+  std::string comment;
+  std::string origin;  ///< From where a person did it.
+  std::uint64_t episode_id{0};
+};
+
+/// The columns of the view fault_history, and what the tables add.
+struct Episode {
+  std::string episode_id;
+  std::string valve_id;
+  std::string detected_utc;
+  std::optional<std::string> isolated_utc;
+  std::optional<std::string> cleared_utc;
+  std::optional<std::string> fault;
+  double peak_factor{0.0};
+  std::string model_set;
+  std::optional<std::string> end_reason;
+  std::optional<std::string> label;
+  std::optional<std::string> acked_by;
+
+  std::uint64_t id{0};
+  std::uint64_t source_id{0};
+  std::uint64_t model_hash{0};
+  std::int64_t detected_ns{0};
+  std::optional<std::int64_t> isolated_ns;
+  std::optional<std::int64_t> cleared_ns;
+  std::optional<std::int64_t> ended_ns;
+  std::optional<std::int64_t> acked_ns;
+  std::optional<std::int64_t> trace_end_ns;  ///< Last instant of the trace.
+  std::optional<std::int64_t> session_id;
+  FaultSet fault_bits{0};
+  double strength{0.0};
+  /// While no fault is isolated: "too_early" or "outside_known".
+  std::optional<std::string> unknown_kind;
+  FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  std::vector<std::string> channels;  ///< Of the trace.
+  std::vector<std::string> faults;    ///< Of the trace, by index.
+};
+
+/// One life of a monitor.
+struct MonitorSession {
+  std::int64_t session_id{0};
+  std::int64_t start_ns{0};
+  std::int64_t alive_ns{0};  ///< Last sign of life.
+  std::optional<std::int64_t> stop_ns;
+  bool clean{false};
+  std::string software;
+  std::string config;
+};
+
+enum class EpisodeState {
+  kAny,
+  kOpen,      ///< Not ended.
+  kDetected,  ///< Open and not isolated.
+  kIsolated,  ///< Open and isolated.
+  kClosed,
+  kUnacked,  ///< Active or not.
+  // AlarmState; shelved ones are also in the state below.
+  kAlarmUnacked,
+  kAlarmAcked,
+  kAlarmReturnedUnacked,
+  kAlarmNormal,
+  kAlarmShelved,
+};
+
+/// "any", "open", ... "UNACK", ..., in any case. @throws ConfigError naming the
+/// accepted names.
+EpisodeState ParseEpisodeState(std::string_view name);
+
+/// Settings of HistoryReader::List().
+struct EpisodeFilter {
+  std::string valve_glob{"*"};  ///< As in a shell: * ? [...].
+  std::string fault;            ///< Name, "unknown", or empty: any.
+  std::int64_t since_ns{std::numeric_limits<std::int64_t>::min()};
+  std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
+  EpisodeState state{EpisodeState::kAny};
+  std::int64_t limit{0};   ///< The newest so many; 0: all.
+  std::int64_t now_ns{0};  ///< At which kAlarmShelved holds.
+};
+
+/// The words of ParseEpisodeState().
+std::vector<std::string> EpisodeStateNames();
+
+/// Episodes of one valve with one answer.
+struct EpisodeStatistics {
+  std::string valve_id;
+  std::string fault;  ///< As in the view; "" while not isolated.
+  std::int64_t episodes{0};
+  std::int64_t open{0};
+  std::int64_t unacked{0};
+  std::int64_t labelled_true{0};           ///< Label true, or of the answer.
+  std::int64_t labelled_false{0};          ///< Label false, or another fault.
+  std::optional<double> mean_isolation_s;  ///< From detection.
+  std::optional<double> mean_duration_s;   ///< Of the ended ones.
+  double peak_factor{0.0};
+  std::int64_t last_detected_ns{0};
+};
+
+/// Time of one valve with one quality, over the days of a filter.
+struct CoverageTime {
+  std::string valve_id;
+  std::string quality;  ///< QualityName().
+  std::int64_t samples{0};
+  double hours{0.0};
+};
+
+}  // namespace fdi::storage
+
+FDI_FIELDS(fdi::storage::HistoryEntry, event_id, kind, stamp_ns, recorded_ns,
+           faults, fault_bits, factor, strength, reason, value, who, comment,
+           origin)
+
+FDI_FIELDS(fdi::storage::Episode, episode_id, valve_id, detected_utc,
+           isolated_utc, cleared_utc, fault, peak_factor, model_set, end_reason,
+           label, acked_by, source_id, model_hash, detected_ns, isolated_ns,
+           cleared_ns, ended_ns, acked_ns, trace_end_ns, session_id, fault_bits,
+           strength, unknown_kind, flow_unit, channels, faults)
+
+FDI_FIELDS(fdi::storage::MonitorSession, session_id, start_ns, alive_ns,
+           stop_ns, clean, software, config)
+
+FDI_FIELDS(fdi::storage::EpisodeStatistics, valve_id, fault, episodes, open,
+           unacked, labelled_true, labelled_false, mean_isolation_s,
+           mean_duration_s, peak_factor, last_detected_ns)
+
+FDI_FIELDS(fdi::storage::CoverageTime, valve_id, quality, samples, hours)

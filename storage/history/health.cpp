@@ -1,0 +1,235 @@
+#include "storage/history/health.h"
+
+#include <cstdint>
+
+#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/model_set.h"
+#include "storage/database/bytes.h"
+#include "storage/history/sql.h"
+
+namespace fdi::storage {
+namespace sql = history_sql;
+
+// The bytes of an hour, format 1:
+//
+//   hour     = head seen alarm open shut live_samples normal_factor travel
+//              reversals  channels channel*  filled bin*  strength* 0
+//   head     = uint8: the format, with 0x80 if flow is in t/h
+//   channel  = uint8 signal, int8 exponent
+//   filled   = uint16: bit b is set if bin b has samples
+//   bin      = for each channel: samples [residual square output]
+//   strength = fault samples strength
+//
+// All numbers without a type are LEB128 with the sign folded in; the three sums
+// of a channel are left out if it has no samples.
+namespace {
+
+constexpr std::uint8_t kFormat = 1;
+constexpr std::uint8_t kTonnes = 0x80;  // beside the format: flow in t/h
+
+// LEB128, negative numbers folded in between: 0, -1, 1, -2, ...
+void PutNumber(ByteWriter& out, std::int64_t value) {
+  auto rest = (static_cast<std::uint64_t>(value) << 1) ^
+              static_cast<std::uint64_t>(value >> 63);
+  while (rest >= 0x80) {
+    out.Put(static_cast<std::uint8_t>(rest | 0x80));
+    rest >>= 7;
+  }
+  out.Put(static_cast<std::uint8_t>(rest));
+}
+
+std::int64_t GetNumber(ByteReader& in) {
+  std::uint64_t folded = 0;
+  for (unsigned shift = 0; shift < 64; shift += 7) {
+    const auto byte = in.Get<std::uint8_t>();
+    folded |= static_cast<std::uint64_t>(byte & 0x7F) << shift;
+    if (byte < 0x80) {
+      return static_cast<std::int64_t>(folded >> 1) ^
+             -static_cast<std::int64_t>(folded & 1);
+    }
+  }
+  in.Refuse("a number has no end");
+}
+
+std::size_t GetCount(ByteReader& in, std::int64_t limit, const char* what) {
+  const std::int64_t count = GetNumber(in);
+  if (count < 0 || count > limit) {
+    in.Refuse(std::string(what) + " " + std::to_string(count) +
+              " is not in 0.." + std::to_string(limit));
+  }
+  return static_cast<std::size_t>(count);
+}
+
+void PutBins(ByteWriter& out, const HealthHour& hour) {
+  std::uint16_t filled = 0;
+  for (std::size_t b = 0; b < hour.bins.size(); ++b) {
+    filled = static_cast<std::uint16_t>(filled |
+                                        (hour.bins[b].empty() ? 0U : 1U << b));
+  }
+  out.Put(filled);
+  for (const auto& bin : hour.bins) {
+    for (const ResidualSums& sums : bin) {
+      PutNumber(out, sums.samples);
+      if (sums.samples != 0) {
+        PutNumber(out, sums.residual);
+        PutNumber(out, sums.square);
+        PutNumber(out, sums.output);
+      }
+    }
+  }
+}
+
+void GetBins(ByteReader& in, HealthHour& hour) {
+  const auto filled = in.Get<std::uint16_t>();
+  for (std::size_t b = 0; b < hour.bins.size(); ++b) {
+    if ((filled >> b & 1U) == 0) {
+      continue;
+    }
+    hour.bins[b].resize(hour.channels.size());
+    for (ResidualSums& sums : hour.bins[b]) {
+      sums.samples = GetNumber(in);
+      if (sums.samples != 0) {
+        sums.residual = GetNumber(in);
+        sums.square = GetNumber(in);
+        sums.output = GetNumber(in);
+      }
+    }
+  }
+}
+
+// The numbers of every hour, in the order in which they are stored.
+template <typename Hour, typename Visit>
+void ForEachNumber(Hour& hour, Visit visit) {
+  visit(hour.seen_ms);
+  visit(hour.alarm_ms);
+  visit(hour.open_ms);
+  visit(hour.shut_ms);
+  visit(hour.live_samples);
+  visit(hour.normal_factor);
+  visit(hour.travel);
+  visit(hour.reversals);
+}
+
+constexpr std::int64_t kHourNs = 3'600'000'000'000;
+
+// The first hour that begins at `stamp_ns` or later.
+std::int64_t HourFrom(std::int64_t stamp_ns) {
+  return stamp_ns / kHourNs + (stamp_ns % kHourNs > 0 ? 1 : 0);
+}
+
+HealthHour Unpacked(const Statement& row, int column, HealthHour hour) {
+  hour.live_ms = row.Int64(column);
+  UnpackHealth(row.Blob(column + 1), hour);
+  return hour;
+}
+
+// What was stored by a program of other channels under the same hash cannot be
+// added to: the newer part stands.
+HealthHour Sum(const HealthHour& stored, const HealthHour& part) {
+  if (stored.channels != part.channels) {
+    return part;
+  }
+  HealthHour sum = stored;
+  sum.Add(part);
+  return sum;
+}
+
+}  // namespace
+
+std::vector<std::byte> PackHealth(const HealthHour& hour) {
+  ByteWriter out;
+  out.Put(static_cast<std::uint8_t>(
+      kFormat | (hour.flow_unit == FlowUnit::kTPerHour ? kTonnes : 0)));
+  ForEachNumber(hour, [&out](std::int64_t value) { PutNumber(out, value); });
+  PutNumber(out, static_cast<std::int64_t>(hour.channels.size()));
+  for (const HealthChannel& channel : hour.channels) {
+    out.Put(static_cast<std::uint8_t>(channel.output));
+    out.Put(static_cast<std::int8_t>(channel.exponent));
+  }
+  PutBins(out, hour);
+  for (const StrengthSums& sums : hour.strengths) {
+    PutNumber(out, sums.fault);
+    PutNumber(out, sums.samples);
+    PutNumber(out, sums.strength);
+  }
+  PutNumber(out, 0);  // no further fault
+  return out.Take();
+}
+
+void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour) {
+  ByteReader in(bytes, "health of " + hour.valve_id);
+  const auto head = in.Get<std::uint8_t>();
+  if ((head & ~kTonnes) != kFormat) {
+    in.Refuse("format " + std::to_string(head & ~kTonnes) +
+              " is none that this program knows");
+  }
+  hour.flow_unit =
+      (head & kTonnes) != 0 ? FlowUnit::kTPerHour : FlowUnit::kM3PerHour;
+  ForEachNumber(hour, [&in](std::int64_t& value) { value = GetNumber(in); });
+  hour.channels.resize(GetCount(in, kMaxChannels, "channels"));
+  for (HealthChannel& channel : hour.channels) {
+    const auto signal = in.Get<std::uint8_t>();
+    if (signal >= kSignalCount) {
+      in.Refuse("signal " + std::to_string(signal));
+    }
+    channel = {static_cast<Signal>(signal), in.Get<std::int8_t>()};
+  }
+  GetBins(in, hour);
+  while (const std::size_t fault = GetCount(in, kLastFault, "fault")) {
+    const std::int64_t samples = GetNumber(in);
+    hour.AddStrength(static_cast<int>(fault), samples, GetNumber(in));
+  }
+  in.ExpectEnd();
+}
+
+void StoreHealth(Database& database, std::span<const HealthHour> hours) {
+  Statement old = database.Prepare(sql::health_hour);
+  Statement row = database.Prepare(sql::put_health_hour);
+  for (const HealthHour& part : hours) {
+    HealthHour key;
+    key.valve_id = part.valve_id;
+    key.hour = part.hour;
+    key.model_hash = part.model_hash;
+    key.epoch = part.epoch;
+    old.Bind(key.valve_id, key.hour, key.model_hash, key.epoch);
+    const HealthHour sum =
+        old.Step() ? Sum(Unpacked(old, 0, std::move(key)), part) : part;
+    old.Reset();
+    const std::vector<std::byte> bytes = PackHealth(sum);
+    row.Bind(sum.valve_id, sum.hour, sum.model_hash, sum.epoch, sum.live_ms,
+             std::span<const std::byte>(bytes))
+        .Run();
+  }
+}
+
+std::vector<HealthHour> ReadHealth(Database& database,
+                                   const HealthFilter& filter) {
+  Statement row = database.Prepare(sql::health_hours);
+  row.Bind(filter.valve_id, HourFrom(filter.since_ns),
+           HourFrom(filter.until_ns));
+  std::vector<HealthHour> hours;
+  while (row.Step()) {
+    HealthHour hour;
+    hour.valve_id = filter.valve_id;
+    row.Read(0, hour.hour, hour.model_hash, hour.epoch);
+    hours.push_back(Unpacked(row, 3, std::move(hour)));
+  }
+  return hours;
+}
+
+std::vector<std::string> HealthValves(Database& database,
+                                      const std::string& glob) {
+  Statement next = database.Prepare(sql::next_health_valve);
+  Statement match = database.Prepare("SELECT ? GLOB ?");
+  std::vector<std::string> valves;
+  std::string last;
+  while (next.Bind(last).Step() && !next.IsNull(0)) {
+    last = next.Text(0);
+    if (match.Bind(last, glob).Step() && match.Bool(0)) {
+      valves.push_back(last);
+    }
+  }
+  return valves;
+}
+
+}  // namespace fdi::storage

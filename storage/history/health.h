@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "diagnosis/health_hour.h"
+#include "storage/database/database.h"
+
+namespace fdi::storage {
+
+/// The sums of an hour as bytes; health.cpp has the layout. Its key and live_ms
+/// are columns of their own.
+std::vector<std::byte> PackHealth(const HealthHour& hour);
+
+/// Fills `hour`, which has its key, with what PackHealth() gave.
+/// @throws DataError if the bytes are damaged or of a later format.
+void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour);
+
+/// Adds `hours` to those that are stored. Within a transaction.
+void StoreHealth(Database& database, std::span<const HealthHour> hours);
+
+/// Settings of ReadHealth().
+struct HealthFilter {
+  std::string valve_id;
+  std::int64_t since_ns{std::numeric_limits<std::int64_t>::min()};
+  std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
+};
+
+/// The hours of one valve that begin in the window, by time.
+std::vector<HealthHour> ReadHealth(Database& database,
+                                   const HealthFilter& filter);
+
+/// Valves that have any, by id; `glob` as in a shell.
+std::vector<std::string> HealthValves(Database& database,
+                                      const std::string& glob);
+
+}  // namespace fdi::storage

@@ -1,0 +1,268 @@
+#include "storage/history/history_reader.h"
+
+#include <iterator>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "storage/database/record.h"
+#include "storage/history/episode.h"
+#include "storage/history/sql.h"
+#include "storage/history/trace.h"
+
+namespace fdi::storage {
+namespace sql = history_sql;
+namespace {
+
+constexpr std::int64_t kDayNs = 86'400'000'000'000;
+constexpr const char* kUnknown = "unknown";
+
+bool IsExact(const EpisodeFilter& filter) {
+  return filter.valve_glob.find_first_of("*?[") == std::string::npos;
+}
+
+bool NamesAFault(const EpisodeFilter& filter) {
+  return !filter.fault.empty() && filter.fault != kUnknown;
+}
+
+bool IsOpen(EpisodeState state) {
+  return state == EpisodeState::kOpen || state == EpisodeState::kDetected ||
+         state == EpisodeState::kIsolated ||
+         state == EpisodeState::kAlarmUnacked ||
+         state == EpisodeState::kAlarmAcked;
+}
+
+bool IsUnacked(EpisodeState state) {
+  return state == EpisodeState::kUnacked ||
+         state == EpisodeState::kAlarmReturnedUnacked;
+}
+
+std::string FaultOf(const EpisodeFilter& filter) {
+  return NamesAFault(filter) ? FaultName(RequireFault(filter.fault))
+                             : filter.fault;
+}
+
+const char* ValveCondition(const EpisodeFilter& filter) {
+  return filter.valve_glob == "*" ? "?1 = '*'"
+         : IsExact(filter)        ? "e.valve_id = ?1"
+                                  : "e.valve_id GLOB ?1";
+}
+
+std::string_view FaultCondition(const EpisodeFilter& filter) {
+  return filter.fault.empty()       ? "?4 = ''"
+         : filter.fault == kUnknown ? "e.fault = ?4"
+                                    : sql::holds_fault;
+}
+
+// " AND ..." for the state, or nothing.
+std::string StateCondition(EpisodeState state) {
+  constexpr const char* kActive = "e.ended_ns IS NULL AND e.cleared_ns IS NULL";
+  constexpr const char* kReturned =
+      "coalesce(e.cleared_ns, e.ended_ns) IS NOT NULL";
+  constexpr const char* kAcked = " AND e.acked_by IS NOT NULL";
+  constexpr const char* kUnacked = " AND e.acked_by IS NULL";
+  const std::string open = " AND e.ended_ns IS NULL";
+  switch (state) {
+    case EpisodeState::kAny:
+      break;
+    case EpisodeState::kOpen:
+      return open;
+    case EpisodeState::kDetected:
+      return open + " AND e.isolated_ns IS NULL";
+    case EpisodeState::kIsolated:
+      return open + " AND e.isolated_ns IS NOT NULL";
+    case EpisodeState::kClosed:
+      return " AND e.ended_ns IS NOT NULL";
+    case EpisodeState::kUnacked:
+      return kUnacked;
+    case EpisodeState::kAlarmUnacked:
+      return std::string(" AND ") + kActive + kUnacked;
+    case EpisodeState::kAlarmAcked:
+      return std::string(" AND ") + kActive + kAcked;
+    case EpisodeState::kAlarmReturnedUnacked:
+      return std::string(kUnacked) + " AND " + kReturned;
+    case EpisodeState::kAlarmNormal:
+      return std::string(kAcked) + " AND " + kReturned;
+    case EpisodeState::kAlarmShelved:
+      return " AND " + std::string(sql::is_shelved);
+  }
+  return "";
+}
+
+const char* IndexFor(const EpisodeFilter& filter) {
+  return IsExact(filter)            ? "episode_by_valve"
+         : filter.fault == kUnknown ? "episode_by_fault"
+         : IsOpen(filter.state)     ? "episode_open"
+         : IsUnacked(filter.state)  ? "episode_unacked"
+                                    : "episode_by_time";
+}
+
+// The ids, newest first.
+std::string NewestIds(const EpisodeFilter& filter) {
+  const std::string valve_and_state =
+      std::string(ValveCondition(filter)) + StateCondition(filter.state);
+  if (NamesAFault(filter) && !IsExact(filter)) {
+    return std::string(sql::newest_of_fault) + " " + valve_and_state +
+           " ORDER BY f.detected_ns DESC, e.valve_id DESC";
+  }
+  return std::string("SELECT e.episode_id FROM episode e INDEXED BY ") +
+         IndexFor(filter) +
+         " WHERE e.detected_ns >= ?2 AND e.detected_ns < ?3 AND " +
+         valve_and_state + " AND " + std::string(FaultCondition(filter)) +
+         " ORDER BY e.detected_ns DESC, e.valve_id DESC";
+}
+
+// SQLite refuses a value for a parameter that the text does not have: ?5 is
+// bound only where it occurs, or where ?6 follows it.
+void BindFilter(Statement& statement, const EpisodeFilter& filter) {
+  if (filter.state == EpisodeState::kAlarmShelved) {
+    statement.Bind(filter.valve_glob, filter.since_ns, filter.until_ns,
+                   FaultOf(filter), filter.now_ns);
+  } else {
+    statement.Bind(filter.valve_glob, filter.since_ns, filter.until_ns,
+                   FaultOf(filter));
+  }
+}
+
+std::vector<Episode> ReadEpisodes(Statement& rows) {
+  auto episodes = ReadRecords<Episode>(rows);
+  for (Episode& episode : episodes) {
+    episode.id = ParseEpisodeId(episode.episode_id).value_or(0);
+  }
+  return episodes;
+}
+
+}  // namespace
+
+std::string ListQuery(const EpisodeFilter& filter) {
+  return std::string(sql::episodes) + " e.episode_id IN (" + NewestIds(filter) +
+         " LIMIT ?6) ORDER BY e.detected_ns, e.valve_id";
+}
+
+std::string StatisticsQuery(const EpisodeFilter& filter) {
+  return std::string(sql::statistics) + " " + ValveCondition(filter) +
+         StateCondition(filter.state) + " AND " +
+         std::string(FaultCondition(filter)) +
+         " GROUP BY e.valve_id, e.fault ORDER BY e.valve_id, e.fault";
+}
+
+std::string AlarmSpanQuery(const EpisodeFilter& filter) {
+  return std::string(sql::alarm_spans) + " " + ValveCondition(filter) +
+         " AND " + std::string(FaultCondition(filter)) +
+         " ORDER BY e.detected_ns, e.valve_id";
+}
+
+std::string AlarmListQuery() {
+  return std::string(sql::episodes) + " " + std::string(sql::alarm_list);
+}
+
+std::vector<AlarmSpan> ReadAlarmSpans(Database& database,
+                                      const EpisodeFilter& filter) {
+  EpisodeFilter any_state = filter;
+  any_state.state = EpisodeState::kAny;
+  Statement rows = database.Prepare(AlarmSpanQuery(any_state));
+  BindFilter(rows, any_state);
+  return ReadRecords<AlarmSpan>(rows);
+}
+
+HistoryReader::HistoryReader(const std::filesystem::path& path)
+    : database_(path, HistorySchema(), Access::kReader) {}
+
+std::vector<Episode> HistoryReader::List(const EpisodeFilter& filter) {
+  Statement rows = database_.Prepare(ListQuery(filter));
+  rows.Bind(filter.valve_glob, filter.since_ns, filter.until_ns,
+            FaultOf(filter), filter.now_ns,
+            filter.limit > 0 ? filter.limit : -1);
+  return ReadEpisodes(rows);
+}
+
+Episode HistoryReader::Show(std::string_view id) {
+  const Snapshot snapshot(database_);
+  const std::uint64_t episode_id = ResolveEpisode(database_, id);
+  Statement rows =
+      database_.Prepare(std::string(sql::episodes) + " e.episode_id = ?");
+  rows.Bind(EpisodeIdText(episode_id));
+  return ReadEpisodes(rows).at(0);
+}
+
+std::vector<HistoryEntry> HistoryReader::Events(std::uint64_t episode_id) {
+  Statement rows = database_.Prepare(SelectSql<HistoryEntry>(
+      "FROM episode_event WHERE episode_id = ? ORDER BY event_id"));
+  rows.Bind(EpisodeIdText(episode_id));
+  auto events = ReadRecords<HistoryEntry>(rows);
+  for (HistoryEntry& event : events) {
+    event.episode_id = episode_id;
+  }
+  return events;
+}
+
+std::vector<TracePoint> HistoryReader::Trace(std::uint64_t episode_id) {
+  const std::string id = EpisodeIdText(episode_id);
+  Statement row = database_.Prepare(sql::trace_chunks);
+  row.Bind(id);
+  std::vector<TracePoint> trace;
+  while (row.Step()) {
+    TraceChunk chunk;
+    std::string number;
+    row.Read(0, chunk.samples.codec, chunk.samples.crc, chunk.samples.count,
+             chunk.samples.bytes, chunk.vector_crc, chunk.vectors, number);
+    auto part = DecodeTrace(chunk, database_.path().string() + ": trace of " +
+                                       id + ", chunk " + number);
+    trace.insert(trace.end(), std::make_move_iterator(part.begin()),
+                 std::make_move_iterator(part.end()));
+  }
+  return trace;
+}
+
+std::vector<EpisodeStatistics> HistoryReader::Statistics(
+    const EpisodeFilter& filter) {
+  Statement rows = database_.Prepare(StatisticsQuery(filter));
+  BindFilter(rows, filter);
+  return ReadRecords<EpisodeStatistics>(rows);
+}
+
+std::vector<DataGap> HistoryReader::Gaps(const EpisodeFilter& filter) {
+  Statement rows = database_.Prepare(sql::gaps);
+  rows.Bind(filter.valve_glob, filter.since_ns, filter.until_ns);
+  return ReadRecords<DataGap>(rows);
+}
+
+std::vector<CoverageTime> HistoryReader::Coverage(const EpisodeFilter& filter) {
+  Statement rows = database_.Prepare(sql::coverage);
+  rows.Bind(filter.valve_glob, filter.since_ns / kDayNs,
+            filter.until_ns / kDayNs);
+  return ReadRecords<CoverageTime>(rows);
+}
+
+std::vector<MonitorSession> HistoryReader::Sessions() {
+  Statement rows = database_.Prepare(
+      SelectSql<MonitorSession>("FROM monitor_session ORDER BY session_id"));
+  return ReadRecords<MonitorSession>(rows);
+}
+
+std::vector<Alarm> HistoryReader::AlarmList(std::int64_t now_ns,
+                                            std::int64_t limit) {
+  const Snapshot snapshot(database_);
+  Statement rows = database_.Prepare(AlarmListQuery());
+  rows.Bind(limit);
+  return Alarms(ReadEpisodes(rows), now_ns);
+}
+
+std::vector<Alarm> HistoryReader::Alarms(std::vector<Episode> episodes,
+                                         std::int64_t now_ns) {
+  return AsAlarms(std::move(episodes), Shelves(now_ns), now_ns);
+}
+
+AlarmStatistics HistoryReader::AlarmFigures(const EpisodeFilter& filter,
+                                            std::int64_t now_ns,
+                                            const AlarmCriteria& criteria) {
+  return ComputeAlarmStatistics(ReadAlarmSpans(database_, filter),
+                                filter.since_ns, filter.until_ns, now_ns,
+                                criteria);
+}
+
+std::vector<Shelf> HistoryReader::Shelves(
+    std::optional<std::int64_t> in_force_at_ns) {
+  return ReadShelves(database_, in_force_at_ns);
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/records/service_records.h"
+#include "diagnosis/records/trace_point.h"
+#include "storage/database/database.h"
+#include "storage/history/alarm.h"
+#include "storage/history/episode.h"
+#include "storage/history/history_database.h"
+
+namespace fdi::storage {
+
+/// Reads history.db beside a running monitor. One thread at a time.
+class HistoryReader {
+ public:
+  /// @throws DataError, SqliteError as Database.
+  explicit HistoryReader(const std::filesystem::path& path);
+
+  /// By detection.
+  std::vector<Episode> List(const EpisodeFilter& filter = {});
+
+  /// `id` may be a unique beginning, or `last`.
+  /// @throws NotFoundError if no episode, or more than one, begins like that.
+  Episode Show(std::string_view id);
+
+  /// Of one episode, in order of recording.
+  std::vector<HistoryEntry> Events(std::uint64_t episode_id);
+
+  /// In order of arrival. @throws DataError if stored bytes are damaged.
+  std::vector<TracePoint> Trace(std::uint64_t episode_id);
+
+  /// By valve and fault, of the episodes that List() would give.
+  std::vector<EpisodeStatistics> Statistics(const EpisodeFilter& filter = {});
+
+  /// Gaps that touch the filter's time, of its valves and of all valves.
+  std::vector<DataGap> Gaps(const EpisodeFilter& filter = {});
+  std::vector<MonitorSession> Sessions();
+
+  /// Time by valve and quality; the filter's fault and state do not count.
+  std::vector<CoverageTime> Coverage(const EpisodeFilter& filter = {});
+
+  /// Open episodes, and ended ones that nobody has acknowledged, newest first:
+  /// `limit` of them, open ones before others. Shelved ones are among them.
+  std::vector<Alarm> AlarmList(std::int64_t now_ns, std::int64_t limit = 500);
+  /// `episodes` with what is shelved now.
+  std::vector<Alarm> Alarms(std::vector<Episode> episodes, std::int64_t now_ns);
+
+  /// ComputeAlarmStatistics() of the filter's valves, fault and time.
+  AlarmStatistics AlarmFigures(const EpisodeFilter& filter, std::int64_t now_ns,
+                               const AlarmCriteria& criteria = {});
+
+  /// By beginning: those in force at a time, or all there ever were.
+  std::vector<Shelf> Shelves(std::optional<std::int64_t> in_force_at_ns = {});
+
+  Database& database() { return database_; }
+
+ private:
+  Database database_;
+};
+
+/// By detection: the episodes of the filter's valves and fault that touch its
+/// time; its state and limit do not count.
+/// @throws ConfigError for a fault that is none.
+std::vector<AlarmSpan> ReadAlarmSpans(Database& database,
+                                      const EpisodeFilter& filter);
+
+// The queries behind it, whose plans are tested: parameters are ?1 valve,
+// ?2 since, ?3 until, ?4 fault, ?5 now, ?6 limit, as far as they occur.
+
+/// SQL for kFieldsOf<Episode> of the newest `limit` episodes of `filter`,
+/// oldest first. Each filter walks an index of its own, newest first, so that a
+/// limit ends it early; the one that narrows most leads: valve id, fault, open,
+/// unacknowledged, time.
+std::string ListQuery(const EpisodeFilter& filter);
+
+/// SQL for the columns of EpisodeStatistics, by valve and fault, from an index
+/// that covers them.
+std::string StatisticsQuery(const EpisodeFilter& filter);
+
+/// SQL for the columns of AlarmSpan, by detection, from the same index: the
+/// episodes that touch the filter's time.
+std::string AlarmSpanQuery(const EpisodeFilter& filter);
+
+/// SQL for kFieldsOf<Episode> of open episodes and ended ones that nobody has
+/// acknowledged, newest first; the newest ?1, open ones before others.
+std::string AlarmListQuery();
+
+}  // namespace fdi::storage

@@ -1,0 +1,443 @@
+#include "storage/history/history_writer.h"
+
+#include <charconv>
+#include <cmath>
+#include <utility>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "storage/database/record.h"
+#include "storage/history/episode.h"
+#include "storage/history/health.h"
+#include "storage/history/history_database.h"
+#include "storage/history/shadow.h"
+#include "storage/history/sql.h"
+
+namespace fdi::storage {
+
+template <>
+struct EnumText<TransitionKind> {
+  static constexpr auto name = TransitionName;
+  static constexpr auto last = TransitionKind::kClosed;
+};
+
+namespace sql = history_sql;
+namespace {
+
+constexpr std::int64_t kAliveEveryNs = 10'000'000'000;
+
+double Finite(double value) {
+  return std::isfinite(value) ? value : 0.0;
+}
+
+bool IsIsolation(TransitionKind kind) {
+  return kind == TransitionKind::kIsolated ||
+         kind == TransitionKind::kReisolated;
+}
+
+bool Has(FaultSet faults, std::size_t bit) {
+  return (faults >> bit & 1U) != 0;
+}
+
+EndReason ReasonOf(std::string_view name) {
+  for (int r = 0; r < static_cast<int>(EndReason::kUnknown); ++r) {
+    if (EndReasonName(static_cast<EndReason>(r)) == name) {
+      return static_cast<EndReason>(r);
+    }
+  }
+  return EndReason::kUnknown;
+}
+
+/// A transition on its way into the tables.
+struct Entry {
+  std::string id;
+  Transition transition;
+  std::int64_t recorded_ns{0};
+  std::vector<std::string> names;  ///< Of the faults, by bit.
+
+  std::string IsolatedNames() const {
+    std::vector<std::string> isolated;
+    for (std::size_t bit = 0; bit < names.size(); ++bit) {
+      if (Has(transition.faults, bit)) {
+        isolated.push_back(names[bit]);
+      }
+    }
+    return JoinNames(isolated);
+  }
+};
+
+Entry InsertEpisode(Database& database, const FaultEvent& event,
+                    std::optional<std::int64_t> session_id) {
+  const ModelSet& models = *event.models;
+  const Transition& t = event.transition;
+  Entry entry{EpisodeIdText(event.episode_id), t, 0, {}};
+  for (const int fault : models.faults) {
+    entry.names.push_back(FaultName(fault));
+  }
+  std::vector<std::string> channels;
+  for (const ChannelSpec& channel : models.channels) {
+    channels.push_back(channel.name);
+  }
+  database.Cached(sql::insert_episode)
+      .Bind(entry.id, session_id, event.valve_id, event.source_id,
+            t.detection_stamp_ns, Finite(t.factor), Finite(t.strength),
+            models.name + "@" + std::to_string(models.version),
+            models.content_hash, FlowUnitName(models.flow_unit),
+            JoinNames(channels), JoinNames(entry.names))
+      .Run();
+  return entry;
+}
+
+// The end of an episode that no engine knows any more: its faults are those
+// that were isolated last. @throws NotFoundError
+Entry EndOfStored(Database& database, const FaultEvent& event) {
+  Entry entry{EpisodeIdText(event.episode_id), event.transition, 0, {}};
+  Statement row = database.Prepare(sql::faults_of_episode);
+  if (!row.Bind(entry.id).Step()) {
+    throw NotFoundError("no episode " + entry.id);
+  }
+  Transition& t = entry.transition;
+  t.unknown = Unknown::kNone;
+  row.Read(0, t.faults, t.factor, t.strength, t.detection_stamp_ns,
+           entry.names);
+  return entry;
+}
+
+void StoreIsolation(Database& database, const Entry& entry) {
+  const Transition& t = entry.transition;
+  const std::string names = entry.IsolatedNames();
+  database.Cached(sql::set_isolated)
+      .Bind(t.stamp_ns, names.empty() ? "unknown" : names, t.faults,
+            Finite(t.factor), Finite(t.strength), entry.id)
+      .Run();
+  database.Cached(sql::release_faults).Bind(entry.id).Run();
+  for (std::size_t bit = 0; bit < entry.names.size(); ++bit) {
+    if (Has(t.faults, bit)) {
+      database.Cached(sql::hold_fault)
+          .Bind(entry.names[bit], bit, t.stamp_ns, entry.id)
+          .Run();
+    }
+  }
+}
+
+// @returns false if the event was there already, or its episode has ended.
+bool StoreEvent(Database& database, const Entry& entry) {
+  const Transition& t = entry.transition;
+  const bool closed = t.kind == TransitionKind::kClosed;
+  database.Cached(sql::insert_event)
+      .Bind(t.kind, t.stamp_ns, entry.recorded_ns, entry.IsolatedNames(),
+            t.faults, t.factor, t.strength,
+            closed ? EndReasonName(t.reason) : std::string_view(), entry.id)
+      .Run();
+  if (database.Changes() == 0) {
+    return false;
+  }
+  database.Cached(sql::insert_unsent).Bind(database.LastInsertRowid()).Run();
+  if (t.unknown != Unknown::kNone) {
+    database.Cached(sql::set_unknown_kind)
+        .Bind(UnknownName(t.unknown), entry.id)
+        .Run();
+  } else if (IsIsolation(t.kind)) {
+    database.Cached(sql::set_unknown_kind).Bind(std::nullopt, entry.id).Run();
+  }
+  if (IsIsolation(t.kind)) {
+    StoreIsolation(database, entry);
+  } else if (t.kind == TransitionKind::kCleared) {
+    database.Cached(sql::set_cleared).Bind(t.stamp_ns, entry.id).Run();
+  } else if (closed) {
+    const bool cleared = t.reason == EndReason::kCleared;
+    database.Cached(sql::set_ended)
+        .Bind(t.stamp_ns, EndReasonName(t.reason),
+              cleared ? std::optional(t.stamp_ns) : std::nullopt, entry.id)
+        .Run();
+  }
+  return true;
+}
+
+void StoreCoverage(Database& database, std::span<const CoverageDay> days) {
+  Statement& row = database.Cached(sql::add_coverage);
+  for (const CoverageDay& day : days) {
+    for (std::size_t i = 0; i < kQualityCount; ++i) {
+      const auto quality = static_cast<Quality>(i);
+      const std::uint64_t samples = day.samples[quality];
+      if (samples != 0) {
+        row.Bind(day.valve_id, day.day, QualityName(quality), samples,
+                 static_cast<double>(samples) * day.period_s)
+            .Run();
+      }
+    }
+  }
+}
+
+void StoreAccumulators(Database& database, std::string_view table,
+                       std::span<const Accumulator> accumulators) {
+  if (accumulators.empty()) {
+    return;
+  }
+  Statement& row = database.Cached(InsertSql<Accumulator>(
+      table,
+      "ON CONFLICT (valve_id) DO UPDATE SET source_id = excluded.source_id, "
+      "model_hash = excluded.model_hash, stamp_ns = excluded.stamp_ns, "
+      "bytes = excluded.bytes"));
+  for (const Accumulator& accumulator : accumulators) {
+    BindRecord(row, accumulator).Run();
+  }
+}
+
+std::vector<Accumulator> ReadAccumulators(Database& database,
+                                          const std::string& table) {
+  Statement rows = database.Prepare(
+      SelectSql<Accumulator>("FROM " + table + " ORDER BY valve_id"));
+  return ReadRecords<Accumulator>(rows);
+}
+
+// "NAME@VERSION"; version 0 if there is none.
+void SplitModelSet(const std::string& text, std::string& name, int& version) {
+  const std::size_t at = text.rfind('@');
+  name = text.substr(0, at);
+  if (at != std::string::npos) {
+    std::from_chars(text.data() + at + 1, text.data() + text.size(), version);
+  }
+}
+
+// The members of `faults` with what was estimated of all of them.
+std::vector<FaultCandidate> IsolatedCandidates(
+    const std::vector<std::string>& names, double factor, double strength) {
+  std::vector<FaultCandidate> candidates;
+  for (const std::string& name : names) {
+    if (const auto fault = ParseFault(name)) {
+      candidates.push_back({*fault, factor, strength, true});
+    }
+  }
+  return candidates;
+}
+
+std::uint64_t RequireEpisodeId(const Statement& row, int column) {
+  const auto id = ParseEpisodeId(row.Text(column));
+  if (!id) {
+    throw DataError("episode id '" + row.Text(column) +
+                    "' is damaged: it is not 16 hex digits");
+  }
+  return *id;
+}
+
+FaultEvent ReadUnsent(const Statement& row) {
+  FaultEvent event;
+  Transition& t = event.transition;
+  std::string reason;
+  std::string model_set;
+  std::vector<std::string> faults;
+  event.episode_id = RequireEpisodeId(row, 1);
+  row.Read(2, t.kind, event.valve_id, event.source_id, t.stamp_ns,
+           t.detection_stamp_ns, t.faults, t.factor, t.strength, reason, faults,
+           model_set, event.model_hash);
+  t.reason = reason.empty() ? EndReason::kNone : ReasonOf(reason);
+  event.candidates = IsolatedCandidates(faults, t.factor, t.strength);
+  SplitModelSet(model_set, event.model_set, event.model_version);
+  event.persisted = true;
+  return event;
+}
+
+OpenEpisode ReadOpen(const Statement& row) {
+  OpenEpisode episode;
+  std::string model_set;
+  std::vector<std::string> names;
+  double factor = 0.0;
+  double strength = 0.0;
+  episode.episode_id = RequireEpisodeId(row, 0);
+  row.Read(1, episode.valve_id, episode.source_id, episode.detection_stamp_ns,
+           episode.last_stamp_ns, episode.faults, episode.isolated, model_set,
+           episode.model_hash, names, factor, strength);
+  std::vector<std::string> isolated;
+  for (std::size_t bit = 0; bit < names.size(); ++bit) {
+    if (Has(episode.faults, bit)) {
+      isolated.push_back(names[bit]);
+    }
+  }
+  episode.candidates = IsolatedCandidates(isolated, factor, strength);
+  SplitModelSet(model_set, episode.model_set, episode.model_version);
+  return episode;
+}
+
+// All rows but the damaged ones, which begin with `what` and their first
+// column in messages.
+template <typename Read>
+auto ReadUndamaged(Statement& rows, const std::string& what, Read read,
+                   std::vector<std::string>* damaged) {
+  std::vector<decltype(read(rows))> records;
+  while (rows.Step()) {
+    try {
+      records.push_back(read(rows));
+    } catch (const DataError& error) {
+      const std::string message =
+          what + " " + rows.Text(0) + ": " + error.what();
+      if (damaged == nullptr) {
+        throw DataError(message);
+      }
+      damaged->push_back(message);
+    }
+  }
+  return records;
+}
+
+}  // namespace
+
+HistoryWriter::HistoryWriter(const std::filesystem::path& path)
+    : database_(path, HistorySchema(), Access::kWriter) {}
+
+SessionStart HistoryWriter::BeginSession(std::int64_t now_ns,
+                                         const std::string& software,
+                                         const std::string& config) {
+  SessionStart start;
+  Transaction transaction(database_);
+  start.died_ns = database_.QueryInt64(sql::last_sign_of_life);
+  database_.Run(sql::end_dead_sessions);
+  database_.Run(sql::insert_session, now_ns, software, config);
+  start.session_id = database_.LastInsertRowid();
+  transaction.Commit();
+  session_id_ = start.session_id;
+  alive_ns_ = now_ns;
+  return start;
+}
+
+void HistoryWriter::EndSession(std::int64_t now_ns, bool clean) {
+  traces_.EndAll();
+  CommitBatch(
+      [&] { database_.Run(sql::end_session, now_ns, clean, session_id_); });
+  session_id_.reset();
+  database_.Checkpoint();
+}
+
+// What was pending before is stored first: the trace of an episode is in the
+// file when its next event is. Only a commit makes it forgotten, so that a
+// full disk costs nothing but time.
+void HistoryWriter::CommitBatch(const std::function<void()>& batch) {
+  if (in_batch_) {
+    batch();
+    return;
+  }
+  in_batch_ = true;
+  failed_ = true;
+  try {
+    Transaction transaction(database_);
+    StorePending();
+    batch();
+    transaction.Commit();
+  } catch (...) {
+    in_batch_ = false;
+    throw;
+  }
+  in_batch_ = false;
+  failed_ = false;
+  Settle();
+}
+
+bool HistoryWriter::Record(const FaultEvent& event, std::int64_t now_ns) {
+  const Transition& t = event.transition;
+  if (event.models == nullptr) {
+    Require(t.kind == TransitionKind::kClosed,
+            "HistoryWriter::Record: only an end goes without a model set");
+    traces_.End(event.episode_id);
+  } else {
+    Require(!event.valve_id.empty(), "HistoryWriter::Record: no valve");
+  }
+  bool is_new = false;
+  CommitBatch([&] {
+    Entry entry = event.models != nullptr
+                      ? InsertEpisode(database_, event, session_id_)
+                      : EndOfStored(database_, event);
+    entry.recorded_ns = now_ns;
+    is_new = StoreEvent(database_, entry);
+  });
+  if (IsIsolation(t.kind)) {
+    traces_.SetIsolated(event.episode_id, t.faults);
+  }
+  return is_new;
+}
+
+void HistoryWriter::Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
+                           std::int64_t now_ns) {
+  const std::string id = EpisodeIdText(episode_id);
+  CommitBatch([&] {
+    if (!database_.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?",
+                              id)) {
+      throw NotFoundError("no episode " + id);
+    }
+    database_.Cached(sql::insert_resumed).Bind(id, stamp_ns, now_ns).Run();
+  });
+}
+
+void HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {
+  CommitBatch([&] {
+    StoreCoverage(database_, checkpoint.coverage);
+    StoreAccumulators(database_, "accumulator", checkpoint.accumulators);
+    StoreHealth(database_, checkpoint.health);
+    StoreShadow(database_, checkpoint.shadow);
+    StoreAccumulators(database_, "shadow_accumulator",
+                      checkpoint.shadow_accumulators);
+  });
+}
+
+std::vector<Accumulator> HistoryWriter::Accumulators() {
+  return ReadAccumulators(database_, "accumulator");
+}
+
+std::vector<Accumulator> HistoryWriter::ShadowAccumulators() {
+  return ReadAccumulators(database_, "shadow_accumulator");
+}
+
+void HistoryWriter::MarkSent(const FaultEvent& event) {
+  sent_.push_back(
+      {event.episode_id, event.transition.kind, event.transition.stamp_ns});
+}
+
+void HistoryWriter::StorePending() {
+  traces_.Store();
+  for (const DataGap& gap : gaps_) {
+    database_.Cached(sql::insert_gap)
+        .Bind(gap.valve_id, gap.from_ns, gap.to_ns, gap.reason, session_id_)
+        .Run();
+  }
+  for (const SentEvent& event : sent_) {
+    database_.Cached(sql::delete_unsent)
+        .Bind(EpisodeIdText(event.episode_id), event.kind, event.stamp_ns)
+        .Run();
+  }
+}
+
+void HistoryWriter::Settle() {
+  gaps_.clear();
+  sent_.clear();
+  traces_.Settle();
+}
+
+bool HistoryWriter::HasPending() const {
+  return !gaps_.empty() || !sent_.empty() || traces_.HasPending();
+}
+
+void HistoryWriter::Commit(std::int64_t now_ns) {
+  const bool alive = session_id_ && now_ns - alive_ns_ >= kAliveEveryNs;
+  if (!HasPending() && !alive && !failed_) {
+    return;
+  }
+  CommitBatch([&] {
+    if (session_id_) {
+      database_.Cached(sql::set_alive).Bind(now_ns, session_id_).Run();
+    }
+  });
+  alive_ns_ = now_ns;
+}
+
+std::vector<FaultEvent> HistoryWriter::UnsentEvents(
+    std::vector<std::string>* damaged) {
+  Statement rows = database_.Prepare(sql::unsent_events);
+  return ReadUndamaged(rows, "event_outbox, event", ReadUnsent, damaged);
+}
+
+std::vector<OpenEpisode> HistoryWriter::OpenEpisodes(
+    std::vector<std::string>* damaged) {
+  Statement rows = database_.Prepare(sql::open_episodes);
+  return ReadUndamaged(rows, "episode", ReadOpen, damaged);
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,321 @@
+-- Statements of history.db: see cmake/FdiSql.cmake. Parameters are bound in
+-- order where they are bare, by number otherwise.
+
+-- ---- Episodes. The columns are kFieldsOf<Episode> in episode.h; the text of a
+-- ---- query for episodes begins with this, and a condition follows.
+-- name: episodes
+SELECT v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc,
+  v.cleared_utc, v.fault, v.peak_factor, v.model_set, v.end_reason, v.label,
+  v.acked_by, e.source_id, e.model_hash, e.detected_ns, e.isolated_ns,
+  e.cleared_ns, e.ended_ns, e.acked_ns,
+  (SELECT max(last_ns) FROM episode_trace t
+   WHERE t.episode_id = e.episode_id), e.session_id, e.fault_bits, e.strength,
+  e.unknown_kind, e.flow_unit, e.channels, e.faults
+FROM episode e CROSS JOIN fault_history v USING (episode_id)
+WHERE
+-- name: newest_episode
+SELECT episode_id FROM episode ORDER BY detected_ns DESC, rowid DESC LIMIT 1
+-- name: episodes_by_prefix
+SELECT episode_id FROM episode WHERE episode_id GLOB ? LIMIT 2
+-- name: alarm_list
+e.episode_id IN (
+  SELECT episode_id FROM (
+    SELECT episode_id FROM episode INDEXED BY episode_open
+    WHERE ended_ns IS NULL ORDER BY detected_ns DESC, valve_id DESC LIMIT ?1)
+  UNION ALL
+  SELECT episode_id FROM (
+    SELECT episode_id FROM episode INDEXED BY episode_unacked
+    WHERE acked_by IS NULL AND ended_ns IS NOT NULL
+    ORDER BY detected_ns DESC, valve_id DESC LIMIT ?1)
+  LIMIT ?1)
+ORDER BY e.detected_ns DESC, e.valve_id DESC
+-- name: newest_of_fault
+SELECT f.episode_id
+FROM episode_fault f INDEXED BY episode_fault_by_fault
+  CROSS JOIN episode e USING (episode_id)
+WHERE f.fault = ?4 AND f.held = 1
+  AND f.detected_ns >= ?2 AND f.detected_ns < ?3 AND
+-- name: holds_fault
+EXISTS (SELECT 1 FROM episode_fault f
+  WHERE f.episode_id = e.episode_id AND f.fault = ?4 AND f.held = 1)
+-- As Covers() and InForce() of alarm.h say.
+-- name: is_shelved
+EXISTS (SELECT 1 FROM shelf s
+  WHERE s.valve_id = e.valve_id AND s.until_ns > ?5 AND s.from_ns <= ?5
+    AND (s.ended_ns IS NULL OR s.ended_ns > ?5)
+    AND (s.fault IS NULL OR s.fault = e.fault))
+-- The columns are kFieldsOf<EpisodeStatistics>. A label is right if it says
+-- true or names a fault of the answer.
+-- name: statistics
+SELECT e.valve_id, coalesce(e.fault, ''), count(*), sum(e.ended_ns IS NULL),
+  sum(e.acked_by IS NULL),
+  sum(e.label IS NOT NULL AND (e.label = 'true' OR instr(
+    '|' || coalesce(e.fault, '') || '|', '|' || e.label || '|') > 0)),
+  sum(e.label IS NOT NULL AND NOT (e.label = 'true' OR instr(
+    '|' || coalesce(e.fault, '') || '|', '|' || e.label || '|') > 0)),
+  avg((e.isolated_ns - e.detected_ns) * 1e-9),
+  avg((e.ended_ns - e.detected_ns) * 1e-9), max(e.peak_factor),
+  max(e.detected_ns)
+FROM episode e INDEXED BY episode_statistics
+WHERE e.detected_ns >= ?2 AND e.detected_ns < ?3 AND
+-- name: alarm_spans
+SELECT e.valve_id, coalesce(e.fault, ''), e.detected_ns, e.ended_ns, e.label,
+  CASE WHEN e.ended_ns IS NULL THEN (
+    SELECT max(last_ns) FROM episode_trace t
+    WHERE t.episode_id = e.episode_id) END
+FROM episode e INDEXED BY episode_statistics
+WHERE (e.ended_ns IS NULL OR e.ended_ns >= ?2) AND e.detected_ns < ?3 AND
+-- name: insert_episode
+INSERT INTO episode (episode_id, session_id, valve_id, source_id, detected_ns,
+  peak_factor, strength, model_set, model_hash, flow_unit, channels, faults)
+VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
+ON CONFLICT (episode_id) DO NOTHING
+-- name: faults_of_episode
+SELECT fault_bits, peak_factor, strength, detected_ns, faults
+FROM episode WHERE episode_id = ?
+-- name: set_isolated
+UPDATE episode SET isolated_ns = coalesce(isolated_ns, ?), fault = ?,
+  fault_bits = ?, peak_factor = ?, strength = ?
+WHERE episode_id = ?
+-- name: release_faults
+UPDATE episode_fault SET held = 0 WHERE episode_id = ?
+-- name: hold_fault
+INSERT INTO episode_fault
+  (episode_id, fault, fault_bit, first_ns, held, detected_ns)
+SELECT episode_id, ?, ?, ?, 1, detected_ns FROM episode WHERE episode_id = ?
+ON CONFLICT (episode_id, fault) DO UPDATE SET held = 1
+-- name: set_unknown_kind
+UPDATE episode SET unknown_kind = ? WHERE episode_id = ?
+-- name: set_cleared
+UPDATE episode SET cleared_ns = ? WHERE episode_id = ?
+-- name: set_ended
+UPDATE episode SET ended_ns = ?, end_reason = ?,
+  fault = coalesce(fault, 'unknown'), cleared_ns = coalesce(cleared_ns, ?)
+WHERE episode_id = ?
+-- name: raise_peak
+UPDATE episode SET peak_factor = max(peak_factor, ?1)
+WHERE episode_id = ?2 AND peak_factor < ?1
+-- The columns make an OpenEpisode; the candidates are made of the last three.
+-- name: open_episodes
+SELECT episode_id, valve_id, source_id, detected_ns,
+  max(detected_ns, coalesce(isolated_ns, 0), coalesce(
+    (SELECT max(last_ns) FROM episode_trace t
+     WHERE t.episode_id = e.episode_id), 0)),
+  fault_bits, isolated_ns IS NOT NULL, model_set, model_hash, faults,
+  peak_factor, strength
+FROM episode e WHERE ended_ns IS NULL ORDER BY detected_ns, valve_id
+
+-- ---- Events.
+-- Nothing is inserted if the event is there already, or its episode has ended.
+-- name: insert_event
+INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns, faults,
+  fault_bits, factor, strength, reason)
+SELECT episode_id, ?, ?, ?, nullif(?, ''), ?, ?, ?, nullif(?, '')
+FROM episode WHERE episode_id = ? AND ended_ns IS NULL
+ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
+-- name: insert_resumed
+INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns)
+VALUES (?, 'RESUMED', ?, ?) ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
+-- name: insert_note
+INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns, value, who,
+  comment, origin)
+VALUES (?, ?, ?, ?, ?, ?, nullif(?, ''), ?)
+ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
+-- name: acknowledge
+UPDATE episode SET acked_by = ?, acked_ns = ?
+WHERE episode_id = ? AND acked_by IS NULL
+-- name: insert_unsent
+INSERT INTO event_outbox (event_id) VALUES (?)
+-- name: delete_unsent
+DELETE FROM event_outbox WHERE event_id = (
+  SELECT event_id FROM episode_event
+  WHERE episode_id = ? AND kind = ? AND stamp_ns = ?)
+-- In the order of commitment.
+-- name: unsent_events
+SELECT v.event_id, v.episode_id, v.kind, e.valve_id, e.source_id, v.stamp_ns,
+  e.detected_ns, v.fault_bits, v.factor, v.strength, v.reason, v.faults,
+  e.model_set, e.model_hash
+FROM event_outbox o JOIN episode_event v USING (event_id)
+  JOIN episode e USING (episode_id)
+ORDER BY v.event_id
+
+-- ---- Evidence.
+-- name: trace_state
+SELECT channels, faults, fault_bits, detected_ns,
+  (SELECT count(*) FROM episode_trace t WHERE t.episode_id = e.episode_id)
+FROM episode e WHERE episode_id = ?
+-- name: insert_trace
+INSERT INTO episode_trace (episode_id, chunk, first_ns, last_ns, instants,
+  sample_codec, sample_crc, samples, vector_crc, vectors)
+VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
+ON CONFLICT (episode_id, chunk) DO UPDATE SET last_ns = excluded.last_ns,
+  instants = excluded.instants, sample_codec = excluded.sample_codec,
+  sample_crc = excluded.sample_crc, samples = excluded.samples,
+  vector_crc = excluded.vector_crc, vectors = excluded.vectors
+-- name: trace_chunks
+SELECT sample_codec, sample_crc, instants, samples, vector_crc, vectors, chunk
+FROM episode_trace WHERE episode_id = ? ORDER BY chunk
+
+-- ---- Sessions and gaps.
+-- name: last_sign_of_life
+SELECT max(alive_ns) FROM monitor_session WHERE stop_ns IS NULL
+-- name: end_dead_sessions
+UPDATE monitor_session SET stop_ns = alive_ns, clean = 0 WHERE stop_ns IS NULL
+-- name: insert_session
+INSERT INTO monitor_session (start_ns, alive_ns, software, config)
+VALUES (?1, ?1, ?2, ?3)
+-- name: end_session
+UPDATE monitor_session SET alive_ns = ?1, stop_ns = ?1, clean = ?2
+WHERE session_id = ?3
+-- name: set_alive
+UPDATE monitor_session SET alive_ns = ? WHERE session_id = ?
+-- name: insert_gap
+INSERT OR IGNORE INTO data_gap (valve_id, from_ns, to_ns, reason, session_id)
+VALUES (nullif(?, ''), ?, ?, ?, ?)
+-- name: gaps
+SELECT valve_id, from_ns, to_ns, reason FROM data_gap
+WHERE (valve_id IS NULL OR valve_id GLOB ?) AND to_ns >= ? AND from_ns < ?
+ORDER BY from_ns, valve_id
+
+-- ---- Coverage and health.
+-- name: add_coverage
+INSERT INTO coverage_day (valve_id, day, quality, samples, seconds)
+VALUES (?, ?, ?, ?, ?)
+ON CONFLICT (valve_id, day, quality) DO UPDATE SET
+  samples = samples + excluded.samples, seconds = seconds + excluded.seconds
+-- name: coverage
+SELECT valve_id, quality, sum(samples), sum(seconds) / 3600.0
+FROM coverage_day WHERE valve_id GLOB ?1 AND day >= ?2 AND day <= ?3
+GROUP BY valve_id, quality ORDER BY valve_id, sum(seconds) DESC
+-- name: health_hour
+SELECT live_ms, bytes FROM health_hour
+WHERE valve_id = ? AND hour = ? AND model_hash = ? AND epoch = ?
+-- name: put_health_hour
+INSERT INTO health_hour (valve_id, hour, model_hash, epoch, live_ms, bytes)
+VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET
+  live_ms = excluded.live_ms, bytes = excluded.bytes
+-- name: health_hours
+SELECT hour, model_hash, epoch, live_ms, bytes FROM health_hour
+WHERE valve_id = ? AND hour >= ? AND hour < ?
+ORDER BY hour, epoch, model_hash
+-- Skips from valve to valve along the key.
+-- name: next_health_valve
+SELECT min(valve_id) FROM health_hour WHERE valve_id > ?
+
+-- ---- Shadow.
+-- name: shadow_differences
+FROM shadow_difference
+WHERE valve_id GLOB ?1 AND from_ns >= ?2 AND from_ns <= ?3
+  AND (?4 = '' OR candidate_set = ?4
+       OR substr(candidate_set, 1, length(?4) + 1) = ?4 || '@')
+ORDER BY from_ns DESC, difference_id DESC LIMIT ?5
+
+-- ---- Shelves. The columns are kFieldsOf<Shelf>.
+-- name: shelves
+FROM shelf ORDER BY shelf_id
+-- name: shelves_in_force
+FROM shelf
+WHERE until_ns > ?1 AND from_ns <= ?1 AND (ended_ns IS NULL OR ended_ns > ?1)
+ORDER BY shelf_id
+-- name: insert_shelf
+INSERT INTO shelf (valve_id, fault, from_ns, until_ns, who, comment, origin)
+VALUES (?, ?, ?, ?, ?, nullif(?, ''), ?)
+-- name: end_shelf
+UPDATE shelf SET ended_ns = ?, ended_by = ?, ended_origin = ?
+WHERE shelf_id = ?
+
+-- ---- Common causes.
+-- name: cause
+SELECT group_name, opened_ns, ended_ns FROM common_cause WHERE cause_id = ?
+-- name: cause_members
+SELECT m.episode_id, m.valve_id, m.fault, m.isolated_ns, e.ended_ns
+FROM common_cause_member m JOIN episode e USING (episode_id)
+WHERE cause_id = ? ORDER BY m.isolated_ns, m.valve_id
+-- name: open_cause_of_group
+SELECT cause_id FROM common_cause WHERE group_name = ? AND ended_ns IS NULL
+ORDER BY opened_ns DESC
+-- name: open_causes_of_episode
+SELECT cause_id FROM common_cause_member JOIN common_cause USING (cause_id)
+WHERE episode_id = ? AND ended_ns IS NULL
+-- name: open_causes
+SELECT cause_id FROM common_cause WHERE ended_ns IS NULL
+-- name: causes
+SELECT cause_id FROM common_cause
+WHERE group_name GLOB ?1 AND opened_ns >= ?2 AND opened_ns < ?3
+  AND (?4 = 0 OR ended_ns IS NULL)
+ORDER BY opened_ns DESC, cause_id LIMIT ?5
+-- name: insert_cause
+INSERT OR IGNORE INTO common_cause (cause_id, group_name, opened_ns)
+VALUES (?, ?, ?)
+-- name: insert_cause_member
+INSERT OR IGNORE INTO common_cause_member
+  (cause_id, episode_id, valve_id, fault, isolated_ns)
+VALUES (?, ?, ?, ?, ?)
+-- name: end_cause
+UPDATE common_cause SET ended_ns = ? WHERE cause_id = ?
+-- Episodes that hold a fault since a time within ?2..?3 and belong to no cause
+-- of the group ?5. ?4 is how long before its isolation one may be detected.
+-- name: cause_candidates
+SELECT e.episode_id, e.valve_id, e.fault, f.first_ns, e.ended_ns
+FROM episode_fault f JOIN episode e USING (episode_id)
+WHERE f.fault = ?1 AND f.held = 1 AND f.detected_ns >= ?2 - ?4
+  AND f.first_ns >= ?2 AND f.first_ns <= ?3
+  AND NOT EXISTS (
+    SELECT 1 FROM common_cause_member m JOIN common_cause c USING (cause_id)
+    WHERE m.episode_id = e.episode_id AND c.group_name = ?5)
+
+-- ---- Retention. Row id, first stamp and stored bytes of what is not
+-- ---- protected: first stamp from ?1 on, ended before ?2, the oldest ?3.
+-- name: run_candidates
+SELECT run_id, start_ns, (SELECT coalesce(sum(length(bytes)), 0)
+  FROM chunk c WHERE c.run_id = r.run_id)
+FROM run r
+WHERE start_ns >= ?1 AND max(created_ns, coalesce(last_stamp_ns, 0)) < ?2
+  AND state <> 'recording' AND origin = 'recorded'
+  AND NOT EXISTS (SELECT 1 FROM run_label l WHERE l.run_id = r.run_id)
+ORDER BY start_ns LIMIT ?3
+-- name: protected_runs
+SELECT count(*) FROM run r WHERE NOT (
+  state <> 'recording' AND origin = 'recorded'
+  AND NOT EXISTS (SELECT 1 FROM run_label l WHERE l.run_id = r.run_id))
+-- name: episode_candidates
+SELECT rowid, detected_ns, (SELECT
+  coalesce(sum(length(samples) + length(vectors)), 0)
+  FROM episode_trace t WHERE t.episode_id = e.episode_id)
+FROM episode e
+WHERE detected_ns >= ?1 AND ended_ns < ?2 AND acked_by IS NOT NULL
+  AND label IS NULL AND NOT EXISTS (
+    SELECT 1 FROM event_outbox JOIN episode_event v USING (event_id)
+    WHERE v.episode_id = e.episode_id)
+ORDER BY detected_ns LIMIT ?3
+-- name: protected_episodes
+SELECT count(*) FROM episode e WHERE NOT (
+  ended_ns IS NOT NULL AND acked_by IS NOT NULL AND label IS NULL
+  AND NOT EXISTS (
+    SELECT 1 FROM event_outbox JOIN episode_event v USING (event_id)
+    WHERE v.episode_id = e.episode_id))
+-- name: old_health
+SELECT count(*), min(hour), max(hour), sum(length(bytes))
+FROM health_hour WHERE valve_id = ? AND hour < ?
+-- name: delete_old_health
+DELETE FROM health_hour WHERE valve_id = ? AND hour < ?
+-- name: old_shadow
+SELECT count(*), min(from_ns), max(from_ns) FROM shadow_difference
+WHERE to_ns < ?
+-- name: delete_old_shadow
+DELETE FROM shadow_difference WHERE difference_id IN (
+  SELECT difference_id FROM shadow_difference WHERE to_ns < ?
+  ORDER BY from_ns LIMIT ?)
+
+-- ---- Integrity: one finding per row, see Schema::checks.
+-- name: damaged_episode_ids
+SELECT 'episode ' || quote(episode_id) || ': its id is not 16 hex digits'
+FROM episode
+WHERE length(episode_id) <> 16 OR episode_id GLOB '*[^0-9a-f]*'
+-- name: damaged_event_ids
+SELECT 'episode_event ' || event_id || ': its episode id ' ||
+  quote(episode_id) || ' is not 16 hex digits' ||
+  iif(EXISTS (SELECT 1 FROM event_outbox o WHERE o.event_id = v.event_id),
+      ' (in event_outbox, not sent)', '')
+FROM episode_event v
+WHERE length(episode_id) <> 16 OR episode_id GLOB '*[^0-9a-f]*'

@@ -1,0 +1,223 @@
+#include "storage/history/retention.h"
+
+#include <algorithm>
+#include <limits>
+#include <thread>
+#include <unordered_set>
+#include <vector>
+
+#include "storage/history/health.h"
+#include "storage/history/history_database.h"
+#include "storage/history/sql.h"
+#include "storage/runs/runs.h"
+
+namespace fdi::storage {
+namespace sql = history_sql;
+namespace {
+
+constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
+
+/// One kind of item that can be deleted.
+struct Items {
+  const Schema& schema;
+  /// Row id, first stamp and stored bytes of what is not protected; first stamp
+  /// from ?1 on, ended before ?2, the oldest ?3.
+  std::string_view candidates;
+  std::string_view erase;
+  std::string_view count_protected;
+  int batch;  ///< So many go in one transaction.
+};
+
+struct Candidate {
+  std::int64_t row{0};
+  std::int64_t stamp_ns{0};
+  std::uintmax_t bytes{0};
+};
+
+class Pruner {
+ public:
+  Pruner(const std::filesystem::path& path, const Items& items,
+         const RetentionLimits& limits)
+      : items_(items),
+        limits_(limits),
+        database_(path, items.schema,
+                  limits.dry_run ? Access::kReader : Access::kOccasionalWriter),
+        candidates_(database_, items.candidates) {}
+
+  PruneResult Run() {
+    result_.bytes_before = database_.UsedBytes();
+    result_.bytes_after = result_.bytes_before;
+    limits_.dry_run ? Plan() : Delete();
+    result_.fits =
+        !limits_.max_bytes || result_.bytes_after <= *limits_.max_bytes;
+    return result_;
+  }
+
+ private:
+  bool TooLarge() const {
+    return limits_.max_bytes && result_.bytes_after > *limits_.max_bytes;
+  }
+
+  std::vector<Candidate> Candidates(std::int64_t from_ns,
+                                    std::int64_t before_ns,
+                                    std::int64_t limit) {
+    std::vector<Candidate> found;
+    candidates_.Bind(from_ns, before_ns, limit);
+    while (candidates_.Step()) {
+      Candidate& item = found.emplace_back();
+      candidates_.Read(0, item.row, item.stamp_ns, item.bytes);
+    }
+    candidates_.Reset();
+    return found;
+  }
+
+  void Note(const Candidate& item) {
+    ++result_.deleted;
+    result_.from_ns = std::min(result_.from_ns.value_or(kEver), item.stamp_ns);
+    result_.to_ns =
+        std::max(result_.to_ns.value_or(item.stamp_ns), item.stamp_ns);
+  }
+
+  void Plan() {
+    const Snapshot snapshot(database_);
+    result_.kept = database_.QueryInt64(items_.count_protected).value_or(0);
+    const auto all = Candidates(-kEver, kEver, -1);
+    const auto old = Candidates(-kEver, limits_.before_ns.value_or(-kEver), -1);
+    std::unordered_set<std::int64_t> dropped;
+    const auto drop = [this, &dropped](const Candidate& item) {
+      Note(item);
+      dropped.insert(item.row);
+      result_.bytes_after -= std::min(result_.bytes_after, item.bytes);
+    };
+    std::for_each(old.begin(), old.end(), drop);
+    for (const Candidate& item : all) {
+      if (TooLarge() && !dropped.contains(item.row)) {
+        drop(item);
+      }
+    }
+  }
+
+  void Delete() {
+    if (limits_.before_ns) {
+      DeleteWhile(*limits_.before_ns, [] { return true; });
+    }
+    DeleteWhile(kEver, [this] { return TooLarge(); });
+    result_.kept = database_.QueryInt64(items_.count_protected).value_or(0);
+  }
+
+  template <typename Condition>
+  void DeleteWhile(std::int64_t before_ns, Condition more) {
+    std::int64_t from_ns = -kEver;
+    while (more()) {
+      Transaction transaction(database_);
+      const auto batch = Candidates(from_ns, before_ns, items_.batch);
+      if (batch.empty()) {
+        return;
+      }
+      for (const Candidate& item : batch) {
+        database_.Run(items_.erase, item.row);
+        Note(item);
+      }
+      transaction.Commit();
+      from_ns = batch.back().stamp_ns;
+      result_.bytes_after = database_.UsedBytes();
+      std::this_thread::sleep_for(limits_.pause);
+    }
+  }
+
+  Items items_;
+  RetentionLimits limits_;
+  Database database_;
+  Statement candidates_;
+  PruneResult result_;
+};
+
+constexpr std::int64_t kHourNs = 3'600'000'000'000;
+
+// Counts what is older than `hour` into `result`. @returns its bytes.
+std::uintmax_t CountHealth(Database& database, const std::string& valve,
+                           std::int64_t hour, PruneResult& result) {
+  Statement row = database.Prepare(sql::old_health);
+  if (!row.Bind(valve, hour).Step() || row.Int64(0) == 0) {
+    return 0;
+  }
+  result.deleted += row.Int64(0);
+  const std::int64_t from_ns = row.Int64(1) * kHourNs;
+  const std::int64_t to_ns = row.Int64(2) * kHourNs;
+  result.from_ns = std::min(result.from_ns.value_or(from_ns), from_ns);
+  result.to_ns = std::max(result.to_ns.value_or(to_ns), to_ns);
+  return row.Uint64(3);
+}
+
+}  // namespace
+
+PruneResult PruneRuns(const std::filesystem::path& path,
+                      const RetentionLimits& limits) {
+  return Pruner(path,
+                {RunsSchema(), sql::run_candidates,
+                 "DELETE FROM run WHERE run_id = ?", sql::protected_runs, 1},
+                limits)
+      .Run();
+}
+
+PruneResult PruneHistory(const std::filesystem::path& path,
+                         const RetentionLimits& limits) {
+  return Pruner(path,
+                {HistorySchema(), sql::episode_candidates,
+                 "DELETE FROM episode WHERE rowid = ?", sql::protected_episodes,
+                 20},
+                limits)
+      .Run();
+}
+
+PruneResult PruneHealth(const std::filesystem::path& path,
+                        const RetentionLimits& limits) {
+  Database database(
+      path, HistorySchema(),
+      limits.dry_run ? Access::kReader : Access::kOccasionalWriter);
+  PruneResult result;
+  result.bytes_before = database.UsedBytes();
+  std::uintmax_t gone = 0;
+  const std::int64_t hour = limits.before_ns ? *limits.before_ns / kHourNs : 0;
+  for (const std::string& valve : HealthValves(database, "*")) {
+    const std::uintmax_t bytes = CountHealth(database, valve, hour, result);
+    gone += bytes;
+    if (bytes != 0 && !limits.dry_run) {
+      Transaction transaction(database);
+      database.Run(sql::delete_old_health, valve, hour);
+      transaction.Commit();
+      std::this_thread::sleep_for(limits.pause);
+    }
+  }
+  result.bytes_after =
+      limits.dry_run ? result.bytes_before - std::min(gone, result.bytes_before)
+                     : database.UsedBytes();
+  return result;
+}
+
+PruneResult PruneShadow(const std::filesystem::path& path,
+                        const RetentionLimits& limits) {
+  constexpr std::int64_t kRowsAtOnce = 1000;
+  Database database(
+      path, HistorySchema(),
+      limits.dry_run ? Access::kReader : Access::kOccasionalWriter);
+  PruneResult result;
+  result.bytes_before = database.UsedBytes();
+  result.bytes_after = result.bytes_before;
+  const std::int64_t before_ns = limits.before_ns.value_or(0);
+  Statement old = database.Prepare(sql::old_shadow);
+  old.Bind(before_ns).Step();
+  old.Read(0, result.deleted, result.from_ns, result.to_ns);
+  old.Reset();
+  for (std::int64_t gone = 0; !limits.dry_run && gone < result.deleted;
+       gone += kRowsAtOnce) {
+    Transaction transaction(database);
+    database.Run(sql::delete_old_shadow, before_ns, kRowsAtOnce);
+    transaction.Commit();
+    std::this_thread::sleep_for(limits.pause);
+    result.bytes_after = database.UsedBytes();
+  }
+  return result;
+}
+
+}  // namespace fdi::storage

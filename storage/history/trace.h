@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/records/trace_point.h"
+#include "storage/database/database.h"
+#include "storage/runs/sample_codec.h"
+
+namespace fdi::storage {
+
+/// Consecutive instants of an episode, as stored.
+struct TraceChunk {
+  Chunk samples;
+  std::uint32_t vector_crc{0};
+  std::vector<std::byte> vectors;
+};
+
+inline constexpr int kTraceChunkInstants = 300;
+
+/// Packs instants without loss; see trace.cpp for the format.
+/// @throws std::invalid_argument if there are none or their sizes differ.
+TraceChunk EncodeTrace(std::span<const TracePoint> instants);
+
+/// @param where the chunk stands, for the message.
+/// @throws DataError if the bytes are not what EncodeTrace() writes.
+std::vector<TracePoint> DecodeTrace(const TraceChunk& chunk,
+                                    std::string_view where);
+
+/// The traces of the episodes that are being recorded: buffers instants and
+/// stores them in chunks. The last chunk of an episode is replaced by a longer
+/// one until it is full, so that a crash loses what was not committed only.
+class TraceWriter {
+ public:
+  explicit TraceWriter(Database& database) : database_(database) {}
+
+  /// As the functions of HistoryWriter of that name.
+  bool Append(std::uint64_t episode_id, std::span<const TracePoint> instants);
+  void End(std::uint64_t episode_id);
+  void EndAll();
+  /// From now on the peak factor is that of this set.
+  void SetIsolated(std::uint64_t episode_id, FaultSet isolated);
+
+  bool HasPending() const;
+  /// Within a transaction: writes what is not yet in the file.
+  void Store();
+  /// Once that is committed: forgets what is in full chunks.
+  void Settle();
+
+ private:
+  // The instants of an episode that are not yet in full chunks.
+  struct Buffer {
+    std::vector<TracePoint> instants;
+    std::int64_t chunk{0};  // Number of the chunk that instants[0] begins.
+    std::size_t channels{0};
+    std::size_t faults{0};
+    FaultSet isolated{0};
+    std::int64_t detected_ns{0};
+    bool dirty{false};
+    bool ended{false};
+  };
+  static double Peak(const Buffer& buffer);
+  Buffer& BufferOf(std::uint64_t episode_id);
+  void StoreBuffer(std::uint64_t episode_id, const Buffer& buffer);
+
+  Database& database_;
+  std::map<std::uint64_t, Buffer> buffers_;
+};
+
+}  // namespace fdi::storage

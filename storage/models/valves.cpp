@@ -1,0 +1,369 @@
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "diagnosis/error.h"
+#include "storage/database/record.h"
+#include "storage/models/models.h"
+#include "storage/models/sql.h"
+
+// The valves of ModelStore: entries, epochs, baselines and valve types.
+namespace fdi::storage {
+
+template <>
+struct EnumText<ValveEventKind> {
+  static constexpr auto name = ValveEventKindName;
+  static constexpr auto last = ValveEventKind::kRecalibrated;
+};
+
+namespace sql = models_sql;
+namespace {
+
+std::string Select(std::string_view rest) {
+  return std::string(sql::valves) + " " + std::string(rest) +
+         " ORDER BY valve_entry_id";
+}
+
+std::string_view SenseName(Sense sense) {
+  return sense == Sense::kOpening ? "opening" : "closing";
+}
+
+ValveEntry ReadEntry(const Statement& row) {
+  ValveEntry entry;
+  std::string sense;
+  std::optional<std::string> set;
+  std::optional<int> version;
+  row.Read(0, entry.pattern, entry.type, entry.flow_unit, sense, entry.signals,
+           entry.period_s, entry.epoch, entry.baseline_epoch, set, version);
+  entry.sense = sense == "opening" ? Sense::kOpening : Sense::kClosing;
+  if (set) {
+    entry.model_set = ModelReference{*set, version};
+  }
+  return entry;
+}
+
+std::optional<std::string> NameOf(const std::optional<ModelReference>& set) {
+  return set ? std::optional(set->name) : std::nullopt;
+}
+
+std::optional<int> VersionOf(const std::optional<ModelReference>& set) {
+  return set ? set->version : std::nullopt;
+}
+
+constexpr std::array<std::string_view, 3> kStateNames = {"none", "provisional",
+                                                         "valid"};
+constexpr std::array<std::string_view, 3> kKindNames = {"replaced", "repacked",
+                                                        "recalibrated"};
+
+std::string JsonText(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (static_cast<unsigned char>(c) >= 0x20) {
+      quoted += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
+    }
+  }
+  return quoted + '"';
+}
+
+// JSON has no infinities; `null` reads back as NaN.
+std::string JsonNumber(double value) {
+  if (!std::isfinite(value)) {
+    return "null";
+  }
+  std::array<char, 32> digits{};
+  const auto end =
+      std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+  return {digits.data(), end};
+}
+
+std::string JsonOf(
+    const std::vector<std::pair<std::string, double>>& parameters) {
+  std::string text = "{";
+  for (const auto& [name, value] : parameters) {
+    text += (text.size() > 1 ? ", " : "") + JsonText(name) + ": " +
+            JsonNumber(value);
+  }
+  return text + '}';
+}
+
+std::string JsonOf(const std::vector<ChannelFigures>& channels) {
+  std::string text = "[";
+  for (const ChannelFigures& c : channels) {
+    text += (text.size() > 1 ? ", {\"name\": " : "{\"name\": ") +
+            JsonText(c.name) + ", \"rmse\": " + JsonNumber(c.rmse) +
+            ", \"bias\": " + JsonNumber(c.bias) +
+            ", \"vaf\": " + JsonNumber(c.vaf) + '}';
+  }
+  return text + ']';
+}
+
+double NumberOf(const Statement& row, int column) {
+  return row.OptionalDouble(column).value_or(std::nan(""));
+}
+
+void ReadParts(Database& database, const std::string& parameters,
+               const std::string& channels, BaselineRecord& record) {
+  Statement pairs = database.Prepare(sql::json_numbers);
+  pairs.Bind(parameters);
+  while (pairs.Step()) {
+    record.parameters.emplace_back(pairs.Text(0), NumberOf(pairs, 1));
+  }
+  Statement figures = database.Prepare(sql::json_channels);
+  figures.Bind(channels);
+  while (figures.Step()) {
+    record.channels.push_back({figures.Text(0), NumberOf(figures, 1),
+                               NumberOf(figures, 2), NumberOf(figures, 3)});
+  }
+}
+
+}  // namespace
+
+std::vector<ValveEntry> ModelStore::Valves() {
+  std::vector<ValveEntry> entries;
+  Statement rows = database_.Prepare(Select(""));
+  while (rows.Step()) {
+    entries.push_back(ReadEntry(rows));
+  }
+  return entries;
+}
+
+void ModelStore::PutValve(const ValveEntry& entry) {
+  if (entry.pattern.empty() || !(entry.period_s > 0.0)) {
+    throw ConfigError("valve \"" + entry.pattern +
+                      "\": an id or glob and a positive sample period are "
+                      "needed");
+  }
+  Transaction transaction(database_);
+  StoreEntry(entry);
+  transaction.Commit();
+}
+
+void ModelStore::StoreEntry(const ValveEntry& entry) {
+  if (entry.model_set) {
+    RequireId(*entry.model_set);
+  }
+  database_.Run(sql::put_valve, entry.pattern, entry.type, entry.flow_unit,
+                SenseName(entry.sense), entry.signals, entry.period_s,
+                entry.epoch, entry.baseline_epoch, NameOf(entry.model_set),
+                VersionOf(entry.model_set));
+  BumpGeneration();
+}
+
+void ModelStore::RemoveValve(std::string_view pattern) {
+  Transaction transaction(database_);
+  database_.Run("DELETE FROM valve WHERE pattern = ?", pattern);
+  if (database_.Changes() == 0) {
+    throw NotFoundError("there is no valve entry \"" + std::string(pattern) +
+                        "\" in " + database_.path().string());
+  }
+  BumpGeneration();
+  transaction.Commit();
+}
+
+ValveEntry ModelStore::RequireEntry(std::string_view pattern) {
+  Statement row = database_.Prepare(Select("WHERE pattern = ?"));
+  if (!row.Bind(pattern).Step()) {
+    throw NotFoundError("there is no valve entry \"" + std::string(pattern) +
+                        "\" in " + database_.path().string());
+  }
+  return ReadEntry(row);
+}
+
+ValveEntry ModelStore::EntryOrNew(
+    std::string_view pattern, const std::optional<ModelReference>& reference) {
+  Statement row = database_.Prepare(Select("WHERE pattern = ?"));
+  if (row.Bind(pattern).Step()) {
+    return ReadEntry(row);
+  }
+  ValveEntry entry;
+  entry.pattern = std::string(pattern);
+  if (reference) {
+    const ModelSummary summary = Summary(*reference);
+    entry.flow_unit = summary.flow_unit;
+    entry.period_s = summary.period_s;
+  }
+  return entry;
+}
+
+void ModelStore::AssignModelSet(
+    std::string_view pattern, const std::optional<ModelReference>& reference) {
+  ValveEntry entry = EntryOrNew(pattern, reference);
+  if (entry.model_set != reference) {
+    entry.baseline_epoch.reset();
+  }
+  entry.model_set = reference;
+  PutValve(entry);
+}
+
+std::optional<ValveEntry> ModelStore::FindValve(std::string_view valve_id) {
+  Statement row =
+      database_.Prepare(Select("WHERE pattern = ?1 OR ?1 GLOB pattern"));
+  return row.Bind(valve_id).Step() ? std::optional(ReadEntry(row))
+                                   : std::nullopt;
+}
+
+std::optional<ModelReference> ModelStore::AssignedModelSet(
+    std::string_view valve_id) {
+  const Snapshot snapshot(database_);
+  Statement row =
+      database_.Prepare(Select("WHERE (pattern = ?1 OR ?1 GLOB pattern)"
+                               " AND model_set IS NOT NULL"));
+  ModelReference reference{std::string(valve_id), std::nullopt};
+  if (row.Bind(valve_id).Step()) {
+    reference = *ReadEntry(row).model_set;
+  }
+  if (!reference.version) {
+    const auto active =
+        database_.QueryInt64(sql::active_version, reference.name);
+    if (!active) {
+      return std::nullopt;
+    }
+    reference.version = static_cast<int>(*active);
+  }
+  return reference;
+}
+
+std::int64_t ModelStore::Generation() {
+  return database_.QueryInt64("SELECT value FROM generation").value_or(0);
+}
+
+ChangeCounter::ChangeCounter(const std::filesystem::path& path)
+    : store_(path),
+      data_version_(store_.database().DataVersion()),
+      generation_(store_.Generation()) {}
+
+bool ChangeCounter::Changed() {
+  const std::int64_t data_version = store_.database().DataVersion();
+  if (data_version == data_version_) {
+    return false;
+  }
+  data_version_ = data_version;
+  const std::int64_t generation = store_.Generation();
+  const bool changed = generation != generation_;
+  generation_ = generation;
+  return changed;
+}
+
+std::string_view BaselineStateName(BaselineState state) {
+  return kStateNames[static_cast<std::size_t>(state)];
+}
+
+std::string_view ValveEventKindName(ValveEventKind kind) {
+  return kKindNames[static_cast<std::size_t>(kind)];
+}
+
+ValveEventKind ParseValveEventKind(std::string_view name) {
+  for (std::size_t i = 0; i < kKindNames.size(); ++i) {
+    if (name == kKindNames[i]) {
+      return static_cast<ValveEventKind>(i);
+    }
+  }
+  throw ConfigError("unknown kind of event '" + std::string(name) +
+                    "': expected replaced, repacked or recalibrated");
+}
+
+void ModelStore::SetBaseline(std::string_view pattern,
+                             const BaselineRecord& record) {
+  const ModelReference reference{record.model_set, record.version};
+  ValveEntry entry = EntryOrNew(pattern, reference);
+  if (record.epoch != entry.epoch) {
+    throw ConfigError("baseline of " + entry.pattern + " is of epoch " +
+                      std::to_string(record.epoch) +
+                      ": expected the valve's, which is " +
+                      std::to_string(entry.epoch));
+  }
+  entry.model_set = reference;
+  entry.baseline_epoch = record.epoch;
+  Transaction transaction(database_);
+  StoreEntry(entry);
+  database_.Run(sql::insert_baseline, entry.pattern, record.epoch,
+                record.model_set, record.version, UtcNow(), record.hours,
+                JsonOf(record.parameters), JsonOf(record.channels));
+  transaction.Commit();
+}
+
+std::vector<BaselineRecord> ModelStore::Baselines(std::string_view pattern) {
+  std::vector<BaselineRecord> records;
+  Statement rows = database_.Prepare(sql::baselines);
+  rows.Bind(pattern);
+  while (rows.Step()) {
+    BaselineRecord& record = records.emplace_back();
+    std::string parameters;
+    std::string channels;
+    rows.Read(0, record.epoch, record.model_set, record.version,
+              record.created_ns, record.hours, parameters, channels);
+    ReadParts(database_, parameters, channels, record);
+  }
+  return records;
+}
+
+ValveEntry ModelStore::AddValveEvent(std::string_view pattern,
+                                     const ValveEvent& event) {
+  ValveEntry entry = RequireEntry(pattern);
+  // Models that were made some other way are those of the valve until now.
+  entry.baseline_epoch = entry.baseline_epoch.value_or(entry.epoch);
+  ++entry.epoch;
+  Transaction transaction(database_);
+  StoreEntry(entry);
+  database_.Run(sql::insert_valve_event, entry.pattern, entry.epoch, event.kind,
+                event.note, event.at_ns, event.who);
+  transaction.Commit();
+  return entry;
+}
+
+std::vector<ValveEvent> ModelStore::ValveEvents(std::string_view pattern) {
+  std::vector<ValveEvent> events;
+  Statement rows = database_.Prepare(sql::valve_events);
+  rows.Bind(pattern);
+  while (rows.Step()) {
+    ValveEvent& event = events.emplace_back();
+    rows.Read(0, event.epoch, event.kind, event.note, event.at_ns, event.who);
+  }
+  return events;
+}
+
+void ModelStore::SaveTemplate(const std::string& name,
+                              std::span<const std::byte> bytes,
+                              const std::string& summary) {
+  if (ParseModelReference(name).version) {
+    throw ConfigError("valve type '" + name + "': expected a name without @");
+  }
+  Transaction transaction(database_);
+  database_.Run(sql::put_valve_type, name, UtcNow(), bytes, summary);
+  transaction.Commit();
+}
+
+ValveType ModelStore::LoadTemplate(std::string_view name) {
+  Statement row = database_.Prepare(sql::valve_type);
+  if (!row.Bind(name).Step()) {
+    std::string there;
+    for (const ValveType& type : ListTemplates()) {
+      there += (there.empty() ? "" : ", ") + type.name;
+    }
+    throw NotFoundError("no valve type '" + std::string(name) + "' in " +
+                        database_.path().string() +
+                        (there.empty() ? "" : "; there are " + there));
+  }
+  ValveType type;
+  row.Read(0, type.name, type.created_ns, type.summary, type.size, type.bytes);
+  return type;
+}
+
+std::vector<ValveType> ModelStore::ListTemplates() {
+  std::vector<ValveType> types;
+  Statement rows = database_.Prepare(sql::valve_types);
+  while (rows.Step()) {
+    ValveType& type = types.emplace_back();
+    rows.Read(0, type.name, type.created_ns, type.summary, type.size);
+  }
+  return types;
+}
+
+void ModelStore::DeleteTemplate(std::string_view name) {
+  LoadTemplate(name);  // It must be there.
+  Transaction transaction(database_);
+  database_.Run("DELETE FROM valve_type WHERE name = ?", name);
+  transaction.Commit();
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "diagnosis/sample_series.h"
+#include "storage/database/database.h"
+#include "storage/runs/run_rows.h"
+#include "storage/runs/runs.h"
+
+namespace fdi::storage {
+
+/// Settings of RunRecorder.
+struct RunRecorderOptions {
+  int chunk_samples{600};  ///< Samples of a full chunk.
+};
+
+/// Records many runs at once through one connection. Append() only buffers;
+/// Commit(), which the caller's clock calls each second, stores what is pending
+/// of all runs in one transaction: in the tail table, and as a chunk once there
+/// is enough for one. What was committed outlives kill -9: runs whose recorder
+/// died become `interrupted` when the next one opens the file.
+/// Dropping the recorder drops what was not committed, as a crash would; see
+/// Close(). One thread at a time. Several recorders may share a file.
+class RunRecorder {
+ public:
+  /// Names a run within this recorder.
+  using Key = std::size_t;
+
+  /// @throws DataError, SqliteError as Database.
+  explicit RunRecorder(const std::filesystem::path& path,
+                       const RunRecorderOptions& options = {});
+
+  /// Begins a run; it is in the file from the next Commit() on.
+  Key Begin(const NewRun& run);
+  /// Its id, known from the start until its end is committed: nothing of a
+  /// run is held after that.
+  /// @throws std::invalid_argument for a run that has ended.
+  const std::string& Id(Key run) const;
+
+  void Append(Key run, const StoredSample& sample);
+  void Append(Key run, const LabelledSample& sample);
+
+  /// Ends a run: the next Commit() compacts it and marks it complete.
+  void End(Key run);
+
+  /// Stores all that is pending. After an error everything is still pending:
+  /// call again, or drop it. @throws SqliteError
+  void Commit();
+  /// Drops what is pending, e.g. while the disk is full.
+  /// @returns the number of samples; they are missing from the runs.
+  std::int64_t DropPending();
+
+  /// Ends all runs, commits and checkpoints. @throws SqliteError
+  void Close();
+
+  /// Samples appended, not committed.
+  std::int64_t pending() const { return pending_; }
+  /// Samples committed.
+  std::int64_t recorded() const { return recorded_; }
+  /// Runs that have not ended, or whose end is not committed.
+  std::size_t active_runs() const { return runs_.size(); }
+  Database& database() { return database_; }
+
+ private:
+  /// What the file holds of a run.
+  struct Committed {
+    std::int64_t run_id{0};  ///< 0: no row yet.
+    std::int64_t samples{0};
+    std::size_t tail{0};       ///< Of them in the tail table.
+    std::size_t threshold{0};  ///< Length of the tail that makes a chunk.
+    bool ended{false};
+  };
+  struct ActiveRun {
+    std::string id;
+    NewRun run;
+    Committed committed;
+    std::vector<StoredSample> pending;
+    ChunkHints hints;
+    bool end_asked{false};
+    bool dirty{false};
+  };
+
+  ActiveRun& Active(Key key);
+  void Touch(Key key, ActiveRun& active);
+  Committed Store(ActiveRun& active);
+  void Compact(ActiveRun& active, Committed& after);
+
+  std::size_t chunk_samples_;
+  Database database_;
+  RecorderLiveness liveness_;
+  std::int64_t recorder_id_{0};
+  Key next_key_{0};
+  std::unordered_map<Key, ActiveRun> runs_;
+  std::vector<Key> dirty_;  // Runs with something to commit.
+  std::int64_t pending_{0};
+  std::int64_t recorded_{0};
+};
+
+}  // namespace fdi::storage

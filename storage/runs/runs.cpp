@@ -1,0 +1,341 @@
+#include "storage/runs/runs.h"
+
+#include <charconv>
+#include <cmath>
+#include <utility>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "storage/database/record.h"
+#include "storage/runs/run_rows.h"
+#include "storage/runs/sql.h"
+
+namespace fdi::storage {
+
+template <>
+struct EnumText<RunOrigin> {
+  static constexpr auto name = RunOriginName;
+  static constexpr auto last = RunOrigin::kRecorded;
+};
+template <>
+struct EnumText<RunState> {
+  static constexpr auto name = RunStateName;
+  static constexpr auto last = RunState::kInterrupted;
+};
+
+namespace sql = runs_sql;
+namespace {
+
+[[noreturn]] void RefuseSelector(std::string_view text,
+                                 const std::string& why) {
+  throw ConfigError("run \"" + std::string(text) + "\": " + why +
+                    "; accepted are ID, ID@from:to, ID@from: and ID@:to with"
+                    " seconds from the start of the run");
+}
+
+double ParseBound(std::string_view bound, double absent,
+                  std::string_view text) {
+  if (bound.empty()) {
+    return absent;
+  }
+  double value = 0.0;
+  const auto [end, error] =
+      std::from_chars(bound.data(), bound.data() + bound.size(), value);
+  if (error != std::errc() || end != bound.data() + bound.size() ||
+      !std::isfinite(value)) {
+    RefuseSelector(text, '"' + std::string(bound) + "\" is not a number");
+  }
+  return value;
+}
+
+// Seconds from the start of a run as ns UTC; what is beyond the numbers is
+// their end.
+std::int64_t StampAt(const RunInfo& info, double t_s) {
+  constexpr auto kEarliest = std::numeric_limits<std::int64_t>::min();
+  constexpr auto kLatest = std::numeric_limits<std::int64_t>::max();
+  const double offset = std::round(t_s * 1e9);
+  if (!(std::abs(offset) < 4e18)) {
+    return t_s < 0.0 ? kEarliest : kLatest;
+  }
+  const auto ns = static_cast<std::int64_t>(offset);
+  const std::int64_t start = info.run.start_ns;
+  if (ns > 0 && start > kLatest - ns) {
+    return kLatest;
+  }
+  return ns < 0 && start < kEarliest - ns ? kEarliest : start + ns;
+}
+
+void ApplyLabels(StoredRun& run) {
+  for (const RunLabel& label : run.info.labels) {
+    const std::int64_t from = StampAt(run.info, label.from_s);
+    const std::int64_t to = StampAt(run.info, label.to_s);
+    for (StoredSample& sample : run.samples) {
+      if (sample.sample.stamp_ns >= from && sample.sample.stamp_ns < to) {
+        sample.truth = FaultTruth{label.fault, label.strength};
+      }
+    }
+  }
+}
+
+constexpr std::size_t kImportChunk = 600;
+
+std::optional<double> BoundOf(double t_s) {
+  return std::isfinite(t_s) ? std::optional(t_s) : std::nullopt;
+}
+
+void CheckLabel(int fault, double strength) {
+  if (fault < 0 || fault > kLastFault) {
+    throw ConfigError("label: fault " + std::to_string(fault) +
+                      " is not in 0..22");
+  }
+  const bool fits = fault == 0 ? strength == 0.0
+                               : strength != 0.0 && std::abs(strength) <= 1.0;
+  if (!fits) {
+    throw ConfigError("label: strength " + std::to_string(strength) + " of " +
+                      FaultName(fault) + " is not " +
+                      (fault == 0 ? "0" : "in [-1, 1] without 0"));
+  }
+}
+
+std::string ImportPart(Database& database, const SampleSeries& part,
+                       const NewRun& run) {
+  std::vector<StoredSample> samples;
+  samples.reserve(part.samples.size());
+  RunCounters counters;
+  for (const LabelledSample& labelled : part.samples) {
+    StoredSample stored;
+    stored.sample = labelled.sample;
+    stored.sample.source_id = run.source_id;
+    stored.truth = labelled.truth;
+    counters.Count(stored);
+    samples.push_back(stored);
+  }
+  const std::string id = NewRunId();
+  const std::int64_t run_id = InsertRun(database, id, run, std::nullopt);
+  InsertChunks(database, run_id, 0, samples, kImportChunk);
+  AddCounters(database, run_id, counters);
+  return id;
+}
+
+}  // namespace
+
+const Schema& RunsSchema() {
+  static const Schema schema{
+      "run",
+      0x46444972,  // "FDIr"
+      Synchronous::kNormal,
+      {sql::kMigrations.begin(), sql::kMigrations.end()}};
+  return schema;
+}
+
+std::string_view RunOriginName(RunOrigin origin) {
+  switch (origin) {
+    case RunOrigin::kSimulated:
+      return "simulated";
+    case RunOrigin::kImported:
+      return "imported";
+    case RunOrigin::kRecorded:
+      break;
+  }
+  return "recorded";
+}
+
+std::string_view RunStateName(RunState state) {
+  switch (state) {
+    case RunState::kRecording:
+      return "recording";
+    case RunState::kComplete:
+      return "complete";
+    case RunState::kInterrupted:
+      break;
+  }
+  return "interrupted";
+}
+
+RunSelector ParseRunSelector(std::string_view text) {
+  RunSelector selector;
+  const std::size_t at = text.find('@');
+  selector.id = std::string(text.substr(0, at));
+  if (selector.id.empty() || selector.id.size() > 12 ||
+      selector.id.find_first_not_of("0123456789abcdefABCDEF") !=
+          std::string::npos) {
+    RefuseSelector(text, "an id is up to 12 hex digits");
+  }
+  for (char& c : selector.id) {
+    c = static_cast<char>(c >= 'A' && c <= 'F' ? c - 'A' + 'a' : c);
+  }
+  if (at == std::string_view::npos) {
+    return selector;
+  }
+  const std::string_view stretch = text.substr(at + 1);
+  const std::size_t colon = stretch.find(':');
+  if (colon == std::string_view::npos) {
+    RefuseSelector(text, "the stretch has no colon");
+  }
+  selector.from_s = ParseBound(stretch.substr(0, colon), selector.from_s, text);
+  selector.to_s = ParseBound(stretch.substr(colon + 1), selector.to_s, text);
+  if (!(selector.from_s < selector.to_s)) {
+    RefuseSelector(text, "the stretch ends before it begins");
+  }
+  return selector;
+}
+
+RunStore::RunStore(const std::filesystem::path& path, Access access)
+    : database_(std::make_unique<Database>(path, RunsSchema(), access)) {}
+
+std::vector<RunInfo> RunStore::List(const RunFilter& filter) {
+  const Snapshot snapshot(*database_);
+  Statement rows = database_->Prepare(
+      std::string(sql::runs) +
+      " valve_id GLOB ? AND start_ns >= ? AND start_ns <= ?"
+      " AND (?4 IS NULL OR origin = ?4) ORDER BY start_ns, run_id");
+  rows.Bind(filter.valve_glob, filter.since_ns, filter.until_ns, filter.origin);
+  std::vector<RunInfo> infos;
+  while (rows.Step()) {
+    infos.push_back(ReadRun(rows));
+  }
+  return infos;
+}
+
+RunInfo RunStore::Info(std::string_view selector) {
+  return Find(ParseRunSelector(selector));
+}
+
+RunInfo RunStore::Find(const RunSelector& selector) {
+  Statement rows =
+      database_->Prepare(std::string(sql::runs) +
+                         " id >= ?1 AND id < ?1 || 'g' ORDER BY id LIMIT 2");
+  if (!rows.Bind(selector.id).Step()) {
+    throw NotFoundError("there is no run " + selector.id + " in " +
+                        database_->path().string());
+  }
+  RunInfo found = ReadRun(rows);
+  if (rows.Step()) {
+    throw NotFoundError("run " + selector.id + " is ambiguous: " + found.id +
+                        ", " + rows.Text(1) + ", ...");
+  }
+  return found;
+}
+
+StoredRun RunStore::Load(std::string_view text) {
+  StoredRun run;
+  run.selector = ParseRunSelector(text);
+  const Snapshot snapshot(*database_);
+  run.info = Find(run.selector);
+  const std::int64_t from = StampAt(run.info, run.selector.from_s);
+  const std::int64_t to = StampAt(run.info, run.selector.to_s);
+  for (const std::string_view table : {"chunk", "tail"}) {
+    LoadTable(table, from, to, run);
+  }
+  if (run.samples.empty()) {
+    throw NotFoundError("run " + std::string(text) + " holds no sample (of " +
+                        std::to_string(run.info.samples) + ")");
+  }
+  ApplyLabels(run);
+  return run;
+}
+
+RunInfo RunStore::ReadRun(const Statement& row) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  constexpr int kFirstIntake = 20;
+  RunInfo info;
+  NewRun& run = info.run;
+  std::int64_t recorder = 0;
+  row.Read(0, info.row_id, info.id, run.valve_id, run.source_id, run.start_ns,
+           run.period_s, run.flow_unit, run.origin, run.scenario, run.seed,
+           run.software, info.state, recorder, info.created_ns, info.samples,
+           info.has_truth, info.first_stamp_ns, info.last_stamp_ns,
+           info.signals, info.stored_bytes);
+  for (int i = 0; i < kIntakeCount; ++i) {
+    info.intake[static_cast<std::size_t>(i)] = row.Int64(kFirstIntake + i);
+  }
+  if (info.state == RunState::kRecording &&
+      !RecorderLiveness::IsAlive(database_->path(), recorder)) {
+    info.state = RunState::kInterrupted;  // Not yet noted in the file.
+  }
+  Statement labels = database_->Prepare(sql::labels);
+  labels.Bind(info.row_id);
+  while (labels.Step()) {
+    info.labels.push_back({labels.OptionalDouble(0).value_or(-kInfinity),
+                           labels.OptionalDouble(1).value_or(kInfinity),
+                           labels.Int(2), labels.Double(3)});
+  }
+  return info;
+}
+
+void RunStore::LoadTable(std::string_view table, std::int64_t from,
+                         std::int64_t to, StoredRun& run) {
+  const std::string name(table);
+  Statement rows = database_->Prepare(std::string(sql::bundles) + " " + name +
+                                      " " + std::string(sql::bundles_between));
+  rows.Bind(run.info.row_id, from, to);
+  const std::string where = database_->path().string() + ": run " +
+                            run.info.id + ", " + name + " of sample ";
+  while (rows.Step()) {
+    for (StoredSample& sample : ReadBundle(rows, where)) {
+      const std::int64_t stamp = sample.sample.stamp_ns;
+      if (stamp >= from && (stamp < to || !run.selector.IsStretch())) {
+        run.samples.push_back(std::move(sample));
+      }
+    }
+  }
+}
+
+std::vector<std::string> RunStore::Import(std::span<const SampleSeries> series,
+                                          const NewRun& base) {
+  std::vector<std::string> ids;
+  Transaction transaction(*database_);
+  for (const SampleSeries& part : series) {
+    NewRun run = base;
+    run.origin = RunOrigin::kImported;
+    run.period_s = part.period_s;
+    run.flow_unit = part.flow_unit;
+    if (series.size() > 1) {
+      run.start_ns = part.samples.front().sample.stamp_ns;
+    }
+    ids.push_back(ImportPart(*database_, part, run));
+  }
+  transaction.Commit();
+  return ids;
+}
+
+void RunStore::Label(std::string_view text, int fault, double strength) {
+  CheckLabel(fault, strength);
+  const RunSelector selector = ParseRunSelector(text);
+  Transaction transaction(*database_);
+  const RunInfo info = Find(selector);
+  if (info.samples == 0 ||
+      StampAt(info, selector.from_s) > info.last_stamp_ns ||
+      StampAt(info, selector.to_s) <= info.first_stamp_ns) {
+    throw NotFoundError("run " + std::string(text) + " holds no sample");
+  }
+  database_->Run(sql::insert_label, info.row_id, BoundOf(selector.from_s),
+                 BoundOf(selector.to_s), fault, strength, UtcNow());
+  transaction.Commit();
+}
+
+int RunStore::RemoveLabels(std::string_view text) {
+  Transaction transaction(*database_);
+  database_->Run("DELETE FROM run_label WHERE run_id = ?", Info(text).row_id);
+  const int removed = database_->Changes();
+  transaction.Commit();
+  return removed;
+}
+
+void RunStore::Delete(std::string_view text) {
+  const RunSelector selector = ParseRunSelector(text);
+  if (selector.IsStretch()) {
+    throw ConfigError("run " + std::string(text) +
+                      ": a stretch cannot be deleted, only the whole run");
+  }
+  Transaction transaction(*database_);
+  const RunInfo info = Find(selector);
+  if (info.state == RunState::kRecording) {
+    throw DataError("run " + info.id +
+                    " is being recorded: end its recorder first");
+  }
+  database_->Run("DELETE FROM run WHERE run_id = ?", info.row_id);
+  transaction.Commit();
+}
+
+}  // namespace fdi::storage

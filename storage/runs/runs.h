@@ -1,0 +1,153 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/sample.h"
+#include "diagnosis/sample_series.h"
+#include "diagnosis/verdict.h"
+#include "storage/database/database.h"
+#include "storage/runs/sample_codec.h"
+
+namespace fdi::storage {
+
+/// Where a run came from; numbers are part of the file format.
+enum class RunOrigin : std::uint8_t { kSimulated, kImported, kRecorded };
+
+enum class RunState : std::uint8_t {
+  kRecording,    ///< A recorder is at it.
+  kComplete,     ///< Ended by its recorder, or imported.
+  kInterrupted,  ///< Its recorder died; all committed samples are there.
+};
+
+std::string_view RunOriginName(RunOrigin origin);  ///< "simulated", ...
+std::string_view RunStateName(RunState state);     ///< "recording", ...
+
+/// What is known when a run begins: one valve, one source, one sample period.
+struct NewRun {
+  std::string valve_id;
+  std::uint64_t source_id{0};
+  std::int64_t start_ns{0};  ///< UTC of t = 0; stretches count from here.
+  double period_s{1.0};
+  FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  RunOrigin origin{RunOrigin::kRecorded};
+  std::string scenario;  ///< Of a simulation: TOML; of an import: the file.
+  std::optional<std::uint64_t> seed;
+  std::string software;  ///< Version and revision of the program.
+};
+
+/// A truth given by a user for t in [from_s, to_s); it overrides a stored one.
+struct RunLabel {
+  double from_s{0.0};
+  double to_s{std::numeric_limits<double>::infinity()};
+  int fault{0};  ///< 0 = normal, else 1..22.
+  double strength{0.0};
+};
+
+/// A stored run without its samples.
+struct RunInfo {
+  std::string id;  ///< 12 hex digits.
+  NewRun run;
+  RunState state{RunState::kComplete};
+  std::int64_t created_ns{0};
+  std::int64_t samples{0};
+  std::int64_t first_stamp_ns{0};  ///< 0 if there is no sample.
+  std::int64_t last_stamp_ns{0};
+  SignalMask signals{0};  ///< Present in some sample.
+  bool has_truth{false};  ///< Stored beside every sample.
+  std::array<std::int64_t, kIntakeCount> intake{};  ///< Samples by verdict.
+  std::int64_t stored_bytes{0};
+  std::vector<RunLabel> labels;
+  std::int64_t row_id{0};  ///< Key of its rows in the tables.
+};
+
+/// Part of a run, written `ID` or `ID@from:to`; a unique beginning of an id
+/// stands for it. t in [from_s, to_s), seconds from the start of the run.
+struct RunSelector {
+  std::string id;
+  double from_s{-std::numeric_limits<double>::infinity()};
+  double to_s{std::numeric_limits<double>::infinity()};
+
+  bool IsStretch() const {
+    return from_s > -std::numeric_limits<double>::infinity() ||
+           to_s < std::numeric_limits<double>::infinity();
+  }
+};
+
+/// "1a2b", "1a2b@600:1200", "1a2b@600:", "1a2b@:600".
+/// @throws ConfigError naming the accepted forms.
+RunSelector ParseRunSelector(std::string_view text);
+
+/// Settings of RunStore::List().
+struct RunFilter {
+  std::string valve_glob{"*"};  ///< As in a shell: * ? [...].
+  std::optional<RunOrigin> origin;
+  std::int64_t since_ns{std::numeric_limits<std::int64_t>::min()};
+  std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
+};
+
+/// A run, or a stretch of it, with its samples in the order of arrival. Labels
+/// are in StoredSample::truth.
+struct StoredRun {
+  RunInfo info;
+  RunSelector selector;
+  std::vector<StoredSample> samples;
+};
+
+/// Schema of runs.db: tables run, run_label, chunk, tail, recorder and the view
+/// run_summary; see docs/data.md.
+const Schema& RunsSchema();
+
+/// Reads runs.db and, opened as an occasional writer, imports, labels and
+/// deletes. One thread at a time.
+class RunStore {
+ public:
+  /// @throws DataError, SqliteError as Database.
+  explicit RunStore(const std::filesystem::path& path,
+                    Access access = Access::kReader);
+
+  /// By start.
+  std::vector<RunInfo> List(const RunFilter& filter = {});
+
+  /// `selector` as in ParseRunSelector(); its stretch is ignored.
+  /// @throws NotFoundError if no run, or more than one, begins like that.
+  RunInfo Info(std::string_view selector);
+
+  /// @throws NotFoundError as Info(), or if the stretch holds no sample.
+  /// @throws DataError naming run and chunk if stored bytes are damaged.
+  StoredRun Load(std::string_view selector);
+
+  /// Stores all runs of a table, or none. @returns their ids, in order.
+  /// `run`: valve, source, start (of t_s = 0), scenario and software count;
+  /// the rest is the table's. A split table makes runs that each start at
+  /// their first sample.
+  std::vector<std::string> Import(std::span<const SampleSeries> series,
+                                  const NewRun& run);
+
+  /// Says what was true in a stretch; later labels win.
+  void Label(std::string_view selector, int fault, double strength);
+  /// @returns how many labels the run had.
+  int RemoveLabels(std::string_view selector);
+  void Delete(std::string_view selector);
+
+  Database& database() { return *database_; }
+
+ private:
+  /// The one run that the selector means. @throws NotFoundError
+  RunInfo Find(const RunSelector& selector);
+  RunInfo ReadRun(const Statement& row);
+  void LoadTable(std::string_view table, std::int64_t from, std::int64_t to,
+                 StoredRun& run);
+
+  std::unique_ptr<Database> database_;
+};
+
+}  // namespace fdi::storage

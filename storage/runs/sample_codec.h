@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/sample.h"
+#include "diagnosis/verdict.h"
+#include "storage/runs/column_codec.h"
+
+namespace fdi::storage {
+
+/// A received sample as the recorder keeps it: with what became of it, so that
+/// re-scoring meets what the engine met.
+struct StoredSample {
+  Sample sample;
+  std::optional<FaultTruth> truth;
+  Intake intake{Intake::kAccepted};
+  bool initialised{false};    ///< The observers were initialised here.
+  bool model_swapped{false};  ///< Another model set answered from here on.
+};
+
+/// Forms of a stored chunk; numbers are part of the file format.
+enum class ChunkCodec : std::uint8_t {
+  kPlain = 0,    ///< Fixed records, for the few samples of a tail row.
+  kColumns = 1,  ///< Columns of differences, byte planes, zlib.
+};
+
+/// Consecutive samples of a run, as stored.
+struct Chunk {
+  ChunkCodec codec{ChunkCodec::kColumns};
+  std::uint32_t crc{0};  ///< CRC-32 of codec, count and bytes.
+  std::uint32_t count{0};
+  std::vector<std::byte> bytes;
+};
+
+inline constexpr std::uint32_t kMaxChunkSamples = 65536;
+
+/// What the last chunk of a run tells about the next one: the predictors of its
+/// columns of doubles, so that they need not be searched again.
+struct ChunkHints {
+  std::array<std::optional<ValuePredictor>, kSignalCount + 1> columns;
+};
+
+/// Packs samples without loss, whatever their bits are (NaN payloads, −0).
+///
+/// kColumns: every field of the samples is a column of 64-bit integers. A
+/// column of doubles becomes one of integers n with value = n / 10^d, or
+/// value = a + q·n (the grid of a converter) with the distance in units in the
+/// last place beside it, or the bits themselves; values that fit not are kept
+/// apart. Of each integer column the first or second differences are cut into
+/// planes of bytes, and all of it is deflated.
+/// @throws std::invalid_argument if there are none or too many.
+Chunk EncodeChunk(std::span<const StoredSample> samples, ChunkCodec codec,
+                  ChunkHints* hints = nullptr);
+
+/// @param where the chunk stands, for the message.
+/// @throws DataError if CRC, sizes or values are not what EncodeChunk() writes.
+std::vector<StoredSample> DecodeChunk(const Chunk& chunk,
+                                      std::string_view where);
+
+}  // namespace fdi::storage

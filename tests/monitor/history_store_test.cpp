@@ -1,0 +1,100 @@
+#include "monitor/app/history_store.h"
+
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "storage/history/history_database.h"
+#include "tests/monitor/linear_models.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::monitor {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::int64_t kStart = 1'700'000'000'000'000'000;
+
+class HistoryStoreTest : public testing::Test {
+ protected:
+  HistoryStore Open() {
+    return HistoryStore(
+        path_, "test", "", [] { return kStart; },
+        [this](LogLevel level, std::string_view line) {
+          if (level == LogLevel::kError) {
+            errors_.emplace_back(line);
+          }
+        });
+  }
+  static FaultEvent Detection(const std::string& valve) {
+    FaultEvent event;
+    event.valve_id = valve;
+    event.episode_id = EpisodeId(valve, 0, kStart);
+    event.transition.kind = TransitionKind::kDetected;
+    event.transition.stamp_ns = kStart;
+    event.transition.detection_stamp_ns = kStart;
+    event.models = SharedLinearModels();
+    return event;
+  }
+  void DamageIdOf(const std::string& valve) const {
+    storage::Database file(path_, storage::HistorySchema(),
+                           storage::Access::kOccasionalWriter);
+    storage::Transaction transaction(file);
+    file.Run("DROP TRIGGER episode_event_keeps");
+    file.QueryInt64("PRAGMA defer_foreign_keys = ON");
+    const std::string id = storage::EpisodeIdText(Detection(valve).episode_id);
+    for (const char* table : {"episode", "episode_event"}) {
+      file.Run("UPDATE " + std::string(table) +
+                   " SET episode_id = 'not sixteen hex.' WHERE episode_id = ?",
+               id);
+    }
+    transaction.Commit();
+  }
+
+  storage::TemporaryDirectory directory_;
+  const std::filesystem::path path_ = directory_.path() / "history.db";
+  std::vector<std::string> errors_;
+};
+
+TEST_F(HistoryStoreTest, ADamagedIdIsReportedAndTheOthersAreSent) {
+  {
+    HistoryStore store = Open();
+    store.CommitBatch([&] {
+      store.Record(Detection("A"));
+      store.Record(Detection("B"));
+    });
+  }
+  DamageIdOf("A");
+
+  HistoryStore store = Open();
+  const auto unsent = store.UnsentEvents();
+  const auto open = store.OpenEpisodes();
+
+  ASSERT_EQ(unsent.size(), 1U);
+  EXPECT_EQ(unsent[0].valve_id, "B");
+  ASSERT_EQ(open.size(), 1U);
+  EXPECT_EQ(open[0].valve_id, "B");
+  ASSERT_EQ(errors_.size(), 2U);
+  EXPECT_THAT(errors_[0], HasSubstr("history_damaged"));
+  EXPECT_THAT(errors_[0], HasSubstr("event_outbox, event 1"));
+}
+
+TEST_F(HistoryStoreTest, AnEventThatWasSentAgainIsNotSentOnceMore) {
+  {
+    HistoryStore store = Open();
+    store.CommitBatch([&] { store.Record(Detection("A")); });
+  }
+  {
+    HistoryStore store = Open();
+    for (const FaultEvent& event : store.UnsentEvents()) {
+      store.MarkSent(event);
+    }
+    store.Commit();
+  }
+
+  EXPECT_TRUE(Open().UnsentEvents().empty());
+}
+
+}  // namespace
+}  // namespace fdi::monitor

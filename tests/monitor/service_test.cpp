@@ -1,0 +1,139 @@
+#include "monitor/app/service.h"
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "cli/time_text.h"
+#include "diagnosis/error.h"
+#include "storage/history/history_database.h"
+#include "storage/models/models.h"
+#include "tests/monitor/fake_sinks.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::monitor {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+std::size_t ThreadCount() {
+  using std::filesystem::directory_iterator;
+  return static_cast<std::size_t>(std::distance(
+      directory_iterator("/proc/self/task"), directory_iterator{}));
+}
+
+// The service in this process, over DDS on loopback.
+class ServiceTest : public testing::Test {
+ protected:
+  ServiceTest() {
+    global_.data_dir = directory_.path() / "data";
+    global_.domain = 60 + static_cast<int>(getpid() % 40);
+  }
+  cli::Context Context(const std::string& software = "fdi-test 1.0") {
+    return {global_,
+            [this](LogLevel, std::string_view line) {
+              notice_.Apply([&] { lines_.emplace_back(line); });
+            },
+            software, "fdi-monitor run"};
+  }
+  std::size_t Count(std::string_view event) const {
+    std::size_t count = 0;
+    for (const std::string& line : lines_) {
+      count += line.starts_with(event) ? 1U : 0U;
+    }
+    return count;
+  }
+  // Behind the back of the service.
+  static void Execute(const std::filesystem::path& path,
+                      const storage::Schema& schema, std::string_view sql) {
+    storage::Database database(path, schema,
+                               storage::Access::kOccasionalWriter);
+    storage::Transaction transaction(database);
+    database.Run(sql);
+    transaction.Commit();
+  }
+
+  storage::TemporaryDirectory directory_;
+  cli::GlobalOptions global_;
+  Notice notice_;
+  std::vector<std::string> lines_;
+};
+
+// The bus takes no text of more than 64 bytes: publishing the status throws.
+TEST_F(ServiceTest, AnErrorWhileServingStillEndsTheSessionInOrder) {
+  const cli::Context context = Context(std::string(100, 's'));
+  cli::StopSignals signals;
+  Service service({}, context);
+
+  EXPECT_THROW(service.Run(signals), DataError);
+
+  EXPECT_EQ(Count("monitor_stopping"), 1U);
+  EXPECT_EQ(Count("monitor_stopped"), 1U);
+  const HistoryStore next(global_.data_dir / "history.db", "test", "",
+                          cli::NowNs, context.log);
+  EXPECT_THAT(lines_, Not(Contains(StartsWith("session_died"))));
+}
+
+// Twice, as the first participant may leave threads of the library behind.
+TEST_F(ServiceTest, AnErrorAtTheStartLeavesNoThreadOfTheConsole) {
+  const std::filesystem::path page = directory_.path() / "page";
+  std::filesystem::create_directories(page);
+  std::ofstream(page / "index.html") << "<html></html>";
+  ServiceOptions options;
+  options.console.emplace();
+  options.console->files = page;
+  options.http.emplace();
+  options.http->host = options.console->address.host = "127.0.0.1";
+  const cli::Context context = Context();
+  cli::StopSignals signals;
+  std::size_t threads_left = 0;
+  for (const char* data : {"first", "second"}) {
+    global_.data_dir = directory_.path() / data;
+    lines_.clear();
+    threads_left = ThreadCount();
+    Service service(options, context);
+    Execute(global_.data_dir / "history.db", storage::HistorySchema(),
+            "DROP TABLE accumulator");
+
+    EXPECT_THROW(service.Run(signals), std::exception);
+
+    EXPECT_EQ(Count("console_listening"), 1U);
+    EXPECT_EQ(Count("monitor_stopped"), 1U);
+  }
+  EXPECT_EQ(ThreadCount(), threads_left);
+}
+
+// Who asks for a reload wants to know, however often.
+TEST_F(ServiceTest, EveryReloadThatFailsIsALineOfTheLog) {
+  const cli::Context context = Context();
+  cli::StopSignals signals;
+  Service service({}, context);
+  Execute(global_.data_dir / "models.db", storage::ModelsSchema(),
+          "DROP TABLE valve");
+  std::thread driver([&] {
+    for (std::size_t reload = 1; reload <= 3; ++reload) {
+      kill(getpid(), SIGHUP);
+      EXPECT_TRUE(notice_.Await(
+          [&] { return Count("reload_failed id=M112") >= reload; }));
+    }
+    signals.RequestStop();
+  });
+
+  EXPECT_EQ(service.Run(signals), 0);
+
+  driver.join();
+}
+
+}  // namespace
+}  // namespace fdi::monitor

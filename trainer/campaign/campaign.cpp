@@ -1,0 +1,334 @@
+#include "trainer/campaign/campaign.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <utility>
+
+#include "cli/toml_reader.h"
+#include "diagnosis/error.h"
+#include "simulator/app/scenario_toml.h"
+#include "trainer/campaign/campaign_fields.h"
+#include "trainer/campaign/file_runs.h"
+
+namespace fdi::trainer {
+namespace {
+
+using cli::TomlReader;
+using simulator::QuoteToml;
+using std::filesystem::path;
+
+// The text that reads back as the same bits: a campaign that is written and
+// read again trains the same models.
+template <typename Number>
+std::string Shortest(Number value) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), end.ptr};
+}
+
+// Sets each field that its table names. Range and type are checked by the
+// reader, which knows file and line.
+class FieldReader {
+ public:
+  explicit FieldReader(TomlReader& table) : table_(table) {}
+
+  void operator()(const char* key, double& field, double least, double most) {
+    field = table_.Number(key, least, most).value_or(field);
+  }
+  void operator()(const char* key, int& field, int least, int most) {
+    if (table_.Number(key, least, most)) {
+      field = static_cast<int>(*table_.Integer(key));
+    }
+  }
+  void operator()(const char* key, bool& field) {
+    field = table_.Boolean(key).value_or(field);
+  }
+
+ private:
+  TomlReader& table_;
+};
+
+// Runs `read`; a ConfigError without a place is given that of `key`.
+template <typename Read>
+void AtKey(const TomlReader& table, std::string_view key, Read&& read) {
+  try {
+    read();
+  } catch (const ConfigError& error) {
+    table.Refuse(key, error.what());
+  }
+}
+
+// The schedules that `faults` and `strengths` of a [[run]] stand for; one
+// without a fault if there are none.
+std::vector<std::vector<simulator::FaultSchedule>> ReadVariants(
+    TomlReader& table, const std::vector<simulator::FaultSchedule>& own) {
+  const std::vector<std::string> faults = table.Texts("faults");
+  const std::vector<double> strengths = table.Numbers("strengths");
+  if (table.Has("strengths") && (faults.empty() || strengths.empty())) {
+    table.Refuse("strengths", "needs faults = [...] beside it, and a number");
+  }
+  if (faults.empty()) {
+    return {own};
+  }
+  if (!own.empty()) {
+    table.Refuse("faults", "either here or in simulate");
+  }
+  std::vector<std::vector<simulator::FaultSchedule>> variants;
+  const auto add = [&](const std::string& text) {
+    AtKey(table, "faults",
+          [&] { variants.push_back({simulator::ParseFaultSchedule(text)}); });
+  };
+  for (const std::string& fault : faults) {
+    const bool named = fault.find(':') == std::string::npos;
+    const std::string base = named ? fault + ":abrupt@0" : fault;
+    if (strengths.empty()) {
+      add(base);
+    }
+    for (const double strength : strengths) {
+      add(base + ":strength=" + Shortest(strength));
+    }
+  }
+  return variants;
+}
+
+// Reads the file in this order, because each part builds on those before: the
+// preset, what overrides it, the scenario that all runs share, the runs.
+// Finish() comes last: it refuses the keys that nobody asked for.
+class Reader {
+ public:
+  explicit Reader(const path& file)
+      : file_(file), folder_(file.parent_path()), root_(file) {}
+
+  Campaign Read() {
+    TrainingOptions& training = campaign_.training;
+    AtKey(root_, "preset", [&] {
+      training = PresetOptions(root_.Text("preset").value_or("paper"));
+    });
+    training.name = root_.Text("name").value_or("");
+    if (auto decision = root_.Table("decision")) {
+      VisitDecision(training.decision, FieldReader(*decision));
+    }
+    if (auto options = root_.Table("training")) {
+      VisitTraining(training, FieldReader(*options));
+    }
+    CheckOrder();
+    if (auto scenario = root_.Table("scenario")) {
+      simulator::ApplyScenario(*scenario, folder_, common_);
+    }
+    for (TomlReader& run : root_.Tables("run")) {
+      ReadRun("run", run, campaign_.runs);
+    }
+    for (TomlReader& run : root_.Tables("validation")) {
+      ReadRun("validation", run, campaign_.validation);
+    }
+    root_.Finish();
+    if (campaign_.runs.empty() && campaign_.validation.empty()) {
+      throw ConfigError(file_.string() +
+                        ": there is no [[run]] and no [[validation]]");
+    }
+    return std::move(campaign_);
+  }
+
+ private:
+  // Ranges that depend on each other, which single fields cannot refuse.
+  void CheckOrder() const {
+    const TrainingOptions& training = campaign_.training;
+    const auto refuse = [this](const std::string& message) {
+      throw ConfigError(file_.string() + ": " + message);
+    };
+    if (training.fit.rules.min_rules > training.fit.rules.max_rules) {
+      refuse("training.min_rules is above training.max_rules");
+    }
+    if (!(training.decision.evidence_core <
+          training.decision.evidence_support)) {
+      refuse("decision.evidence_core is not below decision.evidence_support");
+    }
+  }
+
+  // One [[run]] or [[validation]] becomes one run, or several:
+  //
+  //     recorded = "run"
+  //     imported = "import" ["valve"] ["from_s"] ["to_s"]     per file
+  //     simulated = "simulate" ["faults" ["strengths"]] ["repeat"] [stretch]
+  //
+  // A simulated one expands to fault x strength x repetition, in this order.
+  void ReadRun(const char* kind, TomlReader& table,
+               std::vector<CampaignRun>& runs) {
+    const bool simulate = table.Has("simulate");
+    const bool import = table.Has("import");
+    const bool recorded = table.Has("run");
+    if (simulate + import + recorded != 1) {
+      throw ConfigError(file_.string() + ": [[" + kind + "]] " +
+                        std::to_string(runs.size() + 1) +
+                        ": exactly one of simulate, import, run is needed");
+    }
+    CampaignRun run;
+    run.horizon_s = table.Number("horizon_s", 0.0, 1e12).value_or(0.0);
+    if (recorded) {
+      const std::string selector = *table.Text("run");
+      AtKey(table, "run", [&] { storage::ParseRunSelector(selector); });
+      run.source = RecordedRun{selector};
+      runs.push_back(std::move(run));
+      return;
+    }
+    ReadStretch(table, run.stretch);
+    if (import) {
+      const std::string valve = table.Text("valve").value_or(common_.valve_id);
+      const std::string pattern = *table.Text("import");
+      AtKey(table, "import", [&] {
+        for (const path& file : MatchingFiles(pattern, folder_)) {
+          run.source = ImportedRun{file, valve};
+          runs.push_back(run);
+        }
+      });
+      return;
+    }
+    ReadSimulated(table, run, runs);
+  }
+
+  static void ReadStretch(TomlReader& table, storage::RunSelector& stretch) {
+    stretch.from_s = table.Number("from_s", 0.0, 1e12).value_or(stretch.from_s);
+    stretch.to_s = table.Number("to_s", 0.0, 1e12).value_or(stretch.to_s);
+    if (!(stretch.from_s < stretch.to_s)) {
+      table.Refuse("to_s", "is not behind from_s");
+    }
+  }
+
+  void ReadSimulated(TomlReader& table, CampaignRun run,
+                     std::vector<CampaignRun>& runs) {
+    constexpr int kMostRepeats = 10000;
+    simulator::Scenario scenario = common_;
+    TomlReader own = *table.Table("simulate");
+    simulator::ApplyScenario(own, folder_, scenario);
+    const bool own_seed = own.Has("seed");
+    int repeat = 1;
+    FieldReader fields(table);
+    fields("repeat", repeat, 1, kMostRepeats);
+    // Seeds follow the place of the run in its table if the table has a seed
+    // of its own, else its place among all simulated runs.
+    std::uint64_t index = 0;
+    for (const auto& faults : ReadVariants(table, scenario.config.faults)) {
+      for (int i = 0; i < repeat; ++i, ++index, ++simulated_) {
+        simulator::Scenario one = scenario;
+        one.config.faults = faults;
+        one.config.seed += own_seed ? index : simulated_;
+        AtKey(table, "simulate", [&] { simulator::Validate(one.config); });
+        run.source = SimulatedRun{std::move(one)};
+        runs.push_back(run);
+      }
+    }
+  }
+
+  path file_;
+  path folder_;
+  TomlReader root_;
+  Campaign campaign_;
+  simulator::Scenario common_;
+  std::uint64_t simulated_{0};
+};
+
+// Writes each field that it visits.
+class FieldWriter {
+ public:
+  explicit FieldWriter(std::string& text) : text_(text) {}
+
+  void operator()(const char* key, const auto& field, auto, auto) {
+    Line(key, Shortest(field));
+  }
+  void operator()(const char* key, bool field) {
+    Line(key, field ? "true" : "false");
+  }
+  void Line(const char* key, const std::string& value) {
+    text_ += key;
+    text_ += " = " + value + '\n';
+  }
+
+ private:
+  std::string& text_;
+};
+
+void WriteSource(const char* table, const SimulatedRun& run,
+                 std::string& text) {
+  text += std::string("[") + table + ".simulate]\n" +
+          simulator::ScenarioText(run.scenario);
+}
+
+void WriteSource(const char*, const ImportedRun& run, std::string& text) {
+  text += "import = " + QuoteToml(run.file.string()) +
+          "\nvalve = " + QuoteToml(run.valve_id) + '\n';
+}
+
+void WriteSource(const char*, const RecordedRun& run, std::string& text) {
+  text += "run = " + QuoteToml(run.selector) + '\n';
+}
+
+// Keys of the run itself come before its sub-table [run.simulate], because TOML
+// counts everything behind the head of a table to that table.
+void WriteRun(const char* table, const CampaignRun& run, std::string& text) {
+  text += std::string("\n[[") + table + "]]\n";
+  FieldWriter writer(text);
+  if (run.horizon_s > 0.0) {
+    writer.Line("horizon_s", Shortest(run.horizon_s));
+  }
+  if (std::isfinite(run.stretch.from_s)) {
+    writer.Line("from_s", Shortest(run.stretch.from_s));
+  }
+  if (std::isfinite(run.stretch.to_s)) {
+    writer.Line("to_s", Shortest(run.stretch.to_s));
+  }
+  std::visit([&](const auto& source) { WriteSource(table, source, text); },
+             run.source);
+}
+
+}  // namespace
+
+Campaign LoadCampaign(const path& file) {
+  return Reader(file).Read();
+}
+
+std::vector<CampaignRun> ValidationRuns(const std::filesystem::path& path,
+                                        std::uint64_t seed_offset) {
+  std::vector<CampaignRun> validation = LoadCampaign(path).validation;
+  if (validation.empty()) {
+    throw ConfigError(path.string() + ": there is no [[validation]]");
+  }
+  for (CampaignRun& run : validation) {
+    if (auto* simulated = std::get_if<SimulatedRun>(&run.source)) {
+      simulated->scenario.config.seed += seed_offset;
+    }
+  }
+  return validation;
+}
+
+std::string CampaignText(const Campaign& campaign) {
+  TrainingOptions training = campaign.training;
+  std::string text;
+  FieldWriter writer(text);
+  writer.Line("name", QuoteToml(training.name));
+  writer.Line("preset", QuoteToml(training.preset));
+  text += "\n[decision]\n";
+  VisitDecision(training.decision, writer);
+  text += "\n[training]\n";
+  VisitTraining(training, writer);
+  for (const CampaignRun& run : campaign.runs) {
+    WriteRun("run", run, text);
+  }
+  for (const CampaignRun& run : campaign.validation) {
+    WriteRun("validation", run, text);
+  }
+  return text;
+}
+
+std::string RunLabel(const CampaignRun& run) {
+  if (const auto* simulated = std::get_if<SimulatedRun>(&run.source)) {
+    const auto& faults = simulated->scenario.config.faults;
+    return faults.empty() ? "normal" : simulator::ToText(faults.front());
+  }
+  if (const auto* imported = std::get_if<ImportedRun>(&run.source)) {
+    return imported->file.stem().string();
+  }
+  return std::get<RecordedRun>(run.source).selector;
+}
+
+}  // namespace fdi::trainer

@@ -1,0 +1,138 @@
+#include "trainer/campaign/file_runs.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <string_view>
+
+#include "diagnosis/error.h"
+
+namespace fdi::trainer {
+namespace {
+
+using std::filesystem::path;
+
+// Replaces every ${NAME} by the environment variable of that name.
+std::string WithVariables(std::string text) {
+  for (std::size_t begin = text.find("${"); begin != std::string::npos;
+       begin = text.find("${")) {
+    const std::size_t end = text.find('}', begin);
+    if (end == std::string::npos) {
+      throw ConfigError("'" + text + "' lacks a } behind ${");
+    }
+    const std::string name = text.substr(begin + 2, end - begin - 2);
+    const char* value = std::getenv(name.c_str());
+    if (value == nullptr || *value == '\0') {
+      throw ConfigError("the environment variable " + name + " is not set; '" +
+                        text + "' needs it");
+    }
+    text.replace(begin, end - begin + 1, value);
+  }
+  return text;
+}
+
+// True if `name` is `pattern`, in which a * stands for anything: each * is
+// tried with every length, shortest first.
+bool Matches(std::string_view pattern, std::string_view name) {
+  const std::size_t star = pattern.find('*');
+  if (star == std::string_view::npos) {
+    return pattern == name;
+  }
+  if (!name.starts_with(pattern.substr(0, star))) {
+    return false;
+  }
+  for (std::size_t skip = star; skip <= name.size(); ++skip) {
+    if (Matches(pattern.substr(star + 1), name.substr(skip))) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// The file and the stretch; an @ may be part of the name of a file.
+storage::RunSelector SplitStretch(const std::string& text) {
+  storage::RunSelector selector;
+  selector.id = text;
+  const std::size_t at = text.rfind('@');
+  if (std::filesystem::exists(text) || at == std::string::npos) {
+    return selector;
+  }
+  try {
+    selector = storage::ParseRunSelector("f" + text.substr(at));
+  } catch (const ConfigError&) {
+    throw ConfigError("file " + text +
+                      ": accepted are FILE, FILE@from:to, FILE@from: and "
+                      "FILE@:to with seconds of its time column");
+  }
+  selector.id = text.substr(0, at);
+  return selector;
+}
+
+bool IsWithin(const LabelledSample& labelled,
+              const storage::RunSelector& selector) {
+  const double t_s = static_cast<double>(labelled.sample.stamp_ns) * 1e-9;
+  return t_s >= selector.from_s && t_s < selector.to_s;
+}
+
+}  // namespace
+
+std::vector<path> MatchingFiles(const std::string& pattern,
+                                const path& folder) {
+  const path given = WithVariables(pattern);
+  const path absolute = given.is_absolute() ? given : folder / given;
+  const std::string name = absolute.filename().string();
+  if (name.find('*') == std::string::npos) {
+    return {absolute};
+  }
+  std::vector<path> files;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(
+           absolute.has_parent_path() ? absolute.parent_path() : ".", error)) {
+    if (Matches(name, entry.path().filename().string())) {
+      files.push_back(entry.path());
+    }
+  }
+  // An order that does not depend on the file system: runs of a campaign are
+  // numbered by it.
+  if (files.empty()) {
+    throw ConfigError("no file is called " + absolute.string());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+storage::StoredRun ReadRunFile(const std::string& text,
+                               const std::optional<cli::ColumnMap>& map,
+                               SignalMask required) {
+  storage::StoredRun run;
+  run.selector = SplitStretch(text);
+  const path path = run.selector.id;
+  if (!std::filesystem::exists(path)) {
+    throw NotFoundError("no file " + path.string());
+  }
+  cli::CsvOptions csv;
+  csv.required = required;
+  csv.map = map.value_or(cli::ColumnMap{});
+  const cli::CsvTable table = cli::ReadCsvFile(path, csv);
+  const SampleSeries& content = table.runs.front();
+  run.info.id = run.selector.id;
+  run.info.run.origin = storage::RunOrigin::kImported;
+  run.info.run.period_s = content.period_s;
+  run.info.run.flow_unit = content.flow_unit;
+  run.info.signals = content.signals;
+  run.info.has_truth = content.has_truth;
+  for (const LabelledSample& labelled : content.samples) {
+    if (IsWithin(labelled, run.selector)) {
+      storage::StoredSample stored;
+      stored.sample = labelled.sample;
+      stored.truth = labelled.truth;
+      run.samples.push_back(stored);
+    }
+  }
+  if (run.samples.empty()) {
+    throw NotFoundError("file " + text + " holds no sample (of " +
+                        std::to_string(content.samples.size()) + ")");
+  }
+  return run;
+}
+
+}  // namespace fdi::trainer

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/csv.h"
+#include "diagnosis/sample.h"
+#include "storage/runs/runs.h"
+
+namespace fdi::trainer {
+
+/// The files that `pattern` stands for, ascending: `${NAME}` is replaced by the
+/// environment variable, `*` in the file's name by anything. A pattern without
+/// `*` is returned as it is, whether there is such a file or not.
+///
+/// @param folder That relative patterns start from.
+/// @throws ConfigError if a variable is not set, or nothing matches a `*`.
+std::vector<std::filesystem::path> MatchingFiles(
+    const std::string& pattern, const std::filesystem::path& folder);
+
+/// Reads a CSV file as a run, as `fdi-store runs import` does, without storing
+/// it. Its name stands for the id.
+///
+/// @param text `FILE.csv`, or a stretch of it, `FILE.csv@from:to` [s of t_s].
+/// @param required signals that must be there (CsvOptions::required).
+/// @throws NotFoundError if there is no such file or no sample in the stretch.
+/// @throws ConfigError if the stretch is none; DataError as ReadCsvFile().
+storage::StoredRun ReadRunFile(const std::string& text,
+                               const std::optional<cli::ColumnMap>& map,
+                               SignalMask required);
+
+}  // namespace fdi::trainer

@@ -1,0 +1,255 @@
+#include "trainer/evaluation/detectors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "cli/text_table.h"
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/quality_count.h"
+#include "trainer/campaign/run_input.h"
+#include "trainer/evaluation/csv_rows.h"
+#include "trainer/evaluation/evaluation_report.h"
+#include "trainer/evaluation/rescore.h"
+#include "trainer/model_reduction.h"
+#include "trainer/parallel_for.h"
+
+namespace fdi::trainer {
+namespace {
+
+Answer FollowEngine(const std::shared_ptr<const ModelSet>& models,
+                    const ScoredRun& scored, const VerdictSink& sink) {
+  QualityCount samples;
+  Answer answer;
+  answer.indications =
+      Rescore(models, scored.run, [&](const Sample& s, const Verdict& verdict) {
+        if (CountsAsTime(verdict)) {
+          samples.Add(verdict.quality);
+        }
+        if (sink) {
+          sink(s, verdict);
+        }
+      });
+  answer.seconds.emplace();
+  for (std::size_t q = 0; q < kQualityCount; ++q) {
+    (*answer.seconds)[q] =
+        models->sample_period_s *
+        static_cast<double>(samples[static_cast<Quality>(q)]);
+  }
+  return answer;
+}
+
+Answer FollowBaseline(const Baseline& baseline, const storage::StoredRun& run) {
+  BaselineDetector detector(baseline);
+  std::vector<Indication> all;
+  const std::int64_t period_ns = std::llround(run.info.run.period_s * 1e9);
+  std::int64_t start_ns = 0;
+  std::int64_t last_ns = 0;
+  for (const storage::StoredSample& stored : run.samples) {
+    if (OutOfOrder(stored.intake)) {
+      continue;
+    }
+    const std::int64_t stamp_ns = stored.sample.stamp_ns;
+    start_ns = all.empty() ? stamp_ns : start_ns;
+    // A gap is a step of more than 1.5 periods.
+    if (stored.intake != Intake::kAccepted ||
+        (!all.empty() && 2 * (stamp_ns - last_ns) > 3 * period_ns)) {
+      detector.Reset();
+    }
+    last_ns = stamp_ns;
+    Indication indication = detector.Step(stored.sample);
+    indication.time_s = static_cast<double>(stamp_ns - start_ns) * 1e-9;
+    indication.truth = TruthOf(stored);
+    all.push_back(std::move(indication));
+  }
+  return {std::move(all)};
+}
+
+// The signs of the residuals for each set of faults; empty if the baseline
+// detects only.
+std::string SignatureTable(const Baseline& baseline) {
+  if (baseline.table.empty()) {
+    return {};
+  }
+  std::vector<cli::TextTable::Column> columns;
+  for (const LinearModel& model : baseline.models) {
+    columns.push_back({model.name});
+  }
+  columns.push_back({"faults"});
+  cli::TextTable table(std::move(columns));
+  for (const auto& [signature, faults] : baseline.table) {
+    std::vector<std::string> row;
+    for (const int sign : signature) {
+      row.emplace_back(sign > 0 ? "+" : sign < 0 ? "-" : "0");
+    }
+    row.push_back(SetText(faults));
+    table.AddRow(std::move(row));
+  }
+  return TextOf(table) + '\n';
+}
+
+// Columns of a file of verdicts.
+enum Column : std::size_t { kTime, kDetected, kFaults };
+
+// A row belongs to a sample within this share of the period: t_s is decimal
+// text and has been rounded.
+constexpr double kTimeTolerance = 0.01;
+
+std::vector<int> FaultsIn(const CsvRows& rows, std::size_t row) {
+  std::vector<int> faults;
+  std::string rest = rows.Cell(row, kFaults);
+  while (!rest.empty()) {
+    const std::size_t bar = rest.find('|');
+    const std::string name = rest.substr(0, bar);
+    const auto fault = ParseFault(name);
+    if (!fault) {
+      rows.Refuse(
+          row, "fault '" + name + "' is none of " + std::string(kFaultNames));
+    }
+    faults.push_back(*fault);
+    rest = bar == std::string::npos ? "" : rest.substr(bar + 1);
+  }
+  std::sort(faults.begin(), faults.end());
+  if (std::adjacent_find(faults.begin(), faults.end()) != faults.end()) {
+    rows.Refuse(row, "a fault is there twice: " + rows.Cell(row, kFaults));
+  }
+  return faults;
+}
+
+Indication IndicationIn(const CsvRows& rows, std::size_t row) {
+  Indication indication;
+  indication.settled = true;
+  const double detected = rows.Number(row, kDetected);
+  if (detected != 0.0 && detected != 1.0) {
+    rows.Refuse(
+        row, "detected is " + rows.Cell(row, kDetected) + ", expected 0 or 1");
+  }
+  indication.detected = detected == 1.0;
+  indication.isolated = FaultsIn(rows, row);
+  if (!indication.detected && !indication.isolated.empty()) {
+    rows.Refuse(row, "faults without detected = 1");
+  }
+  return indication;
+}
+
+// Walks through rows and samples side by side; both rise in time.
+Answer ReadVerdicts(const std::string& file, const storage::StoredRun& run) {
+  const CsvRows rows(file, {"t_s", "detected"}, {"faults"});
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    if (!(rows.Number(i, kTime) > rows.Number(i - 1, kTime))) {
+      rows.Refuse(i, "t_s does not rise");
+    }
+  }
+  const double tolerance = kTimeTolerance * run.info.run.period_s;
+  std::vector<Indication> all;
+  std::size_t row = 0;
+  double first_s = 0.0;
+  for (const storage::StoredSample& stored : run.samples) {
+    if (OutOfOrder(stored.intake)) {
+      continue;
+    }
+    const double t_s =
+        static_cast<double>(stored.sample.stamp_ns - run.info.run.start_ns) *
+        1e-9;
+    while (row < rows.size() && rows.Number(row, kTime) < t_s - tolerance) {
+      ++row;
+    }
+    if (row == rows.size() || rows.Number(row, kTime) > t_s + tolerance) {
+      throw DataError(file + ": no row for t_s = " + cli::FormatNumber(t_s, 3) +
+                      " of " + RunName(run));
+    }
+    first_s = all.empty() ? t_s : first_s;
+    Indication indication = IndicationIn(rows, row);
+    indication.time_s = t_s - first_s;
+    indication.truth = TruthOf(stored);
+    all.push_back(std::move(indication));
+  }
+  return {std::move(all)};
+}
+
+}  // namespace
+
+Detector EngineDetector(const std::shared_ptr<const ModelSet>& models) {
+  return {models->name,
+          models->version,
+          models->groups,
+          RequiredSignals(*models),
+          "",
+          [models](const ScoredRun& run, const VerdictSink& sink) {
+            return FollowEngine(models, run, sink);
+          }};
+}
+
+Detector LeaveOneOutDetector(const ModelSet& models) {
+  // By fault; 0 is the whole set, which also answers for faults that it does
+  // not know.
+  std::map<int, std::shared_ptr<const ModelSet>> reduced;
+  reduced[0] = std::make_shared<const ModelSet>(models);
+  for (const int fault : models.faults) {
+    reduced[fault] =
+        std::make_shared<const ModelSet>(WithoutFaults(models, {fault}));
+  }
+  Detector detector = EngineDetector(reduced[0]);
+  detector.follow = [reduced](const ScoredRun& run, const VerdictSink& sink) {
+    const auto found = reduced.find(FaultOf(run.run));
+    return FollowEngine(found == reduced.end() ? reduced.at(0) : found->second,
+                        run, sink);
+  };
+  return detector;
+}
+
+Detector FittedBaseline(Baseline baseline) {
+  Detector detector{
+      baseline.name, 0, {}, kBasicSignals, SignatureTable(baseline)};
+  detector.follow = [baseline = std::move(baseline)](const ScoredRun& run,
+                                                     const VerdictSink&) {
+    return FollowBaseline(baseline, run.run);
+  };
+  return detector;
+}
+
+Detector VerdictFiles(const std::vector<std::string>& files) {
+  return {files.front(),
+          0,
+          {},
+          0,
+          "",
+          [files](const ScoredRun& run, const VerdictSink&) {
+            return ReadVerdicts(files.at(run.position), run.run);
+          }};
+}
+
+EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,
+                      const EvaluationSettings& settings) {
+  const Answer answer = detector.follow(
+      run, settings.watch ? settings.watch(run) : VerdictSink{});
+  EvaluatedRun result;
+  result.indices = ComputeIndices(answer.indications, run.horizon_s);
+  result.indices.run_id = run.name;
+  result.has_truth = settings.assume_normal || HasTruth(run.run);
+  result.duration_s = DurationOf(run.run);
+  result.seconds = answer.seconds;
+  for (const Indication& indication : answer.indications) {
+    if (!indication.isolated.empty()) {
+      result.last_set = indication.isolated;
+    }
+  }
+  if (settings.scored) {
+    settings.scored(run, result, answer.indications);
+  }
+  return result;
+}
+
+std::vector<EvaluatedRun> Evaluate(const Detector& detector,
+                                   const std::vector<ScoredRun>& runs,
+                                   const EvaluationSettings& settings) {
+  std::vector<EvaluatedRun> results(runs.size());
+  ParallelFor(static_cast<int>(runs.size()), settings.threads, [&](int i) {
+    const auto r = static_cast<std::size_t>(i);
+    results[r] = Evaluate(detector, runs[r], settings);
+  });
+  return results;
+}
+
+}  // namespace fdi::trainer

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+#include "trainer/baselines/baseline.h"
+#include "trainer/evaluation/evaluated_run.h"
+#include "trainer/evaluation/scored_runs.h"
+
+namespace fdi::trainer {
+
+/// What a detector indicated in the course of one run.
+struct Answer {
+  std::vector<Indication> indications;
+  /// Seconds by quality, which only the monitor's engine tells.
+  std::optional<std::array<double, kQualityCount>> seconds{};
+};
+
+/// A source of indications: the monitor's engine with a model set, a baseline,
+/// the files of somebody else's detector. Evaluate() scores them all alike.
+struct Detector {
+  std::string name;
+  int version{0};                    ///< Of a model set; 0: no model set.
+  std::vector<FaultGroup> groups{};  ///< Faults that it does not tell apart.
+  SignalMask required{0};            ///< Signals that it cannot do without.
+  std::string preface{};             ///< What people see before its results.
+  /// Follows one run; called from several threads at a time. The sink is
+  /// called with every verdict of an engine, and never by other detectors.
+  std::function<Answer(const ScoredRun&, const VerdictSink&)> follow{};
+};
+
+/// The monitor's engine. @throws DataError from `follow` as Rescore().
+Detector EngineDetector(const std::shared_ptr<const ModelSet>& models);
+
+/// The engine with, for each run, the set reduced by the fault of that run.
+Detector LeaveOneOutDetector(const ModelSet& models);
+
+/// A fitted baseline. It begins anew after a gap, and after a sample that the
+/// engine would not have accepted either.
+Detector FittedBaseline(Baseline baseline);
+
+/// Another detector, which wrote one CSV file for each run with the columns
+/// t_s, detected (0 or 1) and, if it isolates, faults (f3|f6, empty for none).
+/// t_s counts as in the file of the run, or as `fdi-store runs export` writes a
+/// stored one. Every sample has a row; rows outside the run are ignored.
+/// Nothing is smoothed or dated back, and the detector counts as settled from
+/// its first row on.
+///
+/// @param files in the order of the runs.
+/// @throws NotFoundError from `follow` if there is no such file; DataError
+///   naming file, line and reason: a column is missing, t_s does not rise, a
+///   malformed cell, faults without a detection, a sample without a row.
+Detector VerdictFiles(const std::vector<std::string>& files);
+
+/// Settings of Evaluate().
+struct EvaluationSettings {
+  bool assume_normal{false};  ///< A run without truth counts as fault-free.
+  int threads{0};             ///< 0: all of the machine.
+  /// Makes the sink for the verdicts on a run.
+  std::function<VerdictSink(const ScoredRun&)> watch{};
+  /// Called when a run has been scored.
+  std::function<void(const ScoredRun&, const EvaluatedRun&,
+                     const std::vector<Indication>&)>
+      scored{};
+};
+
+/// Computes the indices of one run. One without truth is not counted unless
+/// EvaluationSettings::assume_normal.
+EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,
+                      const EvaluationSettings& settings = {});
+
+/// The same for all of them, in parallel.
+std::vector<EvaluatedRun> Evaluate(const Detector& detector,
+                                   const std::vector<ScoredRun>& runs,
+                                   const EvaluationSettings& settings = {});
+
+}  // namespace fdi::trainer

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "cli/report.h"
+#include "cli/text_table.h"
+#include "diagnosis/model_set.h"
+#include "diagnosis/verdict.h"
+#include "trainer/evaluation/detectors.h"
+
+/// What an evaluation prints and writes, but for its page.
+namespace fdi::trainer {
+
+/// {"model_set", "version"}, or {"detector"}.
+cli::Json DetectorJson(const Detector& detector);
+
+/// What DetectorJson() says, figures over all runs, hours, confusion.
+cli::Json SummaryJson(const Detector& detector,
+                      const std::vector<EvaluatedRun>& runs);
+
+/// The figures of a SummaryJson() for people.
+std::vector<cli::Column> SummaryFields();
+
+/// {"runs": [...], "summary": SummaryJson()}; for people a table of the runs,
+/// the summary and the confusion matrices.
+cli::Report EvaluationReport(const Detector& detector,
+                             const std::vector<EvaluatedRun>& runs);
+
+/// One line per run: the columns of the JSON and a few more.
+void WriteEvaluationCsv(std::ostream& out,
+                        const std::vector<EvaluatedRun>& runs);
+
+/// A table for people, as text or as HTML.
+struct Grid {
+  std::vector<cli::TextTable::Column> columns;
+  std::vector<std::vector<std::string>> rows;
+};
+
+/// A row per run: truth, indices, final set.
+Grid RunsGrid(const std::vector<EvaluatedRun>& runs);
+
+/// A row per truth. The last two columns are those of an unknown fault and of
+/// no alarm.
+Grid ConfusionGrid(const ConfusionMatrix& matrix, const std::string& heading);
+
+/// "f3", "normal"; empty without truth.
+std::string TruthText(const EvaluatedRun& run);
+/// An index for people: "-" where it has no meaning.
+std::string IndexText(double value, int decimals);
+/// "3", "0.33", "." for none: a count, or a share of one.
+std::string CountText(double count);
+/// The table as it would be printed, without its last line break.
+std::string TextOf(const cli::TextTable& table);
+std::string TextOf(const Grid& grid);
+
+/// The file of `evaluate --vectors`: one line per sample with what the engine
+/// said. Numbers are hex floats (%a), so that lines of equal bits are equal.
+/// Columns: run, stamp_ns, source_id, seq, intake, initialised, quality, state,
+/// r_CHANNEL, d_0, d_FAULT, isolated (f3|f6), o_OBSERVER.
+class VectorsCsv {
+ public:
+  /// `out` and `models` must outlive it.
+  VectorsCsv(std::ostream& out, const ModelSet& models);
+  void Add(const std::string& run, const Verdict& verdict);
+
+ private:
+  std::ostream& out_;
+  const ModelSet& models_;
+};
+
+}  // namespace fdi::trainer

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "storage/runs/runs.h"
+#include "trainer/evaluation.h"
+
+namespace fdi::trainer {
+
+/// Runs the monitor's own engine over a stored run as the live one met it: all
+/// samples in the order of arrival, those of a superseded source left out; the
+/// models adopted anew where another set began to answer, the episode ended
+/// where the observers were initialised for a reason that the samples do not
+/// show. The truth is kept beside it and never reaches the engine.
+///
+/// @throws DataError naming run and model set if sample period or flow unit
+///   differ.
+std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
+                                const storage::StoredRun& run,
+                                const VerdictSink& sink = {});
+
+}  // namespace fdi::trainer

@@ -1,0 +1,80 @@
+#include "trainer/evaluation/scored_runs.h"
+
+#include <CLI/CLI.hpp>
+
+#include "cli/tag_map.h"
+#include "diagnosis/error.h"
+#include "storage/database/data_directory.h"
+#include "storage/runs/runs.h"
+#include "trainer/campaign/campaign_runs.h"
+#include "trainer/campaign/file_runs.h"
+#include "trainer/campaign/run_input.h"
+
+namespace fdi::trainer {
+
+void RunSelection::AddTo(CLI::App& verb) {
+  verb.add_option("--runs", runs, "Runs, or stretches of them [s]")
+      ->delimiter(',')
+      ->type_name("ID[@from:to],...");
+  verb.add_option("--file", files,
+                  "CSV file scored without storing it; repeatable")
+      ->expected(1)
+      ->take_all()
+      ->type_name("FILE.csv[@from:to]");
+  verb.add_option("--campaign", campaign,
+                  "Its validation runs; simulates or imports what is missing")
+      ->type_name("FILE.toml");
+  verb.add_option("--seed-offset", seed_offset,
+                  "Added to the seeds of simulated validation runs")
+      ->check(CLI::Range(0, 1000000000))
+      ->type_name("N");
+  verb.add_option("--map", map,
+                  "TOML file: names, units, scale, offset, sense of columns")
+      ->type_name("FILE.toml");
+}
+
+std::optional<cli::ColumnMap> RunSelection::ReadMap() const {
+  return map.empty() ? std::nullopt : std::optional(cli::ReadTagMap(map));
+}
+
+std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
+                                      SignalMask required,
+                                      const cli::Context& context) {
+  if (selection.runs.empty() && selection.files.empty() &&
+      selection.campaign.empty()) {
+    throw ConfigError(
+        "what to score: --runs ID,..., --file FILE.csv or "
+        "--campaign FILE.toml");
+  }
+  std::vector<ScoredRun> runs;
+  // The order is part of the contract: files of verdicts are given in it.
+  const auto add = [&runs](storage::StoredRun run, std::string name = "",
+                           double horizon_s = 0.0) {
+    name = name.empty() ? RunName(run) : std::move(name);
+    runs.push_back({std::move(run), std::move(name), horizon_s, runs.size()});
+  };
+  if (!selection.campaign.empty()) {
+    const std::vector<CampaignRun> validation =
+        ValidationRuns(selection.campaign, selection.seed_offset);
+    std::vector<storage::StoredRun> stored =
+        LoadCampaignRuns(validation, context);
+    for (std::size_t i = 0; i < validation.size(); ++i) {
+      add(std::move(stored[i]), RunLabel(validation[i]),
+          validation[i].horizon_s);
+    }
+  }
+  if (!selection.runs.empty()) {
+    const storage::DataDirectory directory{context.options.data_dir};
+    storage::RunStore store(directory.runs());
+    for (const std::string& selector : selection.runs) {
+      add(store.Load(selector));
+    }
+  }
+  const auto map = selection.ReadMap();
+  for (const std::string& file : selection.files) {
+    add(ReadRunFile(file, map, required));
+  }
+  return runs;
+}
+
+}  // namespace fdi::trainer
