@@ -61,7 +61,10 @@ TEST_F(QosTest, AFileAboutReliabilityLeavesTheLimitsAlone) {
   Participant there(WithBestEffortWriter(), log_there_.Sink());
   Subscriber<ValveSampleMessage> subscriber(here, Profile::kBestEffort);
   Publisher<ValveSampleMessage> publisher(there);
+  // Both ends have to know each other: what a best-effort writer sends before
+  // its reader knows it is lost.
   ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+  ASSERT_TRUE(subscriber.WaitForWriters(1, kPatience));
 
   int count = 0;
   const Handlers<ValveSampleMessage> handlers{
