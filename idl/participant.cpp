@@ -8,7 +8,9 @@
 
 #include <arpa/inet.h>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/UDPv6TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <ifaddrs.h>
 #include <netinet/in.h>
@@ -20,8 +22,11 @@ namespace fdi::idl {
 namespace {
 
 namespace dds = eprosima::fastdds::dds;
-using eprosima::fastdds::rtps::SharedMemTransportDescriptor;
-using eprosima::fastdds::rtps::UDPv4TransportDescriptor;
+namespace transport = eprosima::fastdds::rtps;
+using eprosima::fastrtps::rtps::Locator_t;
+using transport::SharedMemTransportDescriptor;
+using transport::UDPv4TransportDescriptor;
+using transport::UDPv6TransportDescriptor;
 
 constexpr int kMaxDomain = 232;
 constexpr int kMaxValvesLimit = 100000;
@@ -98,6 +103,73 @@ void SetUpLibraryOnce() {
   static_cast<void>(done);
 }
 
+// What a transport of the library receives, without what would harm it.
+class CheckedTransport : public transport::ChainingTransport {
+ public:
+  CheckedTransport(
+      const std::shared_ptr<transport::TransportDescriptorInterface>& lower,
+      std::shared_ptr<DatagramLog> log)
+      : ChainingTransport(Chain(lower)), log_(std::move(log)) {}
+
+  transport::TransportDescriptorInterface* get_configuration() override {
+    return low_level_transport_->get_configuration();
+  }
+
+  bool send(eprosima::fastrtps::rtps::SenderResource* sender,
+            const eprosima::fastrtps::rtps::octet* buffer, std::uint32_t bytes,
+            transport::LocatorsIterator* begin,
+            transport::LocatorsIterator* end,
+            const std::chrono::steady_clock::time_point& timeout) override {
+    return sender->send(buffer, bytes, begin, end, timeout);
+  }
+
+  void receive(transport::TransportReceiverInterface* receiver,
+               const eprosima::fastrtps::rtps::octet* buffer,
+               std::uint32_t bytes, const Locator_t& local,
+               const Locator_t& remote) override {
+    const CheckedDatagram checked = CheckDatagram({buffer, bytes});
+    log_->Count(checked.verdict, bytes, remote);
+    if (checked.verdict == DatagramVerdict::kSound) {
+      receiver->OnDataReceived(
+          buffer, static_cast<std::uint32_t>(checked.bytes), local, remote);
+    }
+  }
+
+ private:
+  // For the base, which makes a transport of `lower`.
+  struct Chain : transport::ChainingTransportDescriptor {
+    using ChainingTransportDescriptor::ChainingTransportDescriptor;
+    transport::TransportInterface* create_transport() const override {
+      return nullptr;
+    }
+  };
+
+  std::shared_ptr<DatagramLog> log_;
+};
+
+// Still a descriptor of its kind: the library looks for shared memory by type.
+template <typename Descriptor>
+struct Checked : Descriptor {
+  Checked(const Descriptor& lower, std::shared_ptr<DatagramLog> datagrams)
+      : Descriptor(lower), log(std::move(datagrams)) {}
+
+  transport::TransportInterface* create_transport() const override {
+    return new CheckedTransport(std::make_shared<Descriptor>(*this), log);
+  }
+
+  std::shared_ptr<DatagramLog> log;
+};
+
+template <typename Descriptor>
+bool Wrap(std::shared_ptr<transport::TransportDescriptorInterface>& any,
+          const std::shared_ptr<DatagramLog>& log) {
+  const auto* lower = dynamic_cast<const Descriptor*>(any.get());
+  if (lower != nullptr) {
+    any = std::make_shared<Checked<Descriptor>>(*lower, log);
+  }
+  return lower != nullptr;
+}
+
 void SetTransports(const DdsOptions& options, dds::DomainParticipantQos& qos) {
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports.clear();
@@ -117,8 +189,27 @@ void SetTransports(const DdsOptions& options, dds::DomainParticipantQos& qos) {
   }
 }
 
+// Also those of a QoS file; TCP stays as it is.
+void CheckTransports(const std::shared_ptr<DatagramLog>& log,
+                     dds::TransportConfigQos& qos) {
+  if (std::exchange(qos.use_builtin_transports, false)) {
+    auto udp = std::make_shared<UDPv4TransportDescriptor>();
+    udp->sendBufferSize = qos.send_socket_buffer_size;
+    udp->receiveBufferSize = qos.listen_socket_buffer_size;
+    qos.user_transports.push_back(udp);
+    qos.user_transports.push_back(
+        std::make_shared<SharedMemTransportDescriptor>());
+  }
+  for (auto& each : qos.user_transports) {
+    Wrap<UDPv4TransportDescriptor>(each, log) ||
+        Wrap<UDPv6TransportDescriptor>(each, log) ||
+        Wrap<SharedMemTransportDescriptor>(each, log);
+  }
+}
+
 dds::DomainParticipantQos MakeQos(const DdsOptions& options,
                                   const ProfileFile& profiles,
+                                  const std::shared_ptr<DatagramLog>& log,
                                   const std::string& name) {
   dds::DomainParticipantQos qos;
   const std::set<std::string>* stated = profiles.Stated(kParticipantProfile);
@@ -134,6 +225,7 @@ dds::DomainParticipantQos MakeQos(const DdsOptions& options,
   if (!states("userTransports") && !states("useBuiltinTransports")) {
     SetTransports(options, qos);
   }
+  CheckTransports(log, qos.transport());
   if (!states("builtin")) {
     auto& discovery = qos.wire_protocol().builtin.discovery_config;
     discovery.leaseDuration = {5, 0};
@@ -172,15 +264,36 @@ void Validate(const DdsOptions& options) {
   ValidateInterfaces(options.interfaces);
 }
 
+void DatagramLog::Count(DatagramVerdict verdict, std::size_t bytes,
+                        const Locator_t& sender) {
+  const std::uint64_t before =
+      counts_[static_cast<std::size_t>(verdict)].fetch_add(
+          1, std::memory_order_relaxed);
+  if (verdict != DatagramVerdict::kSound && before == 0 && log_) {
+    std::ostringstream line;
+    line << "datagram_refused reason=" << DatagramVerdictName(verdict)
+         << " bytes=" << bytes << " from=" << sender;
+    log_(LogLevel::kWarning, line.str());
+  }
+}
+
+DatagramCounts DatagramLog::counts() const {
+  DatagramCounts counts{};
+  std::ranges::copy(counts_, counts.begin());
+  return counts;
+}
+
 Participant::Impl::Impl(const DdsOptions& options, LogSink log,
                         const std::string& name)
     : options_(options),
       log_(std::move(log)),
       library_log_(log_),
+      datagrams_(std::make_shared<DatagramLog>(log_)),
       profiles_(options.qos_file.empty() ? ProfileFile()
                                          : ProfileFile(options.qos_file)) {
   SetUpLibraryOnce();
-  const dds::DomainParticipantQos qos = MakeQos(options_, profiles_, name);
+  const dds::DomainParticipantQos qos =
+      MakeQos(options_, profiles_, datagrams_, name);
   handle_ = NotNull(
       dds::DomainParticipantFactory::get_instance()->create_participant(
           static_cast<std::uint32_t>(options_.domain), qos, this,
@@ -274,6 +387,10 @@ Participant::~Participant() = default;
 
 const DdsOptions& Participant::options() const {
   return impl_->options();
+}
+
+DatagramCounts Participant::datagrams() const {
+  return impl_->datagrams();
 }
 
 }  // namespace fdi::idl

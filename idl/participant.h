@@ -5,6 +5,7 @@
 #include <string>
 
 #include "diagnosis/log.h"
+#include "idl/datagram.h"
 
 namespace fdi::idl {
 
@@ -47,6 +48,9 @@ class Participant {
   Participant& operator=(const Participant&) = delete;
 
   const DdsOptions& options() const;
+  /// What came from the network, all endpoints together. What is refused is
+  /// dropped, with one line in the log for each reason.
+  DatagramCounts datagrams() const;
 
   class Impl;
   Impl& impl() { return *impl_; }

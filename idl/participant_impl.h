@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -85,6 +86,21 @@ class LibraryLog {
   LogSink sink_;
 };
 
+/// Counts the datagrams of a participant, by verdict. Thread safe.
+class DatagramLog {
+ public:
+  explicit DatagramLog(LogSink log) : log_(std::move(log)) {}
+
+  /// @param sender for the log.
+  void Count(DatagramVerdict verdict, std::size_t bytes,
+             const eprosima::fastrtps::rtps::Locator_t& sender);
+  DatagramCounts counts() const;
+
+ private:
+  LogSink log_;
+  std::array<std::atomic<std::uint64_t>, kDatagramVerdictCount> counts_{};
+};
+
 /// What Participant is outside of idl/, with the library's handle in it.
 class Participant::Impl
     : private eprosima::fastdds::dds::DomainParticipantListener {
@@ -109,6 +125,7 @@ class Participant::Impl
   eprosima::fastdds::dds::DomainParticipant* operator->() { return handle_; }
   const DdsOptions& options() const { return options_; }
   const ProfileFile& profiles() const { return profiles_; }
+  DatagramCounts datagrams() const { return datagrams_->counts(); }
 
  private:
   using RemoteKey = std::pair<std::string, bool>;  // Topic, is a writer.
@@ -124,6 +141,7 @@ class Participant::Impl
   DdsOptions options_;
   LogSink log_;
   LibraryLog library_log_;
+  std::shared_ptr<DatagramLog> datagrams_;  // The transports have it, too.
   ProfileFile profiles_;
   std::mutex remotes_mutex_;
   std::map<RemoteKey, std::deque<PolicyTexts>> remotes_;  // Newest first.

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <utility>
 
 #include <systemd/sd-daemon.h>
@@ -376,9 +377,13 @@ void Service::Reload(const char* cause) {
 }
 
 StatusFacts Service::Facts() const {
+  idl::DatagramCounts datagrams = participant_.datagrams();
+  std::ranges::transform(datagrams, intake_participant_.datagrams(),
+                         datagrams.begin(), std::plus<>());
   return {counters_,
           pipeline_.census(),
           samples_.status(),
+          datagrams,
           decisions_.status(),
           pipeline_.journal_backlog(),
           pipeline_.recorder_backlog(),

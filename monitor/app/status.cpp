@@ -145,12 +145,24 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
   constexpr std::string_view kWaitingHelp =
       "Samples, records or points of evidence in a queue";
   std::vector<Measure> measures = facts.counters.Measures();
+  std::uint64_t refused_datagrams = 0;
+  for (std::size_t i = 0; i < idl::kDatagramVerdictCount; ++i) {
+    const auto verdict = static_cast<idl::DatagramVerdict>(i);
+    refused_datagrams += i == 0 ? 0 : facts.datagrams[i];
+    measures.push_back({"", "fdi_dds_datagrams_total", kCounter,
+                        "Datagrams by the check of their framing: sound, or "
+                        "why they were dropped",
+                        "verdict",
+                        std::string(idl::DatagramVerdictName(verdict)),
+                        facts.datagrams[i]});
+  }
   const std::vector<Measure> others{
       {"dds_lost", "fdi_dds_samples_lost_total", kCounter,
        "Samples written that will never come", "", "", samples.lost},
       {"dds_undecodable", "fdi_dds_samples_undecodable_total", kCounter,
        "Samples with a value that no publisher of ours sends", "", "",
        samples.undecodable},
+      {.name = "dds_refused_datagrams", .value = refused_datagrams},
       {"dds_rejected_instances", kRejected, kCounter, kRejectedHelp, "reason",
        "max_valves", samples.rejected_instances},
       {"dds_rejected_samples", kRejected, kCounter, kRejectedHelp, "reason",

@@ -26,6 +26,7 @@ struct StatusFacts {
   const Counters& counters;
   ValveCensus census;
   idl::SubscriberStatus samples;
+  idl::DatagramCounts datagrams;  ///< Of all participants.
   idl::PublisherStatus decisions;
   Journal::Backlog journal;
   std::size_t recorder_backlog{0};

@@ -1,0 +1,185 @@
+// A message is a header and submessages:
+//
+//     message    = "RTPS" version(2) vendor(2) prefix(12) {submessage}
+//     submessage = kind(1) flags(1) length(2) body(length) {pad to 4}
+//
+// Bit 0 of the flags: numbers are little endian. Length 0 means up to the end
+// of the message, except for PAD and INFO_TS.
+#include "idl/datagram.h"
+
+#include <algorithm>
+
+namespace fdi::idl {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+constexpr std::size_t kHeaderBytes = 20;
+constexpr std::size_t kSubmessageHeaderBytes = 4;
+constexpr std::uint8_t kPad = 0x01;
+constexpr std::uint8_t kAckNack = 0x06;
+constexpr std::uint8_t kHeartbeat = 0x07;
+constexpr std::uint8_t kGap = 0x08;
+constexpr std::uint8_t kInfoTs = 0x09;
+constexpr std::uint8_t kNackFrag = 0x12;
+constexpr std::uint8_t kHeartbeatFrag = 0x13;
+constexpr std::uint8_t kData = 0x15;
+constexpr std::uint8_t kDataFrag = 0x16;
+constexpr std::uint8_t kFirstOfVendors = 0x80;
+constexpr std::uint8_t kInlineQosFlag = 0x02;
+constexpr std::uint8_t kInvalidateFlag = 0x02;  // INFO_TS without a time.
+constexpr std::uint16_t kSentinel = 1;          // Ends a parameter list.
+
+// A writer of 100 000 a second has this many after 22 000 years; the library
+// counts on from a number, and aborts at the end of the range.
+constexpr std::int64_t kSequenceLimit = std::int64_t{1} << 56;
+// The library walks through a gap one by one.
+constexpr std::int64_t kLongestGap = std::int64_t{1} << 32;
+
+// Bytes that a body has at least; -1: no such kind.
+int LeastBody(std::uint8_t kind, std::uint8_t flags) {
+  switch (kind) {
+    case kPad:
+      return 0;
+    case kAckNack:
+      return 24;
+    case kHeartbeat:
+    case kGap:
+    case kNackFrag:
+      return 28;
+    case kHeartbeatFrag:
+      return 24;
+    case kInfoTs:
+      return (flags & kInvalidateFlag) != 0 ? 0 : 8;
+    case 0x0c:  // INFO_SRC
+      return 20;
+    case 0x0e:  // INFO_DST
+      return 12;
+    case 0x0d:  // INFO_REPLY_IP4
+    case 0x0f:  // INFO_REPLY
+      return 4;
+    case kData:
+      return 20;
+    case kDataFrag:
+      return 32;
+    default:  // Of DDS Security: SEC_BODY to SRTPS_POSTFIX.
+      return kind >= 0x30 && kind <= 0x34 ? 0 : -1;
+  }
+}
+
+// A body and the order of its bytes. Whoever reads knows that it is long
+// enough.
+struct Body {
+  Bytes bytes;
+  bool little_endian;
+
+  std::uint16_t U16(std::size_t at) const {
+    const std::uint16_t a = bytes[at];
+    const std::uint16_t b = bytes[at + 1];
+    return static_cast<std::uint16_t>(little_endian ? a | b << 8U
+                                                    : a << 8U | b);
+  }
+  std::int64_t U32(std::size_t at) const {
+    const std::int64_t a = U16(at);
+    const std::int64_t b = U16(at + 2);
+    return little_endian ? a | b << 16 : a << 16 | b;
+  }
+  // Of 64 bit, the high half first; -1: none that a writer has.
+  std::int64_t Sequence(std::size_t at) const {
+    const std::int64_t high = U32(at);
+    return high < kSequenceLimit >> 32 ? high << 32 | U32(at + 4) : -1;
+  }
+};
+
+// Whether a data submessage has its parameters inside itself.
+bool DataIsSound(const Body& body, std::uint8_t flags, std::size_t fixed) {
+  std::size_t at = 4U + body.U16(2);  // From behind the offset itself.
+  if (body.Sequence(12) < 1 || at < fixed || at > body.bytes.size()) {
+    return false;
+  }
+  bool ended = (flags & kInlineQosFlag) == 0;
+  while (!ended) {
+    if (at + 4 > body.bytes.size()) {
+      return false;
+    }
+    ended = body.U16(at) == kSentinel;
+    at += 4U + (ended ? 0U : (body.U16(at + 2) + 3U) & ~3U);
+  }
+  return at <= body.bytes.size();
+}
+
+bool ContentIsSound(std::uint8_t kind, std::uint8_t flags, const Body& body) {
+  switch (kind) {
+    case kData:
+      return DataIsSound(body, flags, 20);
+    case kDataFrag:
+      return DataIsSound(body, flags, 32) && body.U32(20) > 0 &&
+             body.U16(24) > 0 && body.U16(26) > 0;
+    case kHeartbeat:
+      return body.Sequence(8) > 0 && body.Sequence(16) >= 0;
+    case kGap: {
+      const std::int64_t start = body.Sequence(8);
+      const std::int64_t base = body.Sequence(16);
+      return start > 0 && base > 0 && base - start <= kLongestGap &&
+             body.U32(24) <= 256;
+    }
+    case kAckNack:
+      return body.Sequence(8) >= 0 && body.U32(16) <= 256;
+    case kNackFrag:
+      return body.Sequence(8) >= 0 && body.U32(20) <= 256;
+    default:
+      return true;
+  }
+}
+
+}  // namespace
+
+std::string_view DatagramVerdictName(DatagramVerdict verdict) {
+  constexpr std::array<std::string_view, kDatagramVerdictCount> kNames{
+      "sound", "header", "length", "kind", "content"};
+  return kNames[static_cast<std::size_t>(verdict)];
+}
+
+CheckedDatagram CheckDatagram(Bytes datagram) {
+  const std::size_t size = datagram.size();
+  if (size < kHeaderBytes || datagram[0] != 'R' || datagram[1] != 'T' ||
+      datagram[2] != 'P' || datagram[3] != 'S' || datagram[4] != 2) {
+    return {DatagramVerdict::kHeader, 0};
+  }
+  std::size_t sound = kHeaderBytes;  // Up to here, all is handed over.
+  for (std::size_t at = sound; at < size;) {
+    if (size - at < kSubmessageHeaderBytes) {
+      return {DatagramVerdict::kLength, 0};
+    }
+    const std::uint8_t kind = datagram[at];
+    const std::uint8_t flags = datagram[at + 1];
+    const Body header{datagram.subspan(at), (flags & 1U) != 0};
+    const std::size_t begin = at + kSubmessageHeaderBytes;
+    const std::size_t stated = header.U16(2);
+    const bool to_end = stated == 0 && kind != kPad && kind != kInfoTs;
+    const std::size_t length = to_end ? size - begin : stated;
+    if (length > size - begin) {
+      return {DatagramVerdict::kLength, 0};
+    }
+    const std::size_t end =
+        begin + std::min((length + 3) & ~std::size_t{3}, size - begin);
+    if (kind < kFirstOfVendors) {
+      const int least = LeastBody(kind, flags);
+      if (least < 0 || at != sound) {  // Behind a vendor's own.
+        return {DatagramVerdict::kKind, 0};
+      }
+      if (length < static_cast<std::size_t>(least)) {
+        return {DatagramVerdict::kLength, 0};
+      }
+      const Body body{datagram.subspan(begin, length), header.little_endian};
+      if (!ContentIsSound(kind, flags, body)) {
+        return {DatagramVerdict::kContent, 0};
+      }
+      sound = end;
+    }
+    at = end;
+  }
+  return {DatagramVerdict::kSound, sound};
+}
+
+}  // namespace fdi::idl

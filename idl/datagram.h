@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace fdi::idl {
+
+/// Whether a datagram goes to the DDS library, or why not.
+enum class DatagramVerdict : std::uint8_t {
+  kSound,
+  kHeader,   ///< Not RTPS 2: magic, version, or too short.
+  kLength,   ///< A submessage does not fit into the datagram, or its kind.
+  kKind,     ///< A kind of submessage that the standard does not have.
+  kContent,  ///< Numbers and lengths inside that no writer has.
+};
+inline constexpr std::size_t kDatagramVerdictCount = 5;
+
+/// "sound", "header", ...
+std::string_view DatagramVerdictName(DatagramVerdict verdict);
+
+struct CheckedDatagram {
+  DatagramVerdict verdict{DatagramVerdict::kSound};
+  /// What to hand over from the front: all but vendors' own submessages at the
+  /// end. Each participant of Fast DDS adds one, its statistics.
+  std::size_t bytes{0};
+};
+
+/// Checks the framing of an RTPS message [OMG formal/2022-04-01, 9.4.5], which
+/// Fast DDS 2.9.1 believes: it aborts on a statistics submessage that is not
+/// the last, on sequence numbers at the end of their range, and reads beyond a
+/// submessage that is shorter than its parameters.
+CheckedDatagram CheckDatagram(std::span<const std::uint8_t> datagram);
+
+/// Datagrams by verdict, since the participant exists.
+using DatagramCounts = std::array<std::uint64_t, kDatagramVerdictCount>;
+
+}  // namespace fdi::idl
