@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Checks the built unit file: known keys only, and an exposure of at most 2 of
-# 10. Usage: service_unit.sh UNIT PROGRAM      77 without systemd-analyze.
+# Checks the built unit file: known keys only, a limit of memory, and an
+# exposure of at most 2 of 10. Usage: service_unit.sh UNIT PROGRAM      77 without systemd-analyze.
 set -euo pipefail
 unit=$1
 program=$2
@@ -17,5 +17,6 @@ if [ -n "$complaints" ]; then
   echo "$complaints"
   exit 1
 fi
+grep -q '^MemoryMax=[0-9]' "$checked"
 systemd-analyze security --offline=true --threshold=20 --no-pager "$checked" |
   tail -1

@@ -439,10 +439,13 @@ std::string GnuplotScript(const Figure& figure, Format format,
   return ScriptWriter(drawable, format).Write(output);
 }
 
-std::string DrawFigure(const Figure& figure, Format format) {
-  return RunGnuplot([&](const std::filesystem::path& output) {
-    return GnuplotScript(figure, format, output);
-  });
+std::string DrawFigure(const Figure& figure, Format format,
+                       const GnuplotLimits& limits) {
+  return RunGnuplot(
+      [&](const std::filesystem::path& output) {
+        return GnuplotScript(figure, format, output);
+      },
+      limits);
 }
 
 void DrawFigure(const Figure& figure, const std::filesystem::path& output) {

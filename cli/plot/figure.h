@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "cli/plot/gnuplot.h"
+
 /// Figures: panels above each other on one horizontal axis, drawn by gnuplot as
 /// PNG or SVG. A caller fills a Figure and calls DrawFigure().
 namespace fdi::plot {
@@ -124,7 +126,8 @@ std::string GnuplotScript(const Figure& figure, Format format,
 /// The bytes of the picture.
 /// @throws DataError if there is nothing to draw; std::runtime_error if gnuplot
 ///   is missing or fails.
-std::string DrawFigure(const Figure& figure, Format format);
+std::string DrawFigure(const Figure& figure, Format format,
+                       const GnuplotLimits& limits = {});
 
 /// Draws to the file `output`, whose ending gives the format. The file is
 /// there only if all of it could be drawn.

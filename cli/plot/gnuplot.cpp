@@ -3,6 +3,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -11,6 +12,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <system_error>
+#include <thread>
 
 #include <spawn.h>
 #include <sys/wait.h>
@@ -46,20 +48,50 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-void RunScript(const std::filesystem::path& script) {
+// In a process group of its own, which can be killed as a whole, and without
+// the files and sockets of this process.
+pid_t Spawn(const std::filesystem::path& script) {
   std::string name = "gnuplot";
   std::string argument = script.string();
   const std::array<char*, 3> arguments{name.data(), argument.data(), nullptr};
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_addclosefrom_np(&files, STDERR_FILENO + 1);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   pid_t child = 0;
-  const int code = posix_spawnp(&child, "gnuplot", nullptr, nullptr,
+  const int code = posix_spawnp(&child, "gnuplot", &files, &attributes,
                                 arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&files);
+  posix_spawnattr_destroy(&attributes);
   if (code != 0) {
     throw std::runtime_error(std::string("gnuplot cannot run: ") +
                              std::strerror(code) +
                              "; on Debian it is in gnuplot-nox");
   }
+  return child;
+}
+
+void RunScript(const std::filesystem::path& script,
+               const GnuplotLimits& limits) {
+  using Clock = std::chrono::steady_clock;
+  const pid_t child = Spawn(script);
+  const Clock::time_point deadline = Clock::now() + limits.time;
+  bool killed = false;
   int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  while (waitpid(child, &status, WNOHANG) == 0) {
+    if (!killed && (Clock::now() >= deadline || limits.stop.stop_requested())) {
+      kill(-child, SIGKILL);
+      killed = true;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  if (killed) {
+    throw std::runtime_error("gnuplot was killed: it took longer than " +
+                             std::to_string(limits.time.count()) +
+                             " ms, or the program ends");
   }
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
     throw std::runtime_error("gnuplot failed, see above");
@@ -82,7 +114,8 @@ bool HaveGnuplot() {
 
 std::string RunGnuplot(
     const std::function<std::string(const std::filesystem::path& output)>&
-        script_for) {
+        script_for,
+    const GnuplotLimits& limits) {
   const ScratchFolder scratch;
   const std::filesystem::path script = scratch.path() / "plot.gp";
   const std::filesystem::path output = scratch.path() / "picture";
@@ -92,7 +125,7 @@ std::string RunGnuplot(
   if (!out) {
     throw std::runtime_error("cannot write " + script.string());
   }
-  RunScript(script);
+  RunScript(script, limits);
   std::ifstream picture(output, std::ios::binary);
   if (!picture) {
     throw std::runtime_error("gnuplot drew nothing, see above");

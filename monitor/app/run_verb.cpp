@@ -64,6 +64,7 @@ void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
   console::ConsoleOptions& console =
       options.console.emplace(arguments.console_options);
   console.address = ParseHttpAddress(arguments.console, "--console");
+  console.names = options.http_names;
   if (writable) {
     console.token_file = arguments.console_token;
   }
@@ -126,6 +127,9 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
     options.http = ParseHttpAddress(arguments.http, "--http");
   }
   TakeConsole(arguments, options);
+  if (!options.http_names.empty() && !options.http && !options.console) {
+    throw ConfigError("--allow-host needs --http or --console");
+  }
   cli::StopSignals signals;
   const cli::Context limited{context.options, LimitLog(context.log),
                              context.software, context.command_line};
@@ -188,6 +192,10 @@ void AddRunVerb(cli::Program& program) {
       ->transform(AddressOr("127.0.0.1:9464"))
       ->type_name("[=[ADDRESS:]PORT]");
   AddConsoleOptions(run, *arguments);
+  run.add_option("--allow-host", service.http_names,
+                 "Answer --http and --console under this name, too; beside it "
+                 "only localhost, addresses, and the name of the machine are")
+      ->type_name("NAME");
   run.add_option("--status-period", service.status_period_s,
                  "Time between status lines in the log [s]")
       ->check(CLI::Range(1.0, 86400.0))

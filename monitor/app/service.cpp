@@ -100,7 +100,7 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
     : options_(options),
       context_(context),
       http_(options.http ? std::make_unique<HttpServer>(
-                               HttpServerOptions{.address = *options.http})
+                               ProbeServer(*options.http, options.http_names))
                          : nullptr),
       console_(options.console
                    ? std::make_unique<console::Console>(
@@ -395,9 +395,14 @@ StatusFacts Service::Facts() const {
 std::string Service::Metrics() const {
   MetricsFacts facts{context_.software, started_ns_, data_,
                      heartbeat_.members()};
+  facts.requests = http_->counts();
   if (console_) {
     facts.streams = console_->streams();
     facts.board_bytes = console_->board_bytes();
+    for (const auto& [outcome, count] : console_->requests()) {
+      facts.requests[outcome] += count;
+    }
+    facts.tokens = console_->tokens();
   }
   std::string page = MetricsPage(Facts(), facts);
   if (const ShadowCounts* counts = pipeline_.shadow_counts()) {

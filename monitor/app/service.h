@@ -47,6 +47,7 @@ struct ServiceOptions {
   std::string shadow_valves{"*"};
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
+  std::vector<std::string> http_names;  ///< See HostAllowed().
   /// Groups of valves with causes in common; empty: DATA/groups.toml, if any.
   std::filesystem::path groups;
   /// Notify a program or a web server of events; empty: nobody.

@@ -75,9 +75,10 @@ void AddThreads(const std::vector<Heartbeat::Member>& threads,
   }
 }
 
-std::vector<Measure> ConsoleMeasures(const console::StreamCounts& streams,
-                                     std::uint64_t board_bytes) {
+std::vector<Measure> ConsoleMeasures(const MetricsFacts& facts) {
   constexpr std::string_view kStreams = "fdi_console_streams_total";
+  constexpr std::string_view kTokens = "fdi_console_token_failures_total";
+  const console::StreamCounts& streams = *facts.streams;
   return {
       {"", "fdi_console_streams", Type::kGauge, "Live streams now", "", "",
        streams.clients},
@@ -87,8 +88,24 @@ std::vector<Measure> ConsoleMeasures(const console::StreamCounts& streams,
        "outcome", "admitted", streams.admitted},
       {"", kStreams, Type::kCounter, "", "outcome", "refused", streams.refused},
       {"", kStreams, Type::kCounter, "", "outcome", "dropped", streams.dropped},
+      {"", kTokens, Type::kCounter,
+       "Requests to change something with a wrong token, or not looked at "
+       "after too many of those",
+       "outcome", "wrong", facts.tokens.wrong},
+      {"", kTokens, Type::kCounter, "", "outcome", "not_looked_at",
+       facts.tokens.unread},
       {"", "fdi_console_bytes", Type::kGauge,
-       "Memory of the trends that the console shows", "", "", board_bytes}};
+       "Memory of the trends that the console shows", "", "",
+       facts.board_bytes}};
+}
+
+void AddRequests(const HttpServer::Counts& requests, Exposition& page) {
+  page.Family("fdi_http_requests_total", Type::kCounter,
+              "Requests to --http and --console that were answered, refused "
+              "before any page saw them, or given up by the client");
+  for (const auto& [outcome, count] : requests) {
+    page.Value(count, {"outcome", outcome});
+  }
 }
 
 void AddProcess(const MetricsFacts& facts, Exposition& page) {
@@ -276,10 +293,23 @@ std::string MetricsPage(const StatusFacts& status, const MetricsFacts& facts) {
   AddDatabases(facts.data, page);
   AddThreads(facts.threads, page);
   if (facts.streams) {
-    page.Add(ConsoleMeasures(*facts.streams, facts.board_bytes));
+    page.Add(ConsoleMeasures(facts));
   }
+  AddRequests(facts.requests, page);
   AddProcess(facts, page);
   return page.text();
+}
+
+HttpServerOptions ProbeServer(const HttpAddress& address,
+                              const std::vector<std::string>& names) {
+  return {.address = address,
+          .lanes = {{.threads = 1,
+                     .takes =
+                         [](std::string_view path) {
+                           return path == "/healthz" || path == "/readyz";
+                         }},
+                    {.threads = 1}},
+          .names = names};
 }
 
 HttpServer::Pages ProbePages(const Heartbeat& heartbeat, ProbeSources sources) {

@@ -10,6 +10,7 @@
 
 #include "idl/endpoint.h"
 #include "idl/wire.h"
+#include "monitor/console/access.h"
 #include "monitor/console/live_stream.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
@@ -75,6 +76,8 @@ struct MetricsFacts {
   std::vector<Heartbeat::Member> threads;
   std::optional<console::StreamCounts> streams;  ///< If there is a console.
   std::uint64_t board_bytes{0};                  ///< Of the console.
+  console::TokenGuard::Counts tokens{};          ///< Of the console.
+  HttpServer::Counts requests{};
 };
 
 /// All that is counted, in the text format of Prometheus.
@@ -85,6 +88,11 @@ struct ProbeSources {
   std::function<std::string()> metrics;
   std::function<Readiness()> readiness;
 };
+
+/// Probes have a thread of their own, so that nothing that asks for metrics
+/// makes a sound service look dead.
+HttpServerOptions ProbeServer(const HttpAddress& address,
+                              const std::vector<std::string>& names);
 
 /// /metrics; /healthz: 200 while all threads get on; /readyz: 200 while there
 /// are models, databases and a publisher. Else 503; the body, JSON, says why.

@@ -1,9 +1,15 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <map>
+#include <mutex>
 #include <string>
 #include <string_view>
+#include <utility>
+
+#include "diagnosis/log.h"
 
 namespace fdi::console {
 
@@ -11,25 +17,53 @@ inline constexpr std::size_t kMinTokenLength = 16;
 
 /// A token: its file, made with a random one and mode 0600 if it is not there.
 /// @returns the first line. @throws ConfigError if that is shorter than 16
-///   characters or has blanks; DataError if the file cannot be used.
+///   characters or has blanks, or if others than the owner, root and the group
+///   can read the file or others than the owner and root can change it;
+///   DataError if the file cannot be used.
 std::string LoadToken(const std::filesystem::path& path);
 
-/// Takes the same time wherever the texts differ.
-bool SameSecret(std::string_view given, std::string_view secret);
+enum class Permission : std::uint8_t {
+  kGranted,
+  kReadOnly,
+  kWrongToken,
+  kTooMany
+};
 
-/// A loopback address, or the name for it.
-bool IsLoopback(std::string_view host);
+/// Decides who may change something. From an address that failed five times in
+/// a row one attempt per second is looked at, the right token or not. Failures
+/// are counted and logged with where they came from. Thread safe.
+class TokenGuard {
+ public:
+  using Clock = std::chrono::steady_clock;
+  struct Counts {
+    std::uint64_t wrong{0};
+    std::uint64_t unread{0};  ///< Refused with kTooMany.
+  };
 
-/// Whether a page may ask us by this Host header: a name that leads to a
-/// loopback address may be anybody's (DNS rebinding), so a console that is
-/// bound to one answers to its own names alone, on any port, as tunnels end on
-/// others. Bound to another address it answers to all.
-bool HostAllowed(std::string_view host_header, std::string_view bound_host);
+  /// @param token empty: the console is read-only.
+  TokenGuard(std::string token, LogSink log)
+      : token_(std::move(token)), log_(std::move(log)) {}
 
-enum class Permission : std::uint8_t { kGranted, kReadOnly, kWrongToken };
+  /// @param authorization the header, "Bearer TOKEN".
+  /// @param origin the address that the request came from.
+  Permission Check(std::string_view authorization, const std::string& origin,
+                   Clock::time_point now = Clock::now());
+  bool writable() const { return !token_.empty(); }
+  Counts counts() const;
 
-/// @param authorization the header, "Bearer TOKEN".
-/// @param token empty: the console is read-only.
-Permission MayWrite(std::string_view authorization, std::string_view token);
+ private:
+  // Attempts that are left, which grow by one per second.
+  struct Allowance {
+    double attempts;
+    Clock::time_point stamp;
+  };
+  Allowance& AllowanceOf(const std::string& origin, Clock::time_point now);
+
+  const std::string token_;
+  const LogSink log_;
+  mutable std::mutex mutex_;
+  std::map<std::string, Allowance> failing_;  // By origin, a bounded number.
+  Counts counts_;
+};
 
 }  // namespace fdi::console

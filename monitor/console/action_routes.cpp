@@ -2,7 +2,6 @@
 #include <httplib.h>
 
 #include "diagnosis/error.h"
-#include "monitor/console/access.h"
 #include "monitor/console/api.h"
 #include "storage/history/alarm.h"
 #include "storage/history/history_editor.h"
@@ -106,7 +105,8 @@ constexpr Action kActions[] = {
 // @returns whether the request may change anything; if not, it is answered.
 bool Admitted(const Api& api, const httplib::Request& request,
               httplib::Response& response) {
-  switch (MayWrite(request.get_header_value("Authorization"), api.token)) {
+  switch (api.access.Check(request.get_header_value("Authorization"),
+                           request.remote_addr)) {
     case Permission::kReadOnly:
       SendError(response, 403,
                 "this console is read-only: start the monitor with "
@@ -117,6 +117,12 @@ bool Admitted(const Api& api, const httplib::Request& request,
       SendError(response, 401,
                 "Authorization: expected Bearer and the token of the file "
                 "named by --console-write");
+      return false;
+    case Permission::kTooMany:
+      response.set_header("Retry-After", "1");
+      SendError(response, 429,
+                "too many wrong tokens came from this address: one attempt "
+                "per second is looked at");
       return false;
     case Permission::kGranted:
       break;

@@ -6,11 +6,13 @@
 #include <mutex>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "cli/fault_texts.h"
+#include "monitor/console/access.h"
 #include "monitor/console/alarm_book.h"
 #include "monitor/console/live_board.h"
 #include "monitor/console/live_stream.h"
@@ -59,8 +61,9 @@ struct Api {
   StoredModels& models;
   WorkListCache& work_list;
   const cli::FaultTexts& texts;
-  std::string token;     ///< Empty: read-only.
+  TokenGuard& access;
   std::string instance;  ///< Differs after a restart.
+  std::stop_token stopping{};
 
   /// Explain(), with the faults called as the catalogue does.
   Json Words(const ModelFacts* models, const TracePoint* point) const;

@@ -6,14 +6,12 @@
 
 #include "cli/shared_files.h"
 #include "diagnosis/error.h"
-#include "monitor/console/access.h"
+#include "monitor/http/request_head.h"
 
 namespace fdi::console {
 namespace {
 
-// Streams take a thread each; what is left answers all the rest.
-constexpr std::size_t kAnsweringThreads = 4;
-constexpr std::size_t kMaxBody = 16 * 1024;
+constexpr std::size_t kMaxBody = std::size_t{16} * 1024;
 constexpr const char* kPolicy =
     "default-src 'self'; img-src 'self' data:; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'";
@@ -25,15 +23,17 @@ std::string NewInstance() {
   return text;
 }
 
-std::string Reason(int status) {
-  switch (status) {
-    case 404:
-      return "there is no such page";
-    case 413:
-      return "the body has more than " + std::to_string(kMaxBody) + " bytes";
-    default:
-      return "this request cannot be answered";
-  }
+// A stream takes a thread for itself; one more says that all are taken.
+// Pictures are drawn by a program that takes a whole processor for a second.
+std::vector<monitor::HttpLane> Lanes() {
+  return {{StreamOptions{}.max_clients + 1, 16,
+           [](std::string_view path) { return path == "/api/v1/stream"; }},
+          {1, 2,
+           [](std::string_view path) {
+             return path.starts_with("/api/v1/episodes/") &&
+                    (path.ends_with(".svg") || path.ends_with(".png"));
+           }},
+          {4}};
 }
 
 }  // namespace
@@ -78,12 +78,11 @@ std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked) {
 Console::Console(const ConsoleOptions& options,
                  const cli::GlobalOptions& global, LogSink log)
     : server_(std::make_unique<monitor::HttpServer>(monitor::HttpServerOptions{
-          options.address, "--console",
-          StreamOptions{}.max_clients + kAnsweringThreads, kMaxBody})),
+          options.address, "--console", Lanes(), kMaxBody, options.names})),
       files_(FindConsoleFiles(options.files)),
-      token_(options.token_file ? LoadToken(*options.token_file) : ""),
-      texts_(cli::LoadFaultTexts(global)),
-      log_(std::move(log)) {
+      log_(std::move(log)),
+      access_(options.token_file ? LoadToken(*options.token_file) : "", log_),
+      texts_(cli::LoadFaultTexts(global)) {
   if (options.token_file) {
     log_(LogLevel::kInfo, "console_token file=" + options.token_file->string());
   }
@@ -103,7 +102,8 @@ void Console::Start(ConsoleSources sources) {
   alarms_ = std::make_unique<AlarmBook>(sources.history, texts_);
   api_ = std::make_unique<Api>(Api{std::move(sources), board_, stream_,
                                    *alarms_, *models_, work_list_, texts_,
-                                   token_, NewInstance()});
+                                   access_, NewInstance(),
+                                   stopping_.get_token()});
   SetRulesOfEveryAnswer();
   httplib::Server& routes = server_->routes();
   for (const auto group : {LiveRoutes(), HistoryRoutes(), PlannerRoutes()}) {
@@ -115,13 +115,14 @@ void Console::Start(ConsoleSources sources) {
   stream_.Start({board_, *alarms_, texts_, api_->sources.utc_now_ns, log_});
   server_->Start();
   const std::string& host = server_->address().host;
-  log_(IsLoopback(host) ? LogLevel::kInfo : LogLevel::kWarning,
+  log_(monitor::IsLoopback(host) ? LogLevel::kInfo : LogLevel::kWarning,
        "console_listening address=" + ToString(server_->address()) +
-           " write=" + (token_.empty() ? "off" : "on") +
-           (IsLoopback(host) ? "" : " open_to_network=yes"));
+           " write=" + (access_.writable() ? "on" : "off") +
+           (monitor::IsLoopback(host) ? "" : " open_to_network=yes"));
 }
 
 void Console::Stop() {
+  stopping_.request_stop();
   stream_.Close();
   if (server_) {
     server_->Stop();
@@ -137,24 +138,16 @@ void Console::Close() {
 
 void Console::SetRulesOfEveryAnswer() {
   httplib::Server& routes = server_->routes();
-  routes.set_tcp_nodelay(true);
   routes.set_default_headers({{"Content-Security-Policy", kPolicy},
                               {"X-Content-Type-Options", "nosniff"},
                               {"Referrer-Policy", "no-referrer"}});
-  routes.set_pre_routing_handler([host = server_->address().host](
-                                     const httplib::Request& request,
-                                     httplib::Response& response) {
-    if (HostAllowed(request.get_header_value("Host"), host)) {
-      return httplib::Server::HandlerResponse::Unhandled;
-    }
-    SendError(response, 403, "Host: expected localhost or a loopback address");
-    return httplib::Server::HandlerResponse::Handled;
-  });
   routes.set_error_handler(httplib::Server::HandlerWithResponse(
       [](const httplib::Request& request, httplib::Response& response) {
         if (response.body.empty()) {
           SendError(response, response.status,
-                    request.path + ": " + Reason(response.status));
+                    request.path + (response.status == 404
+                                        ? ": there is no such page"
+                                        : ": this request cannot be answered"));
         }
         return httplib::Server::HandlerResponse::Handled;
       }));

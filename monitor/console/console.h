@@ -3,7 +3,9 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <vector>
 
 #include "diagnosis/log.h"
 #include "monitor/console/api.h"
@@ -19,6 +21,7 @@ struct ConsoleOptions {
   std::filesystem::path files;
   /// Holds the token of who may act on alarms; none: read-only.
   std::optional<std::filesystem::path> token_file;
+  std::vector<std::string> names;  ///< See monitor::HostAllowed().
 };
 
 /// Folder with index.html. @throws ConfigError naming `asked`, or DataError if
@@ -56,6 +59,8 @@ class Console {
 
   StreamCounts streams() const { return stream_.counts(); }
   std::size_t board_bytes() const { return board_.bytes(); }
+  monitor::HttpServer::Counts requests() const { return server_->counts(); }
+  TokenGuard::Counts tokens() const { return access_.counts(); }
 
  private:
   class Events;
@@ -63,12 +68,13 @@ class Console {
 
   std::unique_ptr<monitor::HttpServer> server_;
   std::filesystem::path files_;
-  std::string token_;
-  cli::FaultTexts texts_;
   LogSink log_;
+  TokenGuard access_;
+  cli::FaultTexts texts_;
   LiveBoard board_;
   LiveStream stream_;
   WorkListCache work_list_;
+  std::stop_source stopping_;
   std::unique_ptr<Events> events_;
   std::unique_ptr<StoredModels> models_;
   std::unique_ptr<AlarmBook> alarms_;

@@ -2,7 +2,6 @@
 // shelves.
 #include <algorithm>
 #include <limits>
-#include <mutex>
 #include <sstream>
 
 #include <httplib.h>
@@ -294,13 +293,11 @@ File EpisodePicture(const Api& api, const httplib::Request& request) {
   plot::EpisodeFigureOptions options;
   options.fault_name =
       api.texts.Words(evidence.episode.fault.value_or(""), 0.0).name;
-  // A picture takes a whole processor, so only one is drawn at a time.
-  static std::mutex drawing;
-  const std::lock_guard lock(drawing);
   const bool svg = ending == "svg";
   return {svg ? "image/svg+xml" : "image/png", "episode-" + id + "." + ending,
           plot::DrawFigure(plot::EpisodeFigure(evidence, options),
-                           svg ? plot::Format::kSvg : plot::Format::kPng)};
+                           svg ? plot::Format::kSvg : plot::Format::kPng,
+                           {.stop = api.stopping})};
 }
 
 constexpr Route kRoutes[] = {

@@ -1,83 +1,170 @@
 #include "monitor/http/http_server.h"
 
+#include <algorithm>
+#include <array>
+#include <atomic>
 #include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <list>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
-#include <vector>
 
+#include <fcntl.h>
 #include <httplib.h>
+#include <netdb.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "diagnosis/error.h"
+#include "monitor/http/request_head.h"
 
 namespace fdi::monitor {
 namespace {
 
-constexpr std::size_t kWaitingConnections = 64;
-constexpr std::chrono::milliseconds kClientPatience{500};
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
 
-// Takes a bounded number of connections, then makes the accepting thread wait.
-class BoundedPool : public httplib::TaskQueue {
+constexpr std::size_t kMaxClients = 256;
+constexpr milliseconds kRequestPatience{2000};  // For a whole request.
+constexpr milliseconds kRefusalPatience{500};   // For reading a refusal.
+// A client may keep a thread waiting for so long at a time and in all, and
+// longer for long answers.
+constexpr milliseconds kPausePatience{2000};
+constexpr milliseconds kAnswerPatience{5000};
+constexpr std::size_t kSlowestBytesPerMs = 1000;
+constexpr milliseconds kStopPatience{500};
+// The library's backlog of 5 lets a burst of clients wait for seconds.
+constexpr int kBacklog = 256;
+
+constexpr Refusal kForeignHost{
+    403, "Forbidden",
+    "Host: expected a name or address of this server (--allow-host NAME)",
+    "host"};
+constexpr Refusal kSlow{408, "Request Timeout",
+                        "expected a whole request within 2 s", "slow"};
+constexpr Refusal kBusy{503, "Service Unavailable",
+                        "too many such requests wait already", "busy"};
+
+// Runs the library's jobs where they come from: they only pass a socket on.
+class Inline : public httplib::TaskQueue {
  public:
-  explicit BoundedPool(std::size_t threads) {
-    for (std::size_t i = 0; i < threads; ++i) {
-      threads_.emplace_back([this] { Work(); });
-    }
-  }
+  void enqueue(std::function<void()> job) override { job(); }
+  void shutdown() override {}
+};
 
-  void enqueue(std::function<void()> job) override {
-    std::unique_lock lock(mutex_);
-    changed_.wait(
-        lock, [this] { return ended_ || jobs_.size() < kWaitingConnections; });
-    jobs_.push_back(std::move(job));
-    changed_.notify_all();
+// A connected socket that does not block; closed with the object.
+class Socket {
+ public:
+  explicit Socket(int handle) : handle_(handle) {
+    fcntl(handle, F_SETFD, FD_CLOEXEC);
+    fcntl(handle, F_SETFL, O_NONBLOCK);
   }
-
-  // Connections that wait are dropped: the process ends.
-  void shutdown() override {
-    {
-      const std::lock_guard lock(mutex_);
-      ended_ = true;
-      changed_.notify_all();
-    }
-    for (std::thread& thread : threads_) {
-      thread.join();
+  ~Socket() {
+    if (handle_ >= 0) {
+      close(handle_);
     }
   }
+  Socket(Socket&& other) noexcept : handle_(std::exchange(other.handle_, -1)) {}
+  Socket& operator=(Socket&& other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  int handle() const { return handle_; }
 
  private:
-  void Work() {
-    std::unique_lock lock(mutex_);
-    while (true) {
-      changed_.wait(lock, [this] { return ended_ || !jobs_.empty(); });
-      if (ended_) {
-        return;
+  int handle_;
+};
+
+// A client whose request is not whole yet, or that was refused and still sends.
+struct Client {
+  Socket socket;
+  Clock::time_point deadline;
+  std::string bytes{};
+  std::optional<RequestHead> head{};
+  bool refused{false};
+};
+
+// What the library reads and where it writes to. It waits for a client that
+// does not read, but in all no longer than an answer of that length may take.
+class AnswerStream : public httplib::Stream {
+ public:
+  AnswerStream(const Client& client, const std::atomic<bool>& ended)
+      : socket_(client.socket.handle()),
+        request_(client.head->text + client.bytes.substr(client.head->size)),
+        ended_(ended) {}
+
+  bool is_readable() const override { return place_ < request_.size(); }
+  bool is_writable() const override { return writable_; }
+  ssize_t read(char* to, std::size_t size) override {
+    const std::size_t count = request_.copy(to, size, place_);
+    place_ += count;
+    return static_cast<ssize_t>(count);
+  }
+  ssize_t write(const char* from, std::size_t size) override {
+    while (writable_) {
+      const ssize_t count = send(socket_, from, size, MSG_NOSIGNAL);
+      if (count >= 0) {
+        written_ += static_cast<std::size_t>(count);
+        paused_ = {};
+        return count;
       }
-      const std::function<void()> job = std::move(jobs_.front());
-      jobs_.pop_front();
-      changed_.notify_all();
-      lock.unlock();
-      job();
-      lock.lock();
+      writable_ = errno == EINTR || (errno == EAGAIN && AwaitClient());
     }
+    return -1;
+  }
+  void get_remote_ip_and_port(std::string& ip, int& port) const override {
+    sockaddr_storage address{};
+    socklen_t size = sizeof address;
+    std::array<char, NI_MAXHOST> host{};
+    auto* const plain = reinterpret_cast<sockaddr*>(&address);
+    if (getpeername(socket_, plain, &size) == 0 &&
+        getnameinfo(plain, size, host.data(), host.size(), nullptr, 0,
+                    NI_NUMERICHOST) == 0) {
+      ip = host.data();
+    }
+    port = 0;
+  }
+  void get_local_ip_and_port(std::string& /*ip*/,
+                             int& /*port*/) const override {}
+  socket_t socket() const override { return -1; }
+
+ private:
+  bool AwaitClient() {
+    const Clock::time_point begin = Clock::now();
+    pollfd entry{socket_, POLLOUT, 0};
+    const int ready = poll(&entry, 1, 100);
+    const Clock::duration waited = Clock::now() - begin;
+    waited_ += waited;
+    paused_ += waited;
+    const milliseconds patience =
+        ended_ ? kStopPatience
+               : kAnswerPatience + milliseconds(written_ / kSlowestBytesPerMs);
+    return ready > 0 || (paused_ < kPausePatience && waited_ < patience);
   }
 
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<std::function<void()>> jobs_;
-  bool ended_{false};
-  std::vector<std::thread> threads_;
+  const int socket_;
+  const std::string request_;
+  const std::atomic<bool>& ended_;
+  std::size_t place_{0};
+  std::size_t written_{0};
+  Clock::duration waited_{0};
+  Clock::duration paused_{0};  // Since the last byte that was taken.
+  bool writable_{true};
 };
 
 // The library's own options let two servers share a port in silence.
-void ForbidSharing(int socket) {
+void SetListenerOptions(int socket) {
   const int yes = 1;
   setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
 }
 
 [[noreturn]] void RefuseAddress(const std::string& text,
@@ -123,24 +210,242 @@ std::string ToString(const HttpAddress& address) {
   return text.append(std::to_string(address.port));
 }
 
-HttpServer::HttpServer(const HttpServerOptions& options)
-    : server_(std::make_unique<httplib::Server>()), address_(options.address) {
-  const HttpAddress& address = options.address;
-  server_->set_socket_options([](socket_t socket) { ForbidSharing(socket); });
-  server_->new_task_queue = [threads = options.threads] {
-    return new BoundedPool(threads);
+// Routes of the library behind a thread that reads all requests.
+class HttpServer::Gate : public httplib::Server {
+ public:
+  explicit Gate(const HttpServerOptions& options) : options_(options) {
+    if (pipe2(wake_.data(), O_CLOEXEC | O_NONBLOCK) != 0) {
+      throw std::system_error(errno, std::generic_category(), "pipe2");
+    }
+    for (const HttpLane& lane : options.lanes) {
+      lanes_.emplace_back(lane);
+    }
+  }
+  ~Gate() override {
+    End();
+    for (std::thread& thread : threads_) {
+      thread.join();
+    }
+    close(wake_[0]);
+    close(wake_[1]);
+  }
+  Gate(const Gate&) = delete;
+  Gate& operator=(const Gate&) = delete;
+
+  void Start() {
+    ::listen(svr_sock_, kBacklog);
+    threads_.emplace_back([this] { Listen(); });
+    for (Lane& lane : lanes_) {
+      for (std::size_t i = 0; i < lane.options.threads; ++i) {
+        threads_.emplace_back([this, &lane] { Answer(lane); });
+      }
+    }
+  }
+
+  void End() {
+    stop();
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+    changed_.notify_all();
+    Wake();
+  }
+
+  Counts counts() const {
+    const std::lock_guard lock(mutex_);
+    return counts_;
+  }
+
+ private:
+  struct Lane {
+    explicit Lane(HttpLane lane) : options(std::move(lane)) {}
+    HttpLane options;
+    std::deque<Client> waiting;  // Guarded by mutex_.
   };
-  server_->set_keep_alive_max_count(1);
-  server_->set_keep_alive_timeout(1);
-  server_->set_read_timeout(kClientPatience);
-  server_->set_write_timeout(kClientPatience);
-  server_->set_payload_max_length(options.max_body);
+
+  // Called by the thread that accepts.
+  bool process_and_close_socket(socket_t socket) override {
+    const std::lock_guard lock(mutex_);
+    accepted_.push_back({Socket(socket), Clock::now() + kRequestPatience});
+    if (accepted_.size() > kMaxClients) {
+      accepted_.pop_front();
+      ++counts_["busy"];
+    }
+    Wake();
+    return true;
+  }
+
+  void Wake() const {
+    [[maybe_unused]] const ssize_t ignored = write(wake_[1], "", 1);
+  }
+
+  void Count(std::string_view what) {
+    const std::lock_guard lock(mutex_);
+    ++counts_[what];
+  }
+
+  void Listen() {
+    std::vector<pollfd> entries;
+    while (!ended_) {
+      TakeAccepted();
+      entries.assign(1, {wake_[0], POLLIN, 0});
+      Clock::time_point next = Clock::now() + kRequestPatience;
+      for (const Client& client : clients_) {
+        entries.push_back({client.socket.handle(), POLLIN, 0});
+        next = std::min(next, client.deadline);
+      }
+      const auto pause = std::chrono::ceil<milliseconds>(next - Clock::now());
+      poll(entries.data(), entries.size(),
+           static_cast<int>(std::max<milliseconds::rep>(pause.count(), 0)));
+      std::array<char, 64> ignored{};
+      while (read(wake_[0], ignored.data(), ignored.size()) > 0) {
+      }
+      std::size_t i = 1;
+      clients_.remove_if([&](Client& client) {
+        return !Serve(client, entries[i++].revents != 0);
+      });
+    }
+    clients_.clear();
+  }
+
+  void TakeAccepted() {
+    const std::lock_guard lock(mutex_);
+    for (; !accepted_.empty(); accepted_.pop_front()) {
+      if (clients_.size() == kMaxClients) {
+        counts_["busy"] += clients_.front().refused ? 0 : 1;
+        clients_.pop_front();
+      }
+      clients_.push_back(std::move(accepted_.front()));
+    }
+  }
+
+  // @returns whether the client remains one that is listened to.
+  bool Serve(Client& client, bool readable) {
+    if (readable && !Read(client)) {
+      return false;
+    }
+    if (Clock::now() < client.deadline) {
+      return client.socket.handle() >= 0;
+    }
+    return !client.refused && Refuse(client, kSlow);
+  }
+
+  bool Read(Client& client) {
+    std::array<char, 4096> part{};
+    const ssize_t size =
+        recv(client.socket.handle(), part.data(), part.size(), 0);
+    if (size < 0 && (errno == EAGAIN || errno == EINTR)) {
+      return true;
+    }
+    if (size <= 0) {
+      if (!client.refused) {
+        Count("left");
+      }
+      return false;
+    }
+    if (client.refused) {
+      return true;
+    }
+    client.bytes.append(part.data(), static_cast<std::size_t>(size));
+    if (!client.head) {
+      if (const auto refusal =
+              ParseRequestHead(client.bytes, options_.max_body, client.head)) {
+        return Refuse(client, *refusal);
+      }
+    }
+    const bool whole =
+        client.head &&
+        client.bytes.size() >= client.head->size + client.head->body_size;
+    return !whole || Dispatch(client);
+  }
+
+  bool Dispatch(Client& client) {
+    const RequestHead& head = *client.head;
+    if (!HostAllowed(head.host, options_.address.host, options_.names)) {
+      return Refuse(client, kForeignHost);
+    }
+    client.bytes.resize(head.size + head.body_size);
+    for (Lane& lane : lanes_) {
+      if (!lane.options.takes || lane.options.takes(head.path)) {
+        const std::lock_guard lock(mutex_);
+        if (lane.waiting.size() < lane.options.waiting) {
+          lane.waiting.push_back(std::move(client));
+          changed_.notify_all();
+          return false;
+        }
+        break;
+      }
+    }
+    return Refuse(client, kBusy);
+  }
+
+  // Goes on reading for a while: a socket that is closed with bytes unread
+  // takes the answer back.
+  bool Refuse(Client& client, const Refusal& refusal) {
+    Count(refusal.kind);
+    const std::string body =
+        std::string(R"({"error":")") + refusal.reason + "\"}\n";
+    std::string answer = "HTTP/1.1 " + std::to_string(refusal.status) + " ";
+    answer.append(refusal.title)
+        .append("\r\nContent-Type: application/json\r\nContent-Length: ")
+        .append(std::to_string(body.size()))
+        .append("\r\nX-Content-Type-Options: nosniff\r\n")
+        .append(refusal.status == 503 ? "Retry-After: 5\r\n" : "")
+        .append("Connection: close\r\n\r\n")
+        .append(body);
+    const int socket = client.socket.handle();
+    const ssize_t sent =
+        send(socket, answer.data(), answer.size(), MSG_NOSIGNAL);
+    shutdown(socket, SHUT_WR);
+    client.refused = true;
+    client.bytes = {};
+    client.deadline = Clock::now() + kRefusalPatience;
+    return sent > 0;
+  }
+
+  void Answer(Lane& lane) {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      changed_.wait(lock, [&] { return ended_ || !lane.waiting.empty(); });
+      if (ended_) {
+        return;
+      }
+      const Client client = std::move(lane.waiting.front());
+      lane.waiting.pop_front();
+      ++counts_["answered"];
+      lock.unlock();
+      AnswerStream stream(client, ended_);
+      bool closed = true;
+      process_request(stream, true, closed, nullptr);
+      lock.lock();
+    }
+  }
+
+  const HttpServerOptions options_;
+  std::array<int, 2> wake_{};
+  std::list<Client> clients_;  // Of the listening thread alone, oldest first.
+  std::list<Lane> lanes_;
+  std::vector<std::thread> threads_;
+  std::atomic<bool> ended_{false};
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Client> accepted_;
+  Counts counts_{{"answered", 0}, {"malformed", 0}, {"too_large", 0},
+                 {"encoded", 0},  {"host", 0},      {"slow", 0},
+                 {"busy", 0},     {"left", 0}};
+};
+
+HttpServer::HttpServer(const HttpServerOptions& options)
+    : gate_(std::make_unique<Gate>(options)), address_(options.address) {
+  const HttpAddress& address = options.address;
+  gate_->set_socket_options(SetListenerOptions);
+  gate_->new_task_queue = [] { return new Inline; };
   errno = 0;
   const int port =
       address.port == 0
-          ? server_->bind_to_any_port(address.host)
-          : (server_->bind_to_port(address.host, address.port) ? address.port
-                                                               : -1);
+          ? gate_->bind_to_any_port(address.host)
+          : (gate_->bind_to_port(address.host, address.port) ? address.port
+                                                             : -1);
   if (port < 0) {
     const std::string reason =
         errno == 0 ? "unknown address" : std::generic_category().message(errno);
@@ -158,13 +463,21 @@ HttpServer::~HttpServer() {
 }
 
 void HttpServer::Stop() {
-  server_->stop();
+  gate_->End();
+}
+
+httplib::Server& HttpServer::routes() {
+  return *gate_;
+}
+
+HttpServer::Counts HttpServer::counts() const {
+  return gate_->counts();
 }
 
 void HttpServer::Add(Pages pages) {
   for (auto& [path, make] : pages) {
-    server_->Get(path, [make = std::move(make)](const httplib::Request&,
-                                                httplib::Response& response) {
+    gate_->Get(path, [make = std::move(make)](const httplib::Request&,
+                                              httplib::Response& response) {
       HttpPage page = make();
       response.status = page.status;
       response.set_content(std::move(page.body), page.type.c_str());
@@ -173,8 +486,9 @@ void HttpServer::Add(Pages pages) {
 }
 
 void HttpServer::Start() {
-  thread_ = std::thread([this] { server_->listen_after_bind(); });
-  while (!server_->is_running()) {  // stop() before that would be forgotten.
+  gate_->Start();
+  thread_ = std::thread([this] { gate_->listen_after_bind(); });
+  while (!gate_->is_running()) {  // stop() before that would be forgotten.
     std::this_thread::yield();
   }
 }

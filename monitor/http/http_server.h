@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <vector>
 
 namespace httplib {
 class Server;
@@ -33,21 +36,35 @@ struct HttpPage {
   std::string body;
 };
 
+/// Threads that answer the requests which `takes` says yes to, and how many may
+/// wait for them; one more is answered 503 with Retry-After.
+struct HttpLane {
+  std::size_t threads{2};
+  std::size_t waiting{32};
+  std::function<bool(std::string_view path)> takes{};  ///< Null: all.
+};
+
 /// Settings of HttpServer.
 struct HttpServerOptions {
   HttpAddress address;
-  std::string option{"--http"};  ///< That asked for it, for messages.
-  std::size_t threads{2};
-  std::size_t max_body{1024};  ///< Of a request [bytes].
+  std::string option{"--http"};      ///< That asked for it, for messages.
+  std::vector<HttpLane> lanes{{}};   ///< The first that takes it answers.
+  std::size_t max_body{0};           ///< Of a request [bytes].
+  std::vector<std::string> names{};  ///< See HostAllowed().
 };
 
-/// Answers HTTP by threads of its own. What they cannot take at once waits,
-/// a bounded number here and the rest in the backlog of the socket, so that no
-/// client costs more than that; a client that does not speak is cut off.
+/// Answers HTTP by threads of its own. A request is read whole, in bounded
+/// memory and time, before any of them sees it, so that no client holds a
+/// thread by sending slowly. A client that reads slowly is cut off. At most 256
+/// clients are listened to at once; the next one takes the place of the one
+/// that has been silent longest.
 class HttpServer {
  public:
   /// From path to what makes the page, called by any of the threads.
   using Pages = std::map<std::string, std::function<HttpPage()>>;
+  /// Clients since the start, by what became of their request: "answered",
+  /// "malformed", "too_large", "encoded", "host", "slow", "busy", "left".
+  using Counts = std::map<std::string_view, std::uint64_t>;
 
   /// Binds the address; nothing is answered yet. A second server on the same
   /// address is an error.
@@ -62,7 +79,7 @@ class HttpServer {
   /// Start().
   void Add(Pages pages);
   /// For what pages cannot do. Before Start().
-  httplib::Server& routes() { return *server_; }
+  httplib::Server& routes();
 
   /// Answers from now on. Once.
   void Start();
@@ -73,8 +90,11 @@ class HttpServer {
   /// With the port that was found, if any was asked for.
   const HttpAddress& address() const { return address_; }
 
+  Counts counts() const;
+
  private:
-  std::unique_ptr<httplib::Server> server_;
+  class Gate;
+  std::unique_ptr<Gate> gate_;
   HttpAddress address_;
   std::thread thread_;
 };

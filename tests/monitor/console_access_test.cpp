@@ -1,4 +1,6 @@
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -14,7 +16,13 @@ using testing::HasSubstr;
 
 class ConsoleTokenTest : public testing::Test {
  protected:
-  void Write(const std::string& text) const { std::ofstream(file_) << text; }
+  void Write(const std::string& text) const {
+    std::ofstream(file_) << text;
+    SetMode(0600);
+  }
+  void SetMode(unsigned mode) const {
+    std::filesystem::permissions(file_, std::filesystem::perms(mode));
+  }
 
   storage::TemporaryDirectory directory_;
   std::filesystem::path file_{directory_.path() / "token"};
@@ -43,38 +51,81 @@ TEST_F(ConsoleTokenTest, OfFewerThanSixteenCharactersIsRefused) {
   EXPECT_EQ(LoadToken(file_), "0123456789abcdef");
 }
 
+TEST_F(ConsoleTokenTest, ThatOthersCanReadOrChangeIsRefused) {
+  Write("0123456789abcdef\n");
+  for (const unsigned mode : {0666U, 0644U, 0660U, 0604U, 0602U}) {
+    SetMode(mode);
+    EXPECT_THAT(storage::MessageOf<ConfigError>([this] { LoadToken(file_); }),
+                HasSubstr("expected a file of the service's user or root with "
+                          "mode 0600 or 0640"))
+        << mode;
+  }
+  SetMode(0640);
+  EXPECT_EQ(LoadToken(file_), "0123456789abcdef");
+}
+
 TEST_F(ConsoleTokenTest, AFolderThatIsNotThereIsNamed) {
   EXPECT_THAT(storage::MessageOf<DataError>(
                   [this] { LoadToken(directory_.path() / "no" / "token"); }),
               HasSubstr("no/token: cannot be made: No such file"));
 }
 
-TEST(ConsoleAccessTest, OnlyTheWholeTokenGrants) {
-  const std::string token = "0123456789abcdef";
+class TokenGuardTest : public testing::Test {
+ protected:
+  Permission Check(const std::string& authorization,
+                   const std::string& origin = "10.0.0.1") {
+    return guard_.Check(authorization, origin, now_);
+  }
 
-  EXPECT_EQ(MayWrite("Bearer " + token, token), Permission::kGranted);
+  const std::string right_{"Bearer 0123456789abcdef"};
+  std::vector<std::string> lines_;
+  TokenGuard guard_{
+      "0123456789abcdef",
+      [this](LogLevel, std::string_view line) { lines_.emplace_back(line); }};
+  TokenGuard::Clock::time_point now_{std::chrono::hours(1)};
+};
+
+TEST_F(TokenGuardTest, OnlyTheWholeTokenGrants) {
+  EXPECT_EQ(Check(right_), Permission::kGranted);
   for (const char* wrong :
        {"", "Bearer", "Bearer ", "0123456789abcdef", "Bearer 0123456789abcde",
         "Bearer 0123456789abcdef0", "Bearer 1123456789abcdef",
         "Bearer 0123456789abcdeg", "Basic 0123456789abcdef"}) {
-    EXPECT_EQ(MayWrite(wrong, token), Permission::kWrongToken) << wrong;
+    EXPECT_EQ(Check(wrong), Permission::kWrongToken) << wrong;
+    now_ += std::chrono::seconds(1);
   }
-  EXPECT_EQ(MayWrite("Bearer ", ""), Permission::kReadOnly);
+  EXPECT_TRUE(lines_.front().starts_with(
+      "console_token_refused origin=10.0.0.1 failures=1 "));
+  TokenGuard none("", {});
+  EXPECT_EQ(none.Check("Bearer ", ""), Permission::kReadOnly);
 }
 
-TEST(ConsoleAccessTest, ANameThatIsNotOursMayNotAskALoopbackAddress) {
-  for (const char* own : {"localhost", "localhost:8080", "LOCALHOST:9000",
-                          "127.0.0.1:8080", "[::1]:8080", "[::1]"}) {
-    EXPECT_TRUE(HostAllowed(own, "127.0.0.1")) << own;
+TEST_F(TokenGuardTest, GuessesAreSlowedToOneASecondByAddress) {
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(Check("Bearer no"), Permission::kWrongToken);
   }
-  EXPECT_TRUE(HostAllowed("127.0.0.7:80", "127.0.0.7"));
-  for (const char* other :
-       {"", "evil.example", "evil.example:8080", "127.0.0.1.evil.example",
-        "localhost.evil.example:8080", "[fe80::1]:8080", "127.0.0.7"}) {
-    EXPECT_FALSE(HostAllowed(other, "127.0.0.1")) << other;
+  for (int i = 0; i < 4650; ++i) {
+    now_ += std::chrono::microseconds(215);
+    EXPECT_EQ(Check(right_), Permission::kTooMany);
   }
-  EXPECT_TRUE(HostAllowed("monitor.plant:8080", "0.0.0.0"));
-  EXPECT_TRUE(HostAllowed("monitor.plant:8080", "192.168.1.5"));
+  EXPECT_EQ(Check(right_, "10.0.0.2"), Permission::kGranted);
+  EXPECT_EQ(guard_.counts().wrong, 5U);
+  EXPECT_EQ(guard_.counts().unread, 4650U);
+  EXPECT_EQ(lines_.size(), 5U);
+  now_ += std::chrono::seconds(1);
+  EXPECT_EQ(Check(right_), Permission::kGranted);
+  EXPECT_EQ(Check("Bearer no"), Permission::kWrongToken);
+}
+
+TEST_F(TokenGuardTest, AnyNumberOfAddressesIsSlowedInBoundedMemory) {
+  int looked_at = 0;
+  for (int i = 0; i < 10'000; ++i) {
+    looked_at += Check("Bearer no", "2001:db8::" + std::to_string(i)) ==
+                         Permission::kWrongToken
+                     ? 1
+                     : 0;
+  }
+  EXPECT_LT(looked_at, 256 + 5 + 1);
 }
 
 }  // namespace

@@ -36,7 +36,9 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
     std::filesystem::create_directory(folder);
     std::ofstream(folder / "index.html") << "<title>page</title>";
     std::ofstream(directory_.path() / "secret.txt") << "secret";
-    std::ofstream(directory_.path() / "token") << kToken << '\n';
+    const auto token = directory_.path() / "token";
+    std::ofstream(token) << kToken << '\n';
+    std::filesystem::permissions(token, std::filesystem::perms(0600));
     storage::ModelStore(directory_.path() / "models.db",
                         storage::Access::kOccasionalWriter);
   }

@@ -1,6 +1,11 @@
 // What a picture shows, and the script that draws it.
+#include <chrono>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <sstream>
+#include <stop_token>
 
 #include <gmock/gmock.h>
 
@@ -151,6 +156,27 @@ TEST(FigureScriptTest, OnlyPngAndSvgInAFolderThatIsThere) {
               HasSubstr("accepted endings are .png and .svg"));
   EXPECT_THAT(MessageOf<DataError>([] { DrawFigure({}, "/nowhere/x.png"); }),
               HasSubstr("no folder /nowhere"));
+}
+
+TEST(GnuplotTest, IsKilledOnceItTakesTooLong) {
+  const storage::TemporaryDirectory tools;
+  const auto program = tools.path() / "gnuplot";
+  std::ofstream(program) << "#!/bin/sh\nsleep 1000\n";
+  std::filesystem::permissions(program, std::filesystem::perms(0700));
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", (tools.path().string() + ":" + path).c_str(), 1);
+  const auto run = [](const GnuplotLimits& limits) {
+    return MessageOf<std::runtime_error>(
+        [&] { RunGnuplot([](const auto&) { return std::string(); }, limits); });
+  };
+  std::stop_source stop;
+  stop.request_stop();
+
+  EXPECT_THAT(run({std::chrono::milliseconds(200), {}}),
+              HasSubstr("gnuplot was killed: it took longer than 200 ms"));
+  EXPECT_THAT(run({std::chrono::hours(1), stop.get_token()}),
+              HasSubstr("gnuplot was killed"));
+  setenv("PATH", path.c_str(), 1);
 }
 
 class EpisodeFigureTest : public HistoryFixture {

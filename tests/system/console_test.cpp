@@ -12,6 +12,7 @@
 #include <httplib.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/monitor/raw_client.h"
 #include "tests/system/monitor_fixture.h"
 
 namespace fdi::monitor {
@@ -96,7 +97,9 @@ class ConsoleTest : public MonitorFixture {
   ConsoleTest() {
     std::filesystem::create_directory(page());
     std::ofstream(page() / "index.html") << "<title>page</title>";
-    std::ofstream(directory_.path() / "token") << "0123456789abcdef\n";
+    const auto token = directory_.path() / "token";
+    std::ofstream(token) << "0123456789abcdef\n";
+    std::filesystem::permissions(token, std::filesystem::perms(0600));
   }
   std::filesystem::path page() const { return directory_.path() / "page"; }
 
@@ -218,6 +221,131 @@ TEST_F(ConsoleTest, SixteenStreamsLeaveTheRestFreeAndEndWithTheService) {
   }
 }
 
+// Sends `part` again and again, up to 200 MB, or until the server has enough.
+void Flood(int port, const std::string& begin, const std::string& part) {
+  RawClient client(port);
+  bool taken = client.Send(begin);
+  for (std::size_t sent = 0; taken && sent < (200U << 20U);
+       sent += part.size()) {
+    taken = client.Send(part);
+  }
+  client.Read();
+}
+
+// What the kernel says of the most memory that the process ever had [MB].
+double PeakMemory(pid_t pid) {
+  std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+  for (std::string word; status >> word;) {
+    if (word == "VmHWM:") {
+      double kilobytes = 0.0;
+      status >> kilobytes;
+      return kilobytes / 1024.0;
+    }
+  }
+  return 0.0;
+}
+
+// 40 MB of zeros.
+std::string BrotliBomb() {
+  std::string bomb;
+  httplib::detail::brotli_compressor compressor;
+  const std::string zeros(std::size_t{1} << 20U, '\0');
+  for (int i = 0; i < 40; ++i) {
+    compressor.compress(zeros.data(), zeros.size(), i == 39,
+                        [&](const char* data, std::size_t size) {
+                          bomb.append(data, size);
+                          return true;
+                        });
+  }
+  return bomb;
+}
+
+TEST_F(ConsoleTest, HostileRequestsTakeNoMemoryAndHoldNobodyUp) {
+  StoreModels(data_, LinearModels());
+  std::ofstream(page() / "large.js") << std::string(4U << 20U, 'x');
+  const auto monitor = StartWithConsole();
+  Get("/api/v1/status");
+  const double before = PeakMemory(monitor->pid());
+  const std::string post = "POST /api/v1/shelf HTTP/1.1\r\nHost: localhost\r\n";
+  const std::string kilobyte(1000, 'x');
+  const std::string bomb = BrotliBomb();
+  std::string ranges =
+      "GET /large.js HTTP/1.1\r\nHost: localhost\r\n"
+      "Range: bytes=0-";
+  for (int i = 0; i < 500; ++i) {
+    ranges += ",0-";
+  }
+  const std::vector<std::pair<std::string, std::string>> attacks{
+      {post + "Content-Encoding: br\r\nContent-Length: " +
+           std::to_string(bomb.size()) + "\r\n\r\n" + bomb,
+       ""},
+      {post + "Transfer-Encoding: chunked\r\n\r\n",
+       "3e8\r\n" + kilobyte + "\r\n"},
+      {post, "X-" + kilobyte + ": y\r\n"},
+      {post + "X: ", kilobyte},
+      {"GET /", kilobyte},
+      {post + "Content-Type: multipart/form-data; boundary=b\r\n"
+              "Content-Length: 209715200\r\n\r\n",
+       "--b\r\nContent-Disposition: form-data; name=\"a\"\r\n\r\n" + kilobyte +
+           "\r\n"},
+      {post + "\r\n", kilobyte},
+      {ranges + "\r\n\r\n", ""}};
+
+  for (const int port : {port_, metrics_port_}) {
+    std::vector<std::thread> clients;
+    for (int i = 0; i < 3; ++i) {
+      for (const auto& [begin, part] : attacks) {
+        clients.emplace_back(
+            [port, begin = begin, part = part] { Flood(port, begin, part); });
+      }
+    }
+    Publish(0, 1);
+    Get("/api/v1/status");
+    for (std::thread& client : clients) {
+      client.join();
+    }
+  }
+
+  EXPECT_LT(PeakMemory(monitor->pid()) - before, 40.0);
+  EXPECT_THAT(Metrics(), HasSubstr("fdi_http_requests_total"
+                                   "{outcome=\"encoded\"} 12\n"));
+  EXPECT_EQ(Get("/api/v1/status")["health"], "OK");
+}
+
+TEST_F(ConsoleTest, AGnuplotThatHangsHoldsNeitherTheConsoleNorTheEnd) {
+  StoreModels(data_, LinearModels());
+  const auto tools = directory_.path() / "tools";
+  std::filesystem::create_directory(tools);
+  const auto begun = directory_.path() / "begun";
+  std::ofstream(tools / "gnuplot")
+      << "#!/bin/sh\ntouch " << begun.string() << "\nsleep 1000\n";
+  std::filesystem::permissions(tools / "gnuplot", std::filesystem::perms(0700));
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", (tools.string() + ":" + path).c_str(), 1);
+  const auto monitor = StartWithConsole();
+  setenv("PATH", path.c_str(), 1);
+  Publish(0, 50);
+  Publish(50, 80, kF7Offset);
+  ASSERT_TRUE(AwaitEvent(TransitionKind::kIsolated));
+  ASSERT_TRUE(Await([this] {
+    return !Get("/api/v1/episodes/last")["trace"]["t_ms"].empty();
+  }));
+  std::vector<std::unique_ptr<RawClient>> clients;
+  for (int i = 0; i < 21; ++i) {
+    clients.push_back(std::make_unique<RawClient>(port_));
+    clients.back()->Send(
+        "GET /api/v1/episodes/last.svg HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  }
+
+  EXPECT_TRUE(Await([&] { return std::filesystem::exists(begun); }));
+  EXPECT_THAT(clients.back()->Read(), HasSubstr("Retry-After: 5\r\n"));
+  EXPECT_EQ(Get("/api/v1/status")["health"], "OK");
+  const Clock::time_point stop = Clock::now();
+  monitor->Signal(SIGTERM);
+  EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
+  EXPECT_LT(Clock::now() - stop, std::chrono::seconds(5));
+}
+
 TEST_F(ConsoleTest, WhatTheConsoleCannotUseIsRefusedAtTheStart) {
   const std::string nowhere = (directory_.path() / "nowhere").string();
   ChildProcess no_page(
@@ -226,6 +354,8 @@ TEST_F(ConsoleTest, WhatTheConsoleCannotUseIsRefusedAtTheStart) {
   EXPECT_THAT(no_page.errors(), HasSubstr(nowhere + ": no index.html"));
 
   std::ofstream(directory_.path() / "short") << "too short\n";
+  std::filesystem::permissions(directory_.path() / "short",
+                               std::filesystem::perms(0600));
   ChildProcess no_token(
       Command({"--console=127.0.0.1:0", "--console-files", page().string(),
                "--console-write", (directory_.path() / "short").string()}));
