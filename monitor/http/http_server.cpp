@@ -32,7 +32,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr std::size_t kMaxClients = 256;
+// Descriptors are few: the usual limit of a process is 1024.
+constexpr std::size_t kMaxClients = 128;
+constexpr std::size_t kMaxAccepted = 64;        // Not yet among those.
 constexpr milliseconds kRequestPatience{2000};  // For a whole request.
 constexpr milliseconds kRefusalPatience{500};   // For reading a refusal.
 // A client may keep a thread waiting for so long at a time and in all, and
@@ -264,12 +266,11 @@ class HttpServer::Gate : public httplib::Server {
 
   // Called by the thread that accepts.
   bool process_and_close_socket(socket_t socket) override {
-    const std::lock_guard lock(mutex_);
-    accepted_.push_back({Socket(socket), Clock::now() + kRequestPatience});
-    if (accepted_.size() > kMaxClients) {
-      accepted_.pop_front();
-      ++counts_["busy"];
-    }
+    Client client{Socket(socket), Clock::now() + kRequestPatience};
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock,
+                  [this] { return ended_ || accepted_.size() < kMaxAccepted; });
+    accepted_.push_back(std::move(client));
     Wake();
     return true;
   }
@@ -309,6 +310,9 @@ class HttpServer::Gate : public httplib::Server {
 
   void TakeAccepted() {
     const std::lock_guard lock(mutex_);
+    if (accepted_.empty()) {
+      return;
+    }
     for (; !accepted_.empty(); accepted_.pop_front()) {
       if (clients_.size() == kMaxClients) {
         counts_["busy"] += clients_.front().refused ? 0 : 1;
@@ -316,6 +320,7 @@ class HttpServer::Gate : public httplib::Server {
       }
       clients_.push_back(std::move(accepted_.front()));
     }
+    changed_.notify_all();
   }
 
   // @returns whether the client remains one that is listened to.
@@ -415,7 +420,13 @@ class HttpServer::Gate : public httplib::Server {
       lock.unlock();
       AnswerStream stream(client, ended_);
       bool closed = true;
-      process_request(stream, true, closed, nullptr);
+      try {
+        process_request(stream, true, closed, nullptr);
+      } catch (const std::exception&) {  // No memory, say; the client sees it.
+        const std::lock_guard again(mutex_);
+        --counts_["answered"];
+        ++counts_["failed"];
+      }
       lock.lock();
     }
   }
@@ -432,7 +443,7 @@ class HttpServer::Gate : public httplib::Server {
   std::deque<Client> accepted_;
   Counts counts_{{"answered", 0}, {"malformed", 0}, {"too_large", 0},
                  {"encoded", 0},  {"host", 0},      {"slow", 0},
-                 {"busy", 0},     {"left", 0}};
+                 {"failed", 0},   {"busy", 0},      {"left", 0}};
 };
 
 HttpServer::HttpServer(const HttpServerOptions& options)

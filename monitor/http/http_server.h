@@ -55,15 +55,15 @@ struct HttpServerOptions {
 
 /// Answers HTTP by threads of its own. A request is read whole, in bounded
 /// memory and time, before any of them sees it, so that no client holds a
-/// thread by sending slowly. A client that reads slowly is cut off. At most 256
+/// thread by sending slowly. A client that reads slowly is cut off. At most 128
 /// clients are listened to at once; the next one takes the place of the one
 /// that has been silent longest.
 class HttpServer {
  public:
   /// From path to what makes the page, called by any of the threads.
   using Pages = std::map<std::string, std::function<HttpPage()>>;
-  /// Clients since the start, by what became of their request: "answered",
-  /// "malformed", "too_large", "encoded", "host", "slow", "busy", "left".
+  /// Clients by what became of them since the start: "answered", "failed",
+  /// "malformed", "too_large", "encoded", "host", "slow", "busy" or "left".
   using Counts = std::map<std::string_view, std::uint64_t>;
 
   /// Binds the address; nothing is answered yet. A second server on the same

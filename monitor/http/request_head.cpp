@@ -54,7 +54,44 @@ bool IsPlain(std::string_view text) {
   });
 }
 
-// "GET /path?query HTTP/1.1"
+// %XX as bytes; nothing if a % is followed by anything else, of which the
+// library would know one more form.
+std::optional<std::string> Decoded(std::string_view text) {
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    unsigned byte = static_cast<unsigned char>(text[i]);
+    if (text[i] == '%') {
+      const std::string_view digits = text.substr(i + 1, 2);
+      const char* const end = digits.data() + digits.size();
+      if (digits.size() != 2 ||
+          std::from_chars(digits.data(), end, byte, 16).ptr != end) {
+        return std::nullopt;
+      }
+      i += 2;
+    }
+    result += static_cast<char>(byte);
+  }
+  return result;
+}
+
+std::string Encoded(std::string_view path) {
+  std::string result;
+  for (const char c : path) {
+    const auto byte = static_cast<unsigned char>(c);
+    if ((byte < 0x80 && std::isalnum(byte) != 0) ||
+        std::string_view("-._~/").find(c) != std::string_view::npos) {
+      result += c;
+    } else {
+      result += '%';
+      result += "0123456789ABCDEF"[byte >> 4U];
+      result += "0123456789ABCDEF"[byte & 15U];
+    }
+  }
+  return result;
+}
+
+// "GET /path?query HTTP/1.1"; the path is passed on in one form, so that the
+// routes see the path that chose the lane.
 std::optional<Refusal> TakeRequestLine(std::string_view line,
                                        RequestHead& head) {
   const std::size_t first = line.find(' ');
@@ -64,15 +101,21 @@ std::optional<Refusal> TakeRequestLine(std::string_view line,
     return kMalformed;
   }
   const std::string_view method = line.substr(0, first);
-  const std::string_view target = line.substr(first + 1, last - first - 1);
-  if (target.find(' ') != std::string_view::npos || !target.starts_with('/')) {
+  std::string_view target = line.substr(first + 1, last - first - 1);
+  target = target.substr(0, target.find('#'));
+  const std::string_view query =
+      target.substr(std::min(target.find('?'), target.size()));
+  const auto path = Decoded(target.substr(0, target.size() - query.size()));
+  if (target.find(' ') != std::string_view::npos || !path ||
+      !path->starts_with('/') || !IsPlain(*path)) {
     return kMalformed;
   }
   if (method != "GET" && method != "HEAD" && method != "POST") {
     return kMethod;
   }
-  head.path = target.substr(0, target.find_first_of("?#"));
-  head.text.append(method).append(" ").append(target).append(" HTTP/1.1\r\n");
+  head.path = *path;
+  head.text.append(method).append(" ").append(Encoded(*path));
+  head.text.append(query).append(" HTTP/1.1\r\n");
   return std::nullopt;
 }
 

@@ -14,7 +14,7 @@ namespace fdi::monitor {
 /// asked for. Therefore it is given only the headers that our pages read.
 struct RequestHead {
   std::string text;     ///< Request line and headers as the library gets them.
-  std::string path;     ///< Without the query.
+  std::string path;     ///< Decoded, without query.
   std::string host;     ///< Header Host.
   std::size_t size{0};  ///< Of the head as it came [bytes].
   std::size_t body_size{0};  ///< Content-Length [bytes].

@@ -43,6 +43,18 @@ TEST(RequestHeadTest, PassesOnOnlyWhatPagesRead) {
             "Authorization: Bearer abc\r\n\r\n");
 }
 
+TEST(RequestHeadTest, APathHasOneForm) {
+  std::optional<RequestHead> head;
+  ASSERT_FALSE(ParseRequestHead(
+      "GET /api/v1/strea%6d/%c3%a9%20?x=%61#y HTTP/1.1\r\n\r\n", kBody, head));
+  EXPECT_EQ(head->path, "/api/v1/stream/\u00e9 ");
+  EXPECT_EQ(head->text, "GET /api/v1/stream/%C3%A9%20?x=%61 HTTP/1.1\r\n\r\n");
+  for (const char* path : {"/%u0061", "/%", "/%4", "/%0a", "/%00", "/%-1"}) {
+    EXPECT_EQ(StatusOf(std::string("GET ") + path + " HTTP/1.1\r\n\r\n"), 400)
+        << path;
+  }
+}
+
 TEST(RequestHeadTest, NoLineHeaderOrBodyIsLongerThanTheLimits) {
   EXPECT_EQ(StatusOf(std::string(4097, 'G')), 414);
   EXPECT_EQ(StatusOf("GET /" + std::string(5000, 'a') + " HTTP/1.1\r\n"), 414);
@@ -102,7 +114,7 @@ TEST(HostRuleTest, OffLoopbackAddressesAndOwnNamesMayAsk) {
   gethostname(machine.data(), machine.size() - 1);
   const std::vector<std::string> names{"Monitor.plant"};
   for (const std::string bound : {"0.0.0.0", "192.168.1.5", "::"}) {
-    for (const std::string own :
+    for (const std::string& own :
          {std::string("192.168.1.5:8080"), std::string("[fe80::1]:8080"),
           std::string("localhost"), std::string(machine.data()) + ":8080",
           std::string("monitor.plant:8080")}) {
