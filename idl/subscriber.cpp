@@ -139,7 +139,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
       }
       const Item& item = batch[next++];
       ++handed;
-      Add(item.ended ? &SubscriberStatus::ended : &SubscriberStatus::received);
+      (item.ended ? ended : received).fetch_add(1, std::memory_order_relaxed);
       const auto& handler =
           item.ended ? handlers.on_ended : handlers.on_message;
       if (handler) {
@@ -285,6 +285,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   std::vector<Item> batch;  // Taken from it, and handed out up to `next`.
   std::size_t next{0};
   std::atomic<bool> pending{false};
+  std::atomic<std::uint64_t> received{0};  // Handed out, as is `ended`.
+  std::atomic<std::uint64_t> ended{0};
 
   mutable std::mutex status_mutex;  // Guards what follows.
   SubscriberStatus counted;         // lost: as the library counts,
@@ -329,6 +331,8 @@ SubscriberStatus Subscriber<Message>::status() const {
   const std::uint64_t refused_bytes = type == nullptr ? 0 : type->refused();
   const std::lock_guard lock(impl.status_mutex);
   SubscriberStatus status = impl.counted;
+  status.received = impl.received.load(std::memory_order_relaxed);
+  status.ended = impl.ended.load(std::memory_order_relaxed);
   status.undecodable += refused_bytes;
   // Messages refused for a reason of their own are missing, too.
   const std::uint64_t explained = status.rejected_instances + refused_bytes;
