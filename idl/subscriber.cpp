@@ -34,6 +34,7 @@ constexpr std::size_t QueueCapacity(std::size_t item_bytes) {
 }
 
 constexpr std::chrono::hours kLongestWait{1};  // The clock must not overflow.
+constexpr std::chrono::milliseconds kLongestFarewell{500};
 
 struct HandleHash {
   std::size_t operator()(const dds::InstanceHandle_t& handle) const {
@@ -105,6 +106,9 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   ~Impl() override {
     queue.Close();
     reader->set_listener(nullptr);
+    if (!holds_receipt) {  // Otherwise nothing is refused.
+      LetWritersFinish();
+    }
     subscriber->delete_datareader(reader);
   }
 
@@ -118,6 +122,26 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
            << dds::StatusMask::sample_lost()
            << dds::StatusMask::sample_rejected()
            << dds::StatusMask::liveliness_changed();
+  }
+
+  // A writer that removes a reader drops what this reader has not acknowledged,
+  // and in Fast DDS 2.9.1 deadlocks if its sending thread is sending just then,
+  // as it is while it repeats what had no room here (matched_reader_remove
+  // against the flow controller, upstream pull request 3468). Hence a reader
+  // that is behind takes and acknowledges all before it leaves, within
+  // kLongestFarewell. A writer that writes on without a pause is not helped.
+  void LetWritersFinish() {
+    const eprosima::fastrtps::Duration_t two_heartbeats{0, 100'000'000};
+    const auto end = std::chrono::steady_clock::now() + kLongestFarewell;
+    const std::lock_guard lock(drain_mutex);
+    dds::SampleInfo info;
+    const auto take = [&] {
+      return reader->take_next_sample(&wire, &info) == ReturnCode::RETCODE_OK;
+    };
+    bool behind = take();
+    while (behind && std::chrono::steady_clock::now() < end) {
+      behind = take() || reader->wait_for_unread_message(two_heartbeats);
+    }
   }
 
   // Of the thread that takes. Waits for the first message only.

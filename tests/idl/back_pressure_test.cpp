@@ -18,7 +18,7 @@ class SlowReaderTest : public DeliveryTest,
                        public testing::WithParamInterface<Overflow> {};
 
 TEST_P(SlowReaderTest, PacesALosslessWriter) {
-  constexpr std::uint64_t kSamples = 120000;
+  constexpr std::uint64_t kSamples = 80000;
   Participant here(domain_.Options(), log_.Sink());
   Participant there(domain_.Options(), log_.Sink());
   Subscriber<ValveSampleMessage> subscriber(here, Profile::kLossless,
