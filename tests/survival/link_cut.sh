@@ -27,11 +27,13 @@ fail() {
 }
 now_ms() { date +%s%3N; }
 
-if ! command -v ip >/dev/null || ! ip netns add "$near" 2>/dev/null; then
+trap finish EXIT
+# In a chroot a namespace can be made but not entered.
+if ! command -v ip >/dev/null || ! ip netns add "$near" 2>/dev/null ||
+  ! ip netns exec "$near" true 2>/dev/null; then
   echo "link_cut: skipped, network namespaces are not permitted here"
   exit 77
 fi
-trap finish EXIT
 ip netns add "$far"
 ip link add "fa$tag" netns "$near" type veth peer name "fb$tag" netns "$far"
 join() {  # NAMESPACE DEVICE ADDRESS
