@@ -1,11 +1,20 @@
 #include "simulator/record_fit.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "diagnosis/error.h"
 #include "simulator/valve_simulation.h"
 
 namespace fdi::simulator {
+
+double DelayedCommand(const std::vector<RecordRow>& record, std::size_t k,
+                      int delay) {
+  const auto last = static_cast<std::ptrdiff_t>(record.size()) - 1;
+  const auto at = std::clamp(static_cast<std::ptrdiff_t>(k) - delay,
+                             std::ptrdiff_t{0}, last);
+  return record[static_cast<std::size_t>(at)].input.cv_pct;
+}
 
 std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
                                          const std::vector<RecordRow>& record,
@@ -16,6 +25,8 @@ std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
   RecordedExcitation excitation;
   for (std::size_t k = first; k < last; ++k) {
     excitation.rows.push_back(record[k].input);
+    excitation.rows.back().cv_pct =
+        DelayedCommand(record, k, drive.command_delay);
   }
   ValveSimulationConfig config;
   config.parameters = parameters;

@@ -19,7 +19,16 @@ struct RecordDrive {
   double period_s{1.0};  ///< Of the rows, > 0.
   /// The command is linear from row to row instead of held.
   bool interpolated_command{false};
+  /// Rows from the stamp of a command to its action: negative where the valve
+  /// answers before the stamp, as to a command that is stamped when the period
+  /// is over.
+  int command_delay{0};
 };
+
+/// The command that acts from row k on: that of row k - delay, or of the
+/// nearest row that there is.
+double DelayedCommand(const std::vector<RecordRow>& record, std::size_t k,
+                      int delay);
 
 /// What the simulated valve answers to one row.
 struct RecordAnswer {

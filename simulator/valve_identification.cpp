@@ -364,7 +364,9 @@ class Identification {
  private:
   std::vector<ValveUnknown> Unknowns(const ValveParameters& base,
                                      bool stated) const;
-  std::vector<Hypothesis> Hypotheses() const;
+  Hypothesis Start(const ValveParameters& variant,
+                   const RecordDrive& drive) const;
+  Hypothesis BestStart() const;
   RobustFit Fit(const Hypothesis& hypothesis,
                 const std::vector<RecordSegment>& segments,
                 int iterations) const;
@@ -392,30 +394,35 @@ std::vector<ValveUnknown> Identification::Unknowns(const ValveParameters& base,
   return unknowns;
 }
 
-// The nominal relay with the command held comes first: it wins a draw.
-std::vector<Hypothesis> Identification::Hypotheses() const {
-  std::vector<Hypothesis> hypotheses;
-  for (const ValveParameters& variant : RelayVariants(nominal_)) {
-    ValveParameters start = variant;
-    if (options_.has_flow) {
-      start.trim = RegressTrim(records_, nominal_);
-    }
-    for (const bool interpolated : {false, true}) {
-      Hypothesis h{{variant, {options_.period_s, interpolated}},
-                   Unknowns(variant, /*stated=*/false),
-                   {},
-                   {}};
-      h.point = BoundsOf(h.unknowns).prior_mean;
-      for (std::size_t i = 0; i < h.unknowns.size(); ++i) {
-        const double value = h.unknowns[i].in(start);
-        if (value > 0.0) {
-          h.point[static_cast<Index>(i)] = std::log(value);
-        }
-      }
-      hypotheses.push_back(std::move(h));
+Hypothesis Identification::Start(const ValveParameters& variant,
+                                 const RecordDrive& drive) const {
+  ValveParameters start = variant;
+  if (options_.has_flow) {
+    start.trim = RegressTrim(records_, nominal_);
+  }
+  Hypothesis h{{variant, drive}, Unknowns(variant, /*stated=*/false), {}, {}};
+  h.point = BoundsOf(h.unknowns).prior_mean;
+  for (std::size_t i = 0; i < h.unknowns.size(); ++i) {
+    const double value = h.unknowns[i].in(start);
+    if (value > 0.0) {
+      h.point[static_cast<Index>(i)] = std::log(value);
     }
   }
-  return hypotheses;
+  return h;
+}
+
+// First how and when the command acts, then the relay. Of what fits alike the
+// first is kept: the nominal relay, the command held and without delay.
+Hypothesis Identification::BestStart() const {
+  std::vector<Hypothesis> drives;
+  for (const int delay : {0, -1, 1, 2}) {
+    for (const bool interpolated : {false, true}) {
+      drives.push_back(
+          Start(nominal_, {options_.period_s, interpolated, delay}));
+    }
+  }
+  Hypothesis best = Best(std::move(drives));
+  return Best({best, Start(RelayVariants(nominal_).back(), best.base.drive)});
 }
 
 RobustFit Identification::Fit(const Hypothesis& hypothesis,
@@ -545,7 +552,7 @@ RecordFit Identification::Compare(const ValveCandidate& candidate) const {
 }
 
 ValveFit Identification::Run() {
-  Hypothesis best = Best(Hypotheses());
+  Hypothesis best = BestStart();
   std::vector<FittedParameter> rejected;
   KeepIdentified(best, rejected);
   AddStated(best, rejected);
@@ -562,6 +569,7 @@ ValveFit Identification::Run() {
   result.values.insert(result.values.end(), rejected.begin(), rejected.end());
   result.parameters = candidate.parameters;
   result.interpolated_command = candidate.drive.interpolated_command;
+  result.command_delay = candidate.drive.command_delay;
   result.fitted = Compare(candidate);
   result.nominal = Compare({nominal_, candidate.drive});
   return result;

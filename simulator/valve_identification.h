@@ -119,6 +119,7 @@ struct FittedParameter {
 struct ValveFit {
   ValveParameters parameters;
   bool interpolated_command{false};  ///< Else held from row to row.
+  int command_delay{0};              ///< Of RecordDrive, -1..2 rows.
   std::vector<FittedParameter> values;
   RecordFit nominal;  ///< With the nominal parameters, driven alike.
   RecordFit fitted;
@@ -127,8 +128,9 @@ struct ValveFit {
 /// Fits a healthy valve's physical parameters to its records.
 ///
 /// Equations (12)-(17) are driven with the recorded inputs, command held and
-/// interpolated, with the benchmark's air relay (square root and dead zone) and
-/// with (16); what follows X best is kept. Unknown are Kv and the exponent of
+/// interpolated, acting -1..+2 rows after its stamp, with the benchmark's air
+/// relay (square root and dead zone) and with (16); what follows X best is
+/// kept. Unknown are Kv and the exponent of
 /// the characteristic, the relay's coefficients, filter time and gain of the
 /// positioner, play and supply pressure. They minimise Huber's loss of the
 /// differences of X and F over their scales, with a mild prior at the nominal

@@ -225,7 +225,9 @@ void AddFit(const simulator::ValveFit& fit, cli::Report& report) {
                               {"identified", "identified"}});
   report.Line(std::string("What is not identified stays nominal. Command ") +
               (fit.interpolated_command ? "interpolated" : "held") +
-              " from sample to sample; simulation against record: X RMSE " +
+              " from sample to sample, acting " +
+              std::to_string(fit.command_delay) +
+              " samples after its stamp; simulation against record: X RMSE " +
               FormatNumber(fit.nominal.x_rmse_pct, 3) + " -> " +
               FormatNumber(fit.fitted.x_rmse_pct, 3) + " %, F RMSE " +
               FormatNumber(fit.nominal.flow_rmse, 3) + " -> " +

@@ -94,8 +94,14 @@ FaultSynthesizer::FaultSynthesizer(ValveType type) : type_(std::move(type)) {
 std::vector<Sample> FaultSynthesizer::Simulate(
     const FaultCondition& fault, const std::vector<Sample>& inputs) const {
   simulator::RecordedExcitation excitation;
-  for (const Sample& sample : inputs) {
-    excitation.rows.push_back(InputsOf(sample, type_.levels));
+  const auto last = static_cast<std::ptrdiff_t>(inputs.size()) - 1;
+  for (std::ptrdiff_t k = 0; k <= last; ++k) {
+    excitation.rows.push_back(
+        InputsOf(inputs[static_cast<std::size_t>(k)], type_.levels));
+    excitation.rows.back().cv_pct =
+        inputs[static_cast<std::size_t>(std::clamp(k - type_.command_delay,
+                                                   std::ptrdiff_t{0}, last))]
+            [Signal::kCv];
   }
   simulator::ValveSimulationConfig config;
   config.parameters = type_.parameters;

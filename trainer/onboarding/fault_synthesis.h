@@ -20,6 +20,8 @@ struct ValveType {
   simulator::ValveParameters parameters{};
   /// The command acts linearly from sample to sample instead of held.
   bool interpolated_command{false};
+  /// Samples from the stamp of a command to its action; see RecordDrive.
+  int command_delay{0};
   /// Stand for P1, P2 and T1 where a valve does not measure them.
   simulator::InputRow levels{71.67, 3555.0, 2615.0, 100.7};
 };

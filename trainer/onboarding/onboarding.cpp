@@ -360,6 +360,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& runs,
     result.fit = FitType(runs, options);
     result.type.parameters = result.fit->parameters;
     result.type.interpolated_command = result.fit->interpolated_command;
+    result.type.command_delay = result.fit->command_delay;
   }
   const FaultSynthesizer synthesize(result.type);
   const std::vector<FaultCondition> faults = OnboardingFaults(signals);
