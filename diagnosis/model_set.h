@@ -107,6 +107,12 @@ struct StuckLimits {
   int p2{0};
 };
 
+/// One number of a valve's fitted physics, e.g. {"parameters.trim.kv_m3_h", 118}.
+struct PhysicalValue {
+  std::string name;
+  double value{0.0};
+};
+
 /// The stored knowledge about one kind of valve: what the trainer writes, the
 /// monitor loads, and both run. Observer 0 is the normal one.
 struct ModelSet {
@@ -129,6 +135,8 @@ struct ModelSet {
   std::vector<std::string> training_runs;
   double threshold_hours{0.0};  ///< Fault-free hours behind the thresholds.
   double false_alarms_per_hour{1e-3};  ///< The rate they are set for.
+  /// The valve as onboarding fitted it, for its simulation; empty without.
+  std::vector<PhysicalValue> physics{};
 };
 
 /// A set of faults as bits: bit i stands for ModelSet::faults[i].

@@ -254,6 +254,27 @@ void ValveDynamics::Roots(double t, const double* x, double* g) const noexcept {
   }
 }
 
+double FlowM3PerHour(const TrimParameters& trim, const FaultEffects& effects,
+                     const ProcessInputs& effective, double rod,
+                     double bypass_opening) {
+  const MediumState medium =
+      MediumAt(effective.inlet_pressure_pa, effective.outlet_pressure_pa,
+               effective.temperature_c);
+  const double plug = rod + effects.plug_offset;
+  const double opening = Opening(trim, plug) + effects.opening_offset;
+  const double bypass =
+      std::clamp(bypass_opening + effects.bypass_opening, 0.0, 1.0);
+  const double through_trim =
+      Flow(trim.kv_m3_h * effects.kv_factor, opening,
+           EffectivePressureDrop(medium, RecoveryCoefficient(plug)),
+           medium.density_kg_m3);
+  const double through_bypass = Flow(
+      trim.bypass_kv_m3_h, bypass,
+      EffectivePressureDrop(medium, BypassRecoveryCoefficient(1.0 - bypass)),
+      medium.density_kg_m3);
+  return (through_trim + through_bypass) * (1.0 - effects.external_loss);
+}
+
 namespace {
 
 // Within this of a stop and moving towards it: at the stop [stroke].
@@ -510,26 +531,10 @@ double ControlValve::NetForce() const {
 double ControlValve::FlowM3PerHour(const ProcessInputs& inputs,
                                    double bypass_opening) const {
   const ValveDynamics& dynamics = impl_->dynamics_;
-  const FaultEffects& effects = dynamics.effects();
-  const TrimParameters& trim = dynamics.parameters().trim;
-  const ProcessInputs effective = dynamics.Effective(inputs);
-  const MediumState medium =
-      MediumAt(effective.inlet_pressure_pa, effective.outlet_pressure_pa,
-               effective.temperature_c);
-  const double plug =
-      dynamics.Rod(impl_->x()[kActuatorState]) + effects.plug_offset;
-  const double opening = Opening(trim, plug) + effects.opening_offset;
-  const double bypass =
-      std::clamp(bypass_opening + effects.bypass_opening, 0.0, 1.0);
-  const double through_trim =
-      Flow(trim.kv_m3_h * effects.kv_factor, opening,
-           EffectivePressureDrop(medium, RecoveryCoefficient(plug)),
-           medium.density_kg_m3);
-  const double through_bypass = Flow(
-      trim.bypass_kv_m3_h, bypass,
-      EffectivePressureDrop(medium, BypassRecoveryCoefficient(1.0 - bypass)),
-      medium.density_kg_m3);
-  return (through_trim + through_bypass) * (1.0 - effects.external_loss);
+  return simulator::FlowM3PerHour(
+      dynamics.parameters().trim, dynamics.effects(),
+      dynamics.Effective(inputs), dynamics.Rod(impl_->x()[kActuatorState]),
+      bypass_opening);
 }
 
 ProcessInputs ControlValve::Effective(const ProcessInputs& inputs) const {

@@ -123,6 +123,12 @@ class ValveDynamics final : public OdeSystem {
   double vapour_pa_{0.0};
 };
 
+/// Flow through trim and bypass [m3/h] with the rod at `rod`, under inputs as
+/// the faults make them.
+double FlowM3PerHour(const TrimParameters& trim, const FaultEffects& effects,
+                     const ProcessInputs& effective, double rod,
+                     double bypass_opening);
+
 /// Where the valve stands. Fractions of the stroke; 0 open, 1 closed.
 struct ValveState {
   double rod;                  ///< Position y of rod and plug, behind the play.

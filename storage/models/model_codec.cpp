@@ -29,6 +29,9 @@ namespace {
 
 constexpr std::uint32_t kMagic = 0x4D494446;  // "FDIM"
 constexpr std::uint32_t kFormat = 3;
+// A set with physics has them behind all other fields.
+constexpr std::uint32_t kFormatWithPhysics = 4;
+constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
 constexpr std::uint32_t kMaxText = 4096;
@@ -150,13 +153,19 @@ void Fields(A& a, T& decision) {
     settling_samples, evidence_window, evidence_core, evidence_support);
 }
 
+template <typename A, Of<PhysicalValue> T>
+void Fields(A& a, T& physical) {
+  auto& [name, value] = physical;
+  a(name, value);
+}
+
 template <typename A, Of<ModelSet> T>
 void Fields(A& a, T& models) {
   // version and content_hash are given by the store.
   auto& [name, version, content_hash, created_ns, software, preset,
          sample_period_s, flow_unit, validity, stuck, decision, channels,
          observers, faults, groups, undetectable, training_runs,
-         threshold_hours, false_alarms_per_hour] = models;
+         threshold_hours, false_alarms_per_hour, physics] = models;
   a(name, created_ns, software, preset, sample_period_s, flow_unit, validity,
     stuck, decision, Limited{channels, kMaxChannels},
     Limited{observers, kMaxObservers}, Limited{faults, kMaxFaults},
@@ -262,9 +271,12 @@ std::uint32_t Checksum(std::span<const std::byte> bytes) {
 std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
   Encoder payload;
   Fields(payload, models);
+  if (!models.physics.empty()) {
+    payload(Limited{models.physics, kMaxPhysics});
+  }
   ByteWriter writer;
   writer.Put(kMagic);
-  writer.Put(kFormat);
+  writer.Put(models.physics.empty() ? kFormat : kFormatWithPhysics);
   writer.Put(static_cast<std::uint64_t>(payload.writer.size()));
   writer.Append(payload.writer.view().data(), payload.writer.size());
   writer.Put(Checksum(writer.view()));
@@ -283,10 +295,12 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
     reader.Refuse("its CRC-32 differs");
   }
   const auto format = reader.Get<std::uint32_t>();
-  if (format != kFormat) {
+  if (format != kFormat && format != kFormatWithPhysics) {
     throw DataError(std::string(where) + ": format version " +
                     std::to_string(format) + ", this program reads " +
-                    std::to_string(kFormat) + "; train the model set anew");
+                    std::to_string(kFormat) + " and " +
+                    std::to_string(kFormatWithPhysics) +
+                    "; train the model set anew");
   }
   if (reader.Get<std::uint64_t>() != bytes.size() - kFrame) {
     reader.Refuse("its length differs");
@@ -295,6 +309,9 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
   ModelSet models;
   Decoder decoder(payload);
   Fields(decoder, models);
+  if (format == kFormatWithPhysics) {
+    decoder(Limited{models.physics, kMaxPhysics});
+  }
   payload.ExpectEnd();
   return models;
 }

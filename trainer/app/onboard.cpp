@@ -77,7 +77,7 @@ struct FoundType {
 };
 
 // A stored type is a scenario in TOML that has the parameters, behind a line
-// `levels = [CV, P1, P2, T1]`. A sine is the one excitation that may be
+// `levels = [CV, P1, P2, T1]` and the delay of the command. A sine is the one excitation that may be
 // continuous without a file.
 std::string TypeText(const ValveType& type) {
   simulator::Scenario scenario;
@@ -87,7 +87,8 @@ std::string TypeText(const ValveType& type) {
   const simulator::InputRow& levels = type.levels;
   return "levels = [" + Shortest(levels.cv_pct) + ", " +
          Shortest(levels.p1_kpa) + ", " + Shortest(levels.p2_kpa) + ", " +
-         Shortest(levels.t1_degc) + "]\n" + ScenarioText(scenario);
+         Shortest(levels.t1_degc) + "]\ncommand_delay = " +
+         std::to_string(type.command_delay) + "\n" + ScenarioText(scenario);
 }
 
 ValveType ParseType(const std::string& text, const std::string& name) {
@@ -96,12 +97,14 @@ ValveType ParseType(const std::string& text, const std::string& name) {
   if (levels.size() != 4) {
     throw DataError("valve type " + name + ": levels must be 4 numbers");
   }
+  const auto delay = reader.Integer("command_delay");
   simulator::Scenario scenario;
   ApplyScenario(reader, {}, scenario);
   reader.Finish();
   return {name,
           scenario.config.parameters,
           scenario.config.continuous_inputs,
+          static_cast<int>(delay.value_or(0)),
           {levels[0], levels[1], levels[2], levels[3]}};
 }
 

@@ -8,6 +8,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/quality_count.h"
+#include "simulator/second_look/episode_looks.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/evaluation/csv_rows.h"
 #include "trainer/evaluation/evaluation_report.h"
@@ -18,19 +19,85 @@
 namespace fdi::trainer {
 namespace {
 
+// What the second look makes of the indications: while an episode has an answer
+// of the physics, that is the set.
+class SecondLooks {
+ public:
+  explicit SecondLooks(const ModelSet& models)
+      : physics_(simulator::PhysicsFrom(models.physics)), looks_(physics_) {}
+
+  void Watch(const Sample& sample, const Verdict& verdict) {
+    if (const auto task = looks_.Step(sample, verdict)) {
+      book_.Enter(*task, simulator::AnswerOf(
+                             simulator::LookAgain(physics_, task->window)));
+    }
+    for (const Transition& transition : verdict.Transitions()) {
+      detection_ns_ = transition.detection_stamp_ns;
+    }
+    if (OutOfOrder(verdict.intake)) {
+      return;
+    }
+    const simulator::LookAnswer* answer =
+        verdict.detected ? book_.At(detection_ns_, sample.stamp_ns) : nullptr;
+    sets_.push_back(answer ? SetOf(*answer) : std::nullopt);
+  }
+
+  void Apply(std::vector<Indication>& indications) const {
+    for (std::size_t k = 0; k < indications.size(); ++k) {
+      if (sets_[k]) {
+        indications[k].isolated = *sets_[k];
+      }
+    }
+  }
+
+ private:
+  // Empty: unknown. Nothing: what the engine says stands.
+  static std::optional<std::vector<int>> SetOf(
+      const simulator::LookAnswer& answer) {
+    using enum simulator::LookOutcome;
+    std::vector<int> set;
+    if (answer.outcome == kNothing || answer.outcome == kNoneFits) {
+      return std::nullopt;
+    }
+    if (answer.outcome == kNamed) {
+      for (const simulator::Explanation& e : answer.faults) {
+        set.push_back(e.fault);
+      }
+      std::sort(set.begin(), set.end());
+    }
+    return set;
+  }
+
+  simulator::ValvePhysics physics_;
+  simulator::EpisodeLooks looks_;
+  simulator::LookBook book_;
+  std::int64_t detection_ns_{0};
+  std::vector<std::optional<std::vector<int>>> sets_;
+};
+
 Answer FollowEngine(const std::shared_ptr<const ModelSet>& models,
                     const ScoredRun& scored, const VerdictSink& sink) {
   QualityCount samples;
+  std::optional<SecondLooks> looks;
+  if (!models->physics.empty()) {
+    looks.emplace(*models);
+  }
   Answer answer;
   answer.indications =
       Rescore(models, scored.run, [&](const Sample& s, const Verdict& verdict) {
         if (CountsAsTime(verdict)) {
           samples.Add(verdict.quality);
         }
+        if (looks) {
+          looks->Watch(s, verdict);
+        }
         if (sink) {
           sink(s, verdict);
         }
       });
+  if (looks) {
+    looks->Apply(answer.indications);
+  }
   answer.seconds.emplace();
   for (std::size_t q = 0; q < kQualityCount; ++q) {
     (*answer.seconds)[q] =

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "diagnosis/error.h"
+#include "simulator/second_look/valve_physics.h"
 #include "trainer/evaluation.h"
 #include "trainer/parallel_for.h"
 
@@ -285,6 +286,19 @@ simulator::ValveFit FitType(const std::vector<TrainingRun>& runs,
                              options.type.parameters, fit);
 }
 
+// How the healthy valve is simulated, for the second look.
+std::vector<PhysicalValue> Physics(const ValveType& type,
+                                   const std::vector<TrainingRun>& runs) {
+  std::vector<std::vector<simulator::RecordRow>> records;
+  for (simulator::HealthyRecord& record : Records(runs, type.levels)) {
+    records.push_back(std::move(record.rows));
+  }
+  return simulator::ToValues(simulator::DescribeValve(
+      type.parameters,
+      {runs.front().period_s, type.interpolated_command, type.command_delay},
+      records));
+}
+
 double NaiveError(const std::vector<TrainingRun>& runs, Signal output) {
   double sum = 0.0;
   double squares = 0.0;
@@ -368,6 +382,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& runs,
       TrainDifferenceSet(runs, faults, std::ref(synthesize),
                          result.type.parameters.instruments.flow.high, training,
                          Part(progress, kFitShare, kTrainShare));
+  result.models.physics = Physics(result.type, runs);
   result.channels = FitsOf(result.models, runs);
   for (const TrainingRun& run : runs) {
     result.hours +=

@@ -1,0 +1,158 @@
+#include "simulator/second_look/episode_looks.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fdi::simulator {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::size_t kBefore = 120;   // rows before the detection
+constexpr std::size_t kLongest = 620;  // rows in all
+constexpr std::size_t kShortest = 30;
+constexpr std::int64_t kFirstAge = 40 * kSecond;
+// None of the hypotheses follows the record: errors of so many healthy ones.
+constexpr double kMostMisfit = 8.0;
+
+std::int64_t AgeAfter(std::int64_t age_ns) {
+  return age_ns < 150 * kSecond   ? 150 * kSecond
+         : age_ns < 500 * kSecond ? 500 * kSecond
+                                  : 3 * age_ns;
+}
+
+}  // namespace
+
+LookAnswer AnswerOf(const SecondLook& look) {
+  LookAnswer answer;
+  answer.misfit = look.misfit;
+  bool nothing = false;
+  for (const Explanation& e : look.ranked) {
+    if (e.distance > kLookMargin) {
+      break;
+    }
+    if (e.fault == 0) {
+      nothing = true;
+    } else if (std::none_of(
+                   answer.faults.begin(), answer.faults.end(),
+                   [&](const auto& f) { return f.fault == e.fault; })) {
+      answer.faults.push_back(e);
+    }
+  }
+  answer.outcome = look.misfit > kMostMisfit            ? LookOutcome::kNoneFits
+                   : nothing                            ? LookOutcome::kNothing
+                   : answer.faults.size() > kMostNamed ? LookOutcome::kUnclear
+                                                        : LookOutcome::kNamed;
+  return answer;
+}
+
+EpisodeLooks::EpisodeLooks(const ValvePhysics& physics)
+    : physics_(physics),
+      period_ns_(std::llround(physics.drive.period_s * kSecond)) {}
+
+// One row a period; up to three missing ones are held, a longer gap begins
+// anew.
+void EpisodeLooks::Keep(const Sample& sample) {
+  constexpr std::int64_t kMostHeld = 3;
+  const std::int64_t step =
+      rows_.empty() ? 1
+                    : (sample.stamp_ns - rows_.back().stamp_ns +
+                       period_ns_ / 2) / period_ns_;
+  if (step < 1 || step > 1 + kMostHeld || sample.present != signals_) {
+    rows_.clear();
+  }
+  signals_ = sample.present;
+  const auto value = [&](Signal signal, double otherwise) {
+    return sample.Has(signal) ? sample[signal] : otherwise;
+  };
+  const RecordRow row{{sample[Signal::kCv], value(Signal::kP1, physics_.p1.mean),
+                       value(Signal::kP2, physics_.p2.mean),
+                       value(Signal::kT1, physics_.t1.mean)},
+                      sample[Signal::kX],
+                      value(Signal::kF, 0.0)};
+  for (std::int64_t held = 1; !rows_.empty() && held < step; ++held) {
+    rows_.push_back({rows_.back().stamp_ns + period_ns_, rows_.back().row});
+  }
+  rows_.push_back({sample.stamp_ns, row});
+  while (rows_.size() > kLongest) {
+    rows_.pop_front();
+  }
+}
+
+std::optional<LookTask> EpisodeLooks::Task(std::int64_t until_ns) const {
+  LookTask task;
+  task.detection_stamp_ns = *detection_ns_;
+  task.window.signals = signals_;
+  const std::int64_t from_ns =
+      *detection_ns_ - static_cast<std::int64_t>(kBefore) * period_ns_;
+  for (const Row& row : rows_) {
+    if (row.stamp_ns < from_ns || row.stamp_ns > until_ns) {
+      continue;
+    }
+    if (row.stamp_ns < *detection_ns_) {
+      task.window.detection = task.window.rows.size() + 1;
+    }
+    task.window.rows.push_back(row.row);
+    task.stamp_ns = row.stamp_ns;
+  }
+  if (task.window.rows.size() < kShortest ||
+      task.window.detection + 10 > task.window.rows.size()) {
+    return std::nullopt;
+  }
+  return task;
+}
+
+std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
+                                           const Verdict& verdict) {
+  if (verdict.intake != Intake::kAccepted) {
+    return std::nullopt;
+  }
+  Keep(sample);
+  std::optional<LookTask> due;
+  for (const Transition& transition : verdict.Transitions()) {
+    if (transition.kind == TransitionKind::kDetected) {
+      detection_ns_ = transition.detection_stamp_ns;
+      next_age_ns_ = kFirstAge;
+    } else if (detection_ns_ && (transition.kind == TransitionKind::kCleared ||
+                                 transition.kind == TransitionKind::kClosed)) {
+      if (next_age_ns_ == kFirstAge) {
+        due = Task(sample.stamp_ns);
+      }
+      detection_ns_.reset();
+    }
+  }
+  if (detection_ns_ && sample.stamp_ns - *detection_ns_ >= next_age_ns_) {
+    while (sample.stamp_ns - *detection_ns_ >= next_age_ns_) {
+      next_age_ns_ = AgeAfter(next_age_ns_);
+    }
+    due = Task(sample.stamp_ns);
+  }
+  return due;
+}
+
+void LookBook::Enter(const LookTask& task, LookAnswer answer) {
+  std::erase_if(entries_, [&](const Entry& entry) {
+    return entry.detection_stamp_ns != task.detection_stamp_ns;
+  });
+  constexpr double kMuchWorse = 2.0;
+  for (const Entry& entry : entries_) {
+    if (answer.misfit > kMuchWorse * std::max(1.0, entry.answer.misfit)) {
+      return;
+    }
+  }
+  entries_.push_back(
+      {task.detection_stamp_ns, task.stamp_ns + kLookDelayNs, std::move(answer)});
+}
+
+const LookAnswer* LookBook::At(std::int64_t detection_stamp_ns,
+                               std::int64_t stamp_ns) const {
+  const LookAnswer* answer = nullptr;
+  for (const Entry& entry : entries_) {
+    if (entry.detection_stamp_ns == detection_stamp_ns &&
+        entry.from_ns <= stamp_ns) {
+      answer = &entry.answer;
+    }
+  }
+  return answer;
+}
+
+}  // namespace fdi::simulator

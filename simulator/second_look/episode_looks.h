@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "diagnosis/verdict.h"
+#include "simulator/second_look/second_look.h"
+
+namespace fdi::simulator {
+
+/// A second look that is due: at what, and for which episode.
+struct LookTask {
+  LookWindow window;
+  std::int64_t stamp_ns{0};            ///< Of the last row.
+  std::int64_t detection_stamp_ns{0};  ///< Key of the episode.
+};
+
+/// What a second look makes of the name of an episode.
+enum class LookOutcome : std::uint8_t {
+  kNamed,      ///< The set stands: what the data do not separate is in it.
+  kUnclear,    ///< More than four faults explain the window: a shortlist.
+  kNothing,    ///< So does no fault at all, or a constant shift.
+  kNoneFits,   ///< No hypothesis follows the record.
+};
+
+struct LookAnswer {
+  LookOutcome outcome{LookOutcome::kNoneFits};
+  std::vector<Explanation> faults;  ///< One each, best first; of kNoneFits none.
+  double misfit{0.0};
+};
+
+/// Largest distance behind the best explanation at which a fault stays in the
+/// set, calibrated for 90 % (docs/method.md).
+inline constexpr double kLookMargin = 12.0;
+/// A set of more faults is a shortlist.
+inline constexpr std::size_t kMostNamed = 4;
+
+LookAnswer AnswerOf(const SecondLook& look);
+
+/// Seconds from the last sample of a look to the stamp from which its answer
+/// counts, whatever the computer took.
+inline constexpr std::int64_t kLookDelayNs = 10'000'000'000;
+
+/// Follows the samples and verdicts of one valve and says when the physics
+/// should look at an episode: 40, 150 and 500 s after its detection, then at
+/// three times the age each time, and at its end if it was shorter. Keeps the
+/// last 620 samples.
+class EpisodeLooks {
+ public:
+  /// `physics` must outlive it.
+  explicit EpisodeLooks(const ValvePhysics& physics);
+
+  /// The next sample and what the engine said about it.
+  std::optional<LookTask> Step(const Sample& sample, const Verdict& verdict);
+
+ private:
+  struct Row {
+    std::int64_t stamp_ns;
+    RecordRow row;
+  };
+
+  void Keep(const Sample& sample);
+  std::optional<LookTask> Task(std::int64_t until_ns) const;
+
+  const ValvePhysics& physics_;
+  std::int64_t period_ns_;
+  SignalMask signals_{0};
+  std::deque<Row> rows_{};
+  std::optional<std::int64_t> detection_ns_{};
+  std::int64_t next_age_ns_{0};
+};
+
+/// The answer of the layer that speaks last: that of the last look at the open
+/// episode that was conclusive, else the engine's. A look that fits much worse
+/// than an earlier one is not heard: the fault may have gone meanwhile.
+class LookBook {
+ public:
+  void Enter(const LookTask& task, LookAnswer answer);
+
+  /// The answer that counts for an episode at `stamp_ns`, if any.
+  const LookAnswer* At(std::int64_t detection_stamp_ns,
+                       std::int64_t stamp_ns) const;
+
+ private:
+  struct Entry {
+    std::int64_t detection_stamp_ns;
+    std::int64_t from_ns;
+    LookAnswer answer;
+  };
+  std::vector<Entry> entries_;
+};
+
+}  // namespace fdi::simulator

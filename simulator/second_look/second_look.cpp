@@ -1,0 +1,517 @@
+#include "simulator/second_look/second_look.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "simulator/control_valve.h"
+#include "simulator/fault_effects.h"
+#include "simulator/valve_equations.h"
+#include "simulator/valve_simulation.h"
+
+namespace fdi::simulator {
+namespace {
+
+using Trajectory = std::vector<RecordAnswer>;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kFreedom = 6.0;  // nu
+constexpr double kEffectError = 0.05;  // kappa
+// 2 log-likelihood that a fault has to gain over none, for its free strength
+// and start; a constant shift alike.
+constexpr double kPriceOfFault = 6.0;
+
+// When a fault acts: from `start` on (from before the window if it is 0 and the
+// fault is constant), or growing from there to the end of the window.
+struct Course {
+  int start;
+  bool growing;
+
+  friend bool operator==(const Course&, const Course&) = default;
+};
+
+// A fault in one direction with what is known about its strength so far.
+struct Hypothesis {
+  int fault;
+  double sign;
+  Course course;
+  std::map<double, Trajectory> simulated{};  // By |strength|.
+  double cost{kInfinity};                    // The least that was simulated,
+  double strength{0.0};                      // and its |strength|.
+};
+
+bool ActsOnFlowAlone(int fault) {
+  return fault == 5 || fault == 6 || fault == 18 || fault == 19;
+}
+
+bool ActsOnInputs(int fault) {
+  return fault == 7 || fault == 17 || TransmitterOf(fault).has_value();
+}
+
+class Looker {
+ public:
+  Looker(const ValvePhysics& physics, const LookWindow& window)
+      : physics_(physics),
+        window_(window),
+        rows_(static_cast<int>(window.rows.size())),
+        detection_(static_cast<int>(window.detection)) {
+    healthy_ = Simulate(0, 0.0, {0, false});
+    FindUsualInputs();
+  }
+
+  SecondLook Run();
+
+ private:
+  bool Measures(Signal signal) const {
+    return (window_.signals & MaskOf(signal)) != 0;
+  }
+  double StrengthAt(int row, double strength, Course course) const;
+  void FindUsualInputs();
+  InputRow InputAt(int row, int fault, double strength) const;
+  Trajectory Simulate(int fault, double strength, Course course);
+  Trajectory FlowOnly(int fault, double strength, Course course) const;
+  double ChannelCost(const Trajectory& answers, bool flow, double slow_sd) const;
+  double InputCost(int fault, double strength, Course course,
+                   const Trajectory& answers) const;
+  double Cost(int fault, double strength, Course course,
+              const Trajectory& answers) const;
+  std::vector<Hypothesis> Hypotheses() const;
+  void Try(Hypothesis& hypothesis, double strength);
+  void TryCourse(Hypothesis& hypothesis, Course course);
+  void Refine(Hypothesis& hypothesis);
+  template <typename Use>
+  void Between(const Hypothesis& hypothesis, Use&& use) const;
+  Explanation Explain(const Hypothesis& hypothesis, double scale) const;
+
+  const ValvePhysics& physics_;
+  const LookWindow& window_;
+  int rows_;
+  int detection_;
+  InputRow usual_{};  // Mean inputs before the detection, or in onboarding.
+  Trajectory healthy_;
+  std::int64_t simulated_{0};
+};
+
+double Looker::StrengthAt(int row, double strength, Course course) const {
+  if (row < course.start) {
+    return 0.0;
+  }
+  return course.growing ? strength * (row - course.start) /
+                              std::max(1, rows_ - 1 - course.start)
+                        : strength;
+}
+
+void Looker::FindUsualInputs() {
+  constexpr int kLeastRows = 30;
+  constexpr int kGuard = 5;  // Of the rows before a late detection.
+  usual_ = {0.0, physics_.p1.mean, physics_.p2.mean, physics_.t1.mean};
+  if (detection_ < kLeastRows + kGuard) {
+    return;
+  }
+  usual_ = {};
+  const double share = 1.0 / (detection_ - kGuard);
+  for (int k = 0; k < detection_ - kGuard; ++k) {
+    const InputRow& in = window_.rows[static_cast<std::size_t>(k)].input;
+    usual_.p1_kpa += share * in.p1_kpa;
+    usual_.p2_kpa += share * in.p2_kpa;
+    usual_.t1_degc += share * in.t1_degc;
+  }
+}
+
+// What acts on the valve if the fault is there: a faulty transmitter does not
+// tell, and the hot water of f7 is read as the end of the range.
+InputRow Looker::InputAt(int row, int fault, double strength) const {
+  InputRow input = window_.rows[static_cast<std::size_t>(row)].input;
+  input.cv_pct = DelayedCommand(window_.rows, static_cast<std::size_t>(row),
+                                physics_.drive.command_delay);
+  if (strength == 0.0) {
+    return input;
+  }
+  switch (fault) {
+    case 7:
+    case kTemperatureTransmitterFault:
+      input.t1_degc = usual_.t1_degc;
+      break;
+    case kInletPressureTransmitterFault:
+      input.p1_kpa = usual_.p1_kpa;
+      break;
+    case kOutletPressureTransmitterFault:
+      input.p2_kpa = usual_.p2_kpa;
+      break;
+    default:
+      break;
+  }
+  return input;
+}
+
+Trajectory Looker::Simulate(int fault, double strength, Course course) {
+  if (ActsOnFlowAlone(fault)) {
+    return FlowOnly(fault, strength, course);
+  }
+  simulated_ += rows_;
+  ValveSimulationConfig config;
+  RecordedExcitation excitation;
+  for (int k = 0; k < rows_; ++k) {
+    excitation.rows.push_back(
+        InputAt(k, fault, StrengthAt(k, strength, course)));
+  }
+  config.parameters = physics_.parameters;
+  config.excitation = std::move(excitation);
+  config.period_s = physics_.drive.period_s;
+  config.duration_s = rows_ * config.period_s;
+  config.continuous_inputs = physics_.drive.interpolated_command;
+  config.noise = false;
+  config.resolution = false;
+  config.tolerance_scale = 10.0;
+  // The recorded pressures already have what f17 does to them.
+  if (fault != 0 && fault != 17 && !TransmitterOf(fault)) {
+    FaultSchedule schedule;
+    schedule.fault = fault;
+    schedule.start_s = course.start * config.period_s;
+    schedule.final_strength = strength;
+    schedule.development_s =
+        course.growing ? (rows_ - 1 - course.start) * config.period_s : 0.0;
+    config.faults = {schedule};
+  }
+  ValveSimulation simulation(config);
+  Trajectory answers;
+  while (!simulation.finished()) {
+    const Sample sample = simulation.Step().sample;
+    answers.push_back({sample[Signal::kX], sample[Signal::kF]});
+  }
+  return answers;
+}
+
+// X as in the healthy valve, the flow by (12).
+Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
+  const InstrumentParameters& i = physics_.parameters.instruments;
+  Trajectory answers = healthy_;
+  for (int k = course.start; k < rows_; ++k) {
+    FaultEffects effects;
+    ApplyFault(fault, StrengthAt(k, strength, course), effects);
+    RecordAnswer& answer = answers[static_cast<std::size_t>(k)];
+    const InputRow& in = window_.rows[static_cast<std::size_t>(k)].input;
+    double flow = FlowM3PerHour(
+        physics_.parameters.trim, effects,
+        {0.01 * in.cv_pct, 1e3 * in.p1_kpa, 1e3 * in.p2_kpa, in.t1_degc},
+        0.01 * answer.x_pct, 0.0);
+    if (i.flow_unit == FlowUnit::kTPerHour) {
+      flow *= LiquidDensity(in.t1_degc) / 1000.0;
+    }
+    answer.flow = std::clamp(
+        std::clamp(flow, -kInfinity, kInfinity) * effects.flow_reading_factor,
+        i.flow.low, i.flow.high);
+  }
+  return answers;
+}
+
+// One channel's share of Q, its shift found by reweighting.
+double Looker::ChannelCost(const Trajectory& answers, bool flow,
+                           double slow_sd) const {
+  const Scatter& scatter = flow ? physics_.flow : physics_.x;
+  const int settle = std::min(10, detection_ / 2);  // It starts at rest.
+  std::vector<double> errors;
+  std::vector<double> widths;  // w
+  for (int k = settle; k < rows_; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const RecordRow& row = window_.rows[at];
+    const RecordAnswer& answer = answers[at];
+    const RecordAnswer& without = healthy_[at];
+    const double error =
+        flow ? row.flow - answer.flow : row.x_pct - answer.x_pct;
+    const double effect =
+        flow ? answer.flow - without.flow : answer.x_pct - without.x_pct;
+    errors.push_back(error / scatter.sd);
+    const double away = kEffectError * effect / scatter.sd;
+    widths.push_back(1.0 + away * away);
+  }
+  const double prior =
+      scatter.correlation_time * scatter.sd * scatter.sd / (slow_sd * slow_sd);
+  double shift = 0.0;  // b / sd
+  for (int iteration = 0; iteration < 4; ++iteration) {
+    double sum = 0.0;
+    double weights = prior;
+    for (std::size_t k = 0; k < errors.size(); ++k) {
+      const double e = errors[k] - shift;
+      const double weight = 1.0 / (widths[k] * (1.0 + e * e / (widths[k] * kFreedom)));
+      sum += weight * errors[k];
+      weights += weight;
+    }
+    shift = sum / weights;
+  }
+  double cost = 0.0;
+  for (std::size_t k = 0; k < errors.size(); ++k) {
+    const double e = errors[k] - shift;
+    cost += kFreedom * std::log1p(e * e / (widths[k] * kFreedom)) +
+            std::log(widths[k]);
+  }
+  return (cost + prior * shift * shift) / scatter.correlation_time;
+}
+
+// How unusual the inputs are, behind the detection, if the fault is there.
+double Looker::InputCost(int fault, double strength, Course course,
+                         const Trajectory& answers) const {
+  const InstrumentParameters& i = physics_.parameters.instruments;
+  double cost = 0.0;
+  const auto add = [&](Signal signal, double InputRow::*member,
+                       const InputBand& band, const Transmitter& transmitter,
+                       auto&& as_read) {
+    if (!Measures(signal)) {
+      return;
+    }
+    double mean = 0.0;
+    double expected = 0.0;
+    double flow = 0.0;
+    const int first = std::max(detection_, course.start);
+    const double share = 1.0 / std::max(1, rows_ - first);
+    for (int k = first; k < rows_; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      mean += share * (window_.rows[at].input.*member);
+      flow += share * answers[at].flow;
+      expected += share * std::clamp(as_read(usual_.*member,
+                                             StrengthAt(k, strength, course)),
+                                     transmitter.low, transmitter.high);
+    }
+    // The loop moves the pressures with the flow; how far is uncertain.
+    const double moved = band.slope * (flow - physics_.flow_mean);
+    const double span = transmitter.high - transmitter.low;
+    const double sd = std::hypot(0.5 * band.sd, 0.005 * span, moved);
+    const double away = (mean - expected) / sd;
+    cost += away * away;
+  };
+  add(Signal::kP1, &InputRow::p1_kpa, physics_.p1, i.pressure,
+      [&](double usual, double s) {
+        return fault == 17 && s < 0.0 ? usual * (1.0 + s)
+               : fault == kInletPressureTransmitterFault
+                   ? usual + s * (i.pressure.high - i.pressure.low)
+                   : usual;
+      });
+  add(Signal::kP2, &InputRow::p2_kpa, physics_.p2, i.pressure,
+      [&](double usual, double s) {
+        return fault == 17 && s > 0.0 ? usual * (1.0 - s)
+               : fault == kOutletPressureTransmitterFault
+                   ? usual + s * (i.pressure.high - i.pressure.low)
+                   : usual;
+      });
+  add(Signal::kT1, &InputRow::t1_degc, physics_.t1, i.temperature,
+      [&](double usual, double s) {
+        return fault == 7 && s > 0.0
+                   ? std::min(usual + 200.0 + 100.0 * s, kMaxTemperatureC)
+               : fault == kTemperatureTransmitterFault
+                   ? usual + s * (i.temperature.high - i.temperature.low)
+                   : usual;
+      });
+  return cost;
+}
+
+double Looker::Cost(int fault, double strength, Course course,
+                    const Trajectory& answers) const {
+  double cost = ChannelCost(answers, false, physics_.x.slow_sd) +
+                InputCost(fault, strength, course, answers);
+  if (Measures(Signal::kF)) {
+    cost += ChannelCost(answers, true, physics_.flow.slow_sd);
+  }
+  return cost;
+}
+
+std::vector<Hypothesis> Looker::Hypotheses() const {
+  std::vector<Hypothesis> hypotheses;
+  for (int fault = 1; fault <= kLastFault; ++fault) {
+    const auto transmitter = TransmitterOf(fault);
+    if (fault == 14 || (transmitter && !Measures(*transmitter)) ||
+        ((ActsOnFlowAlone(fault)) && !Measures(Signal::kF))) {
+      continue;
+    }
+    for (const double sign : {1.0, -1.0}) {
+      if (sign > 0.0 || FaultFactsOf(fault).is_signed) {
+        hypotheses.push_back({fault, sign, {detection_, false}});
+      }
+    }
+  }
+  return hypotheses;
+}
+
+void Looker::Try(Hypothesis& h, double strength) {
+  if (h.simulated.contains(strength)) {
+    return;
+  }
+  Trajectory answers = Simulate(h.fault, h.sign * strength, h.course);
+  const double cost = Cost(h.fault, h.sign * strength, h.course, answers);
+  if (cost < h.cost) {
+    h.cost = cost;
+    h.strength = strength;
+  }
+  h.simulated.emplace(strength, std::move(answers));
+}
+
+// Another course at the best strength; taken if it fits better.
+void Looker::TryCourse(Hypothesis& h, Course course) {
+  if (course == h.course) {
+    return;
+  }
+  Hypothesis other{h.fault, h.sign, course};
+  Try(other, h.strength);
+  if (other.cost < h.cost) {
+    Try(other, 0.75 * h.strength);
+    Try(other, std::min(1.0, 1.3 * h.strength));
+    h = std::move(other);
+  }
+}
+
+// use(|strength|, answers) for strengths between the simulated ones, the
+// answers linear between theirs, from none on.
+template <typename Use>
+void Looker::Between(const Hypothesis& h, Use&& use) const {
+  constexpr int kParts = 8;
+  double low = 0.0;
+  const Trajectory* from = &healthy_;
+  Trajectory answers(healthy_.size());
+  for (const auto& [high, to] : h.simulated) {
+    for (int part = 1; part <= kParts; ++part) {
+      const double share = static_cast<double>(part) / kParts;
+      for (std::size_t k = 0; k < answers.size(); ++k) {
+        answers[k] = {std::lerp((*from)[k].x_pct, to[k].x_pct, share),
+                      std::lerp((*from)[k].flow, to[k].flow, share)};
+      }
+      use(std::lerp(low, high, share), answers);
+    }
+    low = high;
+    from = &to;
+  }
+}
+
+// Simulates where the least cost is expected.
+void Looker::Refine(Hypothesis& h) {
+  double least = kInfinity;
+  double where = h.strength;
+  Between(h, [&](double strength, const Trajectory& answers) {
+    const double cost = Cost(h.fault, h.sign * strength, h.course, answers);
+    if (cost < least) {
+      least = cost;
+      where = strength;
+    }
+  });
+  Try(h, where);
+}
+
+// The interval is where the cost is within 3.84 of the least.
+Explanation Looker::Explain(const Hypothesis& h, double scale) const {
+  constexpr double kQuantile = 3.84;
+  Explanation e{h.fault,
+                h.sign * h.strength,
+                h.strength,
+                h.strength,
+                h.course.start - detection_,
+                h.course.growing};
+  Between(h, [&](double strength, const Trajectory& answers) {
+    const double cost = Cost(h.fault, h.sign * strength, h.course, answers);
+    if (cost - h.cost <= kQuantile * scale) {
+      e.lowest = std::min(e.lowest, strength);
+      e.highest = std::max(e.highest, strength);
+    }
+  });
+  if (h.sign < 0.0) {
+    std::tie(e.lowest, e.highest) = std::pair(-e.highest, -e.lowest);
+  }
+  return e;
+}
+
+SecondLook Looker::Run() {
+  const bool has_flow = Measures(Signal::kF);
+  const double none = Cost(0, 0.0, {detection_, false}, healthy_);
+  // A constant shift of one reading by some per cent: drift.
+  constexpr double kDrift = 0.02;
+  const InstrumentParameters& i = physics_.parameters.instruments;
+  const double x_shift =
+      ChannelCost(healthy_, false,
+                  kDrift * (i.position.high - i.position.low)) -
+      ChannelCost(healthy_, false, physics_.x.slow_sd);
+  const double flow_shift =
+      has_flow ? ChannelCost(healthy_, true,
+                             kDrift * (i.flow.high - i.flow.low)) -
+                     ChannelCost(healthy_, true, physics_.flow.slow_sd)
+               : 0.0;
+  const double unmoved = std::min(
+      {none, none + kPriceOfFault + std::min(x_shift, flow_shift)});
+
+  std::vector<Hypothesis> hypotheses = Hypotheses();
+  const double inputs = InputCost(0, 0.0, {detection_, false}, healthy_);
+  for (Hypothesis& h : hypotheses) {
+    // Faults of the inputs are sought where an input is unusual.
+    if (ActsOnInputs(h.fault) && inputs < 9.0) {
+      continue;
+    }
+    for (const double strength : {0.1, 0.3, 0.6, 1.0}) {
+      Try(h, strength);
+    }
+  }
+  constexpr std::array<std::size_t, 4> kKept{12, 10, 7, 5};
+  for (std::size_t round = 0; round < kKept.size(); ++round) {
+    std::stable_sort(
+        hypotheses.begin(), hypotheses.end(),
+        [](const auto& a, const auto& b) { return a.cost < b.cost; });
+    for (std::size_t j = 0; j < std::min(kKept[round], hypotheses.size());
+         ++j) {
+      Hypothesis& h = hypotheses[j];
+      if (h.simulated.empty()) {
+        continue;
+      }
+      if (round == 1) {
+        for (const Course course :
+             {Course{std::max(0, detection_ - 3), false},
+              Course{std::max(0, detection_ - 20), false}, Course{0, false},
+              Course{std::max(0, detection_ - 60), true}}) {
+          TryCourse(h, course);
+        }
+      }
+      Refine(h);
+    }
+  }
+  std::stable_sort(hypotheses.begin(), hypotheses.end(),
+                   [](const auto& a, const auto& b) { return a.cost < b.cost; });
+
+  const double readings =
+      (rows_ - 10) * (1.0 / physics_.x.correlation_time +
+                      (has_flow ? 1.0 / physics_.flow.correlation_time : 0.0));
+  const double best =
+      std::min(unmoved, hypotheses.front().cost + kPriceOfFault);
+  SecondLook look;
+  look.misfit = best / readings;
+  const double scale = std::max(1.0, look.misfit);
+  Explanation nothing;
+  nothing.distance = (unmoved - best) / scale;
+  look.ranked.push_back(nothing);
+  for (const Hypothesis& h : hypotheses) {
+    if (h.simulated.empty()) {
+      continue;
+    }
+    Explanation explanation = Explain(h, scale);
+    explanation.distance = (h.cost + kPriceOfFault - best) / scale;
+    look.ranked.push_back(explanation);
+  }
+  std::stable_sort(look.ranked.begin(), look.ranked.end(),
+                   [](const Explanation& a, const Explanation& b) {
+                     return a.distance < b.distance;
+                   });
+  const bool faulty = look.ranked.front().fault != 0;
+  look.best = faulty ? hypotheses.front().simulated.at(
+                           hypotheses.front().strength)
+                     : healthy_;
+  look.simulated_rows = simulated_;
+  return look;
+}
+
+}  // namespace
+
+SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window) {
+  Require(window.rows.size() >= 30 && window.detection < window.rows.size(),
+          "a second look takes 30 rows and a detection among them");
+  return Looker(physics, window).Run();
+}
+
+}  // namespace fdi::simulator

@@ -1,0 +1,221 @@
+#include "simulator/second_look/valve_physics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <type_traits>
+
+#include "diagnosis/error.h"
+#include "diagnosis/field_list.h"
+
+namespace fdi::simulator {
+namespace {
+
+constexpr std::size_t kSettleRows = 60;  // The simulation starts at rest.
+constexpr std::size_t kShortest = 180;
+constexpr std::size_t kSlowRows = 600;
+
+double Mean(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) {
+    sum += value;
+  }
+  return sum / static_cast<double>(values.size());
+}
+
+double Median(std::vector<double> values) {
+  const auto middle =
+      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// About the median, what is beyond five robust deviations drawn in.
+std::vector<double> Bounded(std::vector<double> errors) {
+  const double middle = Median(errors);
+  std::vector<double> sizes;
+  for (double& error : errors) {
+    error -= middle;
+    sizes.push_back(std::abs(error));
+  }
+  const double reach = 5.0 * std::max(1e-9, 1.4826 * Median(std::move(sizes)));
+  for (double& error : errors) {
+    error = std::clamp(error, -reach, reach);
+  }
+  return errors;
+}
+
+Scatter ScatterOf(std::vector<double> raw) {
+  const std::vector<double> errors = Bounded(std::move(raw));
+  double squares = 1e-18;
+  for (const double error : errors) {
+    squares += error * error;
+  }
+  Scatter scatter;
+  scatter.sd = std::sqrt(squares / static_cast<double>(errors.size()));
+  constexpr double kUncorrelated = 0.05;
+  for (std::size_t lag = 1; lag < kShortest / 2; ++lag) {
+    double sum = 0.0;
+    for (std::size_t k = lag; k < errors.size(); ++k) {
+      sum += errors[k] * errors[k - lag];
+    }
+    if (sum < kUncorrelated * squares) {
+      break;
+    }
+    scatter.correlation_time += 2.0 * sum / squares;
+  }
+  const std::size_t pieces =
+      std::max<std::size_t>(1, errors.size() / kSlowRows);
+  double means = 0.0;
+  for (std::size_t i = 0; i < pieces; ++i) {
+    const auto at = [&](std::size_t j) {
+      return errors.begin() +
+             static_cast<std::ptrdiff_t>(j * errors.size() / pieces);
+    };
+    const double mean = Mean({at(i), at(i + 1)});
+    means += mean * mean;
+  }
+  // Hours do not show how days differ.
+  constexpr double kLeastSlow = 0.3;
+  scatter.slow_sd = std::max(std::sqrt(means / static_cast<double>(pieces)),
+                             kLeastSlow * scatter.sd);
+  return scatter;
+}
+
+InputBand BandOf(const std::vector<double>& input,
+                 const std::vector<double>& flow) {
+  InputBand band;
+  band.mean = Mean(input);
+  const double flow_mean = Mean(flow);
+  double cross = 0.0;
+  double square = 1e-9;
+  for (std::size_t k = 0; k < input.size(); ++k) {
+    const double away = flow[k] - flow_mean;
+    cross += away * (input[k] - band.mean);
+    square += away * away;
+  }
+  band.slope = cross / square;
+  double rest = 1e-9;
+  for (std::size_t k = 0; k < input.size(); ++k) {
+    const double error =
+        input[k] - band.mean - band.slope * (flow[k] - flow_mean);
+    rest += error * error;
+  }
+  band.sd = std::sqrt(rest / static_cast<double>(input.size()));
+  return band;
+}
+
+}  // namespace
+
+ValvePhysics DescribeValve(const ValveParameters& parameters,
+                           const RecordDrive& drive,
+                           const std::vector<std::vector<RecordRow>>& records) {
+  std::vector<double> x;
+  std::vector<double> flow;
+  std::vector<double> level;
+  std::vector<double> p1;
+  std::vector<double> p2;
+  std::vector<double> t1;
+  for (const std::vector<RecordRow>& rows : records) {
+    if (rows.size() < kShortest) {
+      continue;
+    }
+    const auto answers =
+        SimulateRecord(parameters, rows, 0, rows.size(), drive);
+    for (std::size_t k = kSettleRows; k < rows.size(); ++k) {
+      x.push_back(rows[k].x_pct - answers[k].x_pct);
+      flow.push_back(rows[k].flow - answers[k].flow);
+      level.push_back(rows[k].flow);
+      p1.push_back(rows[k].input.p1_kpa);
+      p2.push_back(rows[k].input.p2_kpa);
+      t1.push_back(rows[k].input.t1_degc);
+    }
+  }
+  if (x.empty()) {
+    throw DataError("healthy records: expected one of at least 180 rows");
+  }
+  ValvePhysics physics{parameters, drive, ScatterOf(std::move(x)),
+                       ScatterOf(std::move(flow)), Mean(level)};
+  physics.p1 = BandOf(p1, level);
+  physics.p2 = BandOf(p2, level);
+  physics.t1 = BandOf(t1, level);
+  return physics;
+}
+
+// VisitFields(value, visit) calls visit(name, field) for each field.
+namespace {
+
+#define FDI_VISIT(FIELD) visit(#FIELD, value.FIELD);
+#define FDI_FIELDS(STRUCT, ...)                      \
+  template <typename Visitor>                        \
+  void VisitFields(STRUCT& value, Visitor&& visit) { \
+    FDI_FOR_EACH(FDI_VISIT, __VA_ARGS__)             \
+  }
+
+FDI_FIELDS(ActuatorParameters, moving_mass_kg, damping_n_s_m, spring_rate_n_m,
+           spring_preload_m, diaphragm_area_m2, stroke_m, chamber_volume_m3,
+           air_temperature_k, ambient_pressure_pa, supply_pressure_gauge_pa,
+           plug_area_m2, play_fraction, lowest_travel, highest_travel,
+           coulomb_friction_n)
+FDI_FIELDS(PositionerParameters, gain, integral_time_s, derivative_time_s,
+           filter_time_s, sampling_period_s, relay, filling_cv, venting_cv,
+           orifice_coefficient, transducer_dead_zone)
+FDI_FIELDS(TrimParameters, kv_m3_h, characteristic, exponent, bypass_kv_m3_h)
+FDI_FIELDS(Transmitter, low, high, noise_sd)
+FDI_FIELDS(InstrumentParameters, flow_unit, command, pressure, temperature,
+           position, flow, positioner_noise_sd_pct, resolution_bits)
+FDI_FIELDS(ValveParameters, actuator, positioner, trim, instruments)
+FDI_FIELDS(RecordDrive, period_s, interpolated_command, command_delay)
+FDI_FIELDS(Scatter, sd, correlation_time, slow_sd)
+FDI_FIELDS(InputBand, mean, slope, sd)
+FDI_FIELDS(ValvePhysics, parameters, drive, x, flow, flow_mean, p1, p2, t1)
+
+#undef FDI_FIELDS
+#undef FDI_VISIT
+
+// Calls use(path, field) for every field that is a number.
+template <typename Use>
+struct Numbers {
+  std::string prefix;
+  Use& use;
+
+  template <typename Field>
+  void operator()(const char* name, Field& field) {
+    if constexpr (std::is_class_v<Field>) {
+      VisitFields(field, Numbers{prefix + name + '.', use});
+    } else {
+      use(prefix + name, field);
+    }
+  }
+};
+
+}  // namespace
+
+std::vector<PhysicalValue> ToValues(const ValvePhysics& physics) {
+  std::vector<PhysicalValue> values;
+  auto use = [&](const std::string& name, auto& field) {
+    values.push_back({name, static_cast<double>(field)});
+  };
+  ValvePhysics copy = physics;
+  VisitFields(copy, Numbers<decltype(use)>{"", use});
+  return values;
+}
+
+ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values) {
+  ValvePhysics physics;
+  std::size_t next = 0;
+  auto use = [&](const std::string& name, auto& field) {
+    if (next >= values.size() || values[next].name != name) {
+      throw DataError("the physics of the model set lacks " + name +
+                      ": onboard the valve anew");
+    }
+    field = static_cast<std::remove_reference_t<decltype(field)>>(
+        values[next++].value);
+  };
+  VisitFields(physics, Numbers<decltype(use)>{"", use});
+  Validate(physics.parameters);
+  return physics;
+}
+
+}  // namespace fdi::simulator

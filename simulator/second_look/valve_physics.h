@@ -1,0 +1,51 @@
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/model_set.h"
+#include "simulator/record_fit.h"
+#include "simulator/valve_parameters.h"
+
+namespace fdi::simulator {
+
+/// What a healthy valve and its simulation differ by in one output.
+struct Scatter {
+  double sd{1.0};                ///< [unit of the output], > 0.
+  double correlation_time{1.0};  ///< Of the difference [rows], >= 1.
+  double slow_sd{0.1};           ///< Of its means over ten minutes, > 0.
+};
+
+/// Readings of a pressure or temperature while the valve is healthy,
+/// mean + slope (F - F_mean), with a deviation about that.
+struct InputBand {
+  double mean{0.0};
+  double slope{0.0};  ///< Per unit of flow.
+  double sd{1.0};     ///< > 0.
+};
+
+/// A valve as onboarding found it: its physical parameters, how its command
+/// acts, and what is left unexplained while it is healthy.
+struct ValvePhysics {
+  ValveParameters parameters{};
+  RecordDrive drive{};
+  Scatter x{};          ///< [%]
+  Scatter flow{};       ///< [flow unit]
+  double flow_mean{0};  ///< [flow unit]
+  InputBand p1{};       ///< [kPa]
+  InputBand p2{};       ///< [kPa]
+  InputBand t1{};       ///< [degC]
+};
+
+/// Simulates the healthy records and measures the differences.
+/// @throws DataError if no record has 180 rows; as SimulateRecord().
+ValvePhysics DescribeValve(
+    const ValveParameters& parameters, const RecordDrive& drive,
+    const std::vector<std::vector<RecordRow>>& records);
+
+/// The physics as it is stored in a model set, and back.
+/// @throws DataError naming a value that is missing or unknown; ConfigError if
+///   a parameter is out of its range.
+std::vector<PhysicalValue> ToValues(const ValvePhysics& physics);
+ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values);
+
+}  // namespace fdi::simulator
