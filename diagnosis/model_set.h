@@ -107,7 +107,8 @@ struct StuckLimits {
   int p2{0};
 };
 
-/// One number of a valve's fitted physics, e.g. {"parameters.trim.kv_m3_h", 118}.
+/// One number of a valve's fitted physics, e.g. {"parameters.trim.kv_m3_h",
+/// 118}.
 struct PhysicalValue {
   std::string name;
   double value{0.0};

@@ -77,6 +77,9 @@ void IndexFault(const std::vector<Indication>& all, Zone zone,
   result.detected = all[zone.last].detected && last_dt >= 0;
   for (std::size_t k = zone.first; k <= zone.last; ++k) {
     const std::vector<int>& set = all[k].isolated;
+    if (all[k].withdrawn) {
+      result.final_set.clear();
+    }
     if (set.empty()) {
       continue;
     }

@@ -18,6 +18,7 @@ struct Indication {
   bool settled{false};        ///< Diagnosis was LIVE at or before it.
   bool detected{false};       ///< DD: an episode is open.
   std::vector<int> isolated;  ///< Faults indicated.
+  bool withdrawn{false};      ///< A second look took the name back: unknown.
 };
 
 /// The indices of the DAMADICS benchmark for one run, times in s from the start
@@ -42,7 +43,8 @@ struct RunIndices {
   double d_acc{-1.0};       ///< 1/size of the final set if the truth is in it.
   int episodes{0};          ///< Rising edges of DD in the whole run.
   int wrong_isolations{0};  ///< Sets of one wrong fault, while one acts.
-  std::vector<int> final_set;  ///< Last set isolated while the fault acted.
+  /// Last set isolated while the fault acted, unless it was withdrawn.
+  std::vector<int> final_set;
 };
 
 /// Computes the indices. t_from is the first instant with a fault, t_on the

@@ -76,6 +76,9 @@ ModelSet WithoutFaults(ModelSet models, const std::vector<int>& faults) {
   }
   std::erase_if(models.groups,
                 [](const auto& group) { return group.size() < 2; });
+  if (!faults.empty()) {
+    models.physics.clear();  // It knows them still.
+  }
   return models;
 }
 

@@ -19,21 +19,26 @@ struct LookTask {
 
 /// What a second look makes of the name of an episode.
 enum class LookOutcome : std::uint8_t {
-  kNamed,      ///< The set stands: what the data do not separate is in it.
-  kUnclear,    ///< More than four faults explain the window: a shortlist.
-  kNothing,    ///< So does no fault at all, or a constant shift.
-  kNoneFits,   ///< No hypothesis follows the record.
+  kNamed,     ///< The set stands: what the data do not separate is in it.
+  kUnclear,   ///< More than four faults explain the window: a shortlist.
+  kNothing,   ///< So does no fault at all, or a constant shift.
+  kNoneFits,  ///< No hypothesis follows the record: outside what is known.
 };
 
 struct LookAnswer {
   LookOutcome outcome{LookOutcome::kNoneFits};
-  std::vector<Explanation> faults;  ///< One each, best first; of kNoneFits none.
+  std::vector<Explanation>
+      faults;  ///< One each, best first; of kNoneFits none.
   double misfit{0.0};
 };
 
 /// Largest distance behind the best explanation at which a fault stays in the
 /// set, calibrated for 90 % (docs/method.md).
-inline constexpr double kLookMargin = 12.0;
+inline constexpr double kLookMargin = 15.0;
+/// A fault that gains less over none, per independent reading, may be what a
+/// healthy valve and its simulation differ by: up to 0.20 were seen without
+/// one.
+inline constexpr double kLeastGain = 0.25;
 /// A set of more faults is a shortlist.
 inline constexpr std::size_t kMostNamed = 4;
 
@@ -44,9 +49,9 @@ LookAnswer AnswerOf(const SecondLook& look);
 inline constexpr std::int64_t kLookDelayNs = 10'000'000'000;
 
 /// Follows the samples and verdicts of one valve and says when the physics
-/// should look at an episode: 40, 150 and 500 s after its detection, then at
-/// three times the age each time, and at its end if it was shorter. Keeps the
-/// last 620 samples.
+/// should look at an episode: 40, 150 and 300 s after its detection, then at
+/// ten times the age each time, and at its end if it was shorter. Keeps the
+/// last 420 samples.
 class EpisodeLooks {
  public:
   /// `physics` must outlive it.

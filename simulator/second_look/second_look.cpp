@@ -20,7 +20,7 @@ namespace {
 using Trajectory = std::vector<RecordAnswer>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kFreedom = 6.0;  // nu
+constexpr double kFreedom = 6.0;       // nu
 constexpr double kEffectError = 0.05;  // kappa
 // 2 log-likelihood that a fault has to gain over none, for its free strength
 // and start; a constant shift alike.
@@ -75,7 +75,8 @@ class Looker {
   InputRow InputAt(int row, int fault, double strength) const;
   Trajectory Simulate(int fault, double strength, Course course);
   Trajectory FlowOnly(int fault, double strength, Course course) const;
-  double ChannelCost(const Trajectory& answers, bool flow, double slow_sd) const;
+  double ChannelCost(const Trajectory& answers, bool flow,
+                     double slow_sd) const;
   double InputCost(int fault, double strength, Course course,
                    const Trajectory& answers) const;
   double Cost(int fault, double strength, Course course,
@@ -238,7 +239,8 @@ double Looker::ChannelCost(const Trajectory& answers, bool flow,
     double weights = prior;
     for (std::size_t k = 0; k < errors.size(); ++k) {
       const double e = errors[k] - shift;
-      const double weight = 1.0 / (widths[k] * (1.0 + e * e / (widths[k] * kFreedom)));
+      const double weight =
+          1.0 / (widths[k] * (1.0 + e * e / (widths[k] * kFreedom)));
       sum += weight * errors[k];
       weights += weight;
     }
@@ -323,12 +325,13 @@ std::vector<Hypothesis> Looker::Hypotheses() const {
   std::vector<Hypothesis> hypotheses;
   for (int fault = 1; fault <= kLastFault; ++fault) {
     const auto transmitter = TransmitterOf(fault);
-    if (fault == 14 || (transmitter && !Measures(*transmitter)) ||
-        ((ActsOnFlowAlone(fault)) && !Measures(Signal::kF))) {
+    constexpr int kPlay = 4;  // There is no less play than none.
+    if (fault == 8 || fault == 14 || (transmitter && !Measures(*transmitter)) ||
+        (ActsOnFlowAlone(fault) && !Measures(Signal::kF))) {
       continue;
     }
     for (const double sign : {1.0, -1.0}) {
-      if (sign > 0.0 || FaultFactsOf(fault).is_signed) {
+      if (sign > 0.0 || (FaultFactsOf(fault).is_signed && fault != kPlay)) {
         hypotheses.push_back({fault, sign, {detection_, false}});
       }
     }
@@ -396,18 +399,22 @@ void Looker::Refine(Hypothesis& h) {
       where = strength;
     }
   });
+  if (h.simulated.contains(where)) {
+    // Not linear in between: halve the wider of the gaps beside it.
+    const auto at = h.simulated.find(where);
+    const double below = at == h.simulated.begin() ? 0.0 : std::prev(at)->first;
+    const double above =
+        std::next(at) == h.simulated.end() ? where : std::next(at)->first;
+    where = 0.5 * (where + (above - where > where - below ? above : below));
+  }
   Try(h, where);
 }
 
 // The interval is where the cost is within 3.84 of the least.
 Explanation Looker::Explain(const Hypothesis& h, double scale) const {
   constexpr double kQuantile = 3.84;
-  Explanation e{h.fault,
-                h.sign * h.strength,
-                h.strength,
-                h.strength,
-                h.course.start - detection_,
-                h.course.growing};
+  Explanation e{h.fault,    h.sign * h.strength,         h.strength,
+                h.strength, h.course.start - detection_, h.course.growing};
   Between(h, [&](double strength, const Trajectory& answers) {
     const double cost = Cost(h.fault, h.sign * strength, h.course, answers);
     if (cost - h.cost <= kQuantile * scale) {
@@ -432,12 +439,12 @@ SecondLook Looker::Run() {
                   kDrift * (i.position.high - i.position.low)) -
       ChannelCost(healthy_, false, physics_.x.slow_sd);
   const double flow_shift =
-      has_flow ? ChannelCost(healthy_, true,
-                             kDrift * (i.flow.high - i.flow.low)) -
-                     ChannelCost(healthy_, true, physics_.flow.slow_sd)
-               : 0.0;
-  const double unmoved = std::min(
-      {none, none + kPriceOfFault + std::min(x_shift, flow_shift)});
+      has_flow
+          ? ChannelCost(healthy_, true, kDrift * (i.flow.high - i.flow.low)) -
+                ChannelCost(healthy_, true, physics_.flow.slow_sd)
+          : 0.0;
+  const double unmoved =
+      std::min({none, none + kPriceOfFault + std::min(x_shift, flow_shift)});
 
   std::vector<Hypothesis> hypotheses = Hypotheses();
   const double inputs = InputCost(0, 0.0, {detection_, false}, healthy_);
@@ -472,8 +479,9 @@ SecondLook Looker::Run() {
       Refine(h);
     }
   }
-  std::stable_sort(hypotheses.begin(), hypotheses.end(),
-                   [](const auto& a, const auto& b) { return a.cost < b.cost; });
+  std::stable_sort(
+      hypotheses.begin(), hypotheses.end(),
+      [](const auto& a, const auto& b) { return a.cost < b.cost; });
 
   const double readings =
       (rows_ - 10) * (1.0 / physics_.x.correlation_time +
@@ -481,6 +489,7 @@ SecondLook Looker::Run() {
   const double best =
       std::min(unmoved, hypotheses.front().cost + kPriceOfFault);
   SecondLook look;
+  look.readings = readings;
   look.misfit = best / readings;
   const double scale = std::max(1.0, look.misfit);
   Explanation nothing;
@@ -499,9 +508,9 @@ SecondLook Looker::Run() {
                      return a.distance < b.distance;
                    });
   const bool faulty = look.ranked.front().fault != 0;
-  look.best = faulty ? hypotheses.front().simulated.at(
-                           hypotheses.front().strength)
-                     : healthy_;
+  look.best = faulty
+                  ? hypotheses.front().simulated.at(hypotheses.front().strength)
+                  : healthy_;
   look.simulated_rows = simulated_;
   return look;
 }

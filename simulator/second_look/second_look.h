@@ -18,13 +18,13 @@ struct LookWindow {
 
 /// How one fault, at its best, explains the window.
 struct Explanation {
-  int fault{0};           ///< 0: none, but for a constant shift of X or F.
-  double strength{0.0};   ///< Most likely; signed [-].
-  double lowest{0.0};     ///< Ends of its 95 % interval [-].
-  double highest{0.0};    ///<
-  int start{0};           ///< Row that the fault begins at; < 0: before.
-  bool growing{false};    ///< From 0 at `start` to `strength` at the end.
-  double distance{0.0};   ///< Behind the best explanation [2 log-likelihood].
+  int fault{0};          ///< 0: none, but for a constant shift of X or F.
+  double strength{0.0};  ///< Most likely; signed [-].
+  double lowest{0.0};    ///< Ends of its 95 % interval [-].
+  double highest{0.0};   ///<
+  int start{0};          ///< Row that the fault begins at; < 0: before.
+  bool growing{false};   ///< From 0 at `start` to `strength` at the end.
+  double distance{0.0};  ///< Behind the best explanation [2 log-likelihood].
 };
 
 /// What the physics of the valve says about a window.
@@ -34,23 +34,25 @@ struct SecondLook {
   /// Mean square of the best explanation's errors in units of the healthy
   /// ones; far above 1 where none fits.
   double misfit{0.0};
+  double readings{0.0};  ///< Of X and F that count as independent.
   std::int64_t simulated_rows{0};
   /// The valve's answer under the best explanation, one per row.
   std::vector<RecordAnswer> best;
 };
 
 /// Simulates the valve over the window with every fault of the catalogue that
-/// acts on X, F or an input, in each direction, abrupt or growing, and ranks
-/// them by likelihood,
+/// moves X, F or an input (f8 and f14 do not), in each direction, abrupt or
+/// growing, and ranks them by likelihood,
 ///
-///     Q = sum_c 1/tau_c [ sum_k nu ln(1 + e_ck^2 / nu) + ln w_ck ] + b_c^2/s_c^2
+///     Q = sum_c 1/tau_c [ sum_k nu ln(1 + e_ck^2 / nu) + ln w_ck ] +
+///     b_c^2/s_c^2
 ///
 /// with e = (y - b - yhat) / (sd sqrt(w)): y is X or F, yhat simulated from the
 /// recorded CV, P1, P2, T1, sd, tau and s the healthy scatter, correlation time
-/// and slow deviation, b a constant shift. w = 1 + (kappa (yhat - yhat_0) / sd)^2
-/// lets the effect of a fault be off by a share. Strengths are found by least
-/// squares between simulated ones. P1, P2 and T1 are compared with what is
-/// usual. Distances are divided by the misfit of the best, at least 1.
+/// and slow deviation, b a constant shift. w = 1 + (kappa (yhat - yhat_0) /
+/// sd)^2 lets the effect of a fault be off by a share. Strengths are found by
+/// least squares between simulated ones. P1, P2 and T1 are compared with what
+/// is usual. Distances are divided by the misfit of the best, at least 1.
 ///
 /// Deterministic: no clock, no threads. @throws CvodeError.
 SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window);

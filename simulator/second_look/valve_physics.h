@@ -38,9 +38,9 @@ struct ValvePhysics {
 
 /// Simulates the healthy records and measures the differences.
 /// @throws DataError if no record has 180 rows; as SimulateRecord().
-ValvePhysics DescribeValve(
-    const ValveParameters& parameters, const RecordDrive& drive,
-    const std::vector<std::vector<RecordRow>>& records);
+ValvePhysics DescribeValve(const ValveParameters& parameters,
+                           const RecordDrive& drive,
+                           const std::vector<std::vector<RecordRow>>& records);
 
 /// The physics as it is stored in a model set, and back.
 /// @throws DataError naming a value that is missing or unknown; ConfigError if

@@ -296,11 +296,10 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
   }
   const auto format = reader.Get<std::uint32_t>();
   if (format != kFormat && format != kFormatWithPhysics) {
-    throw DataError(std::string(where) + ": format version " +
-                    std::to_string(format) + ", this program reads " +
-                    std::to_string(kFormat) + " and " +
-                    std::to_string(kFormatWithPhysics) +
-                    "; train the model set anew");
+    throw DataError(
+        std::string(where) + ": format version " + std::to_string(format) +
+        ", this program reads " + std::to_string(kFormat) + " and " +
+        std::to_string(kFormatWithPhysics) + "; train the model set anew");
   }
   if (reader.Get<std::uint64_t>() != bytes.size() - kFrame) {
     reader.Refuse("its length differs");

@@ -122,6 +122,16 @@ TEST_P(RecoveryTest, RecoversTheParametersOfASimulatedValve) {
 INSTANTIATE_TEST_SUITE_P(ValveIdentification, RecoveryTest,
                          ::testing::Values(-1, 1));
 
+// The command of a row acts over the period before its stamp.
+TEST(ValveIdentificationTest, FindsTheDelayOfTheCommand) {
+  const ValveParameters truth = ParameterSet("lublin-actuator-3-refit");
+  HealthyRecord record = Recording(truth, 400, 3);
+  for (std::size_t k = record.rows.size() - 1; k > 0; --k) {
+    record.rows[k].input.cv_pct = record.rows[k - 1].input.cv_pct;
+  }
+  EXPECT_EQ(FitValve({record}, truth).command_delay, -1);
+}
+
 TEST(ValveIdentificationTest, FindsTheAirRelayAndDoesNotNeedFlow) {
   ValveParameters truth = ParameterSet("lublin-actuator-3");
   truth.positioner.orifice_coefficient *= 1.2;

@@ -39,6 +39,19 @@ std::string Refusal(std::span<const std::byte> bytes) {
   return "accepted";
 }
 
+// A set without physics stays what earlier programs read.
+TEST(ModelCodecTest, PhysicsReadBackAndStandInTheirOwnFormat) {
+  ModelSet models = RandomModelSet("valve", 5);
+  const auto format = [&] { return EncodeModelSet(models)[4]; };
+  EXPECT_EQ(format(), std::byte{3});
+  models.physics = {{"trim.kv_m3_h", 118.5}, {"drive.command_delay", -1.0}};
+  EXPECT_EQ(format(), std::byte{4});
+  const ModelSet back = DecodeModelSet(EncodeModelSet(models), "test");
+  ASSERT_EQ(back.physics.size(), 2U);
+  EXPECT_EQ(back.physics[1].name, "drive.command_delay");
+  EXPECT_EQ(back.physics[1].value, -1.0);
+}
+
 TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
   ModelSet models = RandomModelSet("valve", 5);
   models.observers[2].channels[1].model.parallel = false;

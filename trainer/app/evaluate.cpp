@@ -45,6 +45,7 @@ struct EvaluateOptions {
   std::filesystem::path vectors;
   std::filesystem::path report;
   bool assume_normal{false};
+  bool second_look{true};
   bool csv{false};
 };
 
@@ -70,6 +71,9 @@ std::shared_ptr<const ModelSet> LoadModels(const EvaluateOptions& options,
   std::vector<int> faults;
   for (const std::string& name : options.without) {
     faults.push_back(RequireFault(name));
+  }
+  if (!options.second_look) {
+    models.physics.clear();
   }
   return std::make_shared<const ModelSet>(WithoutChannels(
       WithoutFaults(std::move(models), faults), options.without_channels));
@@ -295,6 +299,9 @@ void AddOutputs(CLI::App& verb, EvaluateOptions& options) {
   verb.add_option("--vectors", options.vectors,
                   "Write every decision vector, numbers as hex floats")
       ->type_name("FILE.csv");
+  verb.add_flag("!--no-second-look", options.second_look,
+                "Score what the observers say, without the second look by "
+                "the physics of an onboarded valve");
   verb.add_flag("--assume-normal", options.assume_normal,
                 "What has no truth counts as free of faults");
   verb.add_flag("--csv", options.csv, "One line per run instead of tables");

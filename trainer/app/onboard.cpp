@@ -77,8 +77,8 @@ struct FoundType {
 };
 
 // A stored type is a scenario in TOML that has the parameters, behind a line
-// `levels = [CV, P1, P2, T1]` and the delay of the command. A sine is the one excitation that may be
-// continuous without a file.
+// `levels = [CV, P1, P2, T1]` and the delay of the command. A sine is the one
+// excitation that may be continuous without a file.
 std::string TypeText(const ValveType& type) {
   simulator::Scenario scenario;
   scenario.config.parameters = type.parameters;
@@ -87,8 +87,9 @@ std::string TypeText(const ValveType& type) {
   const simulator::InputRow& levels = type.levels;
   return "levels = [" + Shortest(levels.cv_pct) + ", " +
          Shortest(levels.p1_kpa) + ", " + Shortest(levels.p2_kpa) + ", " +
-         Shortest(levels.t1_degc) + "]\ncommand_delay = " +
-         std::to_string(type.command_delay) + "\n" + ScenarioText(scenario);
+         Shortest(levels.t1_degc) +
+         "]\ncommand_delay = " + std::to_string(type.command_delay) + "\n" +
+         ScenarioText(scenario);
 }
 
 ValveType ParseType(const std::string& text, const std::string& name) {

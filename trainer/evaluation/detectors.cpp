@@ -46,6 +46,7 @@ class SecondLooks {
     for (std::size_t k = 0; k < indications.size(); ++k) {
       if (sets_[k]) {
         indications[k].isolated = *sets_[k];
+        indications[k].withdrawn = sets_[k]->empty();
       }
     }
   }
@@ -56,7 +57,7 @@ class SecondLooks {
       const simulator::LookAnswer& answer) {
     using enum simulator::LookOutcome;
     std::vector<int> set;
-    if (answer.outcome == kNothing || answer.outcome == kNoneFits) {
+    if (answer.outcome == kNothing) {
       return std::nullopt;
     }
     if (answer.outcome == kNamed) {
@@ -298,7 +299,7 @@ EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,
   result.duration_s = DurationOf(run.run);
   result.seconds = answer.seconds;
   for (const Indication& indication : answer.indications) {
-    if (!indication.isolated.empty()) {
+    if (!indication.isolated.empty() || indication.withdrawn) {
       result.last_set = indication.isolated;
     }
   }

@@ -98,10 +98,8 @@ std::vector<Sample> FaultSynthesizer::Simulate(
   for (std::ptrdiff_t k = 0; k <= last; ++k) {
     excitation.rows.push_back(
         InputsOf(inputs[static_cast<std::size_t>(k)], type_.levels));
-    excitation.rows.back().cv_pct =
-        inputs[static_cast<std::size_t>(std::clamp(k - type_.command_delay,
-                                                   std::ptrdiff_t{0}, last))]
-            [Signal::kCv];
+    excitation.rows.back().cv_pct = inputs[static_cast<std::size_t>(std::clamp(
+        k - type_.command_delay, std::ptrdiff_t{0}, last))][Signal::kCv];
   }
   simulator::ValveSimulationConfig config;
   config.parameters = type_.parameters;

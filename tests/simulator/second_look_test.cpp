@@ -1,0 +1,223 @@
+#include "simulator/second_look/second_look.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/error.h"
+#include "simulator/random.h"
+#include "simulator/second_look/episode_looks.h"
+#include "simulator/valve_simulation.h"
+
+namespace fdi::simulator {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::size_t kLeadIn = 120;
+
+// What the transmitters of a valve read while its command is set anew every
+// 10 s; `faults` act from row kLeadIn on.
+std::vector<RecordRow> Recording(std::size_t count, std::uint64_t seed,
+                                 const std::vector<FaultSchedule>& faults) {
+  NormalSource noise(seed, 7);
+  RecordedExcitation excitation;
+  double level = 60.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    level = k % 10 == 0 ? std::clamp(60.0 + 8.0 * noise(), 46.0, 80.0) : level;
+    excitation.rows.push_back(
+        {level, 3555.0 + 20.0 * noise(), 2615.0 + 10.0 * noise(), 100.7});
+  }
+  ValveSimulationConfig config;
+  config.excitation = std::move(excitation);
+  config.duration_s = static_cast<double>(count);
+  config.faults = faults;
+  config.seed = seed;
+  ValveSimulation simulation(config);
+  std::vector<RecordRow> rows;
+  while (!simulation.finished()) {
+    const Sample s = simulation.Step().sample;
+    rows.push_back(
+        {{s[Signal::kCv], s[Signal::kP1], s[Signal::kP2], s[Signal::kT1]},
+         s[Signal::kX],
+         s[Signal::kF]});
+  }
+  return rows;
+}
+
+const ValvePhysics& Physics() {
+  static const ValvePhysics physics = DescribeValve(
+      ParameterSet("lublin-actuator-3"), {}, {Recording(1200, 1, {})});
+  return physics;
+}
+
+LookWindow Window(const std::vector<FaultSchedule>& faults,
+                  std::uint64_t seed = 2) {
+  return {Recording(kLeadIn + 200, seed, faults), kLeadIn, kBasicSignals};
+}
+
+FaultSchedule Abrupt(int fault, double strength) {
+  FaultSchedule schedule;
+  schedule.fault = fault;
+  schedule.start_s = kLeadIn;
+  schedule.final_strength = strength;
+  return schedule;
+}
+
+class NamedFaultTest : public ::testing::TestWithParam<std::pair<int, double>> {
+};
+
+TEST_P(NamedFaultTest, ComesFirstWithItsStrengthInTheInterval) {
+  const auto [fault, strength] = GetParam();
+  const SecondLook look =
+      LookAgain(Physics(), Window({Abrupt(fault, strength)}));
+  const Explanation& best = look.ranked.front();
+  EXPECT_EQ(best.fault, fault);
+  EXPECT_NEAR(best.strength, strength, 0.05);
+  EXPECT_LE(best.lowest, strength + 0.02);
+  EXPECT_GE(best.highest, strength - 0.02);
+  EXPECT_LT(look.misfit, 1.5);
+  EXPECT_EQ(AnswerOf(look).outcome, LookOutcome::kNamed);
+}
+
+INSTANTIATE_TEST_SUITE_P(SecondLook, NamedFaultTest,
+                         ::testing::Values(std::pair{1, 0.45},
+                                           std::pair{13, -0.2},
+                                           std::pair{16, 0.7},
+                                           std::pair{19, 0.25}));
+
+TEST(SecondLookTest, FindsAGrowingFault) {
+  FaultSchedule growing = Abrupt(13, 0.4);
+  growing.start_s = 60.0;
+  growing.development_s = 260.0;
+  const SecondLook look = LookAgain(Physics(), Window({growing}));
+  EXPECT_EQ(look.ranked.front().fault, 13);
+  EXPECT_TRUE(look.ranked.front().growing);
+  EXPECT_NEAR(look.ranked.front().strength, 0.4, 0.05);
+}
+
+TEST(SecondLookTest, FindsNothingInAHealthyWindow) {
+  EXPECT_EQ(AnswerOf(LookAgain(Physics(), Window({}))).outcome,
+            LookOutcome::kNothing);
+}
+
+TEST(SecondLookTest, TakesAConstantShiftOfXForDrift) {
+  LookWindow window = Window({});
+  for (RecordRow& row : window.rows) {
+    row.x_pct += 1.0;
+  }
+  EXPECT_EQ(AnswerOf(LookAgain(Physics(), window)).outcome,
+            LookOutcome::kNothing);
+}
+
+TEST(SecondLookTest, GivesTheSameBitsTwice) {
+  const LookWindow window = Window({Abrupt(10, 0.5)});
+  const SecondLook one = LookAgain(Physics(), window);
+  const SecondLook two = LookAgain(Physics(), window);
+  ASSERT_EQ(one.ranked.size(), two.ranked.size());
+  for (std::size_t i = 0; i < one.ranked.size(); ++i) {
+    EXPECT_EQ(one.ranked[i].fault, two.ranked[i].fault);
+    EXPECT_EQ(one.ranked[i].distance, two.ranked[i].distance);
+  }
+}
+
+TEST(ValvePhysicsTest, IsReadBackAsItWasStored) {
+  const std::vector<PhysicalValue> values = ToValues(Physics());
+  const std::vector<PhysicalValue> again = ToValues(PhysicsFrom(values));
+  ASSERT_EQ(values.size(), again.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    EXPECT_EQ(values[i].name, again[i].name);
+    EXPECT_EQ(values[i].value, again[i].value);
+  }
+}
+
+TEST(ValvePhysicsTest, RefusesAValueThatIsMissing) {
+  std::vector<PhysicalValue> values = ToValues(Physics());
+  values.pop_back();
+  EXPECT_THROW(PhysicsFrom(values), DataError);
+}
+
+SecondLook Looked(std::vector<std::pair<int, double>> distances) {
+  SecondLook look;
+  look.misfit = 1.0;
+  for (const auto& [fault, distance] : distances) {
+    Explanation explanation;
+    explanation.fault = fault;
+    explanation.distance = distance;
+    look.ranked.push_back(explanation);
+  }
+  return look;
+}
+
+TEST(LookAnswerTest, KeepsLeakAndBypassTogether) {
+  const LookAnswer answer =
+      AnswerOf(Looked({{18, 0.0}, {6, 5.0 * kLookMargin}, {0, 900.0}}));
+  ASSERT_EQ(answer.outcome, LookOutcome::kNamed);
+  ASSERT_EQ(answer.faults.size(), 2U);
+  EXPECT_EQ(answer.faults[1].fault, 6);
+}
+
+TEST(LookAnswerTest, IsAShortlistBeyondFourFaults) {
+  EXPECT_EQ(
+      AnswerOf(Looked({{1, 0}, {2, 1}, {3, 1}, {10, 2}, {16, 2}})).outcome,
+      LookOutcome::kUnclear);
+}
+
+// An episode of the engine, abnormal from `first` on.
+std::vector<LookTask> Follow(int samples, int first) {
+  EpisodeLooks looks(Physics());
+  std::vector<LookTask> tasks;
+  for (int k = 0; k < samples; ++k) {
+    Sample sample;
+    sample.stamp_ns = k * kSecond;
+    for (const Signal signal : {Signal::kCv, Signal::kX, Signal::kF}) {
+      sample.Set(signal, 50.0 + k % 3);
+    }
+    Verdict verdict;
+    if (k == first + 1) {
+      verdict.transitions[0] = {TransitionKind::kDetected, first * kSecond,
+                                first * kSecond};
+      verdict.transition_count = 1;
+    }
+    if (auto task = looks.Step(sample, verdict)) {
+      tasks.push_back(std::move(*task));
+    }
+  }
+  return tasks;
+}
+
+TEST(EpisodeLooksTest, LooksThriceInFiveMinutesFromTwoMinutesBefore) {
+  const std::vector<LookTask> tasks = Follow(700, 200);
+  ASSERT_EQ(tasks.size(), 3U);
+  EXPECT_EQ(tasks[0].stamp_ns, 240 * kSecond);
+  EXPECT_EQ(tasks[0].window.detection, 120U);
+  EXPECT_EQ(tasks[0].window.rows.size(), 161U);
+  EXPECT_EQ(tasks[2].stamp_ns, 500 * kSecond);
+}
+
+TEST(EpisodeLooksTest, ManagesWithoutALeadIn) {
+  const std::vector<LookTask> tasks = Follow(100, 0);
+  ASSERT_EQ(tasks.size(), 1U);
+  EXPECT_EQ(tasks[0].window.detection, 0U);
+}
+
+TEST(LookBookTest, CountsAfterItsDelayAndDoesNotHearAWorseFit) {
+  LookBook book;
+  LookTask task;
+  task.detection_stamp_ns = 7;
+  task.stamp_ns = 100 * kSecond;
+  book.Enter(task, AnswerOf(Looked({{1, 0.0}})));
+  task.stamp_ns = 200 * kSecond;
+  SecondLook worse = Looked({{2, 0.0}});
+  worse.misfit = 3.0;
+  book.Enter(task, AnswerOf(worse));
+  EXPECT_EQ(book.At(7, 109 * kSecond), nullptr);
+  ASSERT_NE(book.At(7, 110 * kSecond), nullptr);
+  EXPECT_EQ(book.At(7, 300 * kSecond)->faults.front().fault, 1);
+  EXPECT_EQ(book.At(8, 300 * kSecond), nullptr);
+}
+
+}  // namespace
+}  // namespace fdi::simulator
