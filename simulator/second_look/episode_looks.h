@@ -33,7 +33,7 @@ struct LookAnswer {
 };
 
 /// Largest distance behind the best explanation at which a fault stays in the
-/// set, calibrated for 90 % (docs/method.md).
+/// set; see docs/method.md.
 inline constexpr double kLookMargin = 15.0;
 /// A fault that gains less over none, per independent reading, may be what a
 /// healthy valve and its simulation differ by: up to 0.20 were seen without
