@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <iostream>
 #include <iterator>
+#include <new>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -19,6 +23,27 @@
 
 namespace fdi::cli {
 namespace {
+
+// Without memory or threads the DDS library throws where nobody can catch, e.g.
+// in destructors: that ends as other failures do, all else by an abort.
+[[noreturn]] void EndTerminated() {
+  const auto end = [](const char* what) {
+    std::fprintf(stderr,
+                 "error: out of memory, address space or threads (%s)\n", what);
+    std::_Exit(kExitFailure);
+  };
+  try {
+    if (const std::exception_ptr error = std::current_exception()) {
+      std::rethrow_exception(error);
+    }
+  } catch (const std::bad_alloc& error) {
+    end(error.what());
+  } catch (const std::system_error& error) {
+    end(error.what());
+  } catch (...) {
+  }
+  std::abort();
+}
 
 // What --check-examples throws.
 struct ExampleCheckRequest {};
@@ -179,6 +204,7 @@ void Program::AddExamples(std::vector<VerbExamples> examples) {
 int Program::Run(int argc, const char* const* argv) noexcept {
   // At a limit of file size a write fails, as on a full disk.
   std::signal(SIGXFSZ, SIG_IGN);
+  std::set_terminate(EndTerminated);
   try {
     const int code = ParseAndRun(argc, argv);
     // A full disk or a closed pipe shows at the end, if at all.

@@ -7,6 +7,12 @@
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi {
+namespace {
+
+constexpr std::int64_t kFarNs = std::int64_t{1} << 61;  // 73 years.
+
+}  // namespace
+
 SourceOrder::SourceOrder(double sample_period_s) : period_ns_(0) {
   SetPeriod(sample_period_s);
 }
@@ -46,7 +52,9 @@ SourceOrder::Placement SourceOrder::Place(const Sample& sample) {
   // Consecutive samples that keep another distance come from a publisher with
   // another period; a distance that a lost sample explains is a gap.
   if (has_stamp_) {
-    const std::int64_t interval = sample.stamp_ns - last_stamp_ns_;
+    // Two of them may lie 400 years apart: in nanoseconds that is too much.
+    const std::int64_t interval =
+        std::clamp(sample.stamp_ns - last_stamp_ns_, -kFarNs, kFarNs);
     const bool consecutive = sample.seq == last_seq_ + 1;
     placement.gap = std::abs(interval - period_ns_) > period_ns_ / 2;
     const bool steady =

@@ -40,7 +40,7 @@ class SourceOrder {
   bool has_source_{false};
   bool has_stamp_{false};
   int off_period_{0};  // intervals in a row that were not one period
-  std::int64_t off_interval_ns_{0};
+  std::int64_t off_interval_ns_{0};  // Their distance.
   std::array<std::uint64_t, kRemembered> superseded_{};
   int superseded_count_{0};
 };

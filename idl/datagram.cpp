@@ -33,6 +33,9 @@ constexpr std::uint16_t kSentinel = 1;          // Ends a parameter list.
 // A writer of 100 000 a second has this many after 22 000 years; the library
 // counts on from a number, and aborts at the end of the range.
 constexpr std::int64_t kSequenceLimit = std::int64_t{1} << 56;
+// The library allocates what a fragment says that its sample has. Ours have
+// some kB at most.
+constexpr std::int64_t kMostSampleBytes = 65'536;
 // The library walks through a gap one by one.
 constexpr std::int64_t kLongestGap = std::int64_t{1} << 32;
 
@@ -114,7 +117,8 @@ bool ContentIsSound(std::uint8_t kind, std::uint8_t flags, const Body& body) {
       return DataIsSound(body, flags, 20);
     case kDataFrag:
       return DataIsSound(body, flags, 32) && body.U32(20) > 0 &&
-             body.U16(24) > 0 && body.U16(26) > 0;
+             body.U16(24) > 0 && body.U16(26) > 0 &&
+             body.U32(28) <= kMostSampleBytes;
     case kHeartbeat:
       return body.Sequence(8) > 0 && body.Sequence(16) >= 0;
     case kGap: {

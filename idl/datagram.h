@@ -30,8 +30,9 @@ struct CheckedDatagram {
 
 /// Checks the framing of an RTPS message [OMG formal/2022-04-01, 9.4.5], which
 /// Fast DDS 2.9.1 believes: it aborts on a statistics submessage that is not
-/// the last, on sequence numbers at the end of their range, and reads beyond a
-/// submessage that is shorter than its parameters.
+/// the last and on sequence numbers at the end of their range, reads beyond a
+/// submessage that is shorter than its parameters, and allocates up to 4 GB for
+/// a fragment.
 CheckedDatagram CheckDatagram(std::span<const std::uint8_t> datagram);
 
 /// Datagrams by verdict, since the participant exists.

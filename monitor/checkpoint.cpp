@@ -9,7 +9,7 @@ namespace fdi::monitor {
 namespace {
 
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
-constexpr std::size_t kMostDifferences = 100'000;
+constexpr std::size_t kMostRecords = 100'000;
 
 std::int64_t DayOf(std::int64_t stamp_ns) {
   return stamp_ns / kDayNs - (stamp_ns % kDayNs < 0 ? 1 : 0);
@@ -19,7 +19,7 @@ std::int64_t DayOf(std::int64_t stamp_ns) {
 // `combine`; behind the others if there is none or `combine` says false.
 template <typename T, typename KeyOf, typename Combine>
 void Merge(std::vector<T>& older, std::vector<T> newer, KeyOf key_of,
-           Combine combine, std::size_t most = SIZE_MAX) {
+           Combine combine) {
   std::map<decltype(key_of(newer.front())), std::size_t> places;
   for (std::size_t i = 0; i < older.size(); ++i) {
     places[key_of(older[i])] = i;
@@ -29,7 +29,7 @@ void Merge(std::vector<T>& older, std::vector<T> newer, KeyOf key_of,
         places.try_emplace(key_of(record), older.size());
     const bool combined = !added && place->second < older.size() &&
                           combine(older[place->second], record);
-    if (!combined && older.size() < most) {
+    if (!combined && older.size() < kMostRecords) {
       older.push_back(std::move(record));
     }
   }
@@ -85,20 +85,19 @@ std::vector<ShadowDifference> Merged(std::vector<ShadowDifference> older,
       [](ShadowDifference& old, ShadowDifference& fresh) {
         old = std::move(fresh);
         return true;
-      },
-      kMostDifferences);
+      });
   return older;
 }
 
 void CoverageBook::Add(std::int64_t stamp_ns, Quality quality,
-                       std::uint64_t samples) {
+                       std::uint64_t samples, bool accepted) {
   const std::int64_t day = DayOf(stamp_ns);
-  auto place = std::ranges::find(days_, day, &Day::day);
-  if (place == days_.end()) {
-    days_.push_back({day, {}});
-    place = days_.end() - 1;
+  Day* row = FindRow(
+      days_, [day](const Day& other) { return other.day == day; }, accepted);
+  if (row == nullptr) {
+    row = &days_.emplace_back(Day{day, {}});
   }
-  place->samples.Add(quality, samples);
+  row->samples.Add(quality, samples);
 }
 
 void CoverageBook::TakeInto(const std::string& valve_id, double period_s,

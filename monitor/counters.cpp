@@ -28,6 +28,7 @@ constexpr std::array<CounterInfo, kCounterCount> kInfos{{
     {"refused_samples", kExcluded, kExcludedHelp, "max_valves"},
     {"filtered_samples", kExcluded, kExcludedHelp, "filtered"},
     {"bad_ids", kExcluded, kExcludedHelp, "valve_id"},
+    {"over_share", kExcluded, kExcludedHelp, "over_share"},
     {"decisions", "fdi_decision_vectors_total",
      "Decision vectors handed to the bus"},
     {"decisions_unsent", "fdi_decision_vectors_unsent_total",

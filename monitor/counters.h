@@ -21,6 +21,7 @@ enum class Counter : std::uint8_t {
   kRefusedSamples,
   kFilteredSamples,
   kBadIds,
+  kOverShare,
   kDecisions,
   kDecisionsUnsent,
   kEvents,

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "monitor/checkpoint.h"
+
 namespace fdi::monitor {
 namespace {
 
@@ -94,11 +96,17 @@ StrokeCount::Step StrokeCount::Push(double position) {
 
 void HealthBook::Add(const Sample& sample, const Verdict& verdict,
                      const ModelSet* models, double period_s) {
-  HealthHour& hour = At(sample, models);
+  HealthHour key;
+  key.hour = HourOf(sample.stamp_ns);
+  key.model_hash = models != nullptr ? models->content_hash : 0;
+  key.epoch = sample.epoch;
+  HealthHour& hour =
+      At(key, sample, models, verdict.intake == Intake::kAccepted);
   const std::int64_t period_ms = std::llround(period_s * 1e3);
   hour.seen_ms += period_ms;
   AddStroke(sample, period_ms, hour);
-  if (models != nullptr && verdict.quality == Quality::kLive) {
+  if (models != nullptr && verdict.quality == Quality::kLive &&
+      hour.SameKey(key)) {
     AddDecision(verdict, *models, period_ms, hour);
     AddResiduals(sample, verdict, hour);
   }
@@ -106,35 +114,29 @@ void HealthBook::Add(const Sample& sample, const Verdict& verdict,
 
 void HealthBook::TakeInto(const std::string& valve_id,
                           std::vector<HealthHour>& hours) {
-  if (hour_) {
-    done_.push_back(std::move(*hour_));
-    hour_.reset();
-  }
-  for (HealthHour& hour : done_) {
+  for (HealthHour& hour : hours_) {
     hour.valve_id = valve_id;
     hours.push_back(std::move(hour));
   }
-  done_.clear();
+  hours_.clear();
 }
 
-HealthHour& HealthBook::At(const Sample& sample, const ModelSet* models) {
-  HealthHour begun;
-  begun.hour = HourOf(sample.stamp_ns);
-  begun.model_hash = models != nullptr ? models->content_hash : 0;
-  begun.epoch = sample.epoch;
-  if (hour_ && hour_->SameKey(begun)) {
-    return *hour_;
+HealthHour& HealthBook::At(const HealthHour& key, const Sample& sample,
+                           const ModelSet* models, bool may_open) {
+  HealthHour* const row = FindRow(
+      hours_, [&key](const HealthHour& other) { return other.SameKey(key); },
+      may_open);
+  if (row != nullptr) {
+    return *row;
   }
-  if (hour_) {
-    done_.push_back(std::move(*hour_));
-  }
+  HealthHour& begun = hours_.emplace_back(key);
   begun.flow_unit = sample.flow_unit;
   if (models != nullptr) {
     for (const ChannelSpec& channel : models->channels) {
       begun.channels.push_back(ChannelOf(channel));
     }
   }
-  return hour_.emplace(std::move(begun));
+  return begun;
 }
 
 void HealthBook::AddStroke(const Sample& sample, std::int64_t period_ms,

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,14 +45,15 @@ class HealthBook {
 
   /// Appends what was added since the last call.
   void TakeInto(const std::string& valve_id, std::vector<HealthHour>& hours);
+  std::size_t rows() const { return hours_.size(); }
 
  private:
-  HealthHour& At(const Sample& sample, const ModelSet* models);
+  HealthHour& At(const HealthHour& key, const Sample& sample,
+                 const ModelSet* models, bool may_open);
   void AddStroke(const Sample& sample, std::int64_t period_ms,
                  HealthHour& hour);
 
-  std::vector<HealthHour> done_;
-  std::optional<HealthHour> hour_;
+  std::vector<HealthHour> hours_;
   StrokeCount stroke_;
   std::uint64_t source_id_{0};
   bool by_command_{false};  // The position is CV for want of X.

@@ -15,6 +15,10 @@ constexpr std::size_t kRecordsPerCommit = 1'000;
 // Few and large transactions: the newest chunk of a trace is packed anew in
 // each of them.
 constexpr std::size_t kPointsPerCommit = 5'000;
+// So many open episodes grow at once: half a millisecond each.
+constexpr int kTracesPerCommit = 100;
+
+constexpr std::chrono::milliseconds kLastDelivery{300};
 
 }  // namespace
 
@@ -61,6 +65,7 @@ void Journal::Stop() {
     unsent_changed_.notify_one();
   }
   errors.Try([this] { publisher_.Join(); });
+  MarkDelivered(Clock::now(), kLastDelivery);
   WriteRecords();
   for (const Record& record : std::exchange(records_, {})) {
     if (std::holds_alternative<PendingEvent>(record)) {
@@ -88,6 +93,14 @@ void Journal::Event(FaultEvent event) {
   if (!kept || degraded_) {
     SettleLocked(*pending, false);
   }
+}
+
+void Journal::Published(const FaultEvent& event) {
+  auto pending = std::make_shared<Pending>();
+  pending->event = event;
+  pending->published = Clock::now();
+  const std::lock_guard lock(mutex_);
+  undelivered_.push_back(std::move(pending));
 }
 
 void Journal::Evidence(EpisodeTrace trace) {
@@ -282,11 +295,12 @@ bool Journal::WriteCheckpoint() {
   return false;
 }
 
-// Buffers evidence and commits it at once, so that no event waits for it.
+// Buffers evidence and commits it at once, so that no event waits for it. Once
+// one does wait it is stored with what is buffered by then.
 bool Journal::WriteTraces() {
   last_commit_ = Clock::now();
   std::size_t points = 0;
-  while (points < kPointsPerCommit) {
+  for (int n = 0; n < kTracesPerCommit && points < kPointsPerCommit; ++n) {
     std::optional<EpisodeTrace> trace;
     bool late = false;
     {
@@ -303,8 +317,18 @@ bool Journal::WriteTraces() {
     if (late || !Attempt([&] { history_.AddTrace(*trace); })) {
       counters_.Add(Counter::kTraceDropped, trace->trace.size());
     }
+    if (EventWaits()) {
+      return WriteRecords();
+    }
   }
   return CommitBuffered();
+}
+
+bool Journal::EventWaits() const {
+  const std::lock_guard lock(mutex_);
+  return std::ranges::any_of(records_, [](const Record& record) {
+    return std::holds_alternative<PendingEvent>(record);
+  });
 }
 
 bool Journal::CommitBuffered() {
@@ -348,10 +372,17 @@ void Journal::Recovered() {
 void Journal::PublishAll() {
   std::unique_lock lock(mutex_);
   while (true) {
-    unsent_changed_.wait(
-        lock, [this] { return publishing_ends_ || !unsent_.empty(); });
+    const bool awake = unsent_changed_.wait_for(
+        lock, options_.commit_period,
+        [this] { return publishing_ends_ || !unsent_.empty(); });
+    lock.unlock();
+    MarkDelivered(Clock::now() - options_.delivery_time, {});
+    lock.lock();
     if (unsent_.empty()) {
-      return;
+      if (awake) {
+        return;
+      }
+      continue;
     }
     const PendingEvent next = unsent_.front();
     unsent_changed_.wait_until(lock, next->deadline, [this, &next] {
@@ -362,6 +393,25 @@ void Journal::PublishAll() {
     lock.unlock();
     Publish(next, persisted);
     lock.lock();
+  }
+}
+
+// Marks as sent what was published before `limit`, if all is acknowledged, and
+// what is too much.
+void Journal::MarkDelivered(Clock::time_point limit,
+                            std::chrono::milliseconds patience) {
+  const auto due = [&] {
+    return !undelivered_.empty() && undelivered_.front()->published <= limit;
+  };
+  std::unique_lock lock(mutex_);
+  bool acknowledged = due();
+  lock.unlock();
+  acknowledged = acknowledged && options_.acknowledged(patience);
+  lock.lock();
+  while (undelivered_.size() > options_.max_undelivered ||
+         (acknowledged && due())) {
+    AddLocked(Sent{std::move(undelivered_.front())});
+    undelivered_.pop_front();
   }
 }
 
@@ -385,7 +435,8 @@ void Journal::Publish(const PendingEvent& pending, bool persisted) {
   if (sent) {
     counters_.Add(Counter::kEvents);
     const std::lock_guard lock(mutex_);
-    AddLocked(Sent{pending});
+    pending->published = Clock::now();
+    undelivered_.push_back(pending);
   } else {
     counters_.Add(Counter::kEventsUnsent);
     log_.Report(LogId::kUnsent, "publication_failed", [&] {

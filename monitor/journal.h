@@ -29,10 +29,21 @@ struct JournalOptions {
   std::chrono::milliseconds stop_limit{1000};  ///< Of evidence at the end.
   std::size_t max_records{100'000};         ///< Events, gaps and marks waiting.
   std::size_t max_trace_points{2'000'000};  ///< Evidence waiting.
+  /// Whether all subscribers there are have, in time, what was published.
+  std::function<bool(std::chrono::milliseconds)> acknowledged{
+      [](std::chrono::milliseconds) { return true; }};
+  /// What was published is kept to be sent again for so long, as subscribers
+  /// may still be about to find us, and until it is acknowledged.
+  std::chrono::milliseconds delivery_time{10'000};
+  std::size_t max_undelivered{
+      10'000};  ///< Beyond it the oldest counts as sent.
 };
 
 /// Takes fault events to the history and to the bus, in this order, and
 /// evidence, gaps and checkpoints to the history. Never blocks the diagnosis.
+///
+/// A published event is marked as sent once subscribers have acknowledged it;
+/// what is not marked is sent again by the next session.
 ///
 /// Two threads, because a commit may take as long as it likes: the history
 /// thread commits, events before evidence, those that wait together at once;
@@ -57,6 +68,8 @@ class Journal : public EpisodeOutlet {
   void Evidence(EpisodeTrace trace) override;
   void Gap(DataGap gap) override;
   void Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) override;
+  /// `event` was published before Start(): it is marked as sent in its turn.
+  void Published(const FaultEvent& event);
   /// Commits `checkpoint`, merged with one that still waits.
   void Commit(Checkpoint checkpoint);
 
@@ -88,6 +101,7 @@ class Journal : public EpisodeOutlet {
     FaultEvent event;
     Clock::time_point deadline;
     Stage stage{Stage::kWaiting};
+    Clock::time_point published{};
   };
   using PendingEvent = std::shared_ptr<Pending>;
   struct Resumption {
@@ -110,6 +124,7 @@ class Journal : public EpisodeOutlet {
   bool WriteBatch(const std::vector<const Record*>& batch);
   bool WriteCheckpoint();
   bool WriteTraces();
+  bool EventWaits() const;
   bool CommitBuffered();
   bool Attempt(const std::function<void()>& call);
   void FailWaitingEvents();
@@ -118,6 +133,8 @@ class Journal : public EpisodeOutlet {
   // Of the publisher.
   void PublishAll();
   void Publish(const PendingEvent& pending, bool persisted);
+  void MarkDelivered(Clock::time_point limit,
+                     std::chrono::milliseconds patience);
 
   HistorySink& history_;
   EventSink& bus_;
@@ -135,6 +152,7 @@ class Journal : public EpisodeOutlet {
   std::condition_variable unsent_changed_;  // for the publisher.
   std::deque<Record> records_;
   std::deque<PendingEvent> unsent_;
+  std::deque<PendingEvent> undelivered_;  // Published; oldest first.
   std::deque<EpisodeTrace> traces_;
   std::size_t trace_points_{0};
   Checkpoint checkpoint_;

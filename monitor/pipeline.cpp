@@ -1,5 +1,6 @@
 #include "monitor/pipeline.h"
 
+#include <algorithm>
 #include <array>
 #include <exception>
 #include <utility>
@@ -73,7 +74,14 @@ Pipeline::~Pipeline() {
 void Pipeline::Start(const std::vector<OpenEpisode>& open,
                      std::vector<Accumulator> accumulators,
                      std::vector<Accumulator> shadow_accumulators) {
+  for (const std::string& id : resolver_->AssignedValves()) {
+    Reserve(id);
+  }
+  for (const OpenEpisode& episode : open) {
+    Reserve(episode.valve_id);
+  }
   for (Accumulator& accumulator : accumulators) {
+    Reserve(accumulator.valve_id);
     accumulators_[accumulator.valve_id] = std::move(accumulator);
   }
   if (shadow_) {
@@ -145,19 +153,89 @@ Pipeline::Valve* Pipeline::Admit(std::string_view valve_id) {
     counters_.Add(Counter::kFilteredSamples);
     return nullptr;
   }
-  return valves_.size() < static_cast<std::size_t>(options_.max_valves)
-             ? &AddValve(valve_id)
-             : Refuse(valve_id);
+  const auto places = static_cast<std::size_t>(options_.max_valves);
+  const bool is_known = reserved_.contains(valve_id);
+  const std::size_t kept = is_known ? 0 : reserved_.size();
+  if (valves_.size() + kept < places || FreePlace(is_known)) {
+    return &AddValve(valve_id);
+  }
+  return Refuse(valve_id, valves_.size() < places ? "reserved" : "max_valves");
+}
+
+// The valve keeps its place, or gets one when it comes.
+void Pipeline::Reserve(const std::string& valve_id) {
+  if (const auto found = by_id_.find(valve_id); found != by_id_.end()) {
+    found->second->known = true;
+  } else if (GlobMatches(options_.valve_glob, valve_id)) {
+    reserved_.insert(valve_id);
+  }
+}
+
+// Strangers whose episode is open stay.
+bool Pipeline::MayGiveUp(const Valve& valve) const {
+  return !valve.known && !valve.monitor.episode_open();
+}
+
+// @returns whether a stranger gave its place up: a silent one or, for a known
+// valve, the one that has been silent longest.
+bool Pipeline::FreePlace(bool for_known) {
+  const TimePoint now = last_tended_;
+  while (!idle_.empty()) {
+    Valve* const valve = idle_.back();
+    idle_.pop_back();
+    if (MayGiveUp(*valve) &&
+        valve->monitor.Silence(now) >= options_.place_timeout) {
+      GiveUp(*valve);
+      return true;
+    }
+  }
+  Valve* longest = nullptr;
+  for (const std::unique_ptr<Valve>& valve : valves_) {
+    if (for_known && MayGiveUp(*valve) &&
+        (longest == nullptr ||
+         valve->monitor.Silence(now) > longest->monitor.Silence(now))) {
+      longest = valve.get();
+    }
+  }
+  if (longest != nullptr) {
+    GiveUp(*longest);
+  }
+  return longest != nullptr;
+}
+
+void Pipeline::GiveUp(Valve& valve) {
+  const std::string id = valve.monitor.id();
+  log_.Line(LogLevel::kDebug, "valve_forgotten valve=" + id);
+  Checkpoint checkpoint;
+  valve.monitor.Flush(journal_);
+  valve.monitor.TakeCheckpoint(checkpoint);
+  if (valve.shadow != nullptr) {
+    valve.shadow->TakeCheckpoint(checkpoint);
+    shadow_->Remove(valve.shadow);
+  }
+  journal_.Commit(std::move(checkpoint));
+  if (live_ != nullptr) {
+    live_->Forget(id);
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase(names_, id);
+  }
+  by_id_.erase(id);
+  std::erase(idle_, &valve);
+  std::erase_if(valves_,
+                [&valve](const auto& each) { return each.get() == &valve; });
 }
 
 // Of refused ids only a bounded set of hashes is kept.
-Pipeline::Valve* Pipeline::Refuse(std::string_view valve_id) {
+Pipeline::Valve* Pipeline::Refuse(std::string_view valve_id,
+                                  const char* reason) {
   if (refused_.size() < kRememberedRefusals) {
     refused_.insert(Hash{}(valve_id));
   }
   counters_.Add(Counter::kRefusedSamples);
   log_.Report(LogId::kValveRefused, "valve_refused", [&] {
-    return "valve=" + std::string(valve_id) +
+    return "valve=" + std::string(valve_id) + " reason=" + reason +
            " max_valves=" + std::to_string(options_.max_valves) +
            " refused_valves=" + std::to_string(refused_.size());
   });
@@ -171,9 +249,9 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
   log_.Line(LogLevel::kDebug,
             "valve_seen valve=" + id + " model_set=" +
                 (parts ? NameOf(parts->plan->models()) : "none"));
-  auto valve =
-      std::make_unique<Valve>(Valve{ValveMonitor(id, parts, options_.trace),
-                                    shadow_ ? shadow_->Add(id) : nullptr});
+  auto valve = std::make_unique<Valve>(
+      Valve{ValveMonitor(id, parts, options_.trace),
+            shadow_ ? shadow_->Add(id) : nullptr, reserved_.erase(id) > 0});
   valve->monitor.HoldIsolation(resolver_->IsolationHeld(id));
   if (const auto open = recovered_.find(id); open != recovered_.end()) {
     valve->monitor.Recover(open->second);
@@ -224,6 +302,13 @@ void Pipeline::Offer(std::string_view valve_id, const Sample& sample,
   if (valve == nullptr) {
     return;
   }
+  if (!valve->monitor.WithinShare(sample, received)) {
+    counters_.Add(Counter::kOverShare);
+    log_.Report(LogId::kOverShare, "sample_rejected", [valve] {
+      return "reason=over_share valve=" + valve->monitor.id();
+    });
+    return;
+  }
   const ValveOutcome outcome =
       valve->monitor.Step(sample, writer, received, journal_);
   if (valve->shadow != nullptr) {
@@ -244,7 +329,10 @@ void Pipeline::Offer(std::string_view valve_id, const Sample& sample,
 }
 
 void Pipeline::OfferEnd(std::string_view valve_id, std::uint64_t writer) {
-  Valve* const valve = Admit(valve_id);
+  // The end of a stream that was never seen takes no stranger's place.
+  const bool expected =
+      by_id_.contains(valve_id) || reserved_.contains(valve_id);
+  Valve* const valve = expected ? Admit(valve_id) : nullptr;
   if (valve == nullptr || !valve->monitor.EndStream(writer, journal_)) {
     return;
   }
@@ -318,8 +406,16 @@ void Pipeline::Tend(TimePoint now) {
 }
 
 void Pipeline::TendSilent(TimePoint now) {
+  idle_.clear();
+  Checkpoint full;  // Of valves whose rows become many before the next one.
   for (const std::unique_ptr<Valve>& valve : valves_) {
     ValveMonitor& monitor = valve->monitor;
+    if (monitor.book_rows() >= kMostBookRows / 2) {
+      monitor.TakeCheckpoint(full);
+    }
+    if (MayGiveUp(*valve) && monitor.Silence(now) >= options_.place_timeout) {
+      idle_.push_back(valve.get());
+    }
     if (monitor.CheckStale(now)) {
       counters_.Add(Counter::kStaleEvents);
       log_.Report(LogId::kStale, "valve_stale",
@@ -334,6 +430,9 @@ void Pipeline::TendSilent(TimePoint now) {
   if (recovery_deadline_ && now >= *recovery_deadline_) {
     recovery_deadline_.reset();
     GiveUpRecovery();
+  }
+  if (!full.empty()) {
+    journal_.Commit(std::move(full));
   }
   TakeCensus();
 }
@@ -399,6 +498,9 @@ void Pipeline::AdoptNextResolver() {
       return;
     }
     resolver_ = std::exchange(next_resolver_, nullptr);
+  }
+  for (const std::string& id : resolver_->AssignedValves()) {
+    Reserve(id);
   }
   std::uint64_t swapped = 0;
   std::vector<EngineParts> alive;  // A plan is made once, adopted or not.

@@ -26,6 +26,10 @@ namespace fdi::monitor {
 /// Settings of Pipeline.
 struct PipelineOptions {
   int max_valves{2000};
+  /// A stranger that is silent for so long gives its place up when another
+  /// valve needs it: one that no model set is assigned to by its id, and that
+  /// the last session did not have. At once if its publisher ended the stream.
+  std::chrono::milliseconds place_timeout{60'000};
   std::string valve_glob{"*"};
   TraceOptions trace;
   std::chrono::milliseconds stale_timeout{3'600'000};  ///< Ends an episode.
@@ -87,6 +91,9 @@ class Pipeline {
              std::vector<Accumulator> accumulators = {},
              std::vector<Accumulator> shadow_accumulators = {});
 
+  /// `event`, of an earlier session, was published. Before Start().
+  void Published(const FaultEvent& event) { journal_.Published(event); }
+
   /// A sample that was received. @param writer who sent it.
   void Offer(std::string_view valve_id, const Sample& sample,
              std::uint64_t writer,
@@ -133,6 +140,7 @@ class Pipeline {
   struct Valve {
     ValveMonitor monitor;
     ShadowValve* shadow;  // Null: not compared.
+    bool known;           // Keeps its place.
   };
   struct Hash {
     using is_transparent = void;
@@ -142,7 +150,11 @@ class Pipeline {
   };
 
   Valve* Admit(std::string_view valve_id);
-  Valve* Refuse(std::string_view valve_id);
+  Valve* Refuse(std::string_view valve_id, const char* reason);
+  void Reserve(const std::string& valve_id);
+  bool FreePlace(bool for_known);
+  void GiveUp(Valve& valve);
+  bool MayGiveUp(const Valve& valve) const;
   Valve& AddValve(std::string_view valve_id);
   bool Resolve(const std::string& valve_id, std::optional<EngineParts>& parts);
   void Count(const Valve& valve, const Sample& sample,
@@ -170,6 +182,9 @@ class Pipeline {
 
   std::vector<std::unique_ptr<Valve>> valves_;  // In the order of first sight.
   std::unordered_map<std::string, Valve*, Hash, std::equal_to<>> by_id_;
+  // Known valves that have no place yet; strangers leave that many free.
+  std::unordered_set<std::string, Hash, std::equal_to<>> reserved_;
+  std::vector<Valve*> idle_;  // Silent strangers, as of the last Tend().
   std::unordered_set<std::size_t> refused_;  // Hashes of ids.
   std::unordered_map<std::string, OpenEpisode> recovered_;
   std::unordered_map<std::string, Accumulator> accumulators_;

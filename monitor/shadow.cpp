@@ -223,6 +223,11 @@ ShadowValve* ShadowBank::Add(const std::string& valve_id) {
   return valves_.back().get();
 }
 
+void ShadowBank::Remove(const ShadowValve* valve) {
+  std::erase_if(valves_,
+                [valve](const auto& each) { return each.get() == valve; });
+}
+
 void ShadowBank::Step(ShadowValve& valve, const Sample& sample,
                       const ValveOutcome& active) {
   const ShadowFit before = valve.fit();

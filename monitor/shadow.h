@@ -137,6 +137,8 @@ class ShadowBank {
   /// A valve that is seen for the first time. @returns null if the candidate
   ///   is not to run on it.
   ShadowValve* Add(const std::string& valve_id);
+  /// `valve` is not used any more.
+  void Remove(const ShadowValve* valve);
 
   /// Gives a sample to the candidate and reports why it does not fit.
   void Step(ShadowValve& valve, const Sample& sample,

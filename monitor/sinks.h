@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "diagnosis/model_set.h"
 #include "diagnosis/records/fault_event.h"
@@ -40,6 +41,8 @@ class ModelResolver {
   /// @throws std::exception if it cannot be had: the valve goes without.
   virtual std::shared_ptr<const ModelSet> ModelsFor(
       std::string_view valve_id) const = 0;
+  /// The valves that a model set is assigned to by their id, not by a glob.
+  virtual std::vector<std::string> AssignedValves() const { return {}; }
   /// Its faults are detected and not named: the baseline is provisional.
   virtual bool IsolationHeld(std::string_view /*valve_id*/) const {
     return false;
@@ -142,6 +145,8 @@ class LiveSink {
                     const ValveOutcome& outcome) = 0;
   /// The valve fell silent; its next sample ends that.
   virtual void ShowSilence(const std::string& valve_id, Silence silence) = 0;
+  /// The valve has given its place up: it is not shown any more.
+  virtual void Forget(const std::string& /*valve_id*/) {}
 };
 
 }  // namespace fdi::monitor

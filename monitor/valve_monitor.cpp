@@ -1,5 +1,6 @@
 #include "monitor/valve_monitor.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -8,6 +9,11 @@ namespace fdi::monitor {
 namespace {
 
 constexpr double kStalePeriods = 3.0;
+constexpr double kSharePerSample = 0.5;
+constexpr double kSharePerSecond = 5.0;
+// Of the period of a valve without a model set, which its samples tell.
+constexpr std::int64_t kShortestNs = 1'000'000;
+constexpr std::int64_t kLongestNs = 3'600'000'000'000;
 
 std::shared_ptr<const ModelSet> ModelsOf(
     const std::optional<EngineParts>& parts) {
@@ -30,6 +36,34 @@ ValveMonitor::ValveMonitor(const std::string& id,
   unassigned_.residuals.fill(std::numeric_limits<double>::quiet_NaN());
 }
 
+bool ValveMonitor::BeginsAnew(const Sample& sample) const {
+  const std::int64_t moved = sample.stamp_ns - stamp_ns_;
+  const std::int64_t longest =
+      models_ ? std::llround(kStalePeriods * models_->sample_period_s * 1e9)
+              : kLongestNs;
+  return sample.source_id != source_id_ || sample.epoch != epoch_ ||
+         moved <= 0 || moved > longest;
+}
+
+bool ValveMonitor::WithinShare(const Sample& sample, TimePoint received) {
+  if (!BeginsAnew(sample)) {
+    share_ = std::min(share_ + kSharePerSample, kFullShare);
+    return true;
+  }
+  const std::chrono::duration<double> since = received - share_at_;
+  share_at_ = received;
+  share_ = std::min(share_ + kSharePerSecond * std::max(since.count(), 0.0),
+                    kFullShare);
+  return share_ >= 1.0;
+}
+
+void ValveMonitor::Place(const Sample& sample) {
+  share_ -= BeginsAnew(sample) ? 1.0 : 0.0;
+  source_id_ = sample.source_id;
+  stamp_ns_ = sample.stamp_ns;
+  epoch_ = sample.epoch;
+}
+
 ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
                                 TimePoint received, EpisodeOutlet& outlet) {
   const bool first = !std::exchange(seen_, true);
@@ -41,12 +75,13 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   if (!engine_) {
     writer_ = writer;
     if (!first && sample.stamp_ns > unassigned_.stamp_ns) {
-      unassigned_interval_ns_ = sample.stamp_ns - unassigned_.stamp_ns;
+      unassigned_interval_ns_ = std::clamp(
+          sample.stamp_ns - unassigned_.stamp_ns, kShortestNs, kLongestNs);
     }
     unassigned_.stamp_ns = sample.stamp_ns;
     unassigned_.source_id = sample.source_id;
     unassigned_.seq = sample.seq;
-    stamp_ns_ = sample.stamp_ns;
+    Place(sample);
     coverage_.Add(sample.stamp_ns, Quality::kUnassigned);
     health_.Add(sample, unassigned_, nullptr, period_s());
     return {unassigned_, nullptr, swapped, isolation_held_, 0};
@@ -54,9 +89,9 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   RestoreOnce(sample.source_id);
   const Verdict& verdict = engine_->Step(sample);
   if (CountsAsTime(verdict)) {
-    source_id_ = sample.source_id;
-    stamp_ns_ = sample.stamp_ns;
-    coverage_.Add(sample.stamp_ns, verdict.quality);
+    Place(sample);
+    coverage_.Add(sample.stamp_ns, verdict.quality, 1,
+                  verdict.intake == Intake::kAccepted);
     health_.Add(sample, verdict, models_.get(), period_s());
   }
   if (verdict.intake != Intake::kSuperseded) {

@@ -40,6 +40,13 @@ class ValveMonitor {
   /// silent, the accumulators.
   void TakeCheckpoint(Checkpoint& checkpoint);
 
+  /// Whether `sample` is within the share of the diagnosis that the valve has.
+  /// A sample that makes it begin anew, as a gap, another source or another
+  /// epoch do, costs many times as much as others, and leaves rows in the
+  /// history. So at most 200 of them in a row are served, then five a second
+  /// and one for two other samples; the rest is to be refused.
+  bool WithinShare(const Sample& sample, TimePoint received);
+
   /// @param writer who sent it; see EndStream().
   ValveOutcome Step(const Sample& sample, std::uint64_t writer,
                     TimePoint received, EpisodeOutlet& outlet);
@@ -69,6 +76,13 @@ class ValveMonitor {
 
   void Flush(EpisodeOutlet& outlet) { tracker_.Flush(outlet); }
 
+  /// Rows of time and health that wait for TakeCheckpoint().
+  std::size_t book_rows() const { return coverage_.rows() + health_.rows(); }
+  /// How long nothing came; for ever once the stream has ended.
+  TimePoint::duration Silence(TimePoint now) const {
+    return ended_ ? TimePoint::duration::max() : now - received_;
+  }
+
   const std::string& id() const { return id_; }
   const ModelSet* models() const { return models_.get(); }
   /// A sample came.
@@ -83,6 +97,10 @@ class ValveMonitor {
   std::size_t trace_bytes() const { return tracker_.trace_bytes(); }
 
  private:
+  static constexpr double kFullShare = 200.0;
+
+  bool BeginsAnew(const Sample& sample) const;
+  void Place(const Sample& sample);
   void Close(EndReason reason, EpisodeOutlet& outlet);
   void RestoreOnce(std::uint64_t source_id);
   double period_s() const;
@@ -100,6 +118,9 @@ class ValveMonitor {
   std::int64_t stamp_ns_{0};
   bool isolation_held_{false};
   std::int64_t unassigned_interval_ns_{1'000'000'000};
+  double share_{kFullShare};  // Beginnings that are left,
+  TimePoint share_at_;        // as of then.
+  std::uint32_t epoch_{0};    // Of the last sample in its order.
   bool swapped_{false};
   bool seen_{false};
   bool stale_{false};

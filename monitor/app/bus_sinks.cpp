@@ -55,7 +55,9 @@ bool BusDecisionSink::Publish(const std::string& valve_id,
   Fill(valve_id, models, verdict);
   bool sent = true;
   if (to_lossless) {
-    sent = lossless_->Write(message_, stop_) == idl::WriteResult::kSent;
+    // Each write into a full history takes 50 ms, also after a stop.
+    sent = !stop_.stop_requested() &&
+           lossless_->Write(message_, stop_) == idl::WriteResult::kSent;
   }
   if (!unheard_) {
     sent = live_.Write(message_) == idl::WriteResult::kSent && sent;

@@ -64,6 +64,18 @@ std::shared_ptr<const ModelSet> ModelAssignment::ModelsFor(
   return assigned ? Load(*assigned) : default_;
 }
 
+std::vector<std::string> ModelAssignment::AssignedValves() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::string> valves;
+  for (const storage::ValveEntry& entry : store_.Valves()) {
+    if (entry.model_set &&
+        entry.pattern.find_first_of("*?[") == std::string::npos) {
+      valves.push_back(entry.pattern);
+    }
+  }
+  return valves;
+}
+
 bool ModelAssignment::IsolationHeld(std::string_view valve_id) const {
   const std::lock_guard lock(mutex_);
   const auto entry = store_.FindValve(valve_id);

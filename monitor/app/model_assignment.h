@@ -35,6 +35,8 @@ class ModelAssignment : public ModelResolver {
   std::shared_ptr<const ModelSet> ModelsFor(
       std::string_view valve_id) const override;
 
+  std::vector<std::string> AssignedValves() const override;
+
   /// While the baseline of the valve is provisional.
   bool IsolationHeld(std::string_view valve_id) const override;
 

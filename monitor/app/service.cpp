@@ -83,6 +83,21 @@ std::filesystem::path LockOf(const storage::DataDirectory& data) {
   return path += ".lock";
 }
 
+// The reader never gives the place of a valve back while its publisher lives,
+// so it takes more than the pipeline, which does.
+int IntakeValves(int max_valves) {
+  constexpr int kStrangers = 60'000;
+  constexpr int kMost = 100'000;  // See idl::DdsOptions.
+  return std::min(max_valves + kStrangers, kMost);
+}
+
+PipelineOptions WithDelivery(PipelineOptions options, BusEventSink& events) {
+  options.journal.acknowledged = [&events](milliseconds patience) {
+    return events.WaitForAcknowledged(patience);
+  };
+  return options;
+}
+
 // To the service manager (systemd, Type=notify), if there is one that listens.
 void Notify(const std::string& state) {
   sd_notify(0, state.c_str());
@@ -117,8 +132,9 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
                                   Milliseconds(options.on_event_timeout_s))),
       participant_(DdsOptionsOf(context.options, options.max_valves),
                    context.log, "fdi-monitor"),
-      intake_participant_(DdsOptionsOf(context.options, options.max_valves),
-                          context.log, "fdi-monitor intake"),
+      intake_participant_(
+          DdsOptionsOf(context.options, IntakeValves(options.max_valves)),
+          context.log, "fdi-monitor intake"),
       models_topic_(participant_),
       changes_(data_.models()),
       assignment_(std::make_shared<const ModelAssignment>(
@@ -147,7 +163,7 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
           idl::Overflow::kOnTheWay),
       log_(context.log),
       pipeline_(
-          pipeline_options_,
+          WithDelivery(pipeline_options_, events_),
           {decisions_, console_ ? console_->Before(EventsOut()) : EventsOut(),
            history_, runs_.get(), console_ ? &console_->live() : nullptr},
           assignment_, {counters_, log_, cli::NowNs}),
@@ -202,7 +218,7 @@ void Service::Start() {
 void Service::ResendEvents() {
   for (const FaultEvent& event : history_.UnsentEvents()) {
     if (events_.Publish(event, true)) {
-      history_.MarkSent(event);
+      pipeline_.Published(event);
       counters_.Add(Counter::kEventsResent);
     }
   }

@@ -151,14 +151,15 @@ struct LiveBoard::Slot {
 LiveBoard::LiveBoard() = default;
 LiveBoard::~LiveBoard() = default;
 
-LiveBoard::Slot* LiveBoard::Find(std::string_view valve_id) const {
+std::shared_ptr<LiveBoard::Slot> LiveBoard::Find(
+    std::string_view valve_id) const {
   const std::shared_lock lock(slots_mutex_);
   const auto found = slots_.find(valve_id);
-  return found == slots_.end() ? nullptr : found->second.get();
+  return found == slots_.end() ? nullptr : found->second;
 }
 
 LiveBoard::Slot& LiveBoard::At(const std::string& valve_id) {
-  if (Slot* const slot = Find(valve_id)) {
+  if (const auto slot = Find(valve_id)) {
     return *slot;
   }
   auto slot = std::make_unique<Slot>();
@@ -224,8 +225,13 @@ void LiveBoard::ShowSilence(const std::string& valve_id,
   ++slot.now.version;
 }
 
+void LiveBoard::Forget(const std::string& valve_id) {
+  const std::unique_lock lock(slots_mutex_);
+  slots_.erase(valve_id);
+}
+
 void LiveBoard::Mark(const FaultEvent& event) {
-  Slot* const slot = Find(event.valve_id);
+  const std::shared_ptr<Slot> slot = Find(event.valve_id);
   if (slot == nullptr) {
     return;  // An episode of an earlier session, of a valve that is silent.
   }
@@ -258,7 +264,7 @@ std::vector<ValveState> LiveBoard::Valves(bool spark) const {
 
 std::optional<LiveTrend> LiveBoard::Trend(std::string_view valve_id,
                                           std::size_t instants) const {
-  const Slot* const slot = Find(valve_id);
+  const std::shared_ptr<const Slot> slot = Find(valve_id);
   if (slot == nullptr) {
     return std::nullopt;
   }
@@ -272,7 +278,7 @@ std::optional<LiveTrend> LiveBoard::Trend(std::string_view valve_id,
 
 std::optional<LiveTrend> LiveBoard::Since(std::string_view valve_id,
                                           std::uint64_t next) const {
-  const Slot* const slot = Find(valve_id);
+  const std::shared_ptr<const Slot> slot = Find(valve_id);
   if (slot == nullptr) {
     return std::nullopt;
   }

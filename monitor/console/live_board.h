@@ -75,6 +75,7 @@ class LiveBoard : public monitor::LiveSink {
             const monitor::ValveOutcome& outcome) override;
   void ShowSilence(const std::string& valve_id,
                    monitor::Silence silence) override;
+  void Forget(const std::string& valve_id) override;
 
   /// An event of an episode. Any thread.
   void Mark(const FaultEvent& event);
@@ -97,12 +98,12 @@ class LiveBoard : public monitor::LiveSink {
  private:
   struct Slot;
   Slot& At(const std::string& valve_id);
-  Slot* Find(std::string_view valve_id) const;
+  std::shared_ptr<Slot> Find(std::string_view valve_id) const;
   std::shared_ptr<const ModelFacts> Facts(const ModelSet& models);
   void NoteGap(Slot& slot, const Sample& sample);
 
-  mutable std::shared_mutex slots_mutex_;  // Slots come and never go.
-  std::map<std::string, std::unique_ptr<Slot>, std::less<>> slots_;
+  mutable std::shared_mutex slots_mutex_;
+  std::map<std::string, std::shared_ptr<Slot>, std::less<>> slots_;
   // By content hash. The diagnosis thread alone uses it.
   std::map<std::uint64_t, std::weak_ptr<const ModelFacts>> facts_;
 

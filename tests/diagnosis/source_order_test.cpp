@@ -43,6 +43,17 @@ TEST(SourceOrderTest, AnotherPeriodIsRefusedAfterThreeIntervals) {
   EXPECT_EQ(order.Place(At(6, 11)).intake, Intake::kAccepted);
 }
 
+// The distances of these differ by more than 63 bits hold: UBSan tells.
+TEST(SourceOrderTest, StampsCenturiesApartAreGaps) {
+  SourceOrder order(1.0);
+  for (std::uint64_t seq = 1; seq < 6; ++seq) {
+    const double stamp_s = seq % 2 == 0 ? 4.1e9 : -2.2e9;
+    const auto placed = order.Place(At(seq, stamp_s));
+    EXPECT_EQ(placed.intake, Intake::kAccepted);
+    EXPECT_EQ(placed.gap, seq > 1);
+  }
+}
+
 TEST(SourceOrderTest, ClockThatStepsBackIsAGapNotAnEndlessDelay) {
   SourceOrder order(1.0);
   order.Place(At(1, 10000));

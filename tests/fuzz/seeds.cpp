@@ -100,7 +100,7 @@ void WriteChunks() {
 }
 
 template <typename Message>
-void WriteMessage(char kind, const Message& message) {
+std::string MessageBytes(const Message& message) {
   using Codec = fdi::idl::Codec<Message>;
   typename Codec::Type type;
   typename Codec::Wire wire;
@@ -108,9 +108,13 @@ void WriteMessage(char kind, const Message& message) {
   eprosima::fastrtps::rtps::SerializedPayload_t payload(
       type.getSerializedSizeProvider(&wire)());
   type.serialize(&wire, &payload);
+  return {reinterpret_cast<const char*>(payload.data), payload.length};
+}
+
+template <typename Message>
+void WriteMessage(char kind, const Message& message) {
   Write("wire", std::string("kind") + std::to_string(kind),
-        kind + std::string(reinterpret_cast<const char*>(payload.data),
-                           payload.length));
+        kind + MessageBytes(message));
 }
 
 void WriteMessages() {
@@ -129,6 +133,43 @@ void WriteMessages() {
   WriteMessage(4, status);
 }
 
+// The samples of V1 as its peer would send them, and the rest of what writer
+// and reader tell each other; little endian, numbers 1 and 2.
+void WriteDatagrams() {
+  const std::string one("\0\0\0\0\1\0\0\0", 8);
+  const std::string two("\0\0\0\0\2\0\0\0", 8);
+  const std::string zeros(32, '\0');
+  const std::string writer("\0\0\0\0\0\0\1\2", 8);  // To any reader.
+  const std::string reader("\0\0\1\4\0\0\2\2", 8);  // To our writer.
+  const std::string discovery("\0\1\0\xc7\0\1\0\xc2", 8);
+  const auto write = [](const std::string& name, char kind, char flags,
+                        const std::string& body) {
+    std::string message("RTPS\2\2\1\xf\0\0\0\0\0\0\0\0\0\0\0\0", 20);
+    message += std::string("\xe\1\xc\0", 4) + std::string(12, '\0');
+    message += {kind, flags, static_cast<char>(body.size()),
+                static_cast<char>(body.size() >> 8U)};
+    Write("rtps", name, message + body);
+  };
+  const std::string payload =
+      MessageBytes<fdi::idl::ValveSampleMessage>({"V1", PlantSample(7)});
+  const std::string parameters("\x70\0\x4\0\0\0\0\1\1\0\0\0", 12);
+  const std::string offset("\0\0\x10\0", 4);
+  write("data", 0x15, 5, offset + writer + one + payload);
+  write("end", 0x15, 7, offset + writer + two + parameters + payload);
+  write("participant", 0x15, 5,
+        offset + discovery + one + std::string("\0\3\0\0", 4) +
+            std::string("\x15\0\4\0\2\2\1\xf\1\0\0\0", 12));
+  write("fragment", 0x16, 1,
+        std::string("\0\0\x1c\0", 4) + writer + two +
+            std::string("\1\0\0\0\1\0\x10\0\x40\0\0\0", 12) + payload);
+  write("heartbeat", 0x07, 1, writer + one + two + zeros.substr(28));
+  write("gap", 0x08, 1, writer + one + two + zeros.substr(28));
+  write("acknack", 0x06, 1, reader + one + zeros.substr(24));
+  write("nackfrag", 0x12, 1, reader + one + zeros.substr(20));
+  write("source", 0x0c, 1, zeros.substr(12));
+  write("time", 0x09, 1, zeros.substr(24));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -142,4 +183,5 @@ int main(int argc, char** argv) {
   WriteModels();
   WriteChunks();
   WriteMessages();
+  WriteDatagrams();
 }

@@ -122,6 +122,15 @@ TEST(DatagramTest, SequenceNumbersAreThoseOfWriters) {
             DatagramVerdict::kContent);
 }
 
+TEST(DatagramTest, FragmentsAreOfSamplesThatFitIntoMemory) {
+  const auto verdict = [](std::uint8_t units) {
+    const Bytes fragment{1, 0, 0, 0, 1, 0, 64, 0, 0, 1, units, 0};
+    return VerdictOn(With(Header(), 0x16, Data(28) + fragment + Zeros(64)));
+  };
+  EXPECT_EQ(verdict(0), DatagramVerdict::kSound);
+  EXPECT_EQ(verdict(16), DatagramVerdict::kContent);
+}
+
 TEST(DatagramTest, ParametersAreInsideTheirSubmessage) {
   constexpr std::uint8_t kQos = 3;
   const Bytes next = Zeros(64);

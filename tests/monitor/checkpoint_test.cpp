@@ -41,6 +41,24 @@ TEST(CheckpointTest, TimeIsBookedOnTheDayOfItsSample) {
   EXPECT_TRUE(days.empty());
 }
 
+TEST(CheckpointTest, DaysAreBoundedAndOfAcceptedSamples) {
+  CoverageBook book;
+  for (int day = 0; day < 1000; ++day) {
+    book.Add(day * kDay, Quality::kLive);
+    book.Add((day + 5000) * kDay, Quality::kBadInput, 1, false);
+  }
+  EXPECT_EQ(book.rows(), kMostBookRows);
+  std::vector<CoverageDay> days;
+  book.TakeInto("V1", 1.0, days);
+  QualityCount all;
+  for (const CoverageDay& day : days) {
+    EXPECT_LT(day.day, 1000);
+    all.Add(day.samples);
+  }
+  EXPECT_EQ(all[Quality::kLive], 1000U);
+  EXPECT_EQ(all[Quality::kBadInput], 1000U);
+}
+
 TEST(CheckpointTest, MergingAddsTimeAndKeepsTheNewestAccumulator) {
   CoverageBook book;
   Checkpoint older;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <functional>
@@ -44,8 +45,10 @@ class Notice {
 
 class FixedResolver : public ModelResolver {
  public:
-  explicit FixedResolver(std::shared_ptr<const ModelSet> models)
-      : models_(std::move(models)) {}
+  explicit FixedResolver(std::shared_ptr<const ModelSet> models,
+                         std::vector<std::string> assigned = {})
+      : models_(std::move(models)), assigned_(std::move(assigned)) {}
+  std::vector<std::string> AssignedValves() const override { return assigned_; }
   bool IsolationHeld(std::string_view valve_id) const override {
     return valve_id.starts_with("provisional");
   }
@@ -59,6 +62,7 @@ class FixedResolver : public ModelResolver {
 
  private:
   std::shared_ptr<const ModelSet> models_;
+  std::vector<std::string> assigned_;
 };
 
 class FakeBus : public DecisionSink, public EventSink {
@@ -116,6 +120,7 @@ class FakeHistory : public HistorySink {
     notice.Apply([&] { FailIfBroken(); });
   }
   void AddTrace(const EpisodeTrace& trace) override {
+    std::this_thread::sleep_for(trace_time.load());
     notice.Apply([&] {
       FailIfBroken();
       trace_points += trace.trace.size();
@@ -148,6 +153,7 @@ class FakeHistory : public HistorySink {
   bool broken{false};
   bool stuck{false};
   std::chrono::milliseconds commit_time{0};
+  std::atomic<std::chrono::milliseconds> trace_time{};
   int attempts{0};
   std::map<std::pair<std::uint64_t, TransitionKind>, int> recorded;
   std::vector<DataGap> gaps;

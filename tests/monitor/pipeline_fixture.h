@@ -30,7 +30,8 @@ class PipelineTest : public testing::Test {
   void Make(SampleSink* samples = nullptr) {
     pipeline_ = std::make_unique<Pipeline>(
         options_, PipelineSinks{bus_, bus_, history_, samples, live_},
-        std::make_shared<FixedResolver>(SharedLinearModels()), context_);
+        std::make_shared<FixedResolver>(SharedLinearModels(), assigned_),
+        context_);
   }
   void Start(SampleSink* samples = nullptr) {
     Make(samples);
@@ -51,6 +52,7 @@ class PipelineTest : public testing::Test {
   }
 
   PipelineOptions options_;
+  std::vector<std::string> assigned_;
   FakeBus bus_;
   FakeHistory history_;
   LiveSink* live_{nullptr};

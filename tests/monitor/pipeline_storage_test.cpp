@@ -30,6 +30,29 @@ TEST_F(PipelineStorageTest, AnEventIsStoredBeforeItIsPublished) {
   EXPECT_EQ(history_.trace_points, 80U);
 }
 
+// Until then it would be sent again by the next session.
+TEST_F(PipelineStorageTest, AnEventIsMarkedAsSentOnceItIsAcknowledged) {
+  std::atomic<bool> acknowledged{false};
+  std::atomic<int> asked{0};
+  options_.journal.acknowledged = [&](milliseconds) {
+    ++asked;
+    return acknowledged.load();
+  };
+  options_.journal.delivery_time = milliseconds(0);
+  Start();
+  OfferEpisode("V1");
+  while (asked < 3) {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(history_.notice.Look([this] { return history_.sent; }), 0);
+  acknowledged = true;
+  EXPECT_TRUE(history_.notice.Await([this] { return history_.sent == 2; }));
+  acknowledged = false;
+  OfferEpisode("V2");
+  pipeline_->Stop();
+  EXPECT_EQ(history_.sent, 2);
+}
+
 // Of valves that fail in the same sample none waits for the commits of others.
 TEST_F(PipelineStorageTest, EventsThatWaitTogetherAreStoredInOneCommit) {
   constexpr int kValves = 100;
@@ -51,6 +74,24 @@ TEST_F(PipelineStorageTest, EventsThatWaitTogetherAreStoredInOneCommit) {
   for (const auto& [key, count] : history_.recorded) {
     EXPECT_EQ(count, 1);
   }
+}
+
+// Evidence of others takes seconds, in pieces.
+TEST_F(PipelineStorageTest, AnEventDoesNotWaitForTheEvidenceOfOthers) {
+  constexpr int kValves = 60;
+  Start();
+  for (int v = 0; v < kValves; ++v) {
+    OfferEpisode(ValveName(v));
+  }
+  history_.trace_time = milliseconds(10);
+  ASSERT_TRUE(AwaitEvents(2 * kValves));
+  OfferEpisode("late");
+  ASSERT_TRUE(AwaitEvents(2 * kValves + 2));
+  history_.trace_time = milliseconds(0);
+  pipeline_->Stop();
+
+  EXPECT_EQ(counters_[Counter::kEventsUnpersisted], 0U);
+  EXPECT_EQ(history_.trace_points, 80U * (kValves + 1));
 }
 
 // A commit that fails as a whole is repeated as a whole, and nothing doubled.

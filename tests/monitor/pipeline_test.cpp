@@ -73,6 +73,62 @@ TEST_F(PipelineTest, ValvesBeyondTheLimitAreCountedNotServed) {
   EXPECT_EQ(counters_[Counter::kFilteredSamples], 1U);
 }
 
+TEST_F(PipelineTest, KnownValvesHaveAPlaceAndSilentStrangersGiveTheirsUp) {
+  options_.max_valves = 2;
+  assigned_ = {"K1"};
+  Start();
+  const auto start = std::chrono::steady_clock::now();
+  const auto offer = [&](const char* valve, std::uint64_t k) {
+    pipeline_->Offer(valve, PlantSample(k), 1, start + std::chrono::seconds(k));
+  };
+  offer("S1", 0);
+  offer("S2", 0);  // The place of K1.
+  offer("K1", 0);
+  offer("S3", 0);
+  EXPECT_THAT(pipeline_->valve_names(), testing::ElementsAre("S1", "K1"));
+  EXPECT_EQ(counters_[Counter::kRefusedSamples], 2U);
+
+  pipeline_->Tend(start + std::chrono::seconds(70));
+  offer("S3", 71);
+  EXPECT_THAT(pipeline_->valve_names(), testing::ElementsAre("K1", "S3"));
+  offer("S1", 71);  // S3 speaks.
+  EXPECT_EQ(counters_[Counter::kRefusedSamples], 3U);
+
+  // Nobody takes a place by the end of a stream that was never seen.
+  pipeline_->OfferEnd("S4", 1);
+  EXPECT_EQ(pipeline_->valve_names().size(), 2U);
+  pipeline_->Stop();
+  EXPECT_EQ(bus_.decisions.size(), 3U);
+}
+
+// Stamps that jump, and epochs that flip, with every sample.
+TEST_F(PipelineTest, WhatMakesADiagnosisBeginAnewIsLimited) {
+  Start();
+  const auto now = std::chrono::steady_clock::now();
+  constexpr std::uint64_t kSent = 2000;
+  for (std::uint64_t k = 0; k < kSent; ++k) {
+    Sample sample = PlantSample(k);
+    sample.stamp_ns += (k % 2 == 0 ? 1 : -1) * static_cast<std::int64_t>(k) *
+                       86'400'000'000'000;
+    pipeline_->Offer("J1", sample, 1, now);
+    sample = PlantSample(k);
+    sample.epoch = static_cast<std::uint32_t>(k);
+    pipeline_->Offer("E1", sample, 1, now);
+    pipeline_->Offer("V1", PlantSample(k), 1, now);
+  }
+  pipeline_->Tend(now + std::chrono::seconds(1));
+  pipeline_->Stop();
+
+  EXPECT_EQ(counters_[Counter::kOverShare], 2 * (kSent - 200));
+  EXPECT_EQ(counters_[Intake::kAccepted] + counters_[Intake::kPeriod] +
+                counters_[Counter::kOverShare],
+            3 * kSent);
+  EXPECT_LE(history_.checkpoint_sum.coverage.size(), 202U);
+  EXPECT_LE(history_.checkpoint_sum.health.size(), 402U);
+  EXPECT_THAT(lines_, testing::Contains(testing::HasSubstr(
+                          "sample_rejected id=M117 reason=over_share")));
+}
+
 TEST_F(PipelineTest, AModelSetThatCannotBeHadLeavesTheValveUnassigned) {
   Start();
   Offer("broken1", 0, 5);
