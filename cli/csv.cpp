@@ -6,9 +6,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <istream>
-#include <limits>
 #include <ostream>
 #include <utility>
 
@@ -18,21 +15,23 @@
 namespace fdi::cli {
 namespace {
 
-/// Steps in time may differ from the period by this share of it.
-constexpr double kStepTolerance = 0.01;
 /// 100 years: later times do not fit in nanoseconds since `start_ns`.
 constexpr double kMaxSeconds = 3.2e9;
+constexpr double kSecondsPerDay = 86400.0;
+/// 1970-01-01 as a spreadsheet counts days.
+constexpr double kSerialOf1970 = 25569.0;
+constexpr const char* kSniff =
+    "; try: fdi-store runs sniff FILE --map-output tags.toml, then --map "
+    "tags.toml";
 
-std::string Quoted(std::string_view text) {
-  return '"' + std::string(text.substr(0, 60)) + '"';
-}
-
-/// The shortest text that reads back as the same double.
-std::string NumberText(double value) {
-  std::array<char, 32> digits;
-  const auto end =
-      std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  return {digits.data(), end};
+/// Whether `words`, each between two bars, have `text`; case does not count.
+bool IsOneOf(std::string_view text, std::string_view words) {
+  std::string lower(text);
+  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return lower.find('|') == std::string::npos &&
+         words.find('|' + lower + '|') != std::string_view::npos;
 }
 
 /// The names that `signal` may have in a header: "F_m3_h or F_t_h".
@@ -45,59 +44,6 @@ std::string ColumnNames(Signal signal) {
     }
   }
   return names;
-}
-
-/// All lines of a stream; keeps them, as the period is known at the end only.
-std::vector<std::string> Lines(std::istream& input, const std::string& source) {
-  std::vector<std::string> lines;
-  std::string line;
-  while (std::getline(input, line)) {
-    lines.push_back(std::move(line));
-    line.clear();
-  }
-  if (input.bad()) {
-    throw DataError(source + ": cannot be read: " + std::strerror(errno));
-  }
-  return lines;
-}
-
-/// The most usual step in time; 0 if there is none. Steps within 1 % of the
-/// median count as one.
-double UsualStep(const std::vector<std::string>& lines, CsvOptions options) {
-  // A first pass with every step allowed. What is wrong with a row is left to
-  // the second one, which knows more.
-  options.split_gaps = true;
-  options.period_s = std::numeric_limits<double>::min();
-  CsvReader reader(options);
-  std::vector<double> steps;
-  std::optional<double> last_t_s;
-  try {
-    for (const std::string& line : lines) {
-      if (const auto row = reader.TakeLine(line)) {
-        if (last_t_s) {
-          steps.push_back(row->t_s - *last_t_s);
-        }
-        last_t_s = row->t_s;
-      }
-    }
-  } catch (const DataError&) {
-  }
-  if (steps.empty()) {
-    return 0.0;
-  }
-  const auto middle =
-      steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
-}
-
-SampleSeries EmptyRun(const CsvHeader& header, double period_s) {
-  SampleSeries run;
-  run.flow_unit = header.flow_unit;
-  run.period_s = period_s;
-  run.has_truth = header.has_truth;
-  run.signals = header.signals;
-  return run;
 }
 
 /// The columns of the contract that a run has.
@@ -164,8 +110,43 @@ std::vector<std::string> RowOf(const LabelledSample& labelled,
 
 }  // namespace
 
+bool IsNoReading(std::string_view cell) {
+  constexpr std::string_view kWords =
+      "|nan|-nan|n/a|na|#n/a|#na|#value!|#ref!|#div/0!|#name?|#num!|#null!|"
+      "null|none|nil|bad|bad input|bad value|bad quality|bad data|i/o timeout|"
+      "io timeout|timeout|no data|no value|no sample|not connect|no result|"
+      "pt created|shutdown|comm fail|comm error|configure|scan off|"
+      "scan timeout|calc failed|under range|over range|underrange|overrange|"
+      "intf shut|offline|invalid|error|fault|missing|-|--|---|?|*|...|"
+      "1.#qnan|-1.#ind|";
+  return cell.empty() || IsOneOf(cell, kWords);
+}
+
+std::string StepCheck::Take(double t_s) {
+  const std::optional<double> last = std::exchange(last_t_s_, t_s);
+  if (!last) {
+    return {};
+  }
+  const double step = t_s - *last;
+  if (!(step > 0.0)) {
+    return "time goes back or stands still: from " + NumberText(*last) +
+           " s to " + NumberText(t_s) +
+           " s; expected rows in the order of time; try to sort the file";
+  }
+  if (period_s_ == 0.0) {
+    period_s_ = step;
+  }
+  const double off = step - period_s_;
+  if (std::abs(off) < 0.5 * period_s_ || (split_gaps_ && off > 0.0)) {
+    return {};
+  }
+  return "time jumps by " + NumberText(step) + " s to " + NumberText(t_s) +
+         " s, the sample period is " + NumberText(period_s_) +
+         " s; try --split-gaps for gaps";
+}
+
 CsvReader::CsvReader(CsvOptions options)
-    : options_(std::move(options)), period_s_(options_.period_s) {
+    : options_(std::move(options)), clock_(options_.map.zone) {
   Require(options_.period_s >= 0.0, "the sample period is not negative");
   for (const ColumnMapping& m : options_.map.columns) {
     if (m.signal == Signal::kF && !options_.map.flow_unit) {
@@ -182,6 +163,21 @@ void CsvReader::Refuse(const std::string& reason) const {
 
 std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
   ++line_;
+  if (line_ <= options_.map.skip) {
+    return std::nullopt;
+  }
+  if (names_.empty() && !record_.open()) {
+    // Spreadsheets write the separator into a line of its own.
+    if (line.starts_with("sep=") && line.size() >= 5) {
+      options_.map.separator = line[4];
+      return std::nullopt;
+    }
+    if (options_.map.separator == '\0' &&
+        line.find_first_not_of(" \t\r") != std::string_view::npos) {
+      options_.map.separator = FindSeparator(line, {});
+    }
+    record_ = CsvCells(options_.map.separator);
+  }
   if (!record_.TakeLine(line) || record_.blank()) {
     return std::nullopt;
   }
@@ -191,25 +187,26 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
   }
   if (record_.cells().size() != names_.size()) {
     Refuse(std::to_string(record_.cells().size()) + " cells, the header has " +
-           std::to_string(names_.size()));
+           std::to_string(names_.size()) + ", separated by " +
+           (options_.map.separator == '\t'
+                ? "tab"
+                : Quoted({&options_.map.separator, 1})) +
+           "; try quotes around cells that contain it, or separator under "
+           "[file] of --map");
   }
   CsvRow row;
-  row.t_s = Number(*time_column_) * options_.map.time_scale;
-  row.after_gap = CheckTime(row.t_s);
+  row.line = line_;
   Sample& sample = row.labelled.sample;
-  sample.stamp_ns = options_.start_ns + std::llround(row.t_s * 1e9);
-  sample.seq = rows_++;
   sample.flow_unit = header_.flow_unit;
-  for (const Conversion& c : conversions_) {
-    std::optional<double> value = Reading(c.column);
-    if (!value) {
-      continue;
+  if (tag_column_ && !TakeTagged(sample)) {
+    return std::nullopt;
+  }
+  TakeTime(row);
+  sample.seq = rows_++;
+  if (!tag_column_) {
+    for (const Conversion& c : conversions_) {
+      Convert(c, sample);
     }
-    // Only if asked for: 0 + 1 * value would lose the sign of −0.
-    if (c.scale != 1.0 || c.offset != 0.0) {
-      value = c.offset + c.scale * *value;
-    }
-    sample.Set(c.signal, c.sense == Sense::kOpening ? 100.0 - *value : *value);
   }
   if (mode_column_) {
     sample.mode = Mode();
@@ -220,31 +217,147 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
   return row;
 }
 
+void CsvReader::Convert(const Conversion& c, Sample& sample) const {
+  std::optional<double> value = Reading(c.column);
+  if (!value) {
+    sample.quality[Index(c.signal)] = SignalQuality::kBad;
+    return;
+  }
+  // Only if asked for: 0 + 1 * value would lose the sign of −0.
+  if (c.scale != 1.0 || c.offset != 0.0) {
+    value = c.offset + c.scale * *value;
+  }
+  sample.Set(c.signal, c.sense == Sense::kOpening ? 100.0 - *value : *value);
+}
+
+bool CsvReader::TakeTagged(Sample& sample) {
+  const std::string& tag = Cell(*tag_column_);
+  const auto found = std::ranges::find_if(
+      conversions_, [&](const Conversion& c) { return SameName(c.tag, tag); });
+  if (found == conversions_.end()) {
+    auto& ignored = header_.ignored_columns;
+    if (std::ranges::find(ignored, tag) == ignored.end()) {
+      ignored.push_back(tag);
+    }
+    return false;
+  }
+  used_[static_cast<std::size_t>(found - conversions_.begin())] = true;
+  const SignalQuality quality = TaggedQuality();
+  if (quality == SignalQuality::kBad) {
+    sample.quality[Index(found->signal)] = quality;
+    return true;
+  }
+  Convert(*found, sample);
+  if (sample.Has(found->signal)) {
+    sample.quality[Index(found->signal)] = quality;
+  }
+  return true;
+}
+
+SignalQuality CsvReader::TaggedQuality() const {
+  constexpr std::string_view kGood =
+      "|good|g|ok|raw|good non-specific|0x00000000|";
+  constexpr std::string_view kUncertain =
+      "|uncertain|questionable|substituted|interpolated|";
+  if (!quality_column_) {
+    return SignalQuality::kGood;
+  }
+  const std::string& cell = Cell(*quality_column_);
+  const std::vector<std::string>& good = options_.map.long_table->good;
+  if (!good.empty()) {
+    return std::ranges::any_of(good,
+                               [&](const auto& g) { return SameName(g, cell); })
+               ? SignalQuality::kGood
+               : SignalQuality::kBad;
+  }
+  // Numbers are those of OPC DA: 192 good, 64 uncertain. 0 is bad there, but
+  // good with OPC UA.
+  const auto number = ParseNumber(cell);
+  if (number && *number == 0.0) {
+    Refuse("column " + Quoted(names_[*quality_column_]) + ": " + Quoted(cell) +
+           " is good in OPC UA and bad in OPC DA; try good = [\"0\"] or good "
+           "= [\"192\"] under [long] of --map");
+  }
+  if (IsOneOf(cell, kGood) || (number && *number >= 192.0)) {
+    return SignalQuality::kGood;
+  }
+  return IsOneOf(cell, kUncertain) || (number && *number >= 64.0)
+             ? SignalQuality::kUncertain
+             : SignalQuality::kBad;
+}
+
 void CsvReader::Finish() const {
   if (record_.open()) {
-    Refuse("a quote is not closed before the end");
+    Refuse("a quote is not closed before the end; expected a closing \"");
   }
   if (names_.empty()) {
     throw DataError(options_.source + ": is empty: no header, no rows");
   }
-  if (rows_ == 0) {
+  if (rows_ == 0 && !tag_column_) {
     throw DataError(options_.source + ": has a header but no rows");
   }
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    if (!used_[i]) {
+      throw DataError(options_.source + ": tag " + Quoted(conversions_[i].tag) +
+                      " does not occur; the others are " +
+                      Quoted(Listed(header_.ignored_columns)) +
+                      "; try another column under [signal." +
+                      std::string(SignalName(conversions_[i].signal)) +
+                      "] of --map");
+    }
+  }
+}
+
+std::optional<std::size_t> CsvReader::Column(std::string_view name) {
+  std::optional<std::size_t> found;
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    if (SameName(names_[i], name)) {
+      if (found) {
+        Refuse("column " + Quoted(name) +
+               " is there twice; expected each name once");
+      }
+      found = i;
+      used_[i] = true;
+    }
+  }
+  return found;
 }
 
 void CsvReader::TakeHeader() {
   names_ = record_.cells();
+  used_.assign(names_.size(), false);
+  const ColumnMap& map = options_.map;
+  static const std::vector<std::string> kTimes = {"t_s", "time", "timestamp",
+                                                  "datetime"};
+  for (const std::string& name :
+       map.time_column.empty() ? kTimes : std::vector{map.time_column}) {
+    time_column_ = time_column_ ? time_column_ : Column(name);
+  }
+  if (!map.clock_column.empty()) {
+    clock_column_ = Column(map.clock_column);
+  }
+  if (map.long_table) {
+    tag_column_ = Column(map.long_table->tag);
+    value_column_ = Column(map.long_table->value).value_or(names_.size());
+    if (!map.long_table->quality.empty()) {
+      quality_column_ = Column(map.long_table->quality);
+    }
+    CheckLongHeader();
+    used_.assign(map.columns.size(), false);
+    for (const ColumnMapping& m : map.columns) {
+      AddSignal(
+          {value_column_, m.signal, m.scale, m.offset, m.sense, m.column});
+    }
+    header_.flow_unit = map.flow_unit.value_or(header_.flow_unit);
+    return;
+  }
+  AddMapped();
   for (std::size_t i = 0; i < names_.size(); ++i) {
-    const std::string& name = names_[i];
-    if (SameName(name, options_.map.time_column)) {
-      if (time_column_) {
-        Refuse("column " + Quoted(name) + " is there twice");
-      }
-      time_column_ = i;
-    } else if (!AddMapped(i, name) && !AddByContract(i, name)) {
-      header_.ignored_columns.push_back(name);
+    if (!used_[i] && !AddByContract(i, names_[i]) && !names_[i].empty()) {
+      header_.ignored_columns.push_back(names_[i]);
     }
   }
+  used_.clear();
   header_.has_truth = fault_column_ || strength_column_;
   CheckHeader();
 }
@@ -252,24 +365,23 @@ void CsvReader::TakeHeader() {
 void CsvReader::AddSignal(const Conversion& conversion) {
   if ((header_.signals & MaskOf(conversion.signal)) != 0) {
     Refuse("column " + Quoted(names_[conversion.column]) + ": signal " +
-           std::string(SignalName(conversion.signal)) + " is there twice");
+           std::string(SignalName(conversion.signal)) +
+           " is there twice; expected it once");
   }
   header_.signals =
       static_cast<SignalMask>(header_.signals | MaskOf(conversion.signal));
   conversions_.push_back(conversion);
 }
 
-bool CsvReader::AddMapped(std::size_t column, std::string_view name) {
+void CsvReader::AddMapped() {
   for (const ColumnMapping& m : options_.map.columns) {
-    if (m.column == name) {
+    if (const auto column = Column(m.column)) {
       if (m.signal == Signal::kF) {
         header_.flow_unit = *options_.map.flow_unit;
       }
-      AddSignal({column, m.signal, m.scale, m.offset, m.sense});
-      return true;
+      AddSignal({*column, m.signal, m.scale, m.offset, m.sense, ""});
     }
   }
-  return false;
 }
 
 bool CsvReader::AddByContract(std::size_t column, std::string_view name) {
@@ -300,27 +412,48 @@ bool CsvReader::AddByContract(std::size_t column, std::string_view name) {
       if (known.signal == Signal::kF) {
         header_.flow_unit = known.flow_unit;
       }
-      AddSignal({column, known.signal, 1.0, 0.0, Sense::kClosing});
+      AddSignal({column, known.signal, 1.0, 0.0, Sense::kClosing, ""});
       return true;
     }
   }
   return false;
 }
 
-void CsvReader::CheckHeader() const {
-  std::string missing;
-  const auto require = [&](bool there, std::string_view name) {
+void CsvReader::CheckLongHeader() const {
+  const LongTable& expected = *options_.map.long_table;
+  std::vector<std::string> missing;
+  const auto require = [&](bool there, const std::string& name) {
     if (!there) {
-      missing += (missing.empty() ? "" : ", ") + std::string(name);
+      missing.push_back(name.empty() ? "time" : name);
     }
   };
-  // Who maps columns says which signals there are; nothing else is demanded.
-  const unsigned listed = options_.map.columns.empty() ? options_.required : 0U;
-  const auto required = static_cast<SignalMask>(listed | MaskOf(Signal::kCv));
   require(time_column_.has_value(), options_.map.time_column);
-  for (const ColumnMapping& m : options_.map.columns) {
-    require(std::find(names_.begin(), names_.end(), m.column) != names_.end(),
-            m.column);
+  require(tag_column_.has_value(), expected.tag);
+  require(value_column_ < names_.size(), expected.value);
+  require(quality_column_ || expected.quality.empty(), expected.quality);
+  if (!missing.empty()) {
+    Refuse("missing column " + Listed(missing) + "; the header is " +
+           Quoted(Listed(names_)) + "; try [long] and [time] of --map");
+  }
+}
+
+void CsvReader::CheckHeader() const {
+  std::vector<std::string> missing;
+  const auto require = [&](bool there, std::string_view name) {
+    if (!there) {
+      missing.emplace_back(name);
+    }
+  };
+  const ColumnMap& map = options_.map;
+  // Who maps columns says which signals there are; nothing else is demanded.
+  const unsigned listed = map.columns.empty() ? options_.required : 0U;
+  const auto required = static_cast<SignalMask>(listed | MaskOf(Signal::kCv));
+  require(time_column_.has_value(), map.time_column.empty()
+                                        ? kTimeColumn
+                                        : std::string_view(map.time_column));
+  require(clock_column_ || map.clock_column.empty(), map.clock_column);
+  for (const ColumnMapping& m : map.columns) {
+    require((header_.signals & MaskOf(m.signal)) != 0, m.column);
   }
   for (std::size_t i = 0; i < kSignalCount; ++i) {
     const auto signal = static_cast<Signal>(i);
@@ -333,27 +466,37 @@ void CsvReader::CheckHeader() const {
   require(fault_column_ || !strength_column_, "fault (or fault_no)");
   require(strength_column_ || !fault_column_, kStrengthColumn);
   if (!missing.empty()) {
-    std::string found;
-    for (const std::string& name : names_) {
-      found += (found.empty() ? "" : ",") + name;
+    std::string names;
+    for (const std::string& name : missing) {
+      names += (names.empty() ? "" : ", ") + name;
     }
-    Refuse("missing column " + missing + "; the header is " + Quoted(found));
+    Refuse("missing column " + names + "; the header is " +
+           Quoted(Listed(names_)) + kSniff);
   }
 }
 
 std::optional<double> CsvReader::Reading(std::size_t column) const {
-  const std::string& cell = record_.cells()[column];
-  // Exports were once written with `nan`, and other tools still do.
-  return cell.empty() || SameName(cell, "nan") ? std::nullopt
-                                               : std::optional(Number(column));
+  return IsNoReading(Cell(column)) ? std::nullopt
+                                   : std::optional(Number(column));
 }
 
 double CsvReader::Number(std::size_t column) const {
-  const std::string_view cell = record_.cells()[column];
-  const auto value = ParseNumber(cell);
+  const std::string& cell = Cell(column);
+  const char decimal = options_.map.decimal;
+  char sign = '.';
+  auto value = ParseNumber(cell, decimal == '\0' ? '.' : decimal);
+  if (!value && decimal == '\0' && DigitsOf(cell, sign) == Digits::kDecimal) {
+    value = ParseNumber(cell, sign);
+  }
   if (!value) {
+    const bool other = DigitsOf(cell, sign) != Digits::kNone;
     Refuse("column " + Quoted(names_[column]) + ": " + Quoted(cell) +
-           " is not a finite number");
+           " is not a finite number; expected digits" +
+           (decimal == ',' ? " with a decimal comma" : "") +
+           (other ? "; thousands separators are not read: try decimal under "
+                    "[file] of --map, or export without them"
+                  : ", or nothing, NaN, Bad ... where there is no reading; try "
+                    "to correct or empty the cell"));
   }
   return *value;
 }
@@ -401,73 +544,99 @@ FaultTruth CsvReader::Truth() const {
   return {fault, strength};
 }
 
-bool CsvReader::CheckTime(double t_s) {
-  if (std::abs(t_s) > kMaxSeconds) {
-    Refuse("time " + NumberText(t_s) + " s is beyond 100 years");
+void CsvReader::FindTimeForm(const std::string& cell) {
+  const ColumnMap& map = options_.map;
+  time_form_ = map.time_form;
+  if (time_form_ != TimeForm::kFindOut) {
+    return;
   }
-  const double step = t_s - std::exchange(last_t_s_, t_s);
-  if (rows_ == 0) {
-    return false;
+  const std::string& name = names_[*time_column_];
+  const auto number =
+      ParseNumber(cell, map.decimal == '\0' ? '.' : map.decimal);
+  if (!number) {
+    time_form_ = TimeForm::kText;
+  } else if (SameName(name, kTimeColumn)) {
+    time_form_ = TimeForm::kElapsed;
+  } else if (*number > 3e4 && *number < 7e4 && *number != std::floor(*number)) {
+    time_form_ = TimeForm::kSerial;
+    notes_.push_back("column " + name +
+                     " taken as days of a spreadsheet (guessed; unit = "
+                     "\"serial\" under [time] confirms it)");
+  } else if (*number > 6e8 && *number < 4e9) {
+    time_form_ = TimeForm::kUnix;
+    notes_.push_back("column " + name +
+                     " taken as seconds since 1970 (guessed; unit = \"unix\" "
+                     "under [time] confirms it)");
+  } else {
+    time_form_ = TimeForm::kElapsed;
+    notes_.push_back("column " + name +
+                     " taken as seconds (guessed; unit = \"s\" under [time] "
+                     "confirms it)");
   }
-  if (!(step > 0.0)) {
-    Refuse("time goes back or stands still: from " + NumberText(t_s - step) +
-           " s to " + NumberText(t_s) + " s");
-  }
-  if (period_s_ == 0.0) {
-    period_s_ = step;
-  }
-  if (std::abs(step - period_s_) <= kStepTolerance * period_s_) {
-    return false;
-  }
-  // A step that is too short is never a gap but a fault of the file.
-  if (options_.split_gaps && step > period_s_) {
-    return true;
-  }
-  Refuse("time jumps by " + NumberText(step) + " s to " + NumberText(t_s) +
-         " s, the sample period is " + NumberText(period_s_) + " s" +
-         (step > period_s_ ? " (--split-gaps begins a new run at a gap)" : ""));
 }
 
-CsvTable ReadCsv(std::istream& input, const CsvOptions& options) {
-  const std::vector<std::string> lines = Lines(input, options.source);
-  CsvOptions settled = options;
-  if (settled.period_s == 0.0) {
-    settled.period_s = UsualStep(lines, options);
+void CsvReader::TakeTime(CsvRow& row) {
+  std::string cell = Cell(*time_column_);
+  if (clock_column_) {
+    cell += ' ' + Cell(*clock_column_);
   }
-  CsvReader reader(settled);
-  // A file is read twice, as text: the period is known after all of it.
-  CsvTable table;
-  for (const std::string& line : lines) {
-    std::optional<CsvRow> row = reader.TakeLine(line);
-    if (!row) {
-      continue;
+  if (time_form_ == TimeForm::kFindOut) {
+    FindTimeForm(cell);
+  }
+  const std::string column = "column " + Quoted(names_[*time_column_]) + ": ";
+  std::int64_t& stamp_ns = row.labelled.sample.stamp_ns;
+  if (time_form_ == TimeForm::kElapsed || time_form_ == TimeForm::kUnix) {
+    row.t_s = Number(*time_column_) * options_.map.time_scale;
+    if (std::abs(row.t_s) > kMaxSeconds) {
+      Refuse(column + "time " + NumberText(row.t_s) +
+             " s is beyond 100 years; try unit under [time] of --map");
     }
-    if (table.runs.empty() || row->after_gap) {
-      table.runs.push_back(EmptyRun(reader.header(), settled.period_s));
+    stamp_ns = std::llround(row.t_s * 1e9) +
+               (time_form_ == TimeForm::kElapsed ? options_.start_ns : 0);
+  } else {
+    std::optional<CivilTime> time;
+    if (time_form_ == TimeForm::kText) {
+      time = ScanTime(cell, options_.map.date_order);
+    } else if (const double days = Number(*time_column_);
+               days > 2.0 && days < 130000.0) {
+      // Excel shows times to the millisecond; beyond is rounding.
+      const auto ms =
+          std::llround((days - kSerialOf1970) * kSecondsPerDay * 1e3);
+      const std::time_t seconds = (ms - ((ms % 1000) + 1000) % 1000) / 1000;
+      time.emplace();
+      gmtime_r(&seconds, &time->fields);
+      time->fraction_ns = (ms - seconds * 1000) * 1'000'000;
     }
-    table.runs.back().samples.push_back(row->labelled);
+    if (!time) {
+      const bool slashed = ScanTime(cell, DateOrder::kDayFirst).has_value() ||
+                           ScanTime(cell, DateOrder::kMonthFirst).has_value();
+      Refuse(column + Quoted(cell) +
+             (slashed ? " may be day/month or month/day; try date = \"d/m/y\" "
+                        "or \"m/d/y\" under [time] of --map"
+                      : " is not a time; expected 2026-11-20 14:56:11.5, "
+                        "20.11.2026 14:56:11,5 or the like; try unit under "
+                        "[time] of --map"));
+    }
+    if (!time->offset_s && !first_ns_ && options_.map.zone.empty()) {
+      notes_.push_back(
+          "times without a zone taken as local time of this machine "
+          "(guessed; --zone says which)");
+    }
+    const auto utc = clock_.Utc(*time, last_ns_);
+    if (!utc) {
+      Refuse(column + Quoted(cell) + " was never shown in zone '" +
+             clock_.zone() +
+             "' (clocks go forward in spring); try --zone UTC or +01:00");
+    }
+    stamp_ns = *utc;
   }
-  reader.Finish();
-  if (settled.period_s == 0.0) {
-    throw DataError(options.source +
-                    ": one row does not tell the sample period");
+  if (!first_ns_) {
+    first_ns_ = stamp_ns;
   }
-  table.header = reader.header();
-  return table;
-}
-
-CsvTable ReadCsvFile(const std::filesystem::path& path, CsvOptions options) {
-  options.source = path.string();
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
-    throw DataError(options.source + ": is a directory, not a file");
+  last_ns_ = stamp_ns;
+  if (dated()) {
+    row.t_s = static_cast<double>(stamp_ns - *first_ns_) * 1e-9;
   }
-  std::ifstream input(path);
-  if (!input) {
-    throw DataError(options.source +
-                    ": cannot be opened: " + std::strerror(errno));
-  }
-  return ReadCsv(input, options);
 }
 
 void WriteCsv(std::ostream& output, std::span<const LabelledSample> samples,

@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "cli/csv_cells.h"
+#include "cli/time_text.h"
+#include "diagnosis/log.h"
 #include "diagnosis/sample_series.h"
 
 namespace fdi::cli {
@@ -45,20 +47,54 @@ inline constexpr std::string_view kStrengthColumn = "fault_strength";
 /// Where a signal comes from in a foreign table:
 /// value = offset + scale · cell, then 100 − value if it is % of opening.
 struct ColumnMapping {
-  std::string column;  ///< Name in the header of the file.
+  std::string column;  ///< Name in the header, or the tag of a long table.
   Signal signal{Signal::kCv};
   double scale{1.0};
   double offset{0.0};
   Sense sense{Sense::kClosing};
+  std::string unit{};  ///< Of the cells, as the map says it.
 };
 
-/// The mapping of `--map tags.toml`. Signals that it does not name are still
-/// found by the names of the CSV contract.
+/// What the cells of the time column are.
+enum class TimeForm {
+  kFindOut,
+  kElapsed,  ///< Seconds (after scaling) from CsvOptions::start_ns.
+  kUnix,     ///< Seconds (after scaling) since 1970.
+  kSerial,   ///< Days of a spreadsheet, 25569 being 1970-01-01, in local time.
+  kText,     ///< As ScanTime() reads it.
+};
+
+/// A table with one reading in each row.
+struct LongTable {
+  std::string tag{"tag"};
+  std::string value{"value"};
+  std::string quality;            ///< Column; empty: none.
+  std::vector<std::string> good;  ///< All else is bad; empty: usual words.
+};
+
+/// How a signal is brought to a period.
+struct Resampling {
+  double period_s{1.0};
+  bool linear{false};    ///< Else the last reading is held.
+  double limit_s{10.0};  ///< No reading is held, no line drawn for longer.
+};
+
+/// What `--map tags.toml`, `--zone` and `--resample` say. Signals that are not
+/// named are still found by the names of the CSV contract.
 struct ColumnMap {
-  std::string time_column{"t_s"};
+  char separator{'\0'};      ///< NUL: found out.
+  char decimal{'\0'};        ///< NUL: found out.
+  int skip{0};               ///< Lines in front of the header.
+  std::string time_column;   ///< Empty: t_s, time, timestamp or datetime.
+  std::string clock_column;  ///< The time of day, if it stands alone.
+  TimeForm time_form{TimeForm::kFindOut};
   double time_scale{1.0};  ///< To seconds.
+  DateOrder date_order{DateOrder::kNotSaid};
+  std::string zone;  ///< Of times that do not say it; empty: the machine's.
+  std::optional<LongTable> long_table;
   std::vector<ColumnMapping> columns;
   std::optional<FlowUnit> flow_unit;  ///< Needed if the flow is mapped.
+  std::optional<Resampling> resampling;
 };
 
 /// Settings of the CSV readers.
@@ -70,7 +106,8 @@ struct CsvOptions {
   SignalMask required{kBasicSignals};
   bool split_gaps{false};    ///< A gap starts another run, not an error.
   double period_s{0.0};      ///< 0: as the file has it.
-  std::int64_t start_ns{0};  ///< UTC of t_s = 0.
+  std::int64_t start_ns{0};  ///< UTC of t_s = 0, unless times have a date.
+  LogSink log;               ///< Gets CsvTable::notes, each as `csv_note`.
 };
 
 /// What the header of a table says.
@@ -85,34 +122,60 @@ struct CsvHeader {
 struct CsvTable {
   CsvHeader header;
   std::vector<SampleSeries> runs;
+  bool dated{false};         ///< The times of the file have a date.
+  std::int64_t start_ns{0};  ///< Of t = 0: dated, the first sample.
+  /// What was found out, converted or filled, one sentence each.
+  std::vector<std::string> notes;
 };
 
-/// A row taken by CsvReader.
+/// A row taken by CsvReader; of a long table it has one signal.
 struct CsvRow {
   LabelledSample labelled;  ///< seq counts from 0; source_id 0, epoch 0.
-  double t_s{0.0};
-  bool after_gap{false};  ///< Starts another run (split_gaps).
+  double t_s{0.0};          ///< Dated: since the first row.
+  std::int64_t line{0};
 };
 
-/// Reads a table line by line, e.g. from a pipe. The sample period is the
-/// option's, else the first step in time.
+/// Watches the steps in time of samples that come one by one.
+class StepCheck {
+ public:
+  /// @param period_s 0: the first step.
+  explicit StepCheck(bool split_gaps, double period_s = 0.0)
+      : split_gaps_(split_gaps), period_s_(period_s) {}
+
+  /// A step may differ from the period by half of it, or be longer with
+  /// `split_gaps`. @returns what is wrong with the next one; empty: nothing.
+  std::string Take(double t_s);
+  double period_s() const { return period_s_; }
+
+ private:
+  bool split_gaps_;
+  double period_s_;
+  std::optional<double> last_t_s_;
+};
+
+/// Reads a table line by line, e.g. from a pipe; what belongs to the steps in
+/// time is left to the caller.
 ///
 /// Header: t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h (or F_t_h), in any
 /// order and case; optional SP_pct,CVI,Ps_kPa,Pz_kPa; optional truth: fault
 /// (f1..f19, t1, p1, p2, normal) or fault_no (0..22) with fault_strength, where
 /// only a non-zero strength marks a fault; optional mode (kValveModeNames; AUTO
-/// if the column is not there). Further columns are ignored. A signal whose
-/// cell is empty or `nan` is missing from that sample.
+/// if the column is not there). Further columns are ignored. docs/import.md has
+/// the rest: other names, forms of time, separators, long tables.
+///
+/// A signal whose cell is empty or says that there is no reading (Bad, I/O
+/// Timeout, #N/A, ...) is missing from that sample, with quality BAD.
 class CsvReader {
  public:
   /// @throws ConfigError if a map has a flow without its unit.
   explicit CsvReader(CsvOptions options);
 
   /// Takes the next line, without its end. @returns nothing for the header, for
-  /// blank lines, and while a quoted cell goes on in the next line.
-  /// @throws DataError naming source, line, column and reason: missing or
-  ///   double column, cells too few or too many, not a finite number, an
-  ///   unknown fault, a step in time that is not the sample period.
+  /// blank lines, for a tag that is not mapped, and while a quoted cell goes on
+  /// in the next line.
+  /// @throws DataError naming source, line, column, value, what was expected
+  ///   and what to try: missing or double column, cells too few or too many,
+  ///   not a number, not a time, an unknown fault.
   std::optional<CsvRow> TakeLine(std::string_view line);
 
   /// After the last line. @throws DataError if there was no row.
@@ -120,9 +183,12 @@ class CsvReader {
 
   /// After the first line.
   const CsvHeader& header() const { return header_; }
-  /// 0 until it is known.
-  double period_s() const { return period_s_; }
-  std::int64_t line_number() const { return line_; }
+  const CsvOptions& options() const { return options_; }
+  bool dated() const {
+    return time_form_ != TimeForm::kElapsed && time_form_ != TimeForm::kFindOut;
+  }
+  const std::vector<std::string>& notes() const { return notes_; }
+  [[noreturn]] void Refuse(const std::string& reason) const;
 
  private:
   struct Conversion {
@@ -131,47 +197,77 @@ class CsvReader {
     double scale;
     double offset;
     Sense sense;
+    std::string tag;
   };
 
   void TakeHeader();
+  std::optional<std::size_t> Column(std::string_view name);
   void AddSignal(const Conversion& conversion);
-  bool AddMapped(std::size_t column, std::string_view name);
+  void AddMapped();
   bool AddByContract(std::size_t column, std::string_view name);
   void CheckHeader() const;
+  void CheckLongHeader() const;
+  const std::string& Cell(std::size_t column) const {
+    return record_.cells()[column];
+  }
   /// The value in the unit of the file; nothing if the reading is missing.
   std::optional<double> Reading(std::size_t column) const;
   double Number(std::size_t column) const;
+  void Convert(const Conversion& conversion, Sample& sample) const;
+  bool TakeTagged(Sample& sample);
+  SignalQuality TaggedQuality() const;
+  void FindTimeForm(const std::string& cell);
+  void TakeTime(CsvRow& row);
   FaultTruth Truth() const;
   ValveMode Mode() const;
-  bool CheckTime(double t_s);
-  [[noreturn]] void Refuse(const std::string& reason) const;
 
   CsvOptions options_;
+  LocalClock clock_;
   CsvHeader header_;
   std::vector<std::string> names_;
+  std::vector<std::string> notes_;
   CsvCells record_;
   std::vector<Conversion> conversions_;
+  std::vector<bool> used_;
   std::optional<std::size_t> time_column_;
+  std::optional<std::size_t> clock_column_;
+  std::optional<std::size_t> tag_column_;
+  std::size_t value_column_{0};
+  std::optional<std::size_t> quality_column_;
   std::optional<std::size_t> fault_column_;
   std::optional<std::size_t> strength_column_;
   std::optional<std::size_t> mode_column_;
   bool fault_by_number_{false};
-  double period_s_{0.0};
-  double last_t_s_{0.0};
+  TimeForm time_form_{TimeForm::kFindOut};
+  std::optional<std::int64_t> first_ns_;
+  std::int64_t last_ns_{0};
   std::uint64_t rows_{0};
   std::int64_t line_{0};
 };
 
-/// Reads a whole table. The sample period is the option's, else the most usual
-/// step, so that a jump is reported where it is.
-/// @throws DataError as CsvReader, or if there are fewer than two rows and the
-///   period is not given.
-CsvTable ReadCsv(std::istream& input, const CsvOptions& options = {});
+/// Reads a whole table (UTF-8, see ReadTextFile()). The sample period is the
+/// option's, else the most usual step. Samples that are less than half a period
+/// off its grid are put onto it; ColumnMap::resampling makes a grid of any
+/// table, where what no reading is near to has quality UNCERTAIN.
+/// @throws DataError as CsvReader, or naming the line of a step in time that is
+///   not the sample period; if there are fewer than two rows and the period is
+///   not given; if thousands separators or the sign of decimals cannot be told
+///   apart; if most values of a mapped signal are impossible.
+CsvTable ReadCsv(std::string_view text, const CsvOptions& options = {});
 
-/// Opens `path`; CsvOptions::source becomes its name.
-/// @throws DataError as above, or naming path and reason if it cannot be read.
+/// Reads `path`, `-` for stdin; CsvOptions::source becomes its name.
+/// @throws as above and as ReadTextFile().
 CsvTable ReadCsvFile(const std::filesystem::path& path,
                      CsvOptions options = {});
+
+/// `map` with the separator and the decimal sign of the table, where it leaves
+/// them open. @throws DataError if thousands separators or the sign of decimals
+///   cannot be told apart.
+ColumnMap WithSigns(std::string_view text, ColumnMap map,
+                    const std::string& source);
+
+/// Whether a cell says that there is no reading: empty, NaN, Bad, #N/A, ...
+bool IsNoReading(std::string_view cell);
 
 /// Writes the columns of the contract for the signals that occur; mode if it is
 /// not AUTO throughout; fault and fault_strength if truth is known. Numbers

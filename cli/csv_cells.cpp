@@ -1,10 +1,20 @@
 #include "cli/csv_cells.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstring>
+#include <memory>
 #include <ostream>
+#include <utility>
+
+#include <unistd.h>
+#include <zlib.h>
+
+#include "diagnosis/error.h"
 
 namespace fdi::cli {
 namespace {
@@ -14,6 +24,66 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 // The CR of a CRLF is a blank too.
 bool IsBlank(char c) {
   return c == ' ' || c == '\t' || c == '\r';
+}
+
+void AppendUtf8(char32_t code, std::string& out) {
+  const auto tail = [&](int shift) {
+    out += static_cast<char>(0x80U | ((code >> shift) & 0x3FU));
+  };
+  if (code < 0x80) {
+    out += static_cast<char>(code);
+  } else if (code < 0x800) {
+    out += static_cast<char>(0xC0U | (code >> 6U));
+    tail(0);
+  } else if (code < 0x10000) {
+    out += static_cast<char>(0xE0U | (code >> 12U));
+    tail(6);
+    tail(0);
+  } else {
+    out += static_cast<char>(0xF0U | (code >> 18U));
+    tail(12);
+    tail(6);
+    tail(0);
+  }
+}
+
+std::string FromUtf16(std::string_view bytes, bool big_endian) {
+  const auto unit = [&](std::size_t i) {
+    const auto byte = [&](std::size_t at) {
+      return static_cast<unsigned char>(bytes[at]);
+    };
+    return static_cast<char32_t>(big_endian ? byte(i) << 8U | byte(i + 1)
+                                            : byte(i + 1) << 8U | byte(i));
+  };
+  std::string text;
+  for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) {
+    char32_t code = unit(i);
+    if (code >= 0xD800 && code < 0xDC00 && i + 3 < bytes.size()) {
+      i += 2;
+      code = 0x10000 + ((code - 0xD800) << 10U) + (unit(i) - 0xDC00);
+    }
+    if (i > 0 || code != 0xFEFF) {
+      AppendUtf8(code, text);
+    }
+  }
+  return text;
+}
+
+bool IsUtf8(std::string_view text) {
+  std::size_t more = 0;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool tail = (byte & 0xC0U) == 0x80U;
+    if (tail != (more > 0)) {
+      return false;
+    }
+    more = tail          ? more - 1
+           : byte < 0x80 ? 0
+           : byte < 0xE0 ? 1
+           : byte < 0xF0 ? 2
+                         : 3;
+  }
+  return more == 0;
 }
 
 }  // namespace
@@ -51,7 +121,7 @@ void CsvCells::Take(char c) {
       if (c == '"') {
         cell_ += c;  // It was the first one of two: a quote of the text.
         state_ = State::kQuoted;
-      } else if (c == ',') {
+      } else if (c == separator_) {
         EndCell();
       } else if (!IsBlank(c)) {
         cell_ += c;  // "FV"-101, which no writer should write.
@@ -68,7 +138,7 @@ void CsvCells::Take(char c) {
       state_ = State::kText;
       [[fallthrough]];
     case State::kText:
-      if (c == ',') {
+      if (c == separator_) {
         EndCell();
       } else {
         cell_ += c;
@@ -86,7 +156,16 @@ void CsvCells::EndCell() {
   state_ = State::kBefore;
 }
 
-std::optional<double> ParseNumber(std::string_view text) {
+std::optional<double> ParseNumber(std::string_view text, char decimal) {
+  std::string point;
+  if (decimal != '.') {
+    if (text.find('.') != std::string_view::npos) {
+      return std::nullopt;
+    }
+    point = text;
+    std::replace(point.begin(), point.end(), decimal, '.');
+    text = point;
+  }
   const char* first = text.data();
   const char* last = first + text.size();
   if (first != last && *first == '+') {
@@ -99,6 +178,135 @@ std::optional<double> ParseNumber(std::string_view text) {
     return std::nullopt;
   }
   return value;
+}
+
+std::string Quoted(std::string_view text) {
+  return '"' + std::string(text.substr(0, 60)) + '"';
+}
+
+std::string NumberText(double value) {
+  std::array<char, 32> digits;
+  const auto end =
+      std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+  return {digits.data(), end};
+}
+
+std::string Listed(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) {
+    list += (list.empty() ? "" : ",") + name;
+  }
+  return list;
+}
+
+Digits DigitsOf(std::string_view cell, char& sign) {
+  if (!cell.empty() && (cell.front() == '+' || cell.front() == '-')) {
+    cell.remove_prefix(1);
+  }
+  const std::size_t exponent = cell.find_first_of("eE");
+  const std::string_view number = cell.substr(0, exponent);
+  const std::size_t first = number.find_first_of(".,");
+  if (first == std::string_view::npos ||
+      number.find_first_not_of("0123456789.,") != std::string_view::npos) {
+    return Digits::kNone;
+  }
+  sign = number[first];
+  const std::size_t second = number.find_first_of(".,", first + 1);
+  const bool grouped = first >= 1 && first <= 3 && number.front() != '0' &&
+                       std::min(second, number.size()) - first == 4;
+  if (second == std::string_view::npos) {
+    return grouped && exponent == std::string_view::npos ? Digits::kEither
+                                                         : Digits::kDecimal;
+  }
+  // Dates such as 01.02.2026 are grouped otherwise.
+  return grouped ? Digits::kThousands : Digits::kNone;
+}
+
+char FindSeparator(std::string_view header, std::string_view row) {
+  char best = ',';
+  std::pair<bool, std::size_t> most{false, 1};
+  for (const char separator : {',', ';', '\t', '|'}) {
+    CsvCells names(separator);
+    CsvCells cells(separator);
+    names.TakeLine(header);
+    cells.TakeLine(row);
+    const std::size_t count = names.cells().size();
+    const std::pair fit{count > 1 && cells.cells().size() == count, count};
+    if (fit > most) {
+      most = fit;
+      best = separator;
+    }
+  }
+  return best;
+}
+
+std::string ToUtf8(std::string bytes, const std::string& source) {
+  const auto zero_at = [&](std::size_t i) {
+    return bytes.size() > i && bytes[i] == '\0';
+  };
+  std::string text;
+  if (bytes.starts_with("\xFF\xFE") || zero_at(1)) {
+    text = FromUtf16(bytes, false);
+  } else if (bytes.starts_with("\xFE\xFF") || zero_at(0)) {
+    text = FromUtf16(bytes, true);
+  } else if (IsUtf8(bytes)) {
+    text = std::move(bytes);
+  } else {
+    for (const char c : bytes) {
+      AppendUtf8(static_cast<unsigned char>(c), text);
+    }
+  }
+  if (text.starts_with("PK\x03\x04")) {
+    throw DataError(source +
+                    ": is a spreadsheet or zip archive, not text: save it as "
+                    "CSV (or unpack it)");
+  }
+  if (text.starts_with("PAR1")) {
+    throw DataError(source +
+                    ": is a Parquet file: docs/import.md has the line of "
+                    "DuckDB that makes it a CSV");
+  }
+  if (text.find('\0') != std::string::npos) {
+    throw DataError(source + ": is binary, not text: export it as CSV");
+  }
+  if (text.find('\n') == std::string::npos) {
+    std::replace(text.begin(), text.end(), '\r', '\n');
+  }
+  return text;
+}
+
+std::string ReadTextFile(const std::filesystem::path& path) {
+  const bool is_stdin = path == "-";
+  const std::string source = is_stdin ? "stdin" : path.string();
+  std::error_code error;
+  if (!is_stdin && !std::filesystem::exists(path, error)) {
+    throw NotFoundError("no file " + source);
+  }
+  if (!is_stdin && std::filesystem::is_directory(path, error)) {
+    throw DataError(source + ": is a directory, not a file");
+  }
+  // zlib hands through what is not compressed.
+  const auto close = [](gzFile file) { gzclose(file); };
+  const std::unique_ptr<gzFile_s, decltype(close)> file(
+      is_stdin ? gzdopen(dup(STDIN_FILENO), "rb") : gzopen(path.c_str(), "rb"),
+      close);
+  if (!file) {
+    throw DataError(source + ": cannot be opened: " + std::strerror(errno));
+  }
+  std::string bytes;
+  std::array<char, 65536> part;
+  int count = 0;
+  while ((count = gzread(file.get(), part.data(), part.size())) > 0) {
+    bytes.append(part.data(), static_cast<std::size_t>(count));
+  }
+  int code = Z_OK;
+  const char* reason = gzerror(file.get(), &code);
+  if (count < 0 || code != Z_OK) {
+    throw DataError(source + ": cannot be read: " +
+                    (code == Z_ERRNO ? std::strerror(errno) : reason) +
+                    (code == Z_ERRNO ? "" : "; try gzip -t, or export again"));
+  }
+  return ToUtf8(std::move(bytes), source);
 }
 
 bool SameName(std::string_view a, std::string_view b) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <iosfwd>
 #include <optional>
 #include <string>
@@ -11,13 +12,16 @@ namespace fdi::cli {
 /// Splits CSV into cells after RFC 4180, one line of the file at a time, so
 /// that it can come from a pipe:
 ///
-///     record = cell *("," cell) break      break = LF / CRLF
+///     record = cell *(separator cell) break      break = LF / CRLF
 ///     cell   = *blank (text / DQUOTE *(char / 2DQUOTE) DQUOTE) *blank
 ///
-/// A quoted cell may hold commas, line breaks and doubled quotes. Beyond the
-/// RFC, blanks around a cell do not count, and a byte order mark is skipped.
+/// A quoted cell may hold separators, line breaks and doubled quotes. Beyond
+/// the RFC, the separator need not be a comma, blanks around a cell do not
+/// count, and a byte order mark is skipped.
 class CsvCells {
  public:
+  explicit CsvCells(char separator = ',') : separator_(separator) {}
+
   /// Takes the next line, without its LF. @returns whether it ends a record;
   /// if not, a quote is open and the record goes on in the next line.
   bool TakeLine(std::string_view line);
@@ -39,6 +43,7 @@ class CsvCells {
   void Take(char c);
   void EndCell();
 
+  char separator_;
   State state_{State::kBefore};
   bool first_line_{true};
   std::vector<std::string> cells_;
@@ -46,7 +51,39 @@ class CsvCells {
 };
 
 /// A finite number and nothing else; it may begin with "+".
-std::optional<double> ParseNumber(std::string_view text);
+std::optional<double> ParseNumber(std::string_view text, char decimal = '.');
+
+/// The shortest text that reads back as the same double.
+std::string NumberText(double value);
+
+/// For messages: "text", cut to 60 characters.
+std::string Quoted(std::string_view text);
+
+/// "a,b"
+std::string Listed(const std::vector<std::string>& names);
+
+/// What a cell says about the sign of decimals.
+enum class Digits {
+  kNone,       ///< No sign, or no number.
+  kDecimal,    ///< "0.5", "12.34": the sign cannot group thousands.
+  kEither,     ///< "1.234"
+  kThousands,  ///< "1.234.567", "1.234,5"
+};
+/// @param sign the first one in the cell, unless kNone.
+Digits DigitsOf(std::string_view cell, char& sign);
+
+/// The separator of a table: the one that cuts `header` and `row` into the same
+/// number of cells, as many as possible.
+char FindSeparator(std::string_view header, std::string_view row);
+
+/// The whole of a file, `-` for stdin, as UTF-8 with LF: gzip is unpacked,
+/// UTF-16 (with a byte order mark, or told by its zeros) is converted, and what
+/// is neither UTF-8 nor UTF-16 is taken as Latin-1.
+/// @throws NotFoundError if there is no such file; DataError naming it and what
+///   it is instead (folder, spreadsheet, Parquet, damaged gzip, binary).
+std::string ReadTextFile(const std::filesystem::path& path);
+/// The same of bytes that were read, except for gzip.
+std::string ToUtf8(std::string bytes, const std::string& source);
 
 /// Whether two names of columns are equal; case does not count.
 bool SameName(std::string_view a, std::string_view b);

@@ -1,13 +1,18 @@
 #include "cli/tag_map.h"
 
-#include <string>
-#include <string_view>
+#include <algorithm>
+#include <cmath>
 
+#include <CLI/CLI.hpp>
+
+#include "cli/time_text.h"
 #include "cli/toml_reader.h"
 #include "diagnosis/error.h"
 
 namespace fdi::cli {
 namespace {
+
+constexpr double kAtmosphereKpa = 101.325;
 
 /// Quantities that share their units.
 enum class Quantity { kPercent, kPressure, kTemperature, kFlow, kNumber };
@@ -33,113 +38,272 @@ Quantity QuantityOf(Signal signal) {
   return Quantity::kNumber;
 }
 
-/// value = offset + scale · reading in the unit
 struct UnitEntry {
   std::string_view name;
   Quantity quantity;
-  double scale;
-  double offset;
-  FlowUnit flow_unit;
+  UnitConversion conversion;
 };
 
 constexpr FlowUnit kVolume = FlowUnit::kM3PerHour;
 constexpr FlowUnit kMass = FlowUnit::kTPerHour;
 constexpr UnitEntry kUnits[] = {
-    {"%", Quantity::kPercent, 1.0, 0.0, kVolume},
-    {"1", Quantity::kPercent, 100.0, 0.0, kVolume},
-    {"kPa", Quantity::kPressure, 1.0, 0.0, kVolume},
-    {"Pa", Quantity::kPressure, 1e-3, 0.0, kVolume},
-    {"bar", Quantity::kPressure, 100.0, 0.0, kVolume},
-    {"MPa", Quantity::kPressure, 1000.0, 0.0, kVolume},
-    {"degC", Quantity::kTemperature, 1.0, 0.0, kVolume},
-    {"K", Quantity::kTemperature, 1.0, -273.15, kVolume},
-    {"m3/h", Quantity::kFlow, 1.0, 0.0, kVolume},
-    {"m3/s", Quantity::kFlow, 3600.0, 0.0, kVolume},
-    {"l/min", Quantity::kFlow, 0.06, 0.0, kVolume},
-    {"t/h", Quantity::kFlow, 1.0, 0.0, kMass},
-    {"kg/h", Quantity::kFlow, 1e-3, 0.0, kMass},
-    {"kg/s", Quantity::kFlow, 3.6, 0.0, kMass},
-    {"1", Quantity::kNumber, 1.0, 0.0, kVolume},
+    {"%", Quantity::kPercent, {1.0, 0.0, kVolume}},
+    {"1", Quantity::kPercent, {100.0, 0.0, kVolume}},
+    {"kPa", Quantity::kPressure, {1.0, 0.0, kVolume}},
+    {"Pa", Quantity::kPressure, {1e-3, 0.0, kVolume}},
+    {"mbar", Quantity::kPressure, {0.1, 0.0, kVolume}},
+    {"bar", Quantity::kPressure, {100.0, 0.0, kVolume}},
+    {"MPa", Quantity::kPressure, {1000.0, 0.0, kVolume}},
+    {"psi", Quantity::kPressure, {6.894757293168, 0.0, kVolume}},
+    {"kg/cm2", Quantity::kPressure, {98.0665, 0.0, kVolume}},
+    {"degC", Quantity::kTemperature, {1.0, 0.0, kVolume}},
+    {"degF", Quantity::kTemperature, {5.0 / 9.0, -160.0 / 9.0, kVolume}},
+    {"K", Quantity::kTemperature, {1.0, -273.15, kVolume}},
+    {"m3/h", Quantity::kFlow, {1.0, 0.0, kVolume}},
+    {"m3/s", Quantity::kFlow, {3600.0, 0.0, kVolume}},
+    {"l/min", Quantity::kFlow, {0.06, 0.0, kVolume}},
+    {"l/s", Quantity::kFlow, {3.6, 0.0, kVolume}},
+    {"l/h", Quantity::kFlow, {1e-3, 0.0, kVolume}},
+    {"gpm", Quantity::kFlow, {0.22712470704, 0.0, kVolume}},  // US gallons
+    {"t/h", Quantity::kFlow, {1.0, 0.0, kMass}},
+    {"kg/h", Quantity::kFlow, {1e-3, 0.0, kMass}},
+    {"kg/s", Quantity::kFlow, {3.6, 0.0, kMass}},
+    {"1", Quantity::kNumber, {1.0, 0.0, kVolume}},
 };
 
-const UnitEntry& RequireUnit(const TomlReader& table, std::string_view name,
-                             Quantity quantity) {
-  std::string accepted;
-  for (const UnitEntry& unit : kUnits) {
-    if (unit.quantity == quantity) {
-      if (unit.name == name) {
-        return unit;
-      }
-      accepted += " " + std::string(unit.name);
+// "bar (g)" is "barg", "m³/h" is "m3/h", "°C" is "degC", "C" too.
+std::string Plain(std::string_view name) {
+  std::string plain;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    if (name.substr(i).starts_with("³")) {
+      plain += '3';
+      ++i;
+    } else if (name.substr(i).starts_with("°")) {
+      plain += "deg";
+      ++i;
+    } else if (std::string_view(" ()[]_").find(name[i]) ==
+               std::string_view::npos) {
+      plain += name[i];
     }
   }
-  table.Refuse("unit", "unknown unit '" + std::string(name) +
-                           "'; accepted are" + accepted);
+  if (SameName(plain, "c") || SameName(plain, "f")) {
+    plain = "deg" + plain;
+  }
+  return SameName(plain, "pct") ? "%" : plain;
 }
 
-Sense ReadSense(TomlReader& table) {
-  const std::string sense = table.Text("sense").value_or("closing");
-  if (sense != "closing" && sense != "opening") {
-    table.Refuse("sense", "'" + sense + "' is neither closing nor opening");
+void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
+              ColumnMapping& mapping) {
+  const bool flow = signal == Signal::kF;
+  const bool percent = QuantityOf(signal) == Quantity::kPercent;
+  // A flow is measured as volume or as mass, and only the file's author knows.
+  const std::string name = table.Text("unit").value_or(
+      flow                     ? ""
+      : signal == Signal::kCvi ? "1"
+                               : std::string(SignalUnit(signal)));
+  const auto unit = FindUnit(signal, name == "mA" && percent ? "%" : name);
+  if (!unit) {
+    table.Refuse("unit", "unknown unit '" + name + "'; accepted are" +
+                             UnitNames(signal));
   }
-  return sense == "opening" ? Sense::kOpening : Sense::kClosing;
+  std::vector<double> raw = table.Numbers("raw");
+  std::vector<double> span = table.Numbers("span");
+  if (name == "mA" && raw.empty()) {
+    raw = {4.0, 20.0};
+  }
+  if (!raw.empty() && span.empty() && percent) {
+    span = {0.0, 100.0};
+  }
+  double scale = table.Number("scale").value_or(1.0);
+  double offset = table.Number("offset").value_or(0.0);
+  if (!raw.empty() || !span.empty()) {
+    if (raw.size() != 2 || span.size() != 2 || raw[0] == raw[1] ||
+        table.Has("scale") || table.Has("offset")) {
+      table.Refuse(raw.empty() ? "span" : "raw",
+                   "raw = [4, 20] and span = [LOW, HIGH] belong together, each "
+                   "with two numbers, and without scale and offset");
+    }
+    scale = (span[1] - span[0]) / (raw[1] - raw[0]);
+    offset = span[0] - scale * raw[0];
+  }
+  // The user's line comes first, then the unit:
+  // value = u₀ + u₁ (offset + scale · cell).
+  mapping.scale = unit->scale * scale;
+  mapping.offset = unit->offset + unit->scale * offset;
+  mapping.unit = name;
+  if (flow) {
+    map.flow_unit = unit->flow_unit;
+  }
 }
 
 void ReadSignal(Signal signal, TomlReader table, ColumnMap& map) {
-  const Quantity quantity = QuantityOf(signal);
   ColumnMapping mapping;
   mapping.signal = signal;
   const auto column = table.Text("column");
   if (!column) {
-    table.Refuse("column", "is missing: the name in the header of the table");
+    table.Refuse("column",
+                 "is missing: the name in the header of the table, or the tag");
   }
   mapping.column = *column;
-  // A flow is measured as volume or as mass, and only the file's author knows.
-  const auto unit_name = table.Text("unit");
-  const UnitEntry& unit =
-      RequireUnit(table,
-                  unit_name.value_or(quantity == Quantity::kFlow ? ""
-                                     : quantity == Quantity::kNumber
-                                         ? "1"
-                                         : std::string(SignalUnit(signal))),
-                  quantity);
-  const double scale = table.Number("scale").value_or(1.0);
-  const double offset = table.Number("offset").value_or(0.0);
-  // The user's line comes first, then the unit:
-  // value = u₀ + u₁ (offset + scale · cell).
-  mapping.scale = unit.scale * scale;
-  mapping.offset = unit.offset + unit.scale * offset;
-  mapping.sense = ReadSense(table);
-  if (quantity == Quantity::kFlow) {
-    map.flow_unit = unit.flow_unit;
+  ReadUnit(table, signal, map, mapping);
+  const std::string sense = table.Text("sense").value_or("closing");
+  if (sense != "closing" && sense != "opening") {
+    table.Refuse("sense", "'" + sense + "' is neither closing nor opening");
   }
-  if (quantity != Quantity::kPercent && mapping.sense == Sense::kOpening) {
+  mapping.sense = sense == "opening" ? Sense::kOpening : Sense::kClosing;
+  if (QuantityOf(signal) != Quantity::kPercent &&
+      mapping.sense == Sense::kOpening) {
     table.Refuse("sense", "only CV, X and SP count in % of closing or opening");
   }
   map.columns.push_back(mapping);
 }
 
 void ReadTime(TomlReader table, ColumnMap& map) {
-  map.time_column = table.Text("column").value_or(map.time_column);
-  const std::string unit = table.Text("unit").value_or("s");
-  if (unit == "ms") {
-    map.time_scale = 1e-3;
-  } else if (unit == "min") {
-    map.time_scale = 60.0;
-  } else if (unit == "h") {
-    map.time_scale = 3600.0;
-  } else if (unit != "s") {
-    table.Refuse("unit", "'" + unit + "' is none of s, ms, min, h");
+  struct Form {
+    std::string_view name;
+    TimeForm form;
+    double scale;
+  };
+  static constexpr Form kForms[] = {
+      {"s", TimeForm::kElapsed, 1.0},     {"ms", TimeForm::kElapsed, 1e-3},
+      {"min", TimeForm::kElapsed, 60.0},  {"h", TimeForm::kElapsed, 3600.0},
+      {"unix", TimeForm::kUnix, 1.0},     {"unix ms", TimeForm::kUnix, 1e-3},
+      {"serial", TimeForm::kSerial, 1.0}, {"text", TimeForm::kText, 1.0},
+      {"auto", TimeForm::kFindOut, 1.0}};
+  map.time_column = table.Text("column").value_or("");
+  map.clock_column = table.Text("clock").value_or("");
+  map.zone = table.Text("zone").value_or("");
+  const std::string unit = table.Text("unit").value_or("auto");
+  const auto form = std::ranges::find(kForms, unit, &Form::name);
+  if (form == std::end(kForms)) {
+    table.Refuse("unit", "'" + unit +
+                             "' is none of s, ms, min, h, unix, unix ms, "
+                             "serial, text, auto");
+  }
+  map.time_form = form->form;
+  map.time_scale = form->scale;
+  if (const auto date = table.Text("date")) {
+    if (*date != "d/m/y" && *date != "m/d/y") {
+      table.Refuse("date", "'" + *date + "' is neither d/m/y nor m/d/y");
+    }
+    map.date_order =
+        *date == "d/m/y" ? DateOrder::kDayFirst : DateOrder::kMonthFirst;
+  }
+}
+
+// One character of `accepted`; NUL if the key is absent.
+char ReadSign(TomlReader& table, std::string_view key,
+              std::string_view accepted) {
+  const std::string text = table.Text(key).value_or("");
+  if (text == "tab") {
+    return '\t';
+  }
+  if (text.size() > 1 ||
+      (!text.empty() && accepted.find(text) == std::string_view::npos)) {
+    table.Refuse(key, "'" + text + "' is none of the signs " +
+                          std::string(accepted) +
+                          (accepted.size() > 2 ? " and tab" : ""));
+  }
+  return text.empty() ? '\0' : text.front();
+}
+
+void ReadFile(TomlReader table, ColumnMap& map) {
+  map.separator = ReadSign(table, "separator", ",;|\t");
+  map.decimal = ReadSign(table, "decimal", ".,");
+  map.skip = static_cast<int>(table.Number("skip", 0.0, 1e6).value_or(0.0));
+  if (const auto resample = table.Text("resample")) {
+    try {
+      map.resampling = ParseResampling(*resample);
+    } catch (const ConfigError& error) {
+      table.Refuse("resample", error.what());
+    }
   }
 }
 
 }  // namespace
 
+std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
+  std::string plain = Plain(name);
+  const auto find = [&]() -> std::optional<UnitConversion> {
+    for (const UnitEntry& unit : kUnits) {
+      // mPa is no MPa.
+      if (unit.quantity == QuantityOf(signal) &&
+          (unit.name == plain ||
+           (unit.name != "MPa" && SameName(unit.name, plain)))) {
+        return unit.conversion;
+      }
+    }
+    return std::nullopt;
+  };
+  auto found = find();
+  for (const std::string_view suffix : {"gauge", "abs", "g", "a"}) {
+    if (!found && QuantityOf(signal) == Quantity::kPressure &&
+        plain.size() > suffix.size() &&
+        SameName(std::string_view(plain).substr(plain.size() - suffix.size()),
+                 suffix)) {
+      plain.resize(plain.size() - suffix.size());
+      found = find();
+      if (found && suffix.front() == 'g') {
+        found->offset += kAtmosphereKpa;
+      }
+    }
+  }
+  return found;
+}
+
+std::string UnitNames(Signal signal) {
+  std::string names;
+  for (const UnitEntry& unit : kUnits) {
+    if (unit.quantity == QuantityOf(signal)) {
+      names += " " + std::string(unit.name);
+    }
+  }
+  switch (QuantityOf(signal)) {
+    case Quantity::kPressure:
+      return names + " and these with g for gauge (barg)";
+    case Quantity::kPercent:
+      return names + " mA";
+    default:
+      return names;
+  }
+}
+
+Resampling ParseResampling(const std::string& text) {
+  const auto parts = CLI::detail::split(text, ':');
+  try {
+    Resampling how;
+    how.period_s = static_cast<double>(ParseDuration(parts.at(0))) / 1e9;
+    how.limit_s = parts.size() > 2
+                      ? static_cast<double>(ParseDuration(parts[2])) / 1e9
+                      : 10.0 * how.period_s;
+    const std::string filling = parts.size() > 1 ? parts[1] : "hold";
+    how.linear = filling == "linear";
+    if ((how.linear || filling == "hold") && parts.size() <= 3 &&
+        how.period_s >= 1e-3) {
+      return how;
+    }
+  } catch (const ConfigError&) {
+  }
+  throw ConfigError("--resample '" + text +
+                    "': accepted are 1s, 1s:hold, 1s:linear and these with a "
+                    "limit on age, 1s:linear:2min");
+}
+
 ColumnMap ReadTagMap(const std::filesystem::path& path) {
   TomlReader file(path);
   ColumnMap map;
+  if (auto table = file.Table("file")) {
+    ReadFile(std::move(*table), map);
+  }
   if (auto time = file.Table("time")) {
     ReadTime(std::move(*time), map);
+  }
+  if (auto table = file.Table("long")) {
+    LongTable& tall = map.long_table.emplace();
+    tall.tag = table->Text("tag").value_or(tall.tag);
+    tall.value = table->Text("value").value_or(tall.value);
+    tall.quality = table->Text("quality").value_or("");
+    tall.good = table->Texts("good");
   }
   if (auto signals = file.Table("signal")) {
     for (const std::string& name : signals->Keys()) {
@@ -154,6 +318,34 @@ ColumnMap ReadTagMap(const std::filesystem::path& path) {
   }
   file.Finish();
   return map;
+}
+
+void TableOptions::AddTo(CLI::App& verb) {
+  verb.add_option("--map", map,
+                  "Names, units, spans and senses of the columns of a file "
+                  "(made by fdi-store runs sniff; docs/import.md)")
+      ->type_name("FILE.toml");
+  verb.add_option("--zone", zone,
+                  "Zone of times in a file that do not say theirs: "
+                  "Europe/Warsaw, UTC, +01:00 (default: the machine's)")
+      ->type_name("ZONE");
+  verb.add_option("--resample", resample,
+                  "Bring a file of any timing to a period; AGE limits what is "
+                  "filled (ten periods)")
+      ->type_name("1s[:hold|linear[:AGE]]");
+}
+
+ColumnMap TableOptions::Read(bool utc) const {
+  ColumnMap columns = map.empty() ? ColumnMap{} : ReadTagMap(map);
+  if (!zone.empty()) {
+    columns.zone = zone;
+  } else if (utc && columns.zone.empty()) {
+    columns.zone = "UTC";
+  }
+  if (!resample.empty()) {
+    columns.resampling = ParseResampling(resample);
+  }
+  return columns;
 }
 
 }  // namespace fdi::cli

@@ -1,12 +1,14 @@
 #include "cli/time_text.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <filesystem>
 #include <optional>
 #include <regex>
 
@@ -16,7 +18,7 @@ namespace fdi::cli {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-/// No time is longer; a regular expression recurses with the length of a text.
+/// A regular expression recurses with the length of a text.
 constexpr std::size_t kLongestTime = 64;
 
 [[noreturn]] void RefuseTime(std::string_view text) {
@@ -26,69 +28,182 @@ constexpr std::size_t kLongestTime = 64;
                     "or an offset such as +01:00");
 }
 
-// RFC 3339, where "T" may be a blank and clock, seconds and offset may be left
-// out. Groups: year month day, hour minute second fraction, offset.
-const std::regex& TimePattern() {
-  static const std::regex pattern(
-      R"((\d{4})-(\d\d)-(\d\d))"
-      R"((?:[Tt ](\d\d):(\d\d)(?::(\d\d))?(?:\.(\d+))?)?)"
-      R"(([Zz]|[+-]\d\d:?\d\d)?)");
-  return pattern;
-}
+// Reads a time from its beginning to its end.
+class Scanner {
+ public:
+  explicit Scanner(std::string_view text) : rest_(text) {}
 
-struct Reading {
-  std::tm fields{};
-  std::int64_t fraction_ns{0};
-  std::optional<int> offset_s;  // Of local time from UTC.
+  bool done() const { return rest_.empty(); }
+  char next() const { return rest_.empty() ? '\0' : rest_.front(); }
+  bool Take(std::string_view any) {
+    if (rest_.empty() || any.find(rest_.front()) == std::string_view::npos) {
+      return false;
+    }
+    rest_.remove_prefix(1);
+    return true;
+  }
+  // Digits only; how many there were is in `count`.
+  std::optional<int> Number(std::size_t* count = nullptr) {
+    const std::size_t digits =
+        std::min(rest_.find_first_not_of("0123456789"), rest_.size());
+    int value = 0;
+    const auto [end, error] =
+        std::from_chars(rest_.data(), rest_.data() + digits, value);
+    if (count != nullptr) {
+      *count = digits;
+    }
+    if (error != std::errc() || digits > 4) {
+      return std::nullopt;
+    }
+    rest_.remove_prefix(digits);
+    return value;
+  }
+  std::string_view Word() {
+    const auto end = std::ranges::find_if(rest_, [](char c) {
+      return !std::isalpha(static_cast<unsigned char>(c));
+    });
+    const std::string_view word(rest_.data(),
+                                static_cast<std::size_t>(end - rest_.begin()));
+    rest_.remove_prefix(word.size());
+    return word;
+  }
+  std::int64_t Fraction() {
+    std::int64_t unit = kSecond;
+    std::int64_t fraction = 0;
+    for (; std::isdigit(static_cast<unsigned char>(next())) != 0;
+         rest_.remove_prefix(1)) {
+      unit /= 10;
+      fraction += unit * (next() - '0');
+    }
+    return fraction;
+  }
+
+ private:
+  std::string_view rest_;
 };
 
-Reading Read(std::string_view text) {
-  std::cmatch found;
-  if (text.size() > kLongestTime ||
-      !std::regex_match(text.data(), text.data() + text.size(), found,
-                        TimePattern())) {
-    RefuseTime(text);
+std::string Lower(std::string_view text) {
+  std::string lower(text);
+  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return lower;
+}
+
+// 1..12 of "Oct", in English as historians write it.
+std::optional<int> MonthOf(std::string_view word) {
+  constexpr std::string_view kMonths = "janfebmaraprmayjunjulaugsepoctnovdec";
+  const std::size_t at = kMonths.find(Lower(word));
+  return word.size() == 3 && at % 3 == 0
+             ? std::optional(static_cast<int>(at / 3) + 1)
+             : std::nullopt;
+}
+
+// 2026-11-20, 20.11.2026, 20-Nov-2026, 20-Nov-26; 20/11/2026 by `order`.
+bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
+  std::size_t digits = 0;
+  const auto first = in.Number(&digits);
+  const bool iso = digits == 4;
+  const char separator = in.next();
+  if (!first || !in.Take(iso ? "-/." : "./-")) {
+    return false;
   }
-  const auto number = [](std::string_view digits) {
-    int value = 0;
-    std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    return value;
-  };
-  const auto group = [&found, &number](std::size_t i) {
-    return number({found[i].first, found[i].second});
-  };
-  Reading reading;
-  reading.fields.tm_year = group(1) - 1900;
-  reading.fields.tm_mon = group(2) - 1;
-  reading.fields.tm_mday = group(3);
-  reading.fields.tm_hour = group(4);
-  reading.fields.tm_min = group(5);
-  reading.fields.tm_sec = group(6);
-  const std::chrono::year_month_day date{
-      std::chrono::year(group(1)),
-      std::chrono::month(static_cast<unsigned>(group(2))),
-      std::chrono::day(static_cast<unsigned>(group(3)))};
-  // A leap second has the number 60.
-  if (!date.ok() || group(4) > 23 || group(5) > 59 || group(6) > 60) {
-    RefuseTime(text);
+  const bool named = std::isalpha(static_cast<unsigned char>(in.next())) != 0;
+  auto month = named ? MonthOf(in.Word()) : in.Number();
+  if (!month || !in.Take(std::string_view(&separator, 1))) {
+    return false;
   }
-  std::int64_t unit = kSecond;
-  for (const char digit : found[7].str()) {
-    unit /= 10;
-    reading.fraction_ns += unit * (digit - '0');
+  auto last = in.Number(&digits);
+  if (!last) {
+    return false;
   }
-  if (const std::string offset = found[8]; !offset.empty()) {
-    const bool utc = offset.size() == 1;
-    const int hours = utc ? 0 : number(std::string_view(offset).substr(1, 2));
-    const int minutes =
-        utc ? 0 : number(std::string_view(offset).substr(offset.size() - 2));
-    if (hours > 23 || minutes > 59) {
-      RefuseTime(text);
+  auto day = iso ? last : first;
+  auto year = iso ? first : last;
+  if (!iso && named && digits == 2) {
+    *year += 2000;
+  } else if (!iso && digits != 4) {
+    return false;
+  }
+  if (!iso && !named && separator != '.') {
+    if (order == DateOrder::kNotSaid) {
+      return false;
     }
-    reading.offset_s =
-        (offset.front() == '-' ? -60 : 60) * (60 * hours + minutes);
+    if (order == DateOrder::kMonthFirst) {
+      std::swap(day, month);
+    }
   }
-  return reading;
+  fields.tm_year = *year - 1900;
+  fields.tm_mon = *month - 1;
+  fields.tm_mday = *day;
+  return std::chrono::year_month_day{
+      std::chrono::year(*year),
+      std::chrono::month(static_cast<unsigned>(*month)),
+      std::chrono::day(static_cast<unsigned>(*day))}
+      .ok();
+}
+
+// " 14:56", "T14:56:11.5", "14:56:11,5 PM"
+bool ScanClock(Scanner& in, CivilTime& time) {
+  const auto hour = in.Number();
+  const auto minute = in.Take(":") ? in.Number() : std::nullopt;
+  if (!hour || !minute) {
+    return false;
+  }
+  time.fields.tm_hour = *hour;
+  time.fields.tm_min = *minute;
+  if (in.Take(":")) {
+    const auto second = in.Number();
+    if (!second) {
+      return false;
+    }
+    time.fields.tm_sec = *second;
+    if (in.Take(".,")) {
+      if (std::isdigit(static_cast<unsigned char>(in.next())) == 0) {
+        return false;
+      }
+      time.fraction_ns = in.Fraction();
+    }
+  }
+  Scanner ahead = in;
+  ahead.Take(" ");
+  const std::string half = Lower(ahead.Word());
+  if (half == "am" || half == "pm") {
+    in = ahead;
+    if (*hour < 1 || *hour > 12) {
+      return false;
+    }
+    time.fields.tm_hour = *hour % 12 + (half == "pm" ? 12 : 0);
+  }
+  // A leap second has the number 60.
+  return time.fields.tm_hour <= 23 && *minute <= 59 && time.fields.tm_sec <= 60;
+}
+
+// "Z", " UTC", "+01:00", "+0100", "+01"
+bool ScanOffset(Scanner& in, CivilTime& time) {
+  in.Take(" ");
+  if (std::isalpha(static_cast<unsigned char>(in.next())) != 0) {
+    const std::string name = Lower(in.Word());
+    time.offset_s = 0;
+    return in.done() && (name == "z" || name == "utc" || name == "gmt");
+  }
+  const int sign = in.next() == '-' ? -1 : 1;
+  std::size_t digits = 0;
+  auto hours = in.Take("+-") ? in.Number(&digits) : std::nullopt;
+  if (!hours || (digits != 2 && digits != 4)) {
+    return false;
+  }
+  std::optional<int> minutes = digits == 4 ? *hours % 100 : 0;
+  if (digits == 4) {
+    *hours /= 100;
+  } else if (in.Take(":")) {
+    minutes = in.Number(&digits);
+  }
+  if (!in.done() || !minutes || digits % 2 != 0 || *hours > 23 ||
+      *minutes > 59) {
+    return false;
+  }
+  time.offset_s = sign * 60 * (60 * *hours + *minutes);
+  return true;
 }
 
 struct Unit {
@@ -138,12 +253,95 @@ std::string FormatTime(std::int64_t stamp_ns, bool utc) {
   return result + text;
 }
 
+std::optional<CivilTime> ScanTime(std::string_view text, DateOrder order) {
+  CivilTime time;
+  Scanner in(text);
+  if (text.size() > kLongestTime || !ScanDate(in, order, time.fields)) {
+    return std::nullopt;
+  }
+  const bool clock = in.Take("Tt ");
+  if ((clock && !ScanClock(in, time)) ||
+      (!in.done() && !ScanOffset(in, time))) {
+    return std::nullopt;
+  }
+  return time;
+}
+
+LocalClock::LocalClock(std::string zone) : zone_(std::move(zone)) {
+  CivilTime offset;
+  Scanner scanner(zone_);
+  if (!zone_.empty() && ScanOffset(scanner, offset)) {
+    fixed_s_ = offset.offset_s;
+  } else if (!zone_.empty() && (zone_.find("..") != std::string::npos ||
+                                !std::filesystem::is_regular_file(
+                                    "/usr/share/zoneinfo/" + zone_))) {
+    throw ConfigError("zone '" + zone_ +
+                      "' is not known here; accepted are UTC, offsets such as "
+                      "+01:00 and, with the package tzdata, names such as "
+                      "Europe/Warsaw");
+  }
+}
+
+void LocalClock::FindOffsets(const std::tm& fields) {
+  const char* before = std::getenv("TZ");
+  const std::optional<std::string> saved =
+      before != nullptr ? std::optional<std::string>(before) : std::nullopt;
+  if (!zone_.empty()) {
+    setenv("TZ", zone_.c_str(), 1);
+    tzset();
+  }
+  offsets_s_.clear();
+  for (const int summer : {1, 0}) {
+    std::tm trial = fields;
+    trial.tm_isdst = summer;
+    mktime(&trial);
+    // Else mktime() has moved it to what the clock did show.
+    if (trial.tm_isdst == summer && trial.tm_hour == fields.tm_hour &&
+        trial.tm_min == fields.tm_min) {
+      offsets_s_.push_back(static_cast<int>(trial.tm_gmtoff));
+    }
+  }
+  if (!zone_.empty()) {
+    saved ? setenv("TZ", saved->c_str(), 1) : unsetenv("TZ");
+    tzset();
+  }
+}
+
+std::optional<std::int64_t> LocalClock::Utc(const CivilTime& time,
+                                            std::int64_t last_ns) {
+  constexpr std::time_t kHalfHour = 1800;
+  std::tm fields = time.fields;
+  const std::time_t shown = timegm(&fields);
+  if (fields.tm_year < 0 || fields.tm_year > 2261 - 1900) {
+    return std::nullopt;
+  }
+  std::vector<int> offsets{time.offset_s.value_or(fixed_s_.value_or(0))};
+  if (!time.offset_s && !fixed_s_) {
+    if (std::time_t half = shown / kHalfHour; half != known_) {
+      FindOffsets(time.fields);
+      known_ = half;
+    }
+    offsets = offsets_s_;
+  }
+  std::optional<std::int64_t> found;
+  for (const int offset : offsets) {
+    const std::int64_t stamp = (shown - offset) * kSecond + time.fraction_ns;
+    if (!found || *found <= last_ns) {
+      found = stamp;
+    }
+  }
+  return found;
+}
+
 std::int64_t ParseTime(std::string_view text, bool utc) {
-  Reading reading = Read(text);
-  std::tm fields = reading.fields;
+  const std::optional<CivilTime> time = ScanTime(text);
+  if (!time) {
+    RefuseTime(text);
+  }
+  std::tm fields = time->fields;
   std::time_t seconds = 0;
-  if (reading.offset_s || utc) {
-    seconds = timegm(&fields) - reading.offset_s.value_or(0);
+  if (time->offset_s || utc) {
+    seconds = timegm(&fields) - time->offset_s.value_or(0);
   } else {
     fields.tm_isdst = -1;  // mktime() finds out whether it was summer time.
     seconds = mktime(&fields);
@@ -152,7 +350,7 @@ std::int64_t ParseTime(std::string_view text, bool utc) {
   if (seconds < -kLimit || seconds > kLimit) {
     RefuseTime(text);
   }
-  return seconds * kSecond + reading.fraction_ns;
+  return seconds * kSecond + time->fraction_ns;
 }
 
 std::int64_t ParseTimeOrAgo(std::string_view text, bool utc,

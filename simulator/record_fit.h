@@ -12,6 +12,9 @@ struct RecordRow {
   InputRow input;
   double x_pct;
   double flow;  ///< In the flow unit of the parameter set.
+  /// False for what was filled in: it drives the valve, and fits nothing.
+  bool x_measured{true};
+  bool flow_measured{true};
 };
 
 /// How the inputs of a record act between its rows.

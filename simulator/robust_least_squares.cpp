@@ -22,12 +22,16 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// Standard deviation of a normal distribution with that median deviation.
+// Standard deviation of a normal distribution with that median deviation. A
+// residual of 0 is that of a row that fits nothing.
 double RobustScale(const VectorXd& residuals) {
-  std::vector<double> sizes(static_cast<std::size_t>(residuals.size()));
-  std::transform(residuals.begin(), residuals.end(), sizes.begin(),
-                 [](double r) { return std::abs(r); });
-  return 1.4826 * Median(std::move(sizes));
+  std::vector<double> sizes;
+  for (const double r : residuals) {
+    if (r != 0.0) {
+      sizes.push_back(std::abs(r));
+    }
+  }
+  return sizes.empty() ? 0.0 : 1.4826 * Median(std::move(sizes));
 }
 
 // Share of independent rows in a series with that lag-1 correlation.

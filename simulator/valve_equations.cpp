@@ -24,6 +24,18 @@ double LiquidDensity(double temperature_c) {
   return WaterDensity(std::min(temperature_c, kHottestC));
 }
 
+void FlowConversion::Apply(Sample& sample) {
+  if (sample.Has(Signal::kT1)) {
+    temperature_c_ = sample[Signal::kT1];
+  }
+  const double t_per_m3 = LiquidDensity(temperature_c_) / 1000.0;
+  if (sample.flow_unit != to_) {
+    sample.values[Index(Signal::kF)] *=
+        to_ == FlowUnit::kTPerHour ? t_per_m3 : 1.0 / t_per_m3;
+    sample.flow_unit = to_;
+  }
+}
+
 double VapourPressure(double temperature_c) {
   return std::pow(10.0, -2141.0 / (temperature_c + 273.15) + 10.7167);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "diagnosis/sample.h"
 #include "simulator/valve_parameters.h"
 
 /// The algebraic equations of the valve, one function each. SI units; X is the
@@ -17,6 +18,18 @@ double WaterDensity(double temperature_c);
 /// to 110 degC, held beyond. The benchmark's model does so: its evaporation
 /// fault leaves the liquid's density alone.
 double LiquidDensity(double temperature_c);
+
+/// Brings the flow of one sample after another to a unit, by LiquidDensity() at
+/// T1: the last one known, 20 degC before.
+class FlowConversion {
+ public:
+  explicit FlowConversion(FlowUnit to) : to_(to) {}
+  void Apply(Sample& sample);
+
+ private:
+  FlowUnit to_;
+  double temperature_c_{20.0};
+};
 
 /// Vapour pressure of water Pv = 10^(-2141/(T + 273.15) + 10.7167) [Pa], the
 /// benchmark's formula: exact at 200 degC, 6 % low at 100, 11 % high at 300.

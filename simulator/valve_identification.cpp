@@ -38,9 +38,9 @@ MatrixXd Residuals(const ValveCandidate& candidate,
   for (std::size_t k = settle_rows; k < segment.size(); ++k) {
     const RecordRow& row = (*segment.rows)[segment.first + k];
     const auto at = static_cast<Index>(k - settle_rows);
-    result(at, 0) = answers[k].x_pct - row.x_pct;
+    result(at, 0) = row.x_measured ? answers[k].x_pct - row.x_pct : 0.0;
     if (has_flow) {
-      result(at, 1) = answers[k].flow - row.flow;
+      result(at, 1) = row.flow_measured ? answers[k].flow - row.flow : 0.0;
     }
   }
   return result;
@@ -538,15 +538,20 @@ RecordFit Identification::Compare(const ValveCandidate& candidate) const {
                        static_cast<std::size_t>(options_.settle_rows),
                        options_.has_flow, options_.threads)
           .front();
+  // Rows that were filled in have a difference of 0.
+  const auto count = [&](Index j) {
+    return std::max(1.0,
+                    static_cast<double>((r.col(j).array() != 0.0).count()));
+  };
   const auto rmse = [&](Index j) {
-    return r.col(j).norm() / std::sqrt(static_cast<double>(r.rows()));
+    return r.col(j).norm() / std::sqrt(count(j));
   };
   RecordFit fit;
   fit.x_rmse_pct = rmse(0);
-  fit.x_bias_pct = r.col(0).mean();
+  fit.x_bias_pct = r.col(0).sum() / count(0);
   if (options_.has_flow) {
     fit.flow_rmse = rmse(1);
-    fit.flow_bias = r.col(1).mean();
+    fit.flow_bias = r.col(1).sum() / count(1);
   }
   return fit;
 }

@@ -261,7 +261,7 @@ TsModel FitChannel(const ChannelPlan& plan,
                    const Condition& condition, const FitOptions& options,
                    double saturation) {
   RegressionData data =
-      BuildRegression(condition.training, regressors, plan.output);
+      BuildRegression(condition.training, regressors, plan.output, true);
   data.saturation = saturation;
   return FitRows(plan, regressors, Thinned(data, options.max_rows), condition,
                  options);
@@ -272,7 +272,8 @@ TsModel FitFaultChannel(const ChannelPlan& plan, const TsModel& normal_model,
                         const FitOptions& options) {
   const std::vector<Regressor>& regressors = normal_model.regressors;
   const auto rows_of = [&](const Condition& of) {
-    RegressionData rows = BuildRegression(of.training, regressors, plan.output);
+    RegressionData rows =
+        BuildRegression(of.training, regressors, plan.output, true);
     rows.saturation = normal_model.saturation;
     return rows;
   };

@@ -17,11 +17,49 @@ int LongestLagOf(const std::vector<Regressor>& regressors) {
   return longest;
 }
 
+bool IsFilled(const Sample& sample, Signal signal) {
+  return sample.quality[Index(signal)] == SignalQuality::kUncertain;
+}
+
+// Tells the rows that were measured from those that were filled in when their
+// table was resampled: the output must have been measured, and the regressors
+// too unless that left less than half of the rows, as with slow data.
+class MeasuredRows {
+ public:
+  MeasuredRows(std::span<const Stretch> stretches,
+               const std::vector<Regressor>& regressors, Signal output)
+      : regressors_(regressors), output_(output) {
+    const auto lag = static_cast<std::size_t>(LongestLagOf(regressors));
+    std::size_t measured = 0;
+    std::size_t wholly = 0;
+    for (const Stretch& stretch : stretches) {
+      for (std::size_t k = lag; k < stretch.samples.size(); ++k) {
+        measured += !IsFilled(stretch.samples[k], output) ? 1U : 0U;
+        wholly += Contains(stretch, k) ? 1U : 0U;
+      }
+    }
+    regressors_too_ = 2 * wholly >= measured;
+  }
+  bool Contains(const Stretch& stretch, std::size_t k) const {
+    return !IsFilled(stretch.samples[k], output_) &&
+           (!regressors_too_ ||
+            std::ranges::none_of(regressors_, [&](const Regressor& r) {
+              const auto lag = static_cast<std::size_t>(r.lag);
+              return k >= lag && IsFilled(stretch.samples[k - lag], r.signal);
+            }));
+  }
+
+ private:
+  const std::vector<Regressor>& regressors_;
+  Signal output_;
+  bool regressors_too_{true};
+};
+
 }  // namespace
 
 RegressionData BuildRegression(std::span<const Stretch> stretches,
                                const std::vector<Regressor>& regressors,
-                               Signal output) {
+                               Signal output, bool measured_only) {
   Require(!regressors.empty(), "a model needs at least one regressor");
   const int lag = LongestLagOf(regressors);
   Eigen::Index rows = 0;
@@ -29,21 +67,28 @@ RegressionData BuildRegression(std::span<const Stretch> stretches,
     rows += std::max<Eigen::Index>(
         0, static_cast<Eigen::Index>(stretch.samples.size()) - lag);
   }
+  const MeasuredRows measured(stretches, regressors, output);
   RegressionData data;
   data.x.resize(rows, static_cast<Eigen::Index>(regressors.size()));
   data.y.resize(rows);
   Eigen::Index row = 0;
   for (const Stretch& stretch : stretches) {
     const int count = static_cast<int>(stretch.samples.size());
-    for (int k = lag; k < count; ++k, ++row) {
+    for (int k = lag; k < count; ++k) {
+      if (measured_only &&
+          !measured.Contains(stretch, static_cast<std::size_t>(k))) {
+        continue;
+      }
       for (std::size_t j = 0; j < regressors.size(); ++j) {
         const auto at = static_cast<std::size_t>(k - regressors[j].lag);
         data.x(row, static_cast<Eigen::Index>(j)) =
             stretch.samples[at][regressors[j].signal];
       }
-      data.y(row) = stretch.samples[static_cast<std::size_t>(k)][output];
+      data.y(row++) = stretch.samples[static_cast<std::size_t>(k)][output];
     }
   }
+  data.x.conservativeResize(row, Eigen::NoChange);
+  data.y.conservativeResize(row);
   return data;
 }
 
@@ -78,13 +123,14 @@ void Run(const TsModel& model, const Stretch& stretch, int settling,
          std::optional<double> past_output, Take take) {
   const std::vector<double> predictions =
       RunPredictions(model, stretch, past_output);
+  const MeasuredRows measured({&stretch, 1}, model.regressors, model.output);
   const auto left_out = static_cast<std::size_t>(
       RunsOnItself(model) ? settling : LongestLag(model));
   for (std::size_t k = left_out; k < stretch.samples.size(); ++k) {
     const Sample& sample = stretch.samples[k];
     const double residual =
         Residual(model, sample[model.output], predictions[k]);
-    if (!std::isnan(residual)) {
+    if (!std::isnan(residual) && measured.Contains(stretch, k)) {
       take(residual, sample);
     }
   }

@@ -5,7 +5,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/csv.h"
 #include "diagnosis/error.h"
 
 namespace fdi::simulator {
@@ -13,8 +12,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kStepTolerance = 0.01;  // As in a CSV.
-constexpr double kMaxSeconds = 3.2e9;    // Nanoseconds must fit.
+constexpr double kMaxSeconds = 3.2e9;  // Nanoseconds must fit.
 
 const cli::SignalColumn* FindColumn(std::string_view key) {
   for (const cli::SignalColumn& column : cli::kSignalColumns) {
@@ -112,27 +110,14 @@ void JsonLineReader::CheckTime(std::optional<double> t_s) {
     Refuse("t_s is beyond 100 years");
   }
   if (rows_ == 0) {
-    last_t_s_ = t_s;
-    return;
+    has_time_ = t_s.has_value();
   }
-  if (t_s.has_value() != last_t_s_.has_value()) {
+  if (t_s.has_value() != has_time_) {
     Refuse("t_s must be in all lines or in none");
   }
-  if (!t_s) {
-    return;
-  }
-  const double step = *t_s - *std::exchange(last_t_s_, t_s);
-  if (!(step > 0.0)) {
-    Refuse("time goes back or stands still at t_s = " + std::to_string(*t_s));
-  }
-  if (period_s_ == 0.0) {
-    period_s_ = step;
-  }
-  const bool on_time = std::abs(step - period_s_) <= kStepTolerance * period_s_;
-  if (!on_time && !(split_gaps_ && step > period_s_)) {
-    Refuse("time jumps by " + std::to_string(step) +
-           " s, the sample period is " + std::to_string(period_s_) + " s" +
-           (step > period_s_ ? " (--split-gaps accepts gaps)" : ""));
+  const std::string wrong = t_s ? steps_.Take(*t_s) : "";
+  if (!wrong.empty()) {
+    Refuse(wrong);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/csv.h"
 #include "diagnosis/sample.h"
 
 namespace fdi::simulator {
@@ -29,7 +30,7 @@ class JsonLineReader {
   /// @param source For messages.
   /// @param split_gaps Accepts gaps in time.
   JsonLineReader(std::string source, bool split_gaps)
-      : source_(std::move(source)), split_gaps_(split_gaps) {}
+      : source_(std::move(source)), steps_(split_gaps) {}
 
   /// @returns nothing for a blank line.
   /// @throws DataError naming source, line, key and reason.
@@ -44,11 +45,10 @@ class JsonLineReader {
   [[noreturn]] void Refuse(const std::string& reason) const;
 
   std::string source_;
-  bool split_gaps_;
+  cli::StepCheck steps_;
   std::vector<std::string> ignored_keys_;
   std::optional<FlowUnit> flow_unit_;
-  std::optional<double> last_t_s_;
-  double period_s_{0.0};  // 0: not known yet
+  bool has_time_{false};
   std::int64_t line_{0};
   std::uint64_t rows_{0};
 };

@@ -29,6 +29,7 @@ void ThrowUnless(bool passing, const char* operation) {
 cli::CsvOptions CsvOptionsOf(const StreamOptions& options) {
   cli::CsvOptions csv;
   csv.source = kStdin;
+  csv.map = options.map;
   csv.required = MaskOf(Signal::kCv);
   csv.split_gaps = options.split_gaps;
   return csv;
@@ -80,6 +81,7 @@ StreamFeed::StreamFeed(int descriptor, cli::StopSignals& signals,
       restamper_(std::move(restamping)),
       log_(std::move(log)),
       csv_(CsvOptionsOf(options)),
+      steps_(options.split_gaps),
       json_(kStdin, options.split_gaps) {}
 
 std::optional<FedSample> StreamFeed::Next() {
@@ -155,6 +157,9 @@ std::optional<Sample> StreamFeed::TakeLine(const std::string& line) {
     if (!row) {
       return std::nullopt;
     }
+    if (const std::string wrong = steps_.Take(row->t_s); !wrong.empty()) {
+      csv_.Refuse(wrong);
+    }
     restamper_.Apply(row->labelled.sample);
     return row->labelled.sample;
   }
@@ -174,22 +179,14 @@ std::optional<Sample> StreamFeed::TakeLine(const std::string& line) {
 
 void StreamFeed::ReportIgnored(const std::vector<std::string>& names) {
   if (!reported_ && !names.empty()) {
-    LogIgnored(log_, kStdin, names);
+    std::string list;
+    for (const std::string& name : names) {
+      list += (list.empty() ? "not used: " : ",") + name;
+    }
+    log_(LogLevel::kInfo,
+         cli::EventLine("csv_note", {{"source", kStdin}, {"note", list}}));
     reported_ = true;
   }
-}
-
-void LogIgnored(const LogSink& log, const std::string& source,
-                const std::vector<std::string>& names) {
-  if (names.empty()) {
-    return;
-  }
-  std::string list;
-  for (const std::string& name : names) {
-    list += (list.empty() ? "" : ",") + name;
-  }
-  log(LogLevel::kInfo,
-      cli::EventLine("columns_ignored", {{"source", source}, {"names", list}}));
 }
 
 }  // namespace fdi::simulator

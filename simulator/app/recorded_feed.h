@@ -54,6 +54,7 @@ class StoredFeed final : public Feed {
 
 /// Settings of StreamFeed.
 struct StreamOptions {
+  cli::ColumnMap map;
   bool split_gaps{false};
   double period_s{1.0};  ///< Of JSON lines without t_s.
 };
@@ -84,13 +85,10 @@ class StreamFeed final : public Feed {
   std::size_t begin_{0};  // Of what was not handed out.
   bool ended_{false};
   cli::CsvReader csv_;
+  cli::StepCheck steps_;
   JsonLineReader json_;
   std::optional<bool> is_json_;
   bool reported_{false};
 };
-
-/// One line of the log about columns or keys that are not used, if any.
-void LogIgnored(const LogSink& log, const std::string& source,
-                const std::vector<std::string>& names);
 
 }  // namespace fdi::simulator

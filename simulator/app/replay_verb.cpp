@@ -7,11 +7,15 @@
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
+#include "cli/logging.h"
+#include "cli/tag_map.h"
 #include "diagnosis/error.h"
 #include "simulator/app/delivery.h"
 #include "simulator/app/recorded_feed.h"
 #include "simulator/app/verbs.h"
+#include "simulator/valve_equations.h"
 #include "storage/database/data_directory.h"
+#include "storage/models/models.h"
 #include "storage/runs/runs.h"
 
 namespace fdi::simulator {
@@ -24,6 +28,7 @@ struct ReplayOptions {
   std::string run;
   std::string valve;
   bool keep_stamps{false};
+  cli::TableOptions table;
   StreamOptions stream;
   DeliveryOptions delivery;
 };
@@ -50,14 +55,40 @@ Recording LoadRun(const ReplayOptions& options, const cli::Context& context) {
   return recording;
 }
 
+// The flow unit of the model set that the valve has here, if it has one.
+std::optional<FlowUnit> UnitOf(const std::string& valve,
+                               const cli::Context& context) {
+  const storage::DataDirectory data{context.options.data_dir};
+  if (!std::filesystem::exists(data.models())) {
+    return std::nullopt;
+  }
+  storage::ModelStore store(data.models());
+  const auto assigned = store.AssignedModelSet(valve);
+  return assigned ? std::optional(store.Load(*assigned).flow_unit)
+                  : std::nullopt;
+}
+
 Recording LoadCsv(const ReplayOptions& options, const cli::Context& context) {
-  cli::CsvOptions csv;
-  csv.required = MaskOf(Signal::kCv);
-  csv.split_gaps = options.stream.split_gaps;
-  cli::CsvTable table = cli::ReadCsvFile(options.csv, csv);
-  LogIgnored(context.log, options.csv, table.header.ignored_columns);
+  const cli::CsvTable table =
+      cli::ReadCsvFile(options.csv, {.map = options.stream.map,
+                                     .required = MaskOf(Signal::kCv),
+                                     .split_gaps = options.stream.split_gaps,
+                                     .log = context.log});
   Recording recording;
-  for (SampleSeries& run : table.runs) {
+  const FlowUnit own = table.header.flow_unit;
+  const FlowUnit unit = UnitOf(options.valve, context).value_or(own);
+  if (unit != own && (table.header.signals & MaskOf(Signal::kF)) != 0) {
+    context.log(LogLevel::kInfo,
+                cli::EventLine("flow_converted",
+                               {{"run", options.csv},
+                                {"from", std::string(FlowUnitName(own))},
+                                {"to", std::string(FlowUnitName(unit))}}));
+  }
+  FlowConversion conversion(unit);
+  for (SampleSeries run : table.runs) {
+    for (LabelledSample& labelled : run.samples) {
+      conversion.Apply(labelled.sample);
+    }
     recording.samples.insert(recording.samples.end(), run.samples.begin(),
                              run.samples.end());
   }
@@ -74,6 +105,9 @@ void Check(const ReplayOptions& options) {
   if (options.keep_stamps && !options.delivery.start.empty()) {
     throw ConfigError("--keep-stamps and --start exclude each other");
   }
+  if (options.csv.empty() && options.table.given()) {
+    throw ConfigError("--map, --zone and --resample are of --csv");
+  }
   StartOf(options.delivery);  // A bad one is refused before all else.
 }
 
@@ -84,6 +118,10 @@ std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options,
                                cli::StopSignals& signals,
                                std::string& valve_id) {
   if (options.csv == kStdinName) {
+    if (options.stream.map.resampling || options.stream.map.long_table) {
+      throw ConfigError(
+          "--csv -: what is resampled or long is read as a whole; try a file");
+    }
     return std::make_unique<StreamFeed>(STDIN_FILENO, signals, options.stream,
                                         restamping, context.log);
   }
@@ -95,8 +133,9 @@ std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options,
   return std::make_unique<StoredFeed>(std::move(recording.samples), restamping);
 }
 
-cli::Report Replay(const ReplayOptions& options, const cli::Context& context) {
+cli::Report Replay(ReplayOptions options, const cli::Context& context) {
   Check(options);
+  options.stream.map = options.table.Read(context.options.utc);
   const bool at_once = options.csv == kStdinName && !options.delivery.speed;
   const double speed =
       ParseSpeed(options.delivery.speed.value_or(at_once ? "max" : "1"));
@@ -136,6 +175,7 @@ void AddReplayVerb(cli::Program& program) {
                   "CSV file; - reads CSV or JSON lines from stdin and passes "
                   "each on at once, unless --speed is given")
       ->type_name("FILE|-");
+  options->table.AddTo(verb);
   verb.add_option("--run", options->run, "A stored run, or a stretch of it")
       ->type_name("ID[@from:to]");
   verb.add_option("--valve", options->valve,

@@ -1,11 +1,9 @@
 // fdi-store runs: list, show, import, export, label, delete, plot.
 #include "storage/runs/runs.h"
 
-#include <iostream>
 #include <random>
 
 #include "cli/csv.h"
-#include "cli/logging.h"
 #include "cli/plot/run_figure.h"
 #include "cli/signal_list.h"
 #include "cli/tag_map.h"
@@ -159,32 +157,13 @@ Report Show(const std::string& id, const Context& context) {
 struct ImportOptions {
   std::string file;
   std::string valve;
-  std::string map;
+  cli::TableOptions table;
   std::string start;
   std::string signals{"CV,P1,P2,T1,X,F"};
   double period_s{0.0};
   bool split_gaps{false};
   bool assume_normal{false};
 };
-
-cli::CsvTable Read(const ImportOptions& options, std::int64_t start_ns) {
-  cli::CsvOptions csv;
-  csv.start_ns = start_ns;
-  if (!options.map.empty()) {
-    csv.map = cli::ReadTagMap(options.map);
-  }
-  csv.required = cli::ParseSignals(options.signals);
-  csv.split_gaps = options.split_gaps;
-  csv.period_s = options.period_s;
-  if (options.file == "-") {
-    csv.source = "stdin";
-    return cli::ReadCsv(std::cin, csv);
-  }
-  if (!std::filesystem::exists(options.file)) {
-    throw NotFoundError("no file " + options.file);
-  }
-  return cli::ReadCsvFile(options.file, csv);
-}
 
 std::uint64_t RandomSource() {
   std::random_device device;
@@ -197,25 +176,31 @@ Report Import(const ImportOptions& options, const Context& context) {
       options.start.empty()
           ? cli::NowNs() / kSecond * kSecond
           : cli::ParseTime(options.start, context.options.utc);
-  const cli::CsvTable table = Read(options, start_ns);
+  const cli::CsvTable table = cli::ReadCsvFile(
+      options.file, {.map = options.table.Read(context.options.utc),
+                     .required = cli::ParseSignals(options.signals),
+                     .split_gaps = options.split_gaps,
+                     .period_s = options.period_s,
+                     .start_ns = start_ns,
+                     .log = context.log});
+  if (table.dated && !options.start.empty()) {
+    throw ConfigError("--start: the times of " + options.file +
+                      " have a date of their own");
+  }
   if (options.assume_normal && table.header.has_truth) {
     throw ConfigError("--assume-normal: " + options.file +
                       " carries its own truth");
   }
-  const Json ignored = table.header.ignored_columns;
-  if (!ignored.empty()) {
-    context.log(
-        LogLevel::kInfo,
-        cli::EventLine("columns_ignored",
-                       {{"columns", CLI::detail::join(
-                                        table.header.ignored_columns, ",")}}));
-  }
   NewRun run;
   run.valve_id = options.valve;
   run.source_id = RandomSource();
-  run.start_ns = start_ns;
+  run.start_ns = table.start_ns;
   run.origin = RunOrigin::kImported;
+  // How the original became the run stands in the run's record.
   run.scenario = options.file;
+  for (const std::string& note : table.notes) {
+    run.scenario += '\n' + note;
+  }
   run.software = context.software;
   RunStore store(WritableDataOf(context).runs(), Access::kOccasionalWriter);
   std::vector<RunInfo> stored;
@@ -233,7 +218,8 @@ Report Import(const ImportOptions& options, const Context& context) {
   // The keys of the first run stand at the top, as there is but one as a rule.
   report.document = RunJson(stored.front());
   report.document["samples"] = samples;
-  report.document["ignored_columns"] = ignored;
+  report.document["ignored_columns"] = table.header.ignored_columns;
+  report.document["notes"] = table.notes;
   report.document["runs"] = Rows(stored, RunJson);
   return report;
 }
@@ -321,10 +307,9 @@ void AddImport(cli::Program& program, CLI::App& group) {
               "Store a CSV file as a run; all of it or nothing", Import);
   verb.add_option("file", options.file, "CSV file, or - for stdin")->required();
   verb.add_option("--valve", options.valve, "Id of the valve")->required();
-  verb.add_option("--map", options.map,
-                  "TOML file: names, units, scale, offset, sense of columns")
-      ->type_name("FILE.toml");
-  verb.add_option("--start", options.start, "UTC of t = 0 (default: now)");
+  options.table.AddTo(verb);
+  verb.add_option("--start", options.start,
+                  "Time of t = 0, if times have no date (default: now)");
   verb.add_option("--signals", options.signals, "Signals that must be there");
   verb.add_option("--period", options.period_s,
                   "Sample period in s (0: the most usual step)")
@@ -350,6 +335,7 @@ void AddRunsVerbs(cli::Program& program) {
   auto [show, id] = AddVerb(program, group, "show", "Show one run", Show);
   show.add_option("run", id, "ID or a unique beginning of it")->required();
 
+  AddSniffVerb(program, group);
   AddImport(program, group);
 
   auto exported = std::make_shared<FileOptions>();

@@ -31,6 +31,7 @@ using cli::Report;
 
 // Each adds the verbs of one group, in the order in which --help lists them.
 void AddRunsVerbs(cli::Program& program);
+void AddSniffVerb(cli::Program& program, CLI::App& group);
 void AddModelsVerbs(cli::Program& program);
 void AddValvesVerbs(cli::Program& program);
 void AddTypesVerbs(cli::Program& program);

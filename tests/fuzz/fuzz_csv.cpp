@@ -18,7 +18,7 @@ void ReadAgain(const SampleSeries& run) {
   options.period_s = run.period_s;
   options.required = 0;
   try {
-    const fdi::cli::CsvTable table = fdi::cli::ReadCsv(text, options);
+    const fdi::cli::CsvTable table = fdi::cli::ReadCsv(text.str(), options);
     if (table.runs.size() != 1 ||
         table.runs[0].samples.size() != run.samples.size()) {
       std::abort();
@@ -38,13 +38,17 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
   fdi::cli::CsvOptions options;
   options.split_gaps = (data[0] & 1) != 0;
   options.period_s = (data[0] & 2) != 0 ? 1.0 : 0.0;
-  std::istringstream input(
-      std::string(reinterpret_cast<const char*>(data) + 1, size - 1));
+  const std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
+  if ((data[0] & 4) != 0) {
+    options.map.resampling.emplace();
+  }
   try {
-    for (const SampleSeries& run : fdi::cli::ReadCsv(input, options).runs) {
+    for (const SampleSeries& run :
+         fdi::cli::ReadCsv(fdi::cli::ToUtf8(bytes, "input"), options).runs) {
       ReadAgain(run);
     }
   } catch (const fdi::DataError&) {
+  } catch (const fdi::ConfigError&) {  // More samples than --resample makes.
   }
   return 0;
 }

@@ -295,6 +295,7 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Page page(Slurp(FDI_JSON_PAGE));
   const std::string id =
       Printed(page, "runs import", "a.csv --valve LV-1")["run_id"];
+  Printed(page, "runs sniff", "a.csv --map-output tags.toml");
   Printed(page, "runs label", id + "@0:1 f7");
   Printed(page, "runs list");
   Printed(page, "runs show", id);

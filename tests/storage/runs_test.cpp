@@ -27,8 +27,7 @@ std::vector<SampleSeries> TableOf(const std::string& text,
   options.required = 0;
   options.start_ns = kStart;
   options.split_gaps = split_gaps;
-  std::istringstream input(text);
-  return cli::ReadCsv(input, options).runs;
+  return cli::ReadCsv(text, options).runs;
 }
 
 TEST_F(RunsTest, AStretchIsHalfOpenAndInSecondsFromTheStart) {

@@ -85,12 +85,11 @@ class AppReportTest : public TrainerProgram {
 
 TEST_F(AppReportTest, FileIsScoredAsTheSameRunWouldBeOnceStored) {
   WriteFile("f.csv", FaultySamples());
-  std::ifstream file(Path("f.csv"));
   storage::NewRun row;
   row.valve_id = "V";
   const std::string id =
       storage::RunStore(Runs(), storage::Access::kOccasionalWriter)
-          .Import(cli::ReadCsv(file).runs, row)
+          .Import(cli::ReadCsvFile(Path("f.csv")).runs, row)
           .front();
   const std::size_t stored = storage::RunStore(Runs()).List().size();
 

@@ -25,8 +25,9 @@ cli::Report CompareSets(const CompareOptions& options,
   storage::ModelStore store(directory.models());
   const auto a = std::make_shared<const ModelSet>(store.Load(options.a));
   const auto b = std::make_shared<const ModelSet>(store.Load(options.b));
-  const auto runs = LoadScoredRuns(
-      options.selection, RequiredSignals(*a) | RequiredSignals(*b), context);
+  const auto runs = LoadScoredRuns(options.selection,
+                                   RequiredSignals(*a) | RequiredSignals(*b),
+                                   std::nullopt, context);
   return ComparisonReport(Compare(a, b, runs, {options.assume_normal}),
                           options.all);
 }

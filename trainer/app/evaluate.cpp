@@ -99,9 +99,9 @@ std::vector<TrainingRun> TrainingRuns(const EvaluateOptions& options,
       stored.push_back(store.Load(selector));
     }
   }
-  const auto map = options.selection.ReadMap();
   for (const std::string& file : options.train_files) {
-    stored.push_back(ReadRunFile(file, map, kBasicSignals));
+    stored.push_back(
+        ReadRunFile(file, options.selection.ForFiles(kBasicSignals, context)));
   }
   std::vector<TrainingRun> runs;
   for (const storage::StoredRun& run : stored) {
@@ -156,8 +156,8 @@ std::vector<EvaluatedRun> EvaluateAndWrite(const EvaluateOptions& options,
 cli::Report EvaluateRuns(const EvaluateOptions& options,
                          const cli::Context& context, const Detector& detector,
                          const ModelSet* models = nullptr) {
-  const auto runs =
-      LoadScoredRuns(options.selection, detector.required, context);
+  const auto runs = LoadScoredRuns(options.selection, detector.required,
+                                   detector.flow_unit, context);
   if (!options.verdicts.empty() && runs.size() != options.verdicts.size()) {
     throw ConfigError(std::to_string(options.verdicts.size()) +
                       " files of verdicts for " + std::to_string(runs.size()) +
@@ -190,13 +190,13 @@ cli::Report EvaluateBaseline(const EvaluateOptions& options,
 cli::Report EvaluateHistory(const EvaluateOptions& options,
                             const cli::Context& context) {
   const std::vector<WorkOrder> orders = ReadWorkOrders(options.work_orders);
-  const auto map = options.selection.ReadMap();
+  const cli::CsvOptions csv = options.selection.ForFiles(0, context);
   std::vector<PastRecord> records;
   for (const ValveFiles& files : FindHistory(options.history, options.valve)) {
     const auto models = LoadModels(
         options, options.model_set.empty() ? files.valve : "", context);
     records.push_back(FollowHistory(
-        files, models, map, [&](const std::filesystem::path& file) {
+        files, models, csv, [&](const std::filesystem::path& file) {
           context.log(
               LogLevel::kInfo,
               cli::EventLine("history_file", {{"valve", files.valve},
@@ -228,9 +228,10 @@ cli::Report EvaluateModels(const EvaluateOptions& options,
   const auto models = LoadModels(options, options.valve, context);
   Detector detector = EngineDetector(models);
   if (options.leave_one_out) {
-    return LeaveOneOut(
-        *models, LoadScoredRuns(options.selection, detector.required, context),
-        {options.assume_normal});
+    return LeaveOneOut(*models,
+                       LoadScoredRuns(options.selection, detector.required,
+                                      detector.flow_unit, context),
+                       {options.assume_normal});
   }
   if (options.seeds > 0) {
     return SeedReport(
@@ -259,9 +260,11 @@ cli::Report RunEvaluate(const EvaluateOptions& options,
   if (options.csv && context.options.json) {
     throw ConfigError("either --json or --csv");
   }
-  if (!options.selection.map.empty() && options.selection.files.empty() &&
+  if (options.selection.table.given() && options.selection.files.empty() &&
       options.train_files.empty() && options.history.empty()) {
-    throw ConfigError("--map is of --file, --train-file or --history");
+    throw ConfigError(
+        "--map, --zone and --resample are of --file, --train-file or "
+        "--history");
   }
   if (!options.verdicts.empty()) {
     return EvaluateRuns(options, context, VerdictFiles(options.verdicts));

@@ -25,7 +25,7 @@ namespace {
 struct InjectOptions {
   std::string run;
   std::string file;
-  std::filesystem::path map;
+  cli::TableOptions table;
   std::vector<std::string> faults;
   std::string parameters{"lublin-actuator-3"};
   std::string flow_range;
@@ -62,19 +62,19 @@ FaultInjection InjectionOf(const InjectOptions& options) {
 }
 
 storage::StoredRun LoadRun(const InjectOptions& options, SignalMask signals,
-                           const storage::DataDirectory& directory) {
+                           const cli::Context& context) {
   if (options.run.empty() == options.file.empty()) {
     throw ConfigError(
         "choose the record to put the fault onto: --run ID or --file FILE.csv");
   }
   if (!options.run.empty()) {
+    const storage::DataDirectory directory{context.options.data_dir};
     return storage::RunStore(directory.runs()).Load(options.run);
   }
-  std::optional<cli::ColumnMap> map;
-  if (!options.map.empty()) {
-    map = cli::ReadTagMap(options.map);
-  }
-  return ReadRunFile(options.file, map, signals);
+  return ReadRunFile(options.file,
+                     {.map = options.table.Read(context.options.utc),
+                      .required = signals,
+                      .log = context.log});
 }
 
 // Returns the id of the new run.
@@ -87,9 +87,9 @@ std::string Store(const InjectedRun& injected, const InjectOptions& options,
   if (row.valve_id.empty()) {
     throw ConfigError("a stored run belongs to a valve: --valve ID");
   }
-  // The times of a file have no date: it becomes a record that starts now.
+  // A file whose times have no date becomes a record that starts now.
   const std::int64_t shift =
-      options.file.empty() ? 0 : cli::NowNs() / kSecond * kSecond;
+      row.start_ns != 0 ? 0 : cli::NowNs() / kSecond * kSecond;
   row.start_ns = injected.run.samples.front().sample.stamp_ns + shift;
   row.origin = storage::RunOrigin::kImported;
   row.scenario = injected.source + " with " + Joined(injected.faults);
@@ -149,9 +149,11 @@ cli::Report ReportOf(const InjectedRun& injected, const std::string& id,
 
 cli::Report Inject(const InjectOptions& options, const cli::Context& context) {
   const FaultInjection injection = InjectionOf(options);
-  const storage::DataDirectory directory{context.options.data_dir};
+  if (options.file.empty() && options.table.given()) {
+    throw ConfigError("--map, --zone and --resample are of --file");
+  }
   const InjectedRun injected =
-      InjectInto(LoadRun(options, SignalsFor(injection), directory), injection,
+      InjectInto(LoadRun(options, SignalsFor(injection), context), injection,
                  !options.flow_range.empty());
   if (!options.output.empty()) {
     Write(injected, options.output);
@@ -166,11 +168,10 @@ void AddOptions(CLI::App& verb, InjectOptions& options) {
   CLI::Option* run = verb.add_option("--run", options.run,
                                      "A healthy run, or a stretch of it [s]")
                          ->type_name("ID[@from:to]");
-  CLI::Option* file =
-      verb.add_option("--file", options.file,
-                      "A healthy record in a CSV file, or a stretch of it [s]")
-          ->excludes(run)
-          ->type_name("FILE.csv[@from:to]");
+  verb.add_option("--file", options.file,
+                  "A healthy record in a CSV file, or a stretch of it [s]")
+      ->excludes(run)
+      ->type_name("FILE.csv[@from:to]");
   verb.add_option("--fault", options.faults,
                   "Times in s from the first sample; repeatable: " +
                       std::string(simulator::kFaultForms))
@@ -186,11 +187,7 @@ void AddOptions(CLI::App& verb, InjectOptions& options) {
                   "Range of the flow transmitter in the unit of the run "
                   "(default: that of the parameters)")
       ->type_name("LOW:HIGH");
-  verb.add_option("--map", options.map,
-                  "Names, units, scales, offsets and senses of the columns of "
-                  "--file")
-      ->type_name("FILE.toml")
-      ->needs(file);
+  options.table.AddTo(verb);
   verb.add_option("-o,--output", options.output,
                   "Write the result to this file instead of storing it")
       ->type_name("FILE.csv");

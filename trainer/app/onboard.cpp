@@ -13,6 +13,7 @@
 #include "cli/report.h"
 #include "cli/signal_list.h"
 #include "cli/stop_signals.h"
+#include "cli/tag_map.h"
 #include "cli/time_text.h"
 #include "cli/toml_reader.h"
 #include "diagnosis/error.h"
@@ -58,6 +59,7 @@ struct OnboardOptions : TypeOptions {
   std::string valve;
   std::vector<std::string> runs;
   std::vector<std::string> files;
+  cli::TableOptions table;
   std::string save_type;
   std::string name;
   double false_alarms_per_hour{1e-3};
@@ -275,24 +277,31 @@ cli::Report ReportOf(const Onboarding& onboarding, const std::string& title) {
 }
 
 std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
-                                  const storage::DataDirectory& directory) {
+                                  const cli::Context& context) {
   if (options.runs.empty() && options.files.empty()) {
     throw ConfigError("healthy data are needed: --runs ID,... or --file CSV");
   }
   std::vector<storage::StoredRun> stored;
   if (!options.runs.empty()) {
+    const storage::DataDirectory directory{context.options.data_dir};
     storage::RunStore store(directory.runs());
     for (const std::string& selector : options.runs) {
       stored.push_back(store.Load(selector));
     }
   }
+  if (options.files.empty() && options.table.given()) {
+    throw ConfigError("--map, --zone and --resample are of --file");
+  }
+  cli::CsvOptions csv{.map = options.table.Read(context.options.utc),
+                      .log = context.log};
+  csv.required =
+      static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kX));
   for (const std::string& file : options.files) {
-    stored.push_back(ReadRunFile(
-        file, std::nullopt,
-        static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kX))));
+    stored.push_back(ReadRunFile(file, csv));
   }
   std::vector<TrainingRun> runs;
-  for (const storage::StoredRun& run : stored) {
+  for (storage::StoredRun& run : stored) {
+    ConvertFlow(run, stored.front().info.run.flow_unit, context.log);
     runs.push_back(ToTrainingRun(run, true));
     if (!options.signals.empty()) {
       runs.back() =
@@ -360,7 +369,7 @@ Progress Reporting(cli::Progress& bar, const cli::StopSignals& signals) {
 cli::Report OnboardValve(const OnboardOptions& options,
                          const cli::Context& context) {
   const storage::DataDirectory directory{context.options.data_dir};
-  const std::vector<TrainingRun> runs = LoadRuns(options, directory);
+  const std::vector<TrainingRun> runs = LoadRuns(options, context);
   storage::EnsureExists(directory);
   storage::ModelStore store(directory.models(),
                             storage::Access::kOccasionalWriter);
@@ -443,6 +452,7 @@ void AddOptions(CLI::App& verb, OnboardOptions& options) {
   verb.add_option("--file", options.files,
                   "Healthy CSV file, not stored; repeatable")
       ->type_name("FILE.csv[@from:to]");
+  options.table.AddTo(verb);
   AddTypeOptions(verb,
                  "Use these signals alone, as if the others were not measured",
                  "Valve type: a stored one, whose fault effects are taken as "

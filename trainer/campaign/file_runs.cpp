@@ -4,7 +4,9 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "cli/logging.h"
 #include "diagnosis/error.h"
+#include "simulator/valve_equations.h"
 
 namespace fdi::trainer {
 namespace {
@@ -67,12 +69,6 @@ storage::RunSelector SplitStretch(const std::string& text) {
   return selector;
 }
 
-bool IsWithin(const LabelledSample& labelled,
-              const storage::RunSelector& selector) {
-  const double t_s = static_cast<double>(labelled.sample.stamp_ns) * 1e-9;
-  return t_s >= selector.from_s && t_s < selector.to_s;
-}
-
 }  // namespace
 
 std::vector<path> MatchingFiles(const std::string& pattern,
@@ -100,39 +96,57 @@ std::vector<path> MatchingFiles(const std::string& pattern,
   return files;
 }
 
-storage::StoredRun ReadRunFile(const std::string& text,
-                               const std::optional<cli::ColumnMap>& map,
-                               SignalMask required) {
+storage::StoredRun ReadRunFile(const std::string& text, cli::CsvOptions csv) {
   storage::StoredRun run;
   run.selector = SplitStretch(text);
-  const path path = run.selector.id;
-  if (!std::filesystem::exists(path)) {
-    throw NotFoundError("no file " + path.string());
-  }
-  cli::CsvOptions csv;
-  csv.required = required;
-  csv.map = map.value_or(cli::ColumnMap{});
-  const cli::CsvTable table = cli::ReadCsvFile(path, csv);
+  csv.split_gaps = true;
+  const cli::CsvTable table = cli::ReadCsvFile(run.selector.id, std::move(csv));
   const SampleSeries& content = table.runs.front();
   run.info.id = run.selector.id;
+  run.info.run.start_ns = table.start_ns;
   run.info.run.origin = storage::RunOrigin::kImported;
   run.info.run.period_s = content.period_s;
   run.info.run.flow_unit = content.flow_unit;
   run.info.signals = content.signals;
   run.info.has_truth = content.has_truth;
-  for (const LabelledSample& labelled : content.samples) {
-    if (IsWithin(labelled, run.selector)) {
-      storage::StoredSample stored;
-      stored.sample = labelled.sample;
-      stored.truth = labelled.truth;
-      run.samples.push_back(stored);
+  std::size_t count = 0;
+  for (const SampleSeries& part : table.runs) {
+    count += part.samples.size();
+    for (const LabelledSample& labelled : part.samples) {
+      const double t_s =
+          static_cast<double>(labelled.sample.stamp_ns - table.start_ns) * 1e-9;
+      if (t_s >= run.selector.from_s && t_s < run.selector.to_s) {
+        storage::StoredSample stored;
+        stored.sample = labelled.sample;
+        stored.truth = labelled.truth;
+        run.samples.push_back(stored);
+      }
     }
   }
   if (run.samples.empty()) {
     throw NotFoundError("file " + text + " holds no sample (of " +
-                        std::to_string(content.samples.size()) + ")");
+                        std::to_string(count) + ")");
   }
   return run;
+}
+
+void ConvertFlow(storage::StoredRun& run, FlowUnit unit, const LogSink& log) {
+  if (run.info.run.flow_unit == unit) {
+    return;
+  }
+  simulator::FlowConversion conversion(unit);
+  for (storage::StoredSample& stored : run.samples) {
+    conversion.Apply(stored.sample);
+  }
+  if (log && (run.info.signals & MaskOf(Signal::kF)) != 0) {
+    log(LogLevel::kInfo,
+        cli::EventLine(
+            "flow_converted",
+            {{"run", run.info.id},
+             {"from", std::string(FlowUnitName(run.info.run.flow_unit))},
+             {"to", std::string(FlowUnitName(unit))}}));
+  }
+  run.info.run.flow_unit = unit;
 }
 
 }  // namespace fdi::trainer

@@ -20,15 +20,16 @@ namespace fdi::trainer {
 std::vector<std::filesystem::path> MatchingFiles(
     const std::string& pattern, const std::filesystem::path& folder);
 
-/// Reads a CSV file as a run, as `fdi-store runs import` does, without storing
-/// it. Its name stands for the id.
+/// Reads a table as a run, as `fdi-store runs import` does, without storing it;
+/// gaps stay in it. Its name stands for the id.
 ///
-/// @param text `FILE.csv`, or a stretch of it, `FILE.csv@from:to` [s of t_s].
-/// @param required signals that must be there (CsvOptions::required).
+/// @param text `FILE.csv`, or a stretch of it, `FILE.csv@from:to` [s of t_s, or
+///   from the first sample if times have a date].
 /// @throws NotFoundError if there is no such file or no sample in the stretch.
 /// @throws ConfigError if the stretch is none; DataError as ReadCsvFile().
-storage::StoredRun ReadRunFile(const std::string& text,
-                               const std::optional<cli::ColumnMap>& map,
-                               SignalMask required);
+storage::StoredRun ReadRunFile(const std::string& text, cli::CsvOptions csv);
+
+/// Brings the flow of a run to `unit` by the density of water at T1.
+void ConvertFlow(storage::StoredRun& run, FlowUnit unit, const LogSink& log);
 
 }  // namespace fdi::trainer

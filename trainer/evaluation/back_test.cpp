@@ -12,6 +12,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/valve_engine.h"
+#include "simulator/valve_equations.h"
 #include "trainer/campaign/file_runs.h"
 #include "trainer/evaluation/csv_rows.h"
 #include "trainer/evaluation/evaluation_report.h"
@@ -143,17 +144,6 @@ class Follower {
   PastRecord& record_;
   std::uint64_t seq_{0};
 };
-
-void RequireSuited(const path& file, const cli::CsvHeader& header,
-                   const ModelSet& models) {
-  if ((RequiredSignals(models) & MaskOf(Signal::kF)) != 0 &&
-      header.flow_unit != models.flow_unit) {
-    throw DataError(file.string() + ": has its flow in " +
-                    std::string(FlowUnitName(header.flow_unit)) +
-                    ", model set " + models.name + " was trained in " +
-                    std::string(FlowUnitName(models.flow_unit)));
-  }
-}
 
 // Judgement.
 
@@ -404,7 +394,7 @@ std::vector<ValveFiles> FindHistory(const std::string& pattern,
 
 PastRecord FollowHistory(const ValveFiles& files,
                          const std::shared_ptr<const ModelSet>& models,
-                         const std::optional<cli::ColumnMap>& map,
+                         const cli::CsvOptions& options,
                          const std::function<void(const path&)>& begin_file) {
   PastRecord record;
   record.valve = files.valve;
@@ -413,15 +403,14 @@ PastRecord FollowHistory(const ValveFiles& files,
     if (begin_file) {
       begin_file(file);
     }
-    cli::CsvOptions csv;
-    csv.map = map.value_or(cli::ColumnMap{});
+    cli::CsvOptions csv = options;
     csv.required = RequiredSignals(*models);
     // Without the period of the models, a file of one sample has none.
     csv.split_gaps = true;
     csv.period_s = models->sample_period_s;
     csv.start_ns = StartInName(file).value_or(0);
     const cli::CsvTable table = cli::ReadCsvFile(file, csv);
-    RequireSuited(file, table.header, *models);
+    simulator::FlowConversion conversion(models->flow_unit);
     const Sample& first = table.runs.front().samples.front().sample;
     if (follower.has_samples() && first.stamp_ns <= record.last_ns) {
       throw DataError(file.string() + ": begins at " +
@@ -432,7 +421,8 @@ PastRecord FollowHistory(const ValveFiles& files,
                       "YYYY-MM-DDTHHMM) tells when t_s = 0 is");
     }
     for (const SampleSeries& run : table.runs) {
-      for (const LabelledSample& labelled : run.samples) {
+      for (LabelledSample labelled : run.samples) {
+        conversion.Apply(labelled.sample);
         follower.Take(labelled.sample);
       }
     }

@@ -75,7 +75,7 @@ struct PastRecord {
 ///   has its flow in another unit, or begins before the end of the file before.
 PastRecord FollowHistory(
     const ValveFiles& files, const std::shared_ptr<const ModelSet>& models,
-    const std::optional<cli::ColumnMap>& map,
+    const cli::CsvOptions& csv,
     const std::function<void(const std::filesystem::path&)>& begin_file = {});
 
 enum class OrderOutcome {

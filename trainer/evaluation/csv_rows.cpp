@@ -1,6 +1,6 @@
 #include "trainer/evaluation/csv_rows.h"
 
-#include <fstream>
+#include <sstream>
 
 #include "cli/csv_cells.h"
 #include "diagnosis/error.h"
@@ -12,13 +12,7 @@ CsvRows::CsvRows(const std::filesystem::path& path,
                  const std::vector<std::string>& optional)
     : source_(path.string()), columns_(required) {
   columns_.insert(columns_.end(), optional.begin(), optional.end());
-  if (!std::filesystem::exists(path)) {
-    throw NotFoundError("no file " + source_);
-  }
-  std::ifstream input(path);
-  if (!input || std::filesystem::is_directory(path)) {
-    throw DataError(source_ + ": cannot be read");
-  }
+  std::istringstream input(cli::ReadTextFile(path));
   cli::CsvCells record;
   const std::vector<std::string>& cells = record.cells();
   // Messages name the line on which a record ends; a quoted cell may span some.

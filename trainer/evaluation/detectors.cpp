@@ -246,7 +246,8 @@ Detector EngineDetector(const std::shared_ptr<const ModelSet>& models) {
           "",
           [models](const ScoredRun& run, const VerdictSink& sink) {
             return FollowEngine(models, run, sink);
-          }};
+          },
+          models->flow_unit};
 }
 
 Detector LeaveOneOutDetector(const ModelSet& models) {

@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/tag_map.h"
 #include "diagnosis/error.h"
 #include "storage/database/data_directory.h"
 #include "storage/runs/runs.h"
@@ -28,17 +27,19 @@ void RunSelection::AddTo(CLI::App& verb) {
                   "Added to the seeds of simulated validation runs")
       ->check(CLI::Range(0, 1000000000))
       ->type_name("N");
-  verb.add_option("--map", map,
-                  "TOML file: names, units, scale, offset, sense of columns")
-      ->type_name("FILE.toml");
+  table.AddTo(verb);
 }
 
-std::optional<cli::ColumnMap> RunSelection::ReadMap() const {
-  return map.empty() ? std::nullopt : std::optional(cli::ReadTagMap(map));
+cli::CsvOptions RunSelection::ForFiles(SignalMask required,
+                                       const cli::Context& context) const {
+  return {.map = table.Read(context.options.utc),
+          .required = required,
+          .log = context.log};
 }
 
 std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
                                       SignalMask required,
+                                      std::optional<FlowUnit> flow_unit,
                                       const cli::Context& context) {
   if (selection.runs.empty() && selection.files.empty() &&
       selection.campaign.empty()) {
@@ -48,8 +49,9 @@ std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
   }
   std::vector<ScoredRun> runs;
   // The order is part of the contract: files of verdicts are given in it.
-  const auto add = [&runs](storage::StoredRun run, std::string name = "",
-                           double horizon_s = 0.0) {
+  const auto add = [&](storage::StoredRun run, std::string name = "",
+                       double horizon_s = 0.0) {
+    ConvertFlow(run, flow_unit.value_or(run.info.run.flow_unit), context.log);
     name = name.empty() ? RunName(run) : std::move(name);
     runs.push_back({std::move(run), std::move(name), horizon_s, runs.size()});
   };
@@ -70,9 +72,8 @@ std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
       add(store.Load(selector));
     }
   }
-  const auto map = selection.ReadMap();
   for (const std::string& file : selection.files) {
-    add(ReadRunFile(file, map, required));
+    add(ReadRunFile(file, selection.ForFiles(required, context)));
   }
   return runs;
 }

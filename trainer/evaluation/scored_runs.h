@@ -8,6 +8,7 @@
 
 #include "cli/csv.h"
 #include "cli/program.h"
+#include "cli/tag_map.h"
 #include "storage/runs/runs.h"
 
 namespace CLI {
@@ -22,12 +23,14 @@ struct RunSelection {
   std::vector<std::string> files;  ///< FILE.csv or FILE.csv@from:to.
   std::filesystem::path campaign;  ///< Its validation runs; empty: none.
   std::uint64_t seed_offset{0};    ///< Added to the seeds of the campaign.
-  std::filesystem::path map;       ///< Of the columns of files.
+  cli::TableOptions table;         ///< Of files.
 
-  /// The options --runs, --file, --campaign, --seed-offset and --map.
+  /// The options --runs, --file, --campaign, --seed-offset and of tables.
   void AddTo(CLI::App& verb);
-  /// What --map says; nothing without it. @throws as cli::ReadTagMap().
-  std::optional<cli::ColumnMap> ReadMap() const;
+  /// How files are read. @param required signals that a file must have.
+  /// @throws as cli::ReadTagMap().
+  cli::CsvOptions ForFiles(SignalMask required,
+                           const cli::Context& context) const;
 };
 
 /// A run to score, under the name that results list it by.
@@ -42,9 +45,11 @@ struct ScoredRun {
 /// What the campaign simulates or imports is stored in runs.db.
 ///
 /// @param required signals that a file must have.
+/// @param flow_unit that flows are converted to; nothing: as they are.
 /// @throws ConfigError if nothing is selected, NotFoundError, DataError.
 std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
                                       SignalMask required,
+                                      std::optional<FlowUnit> flow_unit,
                                       const cli::Context& context);
 
 }  // namespace fdi::trainer

@@ -8,6 +8,7 @@
 
 #include "diagnosis/error.h"
 #include "simulator/second_look/valve_physics.h"
+#include "simulator/valve_equations.h"
 #include "trainer/evaluation.h"
 #include "trainer/parallel_for.h"
 
@@ -246,15 +247,27 @@ void RequireHealthy(const std::vector<TrainingRun>& runs) {
   }
 }
 
-void RequireUnit(const std::vector<TrainingRun>& runs, const ValveType& type) {
-  const FlowUnit unit = type.parameters.instruments.flow_unit;
-  if (runs.front().flow_unit != unit &&
-      runs.front().samples.front().sample.Has(Signal::kF)) {
-    throw DataError("run " + runs.front().id + " has its flow in " +
-                    std::string(FlowUnitName(runs.front().flow_unit)) +
-                    ", valve type " + type.name + " in " +
-                    std::string(FlowUnitName(unit)));
+// The type with a flow transmitter in `unit`: its range is converted by the
+// density at the usual temperature.
+ValveType InUnit(ValveType type, FlowUnit unit) {
+  simulator::InstrumentParameters& instruments = type.parameters.instruments;
+  if (instruments.flow_unit != unit) {
+    const double t_per_m3 =
+        simulator::LiquidDensity(type.levels.t1_degc) / 1000.0;
+    const double factor =
+        unit == FlowUnit::kTPerHour ? t_per_m3 : 1.0 / t_per_m3;
+    for (double* value : {&instruments.flow.low, &instruments.flow.high,
+                          &instruments.flow.noise_sd}) {
+      *value *= factor;
+    }
+    instruments.flow_unit = unit;
   }
+  return type;
+}
+
+// Not filled in when a table was resampled.
+bool IsMeasured(const Sample& sample, Signal signal) {
+  return sample.quality[Index(signal)] == SignalQuality::kGood;
 }
 
 // Stretches without a gap as records of the simulator.
@@ -266,7 +279,8 @@ std::vector<simulator::HealthyRecord> Records(
       records.emplace_back();
       for (const Sample& sample : stretch.samples) {
         records.back().rows.push_back(
-            {InputsOf(sample, levels), sample[Signal::kX], sample[Signal::kF]});
+            {InputsOf(sample, levels), sample[Signal::kX], sample[Signal::kF],
+             IsMeasured(sample, Signal::kX), IsMeasured(sample, Signal::kF)});
       }
     }
   }
@@ -306,6 +320,9 @@ double NaiveError(const std::vector<TrainingRun>& runs, Signal output) {
   for (const TrainingRun& run : runs) {
     for (const LabelledSample& labelled : run.samples) {
       const Sample& sample = labelled.sample;
+      if (!IsMeasured(sample, output)) {
+        continue;
+      }
       const double y =
           sample[output] - (output == Signal::kX ? sample[Signal::kCv] : 0.0);
       sum += y;
@@ -365,13 +382,16 @@ Onboarding Onboard(const std::vector<TrainingRun>& runs,
   const SignalMask signals =
       runs.front().samples.front().sample.present & kBasicSignals;
   const TrainingOptions training = TrainingOf(options, signals);
-  RequireUnit(runs, options.type);
   Onboarding result;
-  result.type = options.type;
+  result.type = (signals & MaskOf(Signal::kF)) != 0
+                    ? InUnit(options.type, runs.front().flow_unit)
+                    : options.type;
   result.signals = signals;
   if (options.fit) {
     Part(progress, 0.0, kFitShare)(0.0, "fitting the physical parameters");
-    result.fit = FitType(runs, options);
+    OnboardingOptions fit = options;
+    fit.type = result.type;
+    result.fit = FitType(runs, fit);
     result.type.parameters = result.fit->parameters;
     result.type.interpolated_command = result.fit->interpolated_command;
     result.type.command_delay = result.fit->command_delay;
