@@ -13,9 +13,8 @@ namespace fdi::trainer {
 /// Rows of regressors and targets from measured values, lags included; a row
 /// never reaches across the border of a stretch.
 ///
-/// @param measured_only Leave out rows of which the output was filled in when
-///   its table was resampled (quality UNCERTAIN), or a regressor, unless that
-///   left less than half of those with a measured output.
+/// @param measured_only Leave out rows whose output was filled in when its
+///   table was resampled (quality UNCERTAIN).
 /// @return X, N×n and y with N the samples of all stretches less the longest
 ///   lag of each.
 RegressionData BuildRegression(std::span<const Stretch> stretches,
@@ -32,8 +31,8 @@ std::vector<double> RunPredictions(const TsModel& model, const Stretch& stretch,
 
 /// Residuals y − ŷ of one stretch, run as the engine runs the model: past of
 /// the first sample at rest, parallel models on their own predictions, limits
-/// kept. Left out are samples that say nothing (Residual()) or that are not
-/// measured (as above), and the first
+/// kept. Left out are samples that say nothing (Residual()) or whose output was
+/// filled in (quality UNCERTAIN), and the first
 /// `settling` residuals of a model that runs on
 /// its own predictions, of others those that lack a lag.
 ///

@@ -160,7 +160,7 @@ TEST_F(AppRunTest, WhatItRefusesItNamesWithWhatIsAccepted) {
       {{"replay", "--valve", "V", "--csv", missing}, 3, {"CV_pct"}},
       {{"replay", "--valve", "V", "--csv", jump}, 3, {"jump.csv:5"}},
       {{"replay", "--valve", "V", "--csv", empty}, 3, {"empty"}},
-      {{"replay", "--valve", "V", "--csv", "no.csv"}, 3, {"no.csv"}},
+      {{"replay", "--valve", "V", "--csv", "no.csv"}, 5, {"no.csv"}},
       {{"replay", "--run", "0123456789ab", "--data", Data()},
        5,
        {"0123456789ab"}},

@@ -76,7 +76,7 @@ TEST_F(AppStdinTest, AFilePipedThroughStdinLosesNothing) {
 
   const Ended ended = process.Wait();
   EXPECT_EQ(ended.code, 0);
-  EXPECT_THAT(ended.err, HasSubstr("names=colour"));
+  EXPECT_THAT(ended.err, HasSubstr("not used: colour"));
   EXPECT_EQ(reader.Samples("P").size(), 3000U);
   EXPECT_EQ(reader.status().lost, 0U);
 }
