@@ -242,6 +242,7 @@ bool CsvReader::TakeTagged(Sample& sample) {
     return false;
   }
   used_[static_cast<std::size_t>(found - conversions_.begin())] = true;
+  tag_ = Index(found->signal);
   const SignalQuality quality = TaggedQuality();
   if (quality == SignalQuality::kBad) {
     sample.quality[Index(found->signal)] = quality;
@@ -622,7 +623,7 @@ void CsvReader::TakeTime(CsvRow& row) {
           "times without a zone taken as local time of this machine "
           "(guessed; --zone says which)");
     }
-    const auto utc = clock_.Utc(*time, last_ns_);
+    const auto utc = clock_.Utc(*time, last_ns_[tag_]);
     if (!utc) {
       Refuse(column + Quoted(cell) + " was never shown in zone '" +
              clock_.zone() +
@@ -633,7 +634,7 @@ void CsvReader::TakeTime(CsvRow& row) {
   if (!first_ns_) {
     first_ns_ = stamp_ns;
   }
-  last_ns_ = stamp_ns;
+  last_ns_[tag_] = stamp_ns;
   if (dated()) {
     row.t_s = static_cast<double>(stamp_ns - *first_ns_) * 1e-9;
   }

@@ -240,7 +240,9 @@ class CsvReader {
   bool fault_by_number_{false};
   TimeForm time_form_{TimeForm::kFindOut};
   std::optional<std::int64_t> first_ns_;
-  std::int64_t last_ns_{0};
+  // Of each tag, as a table may be sorted by it; of a wide table the first.
+  std::array<std::int64_t, kSignalCount> last_ns_{};
+  std::size_t tag_{0};
   std::uint64_t rows_{0};
   std::int64_t line_{0};
 };

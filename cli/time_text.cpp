@@ -326,7 +326,7 @@ std::optional<std::int64_t> LocalClock::Utc(const CivilTime& time,
   std::optional<std::int64_t> found;
   for (const int offset : offsets) {
     const std::int64_t stamp = (shown - offset) * kSecond + time.fraction_ns;
-    if (!found || *found <= last_ns) {
+    if (!found || *found < last_ns) {
       found = stamp;
     }
   }

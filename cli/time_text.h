@@ -36,8 +36,8 @@ class LocalClock {
   /// @throws ConfigError if there is no such zone.
   explicit LocalClock(std::string zone);
 
-  /// Of an hour that is shown twice, in autumn, it is the first one later than
-  /// `last_ns`. A time that says its offset needs no zone.
+  /// Of an hour that is shown twice, in autumn, it is the first one not
+  /// before `last_ns`. A time that says its offset needs no zone.
   /// @returns nothing if the clock never showed this (in spring), or beyond the
   ///   years 1900 to 2261.
   std::optional<std::int64_t> Utc(const CivilTime& time, std::int64_t last_ns);

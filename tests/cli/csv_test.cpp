@@ -348,6 +348,46 @@ TEST(CsvTest, QuotedCellsHoldSeparatorsQuotesAndLineBreaks) {
               HasSubstr("a quote is not closed"));
 }
 
+// Of a long table in UTF-16, with an hour that clocks show twice.
+TEST(CsvTest, TagsOfALongTableAreResampledAndWhatIsFilledIsMarked) {
+  CsvOptions options;
+  options.map.long_table = LongTable{"Tag", "Wert", "Q", {}};
+  options.map.time_column = "Zeit";
+  options.map.zone = "Europe/Warsaw";
+  options.map.columns = {{"CV", Signal::kCv, 1.0, 0.0, Sense::kOpening, "%"},
+                         {"X", Signal::kX, 1.0, 0.0, Sense::kOpening, "%"}};
+  options.map.resampling = Resampling{1.0, true, 5.0};
+  std::string wide("\xFF\xFE", 2);
+  for (const char c : std::string("Tag;Zeit;Wert;Q\r\n"
+                                  "CV;25.10.2026 02:59:58;40,5;Good\r\n"
+                                  "X;25.10.2026 02:59:58;40,5;Good\r\n"
+                                  "CV;25.10.2026 02:00:00;42,5;Good\r\n"
+                                  "X;25.10.2026 02:00:00;7,5;Bad\r\n"
+                                  "X;25.10.2026 02:00:02;48,5;Good\r\n"
+                                  "CV;25.10.2026 02:00:02;44,5;Good\r\n")) {
+    wide += c;
+    wide += '\0';
+  }
+
+  const CsvTable table = ReadCsv(ToUtf8(wide, "input"), options);
+
+  // date -d 2026-10-25T02:59:58+02:00 +%s
+  EXPECT_EQ(table.start_ns, 1'792'889'998'000'000'000);
+  ASSERT_EQ(table.runs.size(), 1U);
+  const auto& samples = table.runs[0].samples;
+  ASSERT_EQ(samples.size(), 5U);
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const Sample& sample = samples[k].sample;
+    const auto quality = [&](bool filled) {
+      return filled ? SignalQuality::kUncertain : SignalQuality::kGood;
+    };
+    EXPECT_DOUBLE_EQ(sample[Signal::kCv], 59.5 - static_cast<double>(k));
+    EXPECT_DOUBLE_EQ(sample[Signal::kX], 59.5 - 2.0 * static_cast<double>(k));
+    EXPECT_EQ(sample.quality[Index(Signal::kCv)], quality(k % 2 == 1));
+    EXPECT_EQ(sample.quality[Index(Signal::kX)], quality(k % 4 != 0));
+  }
+}
+
 TEST(CsvTest, FilesThatCannotBeReadAreNamedWithTheReason) {
   const storage::TemporaryDirectory directory;
   const auto message = [](const std::filesystem::path& path) {
