@@ -35,15 +35,15 @@ static_assert(kMaxChannels == 16 && kMaxFaults == 64 && kMaxObservers == 128 &&
     return static_cast<std::int64_t>(OURS);                                  \
   }
 FDI_LAST(Signal::kPz, kSignalCount - 1)
-FDI_LAST(SignalQuality::kBad, v1::SIGNAL_BAD)
-FDI_LAST(ValveMode::kCalibrating, v1::MODE_CALIBRATING)
-FDI_LAST(FlowUnit::kTPerHour, v1::FLOW_T_PER_H)
-FDI_LAST(Intake::kPeriod, v1::INTAKE_PERIOD)
-FDI_LAST(Quality::kUnassigned, v1::QUALITY_UNASSIGNED)
-FDI_LAST(State::kIsolated, v1::STATE_ISOLATED)
-FDI_LAST(TransitionKind::kClosed, v1::TRANSITION_CLOSED)
-FDI_LAST(EndReason::kUnknown, v1::END_UNKNOWN)
-FDI_LAST(Health::kFailing, v1::HEALTH_FAILING)
+FDI_LAST(SignalQuality::kBad, v1::SignalQuality::SIGNAL_BAD)
+FDI_LAST(ValveMode::kCalibrating, v1::ValveMode::MODE_CALIBRATING)
+FDI_LAST(FlowUnit::kTPerHour, v1::FlowUnit::FLOW_T_PER_H)
+FDI_LAST(Intake::kPeriod, v1::Intake::INTAKE_PERIOD)
+FDI_LAST(Quality::kUnassigned, v1::Quality::QUALITY_UNASSIGNED)
+FDI_LAST(State::kIsolated, v1::State::STATE_ISOLATED)
+FDI_LAST(TransitionKind::kClosed, v1::Transition::TRANSITION_CLOSED)
+FDI_LAST(EndReason::kUnknown, v1::EndReason::END_UNKNOWN)
+FDI_LAST(Health::kFailing, v1::Health::HEALTH_FAILING)
 #undef FDI_LAST
 
 template <bool kEncodes>
@@ -337,8 +337,7 @@ bool Codec<Message>::Decode(const Wire& wire, Message& message) {
   return transfer.all_fit();
 }
 
-std::string KeyInHandle(
-    const eprosima::fastrtps::rtps::InstanceHandle_t& handle) {
+std::string KeyInHandle(const rtps::InstanceHandle_t& handle) {
   constexpr std::size_t kText = 8;
   std::array<unsigned, 16> bytes{};
   std::copy_n(static_cast<const std::uint8_t*>(handle.value), bytes.size(),

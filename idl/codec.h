@@ -8,9 +8,15 @@
 #include <type_traits>
 #include <unordered_set>
 
+#include "idl/fast_dds.h"
+#include "idl/wire.h"
+#if FDI_FAST_DDS == 2
 #include "fdi_v1.h"
 #include "fdi_v1PubSubTypes.h"
-#include "idl/wire.h"
+#else
+#include "fdi_v1.hpp"
+#include "fdi_v1PubSubTypes.hpp"
+#endif
 
 /// Inside idl/ only: plain messages to generated types and back.
 namespace fdi::idl {
@@ -77,8 +83,7 @@ using Key = decltype(CopyOf(KeyOf(std::declval<Message&>())));
 ///
 ///     00 01 00 00 | 07 00 00 00 | 'F' 'V' '-' '1' '0' '1' 00 | 00
 ///     ^ little endian, 00 00 big  ^ length of the text with its NUL
-std::string KeyInHandle(
-    const eprosima::fastrtps::rtps::InstanceHandle_t& handle);
+std::string KeyInHandle(const rtps::InstanceHandle_t& handle);
 
 /// A generated type that survives foreign bytes and several endpoints.
 ///
@@ -91,8 +96,47 @@ std::string KeyInHandle(
 template <typename Generated>
 class CheckedType : public Generated {
  public:
-  bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload,
-                   void* data) override {
+#if FDI_FAST_DDS == 2
+  bool deserialize(rtps::SerializedPayload_t* payload, void* data) override {
+    return Checked(payload, data);
+  }
+  void* createData() override {
+    return Owned(Generated::createData());
+  }
+  void deleteData(void* data) override {
+    Disown(data);
+    Generated::deleteData(data);
+  }
+  bool getKey(void* data, rtps::InstanceHandle_t* handle,
+              bool force_md5) override {
+    const std::lock_guard lock(key_mutex_);
+    return Generated::getKey(data, handle, force_md5);
+  }
+#else
+  bool deserialize(rtps::SerializedPayload_t& payload, void* data) override {
+    return Checked(payload, data);
+  }
+  void* create_data() override {
+    return Owned(Generated::create_data());
+  }
+  void delete_data(void* data) override {
+    Disown(data);
+    Generated::delete_data(data);
+  }
+  using Generated::compute_key;  // The other form calls this one.
+  bool compute_key(const void* data, rtps::InstanceHandle_t& handle,
+                   bool force_md5) override {
+    const std::lock_guard lock(key_mutex_);
+    return Generated::compute_key(data, handle, force_md5);
+  }
+#endif
+
+  std::uint64_t refused() const {
+    return refused_.load(std::memory_order_relaxed);
+  }
+
+ private:
+  bool Checked(auto& payload, void* data) {
     try {
       if (Generated::deserialize(payload, data)) {
         return true;
@@ -106,33 +150,16 @@ class CheckedType : public Generated {
     }
     return false;
   }
-
-  void* createData() override {
-    void* const data = Generated::createData();
+  void* Owned(void* data) {
     const std::lock_guard lock(objects_mutex_);
     objects_of_library_.insert(data);
     return data;
   }
-
-  void deleteData(void* data) override {
-    {
-      const std::lock_guard lock(objects_mutex_);
-      objects_of_library_.erase(data);
-    }
-    Generated::deleteData(data);
+  void Disown(void* data) {
+    const std::lock_guard lock(objects_mutex_);
+    objects_of_library_.erase(data);
   }
 
-  bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle,
-              bool force_md5) override {
-    const std::lock_guard lock(key_mutex_);
-    return Generated::getKey(data, handle, force_md5);
-  }
-
-  std::uint64_t refused() const {
-    return refused_.load(std::memory_order_relaxed);
-  }
-
- private:
   std::mutex key_mutex_;
   std::mutex objects_mutex_;
   std::unordered_set<const void*> objects_of_library_;

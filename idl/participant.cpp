@@ -8,22 +8,27 @@
 
 #include <arpa/inet.h>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/rtps/transport/ChainingTransport.h>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/rtps/transport/UDPv6TransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <ifaddrs.h>
 #include <netinet/in.h>
 
 #include "diagnosis/error.h"
 #include "idl/participant_impl.h"
+#if FDI_FAST_DDS == 2
+#include <fastdds/rtps/transport/ChainingTransport.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/UDPv6TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#else
+#include <fastdds/rtps/transport/ChainingTransport.hpp>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.hpp>
+#include <fastdds/rtps/transport/UDPv6TransportDescriptor.hpp>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.hpp>
+#endif
 
 namespace fdi::idl {
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
 namespace transport = eprosima::fastdds::rtps;
-using eprosima::fastrtps::rtps::Locator_t;
 using transport::SharedMemTransportDescriptor;
 using transport::UDPv4TransportDescriptor;
 using transport::UDPv6TransportDescriptor;
@@ -92,12 +97,19 @@ void ValidateInterfaces(const std::string& interfaces) {
 // One participant in a process sees another as a process would.
 void SetUpLibraryOnce() {
   static const bool done = [] {
+    auto* const factory = dds::DomainParticipantFactory::get_instance();
+#if FDI_FAST_DDS == 2
     constexpr const char* kSettings =
         "<dds xmlns=\"http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles\">"
         "<library_settings><intraprocess_delivery>OFF</intraprocess_delivery>"
         "</library_settings></dds>";
-    dds::DomainParticipantFactory::get_instance()->load_XML_profiles_string(
+    factory->load_XML_profiles_string(
         kSettings, std::char_traits<char>::length(kSettings));
+#else
+    eprosima::fastdds::LibrarySettings settings;
+    settings.intraprocess_delivery = eprosima::fastdds::INTRAPROCESS_OFF;
+    factory->set_library_settings(settings);
+#endif
     return true;
   }();
   static_cast<void>(done);
@@ -115,18 +127,22 @@ class CheckedTransport : public transport::ChainingTransport {
     return low_level_transport_->get_configuration();
   }
 
-  bool send(eprosima::fastrtps::rtps::SenderResource* sender,
-            const eprosima::fastrtps::rtps::octet* buffer, std::uint32_t bytes,
-            transport::LocatorsIterator* begin,
+#if FDI_FAST_DDS == 2
+  bool send(rtps::SenderResource* sender, const rtps::octet* buffer,
+#else
+  bool send(rtps::SenderResource* sender,
+            const std::vector<rtps::NetworkBuffer>& buffer,
+#endif
+            std::uint32_t bytes, transport::LocatorsIterator* begin,
             transport::LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& timeout) override {
     return sender->send(buffer, bytes, begin, end, timeout);
   }
 
   void receive(transport::TransportReceiverInterface* receiver,
-               const eprosima::fastrtps::rtps::octet* buffer,
-               std::uint32_t bytes, const Locator_t& local,
-               const Locator_t& remote) override {
+               const rtps::octet* buffer, std::uint32_t bytes,
+               const rtps::Locator_t& local,
+               const rtps::Locator_t& remote) override {
     const CheckedDatagram checked = CheckDatagram({buffer, bytes});
     log_->Count(checked.verdict, bytes, remote);
     if (checked.verdict == DatagramVerdict::kSound) {
@@ -242,8 +258,8 @@ TransportError::TransportError(const std::string& operation, int code)
       code_(code) {}
 
 void Check(const ReturnCode& code, const std::string& operation) {
-  if (code != ReturnCode::RETCODE_OK) {
-    throw TransportError(operation, static_cast<int>(code()));
+  if (code != return_code::RETCODE_OK) {
+    throw TransportError(operation, NumberOf(code));
   }
 }
 
@@ -265,7 +281,7 @@ void Validate(const DdsOptions& options) {
 }
 
 void DatagramLog::Count(DatagramVerdict verdict, std::size_t bytes,
-                        const Locator_t& sender) {
+                        const rtps::Locator_t& sender) {
   const std::uint64_t before =
       counts_[static_cast<std::size_t>(verdict)].fetch_add(
           1, std::memory_order_relaxed);
@@ -359,23 +375,37 @@ void Participant::Impl::Remember(const RemoteKey& key, PolicyTexts texts) {
   }
 }
 
+#if FDI_FAST_DDS == 2
 void Participant::Impl::on_publisher_discovery(
-    dds::DomainParticipant* /*participant*/,
-    eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) {
-  using Info = eprosima::fastrtps::rtps::WriterDiscoveryInfo;
-  if (info.status == Info::DISCOVERED_WRITER) {
+    dds::DomainParticipant* /*participant*/, rtps::WriterDiscoveryInfo&& info) {
+  if (info.status == rtps::WriterDiscoveryInfo::DISCOVERED_WRITER) {
     Remember({info.info.topicName().c_str(), true}, Describe(info.info.m_qos));
   }
 }
 
 void Participant::Impl::on_subscriber_discovery(
-    dds::DomainParticipant* /*participant*/,
-    eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) {
-  using Info = eprosima::fastrtps::rtps::ReaderDiscoveryInfo;
-  if (info.status == Info::DISCOVERED_READER) {
+    dds::DomainParticipant* /*participant*/, rtps::ReaderDiscoveryInfo&& info) {
+  if (info.status == rtps::ReaderDiscoveryInfo::DISCOVERED_READER) {
     Remember({info.info.topicName().c_str(), false}, Describe(info.info.m_qos));
   }
 }
+#else
+void Participant::Impl::on_data_writer_discovery(
+    dds::DomainParticipant* /*participant*/, rtps::WriterDiscoveryStatus status,
+    const RemoteWriterQos& info, bool& /*should_be_ignored*/) {
+  if (status == rtps::WriterDiscoveryStatus::DISCOVERED_WRITER) {
+    Remember({info.topic_name.c_str(), true}, Describe(info));
+  }
+}
+
+void Participant::Impl::on_data_reader_discovery(
+    dds::DomainParticipant* /*participant*/, rtps::ReaderDiscoveryStatus status,
+    const RemoteReaderQos& info, bool& /*should_be_ignored*/) {
+  if (status == rtps::ReaderDiscoveryStatus::DISCOVERED_READER) {
+    Remember({info.topic_name.c_str(), false}, Describe(info));
+  }
+}
+#endif
 
 Participant::Participant(const DdsOptions& options, LogSink log,
                          const std::string& name) {

@@ -17,14 +17,13 @@
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 
+#include "idl/fast_dds.h"
 #include "idl/participant.h"
 #include "idl/profile_file.h"
 #include "idl/qos.h"
 
 /// Inside idl/ only: what the endpoints of a participant share.
 namespace fdi::idl {
-
-using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
 /// @throws TransportError naming `operation` unless `code` is RETCODE_OK.
 void Check(const ReturnCode& code, const std::string& operation);
@@ -33,7 +32,7 @@ void Check(const ReturnCode& code, const std::string& operation);
 template <typename Handle>
 Handle* NotNull(Handle* handle, const std::string& operation) {
   if (handle == nullptr) {
-    Check(ReturnCode::RETCODE_ERROR, operation);
+    Check(return_code::RETCODE_ERROR, operation);
   }
   return handle;
 }
@@ -93,7 +92,7 @@ class DatagramLog {
 
   /// @param sender for the log.
   void Count(DatagramVerdict verdict, std::size_t bytes,
-             const eprosima::fastrtps::rtps::Locator_t& sender);
+             const rtps::Locator_t& sender);
   DatagramCounts counts() const;
 
  private:
@@ -102,8 +101,7 @@ class DatagramLog {
 };
 
 /// What Participant is outside of idl/, with the library's handle in it.
-class Participant::Impl
-    : private eprosima::fastdds::dds::DomainParticipantListener {
+class Participant::Impl : private dds::DomainParticipantListener {
  public:
   Impl(const DdsOptions& options, LogSink log, const std::string& name);
   ~Impl() override;
@@ -112,17 +110,14 @@ class Participant::Impl
 
   /// The topic called `topic`, made with its type at first use; lives as long
   /// as the participant.
-  eprosima::fastdds::dds::Topic* TopicOf(
-      const std::string& topic,
-      const eprosima::fastdds::dds::TypeSupport& type);
+  dds::Topic* TopicOf(const std::string& topic, const dds::TypeSupport& type);
 
   /// Logs that policy `id` of a remote endpoint on `topic` is incompatible with
   /// ours, with both sides.
   void ReportIncompatible(const std::string& topic, bool remote_is_writer,
-                          eprosima::fastdds::dds::QosPolicyId_t id,
-                          const PolicyTexts& ours);
+                          dds::QosPolicyId_t id, const PolicyTexts& ours);
 
-  eprosima::fastdds::dds::DomainParticipant* operator->() { return handle_; }
+  dds::DomainParticipant* operator->() { return handle_; }
   const DdsOptions& options() const { return options_; }
   const ProfileFile& profiles() const { return profiles_; }
   DatagramCounts datagrams() const { return datagrams_->counts(); }
@@ -130,12 +125,21 @@ class Participant::Impl
  private:
   using RemoteKey = std::pair<std::string, bool>;  // Topic, is a writer.
 
-  void on_publisher_discovery(
-      eprosima::fastdds::dds::DomainParticipant* participant,
-      eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) override;
-  void on_subscriber_discovery(
-      eprosima::fastdds::dds::DomainParticipant* participant,
-      eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
+#if FDI_FAST_DDS == 2
+  void on_publisher_discovery(dds::DomainParticipant* participant,
+                              rtps::WriterDiscoveryInfo&& info) override;
+  void on_subscriber_discovery(dds::DomainParticipant* participant,
+                               rtps::ReaderDiscoveryInfo&& info) override;
+#else
+  void on_data_writer_discovery(dds::DomainParticipant* participant,
+                                rtps::WriterDiscoveryStatus status,
+                                const RemoteWriterQos& info,
+                                bool& should_be_ignored) override;
+  void on_data_reader_discovery(dds::DomainParticipant* participant,
+                                rtps::ReaderDiscoveryStatus status,
+                                const RemoteReaderQos& info,
+                                bool& should_be_ignored) override;
+#endif
   void Remember(const RemoteKey& key, PolicyTexts texts);
 
   DdsOptions options_;
@@ -146,8 +150,8 @@ class Participant::Impl
   std::mutex remotes_mutex_;
   std::map<RemoteKey, std::deque<PolicyTexts>> remotes_;  // Newest first.
   std::mutex topics_mutex_;  // Apart, for it is held in calls of the library.
-  std::map<std::string, eprosima::fastdds::dds::Topic*> topics_;
-  eprosima::fastdds::dds::DomainParticipant* handle_{nullptr};
+  std::map<std::string, dds::Topic*> topics_;
+  dds::DomainParticipant* handle_{nullptr};
 };
 
 }  // namespace fdi::idl

@@ -14,8 +14,6 @@
 namespace fdi::idl {
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
-
 // Calls visit(element) for the child elements of `parent`.
 template <typename Visit>
 void ForEachChild(const tinyxml2::XMLElement& parent, Visit visit) {
@@ -135,7 +133,7 @@ void LoadOnce(const std::string& path) {
                       loaded + "'");
   }
   if (dds::DomainParticipantFactory::get_instance()->load_XML_profiles_file(
-          absolute) != ReturnCode::RETCODE_OK) {
+          absolute) != return_code::RETCODE_OK) {
     throw ConfigError("QoS file '" + path +
                       "' has profiles that Fast DDS does not accept");
   }

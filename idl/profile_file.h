@@ -8,6 +8,8 @@
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
+#include "idl/fast_dds.h"
+
 /// Inside idl/ only.
 namespace fdi::idl {
 
@@ -27,12 +29,10 @@ class ProfileFile {
 
   /// `qos` with what the profile `name` states in its place, if there is one.
   /// @throws TransportError
-  eprosima::fastdds::dds::DataWriterQos Override(
-      const std::string& name, eprosima::fastdds::dds::DataWriterQos qos,
-      const eprosima::fastdds::dds::Publisher& publisher) const;
-  eprosima::fastdds::dds::DataReaderQos Override(
-      const std::string& name, eprosima::fastdds::dds::DataReaderQos qos,
-      const eprosima::fastdds::dds::Subscriber& subscriber) const;
+  dds::DataWriterQos Override(const std::string& name, dds::DataWriterQos qos,
+                              const dds::Publisher& publisher) const;
+  dds::DataReaderQos Override(const std::string& name, dds::DataReaderQos qos,
+                              const dds::Subscriber& subscriber) const;
 
   /// The policies that the profile `name` states; nullptr if there is none.
   const std::set<std::string>* Stated(const std::string& name) const;

@@ -16,7 +16,6 @@
 namespace fdi::idl {
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
 using Clock = std::chrono::steady_clock;
 
 // A full history often answers at once instead of blocking; this keeps the
@@ -25,11 +24,11 @@ constexpr auto kBackOff = std::chrono::microseconds(100);
 constexpr auto kDisposeTimeout = std::chrono::seconds(5);
 
 bool IsFull(const ReturnCode& code) {
-  return code == ReturnCode::RETCODE_TIMEOUT ||
-         code == ReturnCode::RETCODE_OUT_OF_RESOURCES;
+  return code == return_code::RETCODE_TIMEOUT ||
+         code == return_code::RETCODE_OUT_OF_RESOURCES;
 }
 
-eprosima::fastrtps::Duration_t Until(Clock::time_point deadline) {
+Duration Until(Clock::time_point deadline) {
   const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::max(deadline - Clock::now(), Clock::duration::zero()));
   return {static_cast<std::int32_t>(left.count() / 1000),
@@ -100,7 +99,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
              Clock::time_point deadline) {
     while (true) {
       const ReturnCode code = send();
-      if (code == ReturnCode::RETCODE_OK) {
+      if (code == return_code::RETCODE_OK) {
         return true;
       }
       if (!IsFull(code)) {
@@ -186,7 +185,7 @@ void Publisher<Message>::Dispose(const Message& message) {
   };
   if (!impl.Retry(send, "dispose", {}, Clock::now() + kDisposeTimeout)) {
     throw TransportError("dispose: the readers are behind",
-                         static_cast<int>(ReturnCode::RETCODE_TIMEOUT));
+                         NumberOf(return_code::RETCODE_TIMEOUT));
   }
 }
 
@@ -200,7 +199,7 @@ template <typename Message>
 bool Publisher<Message>::WaitForAcknowledged(
     std::chrono::milliseconds timeout) {
   return impl_->writer->wait_for_acknowledgments(Until(DeadlineIn(timeout))) ==
-         ReturnCode::RETCODE_OK;
+         return_code::RETCODE_OK;
 }
 
 template <typename Message>

@@ -5,9 +5,6 @@
 namespace fdi::idl {
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
-namespace rtps = eprosima::fastrtps::rtps;
-
 // Unacknowledged samples that a lossless writer may have on the way: enough to
 // hide a round trip. The library scans its free list at every release, so that
 // larger histories cost throughput (fewer than 5000 measured best).
@@ -20,8 +17,16 @@ constexpr int kReaderBacklog = 131072;
 constexpr int kModelSets = 256;
 constexpr int kMonitors = 64;
 
-eprosima::fastrtps::Duration_t Milliseconds(int count) {
+Duration Milliseconds(int count) {
   return {count / 1000, static_cast<std::uint32_t>(count % 1000) * 1000000U};
+}
+
+Duration& HeartbeatPeriod(dds::DataWriterQos& writer) {
+#if FDI_FAST_DDS == 2
+  return writer.reliable_writer_qos().times.heartbeatPeriod;
+#else
+  return writer.reliable_writer_qos().times.heartbeat_period;
+#endif
 }
 
 // Limits for `instances` keys. An endpoint is refused unless max_samples is at
@@ -48,7 +53,7 @@ EndpointQos Common(const std::string& name) {
   writer.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
   writer.data_sharing().off();
   writer.endpoint().history_memory_policy = rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
-  writer.reliable_writer_qos().times.heartbeatPeriod = Milliseconds(50);
+  HeartbeatPeriod(writer) = Milliseconds(50);
   dds::DataReaderQos& reader = qos.reader;
   reader.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
   reader.durability().kind = dds::VOLATILE_DURABILITY_QOS;
@@ -91,8 +96,8 @@ void TransientLocal(EndpointQos& qos) {
 }
 
 // The policies as words, for the log.
-std::string Text(const eprosima::fastrtps::Duration_t& duration) {
-  if (duration == eprosima::fastrtps::c_TimeInfinite) {
+std::string Text(const Duration& duration) {
+  if (duration == kForever) {
     return "infinite";
   }
   return std::to_string(duration.to_ns() / 1000000) + "ms";
@@ -144,8 +149,13 @@ PolicyTexts TextsOfOurs(const auto& qos) {
                qos.liveliness(), qos.ownership());
 }
 PolicyTexts TextsOfRemote(const auto& qos) {
+#if FDI_FAST_DDS == 2
   return Texts(qos.m_reliability, qos.m_durability, qos.m_deadline,
                qos.m_liveliness, qos.m_ownership);
+#else
+  return Texts(qos.reliability, qos.durability, qos.deadline, qos.liveliness,
+               qos.ownership);
+#endif
 }
 
 }  // namespace
@@ -184,7 +194,7 @@ EndpointQos QosFor<DecisionMessage>(Profile profile, int valves) {
     SetLimits(qos.writer.resource_limits(), valves,
               qos.reader.resource_limits().max_samples_per_instance,
               kSamplesInFlight);
-    qos.writer.reliable_writer_qos().times.heartbeatPeriod = Milliseconds(10);
+    HeartbeatPeriod(qos.writer) = Milliseconds(10);
   }
   return qos;
 }
@@ -238,10 +248,10 @@ PolicyTexts Describe(const dds::DataWriterQos& qos) {
 PolicyTexts Describe(const dds::DataReaderQos& qos) {
   return TextsOfOurs(qos);
 }
-PolicyTexts Describe(const dds::WriterQos& qos) {
+PolicyTexts Describe(const RemoteWriterQos& qos) {
   return TextsOfRemote(qos);
 }
-PolicyTexts Describe(const dds::ReaderQos& qos) {
+PolicyTexts Describe(const RemoteReaderQos& qos) {
   return TextsOfRemote(qos);
 }
 

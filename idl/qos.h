@@ -6,11 +6,10 @@
 
 #include <fastdds/dds/core/policy/QosPolicies.hpp>
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
-#include <fastdds/dds/publisher/qos/WriterQos.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
-#include <fastdds/dds/subscriber/qos/ReaderQos.hpp>
 
 #include "idl/endpoint.h"
+#include "idl/fast_dds.h"
 
 /// Inside idl/ only: the QoS of every topic, with the reasons beside it.
 namespace fdi::idl {
@@ -18,8 +17,8 @@ namespace fdi::idl {
 struct EndpointQos {
   std::string name;  ///< Profiles of --qos: name + "_writer", + "_reader".
   std::string partition{};  ///< Empty: the default one.
-  eprosima::fastdds::dds::DataWriterQos writer{};
-  eprosima::fastdds::dds::DataReaderQos reader{};
+  dds::DataWriterQos writer{};
+  dds::DataReaderQos reader{};
 };
 
 /// The QoS of the topic of Message for up to `valves` valves. Profiles that a
@@ -31,16 +30,15 @@ EndpointQos QosFor(Profile profile, int valves);
 const std::set<std::string>& EndpointNames();
 
 /// The policies that two endpoints must agree on, in words, by policy id.
-using PolicyTexts =
-    std::map<eprosima::fastdds::dds::QosPolicyId_t, std::string>;
+using PolicyTexts = std::map<dds::QosPolicyId_t, std::string>;
 
-PolicyTexts Describe(const eprosima::fastdds::dds::DataWriterQos& qos);
-PolicyTexts Describe(const eprosima::fastdds::dds::DataReaderQos& qos);
+PolicyTexts Describe(const dds::DataWriterQos& qos);
+PolicyTexts Describe(const dds::DataReaderQos& qos);
 /// As discovered from a remote endpoint.
-PolicyTexts Describe(const eprosima::fastdds::dds::WriterQos& qos);
-PolicyTexts Describe(const eprosima::fastdds::dds::ReaderQos& qos);
+PolicyTexts Describe(const RemoteWriterQos& qos);
+PolicyTexts Describe(const RemoteReaderQos& qos);
 
 /// "RELIABILITY", ...
-std::string PolicyName(eprosima::fastdds::dds::QosPolicyId_t id);
+std::string PolicyName(dds::QosPolicyId_t id);
 
 }  // namespace fdi::idl

@@ -22,8 +22,6 @@
 namespace fdi::idl {
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
-
 constexpr std::size_t kRefusedLimit = 65536;
 
 // Messages that wait for Take(), so many as fit into 8 MB; another 8 MB may be
@@ -39,10 +37,8 @@ constexpr std::chrono::milliseconds kLongestFarewell{500};
 struct HandleHash {
   std::size_t operator()(const dds::InstanceHandle_t& handle) const {
     std::size_t hash = 0;  // The handle is an MD5 sum: any part will do.
-    std::memcpy(
-        &hash,
-        static_cast<const eprosima::fastrtps::rtps::octet*>(handle.value),
-        sizeof hash);
+    std::memcpy(&hash, static_cast<const rtps::octet*>(handle.value),
+                sizeof hash);
     return hash;
   }
 };
@@ -96,8 +92,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     const dds::DataReaderQos qos = bus.profiles().Override(
         ours.name + "_reader", ours.reader, *subscriber);
     policies = Describe(qos);
-    has_lease =
-        qos.liveliness().lease_duration != eprosima::fastrtps::c_TimeInfinite;
+    has_lease = qos.liveliness().lease_duration != kForever;
     reader = NotNull(subscriber->create_datareader(topic, qos, this, Mask()),
                      std::string("create_datareader of ") + Traits::kTopic);
     Check(reader->enable(), "enable a reader");
@@ -192,7 +187,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   void DrainLocked(bool waits) noexcept {
     dds::SampleInfo info;
     while (waits ? queue.WaitForRoom() : queue.HasRoom()) {
-      if (reader->take_next_sample(&wire, &info) != ReturnCode::RETCODE_OK) {
+      if (reader->take_next_sample(&wire, &info) != return_code::RETCODE_OK) {
         const std::lock_guard lock(status_mutex);
         missing = gaps.missing();
         return;

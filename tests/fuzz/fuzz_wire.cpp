@@ -1,8 +1,8 @@
 // Bytes from a foreign publisher: refused, or a message that can be sent again.
-#include <cstring>
+#include <string_view>
 
 #include "diagnosis/error.h"
-#include "idl/codec.h"
+#include "tests/idl/payload.h"
 
 namespace {
 
@@ -10,13 +10,11 @@ template <typename Message>
 void Receive(const unsigned char* data, std::size_t size) {
   using Codec = fdi::idl::Codec<Message>;
   fdi::idl::CheckedType<typename Codec::Type> type;
-  eprosima::fastrtps::rtps::SerializedPayload_t payload(
-      static_cast<std::uint32_t>(size));
-  std::memcpy(payload.data, data, size);
-  payload.length = static_cast<std::uint32_t>(size);
   typename Codec::Wire wire;
   Message message;
-  if (!type.deserialize(&payload, &wire) || !Codec::Decode(wire, message)) {
+  const std::string_view bytes(reinterpret_cast<const char*>(data), size);
+  if (!fdi::idl::Deserialize(type, bytes, &wire) ||
+      !Codec::Decode(wire, message)) {
     return;
   }
   try {

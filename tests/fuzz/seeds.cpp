@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "cli/csv.h"
-#include "idl/codec.h"
 #include "simulator/app/scenario_toml.h"
 #include "storage/models/model_codec.h"
 #include "storage/runs/sample_codec.h"
+#include "tests/idl/payload.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/model_set_fixture.h"
 
@@ -105,10 +105,7 @@ std::string MessageBytes(const Message& message) {
   typename Codec::Type type;
   typename Codec::Wire wire;
   Codec::Encode(message, wire);
-  eprosima::fastrtps::rtps::SerializedPayload_t payload(
-      type.getSerializedSizeProvider(&wire)());
-  type.serialize(&wire, &payload);
-  return {reinterpret_cast<const char*>(payload.data), payload.length};
+  return fdi::idl::Serialized(type, &wire);
 }
 
 template <typename Message>

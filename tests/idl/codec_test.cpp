@@ -6,17 +6,16 @@
 #include <limits>
 #include <thread>
 
-#include <fastdds/rtps/common/SerializedPayload.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "tests/idl/payload.h"
 
 namespace fdi::idl {
 namespace {
 
-using eprosima::fastrtps::rtps::SerializedPayload_t;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
@@ -36,10 +35,8 @@ Message RoundTrip(const Message& message) {
   typename Codec<Message>::Wire out;
   Codec<Message>::Encode(message, out);
   CheckedType<typename Codec<Message>::Type> type;
-  SerializedPayload_t payload(type.getSerializedSizeProvider(&out)());
-  EXPECT_TRUE(type.serialize(&out, &payload));
   typename Codec<Message>::Wire in;
-  EXPECT_TRUE(type.deserialize(&payload, &in));
+  EXPECT_TRUE(Deserialize(type, Serialized(type, &out), &in));
   Message result;
   EXPECT_TRUE(Codec<Message>::Decode(in, result));
   return result;
@@ -337,18 +334,15 @@ TEST(CodecTest, ArraysBeyondTheirBoundAreNotDecoded) {
 TEST(CodecTest, BytesThatAreNoMessageAreCountedNotThrown) {
   CheckedType<v1::DecisionVectorPubSubType> type;
   v1::DecisionVector wire;
-  SerializedPayload_t payload(32);
-  payload.length = 32;
-  std::fill_n(payload.data, 32, eprosima::fastrtps::rtps::octet{0xFF});
 
-  EXPECT_FALSE(type.deserialize(&payload, &wire));
+  EXPECT_FALSE(Deserialize(type, std::string(32, '\xFF'), &wire));
   EXPECT_EQ(type.refused(), 1U);
 }
 
 // Cyclone DDS ends the instance "FV-101" with its key, little endian.
 TEST(CodecTest, AShortKeyIsReadFromTheHandle) {
   const auto key_of = [](const std::string& bytes) {
-    eprosima::fastrtps::rtps::InstanceHandle_t handle;
+    rtps::InstanceHandle_t handle;
     for (std::size_t i = 0; i < bytes.size(); ++i) {
       handle.value[i] = static_cast<std::uint8_t>(bytes[i]);
     }
@@ -372,12 +366,10 @@ TEST(CodecTest, ThreadsThatShareATypeGetTheirOwnKeys) {
   const auto compute = [&](const std::string& valve) {
     v1::ValveSample sample;
     sample.valve_id() = valve;
-    eprosima::fastrtps::rtps::InstanceHandle_t first;
-    v1::ValveSamplePubSubType().getKey(&sample, &first, false);
+    v1::ValveSamplePubSubType alone;
+    const rtps::InstanceHandle_t first = HandleOf(alone, &sample);
     for (int i = 0; i < 20000; ++i) {
-      eprosima::fastrtps::rtps::InstanceHandle_t handle;
-      type.getKey(&sample, &handle, false);
-      wrong += handle == first ? 0 : 1;
+      wrong += HandleOf(type, &sample) == first ? 0 : 1;
     }
   };
   {

@@ -11,22 +11,31 @@
 namespace fdi::idl {
 namespace {
 
-namespace dds = eprosima::fastdds::dds;
-
 // The type of a publisher that was built from another IDL: one field less, and
 // so fewer bytes, under the same name or one of its own.
 class OtherVersion : public v1::ValveSamplePubSubType {
  public:
-  explicit OtherVersion(const char* name) { setName(name); }
-  bool serialize(
-      void* data,
-      eprosima::fastrtps::rtps::SerializedPayload_t* payload) override {
-    if (!v1::ValveSamplePubSubType::serialize(data, payload)) {
-      return false;
-    }
-    payload->length -= 4;  // epoch
-    return true;
+#if FDI_FAST_DDS == 2
+  explicit OtherVersion(const char* name) {
+    setName(name);
   }
+  bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
+    const bool done = v1::ValveSamplePubSubType::serialize(data, payload);
+    payload->length -= 4;  // epoch
+    return done;
+  }
+#else
+  explicit OtherVersion(const char* name) {
+    set_name(name);
+  }
+  bool serialize(const void* data, rtps::SerializedPayload_t& payload,
+                 dds::DataRepresentationId_t representation) override {
+    const bool done =
+        v1::ValveSamplePubSubType::serialize(data, payload, representation);
+    payload.length -= 4;  // epoch
+    return done;
+  }
+#endif
 };
 
 // A publisher that uses the library as it is.
