@@ -30,7 +30,8 @@ struct Deleter {
   }
 };
 
-using Context = std::unique_ptr<_SUNContext, Deleter<FreeContext>>;
+using Context = std::unique_ptr<std::remove_pointer_t<SUNContext>,
+                                Deleter<FreeContext>>;
 using Vector = std::unique_ptr<_generic_N_Vector, Deleter<N_VDestroy>>;
 using Matrix = std::unique_ptr<_generic_SUNMatrix, Deleter<SUNMatDestroy>>;
 using Solver = std::unique_ptr<_generic_SUNLinearSolver, Deleter<FreeSolver>>;
@@ -52,7 +53,11 @@ Handle Owned(typename Handle::pointer handle, const char* operation) {
 
 Context MakeContext() {
   SUNContext context = nullptr;
+#if SUNDIALS_VERSION_MAJOR < 7
   Check(SUNContext_Create(nullptr, &context), "SUNContext_Create");
+#else
+  Check(SUNContext_Create(SUN_COMM_NULL, &context), "SUNContext_Create");
+#endif
   return Context(context);
 }
 
@@ -68,13 +73,24 @@ int CallRoots(double t, N_Vector x, double* g, void* system) {
 }
 
 // CVODE's words for the error, kept for the exception.
-void KeepMessage(int, const char*, const char*, char* text, void* message) {
+void Keep(const char* text, void* message) {
   try {
     *static_cast<std::string*>(message) = text;
   } catch (...) {
     static_cast<std::string*>(message)->clear();
   }
 }
+
+#if SUNDIALS_VERSION_MAJOR < 7
+void KeepMessage(int, const char*, const char*, char* text, void* message) {
+  Keep(text, message);
+}
+#else
+void KeepMessage(int, const char*, const char*, const char* text, SUNErrCode,
+                 void* message, SUNContext) {
+  Keep(text, message);
+}
+#endif
 
 }  // namespace
 
@@ -111,8 +127,15 @@ class CvodeIntegrator::Impl {
     // SUNDIALS takes user data as void*; the callbacks only read it.
     Check(CVodeSetUserData(m, const_cast<OdeSystem*>(&system)),
           "CVodeSetUserData");
+#if SUNDIALS_VERSION_MAJOR < 7
     Check(CVodeSetErrHandlerFn(m, KeepMessage, &message_),
           "CVodeSetErrHandlerFn");
+#else
+    Check(SUNContext_ClearErrHandlers(context_.get()),
+          "SUNContext_ClearErrHandlers");
+    Check(SUNContext_PushErrHandler(context_.get(), KeepMessage, &message_),
+          "SUNContext_PushErrHandler");
+#endif
     Check(CVodeSetNoInactiveRootWarn(m), "CVodeSetNoInactiveRootWarn");
     if (options.root_count > 0) {
       Check(CVodeRootInit(m, options.root_count, CallRoots), "CVodeRootInit");
