@@ -126,12 +126,12 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   // that is behind takes and acknowledges all before it leaves, within
   // kLongestFarewell. A writer that writes on without a pause is not helped.
   void LetWritersFinish() {
-    const eprosima::fastrtps::Duration_t two_heartbeats{0, 100'000'000};
+    const Duration two_heartbeats{0, 100'000'000};
     const auto end = std::chrono::steady_clock::now() + kLongestFarewell;
     const std::lock_guard lock(drain_mutex);
     dds::SampleInfo info;
     const auto take = [&] {
-      return reader->take_next_sample(&wire, &info) == ReturnCode::RETCODE_OK;
+      return reader->take_next_sample(&wire, &info) == return_code::RETCODE_OK;
     };
     bool behind = take();
     while (behind && std::chrono::steady_clock::now() < end) {
