@@ -30,7 +30,7 @@ std::string KeyOf(int fault) {
 }
 
 std::optional<int> FaultOf(std::string_view key) {
-  return key == kUnknown ? 0 : ParseFault(key);
+  return key == kUnknown ? 0 : ParseFinding(key);
 }
 
 void AppendTo(std::string& list, std::string_view separator,
@@ -90,7 +90,7 @@ void ReadText(TomlReader& table, FaultText& text) {
 
 [[noreturn]] void RefuseFault(const TomlReader& file, const std::string& key) {
   std::vector<std::string> names;
-  for (int fault = 0; fault <= kLastFault; ++fault) {
+  for (int fault = 0; fault <= kLastFinding; ++fault) {
     names.push_back(KeyOf(fault));
   }
   const auto meant = Suggest(key, names);
@@ -129,7 +129,7 @@ Severity FaultText::SeverityAt(double strength) const {
 // checked for what is too much.
 FaultTexts::FaultTexts(const std::filesystem::path& path) {
   TomlReader file(path);
-  for (int fault = 0; fault <= kLastFault; ++fault) {
+  for (int fault = 0; fault <= kLastFinding; ++fault) {
     const auto table = file.Table(KeyOf(fault));
     for (const char* key :
          {"name", "check", "discipline", "namur", "severity"}) {
@@ -155,7 +155,7 @@ void FaultTexts::Override(const std::filesystem::path& path) {
 }
 
 const FaultText& FaultTexts::Of(int fault) const {
-  Require(fault >= 0 && fault <= kLastFault, "fault must be in 0..22");
+  Require(fault >= 0 && fault <= kLastFinding, "fault is not of the catalogue");
   return texts_[static_cast<std::size_t>(fault)];
 }
 
@@ -200,8 +200,8 @@ FaultTexts LoadFaultTexts(const GlobalOptions& options) {
 
 Json FaultTextsJson(const FaultTexts& texts) {
   Json rows = Json::array();
-  for (int i = 1; i <= kLastFault + 1; ++i) {  // 1, 2 ... and 0 at the end.
-    const int fault = i % (kLastFault + 1);
+  for (int i = 1; i <= kLastFinding + 1; ++i) {  // 1, 2 ... and 0 at the end.
+    const int fault = i % (kLastFinding + 1);
     const FaultText& text = texts.Of(fault);
     Json bands = Json::array();
     for (const SeverityBand& band : text.bands) {

@@ -117,10 +117,17 @@ CoverageReasons Coverage::Inputs(const Sample& sample,
 }
 
 Quality Coverage::Judge(const Sample& sample, const ObserverBank& bank,
-                        bool episode_open) {
+                        bool episode_open, bool found, bool pending) {
   last_stamp_ns_ = sample.stamp_ns;
   armed_now_ = false;
-  const CoverageReasons operation = Operation(sample);
+  settled_ = settling_ == 0;
+  CoverageReasons operation = Operation(sample);
+  const bool abnormal = models_->floor && (episode_open || found);
+  if (abnormal || (models_->floor && pending && armed_)) {
+    operation &= BitOf(CoverageReason::kMode);
+    armed_now_ = !armed_ && settled_ && operation == 0;
+    armed_ = armed_ || armed_now_;
+  }
   const CoverageReasons inputs = Inputs(sample, bank);
   const Quality quality = armed_ && operation == 0
                               ? JudgeArmed(inputs, episode_open)

@@ -26,6 +26,10 @@ inline constexpr std::int64_t kLongestInterruptionNs = 600'000'000'000;
 /// valve is armed, dP, T1, P1 and P2 alone never disarm it: they are judged.
 /// Those that were off while an episode was open do not keep it from being
 /// armed again.
+///
+/// What disarms must come before the deviation: a valve that is abnormal, of a
+/// set with a floor, stays armed whatever its command does, for the fault moves
+/// the command; other modes alone disarm it.
 class Coverage {
  public:
   /// `models` must outlive it.
@@ -40,13 +44,17 @@ class Coverage {
   bool Settle(std::int64_t stamp_ns);
 
   /// kLive, kSettling, kInhibited or kUncovered.
+  /// @param found The floor finds something.
+  /// @param pending Some limit was passed at the last sample that was judged.
   Quality Judge(const Sample& sample, const ObserverBank& bank,
-                bool episode_open);
+                bool episode_open, bool found = false, bool pending = false);
 
   /// Why the last sample was not judged.
   CoverageReasons reasons() const { return reasons_; }
   /// True at the sample that armed the valve.
   bool armed_now() const { return armed_now_; }
+  /// True if the observers need no more samples to settle.
+  bool settled() const { return settled_; }
 
   void Save(SnapshotWriter& writer) const;
   /// @returns false, leaving it undefined, if there is nothing to be read.
@@ -70,6 +78,7 @@ class Coverage {
   std::array<Input, 3> inputs_;
   bool armed_{false};
   bool armed_now_{false};
+  bool settled_{false};
   int settling_{0};  // samples that the observers still need
   int inside_{0};    // samples in a row
   int needed_{0};    // of them

@@ -67,6 +67,11 @@ void Detection::Count(std::size_t test, bool beyond, std::int64_t stamp_ns) {
   run.length = beyond ? run.length + 1 : 0;
 }
 
+bool Detection::pending() const {
+  return std::ranges::any_of(runs_,
+                             [](const Run& run) { return run.length > 0; });
+}
+
 std::optional<std::int64_t> Detection::stamp_ns() const {
   std::optional<std::int64_t> stamp;
   const std::size_t tests = models_->channels.size() * kTestsPerChannel;

@@ -31,6 +31,9 @@ class Detection {
   /// @returns false, leaving windows undefined, if they are not to be read.
   bool Restore(SnapshotReader& reader) { return windows_.Restore(reader); }
 
+  /// True if some residual or window was beyond its limit, if only just.
+  bool pending() const;
+
   /// First sample of the earliest run beyond a limit that is n_d long.
   std::optional<std::int64_t> stamp_ns() const;
 

@@ -1,10 +1,13 @@
 #include "diagnosis/episode.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace fdi {
 namespace {
+
+constexpr int kLargestSet = 4;  // that is a name
 
 int CountOf(double fraction, int samples) {
   return static_cast<int>(std::ceil(fraction * samples - 1e-9));
@@ -173,6 +176,7 @@ void KnowStuck(FaultSet stuck, Verdict& verdict) {
 
 Episode::Episode(std::shared_ptr<const FaultPlan> plan)
     : models_(&plan->models()),
+      floor_names_(FindingsOf(*models_)),
       faults_(std::move(plan)),
       isolation_(models_->decision, models_->faults.size()),
       clearing_(*models_) {}
@@ -189,20 +193,39 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     return;
   }
   if (begins) {
+    clearing_.Restart();
+    begun_ = false;
+    floor_ = 0;
+  }
+  if (findings.settled && !begun_) {
     faults_.Restart();
     isolation_.Restart();
-    clearing_.Restart();
+    begun_ = true;
   }
-  faults_.Follow(bank);
-  faults_.Compete(verdict);
+  if (begun_) {
+    if (findings.settled) {
+      faults_.Follow(bank);
+    }
+    faults_.Compete(verdict);
+  } else {
+    std::ranges::fill(verdict.fault_factors, 0.0);
+  }
   if (findings.stuck != 0) {
     KnowStuck(findings.stuck, verdict);
   }
+  Tell(findings, verdict);
   if (begins) {
     Open(*findings.detected, verdict);
   }
-  Isolate(verdict);
-  JudgeUnknown(verdict);
+  floor_ |= findings.floor;
+  if (findings.settled) {
+    Isolate(verdict);
+    JudgeUnknown(verdict);
+  }
+  NameFloor(verdict);
+  if (!findings.settled) {
+    return;
+  }
   clearing_.Push({verdict.residuals.data(), models_->channels.size()},
                  verdict.normal_factor, findings.abnormal);
   if (clearing_.Cleared()) {
@@ -242,6 +265,30 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
   Emit(TransitionKind::kDetected, detection_stamp_ns_, verdict);
 }
 
+// The factors of what the floor finds, beside those of the faults.
+void Episode::Tell(const Findings& findings, Verdict& verdict) const {
+  const std::size_t first = models_->faults.size() - Floor::kTests;
+  for (std::size_t i = 0; floor_names_ != 0 && i < Floor::kTests; ++i) {
+    const bool found = (findings.floor >> (first + i) & 1U) != 0;
+    verdict.fault_factors[first + i] = found ? 1.0 : 0.0;
+    verdict.strengths[first + i] = found ? findings.sizes[i] : 0.0;
+  }
+}
+
+// What the floor finds is the name of an episode until a fault is named.
+void Episode::NameFloor(Verdict& verdict) {
+  const bool named = (verdict.isolated & ~floor_names_) != 0;
+  if (isolation_held_ || named || (floor_ & ~verdict.isolated) == 0) {
+    return;
+  }
+  const bool first = verdict.state == State::kDetected;
+  verdict.state = State::kIsolated;
+  verdict.isolated = floor_;
+  verdict.unknown = Unknown::kNone;
+  Emit(first ? TransitionKind::kIsolated : TransitionKind::kReisolated,
+       verdict.stamp_ns, verdict);
+}
+
 FaultSet Episode::FactorsFrom(double threshold, const Verdict& verdict) const {
   FaultSet from = 0;
   for (std::size_t i = 0; i < models_->faults.size(); ++i) {
@@ -249,7 +296,7 @@ FaultSet Episode::FactorsFrom(double threshold, const Verdict& verdict) const {
       from |= FaultSet{1} << i;
     }
   }
-  return from;
+  return from & ~floor_names_;
 }
 
 FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
@@ -276,11 +323,20 @@ void Episode::Isolate(Verdict& verdict) {
     return;
   }
   supported = WithGroups(supported, verdict);
-  if (verdict.state == State::kDetected) {
-    verdict.state = State::kIsolated;
-    verdict.isolated = supported;
-    verdict.unknown = Unknown::kNone;
-    Emit(TransitionKind::kIsolated, verdict.stamp_ns, verdict);
+  // So many say nothing: they are candidates, and the episode is unknown.
+  if (models_->floor && std::popcount(supported) > kLargestSet) {
+    supported = floor_;
+  }
+  if ((verdict.isolated & ~floor_names_) == 0) {
+    if ((supported & ~floor_names_) != 0) {
+      const bool first = verdict.state == State::kDetected;
+      verdict.state = State::kIsolated;
+      verdict.isolated = supported;
+      verdict.unknown = Unknown::kNone;
+      contender_ = 0;
+      Emit(first ? TransitionKind::kIsolated : TransitionKind::kReisolated,
+           verdict.stamp_ns, verdict);
+    }
     return;
   }
   // Another set has to hold for a while before it replaces this one.
@@ -289,6 +345,7 @@ void Episode::Isolate(Verdict& verdict) {
   if (supported != verdict.isolated &&
       contender_run_ >= models_->decision.reisolation_samples) {
     verdict.isolated = supported;
+    verdict.state = supported != 0 ? State::kIsolated : State::kDetected;
     Emit(TransitionKind::kReisolated, verdict.stamp_ns, verdict);
   }
 }

@@ -9,6 +9,7 @@
 
 #include "diagnosis/detection.h"
 #include "diagnosis/fault_bank.h"
+#include "diagnosis/floor.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/verdict.h"
@@ -112,6 +113,9 @@ struct Findings {
   std::optional<std::int64_t> detected;  ///< Stamp of a detection.
   bool abnormal{false};  ///< Something is beyond its threshold right now.
   FaultSet stuck{0};     ///< Faults of transmitters that are stuck: certain.
+  FaultSet floor{0};     ///< What the floor finds, by size.
+  std::array<double, Floor::kTests> sizes{};  ///< Of its findings, in order.
+  bool settled{true};                         ///< The observers may be asked.
 };
 
 /// The episode of a valve from its detection to its end: which faults explain
@@ -140,6 +144,8 @@ class Episode {
  private:
   void Open(std::int64_t stamp_ns, Verdict& verdict);
   void Isolate(Verdict& verdict);
+  void NameFloor(Verdict& verdict);
+  void Tell(const Findings& findings, Verdict& verdict) const;
   void JudgeUnknown(Verdict& verdict);
   FaultSet FactorsFrom(double threshold, const Verdict& verdict) const;
   FaultSet WithGroups(FaultSet set, const Verdict& verdict) const;
@@ -149,11 +155,14 @@ class Episode {
             EndReason reason = EndReason::kNone) const;
 
   const ModelSet* models_;
+  FaultSet floor_names_;  // of the faults
   FaultBank faults_;
   IsolationWindow isolation_;
   ClearingWindow clearing_;
   bool isolation_held_{false};
   std::int64_t detection_stamp_ns_{0};
+  FaultSet floor_{0};      // found in this episode
+  bool begun_{false};      // to gather evidence
   int age_{0};             // samples since the detection
   int without_fault_{0};   // since some factor was T/2
   FaultSet contender_{0};  // another set than the isolated one

@@ -49,7 +49,7 @@ std::string Lower(std::string_view text) {
 const std::string kFaultNames = JoinedNames();
 
 const FaultFacts& FaultFactsOf(int fault) {
-  Require(fault >= 1 && fault <= kLastFault, "fault is not of the catalogue");
+  Require(fault >= 1 && fault <= kLastFinding, "fault is not of the catalogue");
   return kFaultCatalogue[fault - 1];
 }
 
@@ -57,7 +57,7 @@ std::string FaultName(int fault) {
   if (fault == 0) {
     return "normal";
   }
-  if (fault < 0 || fault > kLastFault) {
+  if (fault < 0 || fault > kLastFinding) {
     return "unknown";
   }
   return std::string(FaultFactsOf(fault).name);
@@ -83,13 +83,23 @@ std::optional<int> ParseFault(std::string_view name) {
   return std::nullopt;
 }
 
+std::optional<int> ParseFinding(std::string_view name) {
+  const std::string lower = Lower(name);
+  for (int finding = kLastFault + 1; finding <= kLastFinding; ++finding) {
+    if (lower == FaultFactsOf(finding).name) {
+      return finding;
+    }
+  }
+  return ParseFault(name);
+}
+
 std::string DidYouMeanFault(std::string_view name,
                             std::vector<std::string> others) {
   const std::string lower = Lower(name);
   if (NumberAfter(lower, "f") || NumberAfter(lower, "paper")) {
     return "";  // Well written, but there is no such number.
   }
-  for (int fault = 1; fault <= kLastFault; ++fault) {
+  for (int fault = 1; fault <= kLastFinding; ++fault) {
     others.push_back(FaultName(fault));
   }
   const auto meant = Suggest(lower, others);
@@ -108,6 +118,11 @@ int RequireFault(std::string_view name) {
   throw ConfigError("unknown fault '" + std::string(name) + "'" +
                     DidYouMeanFault(name) + ": expected " +
                     std::string(kFaultNames) + " or paper1..paper5");
+}
+
+int RequireFinding(std::string_view name) {
+  const auto finding = ParseFinding(name);
+  return finding ? *finding : RequireFault(name);
 }
 
 }  // namespace fdi

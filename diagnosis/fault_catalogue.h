@@ -19,8 +19,9 @@ struct FaultFacts {
   std::optional<Signal> transmitter{};
 };
 
-/// All faults; the number of a fault is its place, from 1 on. Models, databases
-/// and messages hold these numbers: a new fault comes last.
+/// All faults, then what the floor finds (diagnosis/floor.h): readings that
+/// cannot be, whatever the cause. The number of an entry is its place, from 1
+/// on. Models, databases and messages hold these numbers: a new one comes last.
 inline constexpr FaultFacts kFaultCatalogue[] = {
     {"f1", "valve clogging", "F1", false},
     {"f2", "plug or seat sedimentation", "", false},
@@ -44,24 +45,37 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
     {"t1", "temperature transmitter fault", "", true, Signal::kT1},
     {"p1", "inlet pressure transmitter fault", "", true, Signal::kP1},
     {"p2", "outlet pressure transmitter fault", "", true, Signal::kP2},
+    {"travel_deviation", "rod does not follow the command", "", true},
+    {"shut_flow", "flow with the valve shut", "", false},
+    {"excess_flow", "more flow than the opening can pass", "", false},
+    {"x_stuck", "position reading stuck", "", false},
+    {"f_stuck", "flow reading stuck", "", false},
 };
 
 /// The actuator faults of the DAMADICS benchmark are 1..kFaultCount.
 inline constexpr int kFaultCount = 19;
-/// All faults are 1..kLastFault.
-inline constexpr int kLastFault = static_cast<int>(std::size(kFaultCatalogue));
+/// All faults, which the simulator knows, are 1..kLastFault.
+inline constexpr int kLastFault = 22;
+/// What the floor finds follows: kLastFault + 1..kLastFinding.
+inline constexpr int kLastFinding =
+    static_cast<int>(std::size(kFaultCatalogue));
 
 inline constexpr int kTemperatureTransmitterFault = 20;
 inline constexpr int kInletPressureTransmitterFault = 21;
 inline constexpr int kOutletPressureTransmitterFault = 22;
+inline constexpr int kTravelDeviation = 23;
+inline constexpr int kShutFlow = 24;
+inline constexpr int kExcessFlow = 25;
+inline constexpr int kPositionStuck = 26;
+inline constexpr int kFlowStuck = 27;
 static_assert(kFaultCatalogue[kTemperatureTransmitterFault - 1].name == "t1" &&
-              kFaultCatalogue[kOutletPressureTransmitterFault - 1].name ==
-                  "p2");
+              kFaultCatalogue[kLastFault - 1].name == "p2" &&
+              kFaultCatalogue[kFlowStuck - 1].name == "f_stuck");
 
 /// The names of all faults, for messages and help: "f1..f19, t1, p1, p2".
 extern const std::string kFaultNames;
 
-/// @throws std::invalid_argument if `fault` is not in 1..kLastFault.
+/// @throws std::invalid_argument if `fault` is not in 1..kLastFinding.
 const FaultFacts& FaultFactsOf(int fault);
 
 /// "f19", "t1"; "normal" for 0; "unknown" for anything else.
@@ -70,6 +84,9 @@ std::string FaultName(int fault);
 /// The fault called `name`, in any case: one of kFaultNames, or paper1..paper5
 /// for the five faults of [Mendonça et al., 2009] (f1 f3 f6 f7 f19).
 std::optional<int> ParseFault(std::string_view name);
+
+/// As ParseFault(), and what the floor finds.
+std::optional<int> ParseFinding(std::string_view name);
 
 /// The signal whose transmitter is at fault, if it is such a fault.
 std::optional<Signal> TransmitterOf(int fault);
@@ -81,5 +98,8 @@ std::string DidYouMeanFault(std::string_view name,
 
 /// As ParseFault(). @throws ConfigError naming the accepted names.
 int RequireFault(std::string_view name);
+
+/// As ParseFinding(). @throws ConfigError as RequireFault().
+int RequireFinding(std::string_view name);
 
 }  // namespace fdi

@@ -107,7 +107,37 @@ void ValidateRegion(const ModelSet& models) {
         "samples before a valve is armed again must be in 0..100000");
 }
 
+void ValidateFloor(const ModelSet& models, const FloorLimits& floor) {
+  for (const FloorLimits::Rod& rod : {floor.quick, floor.slow}) {
+    Check(rod.share > 0.0 && rod.share <= 1.0 && rod.rate > 0.0, models,
+          "the rod of the floor must move towards the command");
+  }
+  Check(floor.delay >= 0 && floor.delay < kMaxLag, models,
+        "the delay of the floor must be in 0..." + std::to_string(kMaxLag));
+  Check(floor.deviation > 0.0 && floor.stuck_travel > 0.0 &&
+            floor.flow_factor >= 1.0 && floor.flow_margin > 0.0 &&
+            floor.flow_gain >= 0.0 && floor.flow_high >= 0.0,
+        models, "limits of the floor must be positive");
+  Check(floor.deviation_samples >= 1 && floor.flow_samples >= 1, models,
+        "the floor takes at least one sample");
+}
+
 }  // namespace
+
+void AddFindings(ModelSet& models) {
+  for (int finding = kLastFault + 1; models.floor && finding <= kLastFinding;
+       ++finding) {
+    models.faults.push_back(finding);
+  }
+}
+
+FaultSet FindingsOf(const ModelSet& models) {
+  FaultSet findings = 0;
+  for (std::size_t i = 0; i < models.faults.size(); ++i) {
+    findings |= models.faults[i] > kLastFault ? FaultSet{1} << i : 0;
+  }
+  return findings;
+}
 
 int FaultIndex(const ModelSet& models, int fault) {
   const auto it = std::find(models.faults.begin(), models.faults.end(), fault);
@@ -154,6 +184,11 @@ void Validate(const ModelSet& models) {
         "faults must be ascending");
   ValidateDecision(models);
   ValidateRegion(models);
+  if (models.floor) {
+    ValidateFloor(models, *models.floor);
+  }
+  Check((FindingsOf(models) != 0) == models.floor.has_value(), models,
+        "a floor and its findings belong together");
   for (std::size_t i = 0; i < models.observers.size(); ++i) {
     const Observer& observer = models.observers[i];
     Check((i == 0) == (observer.fault == 0), models,

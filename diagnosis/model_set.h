@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -114,6 +115,38 @@ struct PhysicalValue {
   double value{0.0};
 };
 
+/// The wide limits of the floor (diagnosis/floor.h). Rod and flow follow two
+/// simple models; the margins are far beyond what they erred by on the healthy
+/// record.
+struct FloorLimits {
+  /// The rod goes this share of its way to the command in a sample, at most so
+  /// far [%]: the quickest and the slowest answer that the record leaves open.
+  struct Rod {
+    double share{1.0};   ///< In (0, 1].
+    double rate{100.0};  ///< [%/sample]
+
+    friend bool operator==(const Rod&, const Rod&) = default;
+  };
+  int delay{0};  ///< Between a command and its action [samples].
+  Rod quick;
+  Rod slow;
+  double deviation{10.0};    ///< X beyond both by more is none of them [%].
+  int deviation_samples{5};  ///< For so many samples in a row.
+  double stuck_travel{5.0};  ///< The rod moves no further [%] while X repeats.
+
+  /// F = gain exp(−exponent X/100) √(P1 − P2) [flow unit, kPa]; without both
+  /// pressures at the level of training. 0: no flow was measured.
+  double flow_gain{0.0};
+  double flow_exponent{4.0};
+  double dp_level{0.0};     ///< Mean P1 − P2 of the record, or 1 [kPa].
+  double flow_high{0.0};    ///< The largest flow of the record [flow unit].
+  double flow_factor{1.5};  ///< No opening passes more than this times F(X),
+  double flow_margin{0.1};  ///< and this share of the largest flow.
+  int flow_samples{10};     ///< For so many samples in a row.
+
+  friend bool operator==(const FloorLimits&, const FloorLimits&) = default;
+};
+
 /// The stored knowledge about one kind of valve: what the trainer writes, the
 /// monitor loads, and both run. Observer 0 is the normal one.
 struct ModelSet {
@@ -127,10 +160,14 @@ struct ModelSet {
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   ValidityRegion validity;
   StuckLimits stuck;
+  /// What holds always; sets made before there was a floor have none, and are
+  /// judged within their region alone.
+  std::optional<FloorLimits> floor;
   DecisionParameters decision;
   std::vector<ChannelSpec> channels;
   std::vector<Observer> observers;
   std::vector<int> faults;  ///< Numbers, ascending; index = bit in FaultSet.
+                            ///< With a floor, its findings are the last.
   std::vector<std::vector<int>> groups;  ///< Faults it cannot tell apart.
   std::vector<int> undetectable;         ///< Faults that look normal.
   std::vector<std::string> training_runs;
@@ -142,6 +179,12 @@ struct ModelSet {
 
 /// A set of faults as bits: bit i stands for ModelSet::faults[i].
 using FaultSet = std::uint64_t;
+
+/// Adds the findings of the floor, if there is one, to the faults.
+void AddFindings(ModelSet& models);
+
+/// Those of the faults that are findings of the floor.
+FaultSet FindingsOf(const ModelSet& models);
 
 /// Index of `fault` in `models.faults`, or -1.
 int FaultIndex(const ModelSet& models, int fault);

@@ -6,6 +6,7 @@
 #include "diagnosis/coverage.h"
 #include "diagnosis/detection.h"
 #include "diagnosis/episode.h"
+#include "diagnosis/floor.h"
 #include "diagnosis/intake.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/observer_bank.h"
@@ -54,6 +55,7 @@ struct Diagnosis {
         coverage(plan->models()),
         detection(plan->models()),
         stuck(plan->models()),
+        floor(plan->models()),
         episode(plan->faults()) {}
 
   std::shared_ptr<const EnginePlan> plan;
@@ -61,6 +63,7 @@ struct Diagnosis {
   Coverage coverage;
   Detection detection;
   StuckReadings stuck;
+  Floor floor;
   Episode episode;
 };
 
@@ -135,10 +138,14 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
   }
   diagnosis_->bank.Step(sample);
   diagnosis_->stuck.Push(sample);
+  diagnosis_->floor.Push(sample);
   ReadResiduals();
   diagnosis_->episode.Score(diagnosis_->bank, verdict_);
   verdict_.quality = Judge(sample);
-  if (verdict_.quality == Quality::kLive) {
+  // The floor, and the episode that it may have opened, do not wait.
+  const bool settles = verdict_.quality == Quality::kSettling &&
+                       models().floor && sample.mode == ValveMode::kAuto;
+  if (verdict_.quality == Quality::kLive || settles) {
     Decide(sample);
   } else if (episode_open()) {
     diagnosis_->episode.Hold(verdict_);
@@ -180,6 +187,7 @@ void ValveEngine::Impl::Initialise(const Sample& sample) {
   } else {
     diagnosis_->detection.Restart();
   }
+  diagnosis_->floor.Restart();
   verdict_.initialised = true;
 }
 
@@ -199,24 +207,35 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
   if (diagnosis_->bank.active_channels() == 0) {
     return Quality::kBadInput;
   }
-  const Quality quality =
-      diagnosis_->coverage.Judge(sample, diagnosis_->bank, episode_open());
+  const Quality quality = diagnosis_->coverage.Judge(
+      sample, diagnosis_->bank, episode_open(),
+      diagnosis_->floor.findings() != 0, diagnosis_->detection.pending());
   verdict_.uncovered = diagnosis_->coverage.reasons();
   return quality;
 }
 
 void ValveEngine::Impl::Decide(const Sample& sample) {
   Detection& detection = diagnosis_->detection;
+  const Floor& floor = diagnosis_->floor;
   if (diagnosis_->coverage.armed_now()) {
     detection.Restart();
   }
   Findings findings;
-  findings.stuck = diagnosis_->stuck.faults();
-  findings.abnormal =
-      detection.Push(diagnosis_->bank, sample) || findings.stuck != 0;
-  findings.detected = detection.stamp_ns();
-  if (!findings.detected) {
-    findings.detected = diagnosis_->stuck.stamp_ns();
+  findings.settled = diagnosis_->coverage.settled();
+  findings.floor = floor.findings();
+  findings.abnormal = findings.floor != 0;
+  findings.detected = floor.stamp_ns();
+  for (std::size_t i = 0; i < Floor::kTests; ++i) {
+    findings.sizes[i] = floor.size(i);
+  }
+  if (findings.settled) {
+    findings.stuck = diagnosis_->stuck.faults();
+    findings.abnormal = detection.Push(diagnosis_->bank, sample) ||
+                        findings.stuck != 0 || findings.abnormal;
+    for (const auto& stamp :
+         {detection.stamp_ns(), diagnosis_->stuck.stamp_ns()}) {
+      findings.detected = findings.detected ? findings.detected : stamp;
+    }
   }
   const bool was_open = episode_open();
   diagnosis_->episode.Step(sample, diagnosis_->bank, findings, verdict_);

@@ -24,7 +24,7 @@ namespace fdi::idl {
 namespace {
 
 static_assert(kMaxChannels == 16 && kMaxFaults == 64 && kMaxObservers == 128 &&
-                  kSignalCount == 10 && kLastFault <= 255,
+                  kSignalCount == 10 && kLastFinding <= 255,
               "fdi_v1.idl cannot grow");
 
 // LastOf(enumerator) is the last one of its enumeration. Enumerators stand in
@@ -118,7 +118,7 @@ class Transfer {
     }
     for (std::size_t i = 0; i < count; ++i) {
       if constexpr (std::same_as<typename Ours::value_type, int>) {
-        Ranged(field, ours[i], wire[i], 1, kLastFault);
+        Ranged(field, ours[i], wire[i], 1, kLastFinding);
       } else {
         Fields(*this, ours[i], wire[i]);
       }
@@ -252,7 +252,7 @@ void Fields(auto& t, Is<DecisionMessage> auto& message, auto& w) {
 }
 
 void Fields(auto& t, Is<FaultCandidate> auto& m, auto& w) {
-  t.Ranged("candidates.fault", m.fault, w.fault(), 1, kLastFault);
+  t.Ranged("candidates.fault", m.fault, w.fault(), 1, kLastFinding);
   FDI_FOR_EACH(FDI_FIELD, factor, strength, isolated)
 }
 

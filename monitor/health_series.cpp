@@ -50,7 +50,7 @@ void SetName(std::string_view text, std::string_view name, bool percent,
              HealthLimit& limit) {
   if (name == "travel" || name == "reversals") {
     limit.kind = name == "travel" ? Kind::kTravel : Kind::kReversals;
-  } else if (const auto fault = ParseFault(name)) {
+  } else if (const auto fault = ParseFinding(name)) {
     limit.kind = Kind::kStrength;
     limit.fault = *fault;
   } else if (const auto signal = ParseSignal(name)) {

@@ -64,7 +64,4 @@ std::optional<TimeToLimit> ToLimit(const TrendLine& line, double limit,
 std::optional<TimeToLimit> ToTotal(std::span<const DailyValue> values,
                                    double remaining);
 
-/// Quantile of Student's t, 0 < p < 1 and freedom ≥ 1.
-double StudentQuantile(double p, double freedom);
-
 }  // namespace fdi::monitor

@@ -10,6 +10,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/residual_windows.h"
+#include "diagnosis/student.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer {
@@ -285,6 +286,12 @@ std::optional<WindowLimits> FitWindow(const ResidualSeries& residuals,
 // normal, and single readings beyond the thresholds tell.
 constexpr double kLeastMeanOfInput = 2.0;
 
+constexpr double kBlockS = 600.0;     // of the slow part
+constexpr double kPriorDays = 4.0;    // ν₀
+constexpr double kOutputStray = 0.2;  // κ, deviations
+constexpr double kInputStray = 1.0;
+constexpr double kMostSlowShare = 0.05;
+
 constexpr double kCoreQuantile = 0.05;
 constexpr double kSupportMargin = 1.0;  // standard deviations
 
@@ -375,6 +382,27 @@ double CorrelationTime(std::span<const double> residuals) {
   return time;
 }
 
+double SlowAllowance(const ResidualSeries& residuals, std::size_t block,
+                     double kappa, double share) {
+  std::vector<double> means;
+  for (const std::vector<double>& series : residuals) {
+    // Whole blocks, as near to that length as the series divides into.
+    const std::size_t parts = (series.size() + block / 2) / block;
+    for (std::size_t i = 0; i < parts; ++i) {
+      const std::size_t from = i * series.size() / parts;
+      const std::size_t to = (i + 1) * series.size() / parts;
+      means.push_back(Mean(std::span(series).subspan(from, to - from)));
+    }
+  }
+  const double blocks = std::max(static_cast<double>(means.size()), 1.0);
+  const double stray = kappa * std::sqrt(Variance(Joined(residuals)));
+  const double freedom = kPriorDays + blocks - 1.0;
+  const double variance =
+      (kPriorDays * stray * stray + blocks * Variance(means)) / freedom;
+  return StudentQuantile(1.0 - std::min(share, kMostSlowShare), freedom) *
+         std::sqrt(variance * (1.0 + 1.0 / blocks));
+}
+
 void FitThresholds(const std::vector<ResidualSeries>& residuals,
                    const std::vector<std::vector<int>>& windows,
                    double rate_per_hour, ModelSet& models,
@@ -389,15 +417,21 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
   }
   const double share = rate_per_hour * models.sample_period_s /
                        (3600.0 * static_cast<double>(tests));
+  const auto block =
+      static_cast<std::size_t>(std::max(2.0, kBlockS / models.sample_period_s));
+  const double day = 24.0 * rate_per_hour / static_cast<double>(tests);
   for (std::size_t c = 0; c < channels; ++c) {
     ChannelSpec& channel = models.channels[c];
     const std::vector<double> joined = Joined(residuals[c]);
+    const double slow = SlowAllowance(
+        residuals[c], block,
+        IsInput(channel.output) ? kInputStray : kOutputStray, day);
     const int separation = static_cast<int>(std::ceil(CorrelationTime(joined)));
     const auto level = [&](double sign) {
       const std::vector<double> series =
           Sustained(joined, sign, models.decision.detection_samples);
       const double floor = 1e-6 + std::sqrt(Variance(joined));
-      return std::max(floor, FitTail(series, share, separation).level);
+      return std::max(floor, FitTail(series, share, separation).level) + slow;
     };
     channel.upper_threshold = level(1.0);
     channel.lower_threshold = -level(-1.0);
@@ -410,8 +444,8 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
             IsInput(channel.output)
                 ? kLeastMeanOfInput * std::sqrt(Variance(joined))
                 : 0.0;
-        limits->upper_mean = std::max(limits->upper_mean, least);
-        limits->lower_mean = std::min(limits->lower_mean, -least);
+        limits->upper_mean = std::max(limits->upper_mean + slow, least);
+        limits->lower_mean = std::min(limits->lower_mean - slow, -least);
         channel.windows.push_back(*limits);
       }
     }

@@ -56,12 +56,26 @@ using ResidualSeries = std::vector<std::vector<double>>;
 /// All series one after another.
 std::vector<double> Joined(const ResidualSeries& series);
 
+/// What the slow part of a residual may add on another day, beyond what its
+/// hours show: the bound that a new day's mean exceeds with probability
+/// `share`,
+///
+///     t_ν(1 − share) s √(1 + 1/n),   s² = (ν₀ (κσ)² + Σ (m_i − m̄)²)/ν,
+///     ν = ν₀ + n − 1,
+///
+/// from the means m_i of n blocks of about `block` samples, and a prior of ν₀ =
+/// 4 days on which the mean strayed by κ deviations: 0.2 of an output, 1 of an
+/// input (T1, P1, P2), which goes where the plant goes. With hours it narrows.
+double SlowAllowance(const ResidualSeries& residuals, std::size_t block,
+                     double kappa, double share);
+
 /// Thresholds of the normal residual per channel, and limits of its windows,
 /// for `rate` false alarms per hour over all tests together: each channel has
 /// two for the n_d consecutive samples that a detection takes, and three for
 /// each window, of which the energy is watched upwards only (peaks over
 /// threshold, see FitTail()). A window that the series are too short for gets
-/// no limits.
+/// no limits. Thresholds and limits on means have room for another day
+/// (SlowAllowance(), a day's share of the rate).
 ///
 /// The limit on the energy follows the activity of CV (WindowLimits): the slope
 /// is that of the line through the log-deviations of residual and command over

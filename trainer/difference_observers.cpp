@@ -297,6 +297,7 @@ ModelSet Describe(const std::vector<TrainingRun>& healthy,
   for (const FaultCondition& fault : faults) {
     AddObserver(fault.fault, fault.strength, models);
   }
+  AddFindings(models);
   return models;
 }
 

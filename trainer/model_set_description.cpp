@@ -10,6 +10,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "trainer/floor_fit.h"
 
 namespace fdi::trainer {
 namespace {
@@ -194,6 +195,7 @@ ModelSet DescribeModelSet(const std::vector<TrainingRun>& runs,
   models.flow_unit = runs.front().flow_unit;
   models.validity = TrainedRegion(conditions);
   models.stuck = FitStuckLimits(conditions.front());
+  models.floor = FitFloor(conditions.front(), models.sample_period_s);
   models.decision = options.decision;
   for (const ChannelPlan& plan : options.channels) {
     models.channels.push_back({plan.name, plan.output, -1.0, 1.0});

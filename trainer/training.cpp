@@ -45,6 +45,7 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
   for (const Condition& condition : conditions) {
     AddObserver(condition.fault, condition.strength, models);
   }
+  AddFindings(models);
   const int channels = static_cast<int>(options.channels.size());
   std::vector<std::vector<Regressor>> regressors(options.channels.size());
   std::vector<double> saturations(options.channels.size());

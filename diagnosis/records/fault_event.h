@@ -12,7 +12,7 @@ namespace fdi {
 
 /// A fault that may explain an episode.
 struct FaultCandidate {
-  int fault{0};          ///< 1..22, see diagnosis/fault_catalogue.h.
+  int fault{0};          ///< 1..27, see diagnosis/fault_catalogue.h.
   double factor{0.0};    ///< Decision factor d at the transition [-].
   double strength{0.0};  ///< Estimated; signed [-].
   bool isolated{false};  ///< Member of the isolated set.

@@ -27,7 +27,7 @@ storage::CauseGroup ReadGroup(cli::TomlReader& table) {
   if (const auto faults = table.Texts("faults"); !faults.empty()) {
     group.faults.clear();
     for (const std::string& name : faults) {
-      const auto fault = ParseFault(name);
+      const auto fault = ParseFinding(name);
       if (!fault) {
         table.Refuse("faults", "unknown fault '" + name + "'; there are " +
                                    std::string(kFaultNames));

@@ -30,7 +30,7 @@ void EpisodeOptions::AddTo(CLI::App& verb) {
 }
 
 EpisodeFilter EpisodeOptions::Filter(const Context& context) const {
-  if (!fault.empty() && fault != "unknown" && !ParseFault(fault)) {
+  if (!fault.empty() && fault != "unknown" && !ParseFinding(fault)) {
     throw ConfigError("--fault: unknown fault '" + fault + "'" +
                       DidYouMeanFault(fault, {"unknown"}) + ": expected " +
                       std::string(kFaultNames) + ", paper1..paper5 or unknown");

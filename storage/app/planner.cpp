@@ -39,7 +39,7 @@ Report Faults(const std::string& name, const Context& context) {
     return report.Table("faults", std::move(columns));
   }
   const std::string key =
-      name == "unknown" ? name : FaultName(RequireFault(name));
+      name == "unknown" ? name : FaultName(RequireFinding(name));
   Json& faults = report.document["faults"];
   std::erase_if(faults.get_ref<Json::array_t&>(),
                 [&key](const Json& row) { return row["fault"] != key; });

@@ -175,7 +175,7 @@ void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour) {
     channel = {static_cast<Signal>(signal), in.Get<std::int8_t>()};
   }
   GetBins(in, hour);
-  while (const std::size_t fault = GetCount(in, kLastFault, "fault")) {
+  while (const std::size_t fault = GetCount(in, kLastFinding, "fault")) {
     const std::int64_t samples = GetNumber(in);
     hour.AddStrength(static_cast<int>(fault), samples, GetNumber(in));
   }

@@ -64,7 +64,7 @@ std::string CheckedFaults(const std::string& faults) {
   }
   std::vector<int> numbers;
   for (const std::string& name : SplitNames(faults)) {
-    numbers.push_back(RequireFault(name));
+    numbers.push_back(RequireFinding(name));
   }
   if (numbers.empty()) {
     throw ConfigError("fault is empty; accepted are unknown and " +

@@ -205,7 +205,7 @@ std::vector<FaultCandidate> IsolatedCandidates(
     const std::vector<std::string>& names, double factor, double strength) {
   std::vector<FaultCandidate> candidates;
   for (const std::string& name : names) {
-    if (const auto fault = ParseFault(name)) {
+    if (const auto fault = ParseFinding(name)) {
       candidates.push_back({*fault, factor, strength, true});
     }
   }

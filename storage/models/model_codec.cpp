@@ -24,13 +24,16 @@ namespace fdi::storage {
 // The CRC-32 is of all bytes before it. Of a field stand: a double as its 64
 // bits; int as int32; int64 as it is; bool and enumerations as uint8; a text as
 // uint32 length and bytes; a list as uint32 count and its elements; a struct as
-// its fields. A new or moved field needs another kFormat.
+// its fields. A new or moved field needs another kFormat. A set without a floor
+// stands as format 3 had it, so that sets of before keep their bytes and hash.
 namespace {
 
 constexpr std::uint32_t kMagic = 0x4D494446;  // "FDIM"
+// 3, and one of these for each of the parts that stand behind the other fields.
 constexpr std::uint32_t kFormat = 3;
-// A set with physics has them behind all other fields.
-constexpr std::uint32_t kFormatWithPhysics = 4;
+constexpr std::uint32_t kWithPhysics = 1;
+constexpr std::uint32_t kWithFloor = 2;
+constexpr std::uint32_t kLastFormat = kFormat + kWithPhysics + kWithFloor;
 constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
@@ -69,6 +72,21 @@ template <typename A, Of<StuckLimits> T>
 void Fields(A& a, T& limits) {
   auto& [t1, p1, p2] = limits;
   a(t1, p1, p2);
+}
+
+template <typename A, Of<FloorLimits::Rod> T>
+void Fields(A& a, T& rod) {
+  auto& [share, rate] = rod;
+  a(share, rate);
+}
+
+template <typename A, Of<FloorLimits> T>
+void Fields(A& a, T& floor) {
+  auto& [delay, quick, slow, deviation, deviation_samples, stuck_travel,
+         flow_gain, flow_exponent, dp_level, flow_high, flow_factor,
+         flow_margin, flow_samples] = floor;
+  a(delay, quick, slow, deviation, deviation_samples, stuck_travel, flow_gain,
+    flow_exponent, dp_level, flow_high, flow_factor, flow_margin, flow_samples);
 }
 
 template <typename A, Of<Trapezoid> T>
@@ -163,7 +181,7 @@ template <typename A, Of<ModelSet> T>
 void Fields(A& a, T& models) {
   // version and content_hash are given by the store.
   auto& [name, version, content_hash, created_ns, software, preset,
-         sample_period_s, flow_unit, validity, stuck, decision, channels,
+         sample_period_s, flow_unit, validity, stuck, floor, decision, channels,
          observers, faults, groups, undetectable, training_runs,
          threshold_hours, false_alarms_per_hour, physics] = models;
   a(name, created_ns, software, preset, sample_period_s, flow_unit, validity,
@@ -171,7 +189,7 @@ void Fields(A& a, T& models) {
     Limited{observers, kMaxObservers}, Limited{faults, kMaxFaults},
     Limited{groups, kMaxFaults}, Limited{undetectable, kMaxFaults},
     Limited{training_runs, kMaxTrainingRuns}, threshold_hours,
-    false_alarms_per_hour);
+    false_alarms_per_hour, floor);
 }
 
 class Encoder {
@@ -189,6 +207,11 @@ class Encoder {
   void Field(bool value) { writer.Put(static_cast<std::uint8_t>(value)); }
   void Field(Signal value) { writer.Put(static_cast<std::uint8_t>(value)); }
   void Field(FlowUnit value) { writer.Put(static_cast<std::uint8_t>(value)); }
+  void Field(const std::optional<FloorLimits>& floor) {
+    if (floor) {
+      Field(*floor);
+    }
+  }
   void Field(const std::string& text) {
     CheckSize(text.size(), kMaxText);
     writer.PutText(text);
@@ -215,7 +238,8 @@ class Encoder {
 
 class Decoder {
  public:
-  explicit Decoder(ByteReader& reader) : reader_(reader) {}
+  Decoder(ByteReader& reader, std::uint32_t format)
+      : reader_(reader), format_(format) {}
 
   template <typename... T>
   void operator()(T&&... fields) {
@@ -233,6 +257,11 @@ class Decoder {
   void Field(FlowUnit& value) {
     value = static_cast<FlowUnit>(
         Small(static_cast<std::uint8_t>(FlowUnit::kTPerHour), "flow unit"));
+  }
+  void Field(std::optional<FloorLimits>& floor) {
+    if (((format_ - kFormat) & kWithFloor) != 0) {
+      Field(floor.emplace());
+    }
   }
   void Field(std::string& text) { text = reader_.GetText(kMaxText); }
   template <typename T>
@@ -258,6 +287,7 @@ class Decoder {
   }
 
   ByteReader& reader_;
+  std::uint32_t format_;
 };
 
 std::uint32_t Checksum(std::span<const std::byte> bytes) {
@@ -276,7 +306,8 @@ std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
   }
   ByteWriter writer;
   writer.Put(kMagic);
-  writer.Put(models.physics.empty() ? kFormat : kFormatWithPhysics);
+  writer.Put(kFormat + (models.physics.empty() ? 0U : kWithPhysics) +
+             (models.floor ? kWithFloor : 0U));
   writer.Put(static_cast<std::uint64_t>(payload.writer.size()));
   writer.Append(payload.writer.view().data(), payload.writer.size());
   writer.Put(Checksum(writer.view()));
@@ -295,20 +326,20 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
     reader.Refuse("its CRC-32 differs");
   }
   const auto format = reader.Get<std::uint32_t>();
-  if (format != kFormat && format != kFormatWithPhysics) {
-    throw DataError(
-        std::string(where) + ": format version " + std::to_string(format) +
-        ", this program reads " + std::to_string(kFormat) + " and " +
-        std::to_string(kFormatWithPhysics) + "; train the model set anew");
+  if (format < kFormat || format > kLastFormat) {
+    throw DataError(std::string(where) + ": format version " +
+                    std::to_string(format) + ", this program reads " +
+                    std::to_string(kFormat) + " to " +
+                    std::to_string(kLastFormat) + "; train the model set anew");
   }
   if (reader.Get<std::uint64_t>() != bytes.size() - kFrame) {
     reader.Refuse("its length differs");
   }
   ByteReader payload(reader.TakeBytes(bytes.size() - kFrame), where);
   ModelSet models;
-  Decoder decoder(payload);
+  Decoder decoder(payload, format);
   Fields(decoder, models);
-  if (format == kFormatWithPhysics) {
+  if (((format - kFormat) & kWithPhysics) != 0) {
     decoder(Limited{models.physics, kMaxPhysics});
   }
   payload.ExpectEnd();

@@ -36,7 +36,7 @@ class FaultTextsTest : public testing::Test {
 };
 
 TEST_F(FaultTextsTest, ShippedCatalogueHasWordsOfItsOwnForEveryFault) {
-  for (int fault = 0; fault <= kLastFault; ++fault) {
+  for (int fault = 0; fault <= kLastFinding; ++fault) {
     EXPECT_GT(texts_.Of(fault).check.size(), 60u) << fault;
     for (int other = 0; other < fault; ++other) {
       EXPECT_NE(texts_.Of(fault).name, texts_.Of(other).name);

@@ -252,11 +252,11 @@ TEST(CodecTest, WhatDoesNotFitIsNamed) {
   FaultEvent event;
   event.valve_id = "V";
   v1::FaultEvent wire;
-  event.candidates = {{kLastFault + 1, 0.9, 0.5, true}};
+  event.candidates = {{kLastFinding + 1, 0.9, 0.5, true}};
   EXPECT_THAT([&] { Codec<FaultEvent>::Encode(event, wire); },
               ThrowsMessage<DataError>(
-                  "candidates.fault is " + std::to_string(kLastFault + 1) +
-                  ", accepted are 1 to " + std::to_string(kLastFault)));
+                  "candidates.fault is " + std::to_string(kLastFinding + 1) +
+                  ", accepted are 1 to " + std::to_string(kLastFinding)));
   event.candidates.resize(kMaxFaults + 1, {1, 0.9, 0.5, true});
   EXPECT_THAT([&] { Codec<FaultEvent>::Encode(event, wire); },
               ThrowsMessage<DataError>(
@@ -271,12 +271,12 @@ TEST(CodecTest, WhatDoesNotFitIsNamed) {
 TEST(CodecTest, FaultsBeyondTheCatalogueAreNotDecoded) {
   FaultEvent event;
   event.valve_id = "V";
-  event.candidates = {{kLastFault, 0.9, 0.5, true}};
+  event.candidates = {{kLastFinding, 0.9, 0.5, true}};
   v1::FaultEvent wire;
   Codec<FaultEvent>::Encode(event, wire);
   ASSERT_TRUE(Codec<FaultEvent>::Decode(wire, event));
 
-  for (const int fault : {0, kLastFault + 1, 255}) {
+  for (const int fault : {0, kLastFinding + 1, 255}) {
     wire.candidates()[0].fault(static_cast<std::uint8_t>(fault));
     EXPECT_FALSE(Codec<FaultEvent>::Decode(wire, event)) << fault;
   }

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "diagnosis/student.h"
+
 namespace fdi::monitor {
 namespace {
 

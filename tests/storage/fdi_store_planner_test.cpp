@@ -62,7 +62,7 @@ TEST_F(FdiStorePlannerTest, WorkListAndCausesOfAnEmptyHistoryAreEmpty) {
 }
 
 TEST_F(FdiStorePlannerTest, CatalogueIsListedAndOverridden) {
-  EXPECT_EQ(StoreJson("faults")["faults"].size(), 23u);
+  EXPECT_EQ(StoreJson("faults")["faults"].size(), 28u);
   Write("faults.toml", "[f9]\nname = 'West header leaks'\n");
   EXPECT_EQ(StoreJson("faults f9")["faults"][0]["name"], "West header leaks");
   Write("faults.toml", "[f9]\nnane = 'x'\n");

@@ -101,6 +101,27 @@ TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
   EXPECT_EQ(v.mse, 5e-324);
 }
 
+// Sets of before there was a floor keep their format, their bytes and hash.
+TEST(ModelCodecTest, FloorIsPartOfTheNewerFormatAlone) {
+  ModelSet models = RandomModelSet("valve");
+  const auto without = EncodeModelSet(models);
+  EXPECT_EQ(std::to_integer<int>(without[4]), 3);
+  EXPECT_FALSE(DecodeModelSet(without, "test").floor.has_value());
+  FloorLimits& floor = models.floor.emplace();
+  floor.quick = {0.75, 20.0};
+  floor.slow.share = 0.25;
+  floor.delay = 2;
+  floor.flow_gain = 1.5;
+  floor.flow_samples = 11;
+  AddFindings(models);
+  const auto with = EncodeModelSet(models);
+  EXPECT_EQ(std::to_integer<int>(with[4]), 5);
+  const ModelSet back = DecodeModelSet(with, "test");
+  EXPECT_EQ(back.floor, models.floor);
+  EXPECT_EQ(back.faults, models.faults);
+  EXPECT_EQ(EncodeModelSet(back), with);
+}
+
 TEST(ModelCodecTest, PredictionsAreTheSameAfterReadingBack) {
   const ModelSet models = RandomModelSet("valve");
   const ModelSet back = DecodeModelSet(EncodeModelSet(models), "test");
@@ -165,7 +186,7 @@ TEST(ModelCodecTest, RefusalsNameThePlaceAndTheReason) {
   auto older = bytes;
   older[4] = std::byte{2};
   EXPECT_THAT(Refusal(WithValidChecksum(older)),
-              HasSubstr("format version 2, this program reads 3"));
+              HasSubstr("format version 2, this program reads 3 to 6"));
   EXPECT_THAT(Refusal({}), HasSubstr("is not a model set"));
   // The length of the name stands first in the payload, after 16 bytes.
   auto huge = bytes;

@@ -30,6 +30,24 @@ TEST_F(OnboardProgramTest, ShortRecordIsRefusedAndNothingIsStored) {
   EXPECT_EQ(Run("show FV-101").code, 5);
 }
 
+// Opening read as closing: before anything is fitted or stored.
+TEST_F(OnboardProgramTest, RecordThatCannotBeIsRefusedAndNothingIsStored) {
+  std::string csv = "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h\n";
+  for (int k = 0; k < 900; ++k) {
+    const int cv = 40 + k % 21;
+    csv += std::to_string(k) + "," + std::to_string(cv) + ",3500,2600,100," +
+           std::to_string(100 - cv) + ",17\n";
+  }
+  Write("against.csv", csv);
+  const Outcome outcome = Run("onboard --valve FV-101 --file against.csv");
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_NE(outcome.err.find("X moves against CV (correlation -1)"),
+            std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.err.find("sense = \"opening\""), std::string::npos);
+  EXPECT_EQ(Run("show FV-101").code, 5);
+}
+
 TEST_F(OnboardProgramTest, UnknownTypesAndSignalsAreNamed) {
   const Outcome signal = Run("coverage --signals CV,X,Q");
   EXPECT_EQ(signal.code, 2);

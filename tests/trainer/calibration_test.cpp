@@ -7,6 +7,7 @@
 
 #include "diagnosis/residual_windows.h"
 #include "tests/trainer/gaussian.h"
+#include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
@@ -97,6 +98,46 @@ TEST(TailFitTest, TooFewValuesAreRefused) {
   EXPECT_THROW(FitTail(GaussianSeries(99, 6), 1e-3, 1), std::invalid_argument);
 }
 
+// Records of ten blocks, and the day after, that wander by as much as the prior
+// says; by three times that it is believed a little too long.
+TEST(SlowAllowanceTest, AnotherDayStaysWithinItsShare) {
+  constexpr int kRecords = 1000;
+  constexpr std::size_t kBlock = 100;
+  for (const double stray : {0.2, 0.6}) {
+    const std::vector<double> noise =
+        GaussianSeries(kRecords * 10 * kBlock, 21);
+    const std::vector<double> days = GaussianSeries(kRecords * 11, 22);
+    int beyond = 0;
+    for (std::size_t i = 0; i < kRecords; ++i) {
+      std::vector<double> record;
+      for (std::size_t k = 0; k < 10 * kBlock; ++k) {
+        record.push_back(stray * days[11 * i + k / kBlock] +
+                         noise[10 * kBlock * i + k]);
+      }
+      const double day = stray * days[11 * i + 10];
+      beyond += day > Mean(record) + SlowAllowance({record}, kBlock, 0.2, 0.01);
+    }
+    EXPECT_GT(beyond, 0) << stray;
+    EXPECT_LT(beyond, stray == 0.2 ? 20 : 40) << stray;
+  }
+}
+
+TEST(SlowAllowanceTest, NarrowsWithHours) {
+  double last = 10.0;
+  for (const int hours : {1, 3, 12, 48}) {
+    const double now =
+        SlowAllowance({GaussianSeries(3600 * hours, 23)}, 600, 0.2, 1e-3);
+    EXPECT_LT(now, 0.8 * last) << hours;
+    last = now;
+  }
+  EXPECT_LT(last, 0.2);
+}
+
+// What the thresholds of a channel X with a window allow for another day.
+double Slow(const ResidualSeries& residuals) {
+  return SlowAllowance(residuals, 600, 0.2, 24.0 * 1e-3 / 5.0);
+}
+
 TEST(ThresholdsTest, ConsecutiveSamplesAllowALowerThreshold) {
   ModelSet models;
   models.channels = {{"X", Signal::kX, -1.0, 1.0}};
@@ -124,8 +165,9 @@ TEST(ThresholdsTest, WindowsAreLimitedWellWithinTheSamples) {
   ASSERT_EQ(models.channels[0].windows.size(), 1U);
   const WindowLimits& window = models.channels[0].windows[0];
   EXPECT_EQ(window.length, 50);
-  EXPECT_NEAR(window.upper_mean, 0.55, 0.15);
-  EXPECT_NEAR(window.lower_mean, -0.55, 0.15);
+  const double slow = Slow(residuals[0]);
+  EXPECT_NEAR(window.upper_mean - slow, 0.55, 0.15);
+  EXPECT_NEAR(window.lower_mean + slow, -0.55, 0.15);
   EXPECT_NEAR(window.upper_log_rms, 0.45, 0.2);
 }
 
@@ -188,9 +230,10 @@ TEST(ThresholdsTest, MeansOfInputsHaveRoomForAnotherDay) {
   for (const Signal output : {Signal::kX, Signal::kP2}) {
     ModelSet models;
     models.channels = {{"c", output, -1.0, 1.0}};
-    FitThresholds({{GaussianSeries(30000, 15)}}, {{60}}, 1e-3, models);
+    const ResidualSeries residuals{GaussianSeries(30000, 15)};
+    FitThresholds({residuals}, {{60}}, 1e-3, models);
     EXPECT_NEAR(models.channels[0].windows[0].upper_mean,
-                output == Signal::kX ? 0.55 : 2.0, 0.15);
+                output == Signal::kX ? 0.55 + Slow(residuals) : 2.0, 0.15);
   }
 }
 
@@ -225,8 +268,13 @@ TEST(ThresholdsTest, ShortRecordsBoundWindowsByTheirCorrelation) {
   FitThresholds({{white}, {slow}}, {{200}, {200}}, 1e-3, models);
   ASSERT_EQ(models.channels[0].windows.size(), 1U);
   ASSERT_EQ(models.channels[1].windows.size(), 1U);
-  EXPECT_NEAR(models.channels[0].windows[0].upper_mean, 0.5, 0.1);
-  EXPECT_NEAR(models.channels[1].windows[0].upper_mean, 1.5, 0.4);
+  const auto mean = [&](std::size_t c, const std::vector<double>& residuals) {
+    // Ten tests share the rate.
+    return models.channels[c].windows[0].upper_mean -
+           SlowAllowance({residuals}, 600, 0.2, 24.0 * 1e-3 / 10.0);
+  };
+  EXPECT_NEAR(mean(0, white), 0.5, 0.1);
+  EXPECT_NEAR(mean(1, slow), 1.5, 0.4);
   EXPECT_LT(models.channels[0].windows[0].upper_log_rms, std::log(2.0));
 }
 

@@ -9,6 +9,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "trainer/onboarding/record_checks.h"
 
 namespace fdi::trainer {
 namespace {
@@ -90,11 +91,70 @@ TEST(OnboardingFaultsTest, FaultsOfMissingTransmittersAreLeftOut) {
             static_cast<std::size_t>(kMaxObservers));
 }
 
+std::string Refusal(const std::function<void(Sample&)>& change) {
+  TrainingRun run = RunOf({"r", SimulateHealthy(Lublin(), 900.0, 3)});
+  for (LabelledSample& labelled : run.samples) {
+    change(labelled.sample);
+  }
+  try {
+    CheckRecords({run});
+  } catch (const DataError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void Scale(Sample& sample, Signal signal, double scale, double offset = 0.0) {
+  sample.Set(signal, scale * sample[signal] + offset);
+}
+
+TEST(RecordChecksTest, WrongUnitsAndSensesAreToldApart) {
+  using enum Signal;
+  const auto refused = [](const auto& change, const char* words) {
+    const std::string refusal = Refusal(change);
+    EXPECT_NE(refusal.find(words), std::string::npos) << refusal;
+  };
+  EXPECT_EQ(Refusal([](Sample&) {}), "");
+  refused([](Sample& s) { Scale(s, kCv, 0.01); }, "CV is 0.");
+  refused([](Sample& s) { Scale(s, kX, 0.01); }, "scale = 100");
+  refused(
+      [](Sample& s) {
+        Scale(s, kP1, 0.01);
+        Scale(s, kP2, 0.01);
+      },
+      "Map bar with scale = 100");
+  refused([](Sample& s) { Scale(s, kT1, 1.0, 273.15); }, "K with offset");
+  refused([](Sample& s) { std::swap(s.values[1], s.values[2]); },
+          "above P2 behind it");
+  refused([](Sample& s) { Scale(s, kX, -1.0, 100.0); }, "X moves against CV");
+  refused([](Sample& s) { Scale(s, kCv, -1.0, 100.0); }, "X moves against CV");
+  refused(
+      [](Sample& s) {
+        Scale(s, kCv, -1.0, 100.0);
+        Scale(s, kX, -1.0, 100.0);
+      },
+      "F rises while X closes");
+}
+
+TEST(RecordChecksTest, SimulationHasToBeBetterThanNone) {
+  const std::vector<TrainingRun> runs{
+      RunOf({"r", SimulateHealthy(Lublin(), 900.0, 3)})};
+  simulator::FittedParameter kv{"trim.kv_m3_h", 100.0, 120.0, 30.0,
+                                480.0,          0.01,  true};
+  EXPECT_NO_THROW(CheckFit(runs, {0.5, 0.2, 0.0, 0.0}, {kv}));
+  EXPECT_THROW(CheckFit(runs, {30.0, 0.2, 0.0, 0.0}, {kv}), DataError);
+  EXPECT_THROW(CheckFit(runs, {0.5, 30.0, 0.0, 0.0}, {kv}), DataError);
+  kv.value = 480.0;
+  EXPECT_THROW(CheckFit(runs, {0.5, 0.2, 0.0, 0.0}, {kv}), DataError);
+  kv.identified = false;
+  EXPECT_NO_THROW(CheckFit(runs, {0.5, 0.2, 0.0, 0.0}, {kv}));
+}
+
 // Models of a few faults; what a table says of a fault that is as plain as
 // half the flow, and of one that has no effect on X.
 TEST(CoverageTest, SaysFromWhichStrengthOnAFaultIsSeen) {
   const FaultSynthesizer synthesize(Lublin());
-  const Stretch healthy = Strange(1500.0);
+  const Stretch healthy = Strange(4000.0);
   const std::vector<FaultCondition> faults{
       {8, 0.5}, {8, 1.0}, {19, 0.005}, {19, 0.25}, {19, 0.5}};
   TrainingOptions options = OnboardingPreset(kBasicSignals);

@@ -7,6 +7,7 @@
 #include "diagnosis/fault_catalogue.h"
 #include "storage/models/model_codec.h"
 #include "trainer/rule_text.h"
+#include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
@@ -181,8 +182,23 @@ void AddModelTables(const ModelSet& models, cli::Report& report) {
        {.heading = "regressors", .key = "", .text = regressors_of}});
   report.Line(WindowsText(models));
   report.Table("observers", std::move(figures));
-  report.Line("\nnot told apart: " + GroupsText(models) +
+  report.Line("\n" + AlarmRateText(models) +
+              "\nnot told apart: " + GroupsText(models) +
               "\nundetectable: " + FaultsText(models.undetectable));
+}
+
+std::string AlarmRateText(const ModelSet& models) {
+  std::string text =
+      "limits set for one false alarm in " +
+      FormatNumber(1.0 / models.false_alarms_per_hour, 0) + " h; seen were " +
+      FormatNumber(models.threshold_hours, 2) + " h without fault";
+  if (models.threshold_hours > 0.0) {
+    const double bound =
+        RateOf(0, models.threshold_hours).upper / kHoursPerYear;
+    text += ", which alone say below " + FormatNumber(bound, 2) +
+            " false alarms per hour (95 %)";
+  }
+  return text;
 }
 
 cli::Column StrengthColumn() {

@@ -12,6 +12,9 @@ namespace fdi::trainer {
 std::string GroupsText(const ModelSet& models);
 /// "f8, f14"; "none".
 std::string FaultsText(const std::vector<int>& faults);
+/// What is known about false alarms: the rate that the limits are set for, the
+/// hours that were seen, and what these alone bound.
+std::string AlarmRateText(const ModelSet& models);
 /// ["f8", "f14"]
 cli::Json FaultsJson(const std::vector<int>& faults);
 

@@ -262,11 +262,13 @@ cli::Report ReportOf(const Onboarding& onboarding, const std::string& title) {
       "mean\n");
   report.Line("model set " + NameOf(models) + ", hash " +
               storage::HashHex(models.content_hash) + ", " +
-              std::to_string(models.observers.size()) +
-              " observers; thresholds for " +
-              FormatNumber(models.false_alarms_per_hour * kHoursPerYear, 1) +
-              " false alarms per valve-year from " +
-              FormatNumber(models.threshold_hours, 2) + " h");
+              std::to_string(models.observers.size()) + " observers");
+  report.Line(AlarmRateText(models));
+  if (onboarding.left_out_s > 0.0) {
+    report.Line(FormatNumber(onboarding.left_out_s, 0) +
+                " s of the record with X at a stop, and the minute after, were "
+                "left out");
+  }
   report.Line("not told apart: " + GroupsText(models) +
               "; not seen at half their strengths: " +
               FaultsText(models.undetectable) + "\n");

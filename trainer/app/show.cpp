@@ -399,10 +399,7 @@ void AddSummary(const ModelSet& models, const storage::Lineage& lineage,
            field("commands", Text(models.validity.cv.minimum) + ".." +
                                  Text(models.validity.cv.maximum) + " %"),
            field("faults", FaultsText(models.faults)),
-           field("thresholds", "for " + Text(models.false_alarms_per_hour) +
-                                   " false alarms per hour, from " +
-                                   Text(models.threshold_hours) +
-                                   " h without fault"),
+           field("false alarms", AlarmRateText(models)),
            field("decision", DecisionText(models.decision)),
            field("built on", cli::ParentText(lineage)),
            field("training runs", TrainingRunsText(models))});

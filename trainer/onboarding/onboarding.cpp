@@ -10,6 +10,7 @@
 #include "simulator/second_look/valve_physics.h"
 #include "simulator/valve_equations.h"
 #include "trainer/evaluation.h"
+#include "trainer/onboarding/record_checks.h"
 #include "trainer/parallel_for.h"
 
 namespace fdi::trainer {
@@ -199,6 +200,34 @@ TrainingOptions OnboardingPreset(SignalMask signals) {
   return options;
 }
 
+std::vector<TrainingRun> WithoutStops(std::vector<TrainingRun> runs) {
+  constexpr double kStop = 2.0;  // from an end of the travel [%]
+  constexpr double kAfterS = 60.0;
+  constexpr double kRarely = 0.05;
+  const auto at_stop = [](const LabelledSample& labelled) {
+    const double x = labelled.sample[Signal::kX];
+    return x <= kStop || x >= 100.0 - kStop;
+  };
+  double stops = 0.0;
+  double samples = 0.0;
+  for (const TrainingRun& run : runs) {
+    stops += static_cast<double>(std::ranges::count_if(run.samples, at_stop));
+    samples += static_cast<double>(run.samples.size());
+  }
+  if (stops > kRarely * samples) {
+    return runs;
+  }
+  for (TrainingRun& run : runs) {
+    double since_s = kAfterS;
+    std::erase_if(run.samples, [&](const LabelledSample& labelled) {
+      since_s = at_stop(labelled) ? 0.0 : since_s + run.period_s;
+      return since_s < kAfterS;
+    });
+  }
+  std::erase_if(runs, [](const auto& run) { return run.samples.empty(); });
+  return runs;
+}
+
 namespace {
 
 // Shares of the work, for the progress bar.
@@ -376,12 +405,40 @@ CoverageTable AssessSubset(const ValveType& type, const TrainingRun& full,
 
 }  // namespace
 
-Onboarding Onboard(const std::vector<TrainingRun>& runs,
+namespace {
+
+// The type as it is against the longest stretch.
+simulator::RecordFit Compare(const std::vector<TrainingRun>& runs,
+                             const ValveType& type) {
+  constexpr std::size_t kSettling = 60;
+  const std::vector<simulator::HealthyRecord> records =
+      Records(runs, type.levels);
+  const simulator::HealthyRecord& longest = *std::ranges::max_element(
+      records, {}, [](const auto& record) { return record.rows.size(); });
+  return simulator::FitToRecord(
+      type.parameters, longest.rows, kSettling, longest.rows.size(),
+      {runs.front().period_s, type.interpolated_command});
+}
+
+double Hours(const std::vector<TrainingRun>& runs) {
+  double hours = 0.0;
+  for (const TrainingRun& run : runs) {
+    hours += run.period_s * static_cast<double>(run.samples.size()) / 3600.0;
+  }
+  return hours;
+}
+
+}  // namespace
+
+Onboarding Onboard(const std::vector<TrainingRun>& all,
                    const OnboardingOptions& options, const Progress& progress) {
+  RequireHealthy(all);
+  const std::vector<TrainingRun> runs = WithoutStops(all);
   RequireHealthy(runs);
   const SignalMask signals =
       runs.front().samples.front().sample.present & kBasicSignals;
   const TrainingOptions training = TrainingOf(options, signals);
+  CheckRecords(runs);
   Onboarding result;
   result.type = (signals & MaskOf(Signal::kF)) != 0
                     ? InUnit(options.type, runs.front().flow_unit)
@@ -395,6 +452,9 @@ Onboarding Onboard(const std::vector<TrainingRun>& runs,
     result.type.parameters = result.fit->parameters;
     result.type.interpolated_command = result.fit->interpolated_command;
     result.type.command_delay = result.fit->command_delay;
+    CheckFit(runs, result.fit->fitted, result.fit->values);
+  } else {
+    CheckFit(runs, Compare(runs, result.type), {});
   }
   const FaultSynthesizer synthesize(result.type);
   const std::vector<FaultCondition> faults = OnboardingFaults(signals);
@@ -404,10 +464,8 @@ Onboarding Onboard(const std::vector<TrainingRun>& runs,
                          Part(progress, kFitShare, kTrainShare));
   result.models.physics = Physics(result.type, runs);
   result.channels = FitsOf(result.models, runs);
-  for (const TrainingRun& run : runs) {
-    result.hours +=
-        run.period_s * static_cast<double>(run.samples.size()) / 3600.0;
-  }
+  result.hours = Hours(all);
+  result.left_out_s = 3600.0 * (result.hours - Hours(runs));
   if (options.assess) {
     Part(progress, kFitShare + kTrainShare, 0.0)(0.0, "scoring every fault");
     result.coverage =

@@ -92,9 +92,15 @@ struct Onboarding {
   std::optional<simulator::ValveFit> fit;
   std::vector<ChannelFit> channels;
   std::optional<CoverageTable> coverage;
-  SignalMask signals{0};  ///< That the valve measures.
-  double hours{0.0};      ///< Of healthy data.
+  SignalMask signals{0};   ///< That the valve measures.
+  double hours{0.0};       ///< Of healthy data.
+  double left_out_s{0.0};  ///< Of them at a stop, or just after (WithoutStops).
 };
+
+/// The runs without the samples at which X is at a stop, and the minute after
+/// each: a start-up in the record is not how the valve works. A valve that is
+/// at a stop in more than 5 % of the samples works there, and keeps them all.
+std::vector<TrainingRun> WithoutStops(std::vector<TrainingRun> runs);
 
 /// Makes a model set for a valve from healthy runs alone: fits the physical
 /// parameters of the type to them, simulates every fault of OnboardingFaults()

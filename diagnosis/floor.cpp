@@ -1,0 +1,178 @@
+#include "diagnosis/floor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "diagnosis/fault_catalogue.h"
+
+namespace fdi {
+namespace {
+
+constexpr double kShut = 98.0;       // of CV and X [%]
+constexpr double kStop = 2.0;        // from an end of the travel [%]
+constexpr int kBreakaway = 5;        // samples that a rod may rest
+constexpr int kStuckSamples = 10;    // of the position; twice as many of F
+constexpr double kFlowBorder = 0.9;  // of the largest flow: no saturation
+
+}  // namespace
+
+double Follow(const FloorLimits::Rod& rod, double x, double command) {
+  return x + std::clamp(rod.share * (command - x), -rod.rate, rod.rate);
+}
+
+void RodBand::Restart(double x) {
+  quick_ = slow_ = std::clamp(x, 0.0, 100.0);
+  commands_.fill(quick_);
+  resting_ = true;
+  wait_ = kBreakaway;
+}
+
+void RodBand::Step(double command) {
+  std::shift_right(commands_.begin(), commands_.end(), 1);
+  commands_[0] = std::clamp(command, 0.0, 100.0);
+  const double target = commands_[static_cast<std::size_t>(limits_->delay)];
+  quick_ = Follow(limits_->quick, quick_, target);
+  wait_ = resting_ && wait_ > 0 && std::abs(target - slow_) > kStop ? wait_ - 1
+                                                                    : wait_;
+  if (!resting_ || wait_ == 0) {
+    slow_ = Follow(limits_->slow, slow_, target);
+    resting_ = slow_ < kStop || slow_ > 100.0 - kStop;
+    const bool left = std::abs(target - slow_) > kStop;
+    wait_ = resting_ && !left ? kBreakaway : wait_;
+  }
+}
+
+double RodBand::Beyond(double x) const {
+  return x - std::clamp(x, std::min(quick_, slow_), std::max(quick_, slow_));
+}
+
+double FlowAt(const FloorLimits& floor, double x, double dp) {
+  return floor.flow_gain * std::exp(-0.01 * floor.flow_exponent * x) *
+         std::sqrt(std::max(dp, 0.0));
+}
+
+Floor::Floor(const ModelSet& models)
+    : limits_(models.floor ? &*models.floor : nullptr),
+      first_(models.faults.size() - (models.floor ? kTests : 0)) {
+  if (limits_ != nullptr) {
+    rod_.emplace(*limits_);
+  }
+}
+
+void Floor::Restart() {
+  follows_ = false;
+  tests_ = {};
+  position_ = {};
+  flow_ = {};
+  findings_ = 0;
+}
+
+void Floor::Push(const Sample& sample) {
+  if (limits_ == nullptr) {
+    return;
+  }
+  if (sample.mode != ValveMode::kAuto || !sample.Has(Signal::kCv) ||
+      !sample.Has(Signal::kX)) {
+    Restart();
+    return;
+  }
+  if (!follows_) {
+    rod_->Restart(sample[Signal::kX]);
+    follows_ = true;
+  }
+  rod_->Step(sample[Signal::kCv]);
+  PushTravel(sample);
+  if (limits_->flow_gain > 0.0 && sample.Has(Signal::kF)) {
+    PushFlow(sample);
+  }
+  findings_ = 0;
+  for (std::size_t i = 0; i < kTests; ++i) {
+    findings_ |= tests_[i].found ? FaultSet{1} << (first_ + i) : 0;
+  }
+}
+
+void Floor::Count(int finding, bool beyond, double size, int needed,
+                  std::int64_t stamp_ns) {
+  Test& test = tests_[static_cast<std::size_t>(finding - kTravelDeviation)];
+  test.since_ns = beyond && test.length == 0 ? stamp_ns : test.since_ns;
+  test.length = beyond ? std::min(test.length + 1, needed) : 0;
+  test.size = std::clamp(size, -1.0, 1.0);
+  test.found = test.length >= needed;
+}
+
+// A reading that repeats while what it should follow goes further than `most`.
+void Floor::Watch(int finding, double reading, Expectations expected,
+                  double most, bool counts, const Sample& sample,
+                  Repeat& repeat) {
+  if (repeat.length == 0 || !counts || reading != repeat.reading) {
+    repeat = {reading, sample.stamp_ns, 0, expected, expected};
+  }
+  const int needed =
+      finding == kPositionStuck ? kStuckSamples : 2 * kStuckSamples;
+  repeat.length = std::min(repeat.length + 1, needed);
+  double travel = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    repeat.lowest[i] = std::min(repeat.lowest[i], expected[i]);
+    repeat.highest[i] = std::max(repeat.highest[i], expected[i]);
+    travel = std::min(travel, repeat.highest[i] - repeat.lowest[i]);
+  }
+  Test& test = tests_[static_cast<std::size_t>(finding - kTravelDeviation)];
+  test.found = repeat.length >= needed && travel > most;
+  test.since_ns = repeat.since_ns;
+  test.size = test.found ? 1.0 : 0.0;
+}
+
+void Floor::PushTravel(const Sample& sample) {
+  const double x = sample[Signal::kX];
+  const double deviation = rod_->Beyond(x);
+  // The sides count apart: noise that is beyond both limits in turn is neither.
+  Test& test = tests_[0];
+  if (test.length > 0 && std::signbit(test.size) != std::signbit(deviation)) {
+    test.length = 0;
+  }
+  Count(kTravelDeviation, std::abs(deviation) > limits_->deviation,
+        0.01 * deviation, limits_->deviation_samples, sample.stamp_ns);
+  // Neither stop moves, whatever the command does beyond it.
+  const auto within = [](double at) {
+    return std::clamp(at, kStop, 100.0 - kStop);
+  };
+  Watch(kPositionStuck, x, {within(rod_->quick()), within(rod_->slow())},
+        limits_->stuck_travel, true, sample, position_);
+}
+
+double Floor::Expected(double x, const Sample& sample) const {
+  return FlowAt(*limits_, x,
+                sample.Has(Signal::kP1) && sample.Has(Signal::kP2)
+                    ? sample[Signal::kP1] - sample[Signal::kP2]
+                    : limits_->dp_level);
+}
+
+void Floor::PushFlow(const Sample& sample) {
+  const double x = sample[Signal::kX];
+  const double flow = sample[Signal::kF];
+  const double margin = limits_->flow_margin * limits_->flow_high;
+  const bool shut = x >= kShut && sample[Signal::kCv] >= kShut;
+  Count(kShutFlow, shut && flow > margin, flow / limits_->flow_high,
+        limits_->flow_samples, sample.stamp_ns);
+  const double most =
+      limits_->flow_factor * Expected(x - 0.5 * limits_->deviation, sample) +
+      margin;
+  Count(kExcessFlow, !shut && flow > most, (flow - most) / limits_->flow_high,
+        limits_->flow_samples, sample.stamp_ns);
+  const bool within = flow > margin && flow < kFlowBorder * limits_->flow_high;
+  const double expected = Expected(x, sample);
+  Watch(kFlowStuck, flow, {expected, expected}, margin, within, sample, flow_);
+}
+
+std::optional<std::int64_t> Floor::stamp_ns() const {
+  std::optional<std::int64_t> stamp;
+  for (const Test& test : tests_) {
+    if (test.found) {
+      stamp = std::min(stamp.value_or(test.since_ns), test.since_ns);
+    }
+  }
+  return stamp;
+}
+
+}  // namespace fdi

@@ -1,0 +1,293 @@
+#include "diagnosis/floor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/valve_engine.h"
+#include "tests/diagnosis/linear_plant.h"
+
+namespace fdi {
+namespace {
+
+constexpr double kDp = 900.0;
+
+// The linear plant with a rod that takes 1 to 3 s. F = 100 exp(-2 X) at kDp.
+ModelSet FlooredPlant() {
+  ModelSet models = testing::LinearPlant();
+  FloorLimits& floor = models.floor.emplace();
+  floor.quick = {1.0, 100.0};
+  floor.slow = {0.4, 8.0};
+  floor.flow_gain = 100.0 / std::sqrt(kDp);
+  floor.flow_exponent = 2.0;
+  floor.dp_level = kDp;
+  floor.flow_high = 60.0;
+  AddFindings(models);
+  return models;
+}
+
+struct Valve {
+  double cv{50.0};
+  double x{50.0};
+  std::optional<double> flow{};  // else what the opening passes
+  ValveMode mode{ValveMode::kAuto};
+};
+
+Sample At(int k, const Valve& valve) {
+  Sample sample;
+  sample.stamp_ns = (k + 1LL) * 1'000'000'000;
+  sample.source_id = 7;
+  sample.seq = static_cast<std::uint64_t>(k);
+  sample.mode = valve.mode;
+  sample.Set(Signal::kCv, valve.cv);
+  sample.Set(Signal::kX, valve.x);
+  sample.Set(Signal::kF,
+             valve.flow.value_or(100.0 * std::exp(-0.02 * valve.x)));
+  return sample;
+}
+
+// The number of the first sample with a finding, by finding; -1 without.
+std::vector<int> FirstFindings(const std::function<Valve(int)>& history,
+                               int samples = 200) {
+  const ModelSet models = FlooredPlant();
+  Floor floor(models);
+  std::vector<int> first(Floor::kTests, -1);
+  for (int k = 0; k < samples; ++k) {
+    floor.Push(At(k, history(k)));
+    for (std::size_t i = 0; i < Floor::kTests; ++i) {
+      const bool found = (floor.findings() >> (floor.first() + i) & 1U) != 0;
+      first[i] = first[i] < 0 && found ? k : first[i];
+    }
+  }
+  return first;
+}
+
+int Of(int finding, const std::vector<int>& first) {
+  return first[static_cast<std::size_t>(finding - kTravelDeviation)];
+}
+
+const std::vector<int> kNothing(Floor::kTests, -1);
+
+// From stop to stop, as fast as any command, the rod as slow as it may be.
+TEST(FloorTest, CommandedTravelIsNoFinding) {
+  for (const bool slow : {false, true}) {
+    double x = 50.0;
+    EXPECT_EQ(FirstFindings([&](int k) {
+                const double cv =
+                    std::vector{0.0, 100.0, 30.0,
+                                80.0}[static_cast<std::size_t>(k / 50 % 4)];
+                x = Follow(slow ? FloorLimits::Rod{0.4, 8.0}
+                                : FloorLimits::Rod{1.0, 100.0},
+                           x, cv);
+                // A reading that is off by 6 % and noisy is still healthy.
+                return Valve{cv, x + 5.0 + 0.1 * (k % 3), 5.0};
+              }),
+              kNothing);
+  }
+}
+
+// Nor is a rod that rests at its stop until its chamber is filled.
+TEST(FloorTest, BreakawayFromAStopIsNoFinding) {
+  for (const int start : {0, 60}) {
+    double x = 0.0;
+    EXPECT_EQ(FirstFindings([&](int k) {
+                const double cv = k < start ? 0.0 : 90.0;
+                x = k < start + 4 ? 0.0 : Follow({0.4, 12.0}, x, cv);
+                return Valve{cv, x, 5.0};
+              }),
+              kNothing)
+        << start;
+  }
+}
+
+// The rod leaves a command that wanders by 8 %, as a noisy loop's does.
+TEST(FloorTest, NoLaterThanThePositionersAlert) {
+  for (const double rate : {0.5, 2.0, 5.0, 60.0}) {
+    int run = 0;
+    int alert = -1;
+    const auto history = [&](int k) {
+      Valve valve;
+      valve.cv = 50.0 + 8.0 * std::sin(2.1 * k) * std::cos(0.37 * k);
+      valve.x = k < 60 ? valve.cv : std::max(50.0 - rate * (k - 60), 0.0);
+      run = std::abs(valve.cv - valve.x) > 20.0 ? run + 1 : 0;
+      alert = alert < 0 && run >= 5 ? k : alert;
+      return valve;
+    };
+    const int found = Of(kTravelDeviation, FirstFindings(history));
+    ASSERT_GE(alert, 60);
+    EXPECT_GE(found, 60);
+    EXPECT_LE(found, alert) << rate;
+  }
+}
+
+TEST(FloorTest, StreamThatBeginsWithTheFaultIsNoExcuse) {
+  // The rod lies at its stop before the first sample.
+  const int found = Of(kTravelDeviation, FirstFindings([](int) {
+                         return Valve{60.0, 0.3};
+                       }));
+  EXPECT_GT(found, 0);
+  EXPECT_LE(found, 15);
+}
+
+TEST(FloorTest, FlowThroughAShutValve) {
+  const auto shut = [](double flow) {
+    return FirstFindings([flow](int) { return Valve{100.0, 99.5, flow}; });
+  };
+  EXPECT_EQ(shut(5.0), kNothing);
+  EXPECT_EQ(Of(kShutFlow, shut(8.0)), 9);
+}
+
+TEST(FloorTest, FlowThatNoOpeningPasses) {
+  const auto at = [](double flow) {
+    return FirstFindings([flow](int k) {
+      return Valve{70.0, 70.0, flow + 0.1 * (k % 2)};
+    });
+  };
+  // 24.7 at X; 1.5 times that at 65 %, and a tenth of 60.
+  EXPECT_EQ(at(46.0), kNothing);
+  EXPECT_EQ(Of(kExcessFlow, at(48.0)), 9);
+}
+
+TEST(FloorTest, ReadingsThatRepeatWhileTheyShouldMove) {
+  const auto sine = [](int k) {
+    return 50.0 + 20.0 * std::sin(2.0 * std::numbers::pi * k / 60.0);
+  };
+  const auto stuck = [&](bool position, bool flow) {
+    return FirstFindings([&, position, flow](int k) {
+      Valve valve{sine(k), sine(k)};
+      valve.x = position ? 50.0 : valve.x;
+      if (flow) {
+        valve.flow = 36.0;
+      }
+      return valve;
+    });
+  };
+  EXPECT_EQ(stuck(false, false), kNothing);
+  EXPECT_GT(Of(kPositionStuck, stuck(true, false)), 0);
+  EXPECT_LE(Of(kPositionStuck, stuck(true, false)), 20);
+  EXPECT_GT(Of(kFlowStuck, stuck(false, true)), 0);
+  // A rod that rests, and one at its stop, repeat themselves.
+  EXPECT_EQ(FirstFindings([](int) { return Valve{}; }), kNothing);
+  EXPECT_EQ(FirstFindings([](int k) {
+              return Valve{k % 2 == 0 ? -3.0 : 1.0, 0.0, 100.0};
+            })[kPositionStuck - kTravelDeviation],
+            -1);
+}
+
+TEST(FloorTest, HoldsInAutoOnlyAndNeverWithoutLimits) {
+  EXPECT_EQ(FirstFindings([](int) {
+              return Valve{90.0, 10.0, 100.0, ValveMode::kManual};
+            }),
+            kNothing);
+  const ModelSet models = testing::LinearPlant();
+  Floor floor(models);
+  for (int k = 0; k < 100; ++k) {
+    floor.Push(At(k, {90.0, 10.0}));
+    EXPECT_EQ(floor.findings(), 0U);
+  }
+}
+
+struct Followed {
+  std::vector<Transition> transitions;
+  std::vector<Quality> qualities;
+};
+
+Followed Engine(const ModelSet& models, int samples,
+                const std::function<Valve(int)>& history) {
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  Followed followed;
+  for (int k = 0; k < samples; ++k) {
+    const Verdict& verdict = engine.Step(At(k, history(k)));
+    followed.qualities.push_back(verdict.quality);
+    for (const Transition& transition : verdict.Transitions()) {
+      followed.transitions.push_back(transition);
+    }
+  }
+  return followed;
+}
+
+// Before the observers have settled, and at commands that none was trained on.
+TEST(FloorTest, OpensAnEpisodeBeforeTheObserversMay) {
+  ModelSet models = FlooredPlant();
+  models.validity.cv = {0.0, 55.0};
+  models.decision.settling_samples = 30;
+  const Followed seen = Engine(models, 100, [](int) {
+    return Valve{80.0, 20.0};
+  });
+  ASSERT_GE(seen.transitions.size(), 2U);
+  EXPECT_EQ(seen.transitions[0].kind, TransitionKind::kDetected);
+  EXPECT_LT(seen.transitions[0].stamp_ns, 20'000'000'000);
+  EXPECT_EQ(seen.transitions[1].kind, TransitionKind::kIsolated);
+  EXPECT_EQ(FaultSetName(models, seen.transitions[1].faults),
+            "travel_deviation");
+  EXPECT_EQ(seen.qualities.back(), Quality::kLive);
+}
+
+// The fault moves the command, by more than any step in training and out of
+// the trained range: f6 is named all the same. Sets of before wait outside.
+TEST(FloorTest, AbnormalValveStaysJudgedWhateverItsCommandDoes) {
+  for (const bool floored : {false, true}) {
+    ModelSet models = floored ? FlooredPlant() : testing::LinearPlant();
+    models.validity.cv = {40.0, 60.0};
+    models.validity.cv_step = 10.0;
+    const Followed seen = Engine(models, 200, [](int k) {
+      const double wave = 3.0 * std::sin(0.3 * k);
+      const double cv = (k > 100 ? 75.0 : 50.0) + wave;
+      return Valve{cv, cv, 100.0 - cv + (k >= 100 ? 20.0 : 0.0)};
+    });
+    const bool named =
+        std::ranges::any_of(seen.transitions, [&](const Transition& t) {
+          return FaultSetName(models, t.faults).find("f6") != std::string::npos;
+        });
+    EXPECT_EQ(named, floored);
+    EXPECT_EQ(seen.qualities.back(),
+              floored ? Quality::kLive : Quality::kUncovered);
+  }
+}
+
+// Without a deviation the region holds as it does without a floor.
+TEST(FloorTest, HealthyValveThatLeavesItsRegionIsUncovered) {
+  ModelSet models = FlooredPlant();
+  models.validity.cv = {40.0, 60.0};
+  const Followed seen = Engine(models, 200, [](int k) {
+    const double cv = k >= 100 ? 75.0 : 50.0;
+    return Valve{cv, cv, 100.0 - cv};
+  });
+  EXPECT_TRUE(seen.transitions.empty());
+  EXPECT_EQ(seen.qualities[99], Quality::kLive);
+  EXPECT_EQ(seen.qualities[100], Quality::kUncovered);
+}
+
+// Six faults that predict the same.
+TEST(FloorTest, MoreThanFourFaultsAreNoName) {
+  for (const int faults : {4, 6}) {
+    ModelSet models = FlooredPlant();
+    models.floor->flow_gain = 0.0;
+    models.observers.resize(1);
+    models.faults.clear();
+    for (int fault = 1; fault <= faults; ++fault) {
+      models.observers.push_back(testing::F6(1.0));
+      models.observers.back().fault = fault;
+      models.faults.push_back(fault);
+    }
+    AddFindings(models);
+    const Followed seen = Engine(models, 200, [](int k) {
+      const double cv = 50.0 + 20.0 * std::sin(0.15 * k);
+      return Valve{cv, cv, 100.0 - cv + (k >= 100 ? 20.0 : 0.0)};
+    });
+    ASSERT_FALSE(seen.transitions.empty());
+    EXPECT_EQ(seen.transitions.back().kind, faults == 4
+                                                ? TransitionKind::kIsolated
+                                                : TransitionKind::kDetected);
+  }
+}
+
+}  // namespace
+}  // namespace fdi

@@ -1,0 +1,68 @@
+#include "trainer/floor_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/floor.h"
+#include "tests/trainer/gaussian.h"
+
+namespace fdi::trainer {
+namespace {
+
+// A rod that closes at 8 %/s and opens at 3 %/s, a second after its command,
+// and F = 2 exp(-3 X) sqrt(dP) with noise of 3 %.
+Condition Healthy(double opening, bool flow = true) {
+  const std::vector<double> noise = GaussianSeries(6000, 31);
+  Stretch stretch{"r", {}};
+  double x = 60.0;
+  double cv = 60.0;
+  for (std::size_t k = 0; k < 3000; ++k) {
+    x = Follow({0.8, cv > x ? 8.0 : opening}, x, cv);
+    cv = std::clamp(60.0 + 15.0 * std::sin(0.02 * static_cast<double>(k)) +
+                        5.0 * noise[2 * k],
+                    0.0, 100.0);
+    Sample sample;
+    sample.stamp_ns = static_cast<std::int64_t>(k + 1) * 1'000'000'000;
+    sample.Set(Signal::kCv, cv);
+    sample.Set(Signal::kX, x);
+    sample.Set(Signal::kP1, 3500.0);
+    sample.Set(Signal::kP2, 2600.0);
+    if (flow) {
+      sample.Set(Signal::kF,
+                 60.0 * std::exp(-0.03 * x) * (1.0 + 0.03 * noise[2 * k + 1]));
+    }
+    stretch.samples.push_back(sample);
+  }
+  Condition normal;
+  normal.training = {stretch};
+  normal.validation = {{"r", {}}};
+  return normal;
+}
+
+TEST(FloorFitTest, FindsTheAnswersOfTheRodAndTheLawOfTheFlow) {
+  const auto floor = FitFloor(Healthy(3.0), 1.0);
+  ASSERT_TRUE(floor.has_value());
+  EXPECT_EQ(floor->delay, 1);
+  EXPECT_GE(floor->quick.rate, 8.0);
+  EXPECT_LE(floor->slow.rate, 1.5);
+  EXPECT_GE(floor->slow.rate, 1.0);
+  EXPECT_EQ(floor->deviation, 8.0);
+  EXPECT_EQ(floor->deviation_samples, 5);
+  EXPECT_NEAR(floor->flow_exponent, 3.0, 0.1);
+  EXPECT_NEAR(FlowAt(*floor, 60.0, 900.0), 60.0 * std::exp(-1.8), 0.2);
+  EXPECT_EQ(floor->flow_factor, 1.5);
+}
+
+TEST(FloorFitTest, TimesAreSecondsWhateverThePeriod) {
+  EXPECT_EQ(FitFloor(Healthy(3.0), 0.5)->deviation_samples, 10);
+  EXPECT_EQ(FitFloor(Healthy(3.0), 10.0)->deviation_samples, 2);
+}
+
+TEST(FloorFitTest, NoFlowNoLimitOnIt) {
+  EXPECT_EQ(FitFloor(Healthy(3.0, false), 1.0)->flow_gain, 0.0);
+}
+
+}  // namespace
+}  // namespace fdi::trainer

@@ -1,0 +1,237 @@
+#include "trainer/floor_fit.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "diagnosis/floor.h"
+
+namespace fdi::trainer {
+namespace {
+
+constexpr std::array kShares{0.15, 0.25, 0.35, 0.5, 0.65, 0.8, 1.0};
+constexpr std::array kRates{2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 100.0};
+constexpr int kDelays = 3;
+constexpr std::size_t kMost = 7200;     // samples that dynamics are sought on
+constexpr std::size_t kSettling = 30;   // samples of every stretch
+constexpr double kLargestError = 10.0;  // counts; one more is an outlier [%]
+constexpr double kTolerance = 1.1;      // of the smallest squared error
+constexpr double kSlower = 0.5;       // than any rate that explains the record
+constexpr double kLeastError = 0.05;  // [%²], that of the reading
+constexpr double kMargin = 2.0;       // times what the record showed
+constexpr double kLeastDeviation = 8.0;
+constexpr double kMostDeviation = 15.0;  // a positioner's alert is at 20 %
+constexpr double kDeviationS = 5.0;
+constexpr double kLeastStuckTravel = 5.0;
+constexpr double kFlowS = 10.0;
+constexpr double kLeastTravel = 1.5;  // of X, to tell an exponent [% rms]
+constexpr double kMostFlow = 0.9;     // of the largest: no saturation
+constexpr double kFlowMargin = 1.3;   // times what the record showed
+
+// Filling and venting have a rate each; the floor keeps the extremes.
+struct Answer {
+  int delay;
+  double share;
+  double closing;  // [%/sample]
+  double opening;
+  double error{0.0};
+
+  FloorLimits::Rod Towards(double command, double x) const {
+    return {share, command > x ? closing : opening};
+  }
+};
+
+double Command(const Stretch& stretch, std::size_t k, int delay) {
+  const std::size_t at = k - std::min(k, static_cast<std::size_t>(delay));
+  return std::clamp(stretch.samples[at][Signal::kCv], 0.0, 100.0);
+}
+
+double SquaredError(const std::vector<Stretch>& stretches,
+                    const Answer& answer) {
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (const Stretch& stretch : stretches) {
+    double x = stretch.samples.front()[Signal::kX];
+    for (std::size_t k = 0; k < stretch.samples.size() && count < kMost; ++k) {
+      const double command = Command(stretch, k, answer.delay);
+      x = Follow(answer.Towards(command, x), x, command);
+      if (k >= kSettling) {
+        const double error = std::min(
+            std::abs(stretch.samples[k][Signal::kX] - x), kLargestError);
+        sum += error * error;
+        ++count;
+      }
+    }
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0.0;
+}
+
+void FitRod(const std::vector<Stretch>& stretches, FloorLimits& floor) {
+  std::vector<Answer> answers;
+  for (int delay = 0; delay < kDelays; ++delay) {
+    for (const double share : kShares) {
+      for (const double closing : kRates) {
+        for (const double opening : kRates) {
+          answers.push_back({delay, share, closing, opening});
+          answers.back().error = SquaredError(stretches, answers.back());
+        }
+      }
+    }
+  }
+  const Answer& best = *std::ranges::min_element(answers, {}, &Answer::error);
+  floor.delay = best.delay;
+  floor.quick = {best.share, std::max(best.closing, best.opening)};
+  floor.slow = {best.share, std::min(best.closing, best.opening)};
+  for (const Answer& answer : answers) {
+    if (answer.delay == best.delay &&
+        answer.error <= kTolerance * best.error + kLeastError) {
+      const auto [low, high] = std::minmax(answer.closing, answer.opening);
+      floor.quick.share = std::max(floor.quick.share, answer.share);
+      floor.quick.rate = std::max(floor.quick.rate, high);
+      floor.slow.share = std::min(floor.slow.share, answer.share);
+      floor.slow.rate = std::min(floor.slow.rate, low);
+    }
+  }
+  floor.slow.rate *= kSlower;
+}
+
+// The largest value that `values` stay at or above for `length` in a row.
+double Sustained(const std::vector<double>& values, int length) {
+  double most = 0.0;
+  const auto n = static_cast<std::ptrdiff_t>(length);
+  for (auto from = values.begin(); values.end() - from >= n; ++from) {
+    most = std::max(most, *std::min_element(from, from + n));
+  }
+  return most;
+}
+
+void FitDeviation(const std::vector<Stretch>& stretches, FloorLimits& floor) {
+  double most = 0.0;
+  double repeated = 0.0;  // travel of the slow rod while X repeats
+  for (const Stretch& stretch : stretches) {
+    RodBand rod(floor);
+    rod.Restart(stretch.samples.front()[Signal::kX]);
+    double lowest = rod.slow();
+    double highest = rod.slow();
+    std::vector<double> above;
+    std::vector<double> below;
+    for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
+      const double x = stretch.samples[k][Signal::kX];
+      rod.Step(stretch.samples[k][Signal::kCv]);
+      if (k < kSettling || x != stretch.samples[k - 1][Signal::kX]) {
+        lowest = highest = rod.slow();
+      }
+      if (k < kSettling) {
+        continue;
+      }
+      lowest = std::min(lowest, rod.slow());
+      highest = std::max(highest, rod.slow());
+      repeated = std::max(repeated, highest - lowest);
+      above.push_back(rod.Beyond(x));
+      below.push_back(-rod.Beyond(x));
+    }
+    most = std::max({most, Sustained(above, floor.deviation_samples),
+                     Sustained(below, floor.deviation_samples)});
+  }
+  floor.deviation = std::clamp(kMargin * most, kLeastDeviation, kMostDeviation);
+  floor.stuck_travel = std::max(kLeastStuckTravel, kMargin * repeated);
+}
+
+bool HasDp(const Sample& sample) {
+  return sample.Has(Signal::kP1) && sample.Has(Signal::kP2);
+}
+
+double DpOf(const Sample& sample, const FloorLimits& floor) {
+  return HasDp(sample) ? sample[Signal::kP1] - sample[Signal::kP2]
+                       : floor.dp_level;
+}
+
+void FitLevels(const std::vector<Stretch>& stretches, FloorLimits& floor) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (const Stretch& stretch : stretches) {
+    for (const Sample& sample : stretch.samples) {
+      floor.flow_high = std::max(floor.flow_high, sample[Signal::kF]);
+      if (HasDp(sample)) {
+        sum += sample[Signal::kP1] - sample[Signal::kP2];
+        count += 1.0;
+      }
+    }
+  }
+  floor.dp_level = count > 0.0 ? std::max(sum / count, 1.0) : 1.0;
+}
+
+// ln(F/√dP) = ln gain − n X/100, weighted with F².
+void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
+  FitLevels(stretches, floor);
+  double w = 0.0;
+  double wx = 0.0;
+  double wy = 0.0;
+  double wxx = 0.0;
+  double wxy = 0.0;
+  for (const Stretch& stretch : stretches) {
+    for (const Sample& sample : stretch.samples) {
+      const double flow = sample[Signal::kF];
+      const double dp = DpOf(sample, floor);
+      if (flow <= floor.flow_margin * floor.flow_high ||
+          flow >= kMostFlow * floor.flow_high || dp <= 0.0) {
+        continue;
+      }
+      const double weight = flow * flow;
+      const double x = 0.01 * sample[Signal::kX];
+      const double y = std::log(flow / std::sqrt(dp));
+      w += weight;
+      wx += weight * x;
+      wy += weight * y;
+      wxx += weight * x * x;
+      wxy += weight * x * y;
+    }
+  }
+  if (w <= 0.0) {
+    return;
+  }
+  const double variance = wxx / w - wx / w * (wx / w);
+  if (variance > 1e-4 * kLeastTravel * kLeastTravel) {
+    floor.flow_exponent =
+        std::clamp(-(wxy / w - wx / w * (wy / w)) / variance, 1.0, 8.0);
+  }
+  floor.flow_gain = std::exp(wy / w + floor.flow_exponent * wx / w);
+  for (const Stretch& stretch : stretches) {
+    std::vector<double> ratios;
+    for (const Sample& sample : stretch.samples) {
+      const double least =
+          FlowAt(floor, sample[Signal::kX] - 0.5 * floor.deviation,
+                 DpOf(sample, floor));
+      const double flow =
+          sample[Signal::kF] - floor.flow_margin * floor.flow_high;
+      ratios.push_back(least > 0.0 ? flow / least : 0.0);
+    }
+    floor.flow_factor = std::max(
+        floor.flow_factor, kFlowMargin * Sustained(ratios, floor.flow_samples));
+  }
+}
+
+}  // namespace
+
+std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s) {
+  const std::vector<Stretch> stretches = WholeStretches(normal);
+  const Sample& first = stretches.front().samples.front();
+  if (!first.Has(Signal::kCv) || !first.Has(Signal::kX)) {
+    return std::nullopt;
+  }
+  FloorLimits floor;
+  const auto samples = [&](double seconds) {
+    return std::max(2, static_cast<int>(std::lround(seconds / period_s)));
+  };
+  floor.deviation_samples = samples(kDeviationS);
+  floor.flow_samples = samples(kFlowS);
+  FitRod(stretches, floor);
+  FitDeviation(stretches, floor);
+  if (first.Has(Signal::kF)) {
+    FitFlow(stretches, floor);
+  }
+  return floor;
+}
+
+}  // namespace fdi::trainer

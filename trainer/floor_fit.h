@@ -1,0 +1,17 @@
+#pragma once
+
+#include <optional>
+
+#include "diagnosis/model_set.h"
+#include "trainer/dataset.h"
+
+namespace fdi::trainer {
+
+/// The floor of a valve from its normal operation: the answers of the rod that
+/// explain X nearly as well as the best one, the law of the flow, and margins
+/// of twice what they err by on these very data, within fixed bounds.
+///
+/// @return Nothing without CV and X.
+std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s);
+
+}  // namespace fdi::trainer
