@@ -86,6 +86,22 @@ bool IsUtf8(std::string_view text) {
   return more == 0;
 }
 
+// What a spreadsheet would run as a formula. A number is none.
+bool IsFormula(std::string_view cell) {
+  return cell.size() > 1 &&
+         std::string_view("=+-@\t\r").find(cell.front()) !=
+             std::string_view::npos &&
+         !ParseNumber(cell);
+}
+
+// A formula has a quote in front, which spreadsheets do not show; so has a text
+// that looks guarded already, so that what is read is what was written.
+bool IsGuarded(std::string_view cell) {
+  const std::size_t quotes = cell.find_first_not_of('\'');
+  return quotes != 0 && quotes != std::string_view::npos &&
+         IsFormula(cell.substr(quotes));
+}
+
 }  // namespace
 
 bool CsvCells::TakeLine(std::string_view line) {
@@ -150,6 +166,9 @@ void CsvCells::Take(char c) {
 void CsvCells::EndCell() {
   while (state_ == State::kText && !cell_.empty() && IsBlank(cell_.back())) {
     cell_.pop_back();
+  }
+  if (IsGuarded(cell_)) {
+    cell_.erase(0, 1);
   }
   cells_.push_back(cell_);
   cell_.clear();
@@ -318,7 +337,9 @@ bool SameName(std::string_view a, std::string_view b) {
 
 void WriteCsvLine(std::ostream& out, const std::vector<std::string>& cells) {
   const char* separator = "";
-  for (const std::string& cell : cells) {
+  for (const std::string& text : cells) {
+    const std::string cell =
+        IsFormula(text) || IsGuarded(text) ? "'" + text : text;
     out << separator;
     separator = ",";
     // Blanks at the ends are quoted, since readers may drop them.

@@ -88,7 +88,9 @@ std::string ToUtf8(std::string bytes, const std::string& source);
 /// Whether two names of columns are equal; case does not count.
 bool SameName(std::string_view a, std::string_view b);
 
-/// Writes a record. A cell is quoted where it must be; the line ends with LF,
+/// Writes a record. A text that a spreadsheet would run as a formula (it begins
+/// with = + - @ and is no number) gets a ' in front, which CsvCells takes away
+/// again. A cell is quoted where it must be; the line ends with LF,
 /// as those of all other text files on the system do.
 void WriteCsvLine(std::ostream& out, const std::vector<std::string>& cells);
 

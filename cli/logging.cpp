@@ -5,6 +5,8 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "diagnosis/printable.h"
+
 namespace fdi::cli {
 namespace {
 
@@ -22,23 +24,6 @@ spdlog::level::level_enum ToSpdlog(LogLevel level) {
   return spdlog::level::err;
 }
 
-// A line is `event key=value key="two words"`: one word up to the first blank,
-// then pairs that scripts split at blanks outside quotes.
-bool NeedsQuotes(const std::string& value) {
-  return value.empty() || value.find_first_of(" \t\n\"=") != std::string::npos;
-}
-
-std::string Quoted(const std::string& value) {
-  std::string text = "\"";
-  for (const char c : value) {
-    if (c == '"' || c == '\\') {
-      text += '\\';
-    }
-    text += c == '\n' ? ' ' : c;
-  }
-  return text + '"';
-}
-
 }  // namespace
 
 LogSink MakeStderrSink(LogLevel minimum) {
@@ -50,8 +35,8 @@ LogSink MakeStderrSink(LogLevel minimum) {
   // Each line at once: the last one before a crash is the one that matters.
   logger->flush_on(spdlog::level::debug);
   return [logger](LogLevel level, std::string_view line) {
-    logger->log(ToSpdlog(level),
-                spdlog::string_view_t(line.data(), line.size()));
+    const std::string text = Printable(line);  // No text can forge a line.
+    logger->log(ToSpdlog(level), spdlog::string_view_t(text));
   };
 }
 
@@ -63,7 +48,7 @@ std::string EventLine(
     line += ' ';
     line += key;
     line += '=';
-    line += NeedsQuotes(value) ? Quoted(value) : value;
+    line += LogValue(value);
   }
   return line;
 }

@@ -19,6 +19,7 @@
 #include "cli/help.h"
 #include "cli/logging.h"
 #include "diagnosis/error.h"
+#include "diagnosis/printable.h"
 #include "diagnosis/suggestion.h"
 
 namespace fdi::cli {
@@ -305,7 +306,8 @@ int Program::ExitCodeOf(const std::exception& error) const {
 }
 
 void Program::PrintError(const std::string& message) const {
-  std::cerr << app_->get_name() << ": error: " << message << '\n';
+  std::cerr << app_->get_name() << ": error: " << Printable(message, "\n")
+            << '\n';
 }
 
 }  // namespace fdi::cli

@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "cli/csv_cells.h"
+#include "cli/json_text.h"
 #include "cli/time_text.h"
+#include "diagnosis/printable.h"
 
 namespace fdi::cli {
 namespace {
@@ -55,7 +57,7 @@ std::string Bare(const Json& value) {
   return value.is_array() ? Joined(value) : value.dump();
 }
 
-std::string TextOf(const Json& row, const Column& column, bool utc) {
+std::string RawText(const Json& row, const Column& column, bool utc) {
   if (column.text) {
     return column.text(row);
   }
@@ -79,6 +81,10 @@ std::string TextOf(const Json& row, const Column& column, bool utc) {
   }
   std::string text = Bare(value);
   return text.empty() ? "-" : text;
+}
+
+std::string TextOf(const Json& row, const Column& column, bool utc) {
+  return Printable(RawText(row, column, utc));
 }
 
 Align AlignOf(const Json& rows, const Column& column) {
@@ -170,13 +176,13 @@ void Report::PrintText(std::ostream& out, const ReportStyle& style) const {
     } else if (const auto* fields = std::get_if<FieldsView>(&view)) {
       Print(*fields, out, style);
     } else {
-      out << std::get<std::string>(view) << '\n';
+      out << Printable(std::get<std::string>(view), "\n") << '\n';
     }
   }
 }
 
 void Report::PrintJson(std::ostream& out) const {
-  cli::PrintJson(out, document);
+  out << JsonText(document, 2) << '\n';
 }
 
 void Report::PrintCsv(std::ostream& out) const {

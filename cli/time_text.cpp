@@ -230,7 +230,8 @@ bool IsDuration(std::string_view text) {
 std::string FormatTime(std::int64_t stamp_ns, bool utc) {
   // 0 or more, also before 1970, where % would give a negative rest.
   const std::int64_t fraction = ((stamp_ns % kSecond) + kSecond) % kSecond;
-  const std::time_t seconds = (stamp_ns - fraction) / kSecond;
+  const std::time_t seconds =
+      stamp_ns / kSecond - (stamp_ns % kSecond < 0 ? 1 : 0);
   std::tm fields{};
   utc ? gmtime_r(&seconds, &fields) : localtime_r(&seconds, &fields);
   char text[64];

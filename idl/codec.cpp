@@ -10,6 +10,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/field_list.h"
+#include "diagnosis/printable.h"
 
 // How a record becomes a message of fdi_v1.idl and back:
 //
@@ -91,7 +92,7 @@ class Transfer {
     }
   }
 
-  // The name of an instance: not empty.
+  // The name of an instance: not empty, without control characters.
   template <typename Ours, typename Wire>
   void Id(const char* field, Ours& ours, Wire& wire) {
     static_assert(Wire::max_size == kMaxIdLength);
@@ -99,8 +100,8 @@ class Transfer {
       ValidateId(ours);
     }
     Text(field, ours, wire);
-    if (ours.empty()) {
-      Refuse(field, " is empty");
+    if (ours.empty() || !IsPrintable(ours)) {
+      Refuse(field, " is empty, has control characters or is not UTF-8");
     }
   }
 

@@ -3,6 +3,7 @@
 #include <iterator>
 
 #include "diagnosis/error.h"
+#include "diagnosis/printable.h"
 
 namespace fdi::idl {
 
@@ -18,8 +19,9 @@ void ValidateId(std::string_view id) {
                     std::to_string(id.size()) + " bytes, accepted are 1 to " +
                     std::to_string(kMaxIdLength));
   }
-  if (id.find('\0') != std::string_view::npos) {
-    throw DataError("id '" + std::string(id) + "' contains a NUL byte");
+  if (!IsPrintable(id)) {
+    throw DataError("id '" + Printable(id) +
+                    "' has control characters or is not UTF-8");
   }
 }
 

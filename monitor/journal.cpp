@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "diagnosis/printable.h"
+
 namespace fdi::monitor {
 namespace {
 
@@ -119,14 +121,17 @@ void Journal::Gap(DataGap gap) {
   counters_.Add(Counter::kGaps);
   log_.Report(
       LogId::kGap, "data_gap",
-      [&gap] { return "valve=" + gap.valve_id + " reason=" + gap.reason; },
+      [&gap] {
+        return "valve=" + LogValue(gap.valve_id) + " reason=" + gap.reason;
+      },
       LogLevel::kInfo);
   const std::lock_guard lock(mutex_);
   AddLocked(std::move(gap));
 }
 
 void Journal::Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) {
-  log_.Line(LogLevel::kInfo, "episode_resumed valve=" + episode.valve_id);
+  log_.Line(LogLevel::kInfo,
+            "episode_resumed valve=" + LogValue(episode.valve_id));
   const std::lock_guard lock(mutex_);
   AddLocked(Resumption{episode.episode_id, stamp_ns});
 }
@@ -425,7 +430,7 @@ void Journal::Publish(const PendingEvent& pending, bool persisted) {
     reason = error.what();
   }
   const auto fields = [&] {
-    return "valve=" + event.valve_id +
+    return "valve=" + LogValue(event.valve_id) +
            " transition=" + std::string(TransitionName(event.transition.kind));
   };
   if (!persisted) {

@@ -5,6 +5,7 @@
 #include <exception>
 #include <utility>
 
+#include "diagnosis/printable.h"
 #include "diagnosis/quality_count.h"
 #include "diagnosis/records/valve_glob.h"
 
@@ -235,7 +236,7 @@ Pipeline::Valve* Pipeline::Refuse(std::string_view valve_id,
   }
   counters_.Add(Counter::kRefusedSamples);
   log_.Report(LogId::kValveRefused, "valve_refused", [&] {
-    return "valve=" + std::string(valve_id) + " reason=" + reason +
+    return "valve=" + LogValue(valve_id) + " reason=" + reason +
            " max_valves=" + std::to_string(options_.max_valves) +
            " refused_valves=" + std::to_string(refused_.size());
   });
@@ -247,7 +248,7 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
   std::optional<EngineParts> parts;
   Resolve(id, parts);
   log_.Line(LogLevel::kDebug,
-            "valve_seen valve=" + id + " model_set=" +
+            "valve_seen valve=" + LogValue(id) + " model_set=" +
                 (parts ? NameOf(parts->plan->models()) : "none"));
   auto valve = std::make_unique<Valve>(
       Valve{ValveMonitor(id, parts, options_.trace),
@@ -281,13 +282,15 @@ bool Pipeline::Resolve(const std::string& valve_id,
     const std::string reason = error.what();
     log_.Report(
         LogId::kModelFailure, "model_set_unusable",
-        [&] { return "valve=" + valve_id + " reason=\"" + reason + "\""; },
+        [&] {
+          return "valve=" + LogValue(valve_id) + " reason=" + LogValue(reason);
+        },
         LogLevel::kError);
     return false;
   }
   if (!parts) {
     log_.Report(LogId::kUnassigned, "valve_unassigned",
-                [&valve_id] { return "valve=" + valve_id; });
+                [&valve_id] { return "valve=" + LogValue(valve_id); });
   }
   return true;
 }
@@ -373,7 +376,7 @@ void Pipeline::Count(const Valve& valve, const Sample& sample,
                     ? "reason=" + std::string(IntakeName(verdict.intake))
                     : "reason=missing_signal signal=" +
                           SignalNames(outcome.missing)) +
-               " valve=" + valve.monitor.id() +
+               " valve=" + LogValue(valve.monitor.id()) +
                " seq=" + std::to_string(sample.seq);
       });
 }
@@ -386,7 +389,7 @@ void Pipeline::Publish(const Valve& valve, const ValveOutcome& outcome) {
   }
   counters_.Add(Counter::kDecisionsUnsent);
   log_.Report(LogId::kUnsent, "publication_failed",
-              [&id] { return "topic=DecisionVector valve=" + id; });
+              [&id] { return "topic=DecisionVector valve=" + LogValue(id); });
 }
 
 void Pipeline::Tend(TimePoint now) {
@@ -419,7 +422,7 @@ void Pipeline::TendSilent(TimePoint now) {
     if (monitor.CheckStale(now)) {
       counters_.Add(Counter::kStaleEvents);
       log_.Report(LogId::kStale, "valve_stale",
-                  [&monitor] { return "valve=" + monitor.id(); });
+                  [&monitor] { return "valve=" + LogValue(monitor.id()); });
       if (live_ != nullptr) {
         live_->ShowSilence(monitor.id(), Silence::kStale);
       }

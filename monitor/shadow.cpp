@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "diagnosis/printable.h"
 #include "diagnosis/records/valve_glob.h"
 
 namespace fdi::monitor {
@@ -234,7 +235,7 @@ void ShadowBank::Step(ShadowValve& valve, const Sample& sample,
   valve.Step(sample, active);
   if (valve.fit() != before && valve.fit() != ShadowFit::kCompared) {
     log_.Report(LogId::kShadow, "shadow_not_compared", [&] {
-      return "valve=" + valve.valve_id() +
+      return "valve=" + LogValue(valve.valve_id()) +
              " reason=" + std::string(ShadowFitName(valve.fit())) +
              " candidate=" + NameOf(*options_.candidate);
     });

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "cli/json_text.h"
 #include "cli/logging.h"
 #include "cli/time_text.h"
 #include "diagnosis/fault_catalogue.h"
@@ -135,10 +136,7 @@ void EventHook::Run() {
       }
       continue;
     }
-    const std::string text =
-        waiting_.front().dump(-1, ' ', false,
-                              cli::Json::error_handler_t::replace) +
-        "\n";
+    const std::string text = cli::JsonText(waiting_.front()) + "\n";
     waiting_.pop_front();
     busy_ = true;
     lock.unlock();

@@ -9,6 +9,7 @@
 
 #include "cli/time_text.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/printable.h"
 #include "monitor/console/model_facts.h"
 
 namespace fdi::monitor {
@@ -274,7 +275,7 @@ std::string TopScreen(const TopBoard& board, TopView& view,
   cli::Report report = board.Valves(view.sort, view.filter, now);
   auto& rows = report.document["valves"].get_ref<cli::Json::array_t&>();
   view.rows = rows.size();
-  std::string text = Title(board, view, report.document) + "\n\n";
+  std::string text = Printable(Title(board, view, report.document)) + "\n\n";
   const std::size_t room =
       std::max<std::size_t>(1, height - std::min(height, kOtherLines));
   const std::size_t first =

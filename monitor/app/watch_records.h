@@ -5,6 +5,7 @@
 #include <string>
 
 #include "cli/json_output.h"
+#include "diagnosis/printable.h"
 #include "monitor/app/bus_view.h"
 
 namespace fdi::monitor {
@@ -26,7 +27,11 @@ class WatchRecords {
   static constexpr std::chrono::seconds kPatience{2};
 
   /// @param utc times of lines in UTC, not in the local zone.
-  WatchRecords(bool utc, Sink sink) : utc_(utc), sink_(std::move(sink)) {}
+  WatchRecords(bool utc, const Sink& sink)
+      : utc_(utc), sink_([sink](WatchRecord record) {
+          record.line = Printable(record.line);
+          sink(record);
+        }) {}
 
   void Add(const idl::DecisionMessage& message, Clock::time_point now);
   void Add(const FaultEvent& message, Clock::time_point now);
@@ -41,7 +46,7 @@ class WatchRecords {
   std::string Start(std::int64_t stamp_ns, const std::string& who) const;
 
   bool utc_;
-  Sink sink_;
+  const std::function<void(WatchRecord)> sink_;
   ModelNames names_;
   std::deque<std::pair<Clock::time_point, idl::DecisionMessage>> waiting_;
 };

@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/json_text.h"
 #include "cli/program.h"
 #include "cli/stop_signals.h"
 #include "monitor/app/verbs.h"
@@ -74,10 +75,7 @@ int RunWatch(WatchOptions options, const cli::Context& context) {
   std::cerr << "watch_ready domain=" << context.options.domain << '\n';
   const bool json = context.options.json;
   WatchRecords records(context.options.utc, [json](const WatchRecord& record) {
-    std::cout << (json ? record.object.dump(-1, ' ', false,
-                                            cli::Json::error_handler_t::replace)
-                       : record.line)
-              << '\n';
+    std::cout << (json ? cli::JsonText(record.object) : record.line) << '\n';
   });
   WatchCounts counts;
   const Clock::time_point start = Clock::now();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "cli/json_text.h"
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi::console {
@@ -89,7 +90,7 @@ std::string_view StateOf(const storage::Episode& episode) {
 }  // namespace
 
 std::string Dump(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return cli::JsonText(json);
 }
 
 Json Ms(std::int64_t stamp_ns) {

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cli/csv_cells.h"
 #include "cli/program.h"
 #include "cli/signal_list.h"
 
@@ -75,6 +76,38 @@ TEST(ReportTest, CsvHasTheFirstTableWithBareValuesAndQuotedCells) {
             "live\n"
             "FV-1,2026-11-20T14:56:11Z,185.0,0.125,3,\"CV,P1\",99.126,\n"
             "\"a \"\"new\"\", valve\",,,,,,,true\n");
+}
+
+TEST(ReportTest, TextFromOutsideCommandsNoTerminal) {
+  Report report;
+  report.document = {{"id", "V\x1b[2J\n"}, {"rows", {{{"id", "V\x1b[2J\n"}}}}};
+  report.Table("rows", {{"id", "id"}}).Fields("", {{"id", "id"}});
+  report.Line("id V\x1b[2J");
+
+  EXPECT_EQ(TextOf(report),
+            "id\nV\\x1b[2J\\x0a\nid:  V\\x1b[2J\\x0a\nid V\\x1b[2J\n");
+}
+
+TEST(ReportTest, CsvHoldsNoFormula) {
+  Report report;
+  for (const char* text : {"=1+1", "+1+1", "-1+1", "@SUM(A1)", "'=1", "-1.5",
+                           "+3", "-", "plain", "'plain"}) {
+    report.document["rows"].push_back({{"id", text}});
+  }
+  report.Table("rows", {{"id", "id"}});
+
+  EXPECT_EQ(CsvOf(report),
+            "id\n'=1+1\n'+1+1\n'-1+1\n'@SUM(A1)\n''=1\n-1.5\n+3\n-\nplain\n"
+            "'plain\n");
+  std::istringstream lines(CsvOf(report));
+  std::string line;
+  std::getline(lines, line);
+  CsvCells cells;
+  for (const Json& row : report.document["rows"]) {
+    std::getline(lines, line);
+    ASSERT_TRUE(cells.TakeLine(line));
+    EXPECT_EQ(cells.cells().at(0), row["id"].get<std::string>());
+  }
 }
 
 TEST(ReportTest, CsvMayHaveColumnsOfItsOwn) {

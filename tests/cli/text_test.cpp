@@ -1,4 +1,5 @@
 // Tables, suggestions, event lines and strict TOML.
+#include <algorithm>
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -6,11 +7,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cli/json_text.h"
 #include "cli/logging.h"
 #include "cli/text_table.h"
 #include "cli/toml_reader.h"
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/printable.h"
 #include "diagnosis/suggestion.h"
 
 namespace fdi::cli {
@@ -106,7 +109,47 @@ TEST(EventLineTest, ValuesWithBlanksOrQuotesAreQuoted) {
   EXPECT_EQ(EventLine("import", {{"file", "a b"}, {"rows", "3"}, {"x", ""}}),
             "import file=\"a b\" rows=3 x=\"\"");
   EXPECT_EQ(EventLine("e", {{"m", "say \"no\"\nnow"}}),
-            "e m=\"say \\\"no\\\" now\"");
+            "e m=\"say \\\"no\\\"\\x0anow\"");
+  EXPECT_EQ(EventLine("e", {{"id", "V\x1b[2J"}}), "e id=V\\x1b[2J");
+}
+
+// ESC, BEL, OSC 52, DEL, C1 (CSI in UTF-8), half a letter, a line of its own.
+constexpr const char* kHostile =
+    "\x1b]52;c;aGk=\x07|\x7f|\xc2\x9b"
+    "2J|\xe2\x82|V\r\n2026 error";
+
+TEST(PrintableTest, OnlyLettersReachATerminal) {
+  EXPECT_EQ(
+      Printable(kHostile),
+      "\\x1b]52;c;aGk=\\x07|\\x7f|\\xc2\\x9b2J|\\xe2\\x82|V\\x0d\\x0a2026 "
+      "error");
+  EXPECT_EQ(Printable(std::string("a\0b", 3)), "a\\x00b");
+  EXPECT_EQ(Printable("FV-101 \u00b5\u20ac\U0001f600"),
+            "FV-101 \u00b5\u20ac\U0001f600");
+  EXPECT_EQ(Printable("a\nb\x1b", "\n"), "a\nb\\x1b");
+  EXPECT_FALSE(IsPrintable(kHostile));
+  EXPECT_TRUE(IsPrintable("\u00b5"));
+}
+
+TEST(LogSinkTest, NoTextMakesALineOrCommandsTheTerminal) {
+  testing::internal::CaptureStderr();
+  MakeStderrSink(LogLevel::kInfo)(LogLevel::kWarning,
+                                  std::string("valve_stale valve=") + kHostile);
+  const std::string log = testing::internal::GetCapturedStderr();
+
+  EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), 1);
+  EXPECT_TRUE(IsPrintable(log.substr(0, log.size() - 1))) << log;
+}
+
+TEST(LogValueTest, AValueCannotLookLikeAnotherField) {
+  EXPECT_EQ(LogValue("FV-101"), "FV-101");
+  EXPECT_EQ(LogValue("V1 level=error"), "\"V1 level=error\"");
+  EXPECT_EQ(LogValue("V\" x=\"1"), "\"V\\\" x=\\\"1\"");
+}
+
+TEST(JsonTextTest, ControlsThatJsonAllowsAreEscapedToo) {
+  EXPECT_EQ(JsonText(Json("\x1b|\x7f|\xc2\x9b|\u00b5")),
+            "\"\\u001b|\\u007f|\\u009b|\u00b5\"");
 }
 
 constexpr const char* kToml =

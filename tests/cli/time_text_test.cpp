@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <ctime>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -39,6 +40,8 @@ TEST_F(TimeTextTest, DecimalsAreAsManyAsTheStampNeeds) {
 
 TEST_F(TimeTextTest, StampsBeforeTheEpochKeepTheirDecimals) {
   EXPECT_EQ(FormatTime(-1, true), "1969-12-31T23:59:59.999999999Z");
+  EXPECT_EQ(FormatTime(std::numeric_limits<std::int64_t>::min(), true),
+            "1677-09-21T00:12:43.145224192Z");
   EXPECT_EQ(ParseTime("1969-12-31T23:59:59.999999999Z", false), -1);
 }
 

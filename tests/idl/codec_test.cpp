@@ -235,6 +235,23 @@ TEST(CodecTest, ATooLongIdIsRefusedNotCut) {
               ThrowsMessage<DataError>(HasSubstr("65 bytes")));
 }
 
+TEST(CodecTest, AnIdWithControlCharactersIsNeitherSentNorDecoded) {
+  v1::ValveSample wire;
+  Codec<ValveSampleMessage>::Encode(SomeSample(), wire);
+  ValveSampleMessage message;
+  wire.valve_id() = "V-\u00b5 1";
+  EXPECT_TRUE(Codec<ValveSampleMessage>::Decode(wire, message));
+  for (const char* id :
+       {"V\n2026 error", "V\x1b[2J", "V\x07", "V\x7f", "V\xc2\x9b", "V\xff"}) {
+    wire.valve_id() = id;
+    EXPECT_FALSE(Codec<ValveSampleMessage>::Decode(wire, message)) << id;
+    ValveSampleMessage own = SomeSample();
+    own.valve_id = id;
+    v1::ValveSample other;
+    EXPECT_THROW(Codec<ValveSampleMessage>::Encode(own, other), DataError);
+  }
+}
+
 TEST(CodecTest, TooLongTextsAndListsAreRefused) {
   MonitorStatusMessage status;
   status.monitor = "m";

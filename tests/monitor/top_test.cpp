@@ -183,6 +183,20 @@ TEST_F(TopTest, AMonitorThatIsGoneIsNotHeard) {
   EXPECT_EQ(board_.Health(now_ + std::chrono::seconds(6)), "");
 }
 
+TEST_F(TopTest, WhatAMonitorSaysCommandsNoTerminal) {
+  idl::MonitorStatusMessage status;
+  status.monitor = "m";
+  status.text = "\x1b]0;title\x07";
+  board_.Add(status, now_);
+  board_.Add(Decision("V\x1b[2J", State::kIsolated, 1, {0, 1, 0}), now_);
+  TopView view;
+  view.filter = "\x1b";
+  const std::string screen = TopScreen(board_, view, {false, 200}, 20, now_);
+
+  EXPECT_THAT(screen, HasSubstr("V\\x1b[2J"));
+  EXPECT_EQ(screen.find('\x1b'), std::string::npos);
+}
+
 TEST_F(TopTest, TheScreenHasTheLinesAndColumnsOfTheTerminal) {
   for (const std::size_t height : {3U, 8U, 30U}) {
     TopView view;

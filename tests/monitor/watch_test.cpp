@@ -62,6 +62,15 @@ TEST_F(WatchTest, WithoutNamesAPositionDoesNotLookLikeAFault) {
   EXPECT_THAT(records_[0].line, Not(HasSubstr("d2")));
 }
 
+TEST_F(WatchTest, WhatAMonitorSaysCommandsNoTerminal) {
+  idl::MonitorStatusMessage status;
+  status.monitor = "m\x1b[2J";
+  status.text = "\n2026 forged";
+  watch_.Add(status, now_);
+
+  EXPECT_TRUE(IsPrintable(records_[0].line)) << records_[0].line;
+}
+
 TEST_F(WatchTest, WhatIsNotJudgedIsNotCalledNormal) {
   watch_.Add(Info(7), now_);
   watch_.Add(Decision(7, Quality::kBadInput), now_);

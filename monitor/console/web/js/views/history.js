@@ -2,6 +2,7 @@
 // the alarms of that time. The question is in the address: it can be sent.
 
 import {get} from '../api.js';
+import {csvOf} from '../csv.js';
 import {button, download, errorNote, field, h, replace, select, setText}
   from '../dom.js';
 import {faultTitle} from '../faults.js';
@@ -27,17 +28,9 @@ const kColumns = [
   columns.label,
 ];
 
-function csvOf(rows) {
-  const names = ['episode', 'valve', 'fault', 'name', 'state', 'isa',
-    'detected_ms', 'isolated_ms', 'cleared_ms', 'ended_ms', 'end_reason',
-    'peak_factor', 'strength', 'label', 'acked_by', 'model_set'];
-  const quote = (value) => {
-    const text = value === null || value === undefined ? '' : String(value);
-    return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
-  };
-  return [names.join(','), ...rows.map((row) =>
-    names.map((name) => quote(row[name])).join(','))].join('\n') + '\n';
-}
+const kSaved = ['episode', 'valve', 'fault', 'name', 'state', 'isa',
+  'detected_ms', 'isolated_ms', 'cleared_ms', 'ended_ms', 'end_reason',
+  'peak_factor', 'strength', 'label', 'acked_by', 'model_set'];
 
 class History extends View {
   title = 'History';
@@ -56,7 +49,7 @@ class History extends View {
         this.#statistics,
         h('div', {class: 'controls'}, h('h2', {}, 'Episodes'), this.#found,
             button('Save as CSV', () => download('episodes.csv',
-                new Blob([csvOf(this.#rows)], {type: 'text/csv'})))),
+                new Blob([csvOf(kSaved, this.#rows)], {type: 'text/csv'})))),
         dataTable('Episodes, newest first', kColumns, [],
             {layout: 'cards', body: this.#body}), this.#more);
     this.on(store, 'tiles', (ids) => {
