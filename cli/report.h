@@ -30,7 +30,7 @@ struct Column {
   /// The member of the row, which is the CSV header as well: "period_s". A
   /// member of a member is named by its path, "fit/vaf_pct"; its CSV header is
   /// "fit_vaf_pct".
-  std::string key;
+  std::string key{};
   Format format{Format::kPlain};
   int decimals{2};  ///< Of numbers that are not integers.
   /// Where a table is wider than the terminal, columns above 0 are left out,

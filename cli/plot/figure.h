@@ -45,7 +45,7 @@ struct Range {
 
 /// One value per abscissa; NaN breaks the line.
 struct Series {
-  std::string title;  ///< Empty: not in the legend.
+  std::string title{};  ///< Empty: not in the legend.
   std::string colour{ink::kBlack};
   double width{1.5};  ///< [points]
   Dash dash{Dash::kSolid};

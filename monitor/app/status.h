@@ -74,9 +74,9 @@ struct MetricsFacts {
   std::int64_t started_ns{0};  ///< UTC.
   storage::DataDirectory data;
   std::vector<Heartbeat::Member> threads;
-  std::optional<console::StreamCounts> streams;  ///< If there is a console.
-  std::uint64_t board_bytes{0};                  ///< Of the console.
-  console::TokenGuard::Counts tokens{};          ///< Of the console.
+  std::optional<console::StreamCounts> streams{};  ///< If there is a console.
+  std::uint64_t board_bytes{0};                    ///< Of the console.
+  console::TokenGuard::Counts tokens{};            ///< Of the console.
   HttpServer::Counts requests{};
 };
 

@@ -27,11 +27,11 @@ std::string PlainName(const cli::FaultTexts& texts, std::string_view fault) {
 
 }  // namespace
 
-Json Api::Words(const ModelFacts* models, const TracePoint* point) const {
-  if (models == nullptr || point == nullptr) {
+Json Api::Words(const ModelFacts* facts, const TracePoint* point) const {
+  if (facts == nullptr || point == nullptr) {
     return {};
   }
-  return Explain(*models, *point, [this](std::string_view fault) {
+  return Explain(*facts, *point, [this](std::string_view fault) {
     return PlainName(texts, fault);
   });
 }

@@ -66,7 +66,7 @@ struct Api {
   std::stop_token stopping{};
 
   /// Explain(), with the faults called as the catalogue does.
-  Json Words(const ModelFacts* models, const TracePoint* point) const;
+  Json Words(const ModelFacts* facts, const TracePoint* point) const;
 };
 
 /// A file for the user to save.

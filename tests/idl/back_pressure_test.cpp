@@ -68,8 +68,8 @@ TEST_P(SlowReaderTest, EndsWhileNothingIsTaken) {
 INSTANTIATE_TEST_SUITE_P(Overflow, SlowReaderTest,
                          testing::Values(Overflow::kLibrary,
                                          Overflow::kOnTheWay),
-                         [](const auto& info) {
-                           return info.param == Overflow::kLibrary ? "Library"
+                         [](const auto& test) {
+                           return test.param == Overflow::kLibrary ? "Library"
                                                                    : "OnTheWay";
                          });
 
