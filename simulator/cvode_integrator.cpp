@@ -30,8 +30,8 @@ struct Deleter {
   }
 };
 
-using Context = std::unique_ptr<std::remove_pointer_t<SUNContext>,
-                                Deleter<FreeContext>>;
+using Context =
+    std::unique_ptr<std::remove_pointer_t<SUNContext>, Deleter<FreeContext>>;
 using Vector = std::unique_ptr<_generic_N_Vector, Deleter<N_VDestroy>>;
 using Matrix = std::unique_ptr<_generic_SUNMatrix, Deleter<SUNMatDestroy>>;
 using Solver = std::unique_ptr<_generic_SUNLinearSolver, Deleter<FreeSolver>>;
@@ -162,7 +162,9 @@ class CvodeIntegrator::Impl {
     return code == CV_TSTOP_RETURN ? StepResult::kStopTime : StepResult::kStep;
   }
 
-  std::int64_t steps() const { return steps_ + Current(CVodeGetNumSteps); }
+  std::int64_t steps() const {
+    return steps_ + Current(CVodeGetNumSteps);
+  }
   std::int64_t derivatives() const {
     return derivatives_ + Current(CVodeGetNumRhsEvals) +
            Current(CVodeGetNumLinRhsEvals);

@@ -179,7 +179,7 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
       {"dds_undecodable", "fdi_dds_samples_undecodable_total", kCounter,
        "Samples with a value that no publisher of ours sends", "", "",
        samples.undecodable},
-      {.name = "dds_refused_datagrams", .value = refused_datagrams},
+      {"dds_refused_datagrams", "", kCounter, "", "", "", refused_datagrams},
       {"dds_rejected_instances", kRejected, kCounter, kRejectedHelp, "reason",
        "max_valves", samples.rejected_instances},
       {"dds_rejected_samples", kRejected, kCounter, kRejectedHelp, "reason",

@@ -100,10 +100,9 @@ monitor::EventSink& Console::Before(monitor::EventSink& bus) {
 void Console::Start(ConsoleSources sources) {
   models_ = std::make_unique<StoredModels>(sources.models);
   alarms_ = std::make_unique<AlarmBook>(sources.history, texts_);
-  api_ = std::make_unique<Api>(Api{std::move(sources), board_, stream_,
-                                   *alarms_, *models_, work_list_, texts_,
-                                   access_, NewInstance(),
-                                   stopping_.get_token()});
+  api_ = std::make_unique<Api>(
+      Api{std::move(sources), board_, stream_, *alarms_, *models_, work_list_,
+          texts_, access_, NewInstance(), stopping_.get_token()});
   SetRulesOfEveryAnswer();
   httplib::Server& routes = server_->routes();
   for (const auto group : {LiveRoutes(), HistoryRoutes(), PlannerRoutes()}) {
