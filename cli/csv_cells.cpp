@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <ostream>
@@ -86,19 +87,23 @@ bool IsUtf8(std::string_view text) {
   return more == 0;
 }
 
-// What a spreadsheet would run as a formula. A number is none.
-bool IsFormula(std::string_view cell) {
-  return cell.size() > 1 &&
-         std::string_view("=+-@\t\r").find(cell.front()) !=
-             std::string_view::npos &&
-         !ParseNumber(cell);
+// What a spreadsheet would run as a formula. A number is none, in hexadecimal
+// neither.
+bool IsFormula(const std::string& cell) {
+  if (cell.size() < 2 || std::string_view("=+-@\t\r").find(cell.front()) ==
+                             std::string_view::npos) {
+    return false;
+  }
+  char* end = nullptr;
+  std::strtod(cell.c_str(), &end);
+  return end != cell.c_str() + cell.size();
 }
 
 // A formula has a quote in front, which spreadsheets do not show; so has a text
 // that looks guarded already, so that what is read is what was written.
-bool IsGuarded(std::string_view cell) {
+bool IsGuarded(const std::string& cell) {
   const std::size_t quotes = cell.find_first_not_of('\'');
-  return quotes != 0 && quotes != std::string_view::npos &&
+  return quotes != 0 && quotes != std::string::npos &&
          IsFormula(cell.substr(quotes));
 }
 

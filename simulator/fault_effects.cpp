@@ -70,6 +70,7 @@ static_assert(std::size(kEffects) == kLastFault);
 }  // namespace
 
 void ApplyFault(int fault, double strength, FaultEffects& effects) {
+  Require(fault >= 1 && fault <= kLastFault, "no fault of the catalogue");
   const bool is_signed = FaultFactsOf(fault).is_signed;
   Require(strength >= (is_signed ? -1.0 : 0.0) && strength <= 1.0,
           "fault strength must be in [0, 1], or [-1, 1] for a signed fault");

@@ -421,8 +421,12 @@ Hypothesis Identification::BestStart() const {
           Start(nominal_, {options_.period_s, interpolated, delay}));
     }
   }
-  Hypothesis best = Best(std::move(drives));
-  return Best({best, Start(RelayVariants(nominal_).back(), best.base.drive)});
+  const RecordDrive drive = Best(std::move(drives)).base.drive;
+  std::vector<Hypothesis> relays;
+  for (const ValveParameters& variant : RelayVariants(nominal_)) {
+    relays.push_back(Start(variant, drive));
+  }
+  return Best(std::move(relays));
 }
 
 RobustFit Identification::Fit(const Hypothesis& hypothesis,
@@ -465,8 +469,10 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     const double loss = residuals[i].col(0).norm();
-    constexpr double kClearly = 0.99;
-    if (loss < kClearly * least) {
+    // A lag of the valve looks like a part of a sample of delay.
+    const bool same_delay = hypotheses[i].base.drive.command_delay ==
+                            hypotheses[best].base.drive.command_delay;
+    if (loss < (same_delay ? 0.99 : 0.9) * least) {
       least = loss;
       best = i;
     }
@@ -540,8 +546,15 @@ RecordFit Identification::Compare(const ValveCandidate& candidate) const {
           .front();
   // Rows that were filled in have a difference of 0.
   const auto count = [&](Index j) {
-    return std::max(1.0,
-                    static_cast<double>((r.col(j).array() != 0.0).count()));
+    double measured = 0.0;
+    for (const RecordSegment& segment : whole) {
+      measured += static_cast<double>(
+          std::count_if(segment.rows->begin() + options_.settle_rows,
+                        segment.rows->end(), [j](const RecordRow& row) {
+                          return j == 0 ? row.x_measured : row.flow_measured;
+                        }));
+    }
+    return std::max(1.0, measured);
   };
   const auto rmse = [&](Index j) {
     return r.col(j).norm() / std::sqrt(count(j));

@@ -16,6 +16,9 @@ ModelAssignment::ModelAssignment(
     if (entry.model_set) {
       Load(*entry.model_set);
       ++assigned_;
+      if (entry.pattern.find_first_of("*?[") == std::string::npos) {
+        assigned_valves_.push_back(entry.pattern);
+      }
     }
   }
   const std::optional<storage::ModelReference> reference = wanted ? wanted
@@ -65,15 +68,7 @@ std::shared_ptr<const ModelSet> ModelAssignment::ModelsFor(
 }
 
 std::vector<std::string> ModelAssignment::AssignedValves() const {
-  const std::lock_guard lock(mutex_);
-  std::vector<std::string> valves;
-  for (const storage::ValveEntry& entry : store_.Valves()) {
-    if (entry.model_set &&
-        entry.pattern.find_first_of("*?[") == std::string::npos) {
-      valves.push_back(entry.pattern);
-    }
-  }
-  return valves;
+  return assigned_valves_;
 }
 
 bool ModelAssignment::IsolationHeld(std::string_view valve_id) const {

@@ -60,6 +60,7 @@ class ModelAssignment : public ModelResolver {
   mutable std::map<std::string, std::shared_ptr<const ModelSet>> loaded_;
   std::shared_ptr<const ModelSet> default_;
   std::size_t assigned_{0};
+  std::vector<std::string> assigned_valves_;
 };
 
 /// Makes models.db, or migrates it, if need be. Then it can be read.

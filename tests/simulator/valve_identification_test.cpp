@@ -97,6 +97,7 @@ TEST_P(RecoveryTest, RecoversTheParametersOfASimulatedValve) {
   const ValveFit fit =
       FitValve({record}, ParameterSet("lublin-actuator-3-refit"));
   EXPECT_EQ(fit.interpolated_command, interpolated);
+  EXPECT_EQ(fit.command_delay, 0);
   EXPECT_EQ(fit.parameters.positioner.relay, AirRelay::kCompressible);
   ExpectRecovered(fit, "trim.kv_m3_h", truth.trim.kv_m3_h, 0.05);
   ExpectRecovered(fit, "trim.exponent", truth.trim.exponent, 0.05);
@@ -163,6 +164,7 @@ TEST(ValveIdentificationTest, LeavesAStatedValueThatDoesNotFit) {
   const HealthyRecord record = Recording(truth, 800, 6);
   const ValveFit fit =
       FitValve({record}, ParameterSet("lublin-actuator-3-refit"));
+  EXPECT_EQ(fit.command_delay, 0);
   ExpectRecovered(fit, "positioner.gain", 40.0, 0.1);
 }
 

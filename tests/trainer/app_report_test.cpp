@@ -69,7 +69,7 @@ class AppReportTest : public TrainerProgram {
     twin.fault = 1;
     twin.name = "f1 0.50";
     models.observers.insert(models.observers.begin() + 1, twin);
-    models.faults = {1, 19};
+    models.faults.insert(models.faults.begin(), 1);
     models.groups = {{1, 19}};
     store.Save(models, storage::Activation::kAlways);
   }
