@@ -102,7 +102,9 @@ class LoadTest : public MonitorFixture {
 
 TEST_F(LoadTest, AStuckSubscriberDelaysNeitherDiagnosisNorRecording) {
   const std::chrono::duration<double> alone = TimeOfARun(false);
-  ASSERT_TRUE(Await([this] { return decisions_->status().matched == 0; }));
+  ASSERT_TRUE(Await([this] {
+    return decisions_->status().matched == 0 && samples_->matched() == 0;
+  }));
   const std::chrono::duration<double> stuck = TimeOfARun(true);
 
   // The status that is waited for comes each second.

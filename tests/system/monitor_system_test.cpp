@@ -58,7 +58,9 @@ TEST_F(MonitorSystemTest, KilledInAnEpisodeItGoesOnWithItAndNotesTheOutage) {
   ASSERT_TRUE(AwaitEvent(TransitionKind::kIsolated)) << monitor->errors();
   monitor->Signal(SIGKILL);
   ASSERT_EQ(monitor->AwaitExit(), 128 + SIGKILL);
-  ASSERT_TRUE(Await([this] { return decisions_->status().matched == 0; }));
+  ASSERT_TRUE(Await([this] {
+    return decisions_->status().matched == 0 && samples_->matched() == 0;
+  }));
 
   faults_.clear();
   monitor = StartMonitor();
@@ -101,7 +103,9 @@ TEST_F(MonitorSystemTest, KilledInAnEpisodeThatEndedMeanwhileItClosesUnknown) {
   ASSERT_TRUE(AwaitEvent(TransitionKind::kIsolated)) << monitor->errors();
   monitor->Signal(SIGKILL);
   ASSERT_EQ(monitor->AwaitExit(), 128 + SIGKILL);
-  ASSERT_TRUE(Await([this] { return decisions_->status().matched == 0; }));
+  ASSERT_TRUE(Await([this] {
+    return decisions_->status().matched == 0 && samples_->matched() == 0;
+  }));
 
   faults_.clear();
   monitor = StartMonitor();

@@ -55,7 +55,9 @@ TEST_F(ShadowTest, DifferencesAreRecordedOverARestartAndNotPublished) {
     EXPECT_EQ(event.model_hash, first.active_hash);
   }
 
-  ASSERT_TRUE(Await([this] { return decisions_->status().matched == 0; }));
+  ASSERT_TRUE(Await([this] {
+    return decisions_->status().matched == 0 && samples_->matched() == 0;
+  }));
   monitor = StartMonitor({"--shadow", "linear@2"});
   Publish(90, 150, kF7Offset);
   ASSERT_TRUE(Await([this] { return vectors_.back().verdict.seq == 149; }));
