@@ -58,6 +58,8 @@ class MonitorFixture : public testing::Test {
   std::unique_ptr<ChildProcess> StartMonitor(
       const std::vector<std::string>& arguments = {}) {
     auto monitor = std::make_unique<ChildProcess>(Command(arguments));
+    // One that was stopped may still have a last word waiting here.
+    speaker_ = ":" + std::to_string(monitor->pid());
     EXPECT_TRUE(monitor->AwaitLine("monitor_ready")) << monitor->errors();
     EXPECT_TRUE(samples_->WaitForReaders(1, kMonitorPatience));
     EXPECT_TRUE(decisions_->WaitForWriters(1, kMonitorPatience));
@@ -98,8 +100,10 @@ class MonitorFixture : public testing::Test {
            {}},
           std::chrono::milliseconds(0));
       status_->Take({[this](const idl::MonitorStatusMessage& m, const auto&) {
-                       counters_ = {m.counters.begin(), m.counters.end()};
-                       health_ = m.health;
+                       if (m.monitor.ends_with(speaker_)) {
+                         counters_ = {m.counters.begin(), m.counters.end()};
+                         health_ = m.health;
+                       }
                      },
                      {}},
                     std::chrono::milliseconds(0));
@@ -125,6 +129,7 @@ class MonitorFixture : public testing::Test {
   std::optional<idl::Subscriber<idl::MonitorStatusMessage>> status_;
   std::vector<idl::DecisionMessage> vectors_;
   std::vector<FaultEvent> faults_;
+  std::string speaker_;  ///< End of the name of the monitor started last.
   std::map<std::string, std::uint64_t> counters_;
   idl::Health health_{idl::Health::kOk};
 };
