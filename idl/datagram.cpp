@@ -21,6 +21,7 @@ constexpr std::uint8_t kAckNack = 0x06;
 constexpr std::uint8_t kHeartbeat = 0x07;
 constexpr std::uint8_t kGap = 0x08;
 constexpr std::uint8_t kInfoTs = 0x09;
+constexpr std::uint8_t kInfoSrc = 0x0c;
 constexpr std::uint8_t kNackFrag = 0x12;
 constexpr std::uint8_t kHeartbeatFrag = 0x13;
 constexpr std::uint8_t kData = 0x15;
@@ -30,14 +31,13 @@ constexpr std::uint8_t kInlineQosFlag = 0x02;
 constexpr std::uint8_t kInvalidateFlag = 0x02;  // INFO_TS without a time.
 constexpr std::uint16_t kSentinel = 1;          // Ends a parameter list.
 
-// A writer of 100 000 a second has this many after 22 000 years; the library
-// counts on from a number, and aborts at the end of the range.
-constexpr std::int64_t kSequenceLimit = std::int64_t{1} << 56;
+// A writer of 20 000 a second is here after 20 months. The library aborts at
+// the end of the range, and when it meets a writer counts up to where it
+// stands.
+constexpr std::int64_t kSequenceLimit = std::int64_t{1} << 40;
 // The library allocates what a fragment says that its sample has. Ours have
 // some kB at most.
 constexpr std::int64_t kMostSampleBytes = 65'536;
-// The library walks through a gap one by one.
-constexpr std::int64_t kLongestGap = std::int64_t{1} << 32;
 
 // Bytes that a body has at least; -1: no such kind.
 int LeastBody(std::uint8_t kind, std::uint8_t flags) {
@@ -54,7 +54,7 @@ int LeastBody(std::uint8_t kind, std::uint8_t flags) {
       return 24;
     case kInfoTs:
       return (flags & kInvalidateFlag) != 0 ? 0 : 8;
-    case 0x0c:  // INFO_SRC
+    case kInfoSrc:
       return 20;
     case 0x0e:  // INFO_DST
       return 12;
@@ -121,12 +121,9 @@ bool ContentIsSound(std::uint8_t kind, std::uint8_t flags, const Body& body) {
              body.U32(28) <= kMostSampleBytes;
     case kHeartbeat:
       return body.Sequence(8) > 0 && body.Sequence(16) >= 0;
-    case kGap: {
-      const std::int64_t start = body.Sequence(8);
-      const std::int64_t base = body.Sequence(16);
-      return start > 0 && base > 0 && base - start <= kLongestGap &&
+    case kGap:
+      return body.Sequence(8) > 0 && body.Sequence(16) > 0 &&
              body.U32(24) <= 256;
-    }
     case kAckNack:
       return body.Sequence(8) >= 0 && body.U32(16) <= 256;
     case kNackFrag:
@@ -136,20 +133,67 @@ bool ContentIsSound(std::uint8_t kind, std::uint8_t flags, const Body& body) {
   }
 }
 
+// Who speaks, as long as no INFO_SRC says otherwise.
+class Speaker {
+ public:
+  explicit Speaker(Bytes message) { SetPrefix(message.subspan(8)); }
+
+  void SetPrefix(Bytes prefix) {
+    std::copy_n(prefix.begin(), kPrefixBytes, guid_.begin());
+  }
+
+  const WriterGuid& Writer(Bytes entity) {
+    std::copy_n(entity.begin(), 4, guid_.begin() + kPrefixBytes);
+    return guid_;
+  }
+
+ private:
+  static constexpr std::size_t kPrefixBytes = 12;
+  WriterGuid guid_{};
+};
+
+// Whether a sound submessage says nothing that its writer cannot have written.
+bool KeepsPace(std::uint8_t kind, const Body& body, Speaker& speaker,
+               WriterPace& pace, WriterPace::Clock::time_point now) {
+  switch (kind) {
+    case kData:
+    case kDataFrag:
+      return pace.Admit(speaker.Writer(body.bytes.subspan(8)),
+                        body.Sequence(12), 0, now);
+    case kHeartbeat:
+      return pace.Admit(speaker.Writer(body.bytes.subspan(4)),
+                        std::max(body.Sequence(8), body.Sequence(16)), 0, now);
+    case kGap: {
+      const std::int64_t start = body.Sequence(8);
+      const std::int64_t base = body.Sequence(16);
+      const std::int64_t bits = body.U32(24);
+      return pace.Admit(speaker.Writer(body.bytes.subspan(4)), base + bits,
+                        std::max<std::int64_t>(0, base - start) + bits, now);
+    }
+    case kInfoSrc:
+      speaker.SetPrefix(body.bytes.subspan(8));
+      return true;
+    default:
+      return true;
+  }
+}
+
 }  // namespace
 
 std::string_view DatagramVerdictName(DatagramVerdict verdict) {
   constexpr std::array<std::string_view, kDatagramVerdictCount> kNames{
-      "sound", "header", "length", "kind", "content"};
+      "sound", "header", "length", "kind", "content", "pace"};
   return kNames[static_cast<std::size_t>(verdict)];
 }
 
-CheckedDatagram CheckDatagram(Bytes datagram) {
+CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
+                              WriterPace::Clock::time_point now) {
   const std::size_t size = datagram.size();
   if (size < kHeaderBytes || datagram[0] != 'R' || datagram[1] != 'T' ||
       datagram[2] != 'P' || datagram[3] != 'S' || datagram[4] != 2) {
     return {DatagramVerdict::kHeader, 0};
   }
+  Speaker speaker(datagram);
   std::size_t sound = kHeaderBytes;  // Up to here, all is handed over.
   for (std::size_t at = sound; at < size;) {
     if (size - at < kSubmessageHeaderBytes) {
@@ -178,6 +222,9 @@ CheckedDatagram CheckDatagram(Bytes datagram) {
       const Body body{datagram.subspan(begin, length), header.little_endian};
       if (!ContentIsSound(kind, flags, body)) {
         return {DatagramVerdict::kContent, 0};
+      }
+      if (!KeepsPace(kind, body, speaker, pace, now)) {
+        return {DatagramVerdict::kPace, 0};
       }
       sound = end;
     }

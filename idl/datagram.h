@@ -6,6 +6,8 @@
 #include <span>
 #include <string_view>
 
+#include "idl/writer_pace.h"
+
 namespace fdi::idl {
 
 /// Whether a datagram goes to the DDS library, or why not.
@@ -15,8 +17,9 @@ enum class DatagramVerdict : std::uint8_t {
   kLength,   ///< A submessage does not fit into the datagram, or its kind.
   kKind,     ///< A kind of submessage that the standard does not have.
   kContent,  ///< Numbers and lengths inside that no writer has.
+  kPace,     ///< Numbers that its writer cannot have reached yet.
 };
-inline constexpr std::size_t kDatagramVerdictCount = 5;
+inline constexpr std::size_t kDatagramVerdictCount = 6;
 
 /// "sound", "header", ...
 std::string_view DatagramVerdictName(DatagramVerdict verdict);
@@ -31,9 +34,12 @@ struct CheckedDatagram {
 /// Checks the framing of an RTPS message [OMG formal/2022-04-01, 9.4.5], which
 /// Fast DDS 2.9.1 believes: it aborts on a statistics submessage that is not
 /// the last and on sequence numbers at the end of their range, reads beyond a
-/// submessage that is shorter than its parameters, and allocates up to 4 GB for
-/// a fragment.
-CheckedDatagram CheckDatagram(std::span<const std::uint8_t> datagram);
+/// submessage that is shorter than its parameters, allocates up to 4 GB for a
+/// fragment, and counts through what a heartbeat or a gap leaps over.
+/// @param pace of the writers that were heard so far; takes their numbers.
+CheckedDatagram CheckDatagram(std::span<const std::uint8_t> datagram,
+                              WriterPace& pace,
+                              WriterPace::Clock::time_point now);
 
 /// Datagrams by verdict, since the participant exists.
 using DatagramCounts = std::array<std::uint64_t, kDatagramVerdictCount>;

@@ -143,7 +143,8 @@ class CheckedTransport : public transport::ChainingTransport {
                const rtps::octet* buffer, std::uint32_t bytes,
                const rtps::Locator_t& local,
                const rtps::Locator_t& remote) override {
-    const CheckedDatagram checked = CheckDatagram({buffer, bytes});
+    const CheckedDatagram checked =
+        CheckDatagram({buffer, bytes}, log_->pace(), WriterPace::Clock::now());
     log_->Count(checked.verdict, bytes, remote);
     if (checked.verdict == DatagramVerdict::kSound) {
       receiver->OnDataReceived(

@@ -85,7 +85,8 @@ class LibraryLog {
   LogSink sink_;
 };
 
-/// Counts the datagrams of a participant, by verdict. Thread safe.
+/// What a participant remembers of its datagrams: how many by verdict, and how
+/// far the writers are. Thread safe.
 class DatagramLog {
  public:
   explicit DatagramLog(LogSink log) : log_(std::move(log)) {}
@@ -94,9 +95,11 @@ class DatagramLog {
   void Count(DatagramVerdict verdict, std::size_t bytes,
              const rtps::Locator_t& sender);
   DatagramCounts counts() const;
+  WriterPace& pace() { return pace_; }
 
  private:
   LogSink log_;
+  WriterPace pace_;
   std::array<std::atomic<std::uint64_t>, kDatagramVerdictCount> counts_{};
 };
 

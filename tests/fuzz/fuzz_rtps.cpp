@@ -21,7 +21,17 @@ using fdi::idl::ValveSampleMessage;
 class Target {
  public:
   Target() {
-    publisher_.WaitForReaders(1, std::chrono::seconds(30));
+    // Each writer has said where it stands, as on a bus that runs.
+    publisher_.WaitForReaders(1, kPatience);
+    events_.WaitForReaders(1, kPatience);
+    ValveSampleMessage sample;
+    sample.valve_id = "V";
+    publisher_.Write(sample);
+    fdi::FaultEvent event;
+    event.valve_id = "V";
+    events_.Write(event);
+    Await(subscriber_);
+    Await(watcher_);
     const in_addr loopback{htonl(INADDR_LOOPBACK)};
     setsockopt(socket_, IPPROTO_IP, IP_MULTICAST_IF, &loopback,
                sizeof loopback);
@@ -48,6 +58,18 @@ class Target {
   }
 
  private:
+  static constexpr std::chrono::seconds kPatience{30};
+
+  template <typename Message>
+  static void Await(fdi::idl::Subscriber<Message>& subscriber) {
+    bool taken = false;
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    while (!taken && std::chrono::steady_clock::now() < deadline) {
+      subscriber.Take({[&](const auto&, const auto&) { taken = true; }, {}},
+                      std::chrono::milliseconds(100));
+    }
+  }
+
   void Send(const char* address, int port,
             const std::vector<std::uint8_t>& datagram) {
     sockaddr_in to{};
@@ -75,7 +97,8 @@ class Target {
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
                                       std::size_t size) {
   static Target& target = *new Target;
-  const auto checked = fdi::idl::CheckDatagram({data, size});
+  fdi::idl::WriterPace pace;
+  const auto checked = fdi::idl::CheckDatagram({data, size}, pace, {});
   if (checked.bytes > size) {
     std::abort();
   }

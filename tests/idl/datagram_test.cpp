@@ -1,6 +1,8 @@
 #include "idl/datagram.h"
 
+#include <algorithm>
 #include <cstring>
+#include <thread>
 #include <vector>
 
 #include <arpa/inet.h>
@@ -9,6 +11,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "idl/participant_impl.h"
 #include "tests/idl/dds_fixture.h"
 
 namespace fdi::idl {
@@ -61,8 +64,13 @@ Bytes Data(std::uint8_t offset) {
   return Bytes{0, 0, offset, 0} + Zeros(8) + Sequence(4, 1);
 }
 
+CheckedDatagram Check(const Bytes& message) {
+  WriterPace pace;
+  return CheckDatagram(message, pace, {});
+}
+
 DatagramVerdict VerdictOn(const Bytes& message) {
-  return CheckDatagram(message).verdict;
+  return Check(message).verdict;
 }
 
 // An end of two submessages: it is well formed, and aborts the library.
@@ -103,7 +111,7 @@ TEST(DatagramTest, KindsAreThoseOfTheStandard) {
 TEST(DatagramTest, VendorsSubmessagesAreCutOffAtTheEndAndRefusedElsewhere) {
   const Bytes pad = With(Header(), 0x01, Zeros(4));
   const CheckedDatagram checked =
-      CheckDatagram(With(With(pad, 0x81, Zeros(4)), 0x80, Zeros(56)));
+      Check(With(With(pad, 0x81, Zeros(4)), 0x80, Zeros(56)));
   EXPECT_EQ(checked.verdict, DatagramVerdict::kSound);
   EXPECT_EQ(checked.bytes, pad.size());
   EXPECT_EQ(VerdictOn(StatisticsInFront()), DatagramVerdict::kKind);
@@ -114,12 +122,86 @@ TEST(DatagramTest, SequenceNumbersAreThoseOfWriters) {
             DatagramVerdict::kSound);
   EXPECT_EQ(VerdictOn(With(Header(), 0x07, Heartbeat(Sequence(3, 0x7f)))),
             DatagramVerdict::kContent);
-  EXPECT_EQ(VerdictOn(With(Header(), 0x08, Gap(Sequence(7, 1)) + Zeros(4))),
+  EXPECT_EQ(VerdictOn(With(Header(), 0x08, Gap(Sequence(4, 9)) + Zeros(4))),
             DatagramVerdict::kSound);
-  EXPECT_EQ(VerdictOn(With(Header(), 0x08, Gap(Sequence(0, 2)) + Zeros(4))),
-            DatagramVerdict::kContent);
   EXPECT_EQ(VerdictOn(With(Header(), 0x08, Gap(Zeros(8)) + Zeros(4))),
             DatagramVerdict::kContent);
+}
+
+TEST(DatagramTest, NoWriterLeapsAhead) {
+  WriterPace pace;
+  Bytes source = Zeros(20);
+  source.back() = 1;  // Of the prefix.
+  const Bytes other = With(Header(), 0x0c, source);
+  const Bytes first = Zeros(8) + Sequence(4, 1) + Sequence(4, 9) + Zeros(4);
+  const Bytes ahead = Zeros(8) + Sequence(0, 1) + Sequence(0, 1) + Zeros(4);
+  const Bytes gap = Zeros(8) + Sequence(4, 1) + Sequence(6, 1) + Zeros(8);
+  const auto verdict = [&](const Bytes& message) {
+    return CheckDatagram(message, pace, {}).verdict;
+  };
+  EXPECT_EQ(verdict(With(Header(), 0x07, first)), DatagramVerdict::kSound);
+  EXPECT_EQ(verdict(With(Header(), 0x07, ahead)), DatagramVerdict::kPace);
+  EXPECT_EQ(verdict(With(Header(), 0x08, gap)), DatagramVerdict::kPace);
+  Bytes data = Data(16);
+  data[12] = 1;
+  EXPECT_EQ(verdict(With(Header(), 0x15, data)), DatagramVerdict::kPace);
+  // Met for the first time, a writer may stand anywhere.
+  EXPECT_EQ(verdict(With(other, 0x07, ahead)), DatagramVerdict::kSound);
+  EXPECT_EQ(verdict(With(Header(), 0x07, first)), DatagramVerdict::kSound);
+}
+
+WriterGuid Writer(std::uint8_t participant, std::uint8_t kind) {
+  return {participant, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, kind};
+}
+
+TEST(WriterPaceTest, AWriterIsAheadByWhatItCanHaveWritten) {
+  using std::chrono::hours;
+  using std::chrono::seconds;
+  WriterPace pace;
+  const WriterGuid writer = Writer(1, 3);
+  constexpr std::int64_t kMillion = 1'000'000;
+  WriterPace::Clock::time_point now{hours(1)};
+  std::int64_t number = 5'000 * kMillion;
+  EXPECT_TRUE(pace.Admit(writer, number, 0, now));
+  EXPECT_TRUE(pace.Admit(writer, 1, 0, now)) << "sent again";
+  EXPECT_TRUE(pace.Admit(writer, number += kMillion, 0, now));
+  EXPECT_FALSE(pace.Admit(writer, number + kMillion, 0, now)) << "no time for";
+  now += seconds(1);
+  EXPECT_TRUE(pace.Admit(writer, number += kMillion, 0, now));
+  now += hours(24);
+  EXPECT_FALSE(pace.Admit(writer, number + 10'000 * kMillion, 0, now));
+  EXPECT_TRUE(pace.Admit(writer, number += 8'000 * kMillion, 0, now));
+  // What it did not use of a day is no start for a leap.
+  EXPECT_TRUE(pace.Admit(writer, number + 1, 0, now += hours(24)));
+  EXPECT_FALSE(pace.Admit(writer, number + 2 * kMillion, 0, now));
+}
+
+TEST(WriterPaceTest, DiscoveryStartsAtOne) {
+  WriterPace pace;
+  EXPECT_FALSE(pace.Admit(Writer(1, 0xc2), 10'000'000, 0, {}));
+  EXPECT_TRUE(pace.Admit(Writer(1, 0xc2), 7, 0, {}));
+  EXPECT_TRUE(pace.Admit(Writer(1, 0x03), 10'000'000, 0, {}));
+}
+
+TEST(WriterPaceTest, WhatWasLeftOutCounts) {
+  WriterPace pace;
+  EXPECT_TRUE(pace.Admit(Writer(1, 3), 20'000, 10'000, {}));
+  EXPECT_FALSE(pace.Admit(Writer(1, 3), 20'000, 10'000, {}));
+  EXPECT_TRUE(pace.Admit(Writer(2, 3), 20'000, 10'000, {}));
+}
+
+TEST(WriterPaceTest, AFloodOfStrangersDoesNotMakeItForget) {
+  WriterPace pace;
+  EXPECT_TRUE(pace.Admit(Writer(1, 3), 1, 0, {}));
+  for (std::uint32_t i = 0; i < 60'000; ++i) {
+    WriterGuid stranger = Writer(2, 3);
+    std::memcpy(&stranger[4], &i, sizeof i);
+    pace.Admit(stranger, 1, 0, {});
+    if (i % 30'000 == 0) {
+      EXPECT_TRUE(pace.Admit(Writer(1, 3), 1, 0, {}));
+    }
+  }
+  EXPECT_FALSE(pace.Admit(Writer(1, 3), 10'000'000, 0, {}));
 }
 
 TEST(DatagramTest, FragmentsAreOfSamplesThatFitIntoMemory) {
@@ -147,19 +229,35 @@ TEST(DatagramTest, ParametersAreInsideTheirSubmessage) {
   EXPECT_EQ(verdict(Data(8) + Bytes{1, 0, 0, 0}), DatagramVerdict::kContent);
 }
 
-// To all participants of the domain, as those that look for others do.
-void SendTo(int domain, const Bytes& datagram) {
+void SendTo(const char* address, int port, const Bytes& datagram) {
   const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   const in_addr loopback{htonl(INADDR_LOOPBACK)};
   setsockopt(socket, IPPROTO_IP, IP_MULTICAST_IF, &loopback, sizeof loopback);
   sockaddr_in to{};
   to.sin_family = AF_INET;
-  to.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * domain));
-  to.sin_addr.s_addr = inet_addr("239.255.0.1");
+  to.sin_port = htons(static_cast<std::uint16_t>(port));
+  to.sin_addr.s_addr = inet_addr(address);
   EXPECT_EQ(sendto(socket, datagram.data(), datagram.size(), 0,
                    reinterpret_cast<const sockaddr*>(&to), sizeof to),
             static_cast<ssize_t>(datagram.size()));
   close(socket);
+}
+
+// The ports of discovery [OMG formal/2022-04-01, 9.6.1].
+int PortOf(const TestDomain& domain) {
+  return 7400 + 250 * domain.id();
+}
+
+// To all participants of the domain, as those that look for others do.
+void SendTo(const TestDomain& domain, const Bytes& datagram) {
+  SendTo("239.255.0.1", PortOf(domain), datagram);
+}
+
+// To each of the participants that a process may have had, alone.
+void SendToEach(const TestDomain& domain, const Bytes& datagram) {
+  for (int number = 0; number < 20; ++number) {
+    SendTo("127.0.0.1", PortOf(domain) + 10 + 2 * number, datagram);
+  }
 }
 
 // Without the check this test ends by an abort of the library.
@@ -172,9 +270,9 @@ TEST(DatagramTest, ParticipantOutlivesWhatAbortsTheLibrary) {
   Publisher<ValveSampleMessage> publisher(peer);
   ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
 
-  SendTo(domain.id(), StatisticsInFront());
-  SendTo(domain.id(), StatisticsInFront());
-  SendTo(domain.id(), Zeros(100));
+  SendTo(domain, StatisticsInFront());
+  SendTo(domain, StatisticsInFront());
+  SendTo(domain, Zeros(100));
 
   ASSERT_TRUE(log.WaitFor("datagram_refused reason=header bytes=100 from="));
   const DatagramCounts counts = participant.datagrams();
@@ -187,6 +285,36 @@ TEST(DatagramTest, ParticipantOutlivesWhatAbortsTheLibrary) {
   EXPECT_TRUE(TakeUntil<ValveSampleMessage>(
       subscriber, {[&](const auto&, const auto&) { received = true; }, {}},
       [&] { return received; }));
+}
+
+// Without the check a thread of the library counts, and this test does not end.
+TEST(DatagramTest, ParticipantOutlivesALeapInTheNameOfAPeer) {
+  const TestDomain domain;
+  Participant participant(domain.Options());
+  Participant peer(domain.Options());
+  Subscriber<ValveSampleMessage> subscriber(participant);
+  Publisher<ValveSampleMessage> publisher(peer);
+  ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+
+  const auto& prefix = peer.impl()->guid().guidPrefix.value;
+  Bytes message = Header();
+  std::copy(std::begin(prefix), std::end(prefix), message.begin() + 8);
+  // The writer of its endpoints says that what it still has begins at 2^39, for
+  // the two hundredth time.
+  const Bytes reader{0, 0, 3, 0xc7};
+  const Bytes writer{0, 0, 3, 0xc2};
+  SendToEach(domain, With(message, 0x07,
+                          reader + writer + Sequence(0, 0x80) +
+                              Sequence(0, 0x80) + Bytes{200, 0, 0, 0}));
+  const auto refused = [&] {
+    return participant
+        .datagrams()[static_cast<std::size_t>(DatagramVerdict::kPace)];
+  };
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  while (refused() == 0 && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_EQ(refused(), 1);
 }
 
 }  // namespace

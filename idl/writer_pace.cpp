@@ -1,0 +1,77 @@
+#include "idl/writer_pace.h"
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+namespace fdi::idl {
+namespace {
+
+using std::chrono::duration_cast;
+using std::chrono::seconds;
+
+constexpr std::int64_t kBurst = std::int64_t{1} << 20;  // 2 ms of counting.
+// Four times what a writer of the library reaches on one host, and ten times
+// what one writes for longer.
+constexpr std::int64_t kPerSecond = 1'000'000;
+constexpr std::int64_t kPerSecondOfSilence = 100'000;
+constexpr seconds kSilence{10};
+// A number that was left out stays in a set of the library, 48 bytes each.
+constexpr std::int64_t kCostOfLeftOut = 64;
+constexpr std::size_t kMostRecent = 32'768;
+
+std::int64_t Growth(WriterPace::Clock::duration since) {
+  const auto of = [](WriterPace::Clock::duration time, std::int64_t rate) {
+    return duration_cast<std::chrono::microseconds>(time).count() * rate /
+           1'000'000;
+  };
+  const auto talking = std::min<WriterPace::Clock::duration>(since, kSilence);
+  return of(talking, kPerSecond) + of(since - talking, kPerSecondOfSilence);
+}
+
+// Writers of discovery start at 1 with their participant; others may have
+// written for months.
+bool IsOfDiscovery(const WriterGuid& writer) {
+  return (writer.back() & 0xc0U) == 0xc0U;
+}
+
+}  // namespace
+
+std::size_t WriterPace::Hash::operator()(const WriterGuid& writer) const {
+  return std::hash<std::string_view>{}(
+      {reinterpret_cast<const char*>(writer.data()), writer.size()});
+}
+
+WriterPace::State& WriterPace::Find(const WriterGuid& writer,
+                                    std::int64_t number,
+                                    Clock::time_point now) {
+  if (const auto found = recent_.find(writer); found != recent_.end()) {
+    return found->second;
+  }
+  if (recent_.size() == kMostRecent) {
+    older_ = std::exchange(recent_, {});
+  }
+  State state{IsOfDiscovery(writer) ? 0 : number, kBurst, now};
+  if (const auto found = older_.find(writer); found != older_.end()) {
+    state = found->second;
+  }
+  return recent_.emplace(writer, state).first->second;
+}
+
+bool WriterPace::Admit(const WriterGuid& writer, std::int64_t number,
+                       std::int64_t left_out, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  State& state = Find(writer, number, now);
+  const std::int64_t allowed = state.burst + Growth(now - state.last_word);
+  const std::int64_t cost = std::max<std::int64_t>(0, number - state.number) +
+                            std::min(left_out, allowed) * kCostOfLeftOut;
+  if (cost > allowed) {
+    return false;
+  }
+  state.number = std::max(state.number, number);
+  state.burst = std::min(kBurst, allowed - cost);
+  state.last_word = now;
+  return true;
+}
+
+}  // namespace fdi::idl
