@@ -89,9 +89,9 @@ void ReadText(TomlReader& table, FaultText& text) {
 }
 
 [[noreturn]] void RefuseFault(const TomlReader& file, const std::string& key) {
-  std::vector<std::string> names;
-  for (int fault = 0; fault <= kLastFinding; ++fault) {
-    names.push_back(KeyOf(fault));
+  std::vector<std::string> names{std::string(kUnknown)};
+  for (const int fault : kFaultsAndFindings) {
+    names.push_back(FaultName(fault));
   }
   const auto meant = Suggest(key, names);
   file.Refuse(key, meant ? "unknown fault: did you mean '" + *meant + "'?"
@@ -129,14 +129,18 @@ Severity FaultText::SeverityAt(double strength) const {
 // checked for what is too much.
 FaultTexts::FaultTexts(const std::filesystem::path& path) {
   TomlReader file(path);
-  for (int fault = 0; fault <= kLastFinding; ++fault) {
-    const auto table = file.Table(KeyOf(fault));
+  const auto require = [&file](const std::string& fault) {
+    const auto table = file.Table(fault);
     for (const char* key :
          {"name", "check", "discipline", "namur", "severity"}) {
       if (!table || !table->Has(key)) {
-        file.Refuse(KeyOf(fault), std::string(key) + " is missing");
+        file.Refuse(fault, std::string(key) + " is missing");
       }
     }
+  };
+  require(std::string(kUnknown));
+  for (const int fault : kFaultsAndFindings) {
+    require(FaultName(fault));
   }
   Override(path);
 }
@@ -149,14 +153,15 @@ void FaultTexts::Override(const std::filesystem::path& path) {
     if (!table) {
       RefuseFault(file, key);
     }
-    ReadText(*table, texts_[static_cast<std::size_t>(*fault)]);
+    ReadText(*table, texts_[*fault]);
   }
   file.Finish();
 }
 
 const FaultText& FaultTexts::Of(int fault) const {
-  Require(fault >= 0 && fault <= kLastFinding, "fault is not of the catalogue");
-  return texts_[static_cast<std::size_t>(fault)];
+  const auto text = texts_.find(fault);
+  Require(text != texts_.end(), "fault is not of the catalogue");
+  return text->second;
 }
 
 FaultWords FaultTexts::Words(std::string_view answer, double strength) const {
@@ -200,8 +205,9 @@ FaultTexts LoadFaultTexts(const GlobalOptions& options) {
 
 Json FaultTextsJson(const FaultTexts& texts) {
   Json rows = Json::array();
-  for (int i = 1; i <= kLastFinding + 1; ++i) {  // 1, 2 ... and 0 at the end.
-    const int fault = i % (kLastFinding + 1);
+  std::vector<int> faults(kFaultsAndFindings.begin(), kFaultsAndFindings.end());
+  faults.push_back(0);
+  for (const int fault : faults) {
     const FaultText& text = texts.Of(fault);
     Json bands = Json::array();
     for (const SeverityBand& band : text.bands) {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -75,7 +75,7 @@ class FaultTexts {
   /// @throws as the constructor.
   void Override(const std::filesystem::path& path);
 
-  /// @param fault of the catalogue, 0 stands for unknown.
+  /// @param fault or finding of the catalogue, 0 stands for unknown.
   const FaultText& Of(int fault) const;
 
   /// @param answer as in fault_history: "f19", "f3|f6", "unknown", empty or
@@ -84,7 +84,7 @@ class FaultTexts {
   FaultWords Words(std::string_view answer, double strength) const;
 
  private:
-  std::array<FaultText, kLastFinding + 1> texts_;  // [0]: unknown
+  std::map<int, FaultText> texts_;  // [0]: unknown
 };
 
 /// The catalogue that was installed with the programs, then DATA/faults.toml if

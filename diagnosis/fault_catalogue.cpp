@@ -49,18 +49,18 @@ std::string Lower(std::string_view text) {
 const std::string kFaultNames = JoinedNames();
 
 const FaultFacts& FaultFactsOf(int fault) {
-  Require(fault >= 1 && fault <= kLastFinding, "fault is not of the catalogue");
-  return kFaultCatalogue[fault - 1];
+  Require(IsFault(fault) || IsFinding(fault), "fault is not of the catalogue");
+  return IsFault(fault) ? kFaultCatalogue[fault - 1]
+                        : kFindingCatalogue[fault - kFirstFinding];
 }
 
 std::string FaultName(int fault) {
   if (fault == 0) {
     return "normal";
   }
-  if (fault < 0 || fault > kLastFinding) {
-    return "unknown";
-  }
-  return std::string(FaultFactsOf(fault).name);
+  return IsFault(fault) || IsFinding(fault)
+             ? std::string(FaultFactsOf(fault).name)
+             : "unknown";
 }
 
 std::optional<int> ParseFault(std::string_view name) {
@@ -85,7 +85,7 @@ std::optional<int> ParseFault(std::string_view name) {
 
 std::optional<int> ParseFinding(std::string_view name) {
   const std::string lower = Lower(name);
-  for (int finding = kLastFault + 1; finding <= kLastFinding; ++finding) {
+  for (int finding = kFirstFinding; finding <= kLastFinding; ++finding) {
     if (lower == FaultFactsOf(finding).name) {
       return finding;
     }
@@ -99,7 +99,7 @@ std::string DidYouMeanFault(std::string_view name,
   if (NumberAfter(lower, "f") || NumberAfter(lower, "paper")) {
     return "";  // Well written, but there is no such number.
   }
-  for (int fault = 1; fault <= kLastFinding; ++fault) {
+  for (const int fault : kFaultsAndFindings) {
     others.push_back(FaultName(fault));
   }
   const auto meant = Suggest(lower, others);
@@ -107,8 +107,7 @@ std::string DidYouMeanFault(std::string_view name,
 }
 
 std::optional<Signal> TransmitterOf(int fault) {
-  return fault >= 1 && fault <= kLastFault ? FaultFactsOf(fault).transmitter
-                                           : std::nullopt;
+  return IsFault(fault) ? FaultFactsOf(fault).transmitter : std::nullopt;
 }
 
 int RequireFault(std::string_view name) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <iterator>
 #include <optional>
 #include <string>
@@ -19,9 +20,8 @@ struct FaultFacts {
   std::optional<Signal> transmitter{};
 };
 
-/// All faults, then what the floor finds (diagnosis/floor.h): readings that
-/// cannot be, whatever the cause. The number of an entry is its place, from 1
-/// on. Models, databases and messages hold these numbers: a new one comes last.
+/// All faults. The number of one is its place, from 1 on. Models, databases and
+/// messages hold these numbers: a new one comes last.
 inline constexpr FaultFacts kFaultCatalogue[] = {
     {"f1", "valve clogging", "F1", false},
     {"f2", "plug or seat sedimentation", "", false},
@@ -45,6 +45,11 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
     {"t1", "temperature transmitter fault", "", true, Signal::kT1},
     {"p1", "inlet pressure transmitter fault", "", true, Signal::kP1},
     {"p2", "outlet pressure transmitter fault", "", true, Signal::kP2},
+};
+
+/// What the floor finds (diagnosis/floor.h): readings that cannot be, whatever
+/// the cause. Their numbers begin at kFirstFinding, so that faults can join.
+inline constexpr FaultFacts kFindingCatalogue[] = {
     {"travel_deviation", "rod does not follow the command", "", true},
     {"shut_flow", "flow with the valve shut", "", false},
     {"excess_flow", "more flow than the opening can pass", "", false},
@@ -55,27 +60,47 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
 /// The actuator faults of the DAMADICS benchmark are 1..kFaultCount.
 inline constexpr int kFaultCount = 19;
 /// All faults, which the simulator knows, are 1..kLastFault.
-inline constexpr int kLastFault = 22;
-/// What the floor finds follows: kLastFault + 1..kLastFinding.
+inline constexpr int kLastFault = static_cast<int>(std::size(kFaultCatalogue));
+/// What the floor finds is kFirstFinding..kLastFinding.
+inline constexpr int kFirstFinding = 201;
 inline constexpr int kLastFinding =
-    static_cast<int>(std::size(kFaultCatalogue));
+    kFirstFinding + static_cast<int>(std::size(kFindingCatalogue)) - 1;
 
 inline constexpr int kTemperatureTransmitterFault = 20;
 inline constexpr int kInletPressureTransmitterFault = 21;
 inline constexpr int kOutletPressureTransmitterFault = 22;
-inline constexpr int kTravelDeviation = 23;
-inline constexpr int kShutFlow = 24;
-inline constexpr int kExcessFlow = 25;
-inline constexpr int kPositionStuck = 26;
-inline constexpr int kFlowStuck = 27;
+inline constexpr int kTravelDeviation = kFirstFinding;
+inline constexpr int kShutFlow = 202;
+inline constexpr int kExcessFlow = 203;
+inline constexpr int kPositionStuck = 204;
+inline constexpr int kFlowStuck = 205;
 static_assert(kFaultCatalogue[kTemperatureTransmitterFault - 1].name == "t1" &&
-              kFaultCatalogue[kLastFault - 1].name == "p2" &&
-              kFaultCatalogue[kFlowStuck - 1].name == "f_stuck");
+              kFaultCatalogue[kOutletPressureTransmitterFault - 1].name ==
+                  "p2" &&
+              kFlowStuck == kLastFinding);
+
+constexpr bool IsFault(int number) {
+  return number >= 1 && number <= kLastFault;
+}
+constexpr bool IsFinding(int number) {
+  return number >= kFirstFinding && number <= kLastFinding;
+}
+
+/// The numbers of all faults, then of all findings.
+inline constexpr auto kFaultsAndFindings = [] {
+  std::array<int, std::size(kFaultCatalogue) + std::size(kFindingCatalogue)>
+      numbers{};
+  for (int i = 0; i < static_cast<int>(numbers.size()); ++i) {
+    numbers[static_cast<std::size_t>(i)] =
+        i < kLastFault ? i + 1 : kFirstFinding + i - kLastFault;
+  }
+  return numbers;
+}();
 
 /// The names of all faults, for messages and help: "f1..f19, t1, p1, p2".
 extern const std::string kFaultNames;
 
-/// @throws std::invalid_argument if `fault` is not in 1..kLastFinding.
+/// @throws std::invalid_argument if `fault` is neither fault nor finding.
 const FaultFacts& FaultFactsOf(int fault);
 
 /// "f19", "t1"; "normal" for 0; "unknown" for anything else.

@@ -125,7 +125,7 @@ void ValidateFloor(const ModelSet& models, const FloorLimits& floor) {
 }  // namespace
 
 void AddFindings(ModelSet& models) {
-  for (int finding = kLastFault + 1; models.floor && finding <= kLastFinding;
+  for (int finding = kFirstFinding; models.floor && finding <= kLastFinding;
        ++finding) {
     models.faults.push_back(finding);
   }
@@ -134,7 +134,7 @@ void AddFindings(ModelSet& models) {
 FaultSet FindingsOf(const ModelSet& models) {
   FaultSet findings = 0;
   for (std::size_t i = 0; i < models.faults.size(); ++i) {
-    findings |= models.faults[i] > kLastFault ? FaultSet{1} << i : 0;
+    findings |= IsFinding(models.faults[i]) ? FaultSet{1} << i : 0;
   }
   return findings;
 }

@@ -92,6 +92,19 @@ class Transfer {
     }
   }
 
+  // The number of a fault, or of what the floor finds.
+  template <typename Ours, typename Wire>
+  void Fault(const char* field, Ours& ours, Wire&& wire) {
+    const int fault = kEncodes ? ours : static_cast<int>(wire);
+    if (!IsFault(fault) && !IsFinding(fault)) {
+      Refuse(field, " is " + std::to_string(fault) + ", accepted are " +
+                        Range(1, kLastFault) + " and " +
+                        Range(kFirstFinding, kLastFinding));
+    } else {
+      Ranged(field, ours, wire, 1, kLastFinding);
+    }
+  }
+
   // The name of an instance: not empty, without control characters.
   template <typename Ours, typename Wire>
   void Id(const char* field, Ours& ours, Wire& wire) {
@@ -119,7 +132,7 @@ class Transfer {
     }
     for (std::size_t i = 0; i < count; ++i) {
       if constexpr (std::same_as<typename Ours::value_type, int>) {
-        Ranged(field, ours[i], wire[i], 1, kLastFinding);
+        Fault(field, ours[i], wire[i]);
       } else {
         Fields(*this, ours[i], wire[i]);
       }
@@ -253,7 +266,7 @@ void Fields(auto& t, Is<DecisionMessage> auto& message, auto& w) {
 }
 
 void Fields(auto& t, Is<FaultCandidate> auto& m, auto& w) {
-  t.Ranged("candidates.fault", m.fault, w.fault(), 1, kLastFinding);
+  t.Fault("candidates.fault", m.fault, w.fault());
   FDI_FOR_EACH(FDI_FIELD, factor, strength, isolated)
 }
 

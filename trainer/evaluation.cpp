@@ -103,7 +103,7 @@ void IndexFault(const std::vector<Indication>& all, Zone zone,
 std::vector<int> FaultsIn(const ModelSet& models, FaultSet set) {
   std::vector<int> faults;
   for (std::size_t i = 0; i < models.faults.size(); ++i) {
-    if ((set >> i & 1U) != 0 && models.faults[i] <= kLastFault) {
+    if ((set >> i & 1U) != 0 && IsFault(models.faults[i])) {
       faults.push_back(models.faults[i]);
     }
   }

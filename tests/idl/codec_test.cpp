@@ -273,7 +273,8 @@ TEST(CodecTest, WhatDoesNotFitIsNamed) {
   EXPECT_THAT([&] { Codec<FaultEvent>::Encode(event, wire); },
               ThrowsMessage<DataError>(
                   "candidates.fault is " + std::to_string(kLastFinding + 1) +
-                  ", accepted are 1 to " + std::to_string(kLastFinding)));
+                  ", accepted are 1 to " + std::to_string(kLastFault) +
+                  " and 201 to " + std::to_string(kLastFinding)));
   event.candidates.resize(kMaxFaults + 1, {1, 0.9, 0.5, true});
   EXPECT_THAT([&] { Codec<FaultEvent>::Encode(event, wire); },
               ThrowsMessage<DataError>(
@@ -293,7 +294,8 @@ TEST(CodecTest, FaultsBeyondTheCatalogueAreNotDecoded) {
   Codec<FaultEvent>::Encode(event, wire);
   ASSERT_TRUE(Codec<FaultEvent>::Decode(wire, event));
 
-  for (const int fault : {0, kLastFinding + 1, 255}) {
+  for (const int fault :
+       {0, kLastFault + 1, kFirstFinding - 1, kLastFinding + 1}) {
     wire.candidates()[0].fault(static_cast<std::uint8_t>(fault));
     EXPECT_FALSE(Codec<FaultEvent>::Decode(wire, event)) << fault;
   }
