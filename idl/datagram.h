@@ -35,7 +35,8 @@ struct CheckedDatagram {
 /// Fast DDS 2.9.1 believes: it aborts on a statistics submessage that is not
 /// the last and on sequence numbers at the end of their range, reads beyond a
 /// submessage that is shorter than its parameters, allocates up to 4 GB for a
-/// fragment, and counts through what a heartbeat or a gap leaps over.
+/// fragment, aborts on a message that comes whole and in fragments, and counts
+/// through what a heartbeat or a gap leaps over.
 /// @param pace of the writers that were heard so far; takes their numbers.
 CheckedDatagram CheckDatagram(std::span<const std::uint8_t> datagram,
                               WriterPace& pace,

@@ -204,13 +204,16 @@ TEST(WriterPaceTest, AFloodOfStrangersDoesNotMakeItForget) {
   EXPECT_FALSE(pace.Admit(Writer(1, 3), 10'000'000, 0, {}));
 }
 
-TEST(DatagramTest, FragmentsAreOfSamplesThatFitIntoMemory) {
-  const auto verdict = [](std::uint8_t units) {
+TEST(DatagramTest, FragmentsAreOfDiscoveryAndFitIntoMemory) {
+  const auto verdict = [](std::uint8_t writer, std::uint8_t units) {
+    Bytes data = Data(28);
+    data[11] = writer;
     const Bytes fragment{1, 0, 0, 0, 1, 0, 64, 0, 0, 1, units, 0};
-    return VerdictOn(With(Header(), 0x16, Data(28) + fragment + Zeros(64)));
+    return VerdictOn(With(Header(), 0x16, data + fragment + Zeros(64)));
   };
-  EXPECT_EQ(verdict(0), DatagramVerdict::kSound);
-  EXPECT_EQ(verdict(16), DatagramVerdict::kContent);
+  EXPECT_EQ(verdict(0xc2, 0), DatagramVerdict::kSound);
+  EXPECT_EQ(verdict(0xc2, 16), DatagramVerdict::kContent);
+  EXPECT_EQ(verdict(0x02, 0), DatagramVerdict::kContent);
 }
 
 TEST(DatagramTest, ParametersAreInsideTheirSubmessage) {
