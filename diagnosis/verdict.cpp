@@ -75,6 +75,10 @@ std::string_view EndReasonName(EndReason reason) {
                             "model_changed", "superseded", "unknown"});
 }
 
+std::string_view LayerName(Layer layer) {
+  return NameOf(layer, std::array<std::string_view, 2>{"observers", "physics"});
+}
+
 std::uint64_t EpisodeId(std::string_view valve_id, std::uint64_t source_id,
                         std::int64_t detection_stamp_ns) {
   std::uint64_t hash = kFnvOffset;

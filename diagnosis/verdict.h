@@ -91,6 +91,12 @@ enum class EndReason : std::uint8_t {
   kUnknown,
 };
 
+/// What gave an episode the name that it has.
+enum class Layer : std::uint8_t {
+  kObservers,  ///< The engine: observers and limits.
+  kPhysics,    ///< A simulation of the valve: the second look.
+};
+
 /// A step in the life of an episode.
 struct Transition {
   TransitionKind kind{TransitionKind::kDetected};
@@ -99,10 +105,11 @@ struct Transition {
   std::int64_t detection_stamp_ns{0};
   FaultSet faults{0};    ///< The isolated set, empty until isolated.
   double factor{0.0};    ///< Largest factor of the set, or of any fault.
-  double strength{0.0};  ///< Estimated, of the fault with that factor; 0
-                         ///< until isolated.
+  double strength{0.0};  ///< Estimated, of the fault with that factor, or the
+                         ///< likeliest by the physics; 0 until isolated.
   EndReason reason{EndReason::kNone};  ///< Of kClosed.
   Unknown unknown{Unknown::kNone};     ///< As in the verdict at that time.
+  Layer layer{Layer::kObservers};      ///< Whose answer `faults` is.
 };
 
 /// Everything the engine says about one sample.
@@ -141,6 +148,7 @@ std::string_view UnknownName(Unknown unknown);  ///< "too_early", ...
 std::string CoverageReasonsName(CoverageReasons reasons);
 std::string_view TransitionName(TransitionKind kind);  ///< "DETECTED", ...
 std::string_view EndReasonName(EndReason reason);      ///< "cleared", ...
+std::string_view LayerName(Layer layer);               ///< "observers", ...
 
 /// 64-bit FNV-1a over valve, source and detection stamp: recording the same
 /// episode twice meets the same id.

@@ -61,6 +61,12 @@ constexpr std::array<CounterInfo, kCounterCount> kInfos{{
      "Valves that changed to another model set"},
     {"model_failures", "fdi_model_failures_total",
      "Model sets that could not be loaded"},
+    {"looks", "fdi_second_looks_total",
+     "Second looks by physics at fault episodes"},
+    {"looks_dropped", "fdi_second_looks_dropped_total",
+     "Second looks that were left out, as too many waited"},
+    {"looks_failed", "fdi_second_looks_failed_total",
+     "Second looks whose simulation failed, or without usable physics"},
 }};
 static_assert(!kInfos.back().name.empty(), "a counter has no name");
 

@@ -40,6 +40,9 @@ enum class Counter : std::uint8_t {
   kEpisodes,
   kModelSwaps,
   kModelFailures,
+  kLooks,
+  kLooksDropped,
+  kLooksFailed,
   kCount_
 };
 inline constexpr std::size_t kCounterCount =

@@ -175,6 +175,11 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
       !(ends && transition.faults == 0)) {
     open_->candidates = CandidatesOf(*models, verdict, transition.faults);
   }
+  // What the observers hold likely beside is refuted by the simulation.
+  if (transition.layer == Layer::kPhysics) {
+    std::erase_if(open_->candidates,
+                  [](const FaultCandidate& each) { return !each.isolated; });
+  }
   Emit(recorded, models, outlet);
 }
 

@@ -62,7 +62,9 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
                     [this](DataGap gap) { journal_.Gap(std::move(gap)); })),
       shadow_(options_.shadow.candidate
                   ? std::make_unique<ShadowBank>(options_.shadow, log_)
-                  : nullptr) {}
+                  : nullptr),
+      looks_(options_.second_look ? std::make_unique<LookWorker>(context_)
+                                  : nullptr) {}
 
 Pipeline::~Pipeline() {
   try {
@@ -94,6 +96,9 @@ void Pipeline::Start(const std::vector<OpenEpisode>& open,
   journal_.Start();
   if (recorder_) {
     recorder_->Start();
+  }
+  if (looks_) {
+    looks_->Start();
   }
 }
 
@@ -129,6 +134,9 @@ void Pipeline::Stop() {
     }
     TakeCheckpoint();
   });
+  if (looks_) {
+    errors.Try([this] { looks_->Stop(); });
+  }
   // The recorder first: it may report a gap.
   if (recorder_) {
     errors.Try([this] { recorder_->Stop(); });
@@ -251,7 +259,7 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
             "valve_seen valve=" + LogValue(id) + " model_set=" +
                 (parts ? NameOf(parts->plan->models()) : "none"));
   auto valve = std::make_unique<Valve>(
-      Valve{ValveMonitor(id, parts, options_.trace),
+      Valve{ValveMonitor(id, parts, options_.trace, looks_.get()),
             shadow_ ? shadow_->Add(id) : nullptr, reserved_.erase(id) > 0});
   valve->monitor.HoldIsolation(resolver_->IsolationHeld(id));
   if (const auto open = recovered_.find(id); open != recovered_.end()) {
@@ -315,7 +323,11 @@ void Pipeline::Offer(std::string_view valve_id, const Sample& sample,
   const ValveOutcome outcome =
       valve->monitor.Step(sample, writer, received, journal_);
   if (valve->shadow != nullptr) {
-    shadow_->Step(*valve->shadow, sample, outcome);
+    // Both without second looks, which the candidate does not get.
+    const ValveOutcome observed{valve->monitor.observed(), outcome.models,
+                                outcome.model_swapped, outcome.isolation_held,
+                                outcome.missing};
+    shadow_->Step(*valve->shadow, sample, observed);
   }
   Count(*valve, sample, outcome);
   const Verdict& verdict = outcome.verdict;

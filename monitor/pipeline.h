@@ -15,6 +15,7 @@
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
 #include "monitor/journal.h"
+#include "monitor/look_worker.h"
 #include "monitor/recorder.h"
 #include "monitor/shadow.h"
 #include "monitor/sinks.h"
@@ -39,7 +40,8 @@ struct PipelineOptions {
   std::chrono::milliseconds checkpoint_period{60'000};
   JournalOptions journal;
   RecorderOptions recorder;
-  ShadowOptions shadow;  ///< Without a candidate: none runs.
+  ShadowOptions shadow;    ///< Without a candidate: none runs.
+  bool second_look{true};  ///< By physics, where the model set has them.
 };
 
 /// Where the results go; all outlive the pipeline.
@@ -68,11 +70,12 @@ struct ValveCensus {
 ///
 ///     diagnosis thread: Offer() -> engine -> decision vectors
 ///                                    |-> Journal: history thread, publisher
-///                                    \-> Recorder: recorder thread
+///                                    |-> Recorder: recorder thread
+///                                    \-> LookWorker, which answers later
 ///
-/// Built idle; Start() starts the threads of journal and recorder. All calls
-/// come from the diagnosis thread, Start() and Stop() while there is none,
-/// except where noted.
+/// Built idle; Start() starts the threads of these. All calls come from the
+/// diagnosis thread, Start() and Stop() while there is none, except where
+/// noted.
 class Pipeline {
  public:
   using TimePoint = ValveMonitor::TimePoint;
@@ -119,7 +122,8 @@ class Pipeline {
 
   /// A thread died of an exception, which Stop() throws.
   bool failed() const {
-    return journal_.failed() || (recorder_ && recorder_->failed());
+    return journal_.failed() || (recorder_ && recorder_->failed()) ||
+           (looks_ && looks_->failed());
   }
   ValveCensus census() const;                    ///< As of the last Tend().
   std::vector<std::string> valve_names() const;  ///< Of all valves seen.
@@ -178,6 +182,7 @@ class Pipeline {
   Journal journal_;
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<ShadowBank> shadow_;
+  std::unique_ptr<LookWorker> looks_;  // Null: no second looks.
   EnginePlans plans_;
 
   std::vector<std::unique_ptr<Valve>> valves_;  // In the order of first sight.

@@ -24,16 +24,28 @@ std::shared_ptr<const ModelSet> ModelsOf(
 
 ValveMonitor::ValveMonitor(const std::string& id,
                            const std::optional<EngineParts>& parts,
-                           const TraceOptions& options)
+                           const TraceOptions& options, LookWorker* looks)
     : id_(id),
       models_(ModelsOf(parts)),
       required_(parts ? parts->plan->required() : 0),
+      looks_(looks),
       tracker_(id, options) {
   if (parts) {
     engine_.emplace(*parts);
   }
+  NameEpisodes();
   unassigned_.quality = Quality::kUnassigned;
   unassigned_.residuals.fill(std::numeric_limits<double>::quiet_NaN());
+}
+
+void ValveMonitor::NameEpisodes() {
+  LookWorker::Physics physics;
+  if (looks_ != nullptr && models_ != nullptr) {
+    physics = looks_->PhysicsOf(*models_);
+  }
+  names_ = physics ? std::make_unique<EpisodeNames>(id_, models_,
+                                                    std::move(physics), *looks_)
+                   : nullptr;
 }
 
 bool ValveMonitor::BeginsAnew(const Sample& sample) const {
@@ -87,7 +99,10 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     return {unassigned_, nullptr, swapped, isolation_held_, 0};
   }
   RestoreOnce(sample.source_id);
-  const Verdict& verdict = engine_->Step(sample);
+  const Verdict& engine = engine_->Step(sample);
+  const Verdict& verdict =
+      names_ ? names_->Step(sample, engine, isolation_held_) : engine;
+  answer_ = &verdict;
   if (CountsAsTime(verdict)) {
     Place(sample);
     coverage_.Add(sample.stamp_ns, verdict.quality, 1,
@@ -151,7 +166,7 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
   if (parts && engine_) {
     const std::optional<Transition> closed = engine_->Adopt(*parts);
     if (closed) {
-      tracker_.End(*closed, models_, outlet);
+      End(*closed, outlet);
     }
   } else if (parts) {
     engine_.emplace(*parts);
@@ -161,6 +176,8 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
     engine_.reset();
   }
   models_ = std::move(models);
+  answer_ = nullptr;
+  NameEpisodes();
   required_ = parts ? parts->plan->required() : SignalMask{0};
   swapped_ = true;
   return true;
@@ -212,9 +229,14 @@ void ValveMonitor::Close(EndReason reason, EpisodeOutlet& outlet) {
     return;
   }
   const std::optional<Transition> closed = engine_->EndEpisode(reason);
+  answer_ = nullptr;
   if (closed) {
-    tracker_.End(*closed, models_, outlet);
+    End(*closed, outlet);
   }
+}
+
+void ValveMonitor::End(const Transition& closed, EpisodeOutlet& outlet) {
+  tracker_.End(names_ ? names_->End(closed) : closed, models_, outlet);
 }
 
 }  // namespace fdi::monitor

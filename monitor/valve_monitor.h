@@ -8,14 +8,15 @@
 
 #include "diagnosis/valve_engine.h"
 #include "monitor/checkpoint.h"
+#include "monitor/episode_names.h"
 #include "monitor/episode_tracker.h"
 #include "monitor/health_book.h"
 #include "monitor/sinks.h"
 
 namespace fdi::monitor {
 
-/// One valve of the plant: its engine, its episodes, its clock. A valve
-/// without a model set is listed, and its quality is UNASSIGNED.
+/// One valve of the plant: its engine, its episodes and their names, its clock.
+/// A valve without a model set is listed, and its quality is UNASSIGNED.
 ///
 /// One thread at a time.
 class ValveMonitor {
@@ -23,8 +24,10 @@ class ValveMonitor {
   using TimePoint = std::chrono::steady_clock::time_point;
 
   /// @param parts of the model set; nothing: none assigned.
+  /// @param looks takes second looks if the model set has physics, and outlives
+  ///   this; null: none are taken.
   ValveMonitor(const std::string& id, const std::optional<EngineParts>& parts,
-               const TraceOptions& options);
+               const TraceOptions& options, LookWorker* looks = nullptr);
 
   /// Before the first Step().
   void Recover(const OpenEpisode& episode) { tracker_.Recover(episode); }
@@ -88,7 +91,9 @@ class ValveMonitor {
   /// A sample came.
   bool seen() const { return seen_; }
   /// The last one.
-  const Verdict& verdict() const {
+  const Verdict& verdict() const { return answer_ ? *answer_ : observed(); }
+  /// The same without second looks.
+  const Verdict& observed() const {
     return engine_ ? engine_->verdict() : unassigned_;
   }
   bool stale() const { return stale_; }
@@ -102,6 +107,8 @@ class ValveMonitor {
   bool BeginsAnew(const Sample& sample) const;
   void Place(const Sample& sample);
   void Close(EndReason reason, EpisodeOutlet& outlet);
+  void End(const Transition& closed, EpisodeOutlet& outlet);
+  void NameEpisodes();
   void RestoreOnce(std::uint64_t source_id);
   double period_s() const;
 
@@ -109,6 +116,9 @@ class ValveMonitor {
   std::shared_ptr<const ModelSet> models_;
   SignalMask required_{0};  // By models_.
   std::optional<ValveEngine> engine_;
+  LookWorker* looks_;
+  std::unique_ptr<EpisodeNames> names_;  // Null: the engine's count.
+  const Verdict* answer_{nullptr};       // On the last sample.
   EpisodeTracker tracker_;
   Verdict unassigned_;
   CoverageBook coverage_;

@@ -175,6 +175,9 @@ void AddRunVerb(cli::Program& program) {
                "decision vectors");
   run.add_flag("--best-effort", service.best_effort,
                "Take samples without retransmission");
+  run.add_flag("!--no-second-look", service.second_look,
+               "Name faults as the observers do, without the second look by "
+               "the physics of an onboarded valve");
   run.add_option("--stale-timeout", service.stale_timeout_s,
                  "Close an episode after so much silence of its valve [s]")
       ->check(CLI::Range(1.0, 1e7))

@@ -58,6 +58,7 @@ PipelineOptions PipelineOptionsOf(const ServiceOptions& options,
   pipeline.valve_glob = options.valves;
   pipeline.stale_timeout = Milliseconds(options.stale_timeout_s);
   pipeline.trace.before_s = options.trace_before_s;
+  pipeline.second_look = options.second_look;
   pipeline.recorder.lossless = options.recording == Recording::kLossless;
   return pipeline;
 }

@@ -39,6 +39,7 @@ struct ServiceOptions {
   int max_valves{2000};
   bool lossless_decisions{false};
   bool best_effort{false};  ///< ValveSample without retransmission.
+  bool second_look{true};   ///< Of onboarded valves, by physics.
   double stale_timeout_s{3600.0};
   double trace_before_s{1800.0};
   double status_period_s{60.0};  ///< Of the status line in the log.

@@ -82,6 +82,20 @@ LookAnswer AnswerOf(const SecondLook& look) {
   return answer;
 }
 
+std::optional<std::vector<int>> NamesOf(const LookAnswer& answer) {
+  if (answer.outcome == LookOutcome::kNothing) {
+    return std::nullopt;
+  }
+  std::vector<int> names;
+  if (answer.outcome == LookOutcome::kNamed) {
+    for (const Explanation& e : answer.faults) {
+      names.push_back(e.fault);
+    }
+    std::sort(names.begin(), names.end());
+  }
+  return names;
+}
+
 EpisodeLooks::EpisodeLooks(const ValvePhysics& physics)
     : physics_(physics),
       period_ns_(std::llround(physics.drive.period_s * kSecond)) {}

@@ -44,6 +44,10 @@ inline constexpr std::size_t kMostNamed = 4;
 
 LookAnswer AnswerOf(const SecondLook& look);
 
+/// The faults that an answer names, ascending; empty: unknown. Nothing if what
+/// the engine says stands.
+std::optional<std::vector<int>> NamesOf(const LookAnswer& answer);
+
 /// Seconds from the last sample of a look to the stamp from which its answer
 /// counts, whatever the computer took.
 inline constexpr std::int64_t kLookDelayNs = 10'000'000'000;

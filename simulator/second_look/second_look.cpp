@@ -64,7 +64,7 @@ class Looker {
     FindUsualInputs();
   }
 
-  SecondLook Run();
+  SecondLook Run(const std::stop_token& stop);
 
  private:
   bool Measures(Signal signal) const {
@@ -428,7 +428,7 @@ Explanation Looker::Explain(const Hypothesis& h, double scale) const {
   return e;
 }
 
-SecondLook Looker::Run() {
+SecondLook Looker::Run(const std::stop_token& stop) {
   const bool has_flow = Measures(Signal::kF);
   const double none = Cost(0, 0.0, {detection_, false}, healthy_);
   // A constant shift of one reading by some per cent: drift.
@@ -449,6 +449,9 @@ SecondLook Looker::Run() {
   std::vector<Hypothesis> hypotheses = Hypotheses();
   const double inputs = InputCost(0, 0.0, {detection_, false}, healthy_);
   for (Hypothesis& h : hypotheses) {
+    if (stop.stop_requested()) {
+      return {};
+    }
     // Faults of the inputs are sought where an input is unusual.
     if (ActsOnInputs(h.fault) && inputs < 9.0) {
       continue;
@@ -465,6 +468,9 @@ SecondLook Looker::Run() {
     for (std::size_t j = 0; j < std::min(kKept[round], hypotheses.size());
          ++j) {
       Hypothesis& h = hypotheses[j];
+      if (stop.stop_requested()) {
+        return {};
+      }
       if (h.simulated.empty()) {
         continue;
       }
@@ -517,10 +523,11 @@ SecondLook Looker::Run() {
 
 }  // namespace
 
-SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window) {
+SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window,
+                     const std::stop_token& stop) {
   Require(window.rows.size() >= 30 && window.detection < window.rows.size(),
           "a second look takes 30 rows and a detection among them");
-  return Looker(physics, window).Run();
+  return Looker(physics, window).Run(stop);
 }
 
 }  // namespace fdi::simulator

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <stop_token>
 #include <vector>
 
 #include "diagnosis/sample.h"
@@ -55,6 +56,9 @@ struct SecondLook {
 /// is usual. Distances are divided by the misfit of the best, at least 1.
 ///
 /// Deterministic: no clock, no threads. @throws CvodeError.
-SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window);
+///
+/// @param stop asks it to end between two hypotheses: nothing is ranked then.
+SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window,
+                     const std::stop_token& stop = {});
 
 }  // namespace fdi::simulator

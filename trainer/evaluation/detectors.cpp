@@ -39,7 +39,7 @@ class SecondLooks {
     }
     const simulator::LookAnswer* answer =
         verdict.detected ? book_.At(detection_ns_, sample.stamp_ns) : nullptr;
-    sets_.push_back(answer ? SetOf(*answer) : std::nullopt);
+    sets_.push_back(answer ? simulator::NamesOf(*answer) : std::nullopt);
   }
 
   void Apply(std::vector<Indication>& indications) const {
@@ -52,23 +52,6 @@ class SecondLooks {
   }
 
  private:
-  // Empty: unknown. Nothing: what the engine says stands.
-  static std::optional<std::vector<int>> SetOf(
-      const simulator::LookAnswer& answer) {
-    using enum simulator::LookOutcome;
-    std::vector<int> set;
-    if (answer.outcome == kNothing) {
-      return std::nullopt;
-    }
-    if (answer.outcome == kNamed) {
-      for (const simulator::Explanation& e : answer.faults) {
-        set.push_back(e.fault);
-      }
-      std::sort(set.begin(), set.end());
-    }
-    return set;
-  }
-
   simulator::ValvePhysics physics_;
   simulator::EpisodeLooks looks_;
   simulator::LookBook book_;

@@ -1,0 +1,171 @@
+#include "monitor/episode_names.h"
+
+#include <algorithm>
+#include <chrono>
+
+namespace fdi::monitor {
+namespace {
+
+bool IsIsolation(const Transition& transition) {
+  return transition.kind == TransitionKind::kIsolated ||
+         transition.kind == TransitionKind::kReisolated;
+}
+
+void DropIsolations(Verdict& verdict) {
+  const auto begin = verdict.transitions.begin();
+  const auto kept =
+      std::remove_if(begin, begin + verdict.transition_count, IsIsolation);
+  verdict.transition_count = static_cast<int>(kept - begin);
+}
+
+}  // namespace
+
+EpisodeNames::EpisodeNames(std::string valve_id,
+                           std::shared_ptr<const ModelSet> models,
+                           LookWorker::Physics physics, LookWorker& worker)
+    : valve_id_(std::move(valve_id)),
+      models_(std::move(models)),
+      physics_(std::move(physics)),
+      worker_(&worker),
+      looks_(std::in_place, *physics_) {}
+
+const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
+                                  bool held) {
+  if (!OutOfOrder(engine.intake)) {
+    stamp_ns_ = sample.stamp_ns;
+  }
+  auto due = looks_->Step(sample, engine);
+  for (const Transition& transition : engine.Transitions()) {
+    detection_ns_ = transition.detection_stamp_ns;
+  }
+  // The last look at an episode that has ended would change nothing.
+  if (due && engine.detected && !held) {
+    Ask(std::move(*due));
+  }
+  TakeAnswers();
+  const simulator::LookAnswer* answer =
+      engine.detected && !held ? book_.At(detection_ns_, stamp_ns_) : nullptr;
+  const auto named = answer != nullptr ? simulator::NamesOf(*answer)
+                                       : std::optional<std::vector<int>>();
+  if (!named && !by_physics_) {
+    faults_ = engine.isolated;
+    layer_ = Layer::kObservers;
+    return engine;
+  }
+  verdict_ = engine;
+  DropIsolations(verdict_);
+  if (!engine.detected) {  // It ends under the name that it had.
+    for (const auto& [bit, strength] : strengths_) {
+      verdict_.strengths[bit] = strength;
+    }
+    for (Transition& transition : verdict_.transitions) {
+      WriteName(transition);
+    }
+    Forget();
+    return verdict_;
+  }
+  by_physics_ = named.has_value();
+  if (named) {
+    Name(*answer, *named);
+  }
+  Announce();
+  return verdict_;
+}
+
+void EpisodeNames::Ask(simulator::LookTask task) {
+  simulator::LookTask key;
+  key.stamp_ns = task.stamp_ns;
+  key.detection_stamp_ns = task.detection_stamp_ns;
+  asked_.push_back(
+      {std::move(key), worker_->Submit(valve_id_, physics_, std::move(task))});
+}
+
+void EpisodeNames::TakeAnswers() {
+  using std::future_status;
+  constexpr std::chrono::seconds kNow{0};
+  while (!asked_.empty() &&
+         asked_.front().answer.wait_for(kNow) == future_status::ready) {
+    LookWorker::Answer answer = asked_.front().answer.get();
+    // An answer about an earlier episode would displace those about this one.
+    if (answer && asked_.front().task.detection_stamp_ns == detection_ns_) {
+      book_.Enter(asked_.front().task, std::move(*answer));
+    }
+    asked_.pop_front();
+  }
+}
+
+// Faults that the model set does not have cannot be recorded and stay out.
+void EpisodeNames::Name(const simulator::LookAnswer& answer,
+                        const std::vector<int>& faults) {
+  strengths_.clear();
+  verdict_.isolated = 0;
+  for (const simulator::Explanation& e : answer.faults) {
+    const int index = FaultIndex(*models_, e.fault);
+    if (index >= 0 && std::ranges::count(faults, e.fault) > 0) {
+      const auto bit = static_cast<std::size_t>(index);
+      strengths_.emplace_back(bit, e.strength);
+      verdict_.isolated |= FaultSet{1} << bit;
+      verdict_.strengths[bit] = e.strength;
+    }
+  }
+  const bool known = verdict_.isolated != 0;
+  verdict_.state = known ? State::kIsolated : State::kDetected;
+  verdict_.unknown = known ? Unknown::kNone
+                     : answer.outcome == simulator::LookOutcome::kNoneFits
+                         ? Unknown::kOutsideKnown
+                         : Unknown::kTooEarly;
+}
+
+// Another name than before is a transition.
+void EpisodeNames::Announce() {
+  if (verdict_.isolated == faults_) {
+    return;
+  }
+  Transition changed;
+  changed.kind =
+      faults_ == 0 ? TransitionKind::kIsolated : TransitionKind::kReisolated;
+  changed.stamp_ns = stamp_ns_;
+  changed.detection_stamp_ns = detection_ns_;
+  changed.unknown = verdict_.unknown;
+  faults_ = verdict_.isolated;
+  layer_ = by_physics_ ? Layer::kPhysics : Layer::kObservers;
+  WriteName(changed);
+  verdict_.transitions[static_cast<std::size_t>(verdict_.transition_count++)] =
+      changed;
+}
+
+void EpisodeNames::WriteName(Transition& transition) const {
+  transition.faults = faults_;
+  transition.layer = layer_;
+  transition.factor = 0.0;
+  transition.strength = 0.0;
+  for (std::size_t i = 0; i < models_->faults.size(); ++i) {
+    if ((faults_ == 0 || (faults_ >> i & 1U) != 0) &&
+        verdict_.fault_factors[i] >= transition.factor) {
+      transition.factor = verdict_.fault_factors[i];
+      transition.strength = faults_ == 0 ? 0.0 : verdict_.strengths[i];
+    }
+  }
+  if (by_physics_ && !strengths_.empty()) {
+    transition.strength = strengths_.front().second;
+  }
+}
+
+Transition EpisodeNames::End(Transition closed) {
+  if (by_physics_) {
+    WriteName(closed);
+  }
+  looks_.emplace(*physics_);
+  asked_.clear();
+  Forget();
+  return closed;
+}
+
+void EpisodeNames::Forget() {
+  by_physics_ = false;
+  faults_ = 0;
+  layer_ = Layer::kObservers;
+  strengths_.clear();
+}
+
+}  // namespace fdi::monitor

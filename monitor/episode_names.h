@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "diagnosis/verdict.h"
+#include "monitor/look_worker.h"
+#include "simulator/second_look/episode_looks.h"
+
+namespace fdi::monitor {
+
+/// Names the episodes of one valve: as its engine does, until a second look has
+/// an answer. While one counts, it is the name, and what the engine isolates
+/// meanwhile is not; see simulator::LookBook. So what leaves the monitor is
+/// what `fdi-trainer evaluate` scores.
+class EpisodeNames {
+ public:
+  /// @param worker outlives this.
+  EpisodeNames(std::string valve_id, std::shared_ptr<const ModelSet> models,
+               LookWorker::Physics physics, LookWorker& worker);
+
+  /// Takes a sample and the verdict of the engine. @param held nothing is to be
+  /// named; see ModelResolver::IsolationHeld().
+  /// @returns the verdict with the name that counts; stands as long as `engine`
+  ///   and until the next call.
+  const Verdict& Step(const Sample& sample, const Verdict& engine, bool held);
+
+  /// The engine was made to end its episode. @returns `closed` with the name
+  /// that counted.
+  Transition End(Transition closed);
+
+ private:
+  // A look that was asked for.
+  struct Asked {
+    simulator::LookTask task;  // Without its rows.
+    std::future<LookWorker::Answer> answer;
+  };
+
+  void Ask(simulator::LookTask task);
+  void TakeAnswers();
+  void Name(const simulator::LookAnswer& answer,
+            const std::vector<int>& faults);
+  void Announce();
+  void WriteName(Transition& transition) const;
+  void Forget();
+
+  std::string valve_id_;
+  std::shared_ptr<const ModelSet> models_;
+  LookWorker::Physics physics_;
+  LookWorker* worker_;
+  std::optional<simulator::EpisodeLooks> looks_;  // Made anew at an end.
+  simulator::LookBook book_;
+  std::deque<Asked> asked_;
+  std::int64_t stamp_ns_{0};
+  std::int64_t detection_ns_{0};
+  // Of the open episode.
+  bool by_physics_{false};  // An answer counts.
+  FaultSet faults_{0};      // Its name,
+  Layer layer_{Layer::kObservers};
+  // and what the look estimated, by fault index, likeliest first.
+  std::vector<std::pair<std::size_t, double>> strengths_;
+  Verdict verdict_;  // With that name.
+};
+
+}  // namespace fdi::monitor

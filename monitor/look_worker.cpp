@@ -1,0 +1,102 @@
+#include "monitor/look_worker.h"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "diagnosis/printable.h"
+#include "monitor/counters.h"
+#include "monitor/throttled_log.h"
+
+namespace fdi::monitor {
+
+LookWorker::~LookWorker() {
+  stop_.request_stop();
+}
+
+LookWorker::Physics LookWorker::PhysicsOf(const ModelSet& models) const {
+  if (models.physics.empty()) {
+    return nullptr;
+  }
+  try {
+    return std::make_shared<const simulator::ValvePhysics>(
+        simulator::PhysicsFrom(models.physics));
+  } catch (const std::exception& error) {
+    ReportFailure("model_set=" + NameOf(models), error.what());
+    return nullptr;
+  }
+}
+
+std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
+                                                   Physics physics,
+                                                   simulator::LookTask task) {
+  Look look{std::move(valve_id), std::move(physics), std::move(task)};
+  std::future<Answer> answer = look.answer.get_future();
+  const std::lock_guard lock(mutex_);
+  const auto same = std::ranges::find(waiting_, look.valve_id, &Look::valve_id);
+  if (same != waiting_.end()) {
+    same->answer.set_value(std::nullopt);
+    *same = std::move(look);
+  } else if (waiting_.size() < capacity_) {
+    waiting_.push_back(std::move(look));
+    arrival_.notify_one();
+  } else {
+    look.answer.set_value(std::nullopt);
+    context_.counters.Add(Counter::kLooksDropped);
+    context_.log.Report(LogId::kLookDropped, "second_look_dropped",
+                        [&look] { return "valve=" + LogValue(look.valve_id); });
+  }
+  return answer;
+}
+
+void LookWorker::Start() {
+  thread_.Start([this] { TakeLooks(); });
+}
+
+void LookWorker::Stop() {
+  stop_.request_stop();
+  thread_.Join();
+}
+
+void LookWorker::TakeLooks() {
+  // Samples come first. Linux keeps this value by thread, whatever POSIX says
+  // of processes; if it refuses, the looks compete with the rest.
+  constexpr int kNice = 10;
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
+  const std::stop_token stop = stop_.get_token();
+  std::unique_lock lock(mutex_);
+  while (arrival_.wait(lock, stop, [this] { return !waiting_.empty(); }) &&
+         !stop.stop_requested()) {
+    Look look = std::move(waiting_.front());
+    waiting_.pop_front();
+    lock.unlock();
+    Answer answer = Take(look);
+    const bool taken = answer.has_value();
+    look.answer.set_value(std::move(answer));
+    context_.counters.Add(Counter::kLooks, taken ? 1 : 0);
+    lock.lock();
+  }
+}
+
+LookWorker::Answer LookWorker::Take(const Look& look) const {
+  try {
+    const simulator::SecondLook second = simulator::LookAgain(
+        *look.physics, look.task.window, stop_.get_token());
+    return second.ranked.empty() ? Answer() : simulator::AnswerOf(second);
+  } catch (const std::exception& error) {
+    ReportFailure("valve=" + LogValue(look.valve_id), error.what());
+    return std::nullopt;
+  }
+}
+
+void LookWorker::ReportFailure(const std::string& whose,
+                               const char* reason) const {
+  context_.counters.Add(Counter::kLooksFailed);
+  context_.log.Report(LogId::kLookFailed, "second_look_failed",
+                      [&] { return whose + " reason=" + LogValue(reason); });
+}
+
+}  // namespace fdi::monitor

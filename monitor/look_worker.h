@@ -1,0 +1,78 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "diagnosis/concurrency/worker.h"
+#include "diagnosis/model_set.h"
+#include "monitor/sinks.h"
+#include "simulator/second_look/episode_looks.h"
+
+namespace fdi::monitor {
+
+/// Takes second looks at episodes on a thread of its own, in the order in which
+/// they were asked for. A look costs up to some seconds of processor time: the
+/// thread runs at low priority, and whoever asks never waits for it. A few
+/// looks may wait, one of each valve; what does not fit is dropped and counted.
+///
+/// Built idle. Thread safe, but for Start() and Stop().
+class LookWorker {
+ public:
+  using Physics = std::shared_ptr<const simulator::ValvePhysics>;
+  /// Nothing: the look was dropped, replaced or failed.
+  using Answer = std::optional<simulator::LookAnswer>;
+
+  explicit LookWorker(const MonitorContext& context, std::size_t capacity = 64)
+      : context_(context), capacity_(capacity) {}
+  ~LookWorker();
+  LookWorker(const LookWorker&) = delete;
+  LookWorker& operator=(const LookWorker&) = delete;
+
+  /// The physics of `models`. Null if there are none, or if they cannot be
+  /// used, which is counted and logged.
+  Physics PhysicsOf(const ModelSet& models) const;
+
+  /// Asks for a look. It replaces one at the same valve that still waits.
+  std::future<Answer> Submit(std::string valve_id, Physics physics,
+                             simulator::LookTask task);
+
+  void Start();
+  /// Ends the thread, at once between two hypotheses; what waits is given up.
+  void Stop();
+  /// Looks that wait for the thread. Any thread.
+  std::size_t waiting() const {
+    const std::lock_guard lock(mutex_);
+    return waiting_.size();
+  }
+  /// The thread ended with an exception, which Stop() throws. Any thread.
+  bool failed() const { return thread_.failed(); }
+
+ private:
+  struct Look {
+    std::string valve_id;
+    Physics physics;
+    simulator::LookTask task;
+    std::promise<Answer> answer{};
+  };
+
+  void TakeLooks();
+  Answer Take(const Look& look) const;
+  void ReportFailure(const std::string& whose, const char* reason) const;
+
+  MonitorContext context_;
+  const std::size_t capacity_;
+  std::stop_source stop_;
+  mutable std::mutex mutex_;  // Guards what follows.
+  std::condition_variable_any arrival_;
+  std::deque<Look> waiting_;
+  Worker thread_;
+};
+
+}  // namespace fdi::monitor

@@ -1,0 +1,338 @@
+#include <chrono>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "monitor/counters.h"
+#include "monitor/episode_names.h"
+#include "monitor/episode_tracker.h"
+#include "monitor/look_worker.h"
+#include "monitor/throttled_log.h"
+#include "tests/monitor/fake_sinks.h"
+#include "tests/monitor/linear_models.h"
+#include "tests/simulator/recorded_valve.h"
+
+namespace fdi::monitor {
+namespace {
+
+using simulator::Abrupt;
+using simulator::kLeadIn;
+using simulator::RecordRow;
+using std::chrono::seconds;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::uint64_t kAtOnce = kLeadIn + 2;  // Row of the detection.
+constexpr std::uint64_t kFirstLook = kAtOnce + 40;
+constexpr std::uint64_t kCounts = kFirstLook + 10;
+
+std::shared_ptr<const ModelSet> Models() {
+  ModelSet models = LinearModels();
+  models.faults = {1, 7, 13, 19};
+  models.physics = simulator::ToValues(simulator::Physics());
+  return std::make_shared<const ModelSet>(std::move(models));
+}
+
+constexpr FaultSet kF7 = 0b0010;
+constexpr FaultSet kF19 = 0b1000;
+
+class EventList : public FakeOutlet {
+ public:
+  void Event(FaultEvent event) override { events.push_back(std::move(event)); }
+  std::vector<FaultEvent> events;
+};
+
+// The engine takes f19 for f7.
+class SecondLookTest : public testing::Test {
+ protected:
+  ~SecondLookTest() override { worker_.Stop(); }
+
+  bool AwaitLooks(std::uint64_t count) {
+    const auto until = std::chrono::steady_clock::now() + seconds(300);
+    while (counters_[Counter::kLooks] < count &&
+           std::chrono::steady_clock::now() < until) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return counters_[Counter::kLooks] == count;
+  }
+
+  static Sample SampleOf(const RecordRow& row, std::uint64_t k) {
+    Sample sample = PlantSample(k);
+    sample.Set(Signal::kCv, row.input.cv_pct);
+    sample.Set(Signal::kP1, row.input.p1_kpa);
+    sample.Set(Signal::kP2, row.input.p2_kpa);
+    sample.Set(Signal::kT1, row.input.t1_degc);
+    sample.Set(Signal::kX, row.x_pct);
+    sample.Set(Signal::kF, row.flow);
+    return sample;
+  }
+
+  void Transit(TransitionKind kind) {
+    Transition& t =
+        engine_
+            .transitions[static_cast<std::size_t>(engine_.transition_count++)];
+    t = {};
+    t.kind = kind;
+    t.stamp_ns = engine_.stamp_ns;
+    t.detection_stamp_ns = PlantSample(kAtOnce).stamp_ns;
+    t.faults = engine_.isolated;
+  }
+
+  // Of row k: detected at kAtOnce, f7 five rows later.
+  void Observe(std::uint64_t k) {
+    engine_.stamp_ns = PlantSample(k).stamp_ns;
+    engine_.source_id = 1;
+    engine_.quality = Quality::kLive;
+    engine_.transition_count = 0;
+    if (k == kAtOnce) {
+      engine_.detected = true;
+      engine_.state = State::kDetected;
+      Transit(TransitionKind::kDetected);
+    } else if (k == kAtOnce + 5) {
+      engine_.state = State::kIsolated;
+      engine_.isolated = kF7;
+      engine_.fault_factors[1] = 0.9;
+      engine_.fault_factors[2] = 0.6;
+      engine_.strengths[1] = 1.0;
+      Transit(TransitionKind::kIsolated);
+    }
+  }
+
+  void Clear(std::uint64_t k) {
+    Observe(k);
+    Transit(TransitionKind::kCleared);
+    Transit(TransitionKind::kClosed);
+    engine_.detected = false;
+    engine_.state = State::kNormal;
+    engine_.isolated = 0;
+  }
+
+  const Verdict& Step(std::uint64_t k) {
+    const Sample sample = SampleOf(rows_.at(k), k);
+    const Verdict& verdict = names_.Step(sample, engine_, held_);
+    tracker_.Step(sample, verdict, models_, outlet_);
+    return verdict;
+  }
+
+  // Rows [from, to).
+  void Feed(std::uint64_t from, std::uint64_t to) {
+    for (std::uint64_t k = from; k < to; ++k) {
+      Observe(k);
+      Step(k);
+    }
+  }
+
+  std::vector<TransitionKind> Kinds() const {
+    std::vector<TransitionKind> kinds;
+    for (const FaultEvent& event : outlet_.events) {
+      kinds.push_back(event.transition.kind);
+    }
+    return kinds;
+  }
+
+  Counters counters_;
+  std::vector<std::string> lines_;
+  ThrottledLog log_{
+      [this](LogLevel, std::string_view line) { lines_.emplace_back(line); }};
+  LookWorker worker_{{counters_, log_, [] { return std::int64_t{0}; }}, 3};
+  std::shared_ptr<const ModelSet> models_{Models()};
+  LookWorker::Physics physics_{worker_.PhysicsOf(*models_)};
+  EpisodeNames names_{"V1", models_, physics_, worker_};
+  EpisodeTracker tracker_{"V1", {}};
+  EventList outlet_;
+  std::vector<RecordRow> rows_{
+      simulator::Recording(kLeadIn + 400, 2, {Abrupt(19, 0.25)})};
+  Verdict engine_;
+  bool held_{false};
+};
+
+TEST_F(SecondLookTest, TheSimulationCorrectsTheNameTenSecondsAfterItsSamples) {
+  worker_.Start();
+  Feed(0, kFirstLook + 1);
+  ASSERT_TRUE(AwaitLooks(1));
+  Feed(kFirstLook + 1, kCounts);
+  ASSERT_THAT(Kinds(), ElementsAre(TransitionKind::kDetected,
+                                   TransitionKind::kIsolated));
+
+  Observe(kCounts);
+  const Verdict& verdict = Step(kCounts);
+  EXPECT_EQ(verdict.isolated, kF19);
+  EXPECT_NEAR(verdict.strengths[3], 0.25, 0.05);
+  ASSERT_EQ(outlet_.events.size(), 3U);
+  const FaultEvent& event = outlet_.events.back();
+  EXPECT_EQ(event.transition.kind, TransitionKind::kReisolated);
+  EXPECT_EQ(event.transition.faults, kF19);
+  EXPECT_EQ(event.transition.stamp_ns, PlantSample(kCounts).stamp_ns);
+  EXPECT_EQ(event.transition.layer, Layer::kPhysics);
+  EXPECT_NEAR(event.transition.strength, 0.25, 0.05);
+  ASSERT_EQ(event.candidates.size(), 1U);
+  EXPECT_EQ(event.candidates[0].fault, 19);
+  EXPECT_NEAR(event.candidates[0].strength, 0.25, 0.05);
+  EXPECT_TRUE(event.candidates[0].isolated);
+}
+
+TEST_F(SecondLookTest, ThatNameStaysWhateverTheEngineIsolates) {
+  worker_.Start();
+  Feed(0, kFirstLook + 1);
+  ASSERT_TRUE(AwaitLooks(1));
+  Feed(kFirstLook + 1, kCounts + 20);
+  engine_.isolated = 0b0100;
+  Observe(kCounts + 20);
+  Transit(TransitionKind::kReisolated);
+  EXPECT_EQ(Step(kCounts + 20).isolated, kF19);
+  EXPECT_EQ(outlet_.events.size(), 3U);
+
+  Clear(kCounts + 21);
+  EXPECT_EQ(Step(kCounts + 21).state, State::kNormal);
+  ASSERT_EQ(outlet_.events.size(), 5U);
+  for (const FaultEvent& event : {outlet_.events[3], outlet_.events[4]}) {
+    EXPECT_EQ(event.transition.faults, kF19);
+    EXPECT_NEAR(event.transition.strength, 0.25, 0.05);
+    EXPECT_EQ(event.candidates.front().fault, 19);
+  }
+}
+
+TEST_F(SecondLookTest, SamplesDoNotWaitForAnAnswerWhichCountsOnceItIsThere) {
+  Feed(0, kCounts + 60);  // Nobody looks yet.
+  EXPECT_EQ(outlet_.events.size(), 2U);
+  worker_.Start();
+  ASSERT_TRUE(AwaitLooks(1));
+  Feed(kCounts + 60, kCounts + 61);
+  ASSERT_EQ(outlet_.events.size(), 3U);
+  EXPECT_EQ(outlet_.events.back().transition.stamp_ns,
+            PlantSample(kCounts + 60).stamp_ns);
+}
+
+TEST_F(SecondLookTest, AnEpisodeThatTheEngineEndsKeepsTheName) {
+  worker_.Start();
+  Feed(0, kFirstLook + 1);
+  ASSERT_TRUE(AwaitLooks(1));
+  Feed(kFirstLook + 1, kCounts + 1);
+  Transition closed;
+  closed.kind = TransitionKind::kClosed;
+  closed.faults = kF7;
+  EXPECT_EQ(names_.End(closed).faults, kF19);
+  EXPECT_EQ(names_.End(closed).faults, kF7);  // Of an episode after that.
+}
+
+TEST_F(SecondLookTest, WhatNoFaultExplainsBecomesUnknown) {
+  for (std::size_t k = 40; k < rows_.size(); ++k) {
+    rows_[k].x_pct = k % 2 == 0 ? 10.0 : 90.0;
+    rows_[k].flow *= k % 3 == 0 ? 0.1 : 1.5;
+  }
+  worker_.Start();
+  Feed(0, kFirstLook + 1);
+  ASSERT_TRUE(AwaitLooks(1));
+  Feed(kFirstLook + 1, kCounts);
+  Observe(kCounts);
+  const Verdict& verdict = Step(kCounts);
+  EXPECT_EQ(verdict.isolated, 0U);
+  EXPECT_EQ(verdict.state, State::kDetected);
+  EXPECT_EQ(verdict.unknown, Unknown::kOutsideKnown);
+  ASSERT_EQ(outlet_.events.size(), 3U);
+  const FaultEvent& event = outlet_.events.back();
+  EXPECT_EQ(event.transition.kind, TransitionKind::kReisolated);
+  EXPECT_EQ(event.transition.faults, 0U);
+  EXPECT_EQ(event.transition.unknown, Unknown::kOutsideKnown);
+  EXPECT_THAT(event.candidates, IsEmpty());
+}
+
+TEST_F(SecondLookTest, TheObserversNameStandsIfTheValveLooksHealthy) {
+  rows_ = simulator::Recording(kLeadIn + 100, 2, {});
+  worker_.Start();
+  Feed(0, kFirstLook + 1);
+  ASSERT_TRUE(AwaitLooks(1));
+  Feed(kFirstLook + 1, kCounts + 20);
+  EXPECT_EQ(outlet_.events.size(), 2U);
+}
+
+TEST_F(SecondLookTest, NothingIsNamedWhileIsolationIsHeld) {
+  held_ = true;
+  Feed(0, kFirstLook + 5);
+  worker_.Start();
+  worker_.Stop();
+  EXPECT_EQ(counters_[Counter::kLooks], 0U);
+}
+
+class LookWorkerTest : public SecondLookTest {
+ protected:
+  std::future<LookWorker::Answer> Submit(const std::string& valve) {
+    simulator::LookTask task;
+    task.window = simulator::Window({Abrupt(19, 0.25)});
+    return worker_.Submit(valve, physics_, std::move(task));
+  }
+  static bool Ready(const std::future<LookWorker::Answer>& answer) {
+    return answer.wait_for(seconds(0)) == std::future_status::ready;
+  }
+};
+
+TEST_F(LookWorkerTest, CountsWhatDoesNotFitAndAnswersIt) {
+  std::vector<std::future<LookWorker::Answer>> answers;
+  for (const char* valve : {"V1", "V2", "V3", "V4"}) {
+    answers.push_back(Submit(valve));
+  }
+  EXPECT_FALSE(Ready(answers[2]));
+  ASSERT_TRUE(Ready(answers[3]));
+  EXPECT_FALSE(answers[3].get());
+  EXPECT_EQ(counters_[Counter::kLooksDropped], 1U);
+  ASSERT_EQ(lines_.size(), 1U);
+  EXPECT_THAT(lines_[0], HasSubstr("second_look_dropped id=M161 valve=V4"));
+}
+
+TEST_F(LookWorkerTest, ANewerLookReplacesTheOneOfTheValveThatWaits) {
+  auto older = Submit("V1");
+  auto newer = Submit("V1");
+  ASSERT_TRUE(Ready(older));
+  EXPECT_FALSE(older.get());
+  worker_.Start();
+  ASSERT_TRUE(AwaitLooks(1));
+  EXPECT_TRUE(newer.get());
+  EXPECT_EQ(counters_[Counter::kLooksDropped], 0U);
+}
+
+TEST_F(LookWorkerTest, AStopWaitsForNoLook) {
+  const auto first = Submit("V1");
+  const auto second = Submit("V2");
+  worker_.Start();
+  while (worker_.waiting() > 1) {  // Until the first is in work.
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  const auto before = std::chrono::steady_clock::now();
+  worker_.Stop();
+  EXPECT_LT(std::chrono::steady_clock::now() - before, seconds(2));
+  EXPECT_EQ(counters_[Counter::kLooks], 0U);
+  EXPECT_FALSE(Ready(second));
+}
+
+TEST_F(LookWorkerTest, ALookThatFailsIsReportedAndTheNextOneTaken) {
+  auto failed = worker_.Submit("V1", physics_, {});
+  auto next = Submit("V2");
+  worker_.Start();
+  ASSERT_TRUE(AwaitLooks(1));
+  EXPECT_FALSE(failed.get());
+  EXPECT_TRUE(next.get());
+  EXPECT_EQ(counters_[Counter::kLooksFailed], 1U);
+  ASSERT_EQ(lines_.size(), 1U);
+  EXPECT_THAT(lines_[0], HasSubstr("second_look_failed id=M162 valve=V1"));
+}
+
+TEST_F(LookWorkerTest, PhysicsThatCannotBeUsedAreReported) {
+  ModelSet models = *models_;
+  models.physics.pop_back();
+  EXPECT_EQ(worker_.PhysicsOf(models), nullptr);
+  EXPECT_EQ(counters_[Counter::kLooksFailed], 1U);
+  ASSERT_EQ(lines_.size(), 1U);
+  EXPECT_THAT(lines_[0], HasSubstr("model_set=linear@1"));
+  models.physics.clear();
+  EXPECT_EQ(worker_.PhysicsOf(models), nullptr);
+  EXPECT_EQ(counters_[Counter::kLooksFailed], 1U);
+}
+
+}  // namespace
+}  // namespace fdi::monitor
