@@ -43,11 +43,11 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     Ask(std::move(*due));
   }
   TakeAnswers();
-  const simulator::LookAnswer* answer =
-      engine.detected && !held ? book_.At(detection_ns_, stamp_ns_) : nullptr;
+  const simulator::LookAnswer* answer = AnswerTo(engine, held);
   const auto named = answer != nullptr ? simulator::NamesOf(*answer)
                                        : std::optional<std::vector<int>>();
-  if (!named && !by_physics_) {
+  const bool kept = kept_ && engine.detected && !held;
+  if (!named && !kept && !by_physics_) {
     faults_ = engine.isolated;
     layer_ = Layer::kObservers;
     return engine;
@@ -64,12 +64,28 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     Forget();
     return verdict_;
   }
-  by_physics_ = named.has_value();
+  by_physics_ = named || kept;
+  strengths_.clear();
   if (named) {
     Name(*answer, *named);
+  } else if (kept) {
+    SetName(*kept_, Unknown::kTooEarly);
   }
   Announce();
   return verdict_;
+}
+
+// The one that counts at this sample, if any.
+const simulator::LookAnswer* EpisodeNames::AnswerTo(const Verdict& engine,
+                                                    bool held) {
+  if (!engine.detected || held) {
+    return nullptr;
+  }
+  const simulator::LookAnswer* answer = book_.At(detection_ns_, stamp_ns_);
+  if (answer != nullptr) {
+    kept_.reset();
+  }
+  return answer;
 }
 
 void EpisodeNames::Ask(simulator::LookTask task) {
@@ -97,23 +113,25 @@ void EpisodeNames::TakeAnswers() {
 // Faults that the model set does not have cannot be recorded and stay out.
 void EpisodeNames::Name(const simulator::LookAnswer& answer,
                         const std::vector<int>& faults) {
-  strengths_.clear();
-  verdict_.isolated = 0;
+  FaultSet set = 0;
   for (const simulator::Explanation& e : answer.faults) {
     const int index = FaultIndex(*models_, e.fault);
     if (index >= 0 && std::ranges::count(faults, e.fault) > 0) {
       const auto bit = static_cast<std::size_t>(index);
       strengths_.emplace_back(bit, e.strength);
-      verdict_.isolated |= FaultSet{1} << bit;
       verdict_.strengths[bit] = e.strength;
+      set |= FaultSet{1} << bit;
     }
   }
-  const bool known = verdict_.isolated != 0;
-  verdict_.state = known ? State::kIsolated : State::kDetected;
-  verdict_.unknown = known ? Unknown::kNone
-                     : answer.outcome == simulator::LookOutcome::kNoneFits
-                         ? Unknown::kOutsideKnown
-                         : Unknown::kTooEarly;
+  const bool outside = answer.outcome == simulator::LookOutcome::kNoneFits;
+  SetName(set, outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
+}
+
+// `unknown`: why there is none, if there is none.
+void EpisodeNames::SetName(FaultSet faults, Unknown unknown) {
+  verdict_.isolated = faults;
+  verdict_.state = faults != 0 ? State::kIsolated : State::kDetected;
+  verdict_.unknown = faults != 0 ? Unknown::kNone : unknown;
 }
 
 // Another name than before is a transition.
@@ -166,6 +184,7 @@ void EpisodeNames::Forget() {
   faults_ = 0;
   layer_ = Layer::kObservers;
   strengths_.clear();
+  kept_.reset();
 }
 
 }  // namespace fdi::monitor

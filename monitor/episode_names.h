@@ -25,6 +25,10 @@ class EpisodeNames {
   EpisodeNames(std::string valve_id, std::shared_ptr<const ModelSet> models,
                LookWorker::Physics physics, LookWorker& worker);
 
+  /// `faults`, by an earlier session's look, name the episode that goes on
+  /// until a look of this session has an answer; nothing: none goes on.
+  void Keep(std::optional<FaultSet> faults) { kept_ = faults; }
+
   /// Takes a sample and the verdict of the engine. @param held nothing is to be
   /// named; see ModelResolver::IsolationHeld().
   /// @returns the verdict with the name that counts; stands as long as `engine`
@@ -42,10 +46,12 @@ class EpisodeNames {
     std::future<LookWorker::Answer> answer;
   };
 
+  const simulator::LookAnswer* AnswerTo(const Verdict& engine, bool held);
   void Ask(simulator::LookTask task);
   void TakeAnswers();
   void Name(const simulator::LookAnswer& answer,
             const std::vector<int>& faults);
+  void SetName(FaultSet faults, Unknown unknown);
   void Announce();
   void WriteName(Transition& transition) const;
   void Forget();
@@ -57,6 +63,7 @@ class EpisodeNames {
   std::optional<simulator::EpisodeLooks> looks_;  // Made anew at an end.
   simulator::LookBook book_;
   std::deque<Asked> asked_;
+  std::optional<FaultSet> kept_;
   std::int64_t stamp_ns_{0};
   std::int64_t detection_ns_{0};
   // Of the open episode.

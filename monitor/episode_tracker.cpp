@@ -112,6 +112,7 @@ void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
   event.transition.detection_stamp_ns = episode.detection_stamp_ns;
   event.transition.faults = episode.faults;
   event.transition.reason = reason;
+  event.transition.layer = episode.layer;
   if (!episode.candidates.empty()) {
     event.transition.factor = episode.candidates.front().factor;
     event.transition.strength = episode.candidates.front().strength;

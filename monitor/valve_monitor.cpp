@@ -38,6 +38,14 @@ ValveMonitor::ValveMonitor(const std::string& id,
   unassigned_.residuals.fill(std::numeric_limits<double>::quiet_NaN());
 }
 
+void ValveMonitor::Recover(const OpenEpisode& episode) {
+  tracker_.Recover(episode);
+  if (names_ && episode.layer == Layer::kPhysics &&
+      episode.model_hash == models_->content_hash) {
+    names_->Keep(episode.faults);
+  }
+}
+
 void ValveMonitor::NameEpisodes() {
   LookWorker::Physics physics;
   if (looks_ != nullptr && models_ != nullptr) {
@@ -99,6 +107,9 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     return {unassigned_, nullptr, swapped, isolation_held_, 0};
   }
   RestoreOnce(sample.source_id);
+  if (names_ && !tracker_.recovering() && !engine_->episode_open()) {
+    names_->Keep(std::nullopt);
+  }
   const Verdict& engine = engine_->Step(sample);
   const Verdict& verdict =
       names_ ? names_->Step(sample, engine, isolation_held_) : engine;

@@ -30,7 +30,7 @@ class ValveMonitor {
                const TraceOptions& options, LookWorker* looks = nullptr);
 
   /// Before the first Step().
-  void Recover(const OpenEpisode& episode) { tracker_.Recover(episode); }
+  void Recover(const OpenEpisode& episode);
 
   /// The accumulators as of the last checkpoint of an earlier session; they
   /// count if the first sample is of the same source. Before the first Step().

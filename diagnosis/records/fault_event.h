@@ -65,6 +65,7 @@ struct OpenEpisode {
   FaultSet faults{0};             ///< The set that was isolated last, if any.
   std::vector<FaultCandidate> candidates;  ///< Its members.
   bool isolated{false};
+  Layer layer{Layer::kObservers};  ///< That named them.
   std::string model_set;
   int model_version{0};
   std::uint64_t model_hash{0};

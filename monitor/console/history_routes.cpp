@@ -140,6 +140,7 @@ Json EventJson(const storage::HistoryEntry& event) {
           {"factor", by_hand ? Json() : Rounded(event.factor, 3)},
           {"strength", by_hand ? Json() : Rounded(event.strength, 3)},
           {"reason", TextOrNull(event.reason)},
+          {"layer", TextOrNull(event.layer)},
           {"value", TextOrNull(event.value)},
           {"who", TextOrNull(event.who)},
           {"comment", TextOrNull(event.comment)},

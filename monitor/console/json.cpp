@@ -247,6 +247,7 @@ Json AlarmJson(const storage::Alarm& alarm, const cli::FaultTexts& texts) {
   return {{"episode", e.episode_id},
           {"valve", e.valve_id},
           {"fault", TextOrNull(e.fault)},
+          {"layer", TextOrNull(e.layer)},
           {"state", StateOf(e)},
           {"isa", storage::AlarmStateName(alarm.state)},
           {"shelved", alarm.shelf ? ShelfJson(*alarm.shelf) : Json()},
@@ -290,6 +291,7 @@ storage::Alarm AlarmOf(const FaultEvent& event) {
   e.model_set = event.model_set + "@" + std::to_string(event.model_version);
   if (const std::string faults = IsolatedFaults(event); !faults.empty()) {
     e.fault = faults;
+    e.layer = LayerName(transition.layer);
     e.isolated_ns = transition.stamp_ns;
   }
   if (transition.kind == TransitionKind::kCleared) {

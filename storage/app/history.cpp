@@ -114,15 +114,22 @@ Json EventJson(const HistoryEntry& event) {
           {"factor", by_hand ? Json() : NumberJson(event.factor)},
           {"strength", by_hand ? Json() : NumberJson(event.strength)},
           {"reason", TextJson(event.reason)},
+          {"layer", TextJson(event.layer)},
           {"who", TextJson(event.who)},
           {"value", TextJson(event.value)},
           {"comment", TextJson(event.comment)},
           {"origin", TextJson(event.origin)}};
 }
 
+constexpr const char* kByPhysics = "by simulation of the valve";
+
+bool ByPhysics(const std::string& layer) {
+  return layer == LayerName(Layer::kPhysics);
+}
+
 std::string NoteText(const HistoryEntry& event) {
   if (event.who.empty()) {
-    return event.reason;
+    return ByPhysics(event.layer) ? kByPhysics : event.reason;
   }
   return event.value + (event.value.empty() ? "" : " ") + "by " + event.who +
          (event.origin.empty() ? "" : " (" + event.origin + ")") +
@@ -151,7 +158,10 @@ void AddEvents(const std::vector<HistoryEntry>& events, const Context& context,
 // "f19: Flow transmitter wrong", "unknown (outside_known): ...".
 std::string FaultLine(const Episode& e, const std::string& name) {
   const std::string why = e.unknown_kind ? " (" + *e.unknown_kind + ")" : "";
-  return e.fault ? *e.fault + why + ": " + name : "- (not isolated yet)" + why;
+  const std::string by =
+      ByPhysics(e.layer.value_or("")) ? std::string(", ") + kByPhysics : "";
+  return e.fault ? *e.fault + why + ": " + name + by
+                 : "- (not isolated yet)" + why;
 }
 
 std::string AlarmLine(const Alarm& alarm, const Context& context) {
@@ -209,6 +219,7 @@ Report Show(const std::string& id, const Context& context) {
        {"model_hash", Hex(e.model_hash)},
        {"strength", NumberJson(e.strength)},
        {"unknown_kind", TextJson(e.unknown_kind)},
+       {"layer", TextJson(e.layer)},
        {"ended_utc", TimeJson(e.ended_ns)},
        {"acked_utc", TimeJson(e.acked_ns)},
        {"alarm_state", AlarmStateName(alarm.state)},

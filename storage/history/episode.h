@@ -28,6 +28,7 @@ struct HistoryEntry {
   double factor{0.0};
   double strength{0.0};
   std::string reason;
+  std::string layer;  ///< LayerName() of what names a fault.
   std::string value;  ///< Of LABEL.
   std::string who;
   std::string comment;
@@ -63,6 +64,7 @@ struct Episode {
   double strength{0.0};
   /// While no fault is isolated: "too_early" or "outside_known".
   std::optional<std::string> unknown_kind;
+  std::optional<std::string> layer;  ///< LayerName(); null until isolated.
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   std::vector<std::string> channels;  ///< Of the trace.
   std::vector<std::string> faults;    ///< Of the trace, by index.
@@ -138,14 +140,14 @@ struct CoverageTime {
 }  // namespace fdi::storage
 
 FDI_FIELDS(fdi::storage::HistoryEntry, event_id, kind, stamp_ns, recorded_ns,
-           faults, fault_bits, factor, strength, reason, value, who, comment,
-           origin)
+           faults, fault_bits, factor, strength, reason, layer, value, who,
+           comment, origin)
 
 FDI_FIELDS(fdi::storage::Episode, episode_id, valve_id, detected_utc,
            isolated_utc, cleared_utc, fault, peak_factor, model_set, end_reason,
            label, acked_by, source_id, model_hash, detected_ns, isolated_ns,
            cleared_ns, ended_ns, acked_ns, trace_end_ns, session_id, fault_bits,
-           strength, unknown_kind, flow_unit, channels, faults)
+           strength, unknown_kind, layer, flow_unit, channels, faults)
 
 FDI_FIELDS(fdi::storage::MonitorSession, session_id, start_ns, alive_ns,
            stop_ns, clean, software, config)

@@ -108,7 +108,7 @@ void StoreIsolation(Database& database, const Entry& entry) {
   const std::string names = entry.IsolatedNames();
   database.Cached(sql::set_isolated)
       .Bind(t.stamp_ns, names.empty() ? "unknown" : names, t.faults,
-            Finite(t.factor), Finite(t.strength), entry.id)
+            Finite(t.factor), Finite(t.strength), LayerName(t.layer), entry.id)
       .Run();
   database.Cached(sql::release_faults).Bind(entry.id).Run();
   for (std::size_t bit = 0; bit < entry.names.size(); ++bit) {
@@ -127,7 +127,9 @@ bool StoreEvent(Database& database, const Entry& entry) {
   database.Cached(sql::insert_event)
       .Bind(t.kind, t.stamp_ns, entry.recorded_ns, entry.IsolatedNames(),
             t.faults, t.factor, t.strength,
-            closed ? EndReasonName(t.reason) : std::string_view(), entry.id)
+            closed ? EndReasonName(t.reason) : std::string_view(),
+            IsIsolation(t.kind) ? LayerName(t.layer) : std::string_view(),
+            entry.id)
       .Run();
   if (database.Changes() == 0) {
     return false;
@@ -241,13 +243,16 @@ FaultEvent ReadUnsent(const Statement& row) {
 OpenEpisode ReadOpen(const Statement& row) {
   OpenEpisode episode;
   std::string model_set;
+  std::string layer;
   std::vector<std::string> names;
   double factor = 0.0;
   double strength = 0.0;
   episode.episode_id = RequireEpisodeId(row, 0);
   row.Read(1, episode.valve_id, episode.source_id, episode.detection_stamp_ns,
-           episode.last_stamp_ns, episode.faults, episode.isolated, model_set,
-           episode.model_hash, names, factor, strength);
+           episode.last_stamp_ns, episode.faults, episode.isolated, layer,
+           model_set, episode.model_hash, names, factor, strength);
+  episode.layer =
+      layer == LayerName(Layer::kPhysics) ? Layer::kPhysics : Layer::kObservers;
   std::vector<std::string> isolated;
   for (std::size_t bit = 0; bit < names.size(); ++bit) {
     if (Has(episode.faults, bit)) {

@@ -10,7 +10,7 @@ SELECT v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc,
   e.cleared_ns, e.ended_ns, e.acked_ns,
   (SELECT max(last_ns) FROM episode_trace t
    WHERE t.episode_id = e.episode_id), e.session_id, e.fault_bits, e.strength,
-  e.unknown_kind, e.flow_unit, e.channels, e.faults
+  e.unknown_kind, e.layer, e.flow_unit, e.channels, e.faults
 FROM episode e CROSS JOIN fault_history v USING (episode_id)
 WHERE
 -- name: newest_episode
@@ -75,7 +75,7 @@ SELECT fault_bits, peak_factor, strength, detected_ns, faults
 FROM episode WHERE episode_id = ?
 -- name: set_isolated
 UPDATE episode SET isolated_ns = coalesce(isolated_ns, ?), fault = ?,
-  fault_bits = ?, peak_factor = ?, strength = ?
+  fault_bits = ?, peak_factor = ?, strength = ?, layer = ?
 WHERE episode_id = ?
 -- name: release_faults
 UPDATE episode_fault SET held = 0 WHERE episode_id = ?
@@ -101,7 +101,7 @@ SELECT episode_id, valve_id, source_id, detected_ns,
   max(detected_ns, coalesce(isolated_ns, 0), coalesce(
     (SELECT max(last_ns) FROM episode_trace t
      WHERE t.episode_id = e.episode_id), 0)),
-  fault_bits, isolated_ns IS NOT NULL, model_set, model_hash, faults,
+  fault_bits, isolated_ns IS NOT NULL, layer, model_set, model_hash, faults,
   peak_factor, strength
 FROM episode e WHERE ended_ns IS NULL ORDER BY detected_ns, valve_id
 
@@ -109,8 +109,9 @@ FROM episode e WHERE ended_ns IS NULL ORDER BY detected_ns, valve_id
 -- Nothing is inserted if the event is there already, or its episode has ended.
 -- name: insert_event
 INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns, faults,
-  fault_bits, factor, strength, reason)
-SELECT episode_id, ?, ?, ?, nullif(?, ''), ?, ?, ?, nullif(?, '')
+  fault_bits, factor, strength, reason, layer)
+SELECT episode_id, ?, ?, ?, nullif(?, ''), ?, ?, ?, nullif(?, ''),
+  nullif(?, '')
 FROM episode WHERE episode_id = ? AND ended_ns IS NULL
 ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
 -- name: insert_resumed

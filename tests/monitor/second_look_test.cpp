@@ -252,12 +252,38 @@ TEST_F(SecondLookTest, TheObserversNameStandsIfTheValveLooksHealthy) {
   EXPECT_EQ(outlet_.events.size(), 2U);
 }
 
+TEST_F(SecondLookTest, AResumedEpisodeKeepsItsNameUntilALookAnswers) {
+  OpenEpisode open;
+  open.valve_id = "V1";
+  open.source_id = 1;
+  open.episode_id = 5;
+  open.detection_stamp_ns = PlantSample(0).stamp_ns - 9 * kSecond;
+  open.last_stamp_ns = PlantSample(0).stamp_ns - kSecond;
+  open.isolated = true;
+  open.faults = 0b0100;
+  open.layer = Layer::kPhysics;
+  open.model_hash = models_->content_hash;
+  Feed(0, kAtOnce - 40);
+  tracker_ = EpisodeTracker("V1", {});
+  tracker_.Recover(open);
+  names_.Keep(open.faults);
+  worker_.Start();
+  Feed(kAtOnce - 40, kFirstLook + 1);
+  ASSERT_TRUE(AwaitLooks(1));
+  Observe(kFirstLook + 1);
+  EXPECT_EQ(Step(kFirstLook + 1).isolated, 0b0100U);
+  EXPECT_THAT(outlet_.events, IsEmpty());
+  Feed(kFirstLook + 2, kCounts + 1);
+  ASSERT_EQ(outlet_.events.size(), 1U);
+  EXPECT_EQ(outlet_.events[0].episode_id, 5U);
+  EXPECT_EQ(outlet_.events[0].transition.kind, TransitionKind::kReisolated);
+  EXPECT_EQ(outlet_.events[0].transition.faults, kF19);
+}
+
 TEST_F(SecondLookTest, NothingIsNamedWhileIsolationIsHeld) {
   held_ = true;
   Feed(0, kFirstLook + 5);
-  worker_.Start();
-  worker_.Stop();
-  EXPECT_EQ(counters_[Counter::kLooks], 0U);
+  EXPECT_EQ(worker_.waiting(), 0U);
 }
 
 class LookWorkerTest : public SecondLookTest {

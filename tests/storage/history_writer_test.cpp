@@ -352,6 +352,47 @@ TEST_F(HistoryWriterTest, UnknownSaysWhyUntilAFaultIsIsolated) {
   EXPECT_EQ(reader.Show("last").unknown_kind, std::nullopt);
 }
 
+TEST_F(HistoryWriterTest, TheLayerThatNamedTheFaultIsKept) {
+  HistoryWriter writer(path_);
+  HistoryReader reader(path_);
+  writer.Record(Event(Kind::kDetected, 0), kDetected);
+  EXPECT_EQ(reader.Show("last").layer, std::nullopt);
+  writer.Record(Event(Kind::kIsolated, 10, 0b001, 0.9), kDetected);
+  EXPECT_EQ(reader.Show("last").layer, "observers");
+  FaultEvent corrected = Event(Kind::kReisolated, 50, 0b100, 0.2);
+  corrected.transition.layer = Layer::kPhysics;
+  writer.Record(corrected, kDetected);
+  EXPECT_EQ(reader.Show("last").layer, "physics");
+  EXPECT_EQ(writer.OpenEpisodes().at(0).layer, Layer::kPhysics);
+  writer.Record(Event(Kind::kClosed, 60, 0b100, 0.2, EndReason::kStreamEnded),
+                kDetected);
+  EXPECT_EQ(reader.Show("last").layer, "physics");
+
+  std::vector<std::string> layers;
+  for (const HistoryEntry& entry : reader.Events(Id())) {
+    layers.push_back(entry.layer);
+  }
+  EXPECT_EQ(layers, (std::vector<std::string>{"", "observers", "physics", ""}));
+}
+
+// What an earlier version stored.
+TEST_F(HistoryWriterTest, AnOlderHistoryWasNamedByTheObservers) {
+  Schema older = HistorySchema();
+  older.migrations.resize(6);
+  {
+    Database database(path_, older, Access::kOccasionalWriter);
+    Transaction transaction(database);
+    database.Run(
+        "INSERT INTO episode (episode_id, valve_id, source_id, detected_ns, "
+        "isolated_ns, peak_factor, strength, model_set, model_hash, flow_unit, "
+        "channels, faults) VALUES ('00000000000000aa', 'V', 1, 2, 3, 1.0, 1.0, "
+        "'m@1', 1, 'm3/h', 'X', 'f1')");
+    transaction.Commit();
+  }
+  HistoryWriter writer(path_);
+  EXPECT_EQ(HistoryReader(path_).Show("last").layer, "observers");
+}
+
 // Written behind the back of SQLite's keys, as a disk or a person would.
 class DamagedIdTest : public HistoryFixture {
  protected:

@@ -112,6 +112,10 @@ const kMarkWords = {
 export const markWord = (kind) =>
   kMarkWords[String(kind).toUpperCase()] ?? plain(kind);
 
+/** What gave a fault its name, where that is not the observers. */
+export const layerText = (layer) =>
+  layer === 'physics' ? 'named by simulation of the valve' : '';
+
 // Signs of alarms: shape, number and text say what the colour says.
 const kShapes = {
   1: 'M2 2h16v16H2z',

@@ -7,7 +7,7 @@ import {exportPng} from '../charts/export.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, errorNote, factList, h, replace, setText} from '../dom.js';
-import {faultTitle, groupName, markWord, members, namurText, priorityNames,
+import {faultTitle, groupName, layerText, markWord, members, namurText, priorityNames,
   priorityOf, prioritySign, stateWord} from '../faults.js';
 import {durationText, factorText, percentText, zoneName} from '../format.js';
 import {link} from '../route.js';
@@ -27,7 +27,8 @@ function facts({episode: row, model_hash: hash}) {
     ['Valve', valveLink(row.valve)],
     ['Fault', h('span', {class: 'with-sign'},
         prioritySign(priorityOf(row), members(row.fault).length > 0),
-        faultTitle(row.fault))],
+        faultTitle(row.fault),
+        row.layer === 'physics' ? ` (${layerText(row.layer)})` : '')],
     ['Priority', priorityNames[priorityOf(row)]],
     ['State', `${stateWord(row.state)}; ${groupName(row).toLowerCase()}`],
     ['Detected', timeCell(row.detected_ms)],
@@ -57,6 +58,7 @@ function eventText(event) {
     isolated ? faultTitle(event.faults) : null,
     isolated ? `factor ${factorText(event.factor)}` : null,
     isolated ? `strength ${percentText(event.strength)}` : null,
+    isolated ? layerText(event.layer) : null,
     event.value, event.reason && (kEndWords[event.reason] ?? event.reason),
     event.comment,
   ].filter(Boolean).join(', ');
