@@ -176,10 +176,6 @@ void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour) {
   }
   GetBins(in, hour);
   while (const std::size_t fault = GetCount(in, kLastFinding, "fault")) {
-    if (!IsFault(static_cast<int>(fault)) &&
-        !IsFinding(static_cast<int>(fault))) {
-      in.Refuse("fault " + std::to_string(fault));
-    }
     const std::int64_t samples = GetNumber(in);
     hour.AddStrength(static_cast<int>(fault), samples, GetNumber(in));
   }

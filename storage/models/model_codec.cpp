@@ -1,5 +1,6 @@
 #include "storage/models/model_codec.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <openssl/evp.h>
 #include <zlib.h>
 
+#include "diagnosis/fault_catalogue.h"
 #include "storage/database/bytes.h"
 
 namespace fdi::storage {
@@ -296,6 +298,18 @@ std::uint32_t Checksum(std::span<const std::byte> bytes) {
               reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
+// Sets made before the findings had numbers of their own hold them behind the
+// 22 faults of then.
+void RenumberFindings(ModelSet& models) {
+  constexpr int kBehindFaults = 23;
+  if (!models.floor || std::ranges::any_of(models.faults, IsFinding)) {
+    return;
+  }
+  for (int& fault : models.faults) {
+    fault += fault >= kBehindFaults ? kFirstFinding - kBehindFaults : 0;
+  }
+}
+
 }  // namespace
 
 std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
@@ -343,6 +357,7 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
     decoder(Limited{models.physics, kMaxPhysics});
   }
   payload.ExpectEnd();
+  RenumberFindings(models);
   return models;
 }
 

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "tests/storage/model_set_fixture.h"
 
 namespace fdi::storage {
@@ -120,6 +121,12 @@ TEST(ModelCodecTest, FloorIsPartOfTheNewerFormatAlone) {
   EXPECT_EQ(back.floor, models.floor);
   EXPECT_EQ(back.faults, models.faults);
   EXPECT_EQ(EncodeModelSet(back), with);
+
+  // The first sets with a floor held its findings behind the faults.
+  for (int& fault : models.faults) {
+    fault -= IsFinding(fault) ? kFirstFinding - 23 : 0;
+  }
+  EXPECT_EQ(DecodeModelSet(EncodeModelSet(models), "test").faults, back.faults);
 }
 
 TEST(ModelCodecTest, PredictionsAreTheSameAfterReadingBack) {
