@@ -58,7 +58,12 @@ constexpr Refusal kBusy{503, "Service Unavailable",
 // Runs the library's jobs where they come from: they only pass a socket on.
 class Inline : public httplib::TaskQueue {
  public:
-  void enqueue(std::function<void()> job) override { job(); }
+  // void in the library's version 0.11 (Debian 12), bool in 0.18 (Debian 13).
+  using Taken = decltype(std::declval<httplib::TaskQueue&>().enqueue(nullptr));
+  Taken enqueue(std::function<void()> job) override {
+    job();
+    return Taken(true);
+  }
   void shutdown() override {}
 };
 
@@ -419,15 +424,30 @@ class HttpServer::Gate : public httplib::Server {
       ++counts_["answered"];
       lock.unlock();
       AnswerStream stream(client, ended_);
-      bool closed = true;
       try {
-        process_request(stream, true, closed, nullptr);
+        Process(stream);
       } catch (const std::exception&) {  // No memory, say; the client sees it.
         const std::lock_guard again(mutex_);
         --counts_["answered"];
         ++counts_["failed"];
       }
       lock.lock();
+    }
+  }
+
+  // What version 0.11 asks the stream for, 0.18 wants to be told. A template,
+  // so that only one of the calls has to compile.
+  void Process(auto& stream) {
+    bool closed = true;
+    if constexpr (requires {
+                    process_request(stream, true, closed, nullptr);
+                  }) {
+      process_request(stream, true, closed, nullptr);
+    } else {
+      std::string client;
+      int port = 0;
+      stream.get_remote_ip_and_port(client, port);
+      process_request(stream, client, port, "", 0, true, closed, nullptr);
     }
   }
 
