@@ -8,6 +8,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 purpose=${1:-programs}
 
+# The names of Debian 12; in 13 libfastrtps-dev is an empty package that brings
+# libfastdds-dev.
 packages=(
   g++ cmake ninja-build pkg-config git ca-certificates
   libfastrtps-dev libfastcdr-dev fastddsgen

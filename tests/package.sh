@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Makes the Debian package, looks at what is in it and runs the programs from
 # where it unpacks. With FDI_PACKAGE_CHROOT=1 also installs, upgrades, removes
-# and purges it in a fresh Debian 12 (needs root, debootstrap and the network),
-# and asks lintian where there is one.
+# and purges it in a fresh Debian (needs root, debootstrap and the network), and
+# asks lintian where there is one.
 # Usage: package.sh BUILD_DIRECTORY
 set -euo pipefail
 build=$(cd "$1" && pwd)
@@ -24,7 +24,7 @@ dpkg-deb --control "$package" "$folder/control"
 for field in Package Version Maintainer Depends Recommends Description; do
   [ -n "$(dpkg-deb --field "$package" $field)" ] || fail "no $field"
 done
-dpkg-deb --field "$package" Depends | grep -q libfastrtps ||
+dpkg-deb --field "$package" Depends | grep -qE 'libfast(rtps|dds)' ||
   fail "no dependencies on libraries"
 for script in postinst prerm postrm; do
   sh -n "$folder/control/$script"

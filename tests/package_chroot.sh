@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Installs a package in a fresh Debian 12, where programs, pages and the service
-# have to work, and removes it again. Needs root, debootstrap and the network.
+# Installs a package in a fresh Debian of the release that it was built on, where
+# programs, pages and the service have to work, and removes it again. Needs root,
+# debootstrap and the network.
 # Usage: package_chroot.sh FILE.deb
 set -euo pipefail
 package=$(realpath "$1")
@@ -22,8 +23,9 @@ quietly() {
   "$@" >"$root/log" 2>&1 || fail "$* failed: $(tail -20 "$root/log")"
 }
 
+suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
 mirror=${FDI_DEBIAN_MIRROR:-http://deb.debian.org/debian}
-debootstrap --variant=minbase bookworm "$root" "$mirror" >/dev/null
+debootstrap --variant=minbase "$suite" "$root" "$mirror" >/dev/null
 mount -t proc proc "$root/proc"
 mount --bind /dev "$root/dev"
 cp "$package" "$root/fdi.deb"
@@ -69,4 +71,4 @@ grep -q 'left in place' "$root/log" || fail "purge does not say what it leaves"
 [ ! -e "$root/etc/default/fdi-monitor" ] || fail "purge left the conffile"
 [ -z "$(within dpkg-query -W -f '${Status}' fdi 2>/dev/null)" ] ||
   fail "still known to dpkg"
-echo "package_chroot: installed, used, reinstalled, removed and purged"
+echo "package_chroot: $suite: installed, used, reinstalled, removed and purged"
