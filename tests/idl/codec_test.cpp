@@ -139,7 +139,8 @@ TEST(CodecTest, SmallModelSetsMakeSmallMessages) {
   v1::DecisionVector wire;
   Codec<DecisionMessage>::Encode(message, wire);
 
-  EXPECT_LT(v1::DecisionVector::getCdrSerializedSize(wire), 320U);
+  TopicOf<DecisionMessage>::Type type;
+  EXPECT_LT(Serialized(type, &wire).size(), 320U);
   EXPECT_EQ(RoundTrip(message).verdict.observer_factors[11], 0.0);
 }
 
