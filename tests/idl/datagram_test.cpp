@@ -21,8 +21,9 @@ using Bytes = std::vector<std::uint8_t>;
 
 // Of eProsima: the library looks for statistics in theirs only.
 Bytes Header() {
-  Bytes bytes{'R', 'T', 'P', 'S', 2, 2, 1, 15};
-  bytes.resize(20, 7);
+  constexpr std::uint8_t kStart[] = {'R', 'T', 'P', 'S', 2, 2, 1, 15};
+  Bytes bytes(20, 7);
+  std::ranges::copy(kStart, bytes.begin());
   return bytes;
 }
 

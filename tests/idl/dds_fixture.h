@@ -3,53 +3,15 @@
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
 #include "idl/endpoint.h"
+#include "tests/idl/test_domain.h"
 
 namespace fdi::idl {
 
 inline constexpr std::chrono::seconds kPatience{30};
-
-/// A domain id in 60..99 that no other test process has, as long as it lives.
-/// From 102 on the ports of a domain (7400 + 250 id) are ephemeral ones, which
-/// any socket may hold.
-class TestDomain {
- public:
-  TestDomain() {
-    for (int i = 0; i < 40; ++i) {
-      id_ = 60 + (getpid() + i) % 40;
-      const std::string path =
-          "/tmp/fdi-test-domain-" + std::to_string(id_) + ".lock";
-      file_ = open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
-      if (file_ >= 0 && flock(file_, LOCK_EX | LOCK_NB) == 0) {
-        return;
-      }
-      close(file_);
-    }
-    throw std::runtime_error("no free test domain");
-  }
-  ~TestDomain() { close(file_); }
-  TestDomain(const TestDomain&) = delete;
-  TestDomain& operator=(const TestDomain&) = delete;
-
-  int id() const { return id_; }
-  DdsOptions Options() const {
-    DdsOptions options;
-    options.domain = id_;
-    return options;
-  }
-
- private:
-  int id_{0};
-  int file_{-1};
-};
 
 /// Keeps log lines and lets a test wait for one.
 class LogCapture {

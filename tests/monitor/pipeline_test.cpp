@@ -151,7 +151,7 @@ TEST_F(PipelineTest, NoThreadStartsBeforeStart) {
   Make(&runs);
   EXPECT_EQ(ThreadCount(), before);
   pipeline_->Start({});
-  EXPECT_EQ(ThreadCount(), before + 3);
+  EXPECT_EQ(ThreadCount(), before + 4);
   pipeline_->Stop();
   EXPECT_EQ(ThreadCount(), before);
 }

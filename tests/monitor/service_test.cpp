@@ -16,6 +16,7 @@
 #include "diagnosis/error.h"
 #include "storage/history/history_database.h"
 #include "storage/models/models.h"
+#include "tests/idl/test_domain.h"
 #include "tests/monitor/fake_sinks.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -38,7 +39,7 @@ class ServiceTest : public testing::Test {
  protected:
   ServiceTest() {
     global_.data_dir = directory_.path() / "data";
-    global_.domain = 60 + static_cast<int>(getpid() % 40);
+    global_.domain = domain_.id();
   }
   cli::Context Context(const std::string& software = "fdi-test 1.0") {
     return {global_,
@@ -65,6 +66,7 @@ class ServiceTest : public testing::Test {
   }
 
   storage::TemporaryDirectory directory_;
+  const idl::TestDomain domain_;
   cli::GlobalOptions global_;
   Notice notice_;
   std::vector<std::string> lines_;

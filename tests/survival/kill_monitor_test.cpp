@@ -10,13 +10,13 @@
 #include <tuple>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "idl/endpoint.h"
 #include "storage/history/history_database.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
+#include "tests/idl/test_domain.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/temporary_directory.h"
 #include "tests/survival/faulty_plant.h"
@@ -47,7 +47,7 @@ class KilledMonitor : public testing::Test {
                         storage::Access::kOccasionalWriter)
         .Save(LinearModels(), storage::Activation::kAlways);
     idl::DdsOptions dds;
-    dds.domain = domain_;
+    dds.domain = domain_.id();
     participant_.emplace(dds);
     decisions_.emplace(*participant_);
     events_.emplace(*participant_);
@@ -61,8 +61,8 @@ class KilledMonitor : public testing::Test {
                       .count();
     return std::make_unique<ChildProcess>(std::vector<std::string>{
         FDI_MONITOR_PROGRAM, "--data", directory_.path().string(), "--domain",
-        std::to_string(domain_), "--transport", "udp", "--log-level", "warning",
-        "run", record});
+        std::to_string(domain_.id()), "--transport", "udp", "--log-level",
+        "warning", "run", record});
   }
 
   void Take() {
@@ -108,7 +108,7 @@ class KilledMonitor : public testing::Test {
   void ExpectEpisodesInOrder() const;
   void ExpectOutagesNoted(std::size_t outages) const;
 
-  const int domain_{60 + static_cast<int>(getpid() % 20)};
+  const idl::TestDomain domain_;
   storage::TemporaryDirectory directory_;
   std::optional<idl::Participant> participant_;
   std::optional<idl::Subscriber<idl::DecisionMessage>> decisions_;

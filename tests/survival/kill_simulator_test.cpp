@@ -9,10 +9,10 @@
 #include <thread>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "idl/endpoint.h"
 #include "storage/runs/runs.h"
+#include "tests/idl/test_domain.h"
 #include "tests/storage/temporary_directory.h"
 #include "tests/survival/kill_rounds.h"
 #include "tests/system/monitor_process.h"
@@ -55,7 +55,7 @@ class KilledSimulator : public testing::Test {
     command.insert(command.end(), more.begin(), more.end());
     return command;
   }
-  std::string Domain() const { return std::to_string(domain_); }
+  std::string Domain() const { return std::to_string(domain_.id()); }
 
   // Of the newest recorder; the runs of those before are interrupted.
   static SamplesByValve NewestRuns(const std::filesystem::path& data,
@@ -81,7 +81,7 @@ class KilledSimulator : public testing::Test {
     return all;
   }
 
-  const int domain_{60 + static_cast<int>(getpid() % 20)};
+  const idl::TestDomain domain_;
   storage::TemporaryDirectory directory_;
 };
 
@@ -184,7 +184,7 @@ class Witness {
 };
 
 TEST_F(KilledSimulator, HasRecordedWhatItPublishedButTheLastSecond) {
-  Witness witness(domain_);
+  Witness witness(domain_.id());
   RandomMoments moments(4);
   const std::filesystem::path data = directory_.path() / "data";
   std::set<std::string> known;

@@ -64,7 +64,7 @@ TEST_F(HostilePublishersTest, TenThousandValveIdsAreCountedAndCostLittle) {
   ASSERT_TRUE(AwaitVectors(40));
   const std::size_t before = ResidentBytes(*monitor);
 
-  Stranger stranger(domain_, kIds);
+  Stranger stranger(domain_.id(), kIds);
   for (int round = 0; round < kRounds; ++round) {
     for (int id = 0; id < kIds; ++id) {
       ASSERT_EQ(stranger.samples.Write(
@@ -96,7 +96,7 @@ TEST_F(HostilePublishersTest, OfTwoPublishersOfOneValveTheNewerIsDiagnosed) {
   const auto monitor = StartMonitor();
   Publish(0, 40);
   ASSERT_TRUE(AwaitVectors(40));
-  Stranger second(domain_, 100);
+  Stranger second(domain_.id(), 100);
   for (std::uint64_t k = 40; k < 100; ++k) {
     // One at a time: only so is it known who is first.
     ASSERT_EQ(second.samples.Write({"V1", PlantSample(k, kF7Offset, 2)}),
@@ -173,7 +173,7 @@ TEST_F(HostilePublishersTest, JumpsCostAValveItsShareAndOthersNothing) {
   Publish(0, 1);
   ASSERT_TRUE(AwaitVectors(1));
   const std::size_t before = ResidentBytes(*monitor);
-  Stranger stranger(domain_, 10);
+  Stranger stranger(domain_.id(), 10);
   std::uint64_t sent = 0;
   std::jthread flood([&](const std::stop_token& stop) {
     for (; !stop.stop_requested(); ++sent) {

@@ -56,7 +56,7 @@ class LoadTest : public MonitorFixture {
     std::optional<ChildProcess> watch;
     if (with_stuck_subscriber) {
       watch.emplace(std::vector<std::string>{
-          FDI_MONITOR_PROGRAM, "--domain", std::to_string(domain_),
+          FDI_MONITOR_PROGRAM, "--domain", std::to_string(domain_.id()),
           "--transport", "udp", "watch", "--count"});
       EXPECT_TRUE(watch->AwaitLine("watch_ready")) << watch->errors();
       EXPECT_TRUE(Await([this] { return counters_.contains("received"); }));
@@ -115,11 +115,11 @@ TEST_F(LoadTest, AStuckSubscriberDelaysNeitherDiagnosisNorRecording) {
 // writer that a reader leaves under load (eProsima/Fast-DDS pull request 5432).
 TEST_F(LoadTest, ATermUnderFullLoadDrainsAndEndsWithinTwoSeconds) {
   const auto monitor = StartMonitor({"--record"});
-  const ChildProcess publisher({FDI_SIMULATOR_PROGRAM, "--domain",
-                                std::to_string(domain_), "--transport", "udp",
-                                "--data", (directory_.path() / "sim").string(),
-                                "run", "--valve", "V", "--valves", "200",
-                                "--duration", "100000", "--speed", "max"});
+  const ChildProcess publisher(
+      {FDI_SIMULATOR_PROGRAM, "--domain", std::to_string(domain_.id()),
+       "--transport", "udp", "--data", (directory_.path() / "sim").string(),
+       "run", "--valve", "V", "--valves", "200", "--duration", "100000",
+       "--speed", "max"});
   ASSERT_TRUE(Await([this] { return counters_["diagnosed"] > 20'000; }))
       << publisher.errors();
 

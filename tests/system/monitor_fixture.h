@@ -9,10 +9,10 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "idl/endpoint.h"
 #include "storage/models/models.h"
+#include "tests/idl/test_domain.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/temporary_directory.h"
 #include "tests/system/monitor_process.h"
@@ -27,7 +27,7 @@ class MonitorFixture : public testing::Test {
  protected:
   MonitorFixture() {
     idl::DdsOptions dds;
-    dds.domain = domain_;
+    dds.domain = domain_.id();
     participant_.emplace(dds);
     samples_.emplace(*participant_,
                      idl::PublisherOptions{idl::Profile::kLossless, 100});
@@ -47,8 +47,8 @@ class MonitorFixture : public testing::Test {
   std::vector<std::string> Command(
       const std::vector<std::string>& arguments) const {
     std::vector<std::string> command{
-        FDI_MONITOR_PROGRAM,     "--data",      data_.string(), "--domain",
-        std::to_string(domain_), "--transport", "udp",          "run",
+        FDI_MONITOR_PROGRAM,          "--data",      data_.string(), "--domain",
+        std::to_string(domain_.id()), "--transport", "udp",          "run",
         "--lossless-decisions"};
     command.insert(command.end(), arguments.begin(), arguments.end());
     return command;
@@ -119,7 +119,7 @@ class MonitorFixture : public testing::Test {
     return Await([this, count] { return vectors_.size() >= count; });
   }
 
-  const int domain_{20 + static_cast<int>(getpid() % 40)};
+  const idl::TestDomain domain_;
   storage::TemporaryDirectory directory_;
   std::filesystem::path data_{directory_.path()};
   std::optional<idl::Participant> participant_;

@@ -25,8 +25,8 @@ class TopSystemTest : public MonitorFixture {
   }
 
   std::vector<std::string> Top() const {
-    return {FDI_MONITOR_PROGRAM,     "top",         "--domain",
-            std::to_string(domain_), "--transport", "udp"};
+    return {FDI_MONITOR_PROGRAM,          "top",         "--domain",
+            std::to_string(domain_.id()), "--transport", "udp"};
   }
 
   std::unique_ptr<ChildProcess> monitor_;

@@ -1,0 +1,57 @@
+#!/usr/bin/env bash
+# A valve in its level loop, onboarded on a healthy hour: the monitor, fed over
+# DDS, ends with the name that fdi-trainer evaluate gives the same samples, and
+# the history says that a simulation of the valve gave it.
+# Usage: second_look.sh FOLDER-OF-PROGRAMS
+set -euo pipefail
+bin=$(cd "$1" && pwd)
+work=$(mktemp -d)
+export FDI_DATA=$work/data
+for domain in $(seq 60 99); do  # As TestDomain in tests/idl/test_domain.h.
+  exec 9>"/tmp/fdi-test-domain-$domain.lock"
+  ! flock -n 9 || break
+done
+monitor=
+trap '[ -z "$monitor" ] || kill -9 "$monitor" 2>/dev/null; rm -rf "$work"' EXIT
+cd "$work"
+
+fail() {
+  echo "second_look: $*" >&2
+  cat ./*.log >&2
+  exit 1
+}
+history() { sqlite3 -readonly "$FDI_DATA/history.db" "$1"; }
+record() {  # FILE OPTIONS
+  "$bin/fdi-simulator" run --no-publish --speed max --excitation level-loop \
+    --export "$@" 2>simulator.log >&2 || fail "the simulator fails"
+}
+
+record healthy.csv --seed 31 --duration 3600
+record faulty.csv --seed 32 --duration 1500 --fault f2:abrupt@600:strength=0.7
+"$bin/fdi-trainer" onboard --valve LV-1 --file healthy.csv --no-coverage \
+  >onboard.log 2>&1 || fail "onboarding fails"
+"$bin/fdi-trainer" evaluate --valve LV-1 --file faulty.csv --json \
+  >evaluated.json 2>evaluate.log || fail "the evaluation fails"
+wanted=$(sqlite3 :memory: "select group_concat(value, '|') from
+  (select value from json_each(cast(readfile('evaluated.json') as text),
+   '\$.runs[0].final_set') order by value)")
+
+"$bin/fdi-monitor" --domain "$domain" run 2>monitor.log &
+monitor=$!
+timeout 30 sh -c 'until grep -q monitor_ready monitor.log; do sleep 0.05; done' ||
+  fail "the monitor does not start"
+timeout 200 "$bin/fdi-simulator" --domain "$domain" replay --csv faulty.csv \
+  --valve LV-1 --speed 20 >simulator.log 2>&1 || fail "the simulator fails"
+kill -TERM "$monitor"
+wait "$monitor" || fail "the monitor ended with $?"
+monitor=
+
+found=$(history "select group_concat(name, '|') from
+  (select value as name from episode, json_each('[\"' ||
+   replace(fault, '|', '\",\"') || '\"]') order by value)")
+[ "$found" = "$wanted" ] || fail "named $found, evaluated as $wanted"
+[ "$(history 'select layer from episode')" = physics ] ||
+  fail "named by $(history 'select layer from episode')"
+[ "$(history "select count(*) from episode_event where layer = 'physics'")" -gt 0 ] ||
+  fail "no event of the physics"
+echo "second_look: $found"
