@@ -98,12 +98,12 @@ function(fdi_program name)
   install(TARGETS ${name} RUNTIME)
 endfunction()
 
-# fdi_test(name [NUMERICAL] [THREADS] LABEL unit|system SOURCES a_test.cpp ...
-#          LIBRARIES lib ...)
+# fdi_test(name [NUMERICAL] [THREADS] LABEL unit|system [TIMEOUT 120]
+#          SOURCES a_test.cpp ... LIBRARIES lib ...)
 # NUMERICAL: optimised under sanitizers, too. THREADS: also run under the thread
 # sanitizer (preset tsan).
 function(fdi_test name)
-  cmake_parse_arguments(ARG "NUMERICAL;THREADS" "LABEL" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "NUMERICAL;THREADS" "LABEL;TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} GTest::gtest
                         GTest::gmock GTest::gtest_main)
@@ -122,6 +122,9 @@ function(fdi_test name)
     endif()
     add_dependencies(threaded_tests ${name})
   endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
-                       PROPERTIES LABELS ${ARG_LABEL} TIMEOUT 300)
+                       PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
 endfunction()

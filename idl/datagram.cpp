@@ -94,12 +94,6 @@ struct Body {
   }
 };
 
-// By the last byte of a writer. Messages of ours need no fragments; the library
-// aborts when it gets the same one whole and in fragments.
-bool IsOfDiscovery(std::uint8_t entity_kind) {
-  return (entity_kind & 0xc0U) == 0xc0U;
-}
-
 // Whether a data submessage has its parameters inside itself.
 bool DataIsSound(const Body& body, std::uint8_t flags, std::size_t fixed) {
   std::size_t at = 4U + body.U16(2);  // From behind the offset itself.
@@ -122,6 +116,8 @@ bool ContentIsSound(std::uint8_t kind, std::uint8_t flags, const Body& body) {
     case kData:
       return DataIsSound(body, flags, 20);
     case kDataFrag:
+      // Messages of ours need none; the library aborts when it gets the same
+      // one whole and in fragments.
       return IsOfDiscovery(body.bytes[11]) && DataIsSound(body, flags, 32) &&
              body.U32(20) > 0 && body.U16(24) > 0 && body.U16(26) > 0 &&
              body.U32(28) <= kMostSampleBytes;

@@ -11,8 +11,7 @@ using std::chrono::duration_cast;
 using std::chrono::seconds;
 
 constexpr std::int64_t kBurst = std::int64_t{1} << 20;  // 2 ms of counting.
-// Four times what a writer of the library reaches on one host, and ten times
-// what one writes for longer.
+// Well above what a writer can send, and what one sends for longer.
 constexpr std::int64_t kPerSecond = 1'000'000;
 constexpr std::int64_t kPerSecondOfSilence = 100'000;
 constexpr seconds kSilence{10};
@@ -27,12 +26,6 @@ std::int64_t Growth(WriterPace::Clock::duration since) {
   };
   const auto talking = std::min<WriterPace::Clock::duration>(since, kSilence);
   return of(talking, kPerSecond) + of(since - talking, kPerSecondOfSilence);
-}
-
-// Writers of discovery start at 1 with their participant; others may have
-// written for months.
-bool IsOfDiscovery(const WriterGuid& writer) {
-  return (writer.back() & 0xc0U) == 0xc0U;
 }
 
 }  // namespace
@@ -51,7 +44,9 @@ WriterPace::State& WriterPace::Find(const WriterGuid& writer,
   if (recent_.size() == kMostRecent) {
     older_ = std::exchange(recent_, {});
   }
-  State state{IsOfDiscovery(writer) ? 0 : number, kBurst, now};
+  // Writers of discovery start at 1 with their participant; others may have
+  // written for months.
+  State state{IsOfDiscovery(writer.back()) ? 0 : number, kBurst, now};
   if (const auto found = older_.find(writer); found != older_.end()) {
     state = found->second;
   }

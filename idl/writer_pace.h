@@ -12,6 +12,11 @@ namespace fdi::idl {
 /// Prefix of the participant and number of the writer, as they are sent.
 using WriterGuid = std::array<std::uint8_t, 16>;
 
+/// By the last byte of its GUID: a writer of participants and endpoints.
+constexpr bool IsOfDiscovery(std::uint8_t entity_kind) {
+  return (entity_kind & 0xc0U) == 0xc0U;
+}
+
 /// How fast the sequence numbers of each writer may grow.
 ///
 /// Fast DDS 2.9.1 counts one by one, with the reader's mutex held, from the

@@ -3,42 +3,15 @@
 # that the set does not know is recorded, labelled, learnt, compared and run in
 # the shadow. Usage: learning.sh FOLDER-OF-PROGRAMS
 set -euo pipefail
-bin=$(cd "$1" && pwd)
-work=$(mktemp -d)
-export FDI_DATA=$work/data
-for domain in $(seq 60 99); do  # As TestDomain in tests/idl/test_domain.h.
-  exec 9>"/tmp/fdi-test-domain-$domain.lock"
-  ! flock -n 9 || break
-done
-monitor=
-trap '[ -z "$monitor" ] || kill -9 "$monitor" 2>/dev/null; rm -rf "$work"' EXIT
-cd "$work"
+source "$(dirname "$0")/programs.sh" "$1"
 
-fail() {
-  echo "learning: $*" >&2
-  cat ./*.log >&2
-  exit 1
-}
 expect() {  # WHAT FOUND WANTED
   [ "$2" = "$3" ] || fail "$1: $2, wanted $3"
 }
-history() { sqlite3 -readonly "$FDI_DATA/history.db" "$1"; }
 # SQL over the columns value of what PATH holds in a JSON file.
 json() {  # FILE PATH SQL
   sqlite3 :memory: "with j as (select * from json_each(
     cast(readfile('$1') as text), '$2')) $3"
-}
-start() {  # OPTIONS
-  : >monitor.log
-  "$bin/fdi-monitor" --domain "$domain" run "$@" 2>monitor.log &
-  monitor=$!
-  timeout 30 sh -c 'until grep -q monitor_ready monitor.log; do sleep 0.05; done' ||
-    fail "the monitor does not start"
-}
-stop() {
-  kill -TERM "$monitor"
-  wait "$monitor" || fail "the monitor ended with $?"
-  monitor=
 }
 publish() {  # SEED
   timeout 60 "$bin/fdi-simulator" --domain "$domain" run --scenario plant.toml \

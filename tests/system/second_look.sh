@@ -4,23 +4,8 @@
 # the history says that a simulation of the valve gave it.
 # Usage: second_look.sh FOLDER-OF-PROGRAMS
 set -euo pipefail
-bin=$(cd "$1" && pwd)
-work=$(mktemp -d)
-export FDI_DATA=$work/data
-for domain in $(seq 60 99); do  # As TestDomain in tests/idl/test_domain.h.
-  exec 9>"/tmp/fdi-test-domain-$domain.lock"
-  ! flock -n 9 || break
-done
-monitor=
-trap '[ -z "$monitor" ] || kill -9 "$monitor" 2>/dev/null; rm -rf "$work"' EXIT
-cd "$work"
+source "$(dirname "$0")/programs.sh" "$1"
 
-fail() {
-  echo "second_look: $*" >&2
-  cat ./*.log >&2
-  exit 1
-}
-history() { sqlite3 -readonly "$FDI_DATA/history.db" "$1"; }
 record() {  # FILE OPTIONS
   "$bin/fdi-simulator" run --no-publish --speed max --excitation level-loop \
     --export "$@" 2>simulator.log >&2 || fail "the simulator fails"
@@ -36,15 +21,10 @@ wanted=$(sqlite3 :memory: "select group_concat(value, '|') from
   (select value from json_each(cast(readfile('evaluated.json') as text),
    '\$.runs[0].final_set') order by value)")
 
-"$bin/fdi-monitor" --domain "$domain" run 2>monitor.log &
-monitor=$!
-timeout 30 sh -c 'until grep -q monitor_ready monitor.log; do sleep 0.05; done' ||
-  fail "the monitor does not start"
+start
 timeout 200 "$bin/fdi-simulator" --domain "$domain" replay --csv faulty.csv \
   --valve LV-1 --speed 20 >simulator.log 2>&1 || fail "the simulator fails"
-kill -TERM "$monitor"
-wait "$monitor" || fail "the monitor ended with $?"
-monitor=
+stop
 
 found=$(history "select group_concat(name, '|') from
   (select value as name from episode, json_each('[\"' ||

@@ -7,8 +7,8 @@ import {exportPng} from '../charts/export.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, errorNote, factList, h, replace, setText} from '../dom.js';
-import {faultTitle, groupName, layerText, markWord, members, namurText, priorityNames,
-  priorityOf, prioritySign, stateWord} from '../faults.js';
+import {faultTitle, groupName, layerText, markWord, members, namurText,
+  priorityNames, priorityOf, prioritySign, stateWord} from '../faults.js';
 import {durationText, factorText, percentText, zoneName} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
@@ -27,8 +27,8 @@ function facts({episode: row, model_hash: hash}) {
     ['Valve', valveLink(row.valve)],
     ['Fault', h('span', {class: 'with-sign'},
         prioritySign(priorityOf(row), members(row.fault).length > 0),
-        faultTitle(row.fault),
-        row.layer === 'physics' ? ` (${layerText(row.layer)})` : '')],
+        [faultTitle(row.fault), layerText(row.layer)]
+            .filter(Boolean).join(', '))],
     ['Priority', priorityNames[priorityOf(row)]],
     ['State', `${stateWord(row.state)}; ${groupName(row).toLowerCase()}`],
     ['Detected', timeCell(row.detected_ms)],

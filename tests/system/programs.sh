@@ -1,0 +1,34 @@
+# For the scripts beside it, which run the built programs over DDS:
+#
+#     source programs.sh FOLDER-OF-PROGRAMS
+#
+# Goes to an empty folder, with a data directory and a domain of its own.
+bin=$(cd "$1" && pwd)
+work=$(mktemp -d)
+export FDI_DATA=$work/data
+for domain in $(seq 60 99); do  # As TestDomain in tests/idl/test_domain.h.
+  exec 9>"/tmp/fdi-test-domain-$domain.lock"
+  ! flock -n 9 || break
+done
+monitor=
+trap '[ -z "$monitor" ] || kill -9 "$monitor" 2>/dev/null; rm -rf "$work"' EXIT
+cd "$work"
+
+fail() {
+  echo "$(basename "$0" .sh): $*" >&2
+  cat ./*.log >&2
+  exit 1
+}
+history() { sqlite3 -readonly "$FDI_DATA/history.db" "$1"; }
+start() {  # OPTIONS
+  : >monitor.log
+  "$bin/fdi-monitor" --domain "$domain" run "$@" 2>monitor.log &
+  monitor=$!
+  timeout 30 sh -c 'until grep -q monitor_ready monitor.log; do sleep 0.05; done' ||
+    fail "the monitor does not start"
+}
+stop() {
+  kill -TERM "$monitor"
+  wait "$monitor" || fail "the monitor ended with $?"
+  monitor=
+}
