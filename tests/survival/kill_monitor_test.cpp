@@ -30,11 +30,12 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using Clock = std::chrono::steady_clock;
 
-// Of half of the rounds; a machine that does other things besides may keep any
-// of them waiting.
+// Of half of the rounds, where these are many enough; a machine that does other
+// things besides may keep any of them waiting.
 constexpr milliseconds kLossLimit{1000};
 constexpr milliseconds kStartLimit{2000};
 constexpr milliseconds kBusyLimit{6000};
+constexpr std::size_t kManyRounds = 10;
 constexpr std::int64_t kDetectionNs = 3'000'000'000;  // n_d samples.
 
 // One transition of an episode.
@@ -254,7 +255,9 @@ void ExpectWithin(const char* what, std::vector<milliseconds> times,
                   milliseconds limit) {
   std::sort(times.begin(), times.end());
   const milliseconds median = times[times.size() / 2];
-  EXPECT_LE(median, limit) << what;
+  if (times.size() >= kManyRounds) {
+    EXPECT_LE(median, limit) << what;
+  }
   EXPECT_LE(times.back(), kBusyLimit) << what;
   std::cout << "monitor: " << what << " after " << median.count()
             << " ms (median), " << times.back().count() << " ms (longest)\n";
