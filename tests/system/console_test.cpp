@@ -5,6 +5,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <iostream>
 #include <mutex>
 #include <regex>
 #include <sstream>
@@ -15,6 +16,8 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/monitor/raw_client.h"
+#include "tests/system/attack.h"
+#include "tests/system/honest_valve.h"
 #include "tests/system/monitor_fixture.h"
 
 namespace fdi::monitor {
@@ -234,19 +237,6 @@ void Flood(int port, const std::string& begin, const std::string& part) {
   client.Read();
 }
 
-// What the kernel says of the most memory that the process ever had [MB].
-double PeakMemory(pid_t pid) {
-  std::ifstream status("/proc/" + std::to_string(pid) + "/status");
-  for (std::string word; status >> word;) {
-    if (word == "VmHWM:") {
-      double kilobytes = 0.0;
-      status >> kilobytes;
-      return kilobytes / 1024.0;
-    }
-  }
-  return 0.0;
-}
-
 // 40 MB of zeros.
 std::string BrotliBomb() {
   std::string bomb;
@@ -293,9 +283,8 @@ TEST_F(ConsoleTest, HostileRequestsTakeNoMemoryAndHoldNobodyUp) {
       {post + "\r\n", kilobyte},
       {ranges + "\r\n\r\n", ""}};
 
-  const char* asked = std::getenv("FDI_HTTP_SECONDS");
-  const Clock::time_point end =
-      Clock::now() + std::chrono::seconds(asked == nullptr ? 0 : atoi(asked));
+  HonestValve honest(domain_.id());
+  const Clock::time_point end = Clock::now() + AttackTime();
   std::uint64_t rounds = 0;
   do {
     for (const int port : {port_, metrics_port_}) {
@@ -314,8 +303,14 @@ TEST_F(ConsoleTest, HostileRequestsTakeNoMemoryAndHoldNobodyUp) {
       }
     }
     ++rounds;
+    TakeFor(std::chrono::milliseconds(20));
   } while (Clock::now() < end);
+  const HonestValve::Delays delays = honest.Stop();
+  std::cout << "requests: " << rounds * 6 * attacks.size() << "; " << delays
+            << "; memory " << before << " and " << PeakMemory(monitor->pid())
+            << " MB\n";
 
+  ExpectPunctual(delays);
   EXPECT_LT(PeakMemory(monitor->pid()) - before, 40.0);
   // Each client is counted once, whatever became of it.
   std::istringstream metrics(Metrics());

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cctype>
 #include <csignal>
+#include <iostream>
 #include <sstream>
 #include <stop_token>
 #include <thread>
@@ -151,6 +152,42 @@ TEST_F(LoadTest, ATermUnderFullLoadDrainsAndEndsWithinTwoSeconds) {
        storage::RunStore(data_ / "runs.db").List()) {
     EXPECT_EQ(run.state, storage::RunState::kComplete);
   }
+}
+
+// What the history cannot store in time goes out as not persisted.
+TEST_F(LoadTest, AStormOfAThousandValvesIsPersistedBeforeItIsPublished) {
+  constexpr std::uint64_t kStorm = 1'000;
+  constexpr std::uint64_t kSamples = 90;
+  samples_.emplace(*participant_,
+                   idl::PublisherOptions{idl::Profile::kLossless, kStorm});
+  const auto monitor = StartMonitor();
+  const std::jthread publisher([this] {
+    for (std::uint64_t k = 0; k < kSamples; ++k) {
+      const bool fails = k >= 30 && k < 50;
+      for (std::uint64_t v = 0; v < kStorm; ++v) {
+        samples_->Write(
+            {"V" + std::to_string(v), PlantSample(k, fails ? kF7Offset : 0.0)});
+      }
+    }
+  });
+  ASSERT_TRUE(Await([this] {
+    return counters_["diagnosed"] == kSamples * kStorm;
+  })) << counters_["diagnosed"]
+      << " of " << counters_["received"] << ", " << vectors_.size()
+      << " vectors, " << faults_.size() << " events";
+  ASSERT_TRUE(Await([this] {
+    return std::ranges::count(faults_, TransitionKind::kClosed, [](auto& e) {
+             return e.transition.kind;
+           }) == kStorm;
+  }));
+  monitor->Signal(SIGTERM);
+  EXPECT_EQ(monitor->AwaitExit(), 0) << monitor->errors();
+
+  const auto unpersisted = static_cast<std::size_t>(
+      std::ranges::count(faults_, false, &FaultEvent::persisted));
+  std::cout << "storm: " << faults_.size() << " events, " << unpersisted
+            << " before they were stored\n";
+  EXPECT_LE(unpersisted, faults_.size() / 100);
 }
 
 // The vectors of one valve as they come; kept small, for they are many.

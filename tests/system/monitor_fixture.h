@@ -110,6 +110,10 @@ class MonitorFixture : public testing::Test {
     }
     return true;
   }
+  void TakeFor(std::chrono::milliseconds time) {
+    const auto end = std::chrono::steady_clock::now() + time;
+    Await([end] { return std::chrono::steady_clock::now() >= end; });
+  }
   bool AwaitEvent(TransitionKind kind) {
     return Await([this, kind] {
       return !faults_.empty() && faults_.back().transition.kind == kind;
