@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 namespace fdi::monitor {
 namespace {
@@ -68,6 +69,9 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
   strengths_.clear();
   if (named) {
     Name(*answer, *named);
+    if (std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
+      look_ = RecordOf(*answer);
+    }
   } else if (kept) {
     SetName(*kept_, Unknown::kTooEarly);
   }
@@ -127,6 +131,26 @@ void EpisodeNames::Name(const simulator::LookAnswer& answer,
   SetName(set, outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
 }
 
+EpisodeLook EpisodeNames::RecordOf(const simulator::LookAnswer& answer) const {
+  EpisodeLook look;
+  look.period_ns = std::llround(models_->sample_period_s * 1e9);
+  const auto rows = static_cast<std::int64_t>(answer.simulated.size());
+  look.first_ns = answer.stamp_ns - (rows - 1) * look.period_ns;
+  look.misfit = answer.misfit;
+  if (answer.outcome != simulator::LookOutcome::kNoneFits) {
+    for (const simulator::Explanation& e : answer.faults) {
+      const std::int64_t begins_ns = detection_ns_ + e.start * look.period_ns;
+      look.faults.push_back({e.fault, e.strength, e.lowest, e.highest,
+                             std::max(begins_ns, look.first_ns), e.growing});
+    }
+  }
+  for (const simulator::RecordAnswer& row : answer.simulated) {
+    look.x_pct.push_back(row.x_pct);
+    look.flow.push_back(row.flow);
+  }
+  return look;
+}
+
 // `unknown`: why there is none, if there is none.
 void EpisodeNames::SetName(FaultSet faults, Unknown unknown) {
   verdict_.isolated = faults;
@@ -184,6 +208,8 @@ void EpisodeNames::Forget() {
   faults_ = 0;
   layer_ = Layer::kObservers;
   strengths_.clear();
+  look_ns_ = 0;
+  look_.reset();
   kept_.reset();
 }
 

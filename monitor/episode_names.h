@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "diagnosis/records/episode_look.h"
 #include "diagnosis/verdict.h"
 #include "monitor/look_worker.h"
 #include "simulator/second_look/episode_looks.h"
@@ -35,6 +36,12 @@ class EpisodeNames {
   ///   and until the next call.
   const Verdict& Step(const Sample& sample, const Verdict& engine, bool held);
 
+  /// The look whose answer counts since the last Step(), but for the id of its
+  /// episode. Nothing if none began to count then.
+  std::optional<EpisodeLook> TakeLook() {
+    return std::exchange(look_, std::nullopt);
+  }
+
   /// The engine was made to end its episode. @returns `closed` with the name
   /// that counted.
   Transition End(Transition closed);
@@ -52,6 +59,7 @@ class EpisodeNames {
   void Name(const simulator::LookAnswer& answer,
             const std::vector<int>& faults);
   void SetName(FaultSet faults, Unknown unknown);
+  EpisodeLook RecordOf(const simulator::LookAnswer& answer) const;
   void Announce();
   void WriteName(Transition& transition) const;
   void Forget();
@@ -72,6 +80,8 @@ class EpisodeNames {
   Layer layer_{Layer::kObservers};
   // and what the look estimated, by fault index, likeliest first.
   std::vector<std::pair<std::size_t, double>> strengths_;
+  std::int64_t look_ns_{0};  // Of the look that counts, its last row.
+  std::optional<EpisodeLook> look_;
   Verdict verdict_;  // With that name.
 };
 

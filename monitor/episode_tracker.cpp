@@ -56,6 +56,14 @@ void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
   }
 }
 
+void EpisodeTracker::Take(std::optional<EpisodeLook> look,
+                          EpisodeOutlet& outlet) {
+  if (look && open_) {
+    look->episode_id = open_->episode_id;
+    outlet.Look(std::move(*look));
+  }
+}
+
 // A stretch without accepted samples is a gap.
 void EpisodeTracker::NoteGap(const Sample& sample, const Verdict& verdict,
                              const ModelSet& models, EpisodeOutlet& outlet) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
 #include "diagnosis/verdict.h"
@@ -29,6 +30,7 @@ class EpisodeOutlet {
   virtual ~EpisodeOutlet() = default;
   virtual void Event(FaultEvent event) = 0;
   virtual void Evidence(EpisodeTrace trace) = 0;
+  virtual void Look(EpisodeLook look) = 0;
   virtual void Gap(DataGap gap) = 0;
   /// An episode of an earlier session goes on.
   virtual void Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) = 0;
@@ -52,6 +54,9 @@ class EpisodeTracker {
   void Step(const Sample& sample, const Verdict& verdict,
             const std::shared_ptr<const ModelSet>& models,
             EpisodeOutlet& outlet);
+
+  /// What a second look made of the open episode, but for its id.
+  void Take(std::optional<EpisodeLook> look, EpisodeOutlet& outlet);
 
   /// The engine was made to end its episode. @param models it ran with.
   void End(const Transition& closed,

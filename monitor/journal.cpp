@@ -117,6 +117,11 @@ void Journal::Evidence(EpisodeTrace trace) {
   work_.notify_one();
 }
 
+void Journal::Look(EpisodeLook look) {
+  const std::lock_guard lock(mutex_);
+  AddLocked(std::move(look));
+}
+
 void Journal::Gap(DataGap gap) {
   counters_.Add(Counter::kGaps);
   log_.Report(
@@ -247,12 +252,13 @@ bool Journal::WriteRecords() {
   }
 }
 
-// Events and resumptions in one commit; gaps and marks are buffered once that
-// succeeded, so that a repetition buffers nothing twice.
+// Events, resumptions and looks in one commit; gaps and marks are buffered once
+// that succeeded, so that a repetition buffers nothing twice.
 bool Journal::WriteBatch(const std::vector<const Record*>& batch) {
   const bool any = std::ranges::any_of(batch, [](const Record* record) {
     return std::holds_alternative<PendingEvent>(*record) ||
-           std::holds_alternative<Resumption>(*record);
+           std::holds_alternative<Resumption>(*record) ||
+           std::holds_alternative<EpisodeLook>(*record);
   });
   const bool committed = !any || Attempt([&] {
     history_.CommitBatch([&] {
@@ -261,6 +267,8 @@ bool Journal::WriteBatch(const std::vector<const Record*>& batch) {
           history_.Record((*event)->event);
         } else if (const auto* resumed = std::get_if<Resumption>(record)) {
           history_.Resume(resumed->episode_id, resumed->stamp_ns);
+        } else if (const auto* look = std::get_if<EpisodeLook>(record)) {
+          history_.StoreLook(*look);
         }
       }
     });

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
 #include "diagnosis/records/trace_point.h"
@@ -81,13 +82,15 @@ class EventSink {
 class HistorySink {
  public:
   virtual ~HistorySink() = default;
-  /// Makes the calls of Record() and Resume() in `batch` one commit: all of it
-  /// is on the disk on return or, if it fails, nothing.
+  /// Makes the calls of Record(), Resume() and StoreLook() in `batch` one
+  /// commit: all of it is on the disk on return or, if it fails, nothing.
   virtual void CommitBatch(const std::function<void()>& batch) = 0;
   /// Within CommitBatch().
   virtual void Record(const FaultEvent& event) = 0;
   /// An episode left open by an earlier session goes on. Within CommitBatch().
   virtual void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) = 0;
+  /// Replaces the earlier look at the episode. Within CommitBatch().
+  virtual void StoreLook(const EpisodeLook& look) = 0;
   /// Buffers. Evidence of an episode that is not there is dropped.
   virtual void AddTrace(const EpisodeTrace& trace) = 0;
   /// Buffers.

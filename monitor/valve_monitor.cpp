@@ -124,6 +124,9 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     writer_ = writer;
   }
   tracker_.Step(sample, verdict, models_, outlet);
+  if (names_) {
+    tracker_.Take(names_->TakeLook(), outlet);
+  }
   const auto missing = static_cast<SignalMask>(required_ & ~sample.present);
   return {verdict, models_.get(), swapped, isolation_held_, missing};
 }

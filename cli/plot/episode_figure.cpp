@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "diagnosis/residual_windows.h"
 #include "storage/models/models.h"
 
@@ -91,21 +92,41 @@ std::vector<double> TimesOf(const EpisodeEvidence& evidence,
   });
 }
 
+// A reading as the simulation with the fault that explains it best has it.
+void AddSimulated(const EpisodeEvidence& evidence,
+                  const std::vector<TracePoint>& trace,
+                  const std::vector<double> EpisodeLook::*column,
+                  const std::string& reading, Panel& panel) {
+  const std::optional<EpisodeLook>& look = evidence.look;
+  if (!look || look->faults.empty()) {
+    return;
+  }
+  panel.series.push_back(
+      {reading + " simulated with " + FaultName(look->faults.front().fault),
+       ink::kVermilion, 1.6, Dash::kDashDot,
+       Values(trace, [&](const TracePoint& instant) {
+         const auto row = look->RowAt(instant.sample.stamp_ns);
+         return row ? ((*look).*column)[*row] : kMissing;
+       })});
+}
+
 Panel FlowPanel(const EpisodeEvidence& evidence,
                 const std::vector<TracePoint>& trace) {
   const std::string unit(FlowUnitName(evidence.episode.flow_unit));
-  return {
+  Panel panel{
       "flow F [" + unit + "]",
       {{"F measured", ink::kBlack, 1.6, Dash::kSolid,
         Readings(trace, Signal::kF)},
        {"F if normal", ink::kBlue, 1.6, Dash::kDashed,
         Estimates(evidence, trace, Signal::kF)}},
   };
+  AddSimulated(evidence, trace, &EpisodeLook::flow, "F", panel);
+  return panel;
 }
 
 Panel TravelPanel(const EpisodeEvidence& evidence,
                   const std::vector<TracePoint>& trace) {
-  return {
+  Panel panel{
       "closing [%]",
       {{"command CV", ink::kGrey, 1.6, Dash::kSolid,
         Readings(trace, Signal::kCv)},
@@ -114,6 +135,8 @@ Panel TravelPanel(const EpisodeEvidence& evidence,
        {"X if normal", ink::kBlue, 1.6, Dash::kDashed,
         Estimates(evidence, trace, Signal::kX)}},
   };
+  AddSimulated(evidence, trace, &EpisodeLook::x_pct, "X", panel);
+  return panel;
 }
 
 // Of the output that a channel watches. Channels are named after it, with the
@@ -384,6 +407,7 @@ EpisodeEvidence LoadEvidence(storage::HistoryReader& history,
   const Episode& episode = evidence.episode;
   evidence.events = history.Events(episode.id);
   evidence.trace = history.Trace(episode.id);
+  evidence.look = history.Look(episode.id);
   if (!evidence.trace.empty()) {
     storage::EpisodeFilter filter;
     filter.since_ns = evidence.trace.front().sample.stamp_ns;

@@ -17,7 +17,8 @@ struct EpisodeEvidence {
   storage::Episode episode;
   std::vector<storage::HistoryEntry> events;
   std::vector<TracePoint> trace;
-  std::vector<DataGap> gaps;  ///< Those that touch the trace.
+  std::vector<DataGap> gaps;        ///< Those that touch the trace.
+  std::optional<EpisodeLook> look;  ///< How a simulation explains it.
   /// The set that gave the answer: thresholds and T. Not drawn without.
   std::optional<ModelSet> models;
 };

@@ -103,6 +103,10 @@ void HistoryStore::Resume(std::uint64_t episode_id, std::int64_t stamp_ns) {
            [&] { writer_.Resume(episode_id, stamp_ns, utc_now_ns_()); });
 }
 
+void HistoryStore::StoreLook(const EpisodeLook& look) {
+  Tolerate("second_look", [&] { writer_.StoreLook(look); });
+}
+
 void HistoryStore::AddTrace(const EpisodeTrace& trace) {
   Tolerate("trace", [&] {
     const std::vector<TracePoint> instants = trace.trace.Unpack();

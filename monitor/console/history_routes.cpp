@@ -12,6 +12,7 @@
 #include "cli/report.h"
 #include "cli/time_text.h"
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "monitor/console/api.h"
 
 namespace fdi::console {
@@ -192,6 +193,33 @@ const TracePoint* Telling(const storage::Episode& episode,
   return telling;
 }
 
+// What a second look says; its simulation becomes columns of the trace.
+Json LookJson(const std::optional<EpisodeLook>& look,
+              const std::vector<TracePoint>& points, Json& trace) {
+  if (!look) {
+    return {};
+  }
+  Json faults = Json::array();
+  for (const LookFault& f : look->faults) {
+    faults.push_back({{"fault", FaultName(f.fault)},
+                      {"strength", Rounded(f.strength, 3)},
+                      {"lowest", Rounded(f.lowest, 3)},
+                      {"highest", Rounded(f.highest, 3)},
+                      {"begins_ms", Ms(f.begins_ns)},
+                      {"growing", f.growing}});
+  }
+  Json& x = trace["x_sim"] = Json::array();
+  Json& flow = trace["f_sim"] = Json::array();
+  for (const TracePoint& point : points) {
+    const auto row = look->RowAt(point.sample.stamp_ns);
+    x.push_back(row ? Rounded(look->x_pct[*row], 3) : Json());
+    flow.push_back(row && point.sample.Has(Signal::kF)
+                       ? Rounded(look->flow[*row], 4)
+                       : Json());
+  }
+  return {{"misfit", Rounded(look->misfit, 2)}, {"faults", std::move(faults)}};
+}
+
 Json Episode(const Api& api, const httplib::Request& request) {
   HistoryReader reader(api.sources.history);
   const storage::Alarm alarm =
@@ -212,8 +240,10 @@ Json Episode(const Api& api, const httplib::Request& request) {
   for (const storage::HistoryEntry& event : events) {
     list.push_back(EventJson(event));
   }
+  Json look = LookJson(reader.Look(episode.id), points, trace);
   return {{"episode", AlarmJson(alarm, api.texts)},
           {"events", std::move(list)},
+          {"look", std::move(look)},
           {"trace", std::move(trace)},
           {"model_hash", ModelFactsJson(*models)["hash"]}};
 }

@@ -64,6 +64,7 @@ void KeepTogether(const SecondLook& look, double nothing,
 LookAnswer AnswerOf(const SecondLook& look) {
   LookAnswer answer;
   answer.misfit = look.misfit;
+  answer.simulated = look.best;
   double nothing = std::numeric_limits<double>::infinity();
   for (const Explanation& e : look.ranked) {
     if (e.fault == 0) {
@@ -192,6 +193,7 @@ void LookBook::Enter(const LookTask& task, LookAnswer answer) {
       return;
     }
   }
+  answer.stamp_ns = task.stamp_ns;
   entries_.push_back({task.detection_stamp_ns, task.stamp_ns + kLookDelayNs,
                       std::move(answer)});
 }

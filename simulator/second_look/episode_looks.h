@@ -30,6 +30,9 @@ struct LookAnswer {
   std::vector<Explanation>
       faults;  ///< One each, best first; of kNoneFits none.
   double misfit{0.0};
+  /// The valve's answer under the best explanation, a row each.
+  std::vector<RecordAnswer> simulated;
+  std::int64_t stamp_ns{0};  ///< Of the last row; set by LookBook.
 };
 
 /// Largest distance behind the best explanation at which a fault stays in the

@@ -155,6 +155,40 @@ void AddEvents(const std::vector<HistoryEntry>& events, const Context& context,
   AddTextTable(report, table);
 }
 
+Json LookFaultJson(const LookFault& f) {
+  return {{"fault", FaultName(f.fault)},
+          {"strength", f.strength},
+          {"lowest", f.lowest},
+          {"highest", f.highest},
+          {"begins_utc", TimeJson(f.begins_ns)},
+          {"growing", f.growing}};
+}
+
+void AddLook(const std::optional<EpisodeLook>& look, const Context& context,
+             Report& report) {
+  report.document["look"] = Json();
+  if (!look) {
+    return;
+  }
+  report.document["look"] = {{"misfit", look->misfit},
+                             {"faults", Rows(look->faults, LookFaultJson)}};
+  cli::TextTable table({{"second look"},
+                        {"strength [-]", Align::kRight},
+                        {"95 % interval", Align::kRight},
+                        {"begins"}});
+  const auto number = [](double value) { return cli::FormatNumber(value, 2); };
+  for (const LookFault& f : look->faults) {
+    table.AddRow(
+        {FaultName(f.fault), number(f.strength),
+         number(f.lowest) + ".." + number(f.highest),
+         TimeText(f.begins_ns, context) + (f.growing ? ", growing" : "")});
+  }
+  if (look->faults.empty()) {
+    table.AddRow({"no fault fits"});
+  }
+  AddTextTable(report, table);
+}
+
 // "f19: Flow transmitter wrong", "unknown (outside_known): ...".
 std::string FaultLine(const Episode& e, const std::string& name) {
   const std::string why = e.unknown_kind ? " (" + *e.unknown_kind + ")" : "";
@@ -227,6 +261,7 @@ Report Show(const std::string& id, const Context& context) {
        {"trace_instants", reader.Trace(e.id).size()}});
   report.Fields("", EpisodeFields(alarm, context));
   AddEvents(reader.Events(e.id), context, report);
+  AddLook(reader.Look(e.id), context, report);
   return report;
 }
 

@@ -6,6 +6,7 @@
 #include "diagnosis/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
+#include "storage/history/look.h"
 #include "storage/history/sql.h"
 #include "storage/history/trace.h"
 
@@ -193,6 +194,10 @@ std::vector<HistoryEntry> HistoryReader::Events(std::uint64_t episode_id) {
     event.episode_id = episode_id;
   }
   return events;
+}
+
+std::optional<EpisodeLook> HistoryReader::Look(std::uint64_t episode_id) {
+  return ReadLook(database_, episode_id);
 }
 
 std::vector<TracePoint> HistoryReader::Trace(std::uint64_t episode_id) {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/service_records.h"
 #include "diagnosis/records/trace_point.h"
 #include "storage/database/database.h"
@@ -31,6 +32,10 @@ class HistoryReader {
 
   /// Of one episode, in order of recording.
   std::vector<HistoryEntry> Events(std::uint64_t episode_id);
+
+  /// Nothing if no second look at the episode had an answer.
+  /// @throws DataError
+  std::optional<EpisodeLook> Look(std::uint64_t episode_id);
 
   /// In order of arrival. @throws DataError if stored bytes are damaged.
   std::vector<TracePoint> Trace(std::uint64_t episode_id);

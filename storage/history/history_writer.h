@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
 #include "storage/database/database.h"
@@ -66,6 +67,10 @@ class HistoryWriter {
   /// Notes that an episode left open by a crash goes on. @throws NotFoundError
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
               std::int64_t now_ns);
+
+  /// Replaces what an earlier second look made of the episode.
+  /// @throws NotFoundError
+  void StoreLook(const EpisodeLook& look);
 
   /// Adds instants of an episode, in order of arrival: those before detection
   /// when it begins, then as they come. Buffers. Instants that arrive with the

@@ -157,6 +157,26 @@ ON CONFLICT (episode_id, chunk) DO UPDATE SET last_ns = excluded.last_ns,
 SELECT sample_codec, sample_crc, instants, samples, vector_crc, vectors, chunk
 FROM episode_trace WHERE episode_id = ? ORDER BY chunk
 
+-- ---- Second looks.
+-- name: delete_look
+DELETE FROM episode_look WHERE episode_id = ?
+-- name: insert_look
+INSERT INTO episode_look (episode_id, first_ns, period_ns, misfit)
+VALUES (?, ?, ?, ?)
+-- name: insert_look_fault
+INSERT INTO episode_look_fault (episode_id, rank, fault, strength, lowest,
+  highest, begins_ns, growing)
+VALUES (?, ?, ?, ?, ?, ?, ?, ?)
+-- name: insert_look_row
+INSERT INTO episode_look_row (episode_id, row, x_pct, flow) VALUES (?, ?, ?, ?)
+-- name: look
+SELECT first_ns, period_ns, misfit FROM episode_look WHERE episode_id = ?
+-- name: look_faults
+SELECT fault, strength, lowest, highest, begins_ns, growing
+FROM episode_look_fault WHERE episode_id = ? ORDER BY rank
+-- name: look_rows
+SELECT x_pct, flow FROM episode_look_row WHERE episode_id = ? ORDER BY row
+
 -- ---- Sessions and gaps.
 -- name: last_sign_of_life
 SELECT max(alive_ns) FROM monitor_session WHERE stop_ns IS NULL

@@ -119,6 +119,12 @@ class FakeHistory : public HistorySink {
   void Resume(std::uint64_t /*id*/, std::int64_t /*stamp*/) override {
     notice.Apply([&] { FailIfBroken(); });
   }
+  void StoreLook(const EpisodeLook& look) override {
+    notice.Apply([&] {
+      FailIfBroken();
+      looks[look.episode_id] = look;
+    });
+  }
   void AddTrace(const EpisodeTrace& trace) override {
     std::this_thread::sleep_for(trace_time.load());
     notice.Apply([&] {
@@ -156,6 +162,7 @@ class FakeHistory : public HistorySink {
   std::atomic<std::chrono::milliseconds> trace_time{};
   int attempts{0};
   std::map<std::pair<std::uint64_t, TransitionKind>, int> recorded;
+  std::map<std::uint64_t, EpisodeLook> looks;
   std::vector<DataGap> gaps;
   Checkpoint checkpoint_sum;
   int checkpoints{0};
@@ -176,6 +183,7 @@ class FakeOutlet : public EpisodeOutlet {
  public:
   void Event(FaultEvent /*event*/) override {}
   void Evidence(EpisodeTrace /*trace*/) override {}
+  void Look(EpisodeLook /*look*/) override {}
   void Gap(DataGap /*gap*/) override {}
   void Resumed(const OpenEpisode& /*episode*/,
                std::int64_t /*stamp_ns*/) override {}

@@ -45,7 +45,9 @@ constexpr FaultSet kF19 = 0b1000;
 class EventList : public FakeOutlet {
  public:
   void Event(FaultEvent event) override { events.push_back(std::move(event)); }
+  void Look(EpisodeLook look) override { looks.push_back(std::move(look)); }
   std::vector<FaultEvent> events;
+  std::vector<EpisodeLook> looks;
 };
 
 // The engine takes f19 for f7.
@@ -117,6 +119,7 @@ class SecondLookTest : public testing::Test {
     const Sample sample = SampleOf(rows_.at(k), k);
     const Verdict& verdict = names_.Step(sample, engine_, held_);
     tracker_.Step(sample, verdict, models_, outlet_);
+    tracker_.Take(names_.TakeLook(), outlet_);
     return verdict;
   }
 
@@ -175,6 +178,25 @@ TEST_F(SecondLookTest, TheSimulationCorrectsTheNameTenSecondsAfterItsSamples) {
   EXPECT_EQ(event.candidates[0].fault, 19);
   EXPECT_NEAR(event.candidates[0].strength, 0.25, 0.05);
   EXPECT_TRUE(event.candidates[0].isolated);
+
+  Feed(kCounts + 1, kCounts + 5);
+  ASSERT_EQ(outlet_.looks.size(), 1U);
+  const EpisodeLook& look = outlet_.looks.front();
+  EXPECT_EQ(look.episode_id, event.episode_id);
+  EXPECT_EQ(look.first_ns, PlantSample(kAtOnce - 120).stamp_ns);
+  EXPECT_EQ(look.RowAt(PlantSample(kFirstLook).stamp_ns),
+            look.x_pct.size() - 1);
+  ASSERT_EQ(look.faults.size(), 1U);
+  EXPECT_EQ(look.faults[0].fault, 19);
+  EXPECT_LT(look.faults[0].lowest, 0.25);
+  EXPECT_GT(look.faults[0].highest, 0.25);
+  EXPECT_NEAR(static_cast<double>(look.faults[0].begins_ns -
+                                  PlantSample(kLeadIn).stamp_ns),
+              0.0, 4e9);
+  ASSERT_EQ(look.flow.size(), look.x_pct.size());
+  for (std::size_t row = 0; row < look.flow.size(); ++row) {
+    EXPECT_NEAR(look.flow[row], rows_[kAtOnce - 120 + row].flow, 3.0) << row;
+  }
 }
 
 TEST_F(SecondLookTest, ThatNameStaysWhateverTheEngineIsolates) {

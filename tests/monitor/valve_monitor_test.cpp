@@ -22,6 +22,7 @@ class Notebook : public EpisodeOutlet {
       evidence.emplace_back(trace.episode_id, std::move(point));
     }
   }
+  void Look(EpisodeLook /*look*/) override {}
   void Gap(DataGap gap) override { gaps.push_back(std::move(gap)); }
   void Resumed(const OpenEpisode& episode, std::int64_t /*stamp*/) override {
     resumed.push_back(episode.episode_id);

@@ -230,6 +230,12 @@ class JsonDocumentsTest : public FdiStoreTest {
     HistoryWriter writer(path_);
     RecordEpisode(writer, 0b010);
     writer.AppendTrace(Id(), Instants(20, -5));
+    EpisodeLook look;
+    look.episode_id = Id();
+    look.first_ns = kDetected;
+    look.period_ns = kSecond;
+    look.faults = {{7, 0.5, 0.4, 0.6, kDetected, false}};
+    writer.StoreLook(look);
     CoverageDay day{"LV-1", 20'000, 1.0, {}};
     day.samples.Add(Quality::kLive, 7200);
     std::vector<HealthHour> hours(12);

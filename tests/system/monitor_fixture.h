@@ -90,29 +90,15 @@ class MonitorFixture : public testing::Test {
       if (std::chrono::steady_clock::now() > deadline) {
         return false;
       }
-      decisions_->Take({[this](const idl::DecisionMessage& m, const auto&) {
-                          vectors_.push_back(m);
-                        },
-                        {}},
-                       std::chrono::milliseconds(10));
-      events_->Take(
-          {[this](const FaultEvent& m, const auto&) { faults_.push_back(m); },
-           {}},
-          std::chrono::milliseconds(0));
-      status_->Take({[this](const idl::MonitorStatusMessage& m, const auto&) {
-                       if (m.monitor.ends_with(speaker_)) {
-                         counters_ = {m.counters.begin(), m.counters.end()};
-                         health_ = m.health;
-                       }
-                     },
-                     {}},
-                    std::chrono::milliseconds(0));
+      Take();
     }
     return true;
   }
   void TakeFor(std::chrono::milliseconds time) {
     const auto end = std::chrono::steady_clock::now() + time;
-    Await([end] { return std::chrono::steady_clock::now() >= end; });
+    while (std::chrono::steady_clock::now() < end) {
+      Take();
+    }
   }
   bool AwaitEvent(TransitionKind kind) {
     return Await([this, kind] {
@@ -121,6 +107,26 @@ class MonitorFixture : public testing::Test {
   }
   bool AwaitVectors(std::size_t count) {
     return Await([this, count] { return vectors_.size() >= count; });
+  }
+
+  void Take() {
+    decisions_->Take({[this](const idl::DecisionMessage& m, const auto&) {
+                        vectors_.push_back(m);
+                      },
+                      {}},
+                     std::chrono::milliseconds(10));
+    events_->Take(
+        {[this](const FaultEvent& m, const auto&) { faults_.push_back(m); },
+         {}},
+        std::chrono::milliseconds(0));
+    status_->Take({[this](const idl::MonitorStatusMessage& m, const auto&) {
+                     if (m.monitor.ends_with(speaker_)) {
+                       counters_ = {m.counters.begin(), m.counters.end()};
+                       health_ = m.health;
+                     }
+                   },
+                   {}},
+                  std::chrono::milliseconds(0));
   }
 
   const idl::TestDomain domain_;

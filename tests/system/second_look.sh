@@ -34,4 +34,9 @@ found=$(history "select group_concat(name, '|') from
   fail "named by $(history 'select layer from episode')"
 [ "$(history "select count(*) from episode_event where layer = 'physics'")" -gt 0 ] ||
   fail "no event of the physics"
+"$bin/fdi-store" history show last --json >shown.json
+explained=$(sqlite3 :memory: "select group_concat(value ->> 'fault', '|')
+  from json_each(cast(readfile('shown.json') as text), '\$.look.faults')")
+[ "$(tr '|' '\n' <<<"$explained" | sort)" = "$(tr '|' '\n' <<<"$found" | sort)" ] ||
+  fail "history show explains it by $explained, and names it $found"
 echo "second_look: $found"

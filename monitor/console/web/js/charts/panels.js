@@ -19,9 +19,13 @@ function signalPanel(data) {
     {column: 'x', label: 'X', unit: '%', color: '--s1'},
     {column: 'x_hat', label: 'X expected', unit: '%', color: '--s1',
       dash: [2, 3]},
+    {column: 'x_sim', label: 'X simulated', unit: '%', color: '--s4',
+      dash: [10, 3, 2, 3]},
     {column: 'f', label: 'F', unit: flow, color: '--s2', scale: 'right'},
     {column: 'f_hat', label: 'F expected', unit: flow, color: '--s2',
       dash: [2, 3], scale: 'right'},
+    {column: 'f_sim', label: 'F simulated', unit: flow, color: '--s3',
+      dash: [10, 3, 2, 3], scale: 'right'},
   ];
   return {
     key: 'signals', title: `Signals: CV, X [%] left, F [${flow}] right`,

@@ -2,7 +2,8 @@
 // wants them. Where samples are missing a row of nulls breaks the lines.
 
 const kCapacity = 7200;
-const kSignals = ['cv', 'x', 'f', 'sp', 'p1', 'p2', 't1'];
+const kSignals = [
+  'cv', 'x', 'f', 'sp', 'p1', 'p2', 't1', 'x_sim', 'f_sim'];
 const kGapPeriods = 3;
 const kLeastGapMs = 2500;
 

@@ -72,6 +72,15 @@ const kEventColumns = [
   {text: 'From where', cell: (event) => event.origin ?? ''},
 ];
 
+const kLookColumns = [
+  {text: 'Fault', header: true, cell: ({fault}) => faultTitle(fault)},
+  {text: 'Strength', cell: ({strength}) => percentText(strength)},
+  {text: '95 % interval', cell: ({lowest, highest}) =>
+    `${percentText(lowest)} to ${percentText(highest)}`},
+  {text: 'Begins', cell: ({begins_ms: begins, growing}) =>
+    h('span', {}, timeCell(begins), growing ? ', growing' : '')},
+];
+
 class EpisodePage extends View {
   title = 'Episode';
   #content = h('div', {});
@@ -135,6 +144,13 @@ class EpisodePage extends View {
             h('strong', {}, `Check for ${name}: `), check)),
         this.#timeline ? this.#timeline.element :
           h('p', {class: 'note'}, 'There is no recording of this episode.'),
+        found.look ? [
+          dataTable('Faults that explain it, by simulation of the valve',
+              kLookColumns, found.look.faults),
+          h('p', {class: 'hint'}, `The simulation with the first of them ` +
+              `misses the readings by ${Math.sqrt(found.look.misfit)
+                  .toFixed(1)} times what is usual.`),
+        ] : null,
         dataTable('What happened', kEventColumns, found.events),
         h('p', {class: 'hint'}, `Times are ${zoneName()}.`));
     if (this.#timeline) this.#timeline.rebuild();
