@@ -29,8 +29,9 @@ class JsonLineReader {
  public:
   /// @param source For messages.
   /// @param split_gaps Accepts gaps in time.
-  JsonLineReader(std::string source, bool split_gaps)
-      : source_(std::move(source)), steps_(split_gaps) {}
+  /// @param period_s 0: the first step.
+  JsonLineReader(std::string source, bool split_gaps, double period_s)
+      : source_(std::move(source)), steps_(split_gaps, period_s) {}
 
   /// @returns nothing for a blank line.
   /// @throws DataError naming source, line, key and reason.

@@ -63,6 +63,17 @@ void Restamper::StampByClock(std::int64_t now_ns, std::int64_t period_ns,
   sample.stamp_ns = *last_stamp_ns_;
 }
 
+void ReportConversion(const LogSink& log, const std::string& run, FlowUnit from,
+                      FlowUnit to) {
+  if (from != to) {
+    log(LogLevel::kInfo,
+        cli::EventLine("flow_converted",
+                       {{"run", run},
+                        {"from", std::string(FlowUnitName(from))},
+                        {"to", std::string(FlowUnitName(to))}}));
+  }
+}
+
 std::optional<FedSample> StoredFeed::Next() {
   if (next_ == samples_.size()) {
     return std::nullopt;
@@ -81,12 +92,13 @@ StreamFeed::StreamFeed(int descriptor, cli::StopSignals& signals,
       restamper_(std::move(restamping)),
       log_(std::move(log)),
       csv_(CsvOptionsOf(options)),
-      steps_(options.split_gaps),
-      json_(kStdin, options.split_gaps) {}
+      steps_(options.split_gaps, options.period_s),
+      json_(kStdin, options.split_gaps, options.period_s) {}
 
 std::optional<FedSample> StreamFeed::Next() {
   while (const auto line = NextLine()) {
-    if (const auto sample = TakeLine(*line)) {
+    if (auto sample = TakeLine(*line)) {
+      ConvertFlow(*sample);
       return FedSample{0, {*sample, std::nullopt}};
     }
   }
@@ -171,10 +183,24 @@ std::optional<Sample> StreamFeed::TakeLine(const std::string& line) {
   if (row->t_s) {
     restamper_.Apply(row->sample);
   } else {
-    restamper_.StampByClock(cli::NowNs(), std::llround(options_.period_s * 1e9),
+    const double period_s = options_.period_s > 0.0 ? options_.period_s : 1.0;
+    restamper_.StampByClock(cli::NowNs(), std::llround(period_s * 1e9),
                             row->sample);
   }
   return row->sample;
+}
+
+void StreamFeed::ConvertFlow(Sample& sample) {
+  if (!options_.flow_unit) {
+    return;
+  }
+  if (!conversion_) {
+    conversion_.emplace(*options_.flow_unit);
+    if (sample.Has(Signal::kF)) {
+      ReportConversion(log_, kStdin, sample.flow_unit, *options_.flow_unit);
+    }
+  }
+  conversion_->Apply(sample);
 }
 
 void StreamFeed::ReportIgnored(const std::vector<std::string>& names) {

@@ -11,6 +11,7 @@
 #include "diagnosis/log.h"
 #include "simulator/app/delivery.h"
 #include "simulator/app/json_line_reader.h"
+#include "simulator/valve_equations.h"
 
 /// Samples that were taken before, or elsewhere: the feeds of `replay`.
 namespace fdi::simulator {
@@ -39,6 +40,10 @@ class Restamper {
   std::optional<std::int64_t> last_stamp_ns_;
 };
 
+/// Logs `flow_converted` unless the units are the same.
+void ReportConversion(const LogSink& log, const std::string& run, FlowUnit from,
+                      FlowUnit to);
+
 /// Samples that are all known: a stored run or a file.
 class StoredFeed final : public Feed {
  public:
@@ -56,7 +61,10 @@ class StoredFeed final : public Feed {
 struct StreamOptions {
   cli::ColumnMap map;
   bool split_gaps{false};
-  double period_s{1.0};  ///< Of JSON lines without t_s.
+  /// 0: the first step; of JSON lines without t_s, 1 s.
+  double period_s{0.0};
+  /// To which a flow is converted; nothing: as it comes.
+  std::optional<FlowUnit> flow_unit{};
 };
 
 /// Samples that come line by line from a pipe, as CSV or as JSON (told by the
@@ -74,6 +82,7 @@ class StreamFeed final : public Feed {
   std::optional<std::string> NextLine();
   bool Fill();
   std::optional<Sample> TakeLine(const std::string& line);
+  void ConvertFlow(Sample& sample);
   void ReportIgnored(const std::vector<std::string>& names);
 
   int descriptor_;
@@ -89,6 +98,7 @@ class StreamFeed final : public Feed {
   JsonLineReader json_;
   std::optional<bool> is_json_;
   bool reported_{false};
+  std::optional<FlowConversion> conversion_;
 };
 
 }  // namespace fdi::simulator

@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
-#include "cli/logging.h"
 #include "cli/tag_map.h"
 #include "diagnosis/error.h"
 #include "simulator/app/delivery.h"
@@ -77,12 +76,8 @@ Recording LoadCsv(const ReplayOptions& options, const cli::Context& context) {
   Recording recording;
   const FlowUnit own = table.header.flow_unit;
   const FlowUnit unit = UnitOf(options.valve, context).value_or(own);
-  if (unit != own && (table.header.signals & MaskOf(Signal::kF)) != 0) {
-    context.log(LogLevel::kInfo,
-                cli::EventLine("flow_converted",
-                               {{"run", options.csv},
-                                {"from", std::string(FlowUnitName(own))},
-                                {"to", std::string(FlowUnitName(unit))}}));
+  if ((table.header.signals & MaskOf(Signal::kF)) != 0) {
+    ReportConversion(context.log, options.csv, own, unit);
   }
   FlowConversion conversion(unit);
   for (SampleSeries run : table.runs) {
@@ -122,7 +117,9 @@ std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options,
       throw ConfigError(
           "--csv -: what is resampled or long is read as a whole; try a file");
     }
-    return std::make_unique<StreamFeed>(STDIN_FILENO, signals, options.stream,
+    StreamOptions stream = options.stream;
+    stream.flow_unit = UnitOf(options.valve, context);
+    return std::make_unique<StreamFeed>(STDIN_FILENO, signals, stream,
                                         restamping, context.log);
   }
   Recording recording = options.run.empty() ? LoadCsv(options, context)
@@ -187,8 +184,8 @@ void AddReplayVerb(cli::Program& program) {
   verb.add_flag("--split-gaps", options->stream.split_gaps,
                 "Accept gaps in time of a CSV or of JSON; they are kept");
   verb.add_option("--period", options->stream.period_s,
-                  "Sample period of JSON lines without t_s, which are stamped "
-                  "on arrival")
+                  "Sample period of lines on stdin (default: their first "
+                  "step). Without t_s, JSON lines are stamped on arrival (1 s)")
       ->check(CLI::Range(1e-3, 3600.0))
       ->type_name("S");
 }

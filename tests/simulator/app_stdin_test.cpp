@@ -81,6 +81,19 @@ TEST_F(AppStdinTest, AFilePipedThroughStdinLosesNothing) {
   EXPECT_EQ(reader.status().lost, 0U);
 }
 
+TEST_F(AppStdinTest, AGapMayBeTheFirstStepIfThePeriodIsGiven) {
+  Reader reader(domain_);
+  Process process(With({"replay", "--csv", "-", "--valve", "G", "--period", "1",
+                        "--split-gaps"}));
+
+  process.Send("t_s,CV_pct,X_pct\n0,50,50\n9,51,51\n10,52,52\n11,53,53\n");
+  process.CloseInput();
+  ASSERT_TRUE(reader.TakeUntilEnded());
+
+  EXPECT_EQ(process.Wait().code, 0);
+  EXPECT_EQ(reader.Samples("G").size(), 4U);
+}
+
 TEST_F(AppStdinTest, ABadLineOnStdinEndsTheStreamBehindTheGoodOnes) {
   Reader reader(domain_);
   Process process(
