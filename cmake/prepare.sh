@@ -21,7 +21,7 @@ packages=(
 )
 for_package=(dpkg-dev file gzip help2man)
 for_tests=(libgtest-dev libgmock-dev cyclonedds-dev cyclonedds-tools chromium
-  make procps iproute2)
+  libmodbus-dev make procps iproute2)
 testing=OFF
 packaging=OFF
 case $purpose in
@@ -32,7 +32,7 @@ case $purpose in
     ;;
   tests)
     packages+=("${for_package[@]}" "${for_tests[@]}")
-    # The browser's driver comes by npm, which may be Debian's or not.
+    # The browser's driver and OPC UA come by npm, Debian's or another one.
     command -v npm >/dev/null || packages+=(nodejs npm)
     testing=ON
     packaging=ON

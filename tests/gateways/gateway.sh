@@ -1,0 +1,123 @@
+#!/usr/bin/env bash
+# A simulated server on loopback, a gateway of docs/examples and `replay --csv -`
+# feed a monitor. The server is gone for 40 samples, has readings that are bad
+# and a time in manual; the monitor has to find the fault, and the gateway to
+# count what was lost.
+# Usage: gateway.sh PROGRAMS opcua NODE_MODULES | PROGRAMS modbus
+# 77 without what it takes.
+set -euo pipefail
+way=$2
+modules=${3:+$(realpath "$3")}
+tests=$(cd "$(dirname "$0")/.." && pwd)
+example=$tests/../docs/examples/${way}_gateway
+skip() {
+  echo "gateway: skipped, $*"
+  exit 77
+}
+if [ "$way" = opcua ]; then
+  command -v node >/dev/null || skip "no node (Debian: apt install nodejs)"
+  [ -d "$modules/node-opcua-server" ] || skip "npm has not fetched node-opcua"
+else
+  pkg-config --exists libmodbus || skip "no libmodbus-dev"
+fi
+source "$tests/system/programs.sh" "$1"
+finish() {
+  exec 2>/dev/null
+  kill -9 ${gateway:-} ${server:-} ${monitor:-} || true
+  rm -rf "$work"
+}
+trap finish EXIT
+await() {  # WORD FILE
+  timeout 30 sh -c 'until grep -q "$0" "$1"; do sleep 0.05; done' "$1" "$2" ||
+    fail "no $1 in $2 within 30 s"
+}
+
+count=420
+port=$((46000 + domain))
+"$bin/fdi-trainer" train --campaign "$tests/survival/quick.toml" \
+  >/dev/null 2>train.log
+"$bin/fdi-store" valves assign FV-101 quick >/dev/null
+"$bin/fdi-simulator" run --no-publish --duration $count --seed 7 \
+  --parameters paper-operating-point --fault f19:abrupt@200:strength=0.5 \
+  --set excitation.amplitude_pct=8 --set excitation.period_s=80 \
+  --export valve.csv --log-level error >/dev/null
+start --record --model-set quick
+
+if [ "$way" = opcua ]; then
+  cp "$example/gateway.mjs" "$tests/gateways/opcua_server.mjs" .
+  ln -s "$modules" node_modules
+  sed "s/4840/$port/; s/\"period_s\": 1/&, \"interval_ms\": 0/" \
+    "$example/fv101.json" >fv101.json
+  node opcua_server.mjs valve.csv $port 2>server.log &
+  server=$!
+  run=(node gateway.mjs fv101.json)
+else
+  cmake -S "$example" -B build >cmake.log
+  cmake --build build >build.log 2>&1 || fail "does not build"
+  ! grep warning: build.log || fail "warnings"
+  cc -Wall -Wextra -Werror -o modbus_plc "$tests/gateways/modbus_plc.c" \
+    $(pkg-config --cflags --libs libmodbus) -lm
+  ./modbus_plc valve.csv $port 2>server.log &
+  server=$!
+  run=(build/modbus_gateway 127.0.0.1 $port 1 1 0.005 clock=0:u32
+    mode=2:u16:1 AO1=3 ZT101=4 TT101=5:i16:-32768 PT101=6:f32 PT102=8:f32
+    FT101=10:f32)
+fi
+touch rows.csv
+await ready server.log
+began=$(grep -o 'ready [0-9]*' server.log | cut -d' ' -f2)
+last=$((began + count - 1))
+[ "$way" = modbus ] || last=$(date -u -d "@$last" +%FT%T)
+
+"${run[@]}" 2>gateway.log > >(
+  tee rows.csv | "$bin/fdi-simulator" --domain "$domain" replay --csv - \
+    --valve FV-101 --map "$example/tags.toml" --keep-stamps --split-gaps \
+    --period 1 >replay.txt 2>replay.log) &
+gateway=$!
+await "^$last" rows.csv
+kill -TERM "$gateway"
+wait "$gateway" || fail "the gateway ended with $?"
+gateway=
+await "valve=FV-101.*transition=CLOSED" monitor.log
+stop
+
+number() { tail -1 gateway.log | grep -oE "[0-9]+ $1|$1 [0-9]+" | tr -dc 0-9; }
+runs() {  # COLUMNS, of what was recorded
+  sqlite3 -readonly "$FDI_DATA/runs.db" \
+    "select $1 from run where valve_id = 'FV-101'"
+}
+rows=$(number rows) lost=$(number lost)
+recorded=$(runs "sum(samples)")
+first=$(runs "min(first_stamp_ns) / 1000000000")
+[ "$recorded" -eq "$rows" ] || fail "$recorded of $rows rows are recorded"
+[ $((rows + lost)) -eq $((began + count - first)) ] ||
+  fail "$rows rows and $lost lost of $((began + count - first))"
+[ "$lost" -ge 35 ] || fail "$lost lost of 40 and more"
+[ "$(number bad)" -eq $([ "$way" = opcua ] && echo 5 || echo 9) ] ||
+  fail "$(number bad) bad readings"
+grep -q "connected again" gateway.log || fail "no reconnection"
+
+# The readings are what the valve had, in its units, but for what a register
+# rounds; the flow in t/h became m3/h again.
+manual=0
+for run in $(runs "id || ',' || (first_stamp_ns / 1000000000)"); do
+  "$bin/fdi-store" runs export "${run%,*}" >run.csv
+  awk -F, -v offset=$((${run#*,} - began)) '
+    function same(a, b, off) { return a == "" || (a - b) ^ 2 <= off ^ 2 }
+    NR == FNR { for (i = 2; i <= 7; ++i) true[FNR - 2, i] = $i; next }
+    FNR == 1 { for (i = 1; i <= NF; ++i) at[$i] = i; next }
+    { t = offset + $at["t_s"] }
+    !(same($at["CV_pct"], true[t, 2], 0.006) &&
+      same($at["P1_kPa"], true[t, 3], 0.01) &&
+      same($at["P2_kPa"], true[t, 4], 0.01) &&
+      same($at["T1_degC"], true[t, 5], 0.06) &&
+      same($at["X_pct"], true[t, 6], 0.006) &&
+      same($at["F_m3_h"], true[t, 7], 0.2)) { print "at " t ": " $0; exit 1 }
+  ' valve.csv run.csv || fail "not what the valve had"
+  manual=$((manual + $(grep -c MANUAL run.csv || true)))
+done
+[ $manual -eq 10 ] || fail "$manual of 10 rows in manual"
+found=$(history "select ifnull(fault, 'unknown') || ' ' || end_reason
+  from fault_history where valve_id = 'FV-101'")
+[ "$found" = "f19 stream_ended" ] || fail "episodes: $found"
+echo "gateway: $(tail -1 gateway.log); $found"
