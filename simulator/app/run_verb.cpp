@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/time_text.h"
 #include "diagnosis/error.h"
 #include "simulator/app/delivery.h"
 #include "simulator/app/scenario_toml.h"
@@ -185,9 +186,15 @@ void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
   verb.add_option("--scenario", options.scenario,
                   "Scenario file; the options below override it")
       ->type_name("FILE.toml");
-  verb.add_option("--duration", options.duration_s,
-                  "Simulated seconds (default: 2000, or the excitation's)")
-      ->type_name("S");
+  verb.add_option_function<std::string>(
+          "--duration",
+          [&options](const std::string& text) {
+            options.duration_s =
+                static_cast<double>(cli::ParseDuration(text)) / 1e9;
+          },
+          "Simulated time: seconds, 10m, 1h30m (default: 2000 s, or the "
+          "excitation's)")
+      ->type_name("S|TIME");
   verb.add_option("--fault", options.faults,
                   std::string(kFaultForms) + "; may be repeated")
       ->type_name("SPEC")

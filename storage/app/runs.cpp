@@ -323,7 +323,7 @@ void AddImport(cli::Program& program, CLI::App& group) {
 }  // namespace
 
 void AddRunsVerbs(cli::Program& program) {
-  constexpr const char* kSelector = "ID or ID@from:to in s";
+  constexpr const char* kSelector = "ID or last, or ID@from:to in s";
   CLI::App& group = program.AddGroup("runs", "Stored runs");
   auto [list, list_options] =
       AddVerb(program, group, "list", "List the runs", List);

@@ -28,9 +28,10 @@ namespace {
 
 [[noreturn]] void RefuseSelector(std::string_view text,
                                  const std::string& why) {
-  throw ConfigError("run \"" + std::string(text) + "\": " + why +
-                    "; accepted are ID, ID@from:to, ID@from: and ID@:to with"
-                    " seconds from the start of the run");
+  throw ConfigError(
+      "run \"" + std::string(text) + "\": " + why +
+      "; accepted are ID or last, ID@from:to, ID@from: and ID@:to with"
+      " seconds from the start of the run");
 }
 
 double ParseBound(std::string_view bound, double absent,
@@ -128,6 +129,8 @@ const Schema& RunsSchema() {
   return schema;
 }
 
+constexpr std::string_view kLastRun = "last";
+
 std::string_view RunOriginName(RunOrigin origin) {
   switch (origin) {
     case RunOrigin::kSimulated:
@@ -156,10 +159,11 @@ RunSelector ParseRunSelector(std::string_view text) {
   RunSelector selector;
   const std::size_t at = text.find('@');
   selector.id = std::string(text.substr(0, at));
-  if (selector.id.empty() || selector.id.size() > 12 ||
-      selector.id.find_first_not_of("0123456789abcdefABCDEF") !=
-          std::string::npos) {
-    RefuseSelector(text, "an id is up to 12 hex digits");
+  if (selector.id != kLastRun &&
+      (selector.id.empty() || selector.id.size() > 12 ||
+       selector.id.find_first_not_of("0123456789abcdefABCDEF") !=
+           std::string::npos)) {
+    RefuseSelector(text, "an id is up to 12 hex digits, or last");
   }
   for (char& c : selector.id) {
     c = static_cast<char>(c >= 'A' && c <= 'F' ? c - 'A' + 'a' : c);
@@ -202,9 +206,11 @@ RunInfo RunStore::Info(std::string_view selector) {
 }
 
 RunInfo RunStore::Find(const RunSelector& selector) {
-  Statement rows =
-      database_->Prepare(std::string(sql::runs) +
-                         " id >= ?1 AND id < ?1 || 'g' ORDER BY id LIMIT 2");
+  const bool last = selector.id == kLastRun;
+  Statement rows = database_->Prepare(
+      std::string(sql::runs) +
+      (last ? " ?1 <> '' ORDER BY run_id DESC LIMIT 1"
+            : " id >= ?1 AND id < ?1 || 'g' ORDER BY id LIMIT 2"));
   if (!rows.Bind(selector.id).Step()) {
     throw NotFoundError("there is no run " + selector.id + " in " +
                         database_->path().string());

@@ -70,7 +70,8 @@ struct RunInfo {
 };
 
 /// Part of a run, written `ID` or `ID@from:to`; a unique beginning of an id
-/// stands for it. t in [from_s, to_s), seconds from the start of the run.
+/// stands for it, `last` for the run that was stored last. t in [from_s, to_s),
+/// seconds from the start of the run.
 struct RunSelector {
   std::string id;
   double from_s{-std::numeric_limits<double>::infinity()};

@@ -39,7 +39,7 @@ class AppRunTest : public testing::Test {
 
 TEST_F(AppRunTest, TheSameSeedGivesTheSameSamplesBitForBit) {
   const std::vector<std::string> options = {
-      "--duration", "120",     "--seed",
+      "--duration", "2m",      "--seed",
       "9",          "--fault", "f7:abrupt@60:strength=0.5"};
   auto other_seed = options;
   other_seed[3] = "10";
@@ -147,7 +147,7 @@ TEST_F(AppRunTest, WhatItRefusesItNamesWithWhatIsAccepted) {
       {{"run", "--no-publish", "--scenario", bad_key}, 2, {":2:", "speedy"}},
       {{"run", "--no-publish", "--scenario", "no.toml"}, 5, {"no.toml"}},
       {{"run", "--no-publish", "--set", "a.b=1"}, 2, {"a.b=1"}},
-      {{"run", "--no-publish", "--duration", "-1"}, 2, {"duration_s"}},
+      {{"run", "--no-publish", "--duration", "-1"}, 2, {"not a duration"}},
       {{"run", "--no-publish", "--start", "noon"}, 2, {"noon"}},
       {{"run", "--speed", "fast"}, 2, {"fast", "max"}},
       {{"run", "--no-publish", "--valve", std::string(65, 'v')}, 2, {"64"}},

@@ -65,6 +65,8 @@ TEST_F(RunsTest, AUniqueBeginningOfAnIdSelectsTheRun) {
   for (int i = 0; i < 17; ++i) {
     ids.push_back(store.Import(table, RunOf("V")).at(0));
   }
+  EXPECT_EQ(store.Info("last").id, ids.back());
+  EXPECT_EQ(store.Info("last@1:2").id, ids.back());
   std::sort(ids.begin(), ids.end());
   std::size_t twin = 1;
   while (ids[twin][0] != ids[twin - 1][0]) {
