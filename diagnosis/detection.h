@@ -13,11 +13,28 @@ namespace fdi {
 /// alike on their windows. Each test counts for itself, as its limits were
 /// fitted: noise that passes one limit now and another one next is no
 /// detection. What extrapolation put into a residual is taken away first.
+///
+/// A healthy valve drifts: with the season, its air supply, its wear. While
+/// nothing deviates, Follow() moves the limits with the residual, slowly and
+/// not far, see Drift. What is followed is taken from the residual before it is
+/// compared: (r − mean)/scale, of the means of windows the mean alone.
 class Detection {
  public:
+  /// What a channel has drifted by since training, as far as it is followed:
+  /// the mean of its longest window, and its deviation over the limit on it
+  /// less the margin of 1.4 that training leaves. Each sample moves them by one
+  /// step towards the window, so they go to its medians, the mean at most by
+  /// its limit in 8 h, the deviation by a factor of 2; and both not beyond
+  /// DriftLimits.
+  struct Drift {
+    double mean{0.0};       ///< [unit]
+    double log_scale{0.0};  ///< At least 0.
+  };
+
   /// `models` must outlive the detection.
   explicit Detection(const ModelSet& models);
 
+  /// Runs and windows begin anew; the drift stays, it is the valve's.
   void Restart();
 
   /// Samples are missing: runs end, the windows stay.
@@ -27,9 +44,16 @@ class Detection {
   /// beyond its threshold.
   bool Push(const ObserverBank& bank, const Sample& sample);
 
-  void Save(SnapshotWriter& writer) const { windows_.Save(writer); }
-  /// @returns false, leaving windows undefined, if they are not to be read.
-  bool Restore(SnapshotReader& reader) { return windows_.Restore(reader); }
+  /// The sample belongs to a healthy valve: no episode is open. Nothing is
+  /// followed while pending().
+  void Follow();
+
+  /// By channel.
+  const Drift& drift(std::size_t channel) const { return drifts_[channel]; }
+
+  void Save(SnapshotWriter& writer) const;
+  /// @returns false, leaving it undefined, if there is nothing to be read.
+  bool Restore(SnapshotReader& reader);
 
   /// True if some residual or window was beyond its limit, if only just.
   bool pending() const;
@@ -49,6 +73,7 @@ class Detection {
 
   const ModelSet* models_;
   ResidualWindows windows_;
+  std::array<Drift, kMaxChannels> drifts_{};
   std::array<Run, kTestsPerChannel * kMaxChannels> runs_{};
 };
 

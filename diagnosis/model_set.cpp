@@ -45,6 +45,11 @@ void ValidateChannel(const ModelSet& models, const ChannelSpec& channel) {
         where + "thresholds must enclose zero");
   Check(channel.windows.size() <= kMaxWindows, models,
         where + "at most 4 windows are accepted");
+  const DriftLimits& drift = channel.drift;
+  Check(std::isfinite(drift.lower_mean) && drift.lower_mean <= 0.0 &&
+            std::isfinite(drift.upper_mean) && drift.upper_mean >= 0.0 &&
+            std::isfinite(drift.log_scale) && drift.log_scale >= 0.0,
+        models, where + "limits of a drift must be finite and enclose zero");
   for (const WindowLimits& window : channel.windows) {
     Check(window.length >= 2 && window.length <= 100000, models,
           where + "windows must be 2 to 100000 samples long");

@@ -49,6 +49,16 @@ struct WindowLimits {
   SignalRange command{kUnbounded};  ///< Means of CV that it holds for [%].
 };
 
+/// How far the limits of a channel may follow a drift of the healthy valve
+/// (Detection::Follow); zeros: not at all.
+struct DriftLimits {
+  double lower_mean{0.0};  ///< <= 0 [unit].
+  double upper_mean{0.0};  ///< >= 0 [unit].
+  double log_scale{0.0};   ///< >= 0, of the deviation.
+
+  bool operator==(const DriftLimits&) const = default;
+};
+
 /// A residual channel of the model set: which output it watches.
 struct ChannelSpec {
   std::string name;  ///< "X", "F", ...
@@ -57,6 +67,7 @@ struct ChannelSpec {
   double upper_threshold{0.0};  ///< or above this is abnormal [unit].
   std::vector<WindowLimits>
       windows{};  ///< Slow and small faults; may be empty.
+  DriftLimits drift{};
 };
 
 /// One channel of one observer.

@@ -43,7 +43,7 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
   return Intake::kAccepted;
 }
 
-constexpr std::uint32_t kSnapshotFormat = 1;
+constexpr std::uint32_t kSnapshotFormat = 2;
 
 }  // namespace
 
@@ -164,6 +164,7 @@ void ValveEngine::Impl::TakeSource(const Sample& sample) {
   }
   if (has_source_) {
     diagnosis_->coverage.Restart();
+    diagnosis_->detection = Detection(models());
     diagnosis_->stuck.Restart();
   }
   has_source_ = true;
@@ -241,6 +242,8 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   diagnosis_->episode.Step(sample, diagnosis_->bank, findings, verdict_);
   if (was_open && !episode_open()) {
     detection.Restart();
+  } else if (findings.settled && !findings.abnormal && !episode_open()) {
+    detection.Follow();
   }
 }
 

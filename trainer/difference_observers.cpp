@@ -399,6 +399,7 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
   BalanceThresholds(models);
   FitInterpolationErrors(compared, models);
   FindGroups(compared, models);
+  FitDriftLimits(compared, models);
   Validate(models);
   reporter.Tell(1.0, "done");
   return models;

@@ -323,6 +323,115 @@ void FitInterpolationErrors(const std::vector<Condition>& conditions,
   }
 }
 
+namespace {
+
+constexpr double kMostDrift = 3.0;
+
+// What the longest window of a channel shows of a condition, on average.
+struct WindowAverage {
+  double samples{0.0};
+  double mean{0.0};
+  double excess{0.0};  // of the log-deviation over its limit
+};
+
+std::vector<WindowAverage> AverageWindows(const Condition& condition,
+                                          const ModelSet& models) {
+  std::vector<WindowAverage> averages(models.channels.size());
+  for (const Stretch& stretch : WholeStretches(condition)) {
+    ObserverBank bank(models);
+    ResidualWindows windows(models);
+    bank.Initialise(stretch.samples.front());
+    for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
+      bank.Step(stretch.samples[k]);
+      if (static_cast<int>(k) < models.decision.settling_samples) {
+        continue;
+      }
+      std::array<double, kMaxChannels> residuals{};
+      for (std::size_t c = 0; c < averages.size(); ++c) {
+        residuals[c] = bank.residual(0, static_cast<int>(c));
+      }
+      windows.Push({residuals.data(), averages.size()},
+                   stretch.samples[k][Signal::kCv]);
+      for (std::size_t c = 0; c < averages.size(); ++c) {
+        const std::size_t count = models.channels[c].windows.size();
+        if (count == 0) {
+          continue;
+        }
+        const WindowLimits& limits = models.channels[c].windows[count - 1];
+        const ResidualWindow& window = windows.window(c, count - 1);
+        const ResidualWindow& command = windows.command(c, count - 1);
+        if (Applies(limits, window, command)) {
+          WindowAverage& average = averages[c];
+          average.samples += 1.0;
+          average.mean += (window.mean() - average.mean) / average.samples;
+          average.excess +=
+              (window.log_rms() - UpperLogRms(limits, command) -
+               average.excess) /
+              average.samples;
+        }
+      }
+    }
+  }
+  return averages;
+}
+
+// The limit that a fault passes by most, and how far it may move then.
+struct Witness {
+  double ratio{1.0};
+  double* bound{nullptr};
+  double at_most{0.0};
+
+  void Hear(const Witness& other) {
+    *this = other.ratio > ratio ? other : *this;
+  }
+};
+
+void Hear(const std::vector<WindowAverage>& averages, ModelSet& models,
+          Witness& witness) {
+  for (std::size_t c = 0; c < averages.size(); ++c) {
+    if (averages[c].samples == 0.0) {
+      continue;
+    }
+    const WindowLimits& limits = models.channels[c].windows.back();
+    DriftLimits& drift = models.channels[c].drift;
+    const double mean = averages[c].mean;
+    const double excess = averages[c].excess;
+    witness.Hear({mean / limits.lower_mean, &drift.lower_mean,
+                  0.5 * (mean - limits.lower_mean)});
+    witness.Hear({mean / limits.upper_mean, &drift.upper_mean,
+                  0.5 * (mean - limits.upper_mean)});
+    witness.Hear({std::exp(excess), &drift.log_scale, 0.5 * excess});
+  }
+}
+
+}  // namespace
+
+void FitDriftLimits(const std::vector<Condition>& conditions,
+                    ModelSet& models) {
+  for (ChannelSpec& channel : models.channels) {
+    if (!channel.windows.empty()) {
+      const WindowLimits& limits = channel.windows.back();
+      channel.drift = {kMostDrift * limits.lower_mean,
+                       kMostDrift * limits.upper_mean, std::log(kMostDrift)};
+    }
+  }
+  for (const int fault : models.faults) {
+    for (const bool negative : {false, true}) {
+      Witness witness;
+      for (const int i : Chain(models, fault, negative)) {
+        if (i > 0) {
+          Hear(AverageWindows(conditions[static_cast<std::size_t>(i)], models),
+               models, witness);
+        }
+      }
+      if (witness.bound != nullptr &&
+          std::abs(witness.at_most) < std::abs(*witness.bound)) {
+        *witness.bound = witness.at_most;
+      }
+    }
+  }
+}
+
 void FindGroups(const std::vector<Condition>& conditions, ModelSet& models) {
   models.groups.clear();
   models.undetectable.clear();

@@ -66,6 +66,15 @@ NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
 void FitInterpolationErrors(const std::vector<Condition>& conditions,
                             ModelSet& models);
 
+/// Sets ChannelSpec::drift of every channel with windows: at most three times
+/// the limit on a mean and a factor of 3, and so little that no fault that the
+/// set knows is learnt. Of every fault and direction, at the strength that shows
+/// best, the limit on the longest windows that it passes by most moves at most
+/// by half of what it passes it by.
+///
+/// @param conditions parallel to models.observers.
+void FitDriftLimits(const std::vector<Condition>& conditions, ModelSet& models);
+
 /// Fills ModelSet::groups and ModelSet::undetectable by scoring the validation
 /// stretches of every fault condition: a fault is undetectable if under 5 % of
 /// its samples are beyond a threshold; faults i and l form a group if while i

@@ -90,6 +90,7 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
   reporter.Tell(0.9, "comparing faults");
   FitInterpolationErrors(conditions, models);
   FindGroups(conditions, models);
+  FitDriftLimits(conditions, models);
   Validate(models);
   reporter.Tell(1.0, "done");
   return models;

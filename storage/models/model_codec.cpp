@@ -35,7 +35,9 @@ constexpr std::uint32_t kMagic = 0x4D494446;  // "FDIM"
 constexpr std::uint32_t kFormat = 3;
 constexpr std::uint32_t kWithPhysics = 1;
 constexpr std::uint32_t kWithFloor = 2;
-constexpr std::uint32_t kLastFormat = kFormat + kWithPhysics + kWithFloor;
+constexpr std::uint32_t kWithDrift = 4;
+constexpr std::uint32_t kLastFormat =
+    kFormat + kWithPhysics + kWithFloor + kWithDrift;
 constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
@@ -141,9 +143,17 @@ void Fields(A& a, T& window) {
     command);
 }
 
+template <typename A, Of<DriftLimits> T>
+void Fields(A& a, T& drift) {
+  auto& [lower_mean, upper_mean, log_scale] = drift;
+  a(lower_mean, upper_mean, log_scale);
+}
+
+// Without the drift, which stands behind the other fields.
 template <typename A, Of<ChannelSpec> T>
 void Fields(A& a, T& channel) {
-  auto& [name, output, lower_threshold, upper_threshold, windows] = channel;
+  auto& [name, output, lower_threshold, upper_threshold, windows, drift] =
+      channel;
   a(name, output, lower_threshold, upper_threshold,
     Limited{windows, kMaxWindows});
 }
@@ -292,6 +302,12 @@ class Decoder {
   std::uint32_t format_;
 };
 
+bool FollowsDrift(const ModelSet& models) {
+  return std::ranges::any_of(models.channels, [](const ChannelSpec& channel) {
+    return channel.drift != DriftLimits{};
+  });
+}
+
 std::uint32_t Checksum(std::span<const std::byte> bytes) {
   return static_cast<std::uint32_t>(
       crc32_z(crc32(0, nullptr, 0),
@@ -318,10 +334,14 @@ std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
   if (!models.physics.empty()) {
     payload(Limited{models.physics, kMaxPhysics});
   }
+  const bool drifts = FollowsDrift(models);
+  for (std::size_t c = 0; drifts && c < models.channels.size(); ++c) {
+    payload(models.channels[c].drift);
+  }
   ByteWriter writer;
   writer.Put(kMagic);
   writer.Put(kFormat + (models.physics.empty() ? 0U : kWithPhysics) +
-             (models.floor ? kWithFloor : 0U));
+             (models.floor ? kWithFloor : 0U) + (drifts ? kWithDrift : 0U));
   writer.Put(static_cast<std::uint64_t>(payload.writer.size()));
   writer.Append(payload.writer.view().data(), payload.writer.size());
   writer.Put(Checksum(writer.view()));
@@ -355,6 +375,11 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
   Fields(decoder, models);
   if (((format - kFormat) & kWithPhysics) != 0) {
     decoder(Limited{models.physics, kMaxPhysics});
+  }
+  if (((format - kFormat) & kWithDrift) != 0) {
+    for (ChannelSpec& channel : models.channels) {
+      decoder(channel.drift);
+    }
   }
   payload.ExpectEnd();
   RenumberFindings(models);

@@ -47,7 +47,11 @@ Json ChannelJson(const ChannelSpec& channel, const ModelSet& models) {
           {"unit", UnitOf(channel.output, models.flow_unit)},
           {"lower_threshold", channel.lower_threshold},
           {"upper_threshold", channel.upper_threshold},
-          {"windows", std::move(windows)}};
+          {"windows", std::move(windows)},
+          {"drift",
+           {{"lower_mean", channel.drift.lower_mean},
+            {"upper_mean", channel.drift.upper_mean},
+            {"log_scale", channel.drift.log_scale}}}};
 }
 
 Json ObserverJson(const Observer& observer, const ModelSet& models) {
