@@ -16,6 +16,7 @@ double Certain(double residual, double uncertain) {
 }
 
 constexpr double kFollowingS = 8.0 * 3600.0;
+constexpr double kFirstS = 3600.0;
 constexpr double kMargin = 1.4;  // of the limit on the energy, in training
 
 // One step of `value` towards `target`.
@@ -80,6 +81,10 @@ void Detection::Follow() {
   if (pending()) {
     return;
   }
+  healthy_s_ += models_->sample_period_s;
+  if (healthy_s_ <= kFirstS) {
+    return;
+  }
   const double share = models_->sample_period_s / kFollowingS;
   for (std::size_t c = 0; c < models_->channels.size(); ++c) {
     const std::vector<WindowLimits>& windows = models_->channels[c].windows;
@@ -109,13 +114,15 @@ void Detection::Follow() {
 
 void Detection::Save(SnapshotWriter& writer) const {
   windows_.Save(writer);
+  writer.Put(healthy_s_);
   for (const Drift& drift : drifts_) {
     writer.Put(drift.mean, drift.log_scale);
   }
 }
 
 bool Detection::Restore(SnapshotReader& reader) {
-  return windows_.Restore(reader) &&
+  return windows_.Restore(reader) && reader.Get(healthy_s_) &&
+         std::isfinite(healthy_s_) &&
          std::ranges::all_of(drifts_, [&](Drift& drift) {
            return reader.Get(drift.mean, drift.log_scale) &&
                   std::isfinite(drift.mean) && std::isfinite(drift.log_scale);

@@ -25,7 +25,8 @@ class Detection {
   /// less the margin of 1.4 that training leaves. Each sample moves them by one
   /// step towards the window, so they go to its medians, the mean at most by
   /// its limit in 8 h, the deviation by a factor of 2; and both not beyond
-  /// DriftLimits.
+  /// DriftLimits. In the first hour nothing moves: what is slow cannot be told
+  /// from what is not.
   struct Drift {
     double mean{0.0};       ///< [unit]
     double log_scale{0.0};  ///< At least 0.
@@ -47,9 +48,6 @@ class Detection {
   /// The sample belongs to a healthy valve: no episode is open. Nothing is
   /// followed while pending().
   void Follow();
-
-  /// By channel.
-  const Drift& drift(std::size_t channel) const { return drifts_[channel]; }
 
   void Save(SnapshotWriter& writer) const;
   /// @returns false, leaving it undefined, if there is nothing to be read.
@@ -74,6 +72,7 @@ class Detection {
   const ModelSet* models_;
   ResidualWindows windows_;
   std::array<Drift, kMaxChannels> drifts_{};
+  double healthy_s_{0.0};  // that Follow() was called for
   std::array<Run, kTestsPerChannel * kMaxChannels> runs_{};
 };
 

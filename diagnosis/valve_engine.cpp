@@ -164,7 +164,6 @@ void ValveEngine::Impl::TakeSource(const Sample& sample) {
   }
   if (has_source_) {
     diagnosis_->coverage.Restart();
-    diagnosis_->detection = Detection(models());
     diagnosis_->stuck.Restart();
   }
   has_source_ = true;

@@ -337,7 +337,13 @@ struct WindowAverage {
 std::vector<WindowAverage> AverageWindows(const Condition& condition,
                                           const ModelSet& models) {
   std::vector<WindowAverage> averages(models.channels.size());
-  for (const Stretch& stretch : WholeStretches(condition)) {
+  // Faults that were put onto healthy data have a validation part alone.
+  for (const Stretch& stretch : condition.training.empty()
+                                    ? condition.validation
+                                    : WholeStretches(condition)) {
+    if (stretch.samples.empty()) {
+      continue;
+    }
     ObserverBank bank(models);
     ResidualWindows windows(models);
     bank.Initialise(stretch.samples.front());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include <gtest/gtest.h>
 
@@ -106,6 +107,86 @@ TEST(DetectionTest, LimitOnEnergyFollowsTheExcitation) {
   EXPECT_TRUE(detects(1.0, 10.0, 0.28));
   // Upwards only: a valve at rest is held to the limit as fitted.
   EXPECT_FALSE(detects(1.0, 2.0, 0.14));
+}
+
+constexpr double kLimit = 0.6 * testing::kNoise;  // on the mean of F
+constexpr int kHour = 3600;
+
+std::shared_ptr<const ModelSet> DriftingPlant(const DriftLimits& drift) {
+  ModelSet models = *SharedPlant();
+  models.channels[1].lower_threshold = -100.0;
+  models.channels[1].upper_threshold = 100.0;
+  models.channels[1].windows = {
+      {100, -kLimit, kLimit, std::log(1.5 * testing::kNoise)}};
+  models.channels[1].drift = drift;
+  return std::make_shared<const ModelSet>(models);
+}
+
+const DriftLimits kFollowed{-2.0 * kLimit, 2.0 * kLimit, std::log(2.0)};
+
+// Hour of the first alarm while F is raised by `shift` limits and its noise
+// grows by `growth` each hour; nothing if there is none in 24 h.
+std::optional<double> AlarmAfter(const DriftLimits& drift, double shift,
+                                 double growth) {
+  ValveEngine engine(DriftingPlant(drift));
+  Noise noise(9);
+  for (int k = 0; k < 24 * kHour; ++k) {
+    const double hours = static_cast<double>(k) / kHour;
+    Sample sample = PlantSample(static_cast<std::uint64_t>(k));
+    const double flow = sample[Signal::kF];
+    noise.Add(sample);
+    sample.values[Index(Signal::kF)] =
+        flow + (sample[Signal::kF] - flow) * (1.0 + growth * hours) +
+        shift * hours * kLimit;
+    if (engine.Step(sample).detected) {
+      return hours;
+    }
+  }
+  return std::nullopt;
+}
+
+// One limit takes 12 h, 8 h are followed; then 4 h.
+TEST(DriftTest, SlowShiftIsFollowedAndQuickOneIsNot) {
+  EXPECT_FALSE(AlarmAfter(kFollowed, 1.0 / 12.0, 0.0).has_value());
+  const auto unfollowed = AlarmAfter(DriftLimits{}, 1.0 / 12.0, 0.0);
+  ASSERT_TRUE(unfollowed.has_value());
+  EXPECT_LT(*unfollowed, 12.0);
+  const auto quick = AlarmAfter(kFollowed, 1.0 / 4.0, 0.0);
+  ASSERT_TRUE(quick.has_value());
+  EXPECT_LT(*quick, 9.0);
+}
+
+TEST(DriftTest, SlowRiseOfTheNoiseIsFollowed) {
+  EXPECT_FALSE(AlarmAfter(kFollowed, 0.0, 1.0 / 20.0).has_value());
+  EXPECT_TRUE(AlarmAfter(DriftLimits{}, 0.0, 1.0 / 20.0).has_value());
+}
+
+TEST(DriftTest, NoMoreIsFollowedThanTheSetAllows) {
+  const DriftLimits less{-kLimit, 0.5 * kLimit, 0.0};
+  const auto alarm = AlarmAfter(less, 1.0 / 10.0, 0.0);
+  ASSERT_TRUE(alarm.has_value());
+  EXPECT_GT(*alarm, 10.0);
+  EXPECT_LT(*alarm, 15.0);
+}
+
+// Had the fault been learnt, the repaired valve would be abnormal.
+TEST(DriftTest, FaultIsNotLearnt) {
+  ModelSet models = *DriftingPlant(kFollowed);
+  models.channels[1].lower_threshold = -4.0 * testing::kNoise;
+  models.channels[1].upper_threshold = 4.0 * testing::kNoise;
+  ValveEngine engine(std::make_shared<const ModelSet>(models));
+  Noise noise(10);
+  const auto healthy = [&](Sample& s) { noise.Add(s); };
+  EXPECT_TRUE(StepRange(engine, 0, kHour, healthy).transitions.empty());
+  StepRange(engine, kHour, 20 * kHour, [&](Sample& s) {
+    noise.Add(s);
+    AddF6(s, 0.5);
+  });
+  ASSERT_TRUE(engine.episode_open());
+  StepRange(engine, 20 * kHour, 20 * kHour + 400, healthy);
+  EXPECT_FALSE(engine.episode_open());
+  EXPECT_TRUE(StepRange(engine, 20 * kHour + 400, 21 * kHour, healthy)
+                  .transitions.empty());
 }
 
 // Reading and prediction at the limit of the flow transmitter say nothing; a

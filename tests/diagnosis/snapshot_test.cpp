@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -101,6 +102,34 @@ TEST(SnapshotTest, DamagedSnapshotsAreRefused) {
   std::vector<std::byte> other_format = good;
   other_format[0] ^= std::byte{0x80};
   EXPECT_FALSE(engine.Restore(other_format));
+}
+
+// 1.5 limits in 18 h.
+TEST(SnapshotTest, DriftThatWasFollowedStays) {
+  ModelSet models = *WatchedPlant();
+  const double limit = models.channels[1].windows[0].upper_mean;
+  models.channels[1].drift = {0.0, 2.0 * limit, 0.0};
+  const auto shared = std::make_shared<const ModelSet>(models);
+  const auto sample = [&](int k) {
+    Sample sample = PlantSample(static_cast<std::uint64_t>(k));
+    sample.values[Index(Signal::kF)] += std::min(k / 43200.0, 1.5) * limit;
+    return sample;
+  };
+  ValveEngine before(shared);
+  for (int k = 0; k < 64800; ++k) {
+    ASSERT_FALSE(before.Step(sample(k)).detected) << k;
+  }
+  for (const bool resumed : {false, true}) {
+    ValveEngine after(shared);
+    if (resumed) {
+      ASSERT_TRUE(after.Restore(before.Save()));
+    }
+    bool detected = false;
+    for (int k = 65800; k < 66400; ++k) {
+      detected = after.Step(sample(k)).detected || detected;
+    }
+    EXPECT_EQ(detected, !resumed);
+  }
 }
 
 TEST(SnapshotTest, OpenEpisodeIsNotCarriedOn) {

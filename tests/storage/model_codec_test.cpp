@@ -129,6 +129,21 @@ TEST(ModelCodecTest, FloorIsPartOfTheNewerFormatAlone) {
   EXPECT_EQ(DecodeModelSet(EncodeModelSet(models), "test").faults, back.faults);
 }
 
+// Likewise sets of before a drift was followed.
+TEST(ModelCodecTest, DriftIsPartOfTheNewerFormatAlone) {
+  ModelSet models = RandomModelSet("valve");
+  models.physics = {{"trim.kv_m3_h", 118.5}};
+  ASSERT_EQ(std::to_integer<int>(EncodeModelSet(models)[4]), 4);
+  models.channels.back().drift = {-0.5, 0.25, 1.0};
+  const auto bytes = EncodeModelSet(models);
+  EXPECT_EQ(std::to_integer<int>(bytes[4]), 8);
+  const ModelSet back = DecodeModelSet(bytes, "test");
+  EXPECT_EQ(back.channels.front().drift, DriftLimits{});
+  EXPECT_EQ(back.channels.back().drift, models.channels.back().drift);
+  ASSERT_EQ(back.physics.size(), 1U);
+  EXPECT_EQ(EncodeModelSet(back), bytes);
+}
+
 TEST(ModelCodecTest, PredictionsAreTheSameAfterReadingBack) {
   const ModelSet models = RandomModelSet("valve");
   const ModelSet back = DecodeModelSet(EncodeModelSet(models), "test");
