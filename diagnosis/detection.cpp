@@ -78,9 +78,6 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample) {
 }
 
 void Detection::Follow() {
-  if (pending()) {
-    return;
-  }
   healthy_s_ += models_->sample_period_s;
   if (healthy_s_ <= kFirstS) {
     return;
@@ -102,13 +99,12 @@ void Detection::Follow() {
     Drift& drift = drifts_[c];
     const double usual = UpperLogRms(limits, command) - std::log(kMargin);
     const double band = 0.5 * (limits.upper_mean - limits.lower_mean);
-    drift.mean =
-        std::clamp(Towards(window.mean(), drift.mean, share * band),
-                   most.lower_mean, most.upper_mean);
-    drift.log_scale = std::clamp(
-        Towards(window.log_rms() - usual, drift.log_scale,
-                share * std::numbers::ln2),
-        0.0, most.log_scale);
+    drift.mean = std::clamp(Towards(window.mean(), drift.mean, share * band),
+                            most.lower_mean, most.upper_mean);
+    drift.log_scale =
+        std::clamp(Towards(window.log_rms() - usual, drift.log_scale,
+                           share * std::numbers::ln2),
+                   0.0, most.log_scale);
   }
 }
 

@@ -15,7 +15,7 @@ namespace fdi {
 /// detection. What extrapolation put into a residual is taken away first.
 ///
 /// A healthy valve drifts: with the season, its air supply, its wear. While
-/// nothing deviates, Follow() moves the limits with the residual, slowly and
+/// there is no alarm, Follow() moves the limits with the residual, slowly and
 /// not far, see Drift. What is followed is taken from the residual before it is
 /// compared: (r − mean)/scale, of the means of windows the mean alone.
 class Detection {
@@ -45,8 +45,7 @@ class Detection {
   /// beyond its threshold.
   bool Push(const ObserverBank& bank, const Sample& sample);
 
-  /// The sample belongs to a healthy valve: no episode is open. Nothing is
-  /// followed while pending().
+  /// The last sample was that of a healthy valve: no episode is open.
   void Follow();
 
   void Save(SnapshotWriter& writer) const;

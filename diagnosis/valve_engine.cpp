@@ -241,7 +241,7 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   diagnosis_->episode.Step(sample, diagnosis_->bank, findings, verdict_);
   if (was_open && !episode_open()) {
     detection.Restart();
-  } else if (findings.settled && !findings.abnormal && !episode_open()) {
+  } else if (findings.settled && !episode_open()) {
     detection.Follow();
   }
 }

@@ -370,10 +370,9 @@ std::vector<WindowAverage> AverageWindows(const Condition& condition,
           WindowAverage& average = averages[c];
           average.samples += 1.0;
           average.mean += (window.mean() - average.mean) / average.samples;
-          average.excess +=
-              (window.log_rms() - UpperLogRms(limits, command) -
-               average.excess) /
-              average.samples;
+          average.excess += (window.log_rms() - UpperLogRms(limits, command) -
+                             average.excess) /
+                            average.samples;
         }
       }
     }

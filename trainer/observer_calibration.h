@@ -68,9 +68,9 @@ void FitInterpolationErrors(const std::vector<Condition>& conditions,
 
 /// Sets ChannelSpec::drift of every channel with windows: at most three times
 /// the limit on a mean and a factor of 3, and so little that no fault that the
-/// set knows is learnt. Of every fault and direction, at the strength that shows
-/// best, the limit on the longest windows that it passes by most moves at most
-/// by half of what it passes it by.
+/// set knows is learnt. Of every fault and direction, at the strength that
+/// shows best, the limit on the longest windows that it passes by most moves at
+/// most by half of what it passes it by.
 ///
 /// @param conditions parallel to models.observers.
 void FitDriftLimits(const std::vector<Condition>& conditions, ModelSet& models);

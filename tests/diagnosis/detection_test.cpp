@@ -169,6 +169,36 @@ TEST(DriftTest, NoMoreIsFollowedThanTheSetAllows) {
   EXPECT_LT(*alarm, 15.0);
 }
 
+// F is shifted by `shift` limits for `hours`, then as far the other way, which
+// is an alarm if the first shift was learnt. X is faulty until then, or not:
+// off at every 15th sample, which lets no episode clear.
+bool LearnsShift(double shift, double hours, bool faulty) {
+  ValveEngine engine(DriftingPlant(kFollowed));
+  const int until = static_cast<int>(hours * kHour);
+  StepRange(engine, 0, until, [&](Sample& s) {
+    const auto k = static_cast<int>(s.seq);
+    const bool off = k == 100 || k % 15 == 11;  // 100, 101, 116, ...
+    s.values[Index(Signal::kX)] -= faulty && off ? 10.0 : 0.0;
+    s.values[Index(Signal::kF)] += shift * kLimit;
+  });
+  EXPECT_EQ(engine.episode_open(), faulty);
+  StepRange(engine, until, until + 60);
+  EXPECT_FALSE(engine.episode_open());
+  return !StepRange(engine, until + 60, until + 2000, [&](Sample& s) {
+            s.values[Index(Signal::kF)] -= shift * kLimit;
+          }).transitions.empty();
+}
+
+TEST(DriftTest, NothingIsLearntInTheFirstHour) {
+  EXPECT_FALSE(LearnsShift(0.95, 1.0, false));
+  EXPECT_TRUE(LearnsShift(0.95, 3.0, false));
+}
+
+TEST(DriftTest, NothingIsLearntDuringAnEpisode) {
+  EXPECT_FALSE(LearnsShift(0.95, 10.0, true));
+  EXPECT_TRUE(LearnsShift(0.95, 10.0, false));
+}
+
 // Had the fault been learnt, the repaired valve would be abnormal.
 TEST(DriftTest, FaultIsNotLearnt) {
   ModelSet models = *DriftingPlant(kFollowed);

@@ -93,13 +93,21 @@ std::string WindowsText(const ModelSet& models) {
                         {"window [samples]", Align::kRight},
                         {"mean below", Align::kRight},
                         {"mean above", Align::kRight},
-                        {"deviation above", Align::kRight}});
+                        {"deviation above", Align::kRight},
+                        {"mean may drift", Align::kRight},
+                        {"deviation times", Align::kRight}});
   for (const ChannelSpec& channel : models.channels) {
     for (const WindowLimits& window : channel.windows) {
+      const bool longest = &window == &channel.windows.back();
+      const DriftLimits& drift = channel.drift;
       table.AddRow({channel.name, std::to_string(window.length),
                     FormatNumber(window.lower_mean, 3),
                     FormatNumber(window.upper_mean, 3),
-                    FormatNumber(std::exp(window.upper_log_rms), 3)});
+                    FormatNumber(std::exp(window.upper_log_rms), 3),
+                    longest ? FormatNumber(drift.lower_mean, 3) + " .. " +
+                                  FormatNumber(drift.upper_mean, 3)
+                            : "",
+                    longest ? FormatNumber(std::exp(drift.log_scale), 2) : ""});
     }
   }
   std::ostringstream text;
