@@ -178,6 +178,7 @@ void EpisodeNames::Announce() {
 
 void EpisodeNames::WriteName(Transition& transition) const {
   transition.faults = faults_;
+  transition.unknown = faults_ != 0 ? Unknown::kNone : transition.unknown;
   transition.layer = layer_;
   transition.factor = 0.0;
   transition.strength = 0.0;

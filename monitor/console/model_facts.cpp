@@ -83,7 +83,7 @@ std::string Fitting(const ModelFacts& models, const TracePoint& point,
   for (const std::size_t f : fitting) {
     text.append(text.empty() ? "" : ", ").append(name(models.faults[f]));
   }
-  return text.empty() ? "no known fault" : text;
+  return text.empty() ? "no observer fits" : "fits: " + text;
 }
 
 }  // namespace
@@ -162,7 +162,7 @@ std::string Explain(const ModelFacts& models, const TracePoint& point,
            (residual < 0.0 ? " below" : " above") +
            " what the normal model expects";
   }
-  return text + "; fits: " + Fitting(models, point, name);
+  return text + "; " + Fitting(models, point, name);
 }
 
 }  // namespace fdi::console

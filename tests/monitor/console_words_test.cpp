@@ -45,7 +45,7 @@ TEST(ConsoleWordsTest, NothingBeyondItsThresholdIsSaidSo) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   TracePoint point = Abnormal({kNone, 3.9}, {0.0, 0.0, 0.0});
   EXPECT_EQ(Explain(TwoChannels(), point, Describe),
-            "no reading beyond its threshold now; fits: no known fault");
+            "no reading beyond its threshold now; no observer fits");
   point.state = State::kNormal;
   EXPECT_EQ(Explain(TwoChannels(), point, Describe),
             "as the normal model expects");

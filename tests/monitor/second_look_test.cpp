@@ -239,7 +239,10 @@ TEST_F(SecondLookTest, AnEpisodeThatTheEngineEndsKeepsTheName) {
   Transition closed;
   closed.kind = TransitionKind::kClosed;
   closed.faults = kF7;
-  EXPECT_EQ(names_.End(closed).faults, kF19);
+  closed.unknown = Unknown::kTooEarly;
+  const Transition named = names_.End(closed);
+  EXPECT_EQ(named.faults, kF19);
+  EXPECT_EQ(named.unknown, Unknown::kNone);
   EXPECT_EQ(names_.End(closed).faults, kF7);  // Of an episode after that.
 }
 
