@@ -1,3 +1,4 @@
+#include <charconv>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -180,6 +181,16 @@ cli::Report Run(const RunOptions& options, const cli::Context& context) {
   return Deliver(feed, sinks, speed, signals, std::move(valves));
 }
 
+// A number of any size, or a time as "10m".
+double SecondsOf(const std::string& text) {
+  double seconds = 0.0;
+  const char* end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, seconds);
+  return error == std::errc() && rest == end
+             ? seconds
+             : static_cast<double>(cli::ParseDuration(text)) / 1e9;
+}
+
 void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
   verb.add_option("--valve", options.valve, "Valve id (default: VALVE-0001)")
       ->type_name("ID");
@@ -189,8 +200,7 @@ void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
   verb.add_option_function<std::string>(
           "--duration",
           [&options](const std::string& text) {
-            options.duration_s =
-                static_cast<double>(cli::ParseDuration(text)) / 1e9;
+            options.duration_s = SecondsOf(text);
           },
           "Simulated time: seconds, 10m, 1h30m (default: 2000 s, or the "
           "excitation's)")

@@ -26,6 +26,8 @@ struct EnumText<RunState> {
 namespace sql = runs_sql;
 namespace {
 
+constexpr std::string_view kLastRun = "last";
+
 [[noreturn]] void RefuseSelector(std::string_view text,
                                  const std::string& why) {
   throw ConfigError(
@@ -128,8 +130,6 @@ const Schema& RunsSchema() {
       {sql::kMigrations.begin(), sql::kMigrations.end()}};
   return schema;
 }
-
-constexpr std::string_view kLastRun = "last";
 
 std::string_view RunOriginName(RunOrigin origin) {
   switch (origin) {

@@ -147,7 +147,7 @@ TEST_F(AppRunTest, WhatItRefusesItNamesWithWhatIsAccepted) {
       {{"run", "--no-publish", "--scenario", bad_key}, 2, {":2:", "speedy"}},
       {{"run", "--no-publish", "--scenario", "no.toml"}, 5, {"no.toml"}},
       {{"run", "--no-publish", "--set", "a.b=1"}, 2, {"a.b=1"}},
-      {{"run", "--no-publish", "--duration", "-1"}, 2, {"not a duration"}},
+      {{"run", "--no-publish", "--duration", "-1"}, 2, {"duration_s"}},
       {{"run", "--no-publish", "--start", "noon"}, 2, {"noon"}},
       {{"run", "--speed", "fast"}, 2, {"fast", "max"}},
       {{"run", "--no-publish", "--valve", std::string(65, 'v')}, 2, {"64"}},
