@@ -81,6 +81,17 @@ const kLookColumns = [
     h('span', {}, timeCell(begins), growing ? ', growing' : '')},
 ];
 
+function lookParts({faults, misfit}) {
+  const times = `${Math.sqrt(misfit).toFixed(1)} times what is usual`;
+  return faults.length === 0 ? h('p', {class: 'hint'},
+      `No fault explains it: the best simulation misses by ${times}.`) : [
+    dataTable('Faults that explain it, by simulation of the valve',
+        kLookColumns, faults),
+    h('p', {class: 'hint'}, 'The simulation with the first of them misses ' +
+        `the readings by ${times}.`),
+  ];
+}
+
 class EpisodePage extends View {
   title = 'Episode';
   #content = h('div', {});
@@ -144,13 +155,7 @@ class EpisodePage extends View {
             h('strong', {}, `Check for ${name}: `), check)),
         this.#timeline ? this.#timeline.element :
           h('p', {class: 'note'}, 'There is no recording of this episode.'),
-        found.look ? [
-          dataTable('Faults that explain it, by simulation of the valve',
-              kLookColumns, found.look.faults),
-          h('p', {class: 'hint'}, `The simulation with the first of them ` +
-              `misses the readings by ${Math.sqrt(found.look.misfit)
-                  .toFixed(1)} times what is usual.`),
-        ] : null,
+        found.look ? lookParts(found.look) : null,
         dataTable('What happened', kEventColumns, found.events),
         h('p', {class: 'hint'}, `Times are ${zoneName()}.`));
     if (this.#timeline) this.#timeline.rebuild();
