@@ -6,7 +6,9 @@
 #     cmake --preset release -DFDI_BENCH=ON && cmake --build --preset release
 #     bench/service.sh [BIN]          # BIN: build/release/bin
 #
-# FDI_BENCH_VALVES, FDI_BENCH_SAMPLES, FDI_BENCH_ROUNDS, FDI_BENCH_DOMAIN
+# FDI_BENCH_VALVES, FDI_BENCH_SAMPLES, FDI_BENCH_ROUNDS, FDI_BENCH_DOMAIN;
+# FDI_BENCH_SECURITY=1: with DDS Security, and without the round trips, whose
+# program is gateway and reader at once.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bin=$(realpath "${1:-build/release/bin}")
@@ -19,6 +21,16 @@ export FDI_DATA=$out/data
 monitor=
 trap '[ -z "$monitor" ] || kill -9 "$monitor" 2>/dev/null; rm -rf "$out"' EXIT
 
+declare -A key=([publish]='' [read]='' [run]='')
+if [ -n "${FDI_BENCH_SECURITY:-}" ]; then
+  "$bin/fdi-store" keys init "$out/keys" >/dev/null
+  for role in gateway reader monitor; do
+    "$bin/fdi-store" keys add "$out/keys" "$role" --role "$role" >/dev/null
+  done
+  key=([publish]="--security=$out/keys/gateway"
+    [read]="--security=$out/keys/reader" [run]="--security=$out/keys/monitor")
+fi
+
 field() {  # FILE WORD: the number after the word
   sed -n "s/.*\b$2 \([0-9.]*\).*/\1/p" "$1" | tail -1
 }
@@ -27,7 +39,7 @@ cpu_of() {  # PID: processor seconds so far
 }
 start_monitor() {
   rm -f "$FDI_DATA"/history.db*
-  "$bin/fdi-monitor" run --model-set service --domain "$domain" \
+  "$bin/fdi-monitor" ${key[run]} run --model-set service --domain "$domain" \
     --log-level warning "$@" 2>"$out/monitor.log" &
   monitor=$!
   until grep -q monitor_ready "$out/monitor.log"; do
@@ -52,9 +64,9 @@ wait_for_diagnosis() {  # the last sample acknowledged is not yet diagnosed
 "$bin/fdi-trainer" train --campaign bench/service.toml >/dev/null 2>&1
 
 bare() {
-  timeout 120 "${load[@]}" read >"$out/read" &
+  timeout 120 "${load[@]}" ${key[read]} read >"$out/read" &
   local reader=$!
-  timeout 120 "${load[@]}" publish >"$out/publish"
+  timeout 120 "${load[@]}" ${key[publish]} publish >"$out/publish"
   wait "$reader"
   rate=$(field "$out/read" rate)
   detail="publisher $(field "$out/publish" cpu) s, reader $(field "$out/read" cpu) s"
@@ -62,7 +74,7 @@ bare() {
 diagnosis() {
   start_monitor
   local cpu_before=$(cpu_of "$monitor")
-  timeout 120 "${load[@]}" publish >"$out/publish"
+  timeout 120 "${load[@]}" ${key[publish]} publish >"$out/publish"
   wait_for_diagnosis
   local cpu
   cpu=$(awk -v a="$(cpu_of "$monitor")" -v b="$cpu_before" 'BEGIN {print a - b}')
@@ -73,10 +85,10 @@ diagnosis() {
 service() {
   start_monitor --lossless-decisions
   local cpu_before=$(cpu_of "$monitor")
-  timeout 120 "${load[@]}" vectors >"$out/vectors" &
+  timeout 120 "${load[@]}" ${key[read]} vectors >"$out/vectors" &
   local subscriber=$!
   sleep 1
-  timeout 120 "${load[@]}" publish >"$out/publish"
+  timeout 120 "${load[@]}" ${key[publish]} publish >"$out/publish"
   wait "$subscriber" || { cat "$out/vectors" >&2; exit 1; }
   local cpu
   cpu=$(awk -v a="$(cpu_of "$monitor")" -v b="$cpu_before" 'BEGIN {print a - b}')
@@ -98,6 +110,7 @@ for ((round = 1; round <= rounds; ++round)); do
   done
 done
 
+[ -z "${FDI_BENCH_SECURITY:-}" ] || exit 0
 echo
 printf '%-34s %10s %10s\n' 'round trip at 1 kHz [us]' p50 p99
 for ((round = 1; round <= rounds; ++round)); do

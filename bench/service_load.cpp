@@ -32,6 +32,7 @@ struct Options {
   double idle_s{5.0};
   int rounds{5000};
   double rate_hz{1000.0};
+  std::string security;  // Folder of a key, or empty.
 };
 
 // Healthy samples as the model set of service.toml knows them.
@@ -61,6 +62,7 @@ idl::DdsOptions DdsOf(const Options& options) {
   idl::DdsOptions dds;
   dds.domain = options.domain;
   dds.max_valves = options.valves;
+  dds.security = options.security;
   return dds;
 }
 
@@ -220,6 +222,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.add_option("--domain", options.domain, "DDS domain");
   app.add_option("--valves", options.valves, "Valves of the publisher");
+  app.add_option("--security", options.security, "Folder of a key");
   app.add_option("--samples", options.samples, "Samples of each valve");
   app.add_option("--rounds", options.rounds, "Round trips");
   int code = 0;

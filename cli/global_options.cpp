@@ -258,6 +258,11 @@ void AddBusOptions(CLI::App& app, GlobalOptions& options) {
                  "which is the default of Fast DDS")
       ->check(CLI::IsMember({"udp", "shm", "default"}))
       ->type_name("NAME");
+  app.add_option("--security", options.security,
+                 "Folder of the key that fdi-store keys has made for this "
+                 "program or host; without one the bus is open to all")
+      ->check(CLI::ExistingDirectory)
+      ->type_name("DIR");
   app.add_option("--qos", options.qos_file,
                  "Fast DDS XML file whose QoS profiles override the built-in "
                  "ones")

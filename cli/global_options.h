@@ -21,6 +21,7 @@ struct GlobalOptions {
   /// peer that was killed is in the way of the next for seconds.
   std::string transport{"udp"};
   std::filesystem::path qos_file;     ///< --qos FILE.xml, or empty
+  std::filesystem::path security;     ///< --security DIR, or empty
   std::filesystem::path config_file;  ///< --config FILE.toml, or empty
   /// --fault-catalogue FILE.toml, or empty; see FaultTexts.
   std::filesystem::path fault_catalogue;
@@ -35,7 +36,7 @@ struct PrintConfigRequest {};
 /// Adds --help --version --data --config --print-config --json --utc
 /// --log-level to the root `app`; `options` must outlive it.
 void AddGlobalOptions(CLI::App& app, GlobalOptions& options);
-/// Adds --domain --interface --transport --qos.
+/// Adds --domain --interface --transport --security --qos.
 void AddBusOptions(CLI::App& app, GlobalOptions& options);
 /// Adds --fault-catalogue.
 void AddFaultCatalogueOption(CLI::App& app, GlobalOptions& options);

@@ -1,6 +1,9 @@
 #include "idl/participant.h"
 
 #include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <map>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -13,6 +16,7 @@
 
 #include "diagnosis/error.h"
 #include "idl/participant_impl.h"
+#include "idl/security/keys.h"
 #if FDI_FAST_DDS == 2
 #include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
@@ -38,7 +42,15 @@ constexpr int kMaxValvesLimit = 100000;
 constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
+constexpr std::int64_t kDayNs = 86'400'000'000'000;
+constexpr std::int64_t kDaysOfWarning = 30;
 constexpr std::size_t kRemembered = 64;  // Remote endpoints per topic.
+
+std::int64_t NowNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
 
 std::vector<std::string> Addresses(const std::string& interfaces) {
   std::vector<std::string> addresses;
@@ -224,10 +236,38 @@ void CheckTransports(const std::shared_ptr<DatagramLog>& log,
   }
 }
 
+// The plugins of DDS Security 1.1 with the files of one key.
+void Secure(const std::filesystem::path& folder, const LogSink& log,
+            dds::DomainParticipantQos& qos) {
+  const KeyInfo key = CheckKey(folder, NowNs());
+  const std::int64_t days = (key.until_ns - NowNs()) / kDayNs;
+  if (days < kDaysOfWarning && log) {
+    log(LogLevel::kWarning, "security_key_expires name=" + key.name +
+                                " days=" + std::to_string(days));
+  }
+  const std::string file =
+      "file://" + std::filesystem::absolute(folder).string() + "/";
+  const std::string auth = "dds.sec.auth.builtin.PKI-DH.";
+  const std::string access = "dds.sec.access.builtin.Access-Permissions.";
+  auto& properties = qos.properties().properties();
+  for (const auto& [name, value] : std::map<std::string, std::string>{
+           {"dds.sec.auth.plugin", "builtin.PKI-DH"},
+           {auth + "identity_ca", file + "ca.pem"},
+           {auth + "identity_certificate", file + "cert.pem"},
+           {auth + "private_key", file + "key.pem"},
+           {"dds.sec.access.plugin", "builtin.Access-Permissions"},
+           {access + "permissions_ca", file + "ca.pem"},
+           {access + "governance", file + "governance.p7s"},
+           {access + "permissions", file + "permissions.p7s"},
+           {"dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC"}}) {
+    properties.emplace_back(name, value);
+  }
+}
+
 dds::DomainParticipantQos MakeQos(const DdsOptions& options,
                                   const ProfileFile& profiles,
-                                  const std::shared_ptr<DatagramLog>& log,
-                                  const std::string& name) {
+                                  const std::shared_ptr<DatagramLog>& datagrams,
+                                  const LogSink& log, const std::string& name) {
   dds::DomainParticipantQos qos;
   const std::set<std::string>* stated = profiles.Stated(kParticipantProfile);
   if (stated != nullptr) {
@@ -242,7 +282,10 @@ dds::DomainParticipantQos MakeQos(const DdsOptions& options,
   if (!states("userTransports") && !states("useBuiltinTransports")) {
     SetTransports(options, qos);
   }
-  CheckTransports(log, qos.transport());
+  CheckTransports(datagrams, qos.transport());
+  if (!options.security.empty()) {
+    Secure(options.security, log, qos);
+  }
   if (!states("builtin")) {
     auto& discovery = qos.wire_protocol().builtin.discovery_config;
     discovery.leaseDuration = {5, 0};
@@ -310,7 +353,7 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
                                          : ProfileFile(options.qos_file)) {
   SetUpLibraryOnce();
   const dds::DomainParticipantQos qos =
-      MakeQos(options_, profiles_, datagrams_, name);
+      MakeQos(options_, profiles_, datagrams_, log_, name);
   handle_ = NotNull(
       dds::DomainParticipantFactory::get_instance()->create_participant(
           static_cast<std::uint32_t>(options_.domain), qos, this,
@@ -376,7 +419,26 @@ void Participant::Impl::Remember(const RemoteKey& key, PolicyTexts texts) {
   }
 }
 
+// One line is enough: strangers may come by the thousand.
+void Participant::Impl::Refused(const std::string& who) {
+  if (refused_.fetch_add(1, std::memory_order_relaxed) == 0 && log_) {
+    log_(LogLevel::kWarning,
+         "participant_refused reason=no_key_of_the_authority guid=" + who);
+  }
+}
+
 #if FDI_FAST_DDS == 2
+void Participant::Impl::onParticipantAuthentication(
+    dds::DomainParticipant* /*participant*/,
+    rtps::ParticipantAuthenticationInfo&& info) {
+  if (info.status ==
+      rtps::ParticipantAuthenticationInfo::UNAUTHORIZED_PARTICIPANT) {
+    std::ostringstream guid;
+    guid << info.guid;
+    Refused(guid.str());
+  }
+}
+
 void Participant::Impl::on_publisher_discovery(
     dds::DomainParticipant* /*participant*/, rtps::WriterDiscoveryInfo&& info) {
   if (info.status == rtps::WriterDiscoveryInfo::DISCOVERED_WRITER) {
@@ -418,6 +480,10 @@ Participant::~Participant() = default;
 
 const DdsOptions& Participant::options() const {
   return impl_->options();
+}
+
+std::uint64_t Participant::refused_participants() const {
+  return impl_->refused_participants();
 }
 
 DatagramCounts Participant::datagrams() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -25,6 +26,8 @@ struct DdsOptions {
   std::string interfaces{"127.0.0.1"};
   std::string transport{"udp"};  ///< udp | shm | default (both).
   std::string qos_file;          ///< XML with profiles of qos.h; may be empty.
+  /// Folder of a key as fdi-store keys makes it; without one the bus is open.
+  std::string security;
   int max_valves{2000};          ///< 1..100000; what is beyond is not served.
 };
 
@@ -39,7 +42,8 @@ void Validate(const DdsOptions& options);
 class Participant {
  public:
   /// @param name For tools that list participants, e.g. "fdi-monitor".
-  /// @throws ConfigError on bad options or a QoS file that is missing or wrong.
+  /// @throws ConfigError on bad options or a QoS file that is missing or wrong,
+  ///   or a key that CheckKey() refuses.
   /// @throws TransportError
   explicit Participant(const DdsOptions& options, LogSink log = {},
                        const std::string& name = "fdi");
@@ -51,6 +55,9 @@ class Participant {
   /// What came from the network, all endpoints together. What is refused is
   /// dropped, with one line in the log for each reason.
   DatagramCounts datagrams() const;
+  /// Participants that were refused for want of a key of the authority; the
+  /// first is in the log.
+  std::uint64_t refused_participants() const;
 
   class Impl;
   Impl& impl() { return *impl_; }

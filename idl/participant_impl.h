@@ -124,11 +124,16 @@ class Participant::Impl : private dds::DomainParticipantListener {
   const DdsOptions& options() const { return options_; }
   const ProfileFile& profiles() const { return profiles_; }
   DatagramCounts datagrams() const { return datagrams_->counts(); }
+  std::uint64_t refused_participants() const { return refused_; }
 
  private:
   using RemoteKey = std::pair<std::string, bool>;  // Topic, is a writer.
 
+  void Refused(const std::string& who);
 #if FDI_FAST_DDS == 2
+  void onParticipantAuthentication(
+      dds::DomainParticipant* participant,
+      rtps::ParticipantAuthenticationInfo&& info) override;
   void on_publisher_discovery(dds::DomainParticipant* participant,
                               rtps::WriterDiscoveryInfo&& info) override;
   void on_subscriber_discovery(dds::DomainParticipant* participant,
@@ -150,6 +155,7 @@ class Participant::Impl : private dds::DomainParticipantListener {
   LibraryLog library_log_;
   std::shared_ptr<DatagramLog> datagrams_;  // The transports have it, too.
   ProfileFile profiles_;
+  std::atomic<std::uint64_t> refused_{0};
   std::mutex remotes_mutex_;
   std::map<RemoteKey, std::deque<PolicyTexts>> remotes_;  // Newest first.
   std::mutex topics_mutex_;  // Apart, for it is held in calls of the library.

@@ -401,6 +401,7 @@ StatusFacts Service::Facts() const {
           pipeline_.census(),
           samples_.status(),
           datagrams,
+          intake_participant_.refused_participants(),
           decisions_.status(),
           pipeline_.journal_backlog(),
           pipeline_.recorder_backlog(),

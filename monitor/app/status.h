@@ -28,6 +28,7 @@ struct StatusFacts {
   ValveCensus census;
   idl::SubscriberStatus samples;
   idl::DatagramCounts datagrams;  ///< Of all participants.
+  std::uint64_t refused_participants;  ///< By the one that takes samples.
   idl::PublisherStatus decisions;
   Journal::Backlog journal;
   std::size_t recorder_backlog{0};

@@ -17,6 +17,7 @@ inline idl::DdsOptions DdsOptionsOf(const cli::GlobalOptions& options,
   dds.interfaces = options.interface;
   dds.transport = options.transport;
   dds.qos_file = options.qos_file.string();
+  dds.security = options.security.string();
   dds.max_valves = max_valves;
   return dds;
 }

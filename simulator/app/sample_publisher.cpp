@@ -42,6 +42,7 @@ idl::DdsOptions DdsOptionsOf(const cli::GlobalOptions& options,
   dds.interfaces = options.interface;
   dds.transport = options.transport;
   dds.qos_file = options.qos_file.string();
+  dds.security = options.security.string();
   dds.max_valves = std::max(dds.max_valves, static_cast<int>(valves));
   idl::Validate(dds);
   return dds;

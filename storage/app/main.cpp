@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   fdi::storage::AddHistoryVerbs(program);
   fdi::storage::AddPlannerVerbs(program);
   fdi::storage::AddMaintenanceVerbs(program);
+  fdi::storage::AddKeysVerbs(program);
   program.AddExamples(fdi::storage::Examples());
   return program.Run(argc, argv);
 }

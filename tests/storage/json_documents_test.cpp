@@ -333,6 +333,10 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "health show", "--valve LV-1");
   Printed(page, "health trend", "--valve LV-1 --limit X=3");
   Printed(page, "worklist", "--since 2020-01-01 --limit X=0.01");
+  Printed(page, "keys init", "keys");
+  Printed(page, "keys add", "keys monitor-1 --role monitor");
+  Printed(page, "keys renew", "keys monitor-1");
+  Printed(page, "keys list", "keys");
   Printed(page, "doctor");
   Printed(page, "backup", "copy");
   Printed(page, "migrate");

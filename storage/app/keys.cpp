@@ -1,0 +1,141 @@
+// fdi-store keys init, add, renew, list: the keys of a bus that is locked.
+#include "idl/security/keys.h"
+
+#include "diagnosis/error.h"
+#include "storage/app/verbs.h"
+
+namespace fdi::storage {
+namespace {
+
+constexpr int kAuthorityDays = 3650;
+constexpr int kKeyDays = 365;
+constexpr double kNsPerDay = 86400e9;
+constexpr double kDaysOfWarning = 30.0;
+
+struct KeyOptions {
+  std::string folder;
+  std::string name;
+  std::string role;
+  int days{kKeyDays};
+};
+
+// "days_left" is of now.
+Json KeyJson(const idl::KeyInfo& key) {
+  return {{"name", key.name},
+          {"role", idl::RoleName(key.role)},
+          {"from_utc", TimeJson(key.from_ns)},
+          {"until_utc", TimeJson(key.until_ns)},
+          {"days_left",
+           static_cast<double>(key.until_ns - cli::NowNs()) / kNsPerDay}};
+}
+
+Report ShowKeys(Json keys) {
+  Report report;
+  report.document["keys"] = std::move(keys);
+  report.Table("keys",
+               {{"key", "name"},
+                {"role", "role"},
+                {"valid until", "until_utc", cli::Format::kTime},
+                {.heading = "days left",
+                 .key = "days_left",
+                 .decimals = 0,
+                 .tone =
+                     [](const Json& row) {
+                       return row["days_left"].get<double>() < kDaysOfWarning
+                                  ? cli::Tone::kWarning
+                                  : cli::Tone::kPlain;
+                     }}},
+               "no key yet: fdi-store keys add makes one");
+  return report;
+}
+
+Report Init(const KeyOptions& options, const Context&) {
+  idl::MakeAuthority(options.folder, options.days);
+  Report report;
+  report.document["folder"] = options.folder;
+  report.Line(options.folder +
+              ": an authority, no key yet. Keep ca.key where no monitor runs: "
+              "who has it can make keys.");
+  return report;
+}
+
+Report Add(const KeyOptions& options, const Context&) {
+  const std::optional<idl::Role> role = idl::ParseRole(options.role);
+  if (!role) {
+    throw ConfigError("--role is '" + options.role + "', accepted are " +
+                      idl::kRoleNames);
+  }
+  return ShowKeys(Json::array({KeyJson(idl::MakeKey(
+      options.folder, options.name, *role, options.days, false))}));
+}
+
+Report Renew(const KeyOptions& options, const Context&) {
+  const std::vector<idl::KeyInfo> keys = idl::ListKeys(options.folder);
+  const auto key = std::ranges::find(keys, options.name, &idl::KeyInfo::name);
+  if (key == keys.end()) {
+    throw NotFoundError("no key '" + options.name + "' in " + options.folder);
+  }
+  return ShowKeys(Json::array({KeyJson(idl::MakeKey(
+      options.folder, options.name, key->role, options.days, true))}));
+}
+
+Report List(const KeyOptions& options, const Context&) {
+  return ShowKeys(Rows(idl::ListKeys(options.folder), KeyJson));
+}
+
+void AddFolder(CLI::App& verb, KeyOptions& options) {
+  verb.add_option("folder", options.folder, "Folder of the authority")
+      ->type_name("DIR")
+      ->required();
+}
+
+void AddName(CLI::App& verb, KeyOptions& options) {
+  verb.add_option("name", options.name,
+                  "Of the program or host; also the name of its folder")
+      ->required();
+}
+
+void AddDays(CLI::App& verb, KeyOptions& options) {
+  verb.add_option("--days", options.days, "How long it is valid")
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void AddKeysVerbs(cli::Program& program) {
+  CLI::App& group = program.AddGroup(
+      "keys", "Keys of DDS Security, for --security of the other programs");
+  {
+    auto [verb, options] = AddVerb(program, group, "init",
+                                   "Make an authority, which signs keys", Init);
+    options.days = kAuthorityDays;
+    AddFolder(verb, options);
+    AddDays(verb, options);
+  }
+  {
+    auto [verb, options] = AddVerb(program, group, "add",
+                                   "Make the key of a program or host", Add);
+    AddFolder(verb, options);
+    AddName(verb, options);
+    verb.add_option("--role", options.role,
+                    "gateway (publishes samples), monitor, or reader (of all "
+                    "topics)")
+        ->required();
+    AddDays(verb, options);
+  }
+  {
+    auto [verb, options] =
+        AddVerb(program, group, "renew",
+                "Make a key anew in its folder, with the same role", Renew);
+    AddFolder(verb, options);
+    AddName(verb, options);
+    AddDays(verb, options);
+  }
+  {
+    auto [verb, options] = AddVerb(
+        program, group, "list", "The keys and how long they are valid", List);
+    AddFolder(verb, options);
+  }
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,111 @@
+// A bus with keys: who has one exchanges samples, who has none neither gets nor
+// gives any.
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/error.h"
+#include "idl/security/keys.h"
+#include "tests/idl/dds_fixture.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::idl {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr std::uint64_t kSamples = 200;
+// A participant is found, or refused, well within it.
+constexpr seconds kLongEnough{3};
+
+class SecurityTest : public DeliveryTest {
+ protected:
+  SecurityTest() {
+    MakeAuthority(Keys(), 10);
+    MakeKey(Keys(), "monitor", Role::kMonitor, 10, false);
+    MakeKey(Keys(), "gateway", Role::kGateway, 10, false);
+    MakeKey(Keys(), "reader", Role::kReader, 10, false);
+  }
+
+  std::filesystem::path Keys() const { return directory_.path() / "keys"; }
+  DdsOptions With(const std::string& key) const {
+    DdsOptions options = domain_.Options();
+    options.security = (Keys() / key).string();
+    return options;
+  }
+
+  // Samples from `gateway` that reach `reader`, after kLongEnough if none does.
+  static std::uint64_t Exchanged(Participant& gateway, Participant& reader) {
+    Subscriber<ValveSampleMessage> subscriber(reader, Profile::kLossless);
+    Publisher<ValveSampleMessage> publisher(gateway, {Profile::kLossless});
+    if (!publisher.WaitForReaders(1, kLongEnough)) {
+      return 0;
+    }
+    for (std::uint64_t k = 0; k < kSamples; ++k) {
+      publisher.Write(SampleOf("FV-101", k));
+    }
+    OrderCheck check;
+    TakeUntil(subscriber, check.AsHandlers(),
+              [&] { return check.count >= kSamples; });
+    EXPECT_EQ(check.out_of_order, 0U);
+    return check.count;
+  }
+
+  storage::TemporaryDirectory directory_;
+};
+
+TEST_F(SecurityTest, WhoHasAKeyIsServed) {
+  Participant gateway(With("gateway"));
+  Participant monitor(With("monitor"), log_.Sink());
+  EXPECT_EQ(Exchanged(gateway, monitor), kSamples);
+  Participant reader(With("reader"));
+  EXPECT_EQ(Exchanged(gateway, reader), kSamples);
+  EXPECT_EQ(monitor.refused_participants(), 0U);
+  EXPECT_TRUE(log_.WaitFor("security_key_expires name=monitor days=9"));
+}
+
+TEST_F(SecurityTest, WhoHasNoKeyNeitherGetsNorGivesASample) {
+  Participant monitor(With("monitor"), log_.Sink());
+  Participant gateway(With("gateway"));
+  Participant stranger(domain_.Options());
+  EXPECT_EQ(Exchanged(stranger, monitor), 0U);
+  EXPECT_EQ(Exchanged(gateway, stranger), 0U);
+  EXPECT_EQ(monitor.refused_participants(), 1U);
+  EXPECT_TRUE(log_.WaitFor("participant_refused"));
+  EXPECT_EQ(Exchanged(gateway, monitor), kSamples);
+}
+
+TEST_F(SecurityTest, AKeyOfAnotherAuthorityIsNone) {
+  const std::filesystem::path others = directory_.path() / "others";
+  MakeAuthority(others, 10);
+  MakeKey(others, "gateway", Role::kGateway, 10, false);
+  DdsOptions options = domain_.Options();
+  options.security = (others / "gateway").string();
+  Participant monitor(With("monitor"), log_.Sink());
+  Participant stranger(options);
+  EXPECT_EQ(Exchanged(stranger, monitor), 0U);
+  EXPECT_GE(monitor.refused_participants(), 1U);
+}
+
+TEST_F(SecurityTest, ARoleGivesItsTopicsAndNoOthers) {
+  Participant reader(With("reader"));
+  EXPECT_THROW(Publisher<ValveSampleMessage>{reader}, TransportError);
+  Participant gateway(With("gateway"));
+  EXPECT_THROW(Publisher<FaultEvent>{gateway}, TransportError);
+  EXPECT_THROW(Subscriber<ValveSampleMessage>{gateway}, TransportError);
+  Participant monitor(With("monitor"));
+  EXPECT_THROW(Publisher<ValveSampleMessage>{monitor}, TransportError);
+  const Publisher<FaultEvent> events(monitor);
+  const Subscriber<FaultEvent> read(reader);
+  EXPECT_TRUE(events.WaitForReaders(1, kPatience));
+}
+
+TEST_F(SecurityTest, ABadKeyIsRefusedBeforeTheBusIsTouched) {
+  std::filesystem::remove(Keys() / "monitor" / "cert.pem");
+  EXPECT_THROW(Participant{With("monitor")}, ConfigError);
+  EXPECT_THROW(Participant{With("nobody")}, ConfigError);
+}
+
+}  // namespace
+}  // namespace fdi::idl
