@@ -10,6 +10,7 @@ bin=$1
 seconds=${FDI_SOAK_SECONDS:-60}
 valves=${FDI_SOAK_VALVES:-100}
 speed=${FDI_SOAK_SPEED:-100}
+episode=${FDI_SOAK_EPISODE:-600}
 max_slope_kb_min=${FDI_SOAK_SLOPE:-$((seconds > 480 ? 1024 : 10240))}
 max_wal_mb=80
 max_bytes_per_sample=30
@@ -39,9 +40,13 @@ for _ in $(seq 100); do
   grep -q monitor_ready "$out/monitor.log" && break
   sleep 0.1
 done
+faults=()
+for ((start = episode; start < seconds * speed; start += episode)); do
+  faults+=(--fault "f19:abrupt@$start:strength=0.5:until=$((start + episode / 4))")
+done
 "$bin/fdi-simulator" --domain "$domain" run --valves "$valves" \
   --speed "$speed" --duration $((seconds * speed)) \
-  --parameters paper-operating-point --fault f19:incipient@1000+2000 \
+  --parameters paper-operating-point "${faults[@]}" \
   >"$out/publisher.out" 2>"$out/publisher.log" &
 publisher=$!
 
@@ -68,10 +73,12 @@ wal=$(awk '{w = ($3 > $4 ? $3 : $4); if (w > m) m = w} END {printf "%.1f", m / 1
 samples=$(sqlite3 -readonly "$FDI_DATA/runs.db" 'select sum(samples) from run')
 bytes=$(awk "BEGIN {printf \"%.1f\", $(size "$FDI_DATA/runs.db") / $samples}")
 expected=$((seconds * speed * valves))
+episodes=$(sqlite3 -readonly "$FDI_DATA/history.db" \
+  'select count(*) from fault_history')
 echo "soak: $lasted s, $samples of $expected samples recorded;" \
   "VmRSS at most $peak kB, slope $slope kB/min after $warm s;" \
   "runs.db $bytes bytes a sample, history.db" \
-  "$(($(size "$FDI_DATA/history.db") / 1024)) kB, WAL at most $wal MB;" \
+  "$(($(size "$FDI_DATA/history.db") / 1024)) kB, $episodes episodes, WAL at most $wal MB;" \
   "load $(cut -d' ' -f1 /proc/loadavg)"
 "$bin/fdi-store" doctor >/dev/null || fail "doctor complains"
 check() {  # VALUE LIMIT WHAT
@@ -80,4 +87,5 @@ check() {  # VALUE LIMIT WHAT
 check "$slope" "$max_slope_kb_min" "slope of VmRSS [kB/min]"
 check "$bytes" "$max_bytes_per_sample" "bytes a sample"
 check "$wal" "$max_wal_mb" "WAL [MB]"
+check "$(((${#faults[@]} / 2 + 1) * valves / 2 - episodes))" 0 "episodes missing"
 check "$((expected - samples))" "$((expected / 100))" "samples not recorded"
