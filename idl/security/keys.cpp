@@ -330,9 +330,9 @@ std::string ReadSigned(const fs::path& file, X509* authority) {
   if (PKCS7_verify(signature.get(), nullptr, store.get(), content, out.get(),
                    PKCS7_TEXT) != 1) {
     Refuse(file, "its signature does not hold (" + Reason() +
-                     "): it was changed, or another authority has signed it; "
-                     "take the folder of the key anew from that of the "
-                     "authority, or make another key");
+                     "): it was changed, or another authority has signed it. "
+                     "Remove the folder of the key, and make it anew with "
+                     "fdi-store keys add");
   }
   return TextOf(out.get());
 }
@@ -573,7 +573,7 @@ std::vector<KeyInfo> ListKeys(const fs::path& folder) {
 }
 
 KeyInfo CheckKey(const fs::path& folder, std::int64_t now_ns) {
-  const KeyInfo info = Examine(folder);
+  KeyInfo info = Examine(folder);
   const std::string renew =
       "; fdi-store keys renew FOLDER " + info.name + " makes a new one";
   if (now_ns > info.until_ns) {
