@@ -139,6 +139,7 @@ class CheckedTransport : public transport::ChainingTransport {
     return low_level_transport_->get_configuration();
   }
 
+  // NOLINTBEGIN(readability-function-size): the library's parameters.
 #if FDI_FAST_DDS == 2
   bool send(rtps::SenderResource* sender, const rtps::octet* buffer,
 #else
@@ -150,6 +151,7 @@ class CheckedTransport : public transport::ChainingTransport {
             const std::chrono::steady_clock::time_point& timeout) override {
     return sender->send(buffer, bytes, begin, end, timeout);
   }
+  // NOLINTEND(readability-function-size)
 
   void receive(transport::TransportReceiverInterface* receiver,
                const rtps::octet* buffer, std::uint32_t bytes,

@@ -141,8 +141,32 @@ HttpPage ReadinessPage(const Readiness& readiness) {
                                     {"publishers", readiness.publishers}});
 }
 
+// What came from the network, and who.
+void AddWhatWasRefused(const StatusFacts& facts,
+                       std::vector<Measure>& measures) {
+  constexpr Type kCounter = Type::kCounter;
+  std::uint64_t refused_datagrams = 0;
+  for (std::size_t i = 0; i < idl::kDatagramVerdictCount; ++i) {
+    const auto verdict = static_cast<idl::DatagramVerdict>(i);
+    refused_datagrams += i == 0 ? 0 : facts.datagrams[i];
+    measures.push_back({"", "fdi_dds_datagrams_total", kCounter,
+                        "Datagrams by the check of their framing: sound, or "
+                        "why they were dropped",
+                        "verdict",
+                        std::string(idl::DatagramVerdictName(verdict)),
+                        facts.datagrams[i]});
+  }
+  measures.push_back(
+      {"dds_refused_datagrams", "", kCounter, "", "", "", refused_datagrams});
+  measures.push_back({"dds_refused_participants",
+                      "fdi_dds_participants_refused_total", kCounter,
+                      "Participants without a key of our authority", "", "",
+                      facts.refused_participants});
+}
+
 }  // namespace
 
+// NOLINTNEXTLINE(readability-function-size): a table.
 std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
   constexpr Type kCounter = Type::kCounter;
   constexpr Type kGauge = Type::kGauge;
@@ -162,27 +186,13 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
   constexpr std::string_view kWaitingHelp =
       "Samples, records or points of evidence in a queue";
   std::vector<Measure> measures = facts.counters.Measures();
-  std::uint64_t refused_datagrams = 0;
-  for (std::size_t i = 0; i < idl::kDatagramVerdictCount; ++i) {
-    const auto verdict = static_cast<idl::DatagramVerdict>(i);
-    refused_datagrams += i == 0 ? 0 : facts.datagrams[i];
-    measures.push_back({"", "fdi_dds_datagrams_total", kCounter,
-                        "Datagrams by the check of their framing: sound, or "
-                        "why they were dropped",
-                        "verdict",
-                        std::string(idl::DatagramVerdictName(verdict)),
-                        facts.datagrams[i]});
-  }
+  AddWhatWasRefused(facts, measures);
   const std::vector<Measure> others{
       {"dds_lost", "fdi_dds_samples_lost_total", kCounter,
        "Samples written that will never come", "", "", samples.lost},
       {"dds_undecodable", "fdi_dds_samples_undecodable_total", kCounter,
        "Samples with a value that no publisher of ours sends", "", "",
        samples.undecodable},
-      {"dds_refused_datagrams", "", kCounter, "", "", "", refused_datagrams},
-      {"dds_refused_participants", "fdi_dds_participants_refused_total",
-       kCounter, "Participants without a key of our authority", "", "",
-       facts.refused_participants},
       {"dds_rejected_instances", kRejected, kCounter, kRejectedHelp, "reason",
        "max_valves", samples.rejected_instances},
       {"dds_rejected_samples", kRejected, kCounter, kRejectedHelp, "reason",
