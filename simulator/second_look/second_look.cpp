@@ -53,6 +53,12 @@ bool ActsOnInputs(int fault) {
   return fault == 7 || fault == 17 || TransmitterOf(fault).has_value();
 }
 
+// A channel's share of Q, and what of it the errors alone contribute.
+struct ChannelFit {
+  double cost{0.0};
+  double errors{0.0};
+};
+
 class Looker {
  public:
   Looker(const ValvePhysics& physics, const LookWindow& window)
@@ -75,13 +81,15 @@ class Looker {
   InputRow InputAt(int row, int fault, double strength) const;
   Trajectory Simulate(int fault, double strength, Course course);
   Trajectory FlowOnly(int fault, double strength, Course course) const;
-  double ChannelCost(const Trajectory& answers, bool flow,
-                     double slow_sd) const;
+  ChannelFit FitChannel(const Trajectory& answers, bool flow,
+                        double slow_sd) const;
+  double ErrorsOf(const Trajectory& answers) const;
   double InputCost(int fault, double strength, Course course,
                    const Trajectory& answers) const;
   double Cost(int fault, double strength, Course course,
               const Trajectory& answers) const;
   std::vector<Hypothesis> Hypotheses() const;
+  double StopAsSeen() const;
   void Try(Hypothesis& hypothesis, double strength);
   void TryCourse(Hypothesis& hypothesis, Course course);
   void Refine(Hypothesis& hypothesis);
@@ -211,9 +219,9 @@ Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
   return answers;
 }
 
-// One channel's share of Q, its shift found by reweighting.
-double Looker::ChannelCost(const Trajectory& answers, bool flow,
-                           double slow_sd) const {
+// The shift is found by reweighting.
+ChannelFit Looker::FitChannel(const Trajectory& answers, bool flow,
+                              double slow_sd) const {
   const Scatter& scatter = flow ? physics_.flow : physics_.x;
   const int settle = std::min(10, detection_ / 2);  // It starts at rest.
   std::vector<double> errors;
@@ -246,13 +254,25 @@ double Looker::ChannelCost(const Trajectory& answers, bool flow,
     }
     shift = sum / weights;
   }
-  double cost = 0.0;
+  ChannelFit fit;
   for (std::size_t k = 0; k < errors.size(); ++k) {
     const double e = errors[k] - shift;
-    cost += kFreedom * std::log1p(e * e / (widths[k] * kFreedom)) +
-            std::log(widths[k]);
+    fit.errors += kFreedom * std::log1p(e * e / (widths[k] * kFreedom));
+    fit.cost += std::log(widths[k]);
   }
-  return (cost + prior * shift * shift) / scatter.correlation_time;
+  fit.cost = (fit.errors + fit.cost + prior * shift * shift) /
+             scatter.correlation_time;
+  fit.errors /= scatter.correlation_time;
+  return fit;
+}
+
+// The logarithms of the widths belong to the likelihood, not here: they grow
+// with the effect of a fault, however well it fits.
+double Looker::ErrorsOf(const Trajectory& answers) const {
+  return FitChannel(answers, false, physics_.x.slow_sd).errors +
+         (Measures(Signal::kF)
+              ? FitChannel(answers, true, physics_.flow.slow_sd).errors
+              : 0.0);
 }
 
 // How unusual the inputs are, behind the detection, if the fault is there.
@@ -313,10 +333,10 @@ double Looker::InputCost(int fault, double strength, Course course,
 
 double Looker::Cost(int fault, double strength, Course course,
                     const Trajectory& answers) const {
-  double cost = ChannelCost(answers, false, physics_.x.slow_sd) +
+  double cost = FitChannel(answers, false, physics_.x.slow_sd).cost +
                 InputCost(fault, strength, course, answers);
   if (Measures(Signal::kF)) {
-    cost += ChannelCost(answers, true, physics_.flow.slow_sd);
+    cost += FitChannel(answers, true, physics_.flow.slow_sd).cost;
   }
   return cost;
 }
@@ -337,6 +357,18 @@ std::vector<Hypothesis> Looker::Hypotheses() const {
     }
   }
   return hypotheses;
+}
+
+// Where a stop would be that X does not pass behind the detection, as a
+// strength of f1. Between two stops, one passed and one not, X is not linear.
+double Looker::StopAsSeen() const {
+  std::vector<double> x;
+  for (int k = detection_; k < rows_; ++k) {
+    x.push_back(window_.rows[static_cast<std::size_t>(k)].x_pct);
+  }
+  const auto most = x.begin() + static_cast<std::ptrdiff_t>(x.size() * 9 / 10);
+  std::nth_element(x.begin(), most, x.end());
+  return std::clamp(1.0 - 0.01 * *most, 0.0, 1.0);
 }
 
 void Looker::Try(Hypothesis& h, double strength) {
@@ -430,21 +462,29 @@ Explanation Looker::Explain(const Hypothesis& h, double scale) const {
 
 SecondLook Looker::Run(const std::stop_token& stop) {
   const bool has_flow = Measures(Signal::kF);
-  const double none = Cost(0, 0.0, {detection_, false}, healthy_);
   // A constant shift of one reading by some per cent: drift.
   constexpr double kDrift = 0.02;
   const InstrumentParameters& i = physics_.parameters.instruments;
-  const double x_shift =
-      ChannelCost(healthy_, false,
-                  kDrift * (i.position.high - i.position.low)) -
-      ChannelCost(healthy_, false, physics_.x.slow_sd);
-  const double flow_shift =
-      has_flow
-          ? ChannelCost(healthy_, true, kDrift * (i.flow.high - i.flow.low)) -
-                ChannelCost(healthy_, true, physics_.flow.slow_sd)
-          : 0.0;
-  const double unmoved =
-      std::min({none, none + kPriceOfFault + std::min(x_shift, flow_shift)});
+  const auto drifted = [&](bool flow, const Transmitter& transmitter,
+                           const Scatter& scatter) {
+    ChannelFit fit = FitChannel(healthy_, flow,
+                                kDrift * (transmitter.high - transmitter.low));
+    const ChannelFit usual = FitChannel(healthy_, flow, scatter.slow_sd);
+    fit.cost += kPriceOfFault - usual.cost;
+    fit.errors -= usual.errors;
+    return fit;
+  };
+  ChannelFit unmoved{};
+  ChannelFit shifted = drifted(false, i.position, physics_.x);
+  if (has_flow) {
+    const ChannelFit flow = drifted(true, i.flow, physics_.flow);
+    shifted = flow.cost < shifted.cost ? flow : shifted;
+  }
+  if (shifted.cost < 0.0) {
+    unmoved = shifted;
+  }
+  unmoved.cost += Cost(0, 0.0, {detection_, false}, healthy_);
+  unmoved.errors += ErrorsOf(healthy_);
 
   std::vector<Hypothesis> hypotheses = Hypotheses();
   const double inputs = InputCost(0, 0.0, {detection_, false}, healthy_);
@@ -459,8 +499,16 @@ SecondLook Looker::Run(const std::stop_token& stop) {
     for (const double strength : {0.1, 0.3, 0.6, 1.0}) {
       Try(h, strength);
     }
+    if (h.fault == 1) {
+      Try(h, StopAsSeen());
+    } else if (h.fault == 10 || h.fault == 16) {
+      // Nothing shows until the force lacks, and little more does beyond.
+      for (const double strength : {0.5, 0.7, 0.8, 0.9}) {
+        Try(h, strength);
+      }
+    }
   }
-  constexpr std::array<std::size_t, 4> kKept{12, 10, 7, 5};
+  constexpr std::array<std::size_t, 8> kKept{12, 10, 7, 5, 5, 5, 5, 5};
   for (std::size_t round = 0; round < kKept.size(); ++round) {
     std::stable_sort(
         hypotheses.begin(), hypotheses.end(),
@@ -492,14 +540,16 @@ SecondLook Looker::Run(const std::stop_token& stop) {
   const double readings =
       (rows_ - 10) * (1.0 / physics_.x.correlation_time +
                       (has_flow ? 1.0 / physics_.flow.correlation_time : 0.0));
-  const double best =
-      std::min(unmoved, hypotheses.front().cost + kPriceOfFault);
+  const Hypothesis& first = hypotheses.front();
+  const bool faulty = first.cost + kPriceOfFault < unmoved.cost;
+  const double best = faulty ? first.cost + kPriceOfFault : unmoved.cost;
   SecondLook look;
+  look.best = faulty ? first.simulated.at(first.strength) : healthy_;
   look.readings = readings;
-  look.misfit = best / readings;
+  look.misfit = (faulty ? ErrorsOf(look.best) : unmoved.errors) / readings;
   const double scale = std::max(1.0, look.misfit);
   Explanation nothing;
-  nothing.distance = (unmoved - best) / scale;
+  nothing.distance = (unmoved.cost - best) / scale;
   look.ranked.push_back(nothing);
   for (const Hypothesis& h : hypotheses) {
     if (h.simulated.empty()) {
@@ -513,10 +563,6 @@ SecondLook Looker::Run(const std::stop_token& stop) {
                    [](const Explanation& a, const Explanation& b) {
                      return a.distance < b.distance;
                    });
-  const bool faulty = look.ranked.front().fault != 0;
-  look.best = faulty
-                  ? hypotheses.front().simulated.at(hypotheses.front().strength)
-                  : healthy_;
   look.simulated_rows = simulated_;
   return look;
 }

@@ -34,8 +34,10 @@ TEST_P(NamedFaultTest, ComesFirstWithItsStrengthInTheInterval) {
 
 INSTANTIATE_TEST_SUITE_P(SecondLook, NamedFaultTest,
                          ::testing::Values(std::pair{1, 0.45},
+                                           std::pair{1, 0.38},
                                            std::pair{13, -0.2},
                                            std::pair{16, 0.7},
+                                           std::pair{16, 0.78},
                                            std::pair{19, 0.25}));
 
 TEST(SecondLookTest, FindsAGrowingFault) {
@@ -51,6 +53,12 @@ TEST(SecondLookTest, FindsAGrowingFault) {
 TEST(SecondLookTest, FindsNothingInAHealthyWindow) {
   EXPECT_EQ(AnswerOf(LookAgain(Physics(), Window({}))).outcome,
             LookOutcome::kNothing);
+}
+
+TEST(SecondLookTest, MisfitDoesNotGrowWithTheEffectOfAFault) {
+  const SecondLook look = LookAgain(Physics(), Window({Abrupt(10, 0.85)}));
+  EXPECT_EQ(look.ranked.front().fault, 10);
+  EXPECT_LT(look.misfit, 1.2);
 }
 
 TEST(SecondLookTest, EndsWithoutAnAnswerIfItIsAskedToStop) {
