@@ -15,6 +15,10 @@ constexpr std::size_t kShortest = 30;
 constexpr std::int64_t kFirstAge = 40 * kSecond;
 // None of the hypotheses follows the record: errors of so many healthy ones.
 constexpr double kMostMisfit = 12.0;
+// Nor does no fault, where no fault gains on it.
+constexpr double kMostHealthy = 4.0;
+// Healthy windows have about 1.
+constexpr double kGoodMisfit = 2.0;
 
 std::int64_t AgeAfter(std::int64_t age_ns) {
   return age_ns < 150 * kSecond   ? 150 * kSecond
@@ -31,15 +35,26 @@ bool Has(const std::vector<Explanation>& faults, int fault) {
                      [&](const auto& e) { return e.fault == fault; });
 }
 
-// Faults that what a healthy record leaves open would tell apart. A leak
-// through the seat and an open bypass differ by the shape of the bypass valve;
-// a stop far open, a torn diaphragm and too little supply by gain and supply
-// pressure.
+// Faults that the data do not tell apart, or only by what a healthy record
+// leaves open.
 struct Likeness {
   std::array<int, 3> faults;
-  double share;  // Of the distance of no fault, at which one joins another.
+  bool (*holds)(const SecondLook& look, const Explanation& e, double nothing);
 };
-constexpr Likeness kLikenesses[] = {{{6, 18, 0}, 1.0}, {{1, 10, 16}, 0.06}};
+constexpr Likeness kLikenesses[] = {
+    // Leak through the seat and open bypass have one shape. What tells them
+    // apart is that a leak is small.
+    {{6, 18, 0},
+     [](const SecondLook&, const Explanation& e, double nothing) {
+       return std::abs(e.strength) < 1.0 && e.distance <= nothing;
+     }},
+    // A stop far open, a torn diaphragm and too little supply differ by gain
+    // and supply pressure. Where the best leaves no more than a healthy valve
+    // does, it needs no such excuse.
+    {{1, 10, 16},
+     [](const SecondLook& look, const Explanation& e, double nothing) {
+       return look.misfit > kGoodMisfit && e.distance <= 0.06 * nothing;
+     }}};
 
 void KeepTogether(const SecondLook& look, double nothing,
                   std::vector<Explanation>& set) {
@@ -52,7 +67,7 @@ void KeepTogether(const SecondLook& look, double nothing,
     for (const Explanation& e : look.ranked) {
       if (e.fault != 0 && !Has(set, e.fault) &&
           std::count(alike.begin(), alike.end(), e.fault) > 0 &&
-          e.distance <= likeness.share * nothing) {
+          likeness.holds(look, e, nothing)) {
         set.push_back(e);
       }
     }
@@ -76,7 +91,8 @@ LookAnswer AnswerOf(const SecondLook& look) {
   KeepTogether(look, nothing, answer.faults);
   const bool healthy =
       nothing <= std::max(kLookMargin, kLeastGain * look.readings);
-  answer.outcome = look.misfit > kMostMisfit           ? LookOutcome::kNoneFits
+  const double most = healthy ? kMostHealthy : kMostMisfit;
+  answer.outcome = look.misfit > most                  ? LookOutcome::kNoneFits
                    : healthy                           ? LookOutcome::kNothing
                    : answer.faults.size() > kMostNamed ? LookOutcome::kUnclear
                                                        : LookOutcome::kNamed;

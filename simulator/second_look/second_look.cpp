@@ -366,7 +366,7 @@ double Looker::StopAsSeen() const {
   for (int k = detection_; k < rows_; ++k) {
     x.push_back(window_.rows[static_cast<std::size_t>(k)].x_pct);
   }
-  const auto most = x.begin() + static_cast<std::ptrdiff_t>(x.size() * 9 / 10);
+  const auto most = x.begin() + static_cast<std::ptrdiff_t>(x.size() * 49 / 50);
   std::nth_element(x.begin(), most, x.end());
   return std::clamp(1.0 - 0.01 * *most, 0.0, 1.0);
 }
