@@ -123,11 +123,23 @@ class CheckedType : public Generated {
     Disown(data);
     Generated::delete_data(data);
   }
-  using Generated::compute_key;  // The other form calls this one.
   bool compute_key(const void* data, rtps::InstanceHandle_t& handle,
                    bool force_md5) override {
     const std::lock_guard lock(key_mutex_);
     return Generated::compute_key(data, handle, force_md5);
+  }
+  // Of a message without a hash of its key. One without a handle belongs to no
+  // instance, and Fast DDS 3.1.2 then follows an iterator at its end
+  // (update_instance_nts). What cannot be read has a handle of its own here,
+  // and is refused when it is taken.
+  bool compute_key(rtps::SerializedPayload_t& payload,
+                   rtps::InstanceHandle_t& handle, bool force_md5) override {
+    typename Generated::type message;
+    if (!IsRead(payload, &message) ||
+        !compute_key(&message, handle, force_md5)) {
+      handle.value[0] = 0xff;
+    }
+    return true;
   }
 #endif
 
@@ -136,13 +148,39 @@ class CheckedType : public Generated {
   }
 
  private:
-  bool Checked(auto& payload, void* data) {
+  bool IsRead(auto& payload, void* data) {
     try {
-      if (Generated::deserialize(payload, data)) {
-        return true;
-      }
+#if FDI_FAST_DDS == 2
+      return Generated::deserialize(payload, data);
+#else
+      return Generated::deserialize(payload, data) && IsWhole(payload, data);
+#endif
     } catch (const std::exception&) {
-      // E.g. bad_alloc of an absurd length; counted below.
+      return false;  // E.g. bad_alloc of an absurd length.
+    }
+  }
+#if FDI_FAST_DDS != 2
+  // Fast CDR 2 takes the end of the bytes between any two members for the end
+  // of the message; the others keep what they held before. So a message has to
+  // be as long as what was read from it. The calculated size may be some bytes
+  // too large, for it aligns the elements of an empty list.
+  bool IsWhole(const rtps::SerializedPayload_t& payload, const void* data) {
+    constexpr rtps::octet kFirstOfXcdr2 = 6;  // Of the encapsulations.
+    const auto form = payload.data[1] < kFirstOfXcdr2
+                          ? dds::XCDR_DATA_REPRESENTATION
+                          : dds::XCDR2_DATA_REPRESENTATION;
+    const std::uint32_t size = Generated::calculate_serialized_size(data, form);
+    if (payload.length >= size) {
+      return true;
+    }
+    rtps::SerializedPayload_t again(size);
+    return Generated::serialize(data, again, form) &&
+           payload.length >= again.length;
+  }
+#endif
+  bool Checked(auto& payload, void* data) {
+    if (IsRead(payload, data)) {
+      return true;
     }
     const std::lock_guard lock(objects_mutex_);
     if (!objects_of_library_.contains(data)) {

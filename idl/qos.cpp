@@ -14,6 +14,10 @@ constexpr int kSamplesInFlight = 4096;
 // valve, and the library counts what is missing on the way towards it: 16 per
 // valve halved the rate of 2000 valves.
 constexpr int kReaderBacklog = 131072;
+// Samples in a datagram. Fast DDS 3.1 holds their memory until it is sent, also
+// of those that a newer one has replaced: without room beside the history,
+// writing too fast fails with OUT_OF_RESOURCES. Allocated when needed.
+constexpr int kSamplesInDatagram = 1024;
 constexpr int kModelSets = 256;
 constexpr int kMonitors = 64;
 
@@ -52,6 +56,7 @@ EndpointQos Common(const std::string& name) {
   writer.durability().kind = dds::VOLATILE_DURABILITY_QOS;
   writer.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
   writer.data_sharing().off();
+  writer.resource_limits().extra_samples = kSamplesInDatagram;
   writer.endpoint().history_memory_policy = rtps::DYNAMIC_REUSABLE_MEMORY_MODE;
   HeartbeatPeriod(writer) = Milliseconds(50);
   dds::DataReaderQos& reader = qos.reader;

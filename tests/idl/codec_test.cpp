@@ -359,6 +359,53 @@ TEST(CodecTest, BytesThatAreNoMessageAreCountedNotThrown) {
   EXPECT_EQ(type.refused(), 1U);
 }
 
+// Into an object that holds an earlier message.
+TEST(CodecTest, AMessageThatIsCutAnywhereIsRefused) {
+  const auto expect_refused = [](auto& type, auto wire) {
+    const std::string bytes = Serialized(type, &wire);
+    ASSERT_TRUE(Deserialize(type, bytes, &wire));
+    for (std::size_t length = 0; length < bytes.size(); ++length) {
+      EXPECT_FALSE(Deserialize(type, bytes.substr(0, length), &wire))
+          << length << " of " << bytes.size();
+    }
+  };
+  v1::ValveSample sample;
+  Codec<ValveSampleMessage>::Encode(SomeSample(), sample);
+  CheckedType<v1::ValveSamplePubSubType> samples;
+  expect_refused(samples, sample);
+  v1::DecisionVector decision;
+  Codec<DecisionMessage>::Encode(FullDecision(), decision);
+  CheckedType<v1::DecisionVectorPubSubType> decisions;
+  expect_refused(decisions, decision);
+  DecisionMessage small;
+  small.valve_id = "V";
+  Codec<DecisionMessage>::Encode(small, decision);
+  expect_refused(decisions, decision);  // Ends with empty lists.
+}
+
+#if FDI_FAST_DDS != 2
+TEST(CodecTest, WhatHasNoKeyHasAHandleAllTheSame) {
+  CheckedType<v1::ValveSamplePubSubType> type;
+  v1::ValveSample sample;
+  Codec<ValveSampleMessage>::Encode(SomeSample(), sample);
+  const std::string bytes = Serialized(type, &sample);
+  const auto handle_of = [&](const std::string& message) {
+    rtps::SerializedPayload_t payload(
+        static_cast<std::uint32_t>(message.size() + 1));
+    std::copy(message.begin(), message.end(), payload.data);
+    payload.length = static_cast<std::uint32_t>(message.size());
+    rtps::InstanceHandle_t handle;
+    EXPECT_TRUE(type.compute_key(payload, handle, false));
+    EXPECT_TRUE(handle.isDefined());
+    return handle;
+  };
+  EXPECT_EQ(handle_of(bytes), HandleOf(type, &sample));
+  EXPECT_NE(handle_of(bytes.substr(0, 40)), HandleOf(type, &sample));
+  handle_of("");
+  EXPECT_EQ(type.refused(), 0U);  // Counted when it is taken.
+}
+#endif
+
 // Cyclone DDS ends the instance "FV-101" with its key, little endian.
 TEST(CodecTest, AShortKeyIsReadFromTheHandle) {
   const auto key_of = [](const std::string& bytes) {
