@@ -135,12 +135,6 @@ bool ContentIsSound(std::uint8_t kind, std::uint8_t flags, const Body& body) {
   }
 }
 
-// Fast DDS 3.1 sends some zeros behind the last submessage over shared memory.
-bool IsZero(Bytes bytes) {
-  return bytes.front() == 0 &&
-         std::ranges::all_of(bytes, [](std::uint8_t b) { return b == 0; });
-}
-
 // Who speaks, as long as no INFO_SRC says otherwise.
 class Speaker {
  public:
@@ -203,7 +197,7 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
   }
   Speaker speaker(datagram);
   std::size_t sound = kHeaderBytes;  // Up to here, all is handed over.
-  for (std::size_t at = sound; at < size && !IsZero(datagram.subspan(at));) {
+  for (std::size_t at = sound; at < size;) {
     if (size - at < kSubmessageHeaderBytes) {
       return {DatagramVerdict::kLength, 0};
     }

@@ -118,15 +118,6 @@ TEST(DatagramTest, VendorsSubmessagesAreCutOffAtTheEndAndRefusedElsewhere) {
   EXPECT_EQ(VerdictOn(StatisticsInFront()), DatagramVerdict::kKind);
 }
 
-TEST(DatagramTest, ZerosAtTheEndAreCutOffAndRefusedElsewhere) {
-  const Bytes pad = With(Header(), 0x01, Zeros(4));
-  const CheckedDatagram checked = Check(pad + Zeros(76));
-  EXPECT_EQ(checked.verdict, DatagramVerdict::kSound);
-  EXPECT_EQ(checked.bytes, pad.size());
-  EXPECT_EQ(VerdictOn(With(pad + Zeros(76), 0x01, Zeros(4))),
-            DatagramVerdict::kKind);
-}
-
 TEST(DatagramTest, SequenceNumbersAreThoseOfWriters) {
   EXPECT_EQ(VerdictOn(With(Header(), 0x07, Heartbeat(Sequence(4, 9)))),
             DatagramVerdict::kSound);
