@@ -299,7 +299,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kHuber = 1.345;  // Corner of the loss.
+constexpr double kHuber = 1.345;   // Corner of the loss.
+constexpr double kAtBound = 1e-3;  // Of a search, in the logarithm.
 constexpr int kMostIterations = 10;
 
 // The noise of a transmitter; one without noise still reads in steps.
@@ -505,7 +506,9 @@ void Identification::KeepIdentified(
   }
 }
 
-// Tries each stated parameter beside those that are kept.
+// Tries each stated parameter beside those that are kept. One that goes to a
+// bound of its search stands for something else that the model leaves out, and
+// whether it pays then hangs on the last digit of the readings.
 void Identification::AddStated(Hypothesis& hypothesis,
                                std::vector<FittedParameter>& rejected) const {
   for (const ValveUnknown& unknown :
@@ -523,7 +526,11 @@ void Identification::AddStated(Hypothesis& hypothesis,
     const double before =
         MeanHuberLoss(hypothesis.fit.residuals, scale, kHuber);
     const double after = MeanHuberLoss(trial.fit.residuals, scale, kHuber);
-    if (sd <= options_.identified_sd &&
+    const double value = trial.point[trial.point.size() - 1];
+    const PointBounds bounds = BoundsOf({unknown});
+    const bool inside = value > bounds.lower[0] + kAtBound &&
+                        value < bounds.upper[0] - kAtBound;
+    if (sd <= options_.identified_sd && inside &&
         after < (1.0 - options_.least_gain) * before) {
       hypothesis = std::move(trial);
     } else {

@@ -168,6 +168,19 @@ TEST(ValveIdentificationTest, LeavesAStatedValueThatDoesNotFit) {
   ExpectRecovered(fit, "positioner.gain", 40.0, 0.1);
 }
 
+TEST(ValveIdentificationTest, LeavesAStatedValueAloneThatRunsToABound) {
+  const ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");
+  ValveParameters truth = nominal;
+  truth.actuator.supply_pressure_gauge_pa *= 3.0;  // Searched up to 2.0.
+  ValveFitOptions options;
+  options.least_gain = 0.001;
+  const ValveFit fit = FitValve({Recording(truth, 400, 3)}, nominal, options);
+  const FittedParameter& supply =
+      Named(fit, "actuator.supply_pressure_gauge_pa");
+  EXPECT_FALSE(supply.identified);
+  EXPECT_EQ(supply.value, supply.nominal);
+}
+
 TEST(ValveIdentificationTest, NamesWhatItCannotUse) {
   const ValveParameters valve = ParameterSet("lublin-actuator-3-refit");
   HealthyRecord record = Recording(valve, 179, 1);
