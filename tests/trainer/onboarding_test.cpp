@@ -42,6 +42,25 @@ TrainingRun RunOf(const Stretch& stretch) {
   return run;
 }
 
+// T1 as a swinging-door export has it: at its first and last sample.
+TEST(OnboardingPresetTest, WhatIsHardlyReadIsNoChannel) {
+  TrainingRun run = RunOf(Strange(400.0));
+  for (std::size_t k = 1; k + 1 < run.samples.size(); ++k) {
+    run.samples[k].sample.quality[Index(Signal::kT1)] =
+        SignalQuality::kUncertain;
+    run.samples[k].sample.quality[Index(Signal::kP2)] =
+        k % 3 == 0 ? SignalQuality::kGood : SignalQuality::kUncertain;
+  }
+  std::vector<ChannelPlan> channels = OnboardingPreset(kBasicSignals).channels;
+  const std::size_t all = channels.size();
+
+  EXPECT_EQ(LeaveOutUnread({run}, channels), std::vector<std::string>{"T1"});
+  EXPECT_EQ(channels.size(), all - 1);
+  EXPECT_TRUE(std::ranges::none_of(channels, [](const ChannelPlan& plan) {
+    return plan.output == Signal::kT1;
+  }));
+}
+
 TEST(FaultSynthesizerTest, MismatchOfTheSimulationStaysInTheReadings) {
   const FaultSynthesizer synthesize(Lublin());
   const Stretch healthy = Strange(200.0);

@@ -269,6 +269,11 @@ cli::Report ReportOf(const Onboarding& onboarding, const std::string& title) {
                 " s of the record with X at a stop, and the minute after, were "
                 "left out");
   }
+  for (const std::string& channel : onboarding.unread) {
+    report.Line(channel +
+                " has fewer than 100 readings: filled in as an input, "
+                "not watched");
+  }
   report.Line("not told apart: " + GroupsText(models) +
               "; not seen at half their strengths: " +
               FaultsText(models.undetectable) + "\n");

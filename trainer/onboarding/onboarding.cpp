@@ -200,6 +200,37 @@ TrainingOptions OnboardingPreset(SignalMask signals) {
   return options;
 }
 
+namespace {
+
+// Not filled in when a table was resampled.
+bool IsMeasured(const Sample& sample, Signal signal) {
+  return sample.quality[Index(signal)] == SignalQuality::kGood;
+}
+
+}  // namespace
+
+std::vector<std::string> LeaveOutUnread(const std::vector<TrainingRun>& runs,
+                                        std::vector<ChannelPlan>& channels) {
+  constexpr std::ptrdiff_t kLeastReadings = 100;
+  std::vector<std::string> unread;
+  std::erase_if(channels, [&](const ChannelPlan& plan) {
+    if (plan.output == Signal::kX || plan.output == Signal::kF) {
+      return false;
+    }
+    std::ptrdiff_t readings = 0;
+    for (const TrainingRun& run : runs) {
+      readings += std::ranges::count_if(run.samples, [&](const auto& labelled) {
+        return IsMeasured(labelled.sample, plan.output);
+      });
+    }
+    if (readings < kLeastReadings) {
+      unread.push_back(plan.name);
+    }
+    return readings < kLeastReadings;
+  });
+  return unread;
+}
+
 std::vector<TrainingRun> WithoutStops(std::vector<TrainingRun> runs) {
   constexpr double kStop = 2.0;  // from an end of the travel [%]
   constexpr double kAfterS = 60.0;
@@ -292,11 +323,6 @@ ValveType InUnit(ValveType type, FlowUnit unit) {
     instruments.flow_unit = unit;
   }
   return type;
-}
-
-// Not filled in when a table was resampled.
-bool IsMeasured(const Sample& sample, Signal signal) {
-  return sample.quality[Index(signal)] == SignalQuality::kGood;
 }
 
 // Stretches without a gap as records of the simulator.
@@ -437,9 +463,10 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   RequireHealthy(runs);
   const SignalMask signals =
       runs.front().samples.front().sample.present & kBasicSignals;
-  const TrainingOptions training = TrainingOf(options, signals);
+  TrainingOptions training = TrainingOf(options, signals);
   CheckRecords(runs);
   Onboarding result;
+  result.unread = LeaveOutUnread(runs, training.channels);
   result.type = (signals & MaskOf(Signal::kF)) != 0
                     ? InUnit(options.type, runs.front().flow_unit)
                     : options.type;

@@ -64,6 +64,13 @@ TrainingRun SimulateHealthyRun(const ValveType& type, double duration_s);
 /// @throws DataError if CV or X is not among them.
 TrainingOptions OnboardingPreset(SignalMask signals);
 
+/// Takes T1, P1 and P2 out of `channels` where `runs` have fewer than 100
+/// readings of them, the others being filled in by resampling: a slow
+/// transmitter in a swinging-door export.
+/// @returns the names of these channels.
+std::vector<std::string> LeaveOutUnread(const std::vector<TrainingRun>& runs,
+                                        std::vector<ChannelPlan>& channels);
+
 struct OnboardingOptions {
   std::string name;  ///< Of the model set.
   ValveType type;    ///< Where the fit starts, or what is taken as it is.
@@ -91,6 +98,7 @@ struct Onboarding {
   ValveType type;  ///< With the parameters that the faults were simulated by.
   std::optional<simulator::ValveFit> fit;
   std::vector<ChannelFit> channels;
+  std::vector<std::string> unread;  ///< Channels of LeaveOutUnread().
   std::optional<CoverageTable> coverage;
   SignalMask signals{0};   ///< That the valve measures.
   double hours{0.0};       ///< Of healthy data.
