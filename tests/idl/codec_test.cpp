@@ -427,6 +427,19 @@ TEST(CodecTest, AShortKeyIsReadFromTheHandle) {
   EXPECT_EQ(key_of(""), "");
 }
 
+// The number behind the name is aligned, and the gap is part of the sum.
+TEST(CodecTest, AKeyDoesNotHangOnTheKeyBefore) {
+  CheckedType<v1::ModelSetInfoPubSubType> type;
+  const auto handle_of = [&](const std::string& name) {
+    v1::ModelSetInfo set;
+    set.model_set(name);
+    return HandleOf(type, &set);
+  };
+  const rtps::InstanceHandle_t before = handle_of("PLANT");
+  handle_of("a-longer-name");
+  EXPECT_EQ(handle_of("PLANT"), before);
+}
+
 TEST(CodecTest, ThreadsThatShareATypeGetTheirOwnKeys) {
   CheckedType<v1::ValveSamplePubSubType> type;
   std::atomic<int> wrong{0};
