@@ -1,11 +1,16 @@
 #!/usr/bin/env bash
 # A record of a valve as historians and spreadsheets export it: what onboarding
 # and diagnosis make of each form, beside the record itself (docs/import.md).
-# The record is that of the plant in FDI_REFERENCE_DATA, or a simulated one. The
-# fault is put onto its last quarter.
+# The record is that of the plant in FDI_REFERENCE_DATA; the fault is put onto
+# the last sixth of it.
 # Usage: exports.sh FOLDER-OF-PROGRAMS [all|FORM...]
 #   by default the spreadsheet alone; all prints the table of docs/results.md
+#   77 without the record
 set -euo pipefail
+[ -n "${FDI_REFERENCE_DATA:-}" ] || {
+  echo "exports: skipped, FDI_REFERENCE_DATA is not set"
+  exit 77
+}
 tests=$(cd "$(dirname "$0")" && pwd)
 source "$tests/programs.sh" "$1"
 shift
@@ -21,14 +26,8 @@ faults=(f18:abrupt@$begin:strength=0.25 f19:abrupt@$begin:strength=0.25
   faults=("${faults[0]}")
 }
 
-if [ -n "${FDI_REFERENCE_DATA:-}" ]; then
-  cp "$FDI_REFERENCE_DATA"/plant/lublin_actuator3_2001-10-11_first40min.csv \
-    healthy.csv
-else
-  "$bin/fdi-simulator" run --no-publish --speed max --excitation level-loop \
-    --seed 31 --duration 2400 --export healthy.csv >simulator.log 2>&1 ||
-    fail "the simulator fails"
-fi
+cp "$FDI_REFERENCE_DATA"/plant/lublin_actuator3_2001-10-11_first40min.csv \
+  healthy.csv
 for fault in "${faults[@]}"; do
   "$bin/fdi-trainer" inject --file healthy.csv --fault "$fault" \
     -o "${fault%%:*}.csv" >inject.log 2>&1 || fail "inject fails"
@@ -102,5 +101,5 @@ timeout 60 "$bin/fdi-simulator" --domain "$domain" replay --valve LC51_03 \
   fail "the replay fails"
 stop
 found=$(history "select fault from fault_history where valve_id = 'LC51_03'")
-[[ "|$found|" = *"|$name|"* ]] || fail "found '$found', not $name"
+[ "$found" = "f6|f18" ] || fail "found '$found', not one episode of f6|f18"
 echo "exports: $form replayed: $found"
