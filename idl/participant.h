@@ -28,7 +28,7 @@ struct DdsOptions {
   std::string qos_file;          ///< XML with profiles of qos.h; may be empty.
   /// Folder of a key as fdi-store keys makes it; without one the bus is open.
   std::string security;
-  int max_valves{2000};          ///< 1..100000; what is beyond is not served.
+  int max_valves{2000};  ///< 1..100000; what is beyond is not served.
 };
 
 /// @throws ConfigError naming the option, its value and the accepted ones.

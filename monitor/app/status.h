@@ -27,7 +27,7 @@ struct StatusFacts {
   const Counters& counters;
   ValveCensus census;
   idl::SubscriberStatus samples;
-  idl::DatagramCounts datagrams;  ///< Of all participants.
+  idl::DatagramCounts datagrams;       ///< Of all participants.
   std::uint64_t refused_participants;  ///< By the one that takes samples.
   idl::PublisherStatus decisions;
   Journal::Backlog journal;
