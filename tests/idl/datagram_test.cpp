@@ -299,6 +299,8 @@ TEST(DatagramTest, ParticipantOutlivesALeapInTheNameOfAPeer) {
   Subscriber<ValveSampleMessage> subscriber(participant);
   Publisher<ValveSampleMessage> publisher(peer);
   ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
+  // A writer that was not heard before is believed.
+  ASSERT_TRUE(subscriber.WaitForWriters(1, kPatience));
 
   const auto& prefix = peer.impl()->guid().guidPrefix.value;
   Bytes message = Header();
