@@ -8,7 +8,7 @@
 set -euo pipefail
 bin=$1
 example=$(cd "$(dirname "$0")/../docs/examples/cyclone_subscriber" && pwd)
-domain=${FDI_DOMAIN:-18}
+domain=${FDI_DOMAIN:-19}
 rounds=${FDI_KILL_ROUNDS:-5}
 command -v idlc >/dev/null && [ -e /usr/include/dds/dds.h ] || {
   echo "foreign_subscriber: skipped, no cyclonedds-dev and cyclonedds-tools"
