@@ -11,7 +11,7 @@
 #include <sys/random.h>
 #include <time.h>
 
-#include "dds/dds.h"
+#include "cyclone.h"
 #include "sample_table.h"
 
 typedef struct {
@@ -21,30 +21,13 @@ typedef struct {
   double speed;
 } Options;
 
-/* Ends the program with what Cyclone says about a failed call. */
-static dds_return_t Check(dds_return_t result, const char* what) {
-  if (result < 0) {
-    fprintf(stderr, "cyclone_publisher: %s: %s\n", what,
-            dds_strretcode(-result));
-    exit(4);
-  }
-  return result;
-}
-
-/* RELIABLE and VOLATILE as the readers of fdi ask for; nothing is overwritten
-   before it is acknowledged, which is what paces a fast writer. */
+/* VOLATILE as the readers of fdi ask for; KEEP_ALL paces a fast writer. */
 static dds_entity_t MakeWriter(dds_entity_t participant) {
-  dds_qos_t* qos = dds_create_qos();
-  dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(10));
-  dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
-  dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
+  dds_qos_t* qos = MakeQos(DDS_DURABILITY_VOLATILE);
   dds_qset_resource_limits(qos, 1000, DDS_LENGTH_UNLIMITED,
                            DDS_LENGTH_UNLIMITED);
   /* The end of the program is the end of the stream, not a stale valve. */
   dds_qset_writer_data_lifecycle(qos, true);
-  /* Fast DDS 2.9 reads XCDR1 alone: with XCDR2 no reader is ever found. */
-  const dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
-  dds_qset_data_representation(qos, 1, &xcdr1);
   const dds_entity_t topic =
       Check(dds_create_topic(participant, &fdi_v1_ValveSample_desc,
                              "fdi/v1/ValveSample", qos, NULL),

@@ -7,8 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "dds/dds.h"
-#include "fdi_v1.h"
+#include "cyclone.h"
 
 enum { kAtOnce = 64 };
 
@@ -19,26 +18,10 @@ static void Stop(int signal_number) {
   stopped = 1;
 }
 
-/* Ends the program with what Cyclone says about a failed call. */
-static dds_return_t Check(dds_return_t result, const char* what) {
-  if (result < 0) {
-    fprintf(stderr, "cyclone_subscriber: %s: %s\n", what,
-            dds_strretcode(-result));
-    exit(4);
-  }
-  return result;
-}
-
 /* TRANSIENT_LOCAL: the last events of every valve come at once, also those from
-   before this program. KEEP_ALL: none is overwritten before it is read. */
+   before this program. */
 static dds_entity_t MakeReader(dds_entity_t participant) {
-  dds_qos_t* qos = dds_create_qos();
-  dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(10));
-  dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
-  dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
-  /* Fast DDS 2.9 writes XCDR1 alone. */
-  const dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
-  dds_qset_data_representation(qos, 1, &xcdr1);
+  dds_qos_t* qos = MakeQos(DDS_DURABILITY_TRANSIENT_LOCAL);
   const dds_entity_t topic =
       Check(dds_create_topic(participant, &fdi_v1_FaultEvent_desc,
                              "fdi/v1/FaultEvent", qos, NULL),
@@ -77,8 +60,7 @@ static int PrintEvents(dds_entity_t reader) {
     }
     const fdi_v1_FaultEvent* event = samples[i];
     printf("%016" PRIx64 " %s %" PRId64 " %s\n", event->episode_id,
-           TransitionName(event->transition), event->stamp_ns,
-           event->valve_id);
+           TransitionName(event->transition), event->stamp_ns, event->valve_id);
   }
   fflush(stdout);
   if (count > 0) {
@@ -95,9 +77,11 @@ int main(int argc, char** argv) {
   const dds_entity_t participant =
       Check(dds_create_participant(domain, NULL, NULL), "participant");
   const dds_entity_t reader = MakeReader(participant);
-  const dds_entity_t arrived = Check(
-      dds_create_readcondition(reader, DDS_NOT_READ_SAMPLE_STATE | DDS_ANY_VIEW_STATE |
-                                               DDS_ANY_INSTANCE_STATE), "condition");
+  const dds_entity_t arrived =
+      Check(dds_create_readcondition(reader, DDS_NOT_READ_SAMPLE_STATE |
+                                                 DDS_ANY_VIEW_STATE |
+                                                 DDS_ANY_INSTANCE_STATE),
+            "condition");
   const dds_entity_t waitset = Check(dds_create_waitset(participant), "wait");
   Check(dds_waitset_attach(waitset, arrived, reader), "wait");
   while (!stopped) {
