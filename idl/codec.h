@@ -139,7 +139,7 @@ class CheckedType : public Generated {
   // Of a message without a hash of its key. One without a handle belongs to no
   // instance, and Fast DDS 3.1.2 then follows an iterator at its end
   // (update_instance_nts). What cannot be read has a handle of its own here,
-  // and is refused when it is taken.
+  // and is refused when it is taken. The end of an instance is its key alone.
   bool compute_key(rtps::SerializedPayload_t& payload,
                    rtps::InstanceHandle_t& handle, bool force_md5) override {
     typename Generated::type message;
@@ -161,16 +161,17 @@ class CheckedType : public Generated {
 
   bool IsRead(auto& payload, void* data) {
     try {
-#if FDI_FAST_DDS == 2
       return Generated::deserialize(payload, data);
-#else
-      return Generated::deserialize(payload, data) && IsWhole(payload, data);
-#endif
     } catch (const std::exception&) {
       return false;  // E.g. bad_alloc of an absurd length.
     }
   }
-#if FDI_FAST_DDS != 2
+#if FDI_FAST_DDS == 2
+  static bool IsWhole(const rtps::SerializedPayload_t* /*payload*/,
+                      const void* /*data*/) {
+    return true;
+  }
+#else
   // Fast CDR 2 takes the end of the bytes between any two members for the end
   // of the message; the others keep what they held before. So a message has to
   // be as long as what was read from it. The calculated size may be some bytes
@@ -190,7 +191,7 @@ class CheckedType : public Generated {
   }
 #endif
   bool Checked(auto& payload, void* data) {
-    if (IsRead(payload, data)) {
+    if (IsRead(payload, data) && IsWhole(payload, data)) {
       return true;
     }
     const std::lock_guard lock(objects_mutex_);

@@ -1,9 +1,7 @@
 #include "idl/participant.h"
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
-#include <map>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -43,14 +41,7 @@ constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
-constexpr std::int64_t kDaysOfWarning = 30;
 constexpr std::size_t kRemembered = 64;  // Remote endpoints per topic.
-
-std::int64_t NowNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 std::vector<std::string> Addresses(const std::string& interfaces) {
   std::vector<std::string> addresses;
@@ -249,8 +240,9 @@ void CheckTransports(const std::shared_ptr<DatagramLog>& log,
 // The plugins of DDS Security 1.1 with the files of one key.
 void Secure(const std::filesystem::path& folder, const LogSink& log,
             dds::DomainParticipantQos& qos) {
-  const KeyInfo key = CheckKey(folder, NowNs());
-  const std::int64_t days = (key.until_ns - NowNs()) / kDayNs;
+  const std::int64_t now = NowNs();
+  const KeyInfo key = CheckKey(folder, now);
+  const std::int64_t days = (key.until_ns - now) / kDayNs;
   if (days < kDaysOfWarning && log) {
     log(LogLevel::kWarning, "security_key_expires name=" + key.name +
                                 " days=" + std::to_string(days));
@@ -259,8 +251,8 @@ void Secure(const std::filesystem::path& folder, const LogSink& log,
       "file://" + std::filesystem::absolute(folder).string() + "/";
   const std::string auth = "dds.sec.auth.builtin.PKI-DH.";
   const std::string access = "dds.sec.access.builtin.Access-Permissions.";
-  auto& properties = qos.properties().properties();
-  for (const auto& [name, value] : std::map<std::string, std::string>{
+  for (const auto& [name, value] :
+       std::initializer_list<std::pair<std::string, std::string>>{
            {"dds.sec.auth.plugin", "builtin.PKI-DH"},
            {auth + "identity_ca", file + "ca.pem"},
            {auth + "identity_certificate", file + "cert.pem"},
@@ -270,7 +262,7 @@ void Secure(const std::filesystem::path& folder, const LogSink& log,
            {access + "governance", file + "governance.p7s"},
            {access + "permissions", file + "permissions.p7s"},
            {"dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC"}}) {
-    properties.emplace_back(name, value);
+    qos.properties().properties().emplace_back(name, value);
   }
 }
 
@@ -430,25 +422,20 @@ void Participant::Impl::Remember(const RemoteKey& key, PolicyTexts texts) {
 }
 
 // One line is enough: strangers may come by the thousand.
-void Participant::Impl::Refused(const std::string& who) {
-  if (refused_.fetch_add(1, std::memory_order_relaxed) == 0 && log_) {
-    log_(LogLevel::kWarning,
-         "participant_refused reason=no_key_of_the_authority guid=" + who);
+void Participant::Impl::onParticipantAuthentication(
+    dds::DomainParticipant* /*participant*/,
+    rtps::ParticipantAuthenticationInfo&& info) {
+  using Info = rtps::ParticipantAuthenticationInfo;
+  if (info.status == Info::UNAUTHORIZED_PARTICIPANT &&
+      refused_.fetch_add(1, std::memory_order_relaxed) == 0 && log_) {
+    std::ostringstream line;
+    line << "participant_refused reason=no_key_of_the_authority guid="
+         << info.guid;
+    log_(LogLevel::kWarning, line.str());
   }
 }
 
 #if FDI_FAST_DDS == 2
-void Participant::Impl::onParticipantAuthentication(
-    dds::DomainParticipant* /*participant*/,
-    rtps::ParticipantAuthenticationInfo&& info) {
-  if (info.status ==
-      rtps::ParticipantAuthenticationInfo::UNAUTHORIZED_PARTICIPANT) {
-    std::ostringstream guid;
-    guid << info.guid;
-    Refused(guid.str());
-  }
-}
-
 void Participant::Impl::on_publisher_discovery(
     dds::DomainParticipant* /*participant*/, rtps::WriterDiscoveryInfo&& info) {
   if (info.status == rtps::WriterDiscoveryInfo::DISCOVERED_WRITER) {

@@ -37,6 +37,13 @@ Handle* NotNull(Handle* handle, const std::string& operation) {
   return handle;
 }
 
+/// UTC
+inline std::int64_t NowNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
 /// `timeout` from now; a timeout without end is one of a year, so that nothing
 /// overflows.
 inline std::chrono::steady_clock::time_point DeadlineIn(
@@ -129,11 +136,10 @@ class Participant::Impl : private dds::DomainParticipantListener {
  private:
   using RemoteKey = std::pair<std::string, bool>;  // Topic, is a writer.
 
-  void Refused(const std::string& who);
-#if FDI_FAST_DDS == 2
   void onParticipantAuthentication(
       dds::DomainParticipant* participant,
       rtps::ParticipantAuthenticationInfo&& info) override;
+#if FDI_FAST_DDS == 2
   void on_publisher_discovery(dds::DomainParticipant* participant,
                               rtps::WriterDiscoveryInfo&& info) override;
   void on_subscriber_discovery(dds::DomainParticipant* participant,

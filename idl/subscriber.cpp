@@ -52,12 +52,6 @@ std::uint64_t WriterId(const dds::InstanceHandle_t& writer) {
   return hash;
 }
 
-std::int64_t NowNs() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
 }  // namespace
 
 template <typename Message>

@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstdlib>
+#include <cstdio>
 #include <ctime>
 #include <fstream>
-#include <iterator>
 #include <memory>
 #include <system_error>
 
@@ -427,6 +426,13 @@ std::string Between(const std::string& text, const std::string& before,
              : text.substr(begin + before.size(), end - begin - before.size());
 }
 
+void RequireAuthority(const fs::path& folder) {
+  if (!fs::exists(folder / kCaCertificate)) {
+    throw ConfigError(folder.string() +
+                      " has no authority; fdi-store keys init makes one");
+  }
+}
+
 // CheckKey(), but for the times.
 KeyInfo Examine(const fs::path& folder) {
   const Certificate authority = ReadCertificate(folder / kCaCertificate);
@@ -515,10 +521,7 @@ KeyInfo MakeKey(const fs::path& folder, const std::string& name, Role role,
                 int days, bool replace) {
   RequireName(name);
   RequireDays(days);
-  if (!fs::exists(folder / kCaCertificate)) {
-    throw ConfigError(folder.string() +
-                      " has no authority; fdi-store keys init makes one");
-  }
+  RequireAuthority(folder);
   const fs::path target = folder / name;
   if (fs::exists(target) != replace) {
     throw ConfigError(target.string() +
@@ -535,7 +538,6 @@ KeyInfo MakeKey(const fs::path& folder, const std::string& name, Role role,
       key.get(), name, until, authority.get(), authority_key.get());
 
   const fs::path fresh = folder / ("." + name + ".new");
-  const fs::path stale = folder / ("." + name + ".old");
   fs::remove_all(fresh);
   fs::create_directory(fresh);
   Write(fresh / kKey, Pem(key.get()), 0600);
@@ -547,20 +549,17 @@ KeyInfo MakeKey(const fs::path& folder, const std::string& name, Role role,
   Write(fresh / kCaCertificate, Read(folder / kCaCertificate), 0644);
   Write(fresh / kGovernance, Read(folder / kGovernance), 0644);
   KeyInfo info = Examine(fresh);
-  fs::remove_all(stale);
-  if (replace) {
-    fs::rename(target, stale);
+  if (renameat2(AT_FDCWD, fresh.c_str(), AT_FDCWD, target.c_str(),
+                replace ? RENAME_EXCHANGE : RENAME_NOREPLACE) != 0) {
+    throw DataError(target.string() + ": cannot be replaced: " +
+                    std::generic_category().message(errno));
   }
-  fs::rename(fresh, target);
-  fs::remove_all(stale);
+  fs::remove_all(fresh);
   return info;
 }
 
 std::vector<KeyInfo> ListKeys(const fs::path& folder) {
-  if (!fs::exists(folder / kCaCertificate)) {
-    throw ConfigError(folder.string() +
-                      " has no authority; fdi-store keys init makes one");
-  }
+  RequireAuthority(folder);
   std::vector<KeyInfo> keys;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     if (entry.is_directory() &&

@@ -29,6 +29,9 @@ inline constexpr const char* kRoleNames = "gateway, monitor or reader";
 const char* RoleName(Role role);
 std::optional<Role> ParseRole(std::string_view name);
 
+/// Programs and lists warn so long before a key expires.
+inline constexpr int kDaysOfWarning = 30;
+
 struct KeyInfo {
   std::string name;  ///< Common name of the certificate, name of the folder.
   Role role{Role::kReader};

@@ -10,7 +10,6 @@ namespace {
 constexpr int kAuthorityDays = 3650;
 constexpr int kKeyDays = 365;
 constexpr double kNsPerDay = 86400e9;
-constexpr double kDaysOfWarning = 30.0;
 
 struct KeyOptions {
   std::string folder;
@@ -41,7 +40,8 @@ Report ShowKeys(Json keys) {
                  .decimals = 0,
                  .tone =
                      [](const Json& row) {
-                       return row["days_left"].get<double>() < kDaysOfWarning
+                       return row["days_left"].get<double>() <
+                                      idl::kDaysOfWarning
                                   ? cli::Tone::kWarning
                                   : cli::Tone::kPlain;
                      }}},
