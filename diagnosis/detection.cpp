@@ -51,6 +51,10 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample) {
                 sample.Has(Signal::kCv) ? sample[Signal::kCv] : kNan);
   bool abnormal = false;
   for (std::size_t c = 0; c < channels; ++c) {
+    const int index = static_cast<int>(c);
+    if (bank.active(index) && !bank.measured(index)) {
+      continue;  // Neither goes on nor interrupts.
+    }
     const ChannelSpec& channel = models_->channels[c];
     const Drift& drift = drifts_[c];
     const double scale = std::exp(drift.log_scale);

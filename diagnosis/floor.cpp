@@ -82,8 +82,13 @@ void Floor::Push(const Sample& sample) {
     follows_ = true;
   }
   rod_->Step(sample[Signal::kCv]);
+  const SignalMask uncertain = sample.uncertain();
+  if ((uncertain & (MaskOf(Signal::kCv) | MaskOf(Signal::kX))) != 0) {
+    return;
+  }
   PushTravel(sample);
-  if (limits_->flow_gain > 0.0 && sample.Has(Signal::kF)) {
+  if (limits_->flow_gain > 0.0 && sample.Has(Signal::kF) &&
+      (uncertain & MaskOf(Signal::kF)) == 0) {
     PushFlow(sample);
   }
   findings_ = 0;

@@ -60,7 +60,8 @@ class Floor {
   /// Nothing is known: the rod is where the next reading says.
   void Restart();
 
-  /// Takes every accepted sample. Other modes than AUTO restart it.
+  /// Takes every accepted sample. Other modes than AUTO restart it; UNCERTAIN
+  /// readings are not tested.
   void Push(const Sample& sample);
 
   /// What is found right now; never anything without a floor.

@@ -95,18 +95,21 @@ void StuckReadings::Restart() {
 
 void StuckReadings::Push(const Sample& sample) {
   faults_ = 0;
+  const SignalMask uncertain = sample.uncertain();
   for (Watch& watch : watches_) {
     if (watch.limit == 0 || !sample.Has(watch.signal)) {
       watch.length = 0;
       continue;
     }
-    const double reading = sample[watch.signal];
-    watch.length = watch.length > 0 && reading == watch.reading
-                       ? std::min(watch.length, watch.limit + 1) + 1
-                       : 1;
-    watch.reading = reading;
-    if (watch.length == watch.limit + 1) {
-      watch.since_ns = sample.stamp_ns;
+    if ((uncertain & MaskOf(watch.signal)) == 0) {
+      const double reading = sample[watch.signal];
+      watch.length = watch.length > 0 && reading == watch.reading
+                         ? std::min(watch.length, watch.limit + 1) + 1
+                         : 1;
+      watch.reading = reading;
+      if (watch.length == watch.limit + 1) {
+        watch.since_ns = sample.stamp_ns;
+      }
     }
     faults_ |= watch.length > watch.limit ? watch.fault : 0;
   }

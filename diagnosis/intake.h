@@ -47,8 +47,9 @@ class SourceOrder {
 
 /// Finds transmitters of T1, P1 and P2 that repeat one reading, to the bit, for
 /// longer than they ever did in normal operation (StuckLimits). No observer
-/// sees that: the reading is a normal one. Signals whose transmitter fault is
-/// not among those of the model set are not watched.
+/// sees that: the reading is a normal one. What is UNCERTAIN is no reading.
+/// Signals whose transmitter fault is not among those of the model set are not
+/// watched.
 class StuckReadings {
  public:
   /// `models` must outlive it.

@@ -1,15 +1,22 @@
 #include "diagnosis/observer_bank.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace fdi {
+namespace {
+
+constexpr double kShareGain = 0.01;  // of the share of whole rows, per reading
+
+}  // namespace
 
 ObserverBank::ObserverBank(std::shared_ptr<const ObserverPlan> plan,
                            std::shared_ptr<ObserverOutputs> outputs,
                            InstructionSet instructions)
     : plan_(std::move(plan)),
       kernels_(&KernelsFor(instructions)),
-      state_(*plan_, std::move(outputs)) {}
+      state_(*plan_, std::move(outputs)),
+      whole_share_(plan_->models().channels.size(), 1.0) {}
 
 ObserverBank::ObserverBank(const std::shared_ptr<const ObserverPlan>& plan,
                            InstructionSet instructions)
@@ -21,6 +28,8 @@ ObserverBank::ObserverBank(const ModelSet& models)
 
 void ObserverBank::Initialise(const Sample& sample) {
   std::fill(state_.measured.begin(), state_.measured.end(), sample.values);
+  std::fill(state_.uncertain.begin(), state_.uncertain.end(),
+            sample.uncertain());
   active_count_ = 0;
   for (std::size_t c = 0; c < state_.active.size(); ++c) {
     const SignalMask needed = plan_->signals(c);
@@ -40,13 +49,38 @@ void ObserverBank::Initialise(const Sample& sample) {
   }
 }
 
+// As the fits do (BuildRegression), over the last hundred readings or so.
+bool ObserverBank::IsMeasured(std::size_t channel) {
+  if (state_.active[channel] == 0) {
+    return false;
+  }
+  const TsModel& model = plan_->models().observers[0].channels[channel].model;
+  const auto is_uncertain = [&](Signal signal, int lag) {
+    return (state_.uncertain[state_.Row(lag)] & MaskOf(signal)) != 0;
+  };
+  if (is_uncertain(model.output, 0)) {
+    return false;
+  }
+  const bool whole = std::ranges::none_of(
+      model.regressors,
+      [&](const Regressor& r) { return is_uncertain(r.signal, r.lag); });
+  double& share = whole_share_[channel];
+  share += kShareGain * ((whole ? 1.0 : 0.0) - share);
+  return whole || share < 0.5;
+}
+
 void ObserverBank::Step(const Sample& sample) {
   state_.head = (state_.head + 1) % state_.depth;
   state_.measured[state_.Row(0)] = sample.values;
+  state_.uncertain[state_.Row(0)] = sample.uncertain();
+  measured_count_ = 0;
   const Observer& normal = plan_->models().observers.front();
   for (std::size_t c = 0; c < state_.active.size(); ++c) {
     const TsModel& model = normal.channels[c].model;
-    const double reading = sample[model.output];
+    const bool measured = IsMeasured(c);
+    measured_count_ += measured ? 1 : 0;
+    const double reading = measured ? sample[model.output]
+                                    : std::numeric_limits<double>::quiet_NaN();
     state_.outputs->readings[c] = reading;
     state_.outputs->saturated[c] =
         state_.active[c] != 0 && reading >= model.saturation ? 1 : 0;

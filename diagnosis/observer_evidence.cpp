@@ -20,7 +20,7 @@ void ObserverEvidence::Gather(const ObserverBank& bank) {
     const int channel = static_cast<int>(c);
     if (bank.active(channel)) {
       const bool saturated = bank.saturated(channel);
-      const GainTerms terms{saturated ? 1.0 : plan_->memory(),
+      const GainTerms terms{bank.fades(channel) ? plan_->memory() : 1.0,
                             plan_->channel_time(c), !saturated};
       bank.kernels().gather(plan_->observers(), bank.state(), c, terms,
                             parts_.data());

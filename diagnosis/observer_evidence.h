@@ -10,8 +10,8 @@ namespace fdi {
 
 /// The evidence for one explanation, L = Σ_c L_c, gathered by channel so that
 /// each forgets for itself: a channel at its transmitter's limit, or without
-/// its signals, says next to nothing, and what it said before is held until it
-/// speaks again,
+/// measured signals, says next to nothing, and what it said before is held
+/// until it speaks again,
 ///
 ///     L_c ← λ L_c + gain,   λ = 1 meanwhile.
 ///

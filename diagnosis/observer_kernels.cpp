@@ -134,6 +134,7 @@ ObserverState::ObserverState(const ObserverPlan& plan,
                              std::shared_ptr<ObserverOutputs> place)
     : depth(plan.depth()),
       measured(static_cast<std::size_t>(depth)),
+      uncertain(static_cast<std::size_t>(depth), 0),
       own_past(static_cast<std::size_t>(depth) * plan.own_blocks()),
       active(plan.models().channels.size(), 0),
       outputs(std::move(place)) {}

@@ -14,7 +14,7 @@ namespace fdi {
 struct ObserverOutputs {
   explicit ObserverOutputs(const ObserverPlan& plan);
 
-  std::vector<double> readings;  ///< By channel.
+  std::vector<double> readings;  ///< By channel; NaN: not measured.
   std::vector<char> saturated;
   std::vector<Quad> predictions;
   std::vector<Quad> residuals;
@@ -33,6 +33,7 @@ struct ObserverState {
   int depth;  ///< Of the rings.
   int head{0};
   std::vector<std::array<double, kSignalCount>> measured;  ///< A ring.
+  std::vector<SignalMask> uncertain;                       ///< A ring.
   std::vector<Quad> own_past;  ///< Ring of rows of plan.own_blocks().
   std::vector<char> active;    ///< By channel.
   std::shared_ptr<ObserverOutputs> outputs;

@@ -96,6 +96,17 @@ struct Sample {
 
   double operator[](Signal signal) const { return values[Index(signal)]; }
   bool Has(Signal signal) const { return (present & MaskOf(signal)) != 0; }
+  /// The signals whose values are guesses, such as those drawn between two
+  /// readings: quality UNCERTAIN.
+  SignalMask uncertain() const {
+    SignalMask mask = 0;
+    for (std::size_t i = 0; i < kSignalCount; ++i) {
+      if (quality[i] == SignalQuality::kUncertain) {
+        mask = static_cast<SignalMask>(mask | MaskOf(static_cast<Signal>(i)));
+      }
+    }
+    return mask;
+  }
   void Set(Signal signal, double value) {
     values[Index(signal)] = value;
     present = static_cast<SignalMask>(present | MaskOf(signal));

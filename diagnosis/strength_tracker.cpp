@@ -216,7 +216,7 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
     if (!bank.active(channel)) {
       continue;
     }
-    evidence_[c] *= bank.saturated(channel) ? 1.0 : memory;
+    evidence_[c] *= bank.fades(channel) ? memory : 1.0;
     const Prediction p = At(bank, c, SegmentOf(bank, c, place.segment), place);
     if (std::isnan(p.residual)) {
       continue;

@@ -1,5 +1,6 @@
 #include "diagnosis/valve_engine.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -44,6 +45,7 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
 }
 
 constexpr std::uint32_t kSnapshotFormat = 2;
+constexpr int kMostUncertain = 60;  // samples in a row, until nothing is known
 
 }  // namespace
 
@@ -102,6 +104,7 @@ class ValveEngine::Impl {
   bool has_source_{false};
   bool needs_initialisation_{true};
   SignalMask present_{0};
+  int uncertain_{0};  // samples in a row of which no channel was measured
 };
 
 void ValveEngine::Impl::ClearVerdict() {
@@ -140,14 +143,20 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
   diagnosis_->stuck.Push(sample);
   diagnosis_->floor.Push(sample);
   ReadResiduals();
-  diagnosis_->episode.Score(diagnosis_->bank, verdict_);
+  const ObserverBank& bank = diagnosis_->bank;
+  const bool uncertain =
+      bank.active_channels() > 0 && bank.measured_channels() == 0;
+  uncertain_ = uncertain ? std::min(uncertain_ + 1, kMostUncertain + 1) : 0;
+  if (!uncertain) {
+    diagnosis_->episode.Score(bank, verdict_);
+  }
   verdict_.quality = Judge(sample);
   // The floor, and the episode that it may have opened, do not wait.
   const bool settles = verdict_.quality == Quality::kSettling &&
                        models().floor && sample.mode == ValveMode::kAuto;
   if (verdict_.quality == Quality::kLive || settles) {
     Decide(sample);
-  } else if (episode_open()) {
+  } else if (episode_open() && !uncertain) {
     diagnosis_->episode.Hold(verdict_);
   }
   verdict_.detected = episode_open();
@@ -204,7 +213,7 @@ void ValveEngine::Impl::ReadResiduals() {
 
 Quality ValveEngine::Impl::Judge(const Sample& sample) {
   verdict_.uncovered = 0;
-  if (diagnosis_->bank.active_channels() == 0) {
+  if (diagnosis_->bank.active_channels() == 0 || uncertain_ > kMostUncertain) {
     return Quality::kBadInput;
   }
   const Quality quality = diagnosis_->coverage.Judge(
@@ -219,6 +228,9 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   const Floor& floor = diagnosis_->floor;
   if (diagnosis_->coverage.armed_now()) {
     detection.Restart();
+  }
+  if (uncertain_ > 0) {
+    return;  // All stays as it is.
   }
   Findings findings;
   findings.settled = diagnosis_->coverage.settled();

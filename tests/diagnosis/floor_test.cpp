@@ -38,6 +38,7 @@ struct Valve {
   double x{50.0};
   std::optional<double> flow{};  // else what the opening passes
   ValveMode mode{ValveMode::kAuto};
+  SignalQuality quality{SignalQuality::kGood};  // of X and F
 };
 
 Sample At(int k, const Valve& valve) {
@@ -50,6 +51,8 @@ Sample At(int k, const Valve& valve) {
   sample.Set(Signal::kX, valve.x);
   sample.Set(Signal::kF,
              valve.flow.value_or(100.0 * std::exp(-0.02 * valve.x)));
+  sample.quality[Index(Signal::kX)] = valve.quality;
+  sample.quality[Index(Signal::kF)] = valve.quality;
   return sample;
 }
 
@@ -192,6 +195,16 @@ TEST(FloorTest, HoldsInAutoOnlyAndNeverWithoutLimits) {
     floor.Push(At(k, {90.0, 10.0}));
     EXPECT_EQ(floor.findings(), 0U);
   }
+}
+
+TEST(FloorTest, WhatIsUncertainIsNotTested) {
+  const auto found = [](SignalQuality quality) {
+    return FirstFindings([=](int) {
+      return Valve{99.0, 10.0, 99.0, ValveMode::kAuto, quality};
+    });
+  };
+  EXPECT_NE(found(SignalQuality::kGood), kNothing);
+  EXPECT_EQ(found(SignalQuality::kUncertain), kNothing);
 }
 
 struct Followed {

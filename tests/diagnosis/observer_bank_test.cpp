@@ -36,6 +36,51 @@ Sample Reading(double cv, double x) {
   return sample;
 }
 
+void MarkUncertain(Sample& sample, Signal signal) {
+  sample.quality[Index(signal)] = SignalQuality::kUncertain;
+}
+
+TEST(ObserverBankTest, WhatIsUncertainOrPredictedFromItIsNotMeasured) {
+  const ModelSet models = FirstOrder(false);
+  ObserverBank bank(models);
+  const Sample good = Reading(60.0, 80.0);
+  Sample x_uncertain = good;
+  MarkUncertain(x_uncertain, Signal::kX);
+  Sample cv_uncertain = good;
+  MarkUncertain(cv_uncertain, Signal::kCv);
+  bank.Initialise(good);
+  const auto is_measured = [&](const Sample& sample) {
+    bank.Step(sample);
+    EXPECT_EQ(std::isnan(bank.residual(0, 0)), !bank.measured(0));
+    EXPECT_EQ(bank.measured_channels(), bank.measured(0) ? 1 : 0);
+    return bank.measured(0);
+  };
+  EXPECT_TRUE(is_measured(good));
+  EXPECT_FALSE(is_measured(x_uncertain));
+  EXPECT_FALSE(is_measured(good));  // Predicted from the X before.
+  EXPECT_TRUE(is_measured(good));
+  EXPECT_TRUE(is_measured(cv_uncertain));  // Predicted from the CV before.
+  EXPECT_FALSE(is_measured(good));
+  EXPECT_TRUE(is_measured(good));
+}
+
+// One sample in three: hardly any is predicted from readings alone.
+TEST(ObserverBankTest, OfSlowDataTheReadingAloneDecides) {
+  const ModelSet models = FirstOrder(false);
+  ObserverBank bank(models);
+  const Sample good = Reading(60.0, 80.0);
+  Sample drawn = good;
+  MarkUncertain(drawn, Signal::kX);
+  MarkUncertain(drawn, Signal::kCv);
+  bank.Initialise(good);
+  int measured = 0;
+  for (int k = 1; k <= 600; ++k) {
+    bank.Step(k % 3 == 0 ? good : drawn);
+    measured += k > 300 && bank.measured(0) ? 1 : 0;
+  }
+  EXPECT_EQ(measured, 100);
+}
+
 // X̂ = X̂_0 + 0.1 CV: it follows the dynamics of the normal observer.
 TEST(ObserverBankTest, DifferenceIsAddedToTheNormalPrediction) {
   ModelSet models = FirstOrder(true);

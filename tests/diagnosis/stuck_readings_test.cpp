@@ -63,6 +63,21 @@ TEST(StuckReadingsTest, TransmitterIsNamedOnceItRepeatsItselfForTooLong) {
   EXPECT_EQ(transitions[3].reason, EndReason::kCleared);
 }
 
+TEST(StuckReadingsTest, WhatIsUncertainIsNoReading) {
+  for (const bool marked : {false, true}) {
+    ValveEngine engine(std::make_shared<const ModelSet>(HeatedPlant()));
+    int transitions = 0;
+    for (int k = 0; k < 600; ++k) {
+      Sample sample = HeatedSample(k, 200, 500);
+      sample.quality[Index(Signal::kT1)] = marked && k > 200 && k < 500
+                                               ? SignalQuality::kUncertain
+                                               : SignalQuality::kGood;
+      transitions += engine.Step(sample).transition_count;
+    }
+    EXPECT_EQ(transitions == 0, marked);
+  }
+}
+
 TEST(StuckReadingsTest, RunUpToTheLimitIsNormal) {
   ValveEngine engine(std::make_shared<const ModelSet>(HeatedPlant()));
   for (int k = 0; k < 600; ++k) {

@@ -35,6 +35,55 @@ TEST(ValveEngineTest, NormalOperationOpensNoEpisode) {
   EXPECT_EQ(seen.last.confidence, 1.0);
 }
 
+// Wrong by 6 deviations, in every third sample, and marked or not.
+void DrawWrongly(Sample& sample, bool marked) {
+  if (sample.seq % 3 == 0) {
+    sample.values[Index(Signal::kF)] += 3.0;
+    sample.quality[Index(Signal::kF)] =
+        marked ? SignalQuality::kUncertain : SignalQuality::kGood;
+  }
+}
+
+TEST(ValveEngineTest, WhatIsUncertainOpensNoEpisodeAndHidesNone) {
+  for (const bool marked : {false, true}) {
+    ModelSet models = testing::LinearPlant();
+    models.decision.detection_samples = 1;
+    ValveEngine engine(std::make_shared<const ModelSet>(models));
+    const Seen healthy =
+        StepRange(engine, 0, 300, [&](Sample& s) { DrawWrongly(s, marked); });
+    EXPECT_EQ(healthy.transitions.empty(), marked);
+    if (marked) {
+      EXPECT_EQ(healthy.last.quality, Quality::kLive);
+      const Seen faulty = StepRange(engine, 300, 400, [&](Sample& s) {
+        FullF6(s);
+        DrawWrongly(s, marked);
+      });
+      ASSERT_EQ(faulty.transitions.size(), 2U);
+      EXPECT_EQ(faulty.transitions[0].stamp_ns, StampOf(301));
+      EXPECT_EQ(faulty.last.state, State::kIsolated);
+    }
+  }
+}
+
+void MarkAll(Sample& sample) {
+  sample.quality.fill(SignalQuality::kUncertain);
+}
+
+TEST(ValveEngineTest, AllUncertainLeavesEverythingAsItIsForAMinute) {
+  ValveEngine engine(SharedPlant());
+  StepRange(engine, 0, 50);
+  const Seen isolated = StepRange(engine, 50, 100, FullF6);
+  ASSERT_EQ(isolated.last.state, State::kIsolated);
+  const Seen held = StepRange(engine, 100, 160, MarkAll);
+  EXPECT_TRUE(held.transitions.empty());
+  EXPECT_EQ(held.last.quality, Quality::kLive);
+  EXPECT_EQ(held.last.fault_factors, isolated.last.fault_factors);
+  const Seen unknown = StepRange(engine, 160, 200, MarkAll);
+  EXPECT_TRUE(unknown.transitions.empty());
+  EXPECT_EQ(unknown.last.quality, Quality::kBadInput);
+  EXPECT_EQ(StepRange(engine, 200, 300).last.state, State::kNormal);
+}
+
 TEST(ValveEngineTest, DetectionBearsTheStampOfTheFirstAbnormalSample) {
   ValveEngine engine(SharedPlant());
   StepRange(engine, 0, 50);

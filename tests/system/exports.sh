@@ -91,6 +91,25 @@ for form in "$@"; do
   echo
 done
 
+# A healthy loop whose command moves by some per cent every second: what is drawn
+# between its readings is wrong by as much, and is not judged.
+"$bin/fdi-simulator" run --no-publish --duration 1500 --seed 31 \
+  --excitation level-loop --export loop.csv --log-level error >/dev/null
+"$bin/fdi-trainer" onboard --valve loop --file loop.csv --no-coverage \
+  >onboard.log 2>&1 || fail "onboarding refuses the loop"
+awk -v form=spreadsheet -f "$tests/exports.awk" loop.csv >export.csv
+"$bin/fdi-store" runs sniff export.csv --zone $zone --map-output loop.toml \
+  >sniff.log 2>&1 || fail "sniff refuses the loop"
+sed -i 's/^unit = "bar"$/unit = "bar g"/' loop.toml
+"$bin/fdi-trainer" evaluate --model-set loop --file export.csv --map loop.toml \
+  --no-second-look --vectors vectors.csv >evaluate.log 2>&1 ||
+  fail "evaluating refuses the loop"
+awk -F, 'NR == 1 {for (i = 1; i <= NF; ++i) column[$i] = i; next}
+  $column["quality"] == "LIVE" {++judged}
+  $column["state"] != "NORMAL" {++alarms}
+  END {exit alarms > 0 || judged < 1200}' vectors.csv ||
+  fail "a healthy loop has an episode as a spreadsheet"
+
 # The third command: as live data, into an episode.
 [ "$form" != record ] || exit 0
 start --model-set "$form"
