@@ -1,7 +1,6 @@
 #include "idl/codec.h"
 
 #include <algorithm>
-#include <array>
 #include <concepts>
 #include <limits>
 #include <string>
@@ -349,23 +348,6 @@ bool Codec<Message>::Decode(const Wire& wire, Message& message) {
   KeyFields(transfer, message, wire);
   Fields(transfer, message, wire);
   return transfer.all_fit();
-}
-
-std::string KeyInHandle(const rtps::InstanceHandle_t& handle) {
-  constexpr std::size_t kText = 8;
-  std::array<unsigned, 16> bytes{};
-  std::copy_n(static_cast<const std::uint8_t*>(handle.value), bytes.size(),
-              bytes.begin());
-  const bool little = bytes[1] == 1;
-  const unsigned length = little ? bytes[4] : bytes[7];
-  const unsigned rest = bytes[0] + bytes[5] + bytes[6] +
-                        (little ? bytes[7] : bytes[1] + bytes[4]);
-  if (rest != 0 || length < 2 || length > bytes.size() - kText) {
-    return "";
-  }
-  std::string text(bytes.begin() + kText, bytes.begin() + kText + length);
-  // One NUL, the last.
-  return text.find('\0') == length - 1 ? text.substr(0, length - 1) : "";
 }
 
 template struct Codec<ValveSampleMessage>;

@@ -74,17 +74,6 @@ std::tuple<std::remove_const_t<T>...> CopyOf(const std::tuple<T&...>& members) {
 template <typename Message>
 using Key = decltype(CopyOf(KeyOf(std::declval<Message&>())));
 
-/// The id in a handle that is a serialized key; empty if it is none.
-///
-/// Other DDS libraries end an instance with its key, serialized, where Fast DDS
-/// sends an MD5 sum of it. If that key has at most 16 bytes (an id of at most
-/// 7), Fast DDS 2.9.1 takes it for the sum, so that no message ever had this
-/// handle:
-///
-///     00 01 00 00 | 07 00 00 00 | 'F' 'V' '-' '1' '0' '1' 00 | 00
-///     ^ little endian, 00 00 big  ^ length of the text with its NUL
-std::string KeyInHandle(const rtps::InstanceHandle_t& handle);
-
 /// A generated type that survives foreign bytes and several endpoints.
 ///
 /// What cannot be deserialized, for whatever reason, is refused and counted,
@@ -197,7 +186,11 @@ class CheckedType : public Generated {
     const std::lock_guard lock(objects_mutex_);
     if (!objects_of_library_.contains(data)) {
       refused_.fetch_add(1, std::memory_order_relaxed);
+      return false;
     }
+    // For its key: that of this message, if it got so far, not of the last.
+    *static_cast<typename Generated::type*>(data) = {};
+    static_cast<void>(IsRead(payload, data));
     return false;
   }
   void* Owned(void* data) {

@@ -8,6 +8,7 @@
 #include "idl/datagram.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace fdi::idl {
 namespace {
@@ -28,8 +29,11 @@ constexpr std::uint8_t kData = 0x15;
 constexpr std::uint8_t kDataFrag = 0x16;
 constexpr std::uint8_t kFirstOfVendors = 0x80;
 constexpr std::uint8_t kInlineQosFlag = 0x02;
+constexpr std::uint8_t kDataFlag = 0x04;
+constexpr std::uint8_t kKeyFlag = 0x08;
 constexpr std::uint8_t kInvalidateFlag = 0x02;  // INFO_TS without a time.
 constexpr std::uint16_t kSentinel = 1;          // Ends a parameter list.
+constexpr std::uint16_t kKeyHash = 0x70;
 
 // A writer of 20 000 a second is here after 20 months. The library aborts at
 // the end of the range, and when it meets a writer counts up to where it
@@ -94,21 +98,46 @@ struct Body {
   }
 };
 
-// Whether a data submessage has its parameters inside itself.
-bool DataIsSound(const Body& body, std::uint8_t flags, std::size_t fixed) {
-  std::size_t at = 4U + body.U16(2);  // From behind the offset itself.
-  if (body.Sequence(12) < 1 || at < fixed || at > body.bytes.size()) {
-    return false;
-  }
-  bool ended = (flags & kInlineQosFlag) == 0;
-  while (!ended) {
+// Whether the parameters of a data submessage, from `at` on, are inside it.
+// Calls see(id) for each.
+template <typename See>
+bool ReadParameters(const Body& body, std::size_t at, See see) {
+  for (bool ended = false; !ended;) {
     if (at + 4 > body.bytes.size()) {
       return false;
     }
-    ended = body.U16(at) == kSentinel;
+    const std::uint16_t id = body.U16(at);
+    see(id);
+    ended = id == kSentinel;
     at += 4U + (ended ? 0U : (body.U16(at + 2) + 3U) & ~3U);
   }
   return at <= body.bytes.size();
+}
+
+// Where the parameters begin: counted from behind the offset itself.
+std::size_t ParametersOf(const Body& body) {
+  return 4U + body.U16(2);
+}
+
+bool DataIsSound(const Body& body, std::uint8_t flags, std::size_t fixed) {
+  const std::size_t at = ParametersOf(body);
+  return body.Sequence(12) >= 1 && at >= fixed && at <= body.bytes.size() &&
+         ((flags & kInlineQosFlag) == 0 ||
+          ReadParameters(body, at, [](std::uint16_t) {}));
+}
+
+// Of sound data.
+bool IsBareKey(const Body& body, std::uint8_t flags) {
+  constexpr std::uint8_t kEndOfInstance = kKeyFlag | kInlineQosFlag;
+  if ((flags & (kEndOfInstance | kDataFlag)) != kEndOfInstance ||
+      IsOfDiscovery(body.bytes[11])) {
+    return false;
+  }
+  bool has_hash = false;
+  ReadParameters(body, ParametersOf(body), [&](std::uint16_t id) {
+    has_hash = has_hash || id == kKeyHash;
+  });
+  return !has_hash;
 }
 
 bool ContentIsSound(std::uint8_t kind, std::uint8_t flags, const Body& body) {
@@ -193,13 +222,14 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
   const std::size_t size = datagram.size();
   if (size < kHeaderBytes || datagram[0] != 'R' || datagram[1] != 'T' ||
       datagram[2] != 'P' || datagram[3] != 'S' || datagram[4] != 2) {
-    return {DatagramVerdict::kHeader, 0};
+    return {DatagramVerdict::kHeader, 0, {}};
   }
   Speaker speaker(datagram);
   std::size_t sound = kHeaderBytes;  // Up to here, all is handed over.
+  std::vector<std::size_t> bare_keys;
   for (std::size_t at = sound; at < size;) {
     if (size - at < kSubmessageHeaderBytes) {
-      return {DatagramVerdict::kLength, 0};
+      return {DatagramVerdict::kLength, 0, {}};
     }
     const std::uint8_t kind = datagram[at];
     const std::uint8_t flags = datagram[at + 1];
@@ -209,30 +239,40 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
     const bool to_end = stated == 0 && kind != kPad && kind != kInfoTs;
     const std::size_t length = to_end ? size - begin : stated;
     if (length > size - begin) {
-      return {DatagramVerdict::kLength, 0};
+      return {DatagramVerdict::kLength, 0, {}};
     }
     const std::size_t end =
         begin + std::min((length + 3) & ~std::size_t{3}, size - begin);
     if (kind < kFirstOfVendors) {
       const int least = LeastBody(kind, flags);
       if (least < 0 || at != sound) {  // Behind a vendor's own.
-        return {DatagramVerdict::kKind, 0};
+        return {DatagramVerdict::kKind, 0, {}};
       }
       if (length < static_cast<std::size_t>(least)) {
-        return {DatagramVerdict::kLength, 0};
+        return {DatagramVerdict::kLength, 0, {}};
       }
       const Body body{datagram.subspan(begin, length), header.little_endian};
       if (!ContentIsSound(kind, flags, body)) {
-        return {DatagramVerdict::kContent, 0};
+        return {DatagramVerdict::kContent, 0, {}};
       }
       if (!KeepsPace(kind, body, speaker, pace, now)) {
-        return {DatagramVerdict::kPace, 0};
+        return {DatagramVerdict::kPace, 0, {}};
+      }
+      if (kind == kData && IsBareKey(body, flags)) {
+        bare_keys.push_back(at + 1);
       }
       sound = end;
     }
     at = end;
   }
-  return {DatagramVerdict::kSound, sound};
+  return {DatagramVerdict::kSound, sound, std::move(bare_keys)};
+}
+
+void ShowKeys(const std::vector<std::size_t>& bare_keys,
+              std::span<std::uint8_t> datagram) {
+  for (const std::size_t at : bare_keys) {
+    datagram[at] ^= kKeyFlag | kDataFlag;
+  }
 }
 
 }  // namespace fdi::idl

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "idl/writer_pace.h"
 
@@ -29,6 +30,9 @@ struct CheckedDatagram {
   /// What to hand over from the front: all but vendors' own submessages at the
   /// end. Each participant of Fast DDS adds one, its statistics.
   std::size_t bytes{0};
+  /// Places of the flags of ends of instances that carry nothing but the key
+  /// itself, as Cyclone DDS sends them: see ShowKeys().
+  std::vector<std::size_t> bare_keys;
 };
 
 /// Checks the framing of an RTPS message [OMG formal/2022-04-01, 9.4.5], which
@@ -41,6 +45,12 @@ struct CheckedDatagram {
 CheckedDatagram CheckDatagram(std::span<const std::uint8_t> datagram,
                               WriterPace& pace,
                               WriterPace::Clock::time_point now);
+
+/// Fast DDS 2.9.1 and 3.1.2 take a bare key of at most 16 bytes for a hash,
+/// drop a longer one, and then end the instance of which they read last.
+/// Declared as data it is read as a message that is cut behind its key.
+void ShowKeys(const std::vector<std::size_t>& bare_keys,
+              std::span<std::uint8_t> datagram);
 
 /// Datagrams by verdict, since the participant exists.
 using DatagramCounts = std::array<std::uint64_t, kDatagramVerdictCount>;

@@ -41,7 +41,8 @@ constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
-constexpr std::size_t kRemembered = 64;  // Remote endpoints per topic.
+constexpr std::size_t kRemembered =
+    64;  // Remote endpoints per topic; strangers.
 
 std::vector<std::string> Addresses(const std::string& interfaces) {
   std::vector<std::string> addresses;
@@ -159,9 +160,16 @@ class CheckedTransport : public transport::ChainingTransport {
     const CheckedDatagram checked =
         CheckDatagram({buffer, bytes}, log_->pace(), WriterPace::Clock::now());
     log_->Count(checked.verdict, bytes, remote);
-    if (checked.verdict == DatagramVerdict::kSound) {
-      receiver->OnDataReceived(
-          buffer, static_cast<std::uint32_t>(checked.bytes), local, remote);
+    if (checked.verdict != DatagramVerdict::kSound) {
+      return;
+    }
+    const auto sound = static_cast<std::uint32_t>(checked.bytes);
+    if (checked.bare_keys.empty()) {
+      receiver->OnDataReceived(buffer, sound, local, remote);
+    } else {
+      std::vector<rtps::octet> copy(buffer, buffer + sound);
+      ShowKeys(checked.bare_keys, copy);
+      receiver->OnDataReceived(copy.data(), sound, local, remote);
     }
   }
 
@@ -421,13 +429,26 @@ void Participant::Impl::Remember(const RemoteKey& key, PolicyTexts texts) {
   }
 }
 
-// One line is enough: strangers may come by the thousand.
+// One line is enough: strangers may come by the thousand. Fast DDS 3.1.2
+// refuses each again and again.
 void Participant::Impl::onParticipantAuthentication(
     dds::DomainParticipant* /*participant*/,
     rtps::ParticipantAuthenticationInfo&& info) {
   using Info = rtps::ParticipantAuthenticationInfo;
-  if (info.status == Info::UNAUTHORIZED_PARTICIPANT &&
-      refused_.fetch_add(1, std::memory_order_relaxed) == 0 && log_) {
+  if (info.status != Info::UNAUTHORIZED_PARTICIPANT) {
+    return;
+  }
+  {
+    const std::lock_guard lock(remotes_mutex_);
+    if (std::ranges::find(refused_guids_, info.guid) != refused_guids_.end()) {
+      return;
+    }
+    refused_guids_.push_front(info.guid);
+    if (refused_guids_.size() > kRemembered) {
+      refused_guids_.pop_back();
+    }
+  }
+  if (refused_.fetch_add(1, std::memory_order_relaxed) == 0 && log_) {
     std::ostringstream line;
     line << "participant_refused reason=no_key_of_the_authority guid="
          << info.guid;

@@ -164,6 +164,7 @@ class Participant::Impl : private dds::DomainParticipantListener {
   std::atomic<std::uint64_t> refused_{0};
   std::mutex remotes_mutex_;
   std::map<RemoteKey, std::deque<PolicyTexts>> remotes_;  // Newest first.
+  std::deque<rtps::GUID_t> refused_guids_;                // Newest first.
   std::mutex topics_mutex_;  // Apart, for it is held in calls of the library.
   std::map<std::string, dds::Topic*> topics_;
   dds::DomainParticipant* handle_{nullptr};

@@ -218,18 +218,15 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   }
 
   // Sets the key of the instance that has ended. An end carries the handle of
-  // its instance only, an MD5 sum of the key: `keys` has what it stands for. A
-  // handle that no message had may be a short key itself, see KeyInHandle().
+  // its instance only, an MD5 sum of the key: `keys` has what it stands for.
   bool FindKey(const dds::InstanceHandle_t& handle, Message& message) {
     const auto found = keys.find(handle);
-    if (found != keys.end()) {
-      KeyOf(message) = found->second;
-      keys.erase(found);
-      return true;
+    if (found == keys.end()) {
+      return false;
     }
-    auto& id = std::get<0>(KeyOf(message));
-    id = KeyInHandle(handle);
-    return !id.empty();
+    KeyOf(message) = found->second;
+    keys.erase(found);
+    return true;
   }
 
   void Add(std::uint64_t SubscriberStatus::*count, std::uint64_t more = 1) {

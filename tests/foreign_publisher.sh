@@ -22,17 +22,24 @@ await() {  # WORD
   fail "no $1 within 20 s"
 }
 
-# Two ids: the end of a stream carries its key, which Fast DDS takes for a handle
-# if the id has at most 7 characters.
-valves="UNIT-12-FEEDWATER-FV-1201 FV-101"
-for valve in $valves; do
-  timeout 60 ./build/cyclone_publisher "$valve" "$domain" 1 0 <valve.csv \
-    >publisher.log 2>&1 || fail "the publisher ended with $?"
-  await "valve=$valve.*transition=CLOSED"
-done
+# The end of a stream carries its key, which Fast DDS takes for a handle if the id
+# has at most 7 characters, and for that of the last message otherwise.
+publish() {  # VALVE SPEED
+  timeout 60 ./build/cyclone_publisher "$1" "$domain" 1 "$2" <valve.csv \
+    >"$1.log" 2>&1 || fail "the publisher of $1 ended with $?"
+}
+publish FV-101 60 &
+other=$!
+await "valve=FV-101.*transition=ISOLATED"
+publish UNIT-12-FEEDWATER-FV-1201 0
+await "valve=UNIT-12-FEEDWATER-FV-1201.*transition=CLOSED"
+! grep -q "valve=FV-101.*transition=CLOSED" monitor.log ||
+  fail "the end of another stream has ended that of FV-101"
+await "valve=FV-101.*transition=CLOSED"
+wait "$other"
 stop
 
-for valve in $valves; do
+for valve in UNIT-12-FEEDWATER-FV-1201 FV-101; do
   recorded=$(sqlite3 -readonly "$FDI_DATA/runs.db" \
     "select ifnull(sum(samples), 0) from run where valve_id = '$valve'")
   [ "$recorded" -eq 600 ] || fail "$recorded of 600 samples of $valve arrived"

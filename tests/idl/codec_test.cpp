@@ -406,27 +406,6 @@ TEST(CodecTest, WhatHasNoKeyHasAHandleAllTheSame) {
 }
 #endif
 
-// Cyclone DDS ends the instance "FV-101" with its key, little endian.
-TEST(CodecTest, AShortKeyIsReadFromTheHandle) {
-  const auto key_of = [](const std::string& bytes) {
-    rtps::InstanceHandle_t handle;
-    for (std::size_t i = 0; i < bytes.size(); ++i) {
-      handle.value[i] = static_cast<std::uint8_t>(bytes[i]);
-    }
-    return KeyInHandle(handle);
-  };
-  using std::string;
-  EXPECT_EQ(key_of(string("\0\1\0\0\7\0\0\0", 8) + "FV-101"), "FV-101");
-  EXPECT_EQ(key_of(string("\0\0\0\0\0\0\0\7", 8) + "FV-101"), "FV-101");
-  EXPECT_EQ(key_of(string("\0\1\0\3\7\0\0\0", 8) + "FV-101"), "FV-101");
-  EXPECT_EQ(key_of(string("\0\1\0\0\10\0\0\0", 8) + "FV-1012"), "FV-1012");
-  // What is an MD5 sum, or no text with its end.
-  EXPECT_EQ(key_of("0123456789abcdef"), "");
-  EXPECT_EQ(key_of(string("\0\1\0\0\6\0\0\0", 8) + "FV-101"), "");
-  EXPECT_EQ(key_of(string("\0\1\0\0\1\0\0\0", 8)), "");
-  EXPECT_EQ(key_of(""), "");
-}
-
 // The number behind the name is aligned, and the gap is part of the sum.
 TEST(CodecTest, AKeyDoesNotHangOnTheKeyBefore) {
   CheckedType<v1::ModelSetInfoPubSubType> type;

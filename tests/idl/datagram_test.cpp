@@ -79,6 +79,33 @@ Bytes StatisticsInFront() {
   return With(With(Header(), 0x80, Zeros(56)), 0x01, Zeros(4));
 }
 
+// What Cyclone DDS sends when an instance ends: no data, and no hash of the
+// key.
+TEST(DatagramTest, ABareKeyIsDeclaredAsData) {
+  constexpr std::uint8_t kEnd = 0x0b;    // Little endian, parameters, key.
+  constexpr std::uint8_t kWhole = 0x07;  // The same with data.
+  const Bytes status{0x71, 0, 4, 0, 0, 0, 0, 3, 1, 0, 0, 0};
+  const Bytes hash = Bytes{0x70, 0, 16, 0} + Zeros(16);
+  const Bytes key = Bytes{0, 1, 0, 0, 3, 0, 0, 0, 'V', '1', 0, 0};
+  const auto keys_in = [&](const Bytes& body, std::uint8_t flags) {
+    return Check(With(With(Header(), 0x01, Zeros(4)), 0x15, body, flags))
+        .bare_keys;
+  };
+  const std::vector<std::size_t> found{29};
+  EXPECT_EQ(keys_in(Data(16) + status + key, kEnd), found);
+  EXPECT_TRUE(keys_in(Data(16) + hash + status + key, kEnd).empty());
+  EXPECT_TRUE(keys_in(Data(16) + status + key, kWhole).empty());
+  Bytes of_discovery = Data(16) + status + key;
+  of_discovery[11] = 0xc2;
+  EXPECT_TRUE(keys_in(of_discovery, kEnd).empty());
+
+  Bytes datagram = With(Header(), 0x15, Data(16) + status + key, kEnd);
+  const CheckedDatagram checked = Check(datagram);
+  ASSERT_EQ(checked.verdict, DatagramVerdict::kSound);
+  ShowKeys(checked.bare_keys, datagram);
+  EXPECT_EQ(datagram, With(Header(), 0x15, Data(16) + status + key, kWhole));
+}
+
 TEST(DatagramTest, HeaderIsOfRtps2) {
   EXPECT_EQ(VerdictOn({}), DatagramVerdict::kHeader);
   EXPECT_EQ(VerdictOn(Header()), DatagramVerdict::kSound);
