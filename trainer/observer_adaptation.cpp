@@ -109,17 +109,29 @@ struct Systems {
 
 Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
   Systems systems;
-  std::vector<MatrixXd> grams;
-  for (int f = 0; f < static_cast<int>(kFolds); ++f) {
-    VectorXd use(design.rows());
+  // Lower triangles; of the rows of each fold, then of those that it uses.
+  const MatrixXd zero = MatrixXd::Zero(design.cols(), design.cols());
+  std::vector<MatrixXd> own(kFolds, zero);
+  std::vector<MatrixXd> grams(kFolds + 1, zero);
+  for (std::size_t f = 0; f < kFolds; ++f) {
+    std::vector<Index> members;
+    VectorXd use = VectorXd::Ones(design.rows());
     for (Index k = 0; k < design.rows(); ++k) {
-      use(k) = folds[static_cast<std::size_t>(k)] == f ? 0.0 : 1.0;
+      if (folds[static_cast<std::size_t>(k)] == static_cast<int>(f)) {
+        members.push_back(k);
+        use(k) = 0.0;
+      }
     }
-    grams.push_back(design.transpose() * (use.asDiagonal() * design));
+    const MatrixXd part = design(members, Eigen::all);
+    own[f].selfadjointView<Eigen::Lower>().rankUpdate(part.transpose());
     systems.uses.push_back(std::move(use));
   }
-  grams.push_back(design.transpose() * design);
   systems.uses.push_back(VectorXd::Ones(design.rows()));
+  for (std::size_t f = 0; f <= kFolds; ++f) {
+    for (std::size_t other = 0; other < kFolds; ++other) {
+      grams[f] += other == f ? zero : own[other];
+    }
+  }
   for (const double penalty : kPenalties) {
     for (const MatrixXd& gram : grams) {
       MatrixXd regular = gram;
