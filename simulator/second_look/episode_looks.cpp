@@ -138,9 +138,12 @@ void EpisodeLooks::Keep(const Sample& sample) {
        value(Signal::kP2, physics_.p2.mean),
        value(Signal::kT1, physics_.t1.mean)},
       sample[Signal::kX],
-      value(Signal::kF, 0.0)};
+      value(Signal::kF, 0.0),
+      (sample.uncertain() & MaskOf(Signal::kX)) == 0,
+      (sample.uncertain() & MaskOf(Signal::kF)) == 0};
   for (std::int64_t held = 1; !rows_.empty() && held < step; ++held) {
     rows_.push_back({rows_.back().stamp_ns + period_ns_, rows_.back().row});
+    rows_.back().row.x_measured = rows_.back().row.flow_measured = false;
   }
   rows_.push_back({sample.stamp_ns, row});
   while (rows_.size() > kLongest) {
@@ -164,7 +167,9 @@ std::optional<LookTask> EpisodeLooks::Task(std::int64_t until_ns) const {
     task.window.rows.push_back(row.row);
     task.stamp_ns = row.stamp_ns;
   }
-  if (task.window.rows.size() < kShortest ||
+  const auto measured = static_cast<std::size_t>(
+      std::ranges::count_if(task.window.rows, &RecordRow::x_measured));
+  if (measured < kShortest ||
       task.window.detection + 10 > task.window.rows.size()) {
     return std::nullopt;
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <span>
 #include <utility>
 
 #include "diagnosis/error.h"
@@ -229,6 +230,9 @@ ChannelFit Looker::FitChannel(const Trajectory& answers, bool flow,
   for (int k = settle; k < rows_; ++k) {
     const auto at = static_cast<std::size_t>(k);
     const RecordRow& row = window_.rows[at];
+    if (!(flow ? row.flow_measured : row.x_measured)) {
+      continue;
+    }
     const RecordAnswer& answer = answers[at];
     const RecordAnswer& without = healthy_[at];
     const double error =
@@ -537,9 +541,13 @@ SecondLook Looker::Run(const std::stop_token& stop) {
       hypotheses.begin(), hypotheses.end(),
       [](const auto& a, const auto& b) { return a.cost < b.cost; });
 
-  const double readings =
-      (rows_ - 10) * (1.0 / physics_.x.correlation_time +
-                      (has_flow ? 1.0 / physics_.flow.correlation_time : 0.0));
+  double readings = 0.0;
+  for (const RecordRow& row : std::span(window_.rows).subspan(10)) {
+    readings += row.x_measured ? 1.0 / physics_.x.correlation_time : 0.0;
+    readings += has_flow && row.flow_measured
+                    ? 1.0 / physics_.flow.correlation_time
+                    : 0.0;
+  }
   const Hypothesis& first = hypotheses.front();
   const bool faulty = first.cost + kPriceOfFault < unmoved.cost;
   const double best = faulty ? first.cost + kPriceOfFault : unmoved.cost;

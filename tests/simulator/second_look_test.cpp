@@ -75,6 +75,23 @@ TEST(SecondLookTest, TakesAConstantShiftOfXForDrift) {
             LookOutcome::kNothing);
 }
 
+TEST(SecondLookTest, WhatIsNotMeasuredSaysNothing) {
+  for (const bool marked : {false, true}) {
+    LookWindow window = Window({Abrupt(19, 0.25)});
+    for (std::size_t k = 0; k < window.rows.size(); k += 3) {
+      RecordRow& row = window.rows[k];
+      row.x_pct += 15.0;
+      row.flow *= 1.5;
+      row.x_measured = row.flow_measured = !marked;
+    }
+    const SecondLook look = LookAgain(Physics(), window);
+    const Explanation& best = look.ranked.front();
+    EXPECT_EQ(look.misfit < 1.5, marked);
+    EXPECT_EQ(best.fault == 19 && std::abs(best.strength - 0.25) < 0.05,
+              marked);
+  }
+}
+
 TEST(SecondLookTest, GivesTheSameBitsTwice) {
   const LookWindow window = Window({Abrupt(10, 0.5)});
   const SecondLook one = LookAgain(Physics(), window);
@@ -149,7 +166,8 @@ TEST(LookAnswerTest, IsAShortlistBeyondFourFaults) {
 }
 
 // An episode of the engine, abnormal from `first` on.
-std::vector<LookTask> Follow(int samples, int first) {
+std::vector<LookTask> Follow(int samples, int first,
+                             SignalQuality quality = SignalQuality::kGood) {
   EpisodeLooks looks(Physics());
   std::vector<LookTask> tasks;
   for (int k = 0; k < samples; ++k) {
@@ -159,6 +177,9 @@ std::vector<LookTask> Follow(int samples, int first) {
       sample.Set(signal, 50.0 + k % 3);
     }
     Verdict verdict;
+    if (k % 2 == 0 && quality == SignalQuality::kUncertain) {
+      sample.quality.fill(quality);
+    }
     if (k == first + 1) {
       verdict.transitions[0] = {TransitionKind::kDetected, first * kSecond,
                                 first * kSecond};
@@ -184,6 +205,17 @@ TEST(EpisodeLooksTest, ManagesWithoutALeadIn) {
   const std::vector<LookTask> tasks = Follow(100, 0);
   ASSERT_EQ(tasks.size(), 1U);
   EXPECT_EQ(tasks[0].window.detection, 0U);
+}
+
+// Every second sample; a task needs 30 that were measured.
+TEST(EpisodeLooksTest, KnowsWhatWasMeasured) {
+  EXPECT_EQ(Follow(50, 0).size(), 1U);
+  EXPECT_TRUE(Follow(50, 0, SignalQuality::kUncertain).empty());
+  const std::vector<LookTask> tasks = Follow(100, 0, SignalQuality::kUncertain);
+  ASSERT_FALSE(tasks.empty());
+  EXPECT_FALSE(tasks[0].window.rows[0].x_measured);
+  EXPECT_FALSE(tasks[0].window.rows[0].flow_measured);
+  EXPECT_TRUE(tasks[0].window.rows[1].x_measured);
 }
 
 TEST(LookBookTest, CountsAfterItsDelayAndDoesNotHearAWorseFit) {
