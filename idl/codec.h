@@ -127,13 +127,18 @@ class CheckedType : public Generated {
   }
   // Of a message without a hash of its key. One without a handle belongs to no
   // instance, and Fast DDS 3.1.2 then follows an iterator at its end
-  // (update_instance_nts). What cannot be read has a handle of its own here,
-  // and is refused when it is taken. The end of an instance is its key alone.
+  // (update_instance_nts). What has no key has a handle of its own here, and is
+  // refused when it is taken. The end of an instance is its key alone, and so
+  // cannot be read as a whole.
   bool compute_key(rtps::SerializedPayload_t& payload,
                    rtps::InstanceHandle_t& handle, bool force_md5) override {
     typename Generated::type message;
-    if (!IsRead(payload, &message) ||
-        !compute_key(&message, handle, force_md5)) {
+    rtps::InstanceHandle_t of_none;
+    compute_key(&message, of_none, force_md5);
+    static_cast<void>(IsRead(payload, &message));
+    compute_key(&message, handle, force_md5);
+    if (handle == of_none) {
+      handle = rtps::InstanceHandle_t();
       handle.value[0] = 0xff;
     }
     return true;

@@ -400,7 +400,10 @@ TEST(CodecTest, WhatHasNoKeyHasAHandleAllTheSame) {
     return handle;
   };
   EXPECT_EQ(handle_of(bytes), HandleOf(type, &sample));
-  EXPECT_NE(handle_of(bytes.substr(0, 40)), HandleOf(type, &sample));
+  // Encapsulation, length, key and its NUL; padded, as an end is.
+  const std::size_t key = 8 + sample.valve_id().size() + 1;
+  EXPECT_EQ(handle_of(bytes.substr(0, key + 1)), HandleOf(type, &sample));
+  EXPECT_NE(handle_of(bytes.substr(0, key - 3)), HandleOf(type, &sample));
   handle_of("");
   EXPECT_EQ(type.refused(), 0U);  // Counted when it is taken.
 }
