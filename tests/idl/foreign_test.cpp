@@ -146,8 +146,9 @@ TEST(ForeignTest, ATypeOfAnotherNameIsNotMatched) {
   ForeignPublisher other(domain.Options(),
                          new OtherVersion("fdi::v2::ValveSample"));
   ForeignPublisher ours(domain.Options());  // Found later than the other.
-  ASSERT_TRUE(TakeUntil<ValveSampleMessage>(subscriber, {},
-                                            [&] { return ours.Matched(); }));
+  ASSERT_TRUE(TakeUntil<ValveSampleMessage>(subscriber, {}, [&] {
+    return ours.Matched() && subscriber.status().matched > 0;
+  }));
 
   EXPECT_FALSE(other.Matched());
   EXPECT_EQ(subscriber.status().matched, 1);
