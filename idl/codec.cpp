@@ -325,6 +325,11 @@ void Fields(auto& t, Is<MonitorStatusMessage> auto& m, auto& w) {
   t.List("counters", m.counters, w.counters(), kMaxCounters);
 }
 
+void Fields(auto& t, Is<PairState> auto& m, auto& w) {
+  FDI_FOR_EACH(FDI_FIELD, pair, rank, instance, leads, leaving, judged,
+               received)
+}
+
 #undef FDI_FIELD
 
 }  // namespace
@@ -355,5 +360,6 @@ template struct Codec<DecisionMessage>;
 template struct Codec<FaultEvent>;
 template struct Codec<ModelSetInfoMessage>;
 template struct Codec<MonitorStatusMessage>;
+template struct Codec<PairState>;
 
 }  // namespace fdi::idl

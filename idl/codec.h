@@ -37,6 +37,7 @@ FDI_TOPIC(DecisionMessage, DecisionVector)
 FDI_TOPIC(FaultEvent, FaultEvent)
 FDI_TOPIC(ModelSetInfoMessage, ModelSetInfo)
 FDI_TOPIC(MonitorStatusMessage, MonitorStatus)
+FDI_TOPIC(PairState, PairState)
 #undef FDI_TOPIC
 
 /// Conversion of the messages of one topic; the fields are listed in codec.cpp,

@@ -23,6 +23,8 @@ enum class Profile {
 struct PublisherOptions {
   Profile profile{Profile::kLive};
   int valves{0};  ///< How many this publisher speaks for; 0: max_valves.
+  /// Beside the usual partition; empty: none.
+  std::string also_partition{};
 };
 
 enum class WriteResult {
@@ -42,7 +44,7 @@ struct PublisherStatus {
 /// Writes one topic. Thread safe. What is on the way when it is destroyed is
 /// lost: call WaitForAcknowledged() first.
 ///
-/// Message is one of the five of wire.h; there are no others.
+/// Message is one of the six of wire.h; there are no others.
 template <typename Message>
 class Publisher {
  public:
@@ -71,6 +73,10 @@ class Publisher {
   PublisherStatus status() const;
   /// PublisherStatus::matched, at the cost of one load.
   int matched() const;
+  /// Readers that came since the start, gone or not.
+  int came() const;
+  /// Readers that come from now on are not given what was written before.
+  void Forget();
 
  private:
   struct Impl;
@@ -130,10 +136,13 @@ struct Handlers {
 template <typename Message>
 class Subscriber {
  public:
+  /// @param partition where to read, a pattern as of fnmatch(); empty: the
+  ///   usual one.
   /// @throws TransportError if the library refuses the endpoint.
   explicit Subscriber(Participant& participant,
                       Profile profile = Profile::kLive,
-                      Overflow overflow = Overflow::kLibrary);
+                      Overflow overflow = Overflow::kLibrary,
+                      const std::string& partition = {});
   ~Subscriber();
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;
@@ -163,10 +172,12 @@ extern template class Publisher<DecisionMessage>;
 extern template class Publisher<FaultEvent>;
 extern template class Publisher<ModelSetInfoMessage>;
 extern template class Publisher<MonitorStatusMessage>;
+extern template class Publisher<PairState>;
 extern template class Subscriber<ValveSampleMessage>;
 extern template class Subscriber<DecisionMessage>;
 extern template class Subscriber<FaultEvent>;
 extern template class Subscriber<ModelSetInfoMessage>;
 extern template class Subscriber<MonitorStatusMessage>;
+extern template class Subscriber<PairState>;
 
 }  // namespace fdi::idl

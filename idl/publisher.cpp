@@ -48,8 +48,11 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
         options.profile,
         options.valves > 0 ? options.valves : bus.options().max_valves);
     dds::PublisherQos publisher_qos;
-    if (!ours.partition.empty()) {
+    if (!ours.partition.empty() || !options.also_partition.empty()) {
       publisher_qos.partition().push_back(ours.partition.c_str());
+    }
+    if (!options.also_partition.empty()) {
+      publisher_qos.partition().push_back(options.also_partition.c_str());
     }
     publisher = {
         NotNull(bus->create_publisher(publisher_qos), "create_publisher"),
@@ -116,6 +119,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   void on_publication_matched(
       dds::DataWriter* /*writer*/,
       const dds::PublicationMatchedStatus& status) override {
+    came.store(status.total_count);
     matched.Set(status.current_count);
   }
 
@@ -134,6 +138,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   dds::DataWriter* writer{nullptr};
   PolicyTexts policies;
   Matched matched;
+  std::atomic<int> came{0};
   std::atomic<std::uint64_t> written{0};
   std::atomic<std::uint64_t> retries{0};
   std::atomic<std::uint64_t> refused{0};
@@ -215,10 +220,23 @@ int Publisher<Message>::matched() const {
   return impl_->matched.count();
 }
 
+template <typename Message>
+int Publisher<Message>::came() const {
+  return impl_->came.load();
+}
+
+template <typename Message>
+void Publisher<Message>::Forget() {
+  const std::lock_guard lock(impl_->mutex);
+  std::size_t removed = 0;
+  impl_->writer->clear_history(&removed);
+}
+
 template class Publisher<ValveSampleMessage>;
 template class Publisher<DecisionMessage>;
 template class Publisher<FaultEvent>;
 template class Publisher<ModelSetInfoMessage>;
 template class Publisher<MonitorStatusMessage>;
+template class Publisher<PairState>;
 
 }  // namespace fdi::idl

@@ -235,6 +235,14 @@ EndpointQos QosFor<MonitorStatusMessage>(Profile /*profile*/, int /*valves*/) {
   return qos;
 }
 
+// The newest word is all that counts.
+template <>
+EndpointQos QosFor<PairState>(Profile /*profile*/, int /*valves*/) {
+  EndpointQos qos = Common("fdi_pair_state");
+  KeepLast(qos, kMonitors, 1, 1);
+  return qos;
+}
+
 const std::set<std::string>& EndpointNames() {
   static const std::set<std::string> names{"fdi_valve_sample",
                                            "fdi_valve_sample_lossless",
@@ -243,7 +251,8 @@ const std::set<std::string>& EndpointNames() {
                                            "fdi_decision_vector_lossless",
                                            "fdi_fault_event",
                                            "fdi_model_set_info",
-                                           "fdi_monitor_status"};
+                                           "fdi_monitor_status",
+                                           "fdi_pair_state"};
   return names;
 }
 

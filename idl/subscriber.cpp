@@ -65,7 +65,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     bool ended{false};
   };
 
-  Impl(Participant& participant, Profile profile, Overflow overflow)
+  Impl(Participant& participant, Profile profile, Overflow overflow,
+       const std::string& partition)
       : bus(participant.impl()),
         holds_receipt(overflow == Overflow::kOnTheWay),
         max_keys(4 * static_cast<std::size_t>(bus.options().max_valves) +
@@ -77,8 +78,9 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     // The reader is enabled once `reader` is set: callbacks use it.
     dds::SubscriberQos subscriber_qos;
     subscriber_qos.entity_factory().autoenable_created_entities = false;
-    if (!ours.partition.empty()) {
-      subscriber_qos.partition().push_back(ours.partition.c_str());
+    const std::string& where = partition.empty() ? ours.partition : partition;
+    if (!where.empty()) {
+      subscriber_qos.partition().push_back(where.c_str());
     }
     subscriber = {
         NotNull(bus->create_subscriber(subscriber_qos), "create_subscriber"),
@@ -311,8 +313,10 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
 
 template <typename Message>
 Subscriber<Message>::Subscriber(Participant& participant, Profile profile,
-                                Overflow overflow)
-    : impl_(std::make_unique<Impl>(participant, profile, overflow)) {}
+                                Overflow overflow,
+                                const std::string& partition)
+    : impl_(std::make_unique<Impl>(participant, profile, overflow, partition)) {
+}
 
 template <typename Message>
 Subscriber<Message>::~Subscriber() = default;
@@ -362,5 +366,6 @@ template class Subscriber<DecisionMessage>;
 template class Subscriber<FaultEvent>;
 template class Subscriber<ModelSetInfoMessage>;
 template class Subscriber<MonitorStatusMessage>;
+template class Subscriber<PairState>;
 
 }  // namespace fdi::idl

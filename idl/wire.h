@@ -8,6 +8,7 @@
 
 #include "diagnosis/model_set.h"
 #include "diagnosis/records/fault_event.h"
+#include "diagnosis/records/pair_state.h"
 #include "diagnosis/sample.h"
 #include "diagnosis/verdict.h"
 

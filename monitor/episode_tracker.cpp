@@ -26,6 +26,23 @@ void EpisodeTracker::Recover(const OpenEpisode& episode) {
   recovered_ = episode;
 }
 
+void EpisodeTracker::Adopt(const FaultEvent& event) {
+  const bool same = recovered_ && recovered_->episode_id == event.episode_id;
+  if (event.transition.kind == TransitionKind::kClosed) {
+    if (same) {
+      recovered_.reset();
+    }
+    return;
+  }
+  if (open_ || (recovered_ && !same)) {
+    return;
+  }
+  recovered_ = OpenEpisodeOf(event);
+  if (!same) {
+    first_stamp_ns_ = std::max(first_stamp_ns_, accepted_stamp_ns_);
+  }
+}
+
 void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
                           const std::shared_ptr<const ModelSet>& models,
                           EpisodeOutlet& outlet) {

@@ -50,6 +50,10 @@ class EpisodeTracker {
   /// Before the first Step().
   void Recover(const OpenEpisode& episode);
 
+  /// Takes what another monitor of this valve raised and this one did not: its
+  /// open episode is to be resumed here, or has ended.
+  void Adopt(const FaultEvent& event);
+
   /// Takes a sample and what the engine with `models` said about it.
   void Step(const Sample& sample, const Verdict& verdict,
             const std::shared_ptr<const ModelSet>& models,

@@ -362,6 +362,42 @@ void Pipeline::OfferEnd(std::string_view valve_id, std::uint64_t writer) {
   }
 }
 
+void Pipeline::Adopt(FaultEvent event) {
+  std::optional<EngineParts> parts;
+  Resolve(event.valve_id, parts);
+  if (!parts || parts->plan->models().content_hash != event.model_hash) {
+    log_.Line(LogLevel::kInfo,
+              "event_not_adopted valve=" + LogValue(event.valve_id) +
+                  " model_set=" + LogValue(event.model_set) + "@" +
+                  std::to_string(event.model_version));
+    return;
+  }
+  event.models = parts->plan->shared_models();
+  journal_.Event(event);
+  if (const auto found = by_id_.find(event.valve_id); found != by_id_.end()) {
+    found->second->monitor.Adopt(event);
+    return;
+  }
+  const auto open = recovered_.find(event.valve_id);
+  if (open != recovered_.end() &&
+      open->second.episode_id != event.episode_id) {
+    return;
+  }
+  if (event.transition.kind == TransitionKind::kClosed) {
+    recovered_.erase(event.valve_id);
+    return;
+  }
+  recovered_.insert_or_assign(event.valve_id, OpenEpisodeOf(event));
+  recovery_deadline_ = last_tended_ + options_.recovery_window;
+  Reserve(event.valve_id);
+}
+
+bool Pipeline::IsSettling(const std::string& valve_id) const {
+  const auto found = by_id_.find(valve_id);
+  return found == by_id_.end() ||
+         found->second->monitor.verdict().quality == Quality::kSettling;
+}
+
 void Pipeline::Count(const Valve& valve, const Sample& sample,
                      const ValveOutcome& outcome) {
   const Verdict& verdict = outcome.verdict;
@@ -474,6 +510,11 @@ void Pipeline::TakeCensus() {
     census.ended += monitor.ended() ? 1 : 0;
     census.open_episodes += monitor.episode_open() ? 1 : 0;
     census.trace_bytes += monitor.trace_bytes();
+    census.judged += monitor.models() != nullptr && monitor.seen() &&
+                             !monitor.stale() && !monitor.ended() &&
+                             monitor.verdict().quality != Quality::kSettling
+                         ? 1
+                         : 0;
   }
   const std::lock_guard lock(mutex_);
   census_ = census;

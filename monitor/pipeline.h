@@ -61,6 +61,7 @@ struct ValveCensus {
   std::uint64_t ended{0};
   std::uint64_t open_episodes{0};
   std::uint64_t trace_bytes{0};
+  std::uint64_t judged{0};  ///< Not silent, with a model set, and settled.
 };
 
 /// From samples to decisions, events and records. The thread that takes samples
@@ -101,6 +102,11 @@ class Pipeline {
   void Offer(std::string_view valve_id, const Sample& sample,
              std::uint64_t writer,
              TimePoint received = std::chrono::steady_clock::now());
+  /// Another monitor of the same valves raised an event that this one did not:
+  /// it is recorded, and an episode that is open there goes on here.
+  void Adopt(FaultEvent event);
+  /// Nothing is judged of this valve yet, or not again.
+  bool IsSettling(const std::string& valve_id) const;
   /// The publisher ended the stream of the valve.
   void OfferEnd(std::string_view valve_id, std::uint64_t writer);
 

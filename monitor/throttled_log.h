@@ -41,6 +41,7 @@ enum class LogId : std::uint8_t {
   kRecordFailed = 132,   ///< record_failed
   kTransport = 141,      ///< transport_loss
   kStalled = 151,        ///< threads_stalled
+  kPairTwin = 152,       ///< pair_rank_taken
   kLookDropped = 161,    ///< second_look_dropped
   kLookFailed = 162,     ///< second_look_failed
 };

@@ -32,6 +32,9 @@ class ValveMonitor {
   /// Before the first Step().
   void Recover(const OpenEpisode& episode);
 
+  /// See EpisodeTracker::Adopt().
+  void Adopt(const FaultEvent& event) { tracker_.Adopt(event); }
+
   /// The accumulators as of the last checkpoint of an earlier session; they
   /// count if the first sample is of the same source. Before the first Step().
   void Resume(Accumulator accumulator) { saved_ = std::move(accumulator); }

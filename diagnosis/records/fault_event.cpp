@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 
 namespace fdi {
 
@@ -21,6 +22,25 @@ std::vector<FaultCandidate> CandidatesOf(const ModelSet& models,
   std::ranges::stable_sort(candidates, std::ranges::greater{},
                            &FaultCandidate::factor);
   return candidates;
+}
+
+OpenEpisode OpenEpisodeOf(const FaultEvent& event) {
+  const Transition& transition = event.transition;
+  OpenEpisode episode;
+  episode.valve_id = event.valve_id;
+  episode.source_id = event.source_id;
+  episode.episode_id = event.episode_id;
+  episode.detection_stamp_ns = transition.detection_stamp_ns;
+  episode.last_stamp_ns = transition.stamp_ns;
+  episode.faults = transition.faults;
+  std::ranges::copy_if(event.candidates, std::back_inserter(episode.candidates),
+                       &FaultCandidate::isolated);
+  episode.isolated = transition.faults != 0;
+  episode.layer = transition.layer;
+  episode.model_set = event.model_set;
+  episode.model_version = event.model_version;
+  episode.model_hash = event.model_hash;
+  return episode;
 }
 
 }  // namespace fdi

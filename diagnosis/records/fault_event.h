@@ -71,4 +71,7 @@ struct OpenEpisode {
   std::uint64_t model_hash{0};
 };
 
+/// The episode as `event` left it, which did not close it.
+OpenEpisode OpenEpisodeOf(const FaultEvent& event);
+
 }  // namespace fdi

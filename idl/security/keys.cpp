@@ -56,8 +56,10 @@ const std::vector<RoleRow>& Roles() {
       {Role::kMonitor,
        "monitor",
        {"fdi/v1/DecisionVector", "fdi/v1/FaultEvent", "fdi/v1/ModelSetInfo",
-        "fdi/v1/MonitorStatus"},
-       {"fdi/v1/ValveSample"}},
+        "fdi/v1/MonitorStatus", "fdi/v1/PairState"},
+       // Beside samples, what the monitor says that it stands in for.
+       {"fdi/v1/ValveSample", "fdi/v1/DecisionVector", "fdi/v1/FaultEvent",
+        "fdi/v1/PairState"}},
       {Role::kReader, "reader", {}, {"fdi/v1/*"}}};
   return kRoles;
 }

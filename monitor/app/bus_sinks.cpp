@@ -24,8 +24,10 @@ std::string IsolatedNames(const FaultEvent& message) {
 }  // namespace
 
 BusDecisionSink::BusDecisionSink(idl::Participant& participant, bool lossless,
-                                 std::stop_token stop)
-    : live_(participant, {idl::Profile::kLive, 0}), stop_(std::move(stop)) {
+                                 std::stop_token stop,
+                                 const std::string& partition)
+    : live_(participant, {idl::Profile::kLive, 0, partition}),
+      stop_(std::move(stop)) {
   if (lossless) {
     lossless_.emplace(participant,
                       idl::PublisherOptions{idl::Profile::kLossless, 0});
@@ -33,34 +35,42 @@ BusDecisionSink::BusDecisionSink(idl::Participant& participant, bool lossless,
 }
 
 void BusDecisionSink::Fill(const std::string& valve_id, const ModelSet* models,
-                           const Verdict& verdict) {
-  message_.valve_id = valve_id;
-  message_.model_hash = models != nullptr ? models->content_hash : 0;
-  message_.channel_count =
+                           const Verdict& verdict,
+                           idl::DecisionMessage& message) {
+  message.valve_id = valve_id;
+  message.model_hash = models != nullptr ? models->content_hash : 0;
+  message.channel_count =
       models != nullptr ? static_cast<int>(models->channels.size()) : 0;
-  message_.fault_count =
+  message.fault_count =
       models != nullptr ? static_cast<int>(models->faults.size()) : 0;
-  message_.observer_count =
+  message.observer_count =
       models != nullptr ? static_cast<int>(models->observers.size()) : 0;
-  message_.verdict = verdict;
+  message.verdict = verdict;
+}
+
+bool BusDecisionSink::ToLive() {
+  unheard_ = unheard_ || live_.matched() == 0;
+  return !unheard_;
 }
 
 bool BusDecisionSink::Publish(const std::string& valve_id,
                               const ModelSet* models, const Verdict& verdict) {
-  unheard_ = unheard_ || live_.matched() == 0;
-  const bool to_lossless = lossless_ && lossless_->matched() > 0;
-  if (unheard_ && !to_lossless) {
+  if (!ToLive() && !ToLossless()) {
     return true;
   }
-  Fill(valve_id, models, verdict);
+  Fill(valve_id, models, verdict, message_);
+  return Send(message_);
+}
+
+bool BusDecisionSink::Send(const idl::DecisionMessage& message) {
   bool sent = true;
-  if (to_lossless) {
+  if (ToLossless()) {
     // Each write into a full history takes 50 ms, also after a stop.
     sent = !stop_.stop_requested() &&
-           lossless_->Write(message_, stop_) == idl::WriteResult::kSent;
+           lossless_->Write(message, stop_) == idl::WriteResult::kSent;
   }
-  if (!unheard_) {
-    sent = live_.Write(message_) == idl::WriteResult::kSent && sent;
+  if (ToLive()) {
+    sent = live_.Write(message) == idl::WriteResult::kSent && sent;
   }
   return sent;
 }
@@ -76,7 +86,7 @@ bool BusDecisionSink::WantsLast() {
 void BusDecisionSink::PublishLast(const std::string& valve_id,
                                   const ModelSet* models,
                                   const Verdict& verdict) {
-  Fill(valve_id, models, verdict);
+  Fill(valve_id, models, verdict, message_);
   live_.Write(message_);
 }
 
@@ -98,8 +108,10 @@ idl::PublisherStatus BusDecisionSink::status() const {
   return status;
 }
 
-BusEventSink::BusEventSink(idl::Participant& participant, LogSink log)
-    : publisher_(participant), log_(std::move(log)) {}
+BusEventSink::BusEventSink(idl::Participant& participant, LogSink log,
+                           const std::string& partition)
+    : publisher_(participant, {idl::Profile::kLive, 0, partition}),
+      log_(std::move(log)) {}
 
 bool BusEventSink::Publish(const FaultEvent& event, bool persisted) {
   FaultEvent message = event;

@@ -18,8 +18,10 @@ namespace fdi::monitor {
 /// `stop` is requested.
 class BusDecisionSink : public DecisionSink {
  public:
+  /// @param partition where a monitor that stands in for us reads; empty:
+  ///   nowhere beside the usual one.
   BusDecisionSink(idl::Participant& participant, bool lossless,
-                  std::stop_token stop);
+                  std::stop_token stop, const std::string& partition = {});
 
   bool Publish(const std::string& valve_id, const ModelSet* models,
                const Verdict& verdict) override;
@@ -27,14 +29,24 @@ class BusDecisionSink : public DecisionSink {
   void PublishLast(const std::string& valve_id, const ModelSet* models,
                    const Verdict& verdict) override;
 
+  /// What Publish() sends.
+  static void Fill(const std::string& valve_id, const ModelSet* models,
+                   const Verdict& verdict, idl::DecisionMessage& message);
+  /// As Publish().
+  bool Send(const idl::DecisionMessage& message);
+  /// Who comes from now on gets nothing that was sent before.
+  void Forget() { live_.Forget(); }
+  /// Subscribers so far; see idl::Publisher.
+  int came() const { return live_.came(); }
+
   /// Waits until all readers have what was published.
   bool WaitForAcknowledged(std::chrono::milliseconds timeout);
   /// Of both streams; `written` of the one that was written more to.
   idl::PublisherStatus status() const;
 
  private:
-  void Fill(const std::string& valve_id, const ModelSet* models,
-            const Verdict& verdict);
+  bool ToLive();
+  bool ToLossless() const { return lossless_ && lossless_->matched() > 0; }
 
   idl::Publisher<idl::DecisionMessage> live_;
   std::optional<idl::Publisher<idl::DecisionMessage>> lossless_;
@@ -46,9 +58,14 @@ class BusDecisionSink : public DecisionSink {
 /// Fault events over DDS; each is a line of the log as well.
 class BusEventSink : public EventSink {
  public:
-  BusEventSink(idl::Participant& participant, LogSink log);
+  /// @param partition as of BusDecisionSink.
+  BusEventSink(idl::Participant& participant, LogSink log,
+               const std::string& partition = {});
 
   bool Publish(const FaultEvent& event, bool persisted) override;
+  /// For subscribers that came after `event` was published by another one.
+  void Repeat(const FaultEvent& event) { publisher_.Write(event); }
+  int came() const { return publisher_.came(); }
 
   bool WaitForAcknowledged(std::chrono::milliseconds timeout) {
     return publisher_.WaitForAcknowledged(timeout);

@@ -23,6 +23,7 @@ struct RunArguments {
   std::string console{"off"};
   console::ConsoleOptions console_options;
   std::string console_token;
+  PairOptions pair;
   ServiceOptions service;
 };
 
@@ -109,6 +110,22 @@ void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
       ->capture_default_str();
 }
 
+void AddPairOptions(CLI::App& run, PairOptions& pair) {
+  run.add_option("--pair", pair.name,
+                 "Diagnose beside another monitor of the same NAME: one of the "
+                 "two publishes, the other one takes over when it fails")
+      ->type_name("NAME");
+  run.add_option("--rank", pair.rank,
+                 "Of this monitor in the pair; when both may lead, 1 does "
+                 "before 2")
+      ->type_name("1..9");
+  run.add_option("--pair-patience", pair.patience_s,
+                 "Take over when the diagnosis of the leader was not heard for "
+                 "so long [s]")
+      ->check(CLI::Range(0.1, 60.0))
+      ->capture_default_str();
+}
+
 int Run(const RunArguments& arguments, const cli::Context& context) {
   ServiceOptions options = arguments.service;
   if (!arguments.model_set.empty()) {
@@ -122,6 +139,11 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
   if (arguments.record != "off") {
     options.recording =
         arguments.record == "lossless" ? Recording::kLossless : Recording::kOn;
+  }
+  if (!arguments.pair.name.empty()) {
+    Validate(options.pair.emplace(arguments.pair));
+  } else if (arguments.pair.rank != 0) {
+    throw ConfigError("--rank needs --pair NAME");
   }
   if (arguments.http != "off") {
     options.http = ParseHttpAddress(arguments.http, "--http");
@@ -188,6 +210,7 @@ void AddRunVerb(cli::Program& program) {
       ->check(CLI::Range(0.0, 1800.0))
       ->capture_default_str();
   AddOnEventOptions(run, service);
+  AddPairOptions(run, arguments->pair);
   run.add_option("--http", arguments->http,
                  "Serve /metrics, /healthz and /readyz; port 0: any free one")
       ->expected(0, 1)

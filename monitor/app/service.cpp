@@ -30,6 +30,9 @@ using Clock = std::chrono::steady_clock;
 
 constexpr milliseconds kTakeTimeout{100};
 constexpr int kTakeLimit = 4096;  // Under full load Take() has no other end.
+// A pair has to hear of us more often.
+constexpr milliseconds kPairTakeTimeout{20};
+constexpr int kPairTakeLimit = 256;
 constexpr milliseconds kTickPeriod{1000};
 constexpr milliseconds kHookPatience{1000};
 constexpr milliseconds kDrainLimit{1000};
@@ -92,11 +95,8 @@ int IntakeValves(int max_valves) {
   return std::min(max_valves + kStrangers, kMost);
 }
 
-PipelineOptions WithDelivery(PipelineOptions options, BusEventSink& events) {
-  options.journal.acknowledged = [&events](milliseconds patience) {
-    return events.WaitForAcknowledged(patience);
-  };
-  return options;
+std::string PairPartition(const ServiceOptions& options) {
+  return options.pair ? PartitionOf(*options.pair) : "";
 }
 
 // To the service manager (systemd, Type=notify), if there is one that listens.
@@ -148,8 +148,8 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
                 ? nullptr
                 : std::make_unique<RunStore>(data_.runs(), context.software)),
       decisions_(participant_, options.lossless_decisions,
-                 publication_stop_.get_token()),
-      events_(participant_, context.log),
+                 publication_stop_.get_token(), PairPartition(options)),
+      events_(participant_, context.log, PairPartition(options)),
       outward_(
           delivery_ == nullptr
               ? nullptr
@@ -163,11 +163,12 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
           options.best_effort ? idl::Profile::kBestEffort : idl::Profile::kLive,
           idl::Overflow::kOnTheWay),
       log_(context.log),
-      pipeline_(
-          WithDelivery(pipeline_options_, events_),
-          {decisions_, console_ ? console_->Before(EventsOut()) : EventsOut(),
-           history_, runs_.get(), console_ ? &console_->live() : nullptr},
-          assignment_, {counters_, log_, cli::NowNs}),
+      pair_(options.pair ? std::make_unique<Pair>(
+                               participant_, *options.pair, MonitorName(),
+                               decisions_, events_, EventsOut(), log_)
+                         : nullptr),
+      pipeline_(WithDelivery(pipeline_options_), Sinks(), assignment_,
+                {counters_, log_, cli::NowNs}),
       heartbeat_(Members(pipeline_, service_pulse_)),
       started_ns_(cli::NowNs()),
       last_status_line_(Clock::now()) {}
@@ -177,6 +178,21 @@ Service::~Service() = default;
 // The bus, and who else is told.
 EventSink& Service::EventsOut() {
   return outward_ ? static_cast<EventSink&>(*outward_) : events_;
+}
+
+PipelineSinks Service::Sinks() {
+  EventSink& events = pair_ ? *pair_ : EventsOut();
+  return {pair_ ? static_cast<DecisionSink&>(*pair_) : decisions_,
+          console_ ? console_->Before(events) : events, history_, runs_.get(),
+          console_ ? &console_->live() : nullptr};
+}
+
+PipelineOptions Service::WithDelivery(PipelineOptions options) {
+  options.journal.acknowledged = [this](milliseconds patience) {
+    return (!pair_ || pair_->HeardAllEvents()) &&
+           events_.WaitForAcknowledged(patience);
+  };
+  return options;
 }
 
 // Any thread that resolves models.
@@ -218,7 +234,7 @@ void Service::Start() {
 // What an earlier session committed but perhaps did not send.
 void Service::ResendEvents() {
   for (const FaultEvent& event : history_.UnsentEvents()) {
-    if (events_.Publish(event, true)) {
+    if (pair_ ? pair_->Publish(event, true) : events_.Publish(event, true)) {
       pipeline_.Published(event);
       counters_.Add(Counter::kEventsResent);
     }
@@ -283,17 +299,24 @@ void Service::Diagnose() {
           const idl::Reception& reception) {
         pipeline_.OfferEnd(message.valve_id, reception.writer_id);
       }};
+  const int limit = pair_ ? kPairTakeLimit : kTakeLimit;
   const auto take = [&](milliseconds timeout) {
     // Anew each time: the UTC clock may have been set.
     utc_to_steady_ns =
         Clock::now().time_since_epoch() / std::chrono::nanoseconds(1) -
         cli::NowNs();
-    return samples_.Take(handlers, timeout, kTakeLimit);
+    return samples_.Take(handlers, timeout, limit);
   };
   while (!stopping_) {
     // While samples wait, silence is measured up to the newest one handled.
-    const int taken = take(kTakeTimeout);
-    pipeline_.Tend(taken < kTakeLimit ? Clock::now() : received);
+    const int taken = take(pair_ ? kPairTakeTimeout : kTakeTimeout);
+    pipeline_.Tend(taken < limit ? Clock::now() : received);
+    if (pair_) {
+      pair_->Tick(counters_[Counter::kReceived], pipeline_);
+    }
+  }
+  if (pair_) {
+    pair_->Leave();
   }
   // What is there already; publishers that go on do not keep us.
   while (Clock::now() < drain_until_.load() && take(milliseconds(0)) > 0) {
@@ -407,7 +430,8 @@ StatusFacts Service::Facts() const {
           pipeline_.recorder_backlog(),
           pipeline_.history_degraded(),
           pipeline_.recording_degraded(),
-          heartbeat_.StalledSince(Clock::now() - kStallLimit)};
+          heartbeat_.StalledSince(Clock::now() - kStallLimit),
+          pair_ ? std::optional(pair_->status()) : std::nullopt};
 }
 
 std::string Service::Metrics() const {

@@ -18,6 +18,7 @@
 #include "monitor/app/event_hook.h"
 #include "monitor/app/history_store.h"
 #include "monitor/app/model_assignment.h"
+#include "monitor/app/pair.h"
 #include "monitor/app/run_store.h"
 #include "monitor/app/status.h"
 #include "monitor/console/console.h"
@@ -43,6 +44,7 @@ struct ServiceOptions {
   double stale_timeout_s{3600.0};
   double trace_before_s{1800.0};
   double status_period_s{60.0};  ///< Of the status line in the log.
+  std::optional<PairOptions> pair;   ///< Another monitor stands in for us.
   /// Runs beside the active sets; without a version the newest one.
   std::optional<storage::ModelReference> shadow;
   std::string shadow_valves{"*"};
@@ -81,6 +83,8 @@ class Service {
   using TimePoint = Heartbeat::TimePoint;
 
   EventSink& EventsOut();
+  PipelineSinks Sinks();
+  PipelineOptions WithDelivery(PipelineOptions options);
   void AnnounceModels(const ModelSet& models);
 
   void Start();
@@ -130,6 +134,7 @@ class Service {
   idl::Subscriber<idl::ValveSampleMessage> samples_;
   Counters counters_;
   ThrottledLog log_;
+  std::unique_ptr<Pair> pair_;  // Null: nobody stands in for us.
   Pipeline pipeline_;
   Pulse service_pulse_;  // Of the thread of Run().
   Heartbeat heartbeat_;

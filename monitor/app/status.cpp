@@ -236,6 +236,21 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
       {"", "fdi_waiting", kGauge, kWaitingHelp, "queue", "evidence",
        facts.journal.trace_points}};
   measures.insert(measures.end(), others.begin(), others.end());
+  if (facts.pair) {
+    measures.insert(
+        measures.end(),
+        {{"pair_leader", "fdi_pair_leader", kGauge,
+          "1 while this monitor publishes for its pair", "", "",
+          std::uint64_t{facts.pair->leads}},
+         {"", "fdi_pair_rank", kGauge, "Of --rank", "", "",
+          number(facts.pair->rank)},
+         {"", "fdi_pair_others", kGauge,
+          "Monitors of the pair that are there to take over", "", "",
+          number(facts.pair->others)},
+         {"", "fdi_pair_takeovers_total", kCounter,
+          "Times this monitor began to publish for its pair", "", "",
+          facts.pair->takeovers}});
+  }
   return measures;
 }
 
@@ -252,6 +267,10 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   if (facts.recording_degraded) {
     status.text +=
         status.text.empty() ? "persistence degraded: runs" : ", runs";
+  }
+  if (facts.pair && facts.pair->others == 0) {
+    status.text += status.text.empty() ? "" : "; ";
+    status.text += "nobody stands by";
   }
   status.health =
       status.text.empty() ? idl::Health::kOk : idl::Health::kDegraded;
@@ -277,6 +296,9 @@ std::string ManagerLine(const idl::MonitorStatusMessage& status) {
   std::string line(idl::HealthName(status.health));
   for (const char* name : {"valves", "valves_stale", "open_episodes"}) {
     line += std::string(" ") + name + "=" + std::to_string(counters.at(name));
+  }
+  if (const auto leads = counters.find("pair_leader"); leads != counters.end()) {
+    line += leads->second != 0 ? " leads its pair" : " stands by";
   }
   return status.text.empty() ? line : line + " (" + status.text + ")";
 }

@@ -10,6 +10,7 @@
 
 #include "idl/endpoint.h"
 #include "idl/wire.h"
+#include "monitor/app/pair.h"
 #include "monitor/console/access.h"
 #include "monitor/console/live_stream.h"
 #include "monitor/counters.h"
@@ -35,6 +36,7 @@ struct StatusFacts {
   bool history_degraded{false};
   bool recording_degraded{false};
   std::vector<std::string_view> stalled;  ///< Threads.
+  std::optional<Pair::Status> pair{};     ///< If there is one.
 };
 
 /// All that is counted and measured, the counters first.

@@ -83,6 +83,17 @@ Json LargestOf(const Json& factors) {
   return largest;
 }
 
+// "leader host:1 "; of a monitor without a pair nothing.
+std::string PairText(const idl::MonitorStatusMessage& status) {
+  const auto leads = std::ranges::find(
+      status.counters, "pair_leader",
+      &std::pair<std::string, std::uint64_t>::first);
+  return leads == status.counters.end()
+             ? ""
+             : (leads->second != 0 ? "leader " : "standby ") + status.monitor +
+                   " ";
+}
+
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 // Lines that are no rows: title, blank, heading, "too narrow", blank, keys.
 constexpr std::size_t kOtherLines = 6;
@@ -160,7 +171,7 @@ std::string TopBoard::Health(Clock::time_point now) const {
     const auto& [status, at] = heard;
     if (now - at <= kMonitorSilence) {
       text += (text.empty() ? "" : ", ") +
-              std::string(idl::HealthName(status.health)) +
+              PairText(status) + std::string(idl::HealthName(status.health)) +
               (status.text.empty() ? "" : ": " + status.text);
     }
   }

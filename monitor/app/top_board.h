@@ -48,7 +48,8 @@ class TopBoard {
                      Clock::time_point now) const;
 
   std::size_t valves() const { return decisions_.size(); }
-  /// "OK", "DEGRADED: why"; empty if no monitor has spoken lately.
+  /// "OK", "DEGRADED: why", of a pair "leader host:1 OK, standby host:2 OK";
+  /// empty if no monitor has spoken lately.
   std::string Health(Clock::time_point now) const;
 
  private:

@@ -1,0 +1,384 @@
+// Who publishes what, and when.
+//
+// Vectors. A valve's vectors have an order (source, seq). What the leader
+// publishes covers ours up to the same place; the rest is held for some
+// seconds, and published by who takes over. So no vector is missing, and none
+// is there twice unless both led.
+//
+// Events. They are recorded before they come here (the outbox of the history
+// has them until they are marked as sent), and are the same on both sides: ids
+// are hashes of valve, source and stamp of detection. What was not heard goes
+// out at the take-over. What the leader raised and we did not, as we were away
+// or were settling, is adopted after a while: recorded, and its episode goes on
+// here under the same id.
+//
+// Subscribers that come late are given the last vectors and events of each
+// valve by DDS, but only those of a writer that lives. So the first one that
+// comes after a take-over makes us send what the former leader had published;
+// who was there before drops repeats by (source, seq) or by (episode,
+// transition, stamp), as after a restart.
+//
+// Leading is a lease: it ends by itself if the diagnosis does not get on for as
+// long as the others wait. A process that was stopped and goes on therefore
+// publishes nothing before it has heard who leads by now.
+#include "monitor/app/pair.h"
+
+#include <algorithm>
+#include <random>
+#include <set>
+#include <unordered_set>
+#include <utility>
+#include <vector>
+
+#include "diagnosis/error.h"
+#include "diagnosis/printable.h"
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kTickPeriod{10};
+constexpr milliseconds kWordPeriod{50};
+constexpr milliseconds kListening{1500};  // Discovery takes some 100 ms.
+constexpr milliseconds kHoldVectors{3000};
+constexpr std::size_t kMostVectors = 20'000;  // 46 MB
+constexpr std::size_t kMostEvents = 10'000;
+constexpr std::size_t kMostPlaces = 200'000;
+// Later than that one of the two has judged differently.
+constexpr milliseconds kAdoptAfter{2000};
+constexpr milliseconds kHeardWithin{60'000};
+constexpr std::size_t kEventsPerValve = 16;  // As the writer keeps for DDS.
+
+bool Same(const FaultEvent& a, const FaultEvent& b) {
+  return a.episode_id == b.episode_id &&
+         a.transition.kind == b.transition.kind &&
+         a.transition.stamp_ns == b.transition.stamp_ns;
+}
+
+PairState OwnState(const PairOptions& options, const std::string& monitor) {
+  std::random_device random;
+  PairState state;
+  state.monitor = monitor;
+  state.pair = options.name;
+  state.rank = options.rank;
+  state.instance = (std::uint64_t{random()} << 32U) | random();
+  return state;
+}
+
+std::string PatternOfOthers(const PairOptions& options) {
+  return "pair/" + options.name + "/[!" + std::to_string(options.rank) + "]";
+}
+
+}  // namespace
+
+void Validate(const PairOptions& options) {
+  const auto plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+           (c >= '0' && c <= '9') || c == '-' || c == '_';
+  };
+  if (options.name.empty() || options.name.size() > idl::kMaxNameLength ||
+      !std::ranges::all_of(options.name, plain)) {
+    throw ConfigError("--pair '" + options.name +
+                      "': accepted are 1 to 32 letters, digits, - and _");
+  }
+  if (options.rank < 1 || options.rank > 9) {
+    throw ConfigError("--pair needs --rank 1 .. 9, another one for each");
+  }
+}
+
+std::string PartitionOf(const PairOptions& options) {
+  return "pair/" + options.name + "/" + std::to_string(options.rank);
+}
+
+Pair::Pair(idl::Participant& participant, const PairOptions& options,
+           const std::string& monitor, BusDecisionSink& decisions,
+           BusEventSink& bus, EventSink& events, ThrottledLog& log)
+    : options_(options),
+      patience_(std::chrono::duration_cast<Clock::duration>(
+          std::chrono::duration<double>(options.patience_s))),
+      decisions_(decisions),
+      bus_(bus),
+      events_(events),
+      log_(log),
+      own_word_(participant),
+      words_(participant),
+      heard_vectors_(participant, idl::Profile::kLive, idl::Overflow::kLibrary,
+                     PatternOfOthers(options)),
+      heard_events_(participant, idl::Profile::kLive, idl::Overflow::kLibrary,
+                    PatternOfOthers(options)),
+      election_(OwnState(options, monitor), patience_, kListening,
+                Clock::now()) {
+  status_.name = options.name;
+  status_.rank = options.rank;
+}
+
+bool Pair::IsCovered(const std::string& valve_id,
+                     const Verdict& verdict) const {
+  const auto found = covered_.find(valve_id);
+  return found != covered_.end() &&
+         found->second.source_id == verdict.source_id &&
+         verdict.seq <= found->second.seq;
+}
+
+bool Pair::Publish(const std::string& valve_id, const ModelSet* models,
+                   const Verdict& verdict) {
+  if (held_vectors_.empty() && Leads()) {
+    return decisions_.Publish(valve_id, models, verdict);
+  }
+  if (!IsCovered(valve_id, verdict)) {
+    if (held_vectors_.size() >= kMostVectors) {
+      held_vectors_.pop_front();
+    }
+    HeldVector& held = held_vectors_.emplace_back();
+    held.since = Clock::now();
+    BusDecisionSink::Fill(valve_id, models, verdict, held.message);
+  }
+  return true;
+}
+
+bool Pair::WantsLast() {
+  if (!Leads()) {
+    return false;
+  }
+  const bool lacks = vectors_lacked_ >= 0 && decisions_.came() > vectors_lacked_;
+  if (lacks) {
+    vectors_lacked_ = -1;
+  }
+  return decisions_.WantsLast() || lacks;
+}
+
+// By the publisher of the journal, but at the start.
+bool Pair::Publish(const FaultEvent& event, bool persisted) {
+  const std::lock_guard lock(mutex_);
+  FaultEvent own = event;
+  own.persisted = persisted;
+  if (Leads()) {
+    return !RememberLocked(own) || events_.Publish(event, persisted);
+  }
+  const auto same = [&](const HeldEvent& held) {
+    return Same(held.event, event);
+  };
+  std::erase_if(foreign_, same);
+  const auto known = published_.find(event.valve_id);
+  if (known != published_.end() &&
+      std::ranges::any_of(known->second, [&](const FaultEvent& each) {
+        return Same(each, event);
+      })) {
+    return true;
+  }
+  if (held_events_.size() >= kMostEvents) {
+    held_events_.pop_front();
+  }
+  held_events_.push_back({Clock::now(), std::move(own)});
+  return true;
+}
+
+// @returns false if it is on the bus already.
+bool Pair::RememberLocked(const FaultEvent& event) {
+  std::deque<FaultEvent>& last = published_[event.valve_id];
+  if (std::ranges::any_of(
+          last, [&](const FaultEvent& each) { return Same(each, event); })) {
+    return false;
+  }
+  if (last.size() >= kEventsPerValve) {
+    last.pop_front();
+  }
+  last.push_back(event);
+  return true;
+}
+
+void Pair::Hear(const idl::DecisionMessage& message) {
+  if (covered_.size() >= kMostPlaces) {
+    covered_.clear();
+  }
+  const Verdict& verdict = message.verdict;
+  if (!IsCovered(message.valve_id, verdict)) {
+    covered_[message.valve_id] = {verdict.source_id, verdict.seq};
+  }
+}
+
+void Pair::Hear(const FaultEvent& event, TimePoint now) {
+  const std::lock_guard lock(mutex_);
+  if (!RememberLocked(event)) {
+    return;
+  }
+  if (std::erase_if(held_events_, [&](const HeldEvent& held) {
+        return Same(held.event, event);
+      }) == 0) {
+    foreign_.push_back({now, event});
+  }
+}
+
+void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
+  const TimePoint now = Clock::now();
+  if (now - ticked_ < kTickPeriod) {
+    return;
+  }
+  ticked_ = now;
+  constexpr milliseconds kNow{0};
+  words_.Take({[&](const PairState& word, const auto&) {
+                 election_.Heard(word, now);
+               },
+               {}},
+              kNow);
+  heard_vectors_.Take(
+      {[&](const idl::DecisionMessage& message, const auto&) { Hear(message); },
+       {}},
+      kNow);
+  heard_events_.Take(
+      {[&](const FaultEvent& event, const auto&) { Hear(event, now); }, {}},
+      kNow);
+  election_.Step(received, static_cast<int>(pipeline.census().judged), now);
+  Follow(now);
+  DropHeard(now);
+  Adopt(now, pipeline);
+  if (led_ && events_lacked_ >= 0 && bus_.came() > events_lacked_) {
+    RepeatEvents();
+  }
+}
+
+void Pair::Leave() {
+  const TimePoint now = Clock::now();
+  election_.Leave(now);
+  Follow(now);
+  own_word_.WaitForAcknowledged(milliseconds(100));
+}
+
+// Does what the election decided.
+void Pair::Follow(TimePoint now) {
+  const bool leads = election_.leads();
+  const bool changed = leads != led_;
+  if (changed && !leads) {
+    lease_until_ = TimePoint{};
+    decisions_.Forget();
+  }
+  if (changed || election_.self().leaving || now - said_ >= kWordPeriod) {
+    said_ = now;
+    own_word_.Write(election_.self());
+  }
+  if (leads) {
+    lease_until_ = said_ + patience_;
+  }
+  if (changed && leads) {
+    const std::lock_guard lock(mutex_);
+    vectors_lacked_ = covered_.empty() ? -1 : decisions_.came();
+    events_lacked_ = published_.empty() ? -1 : bus_.came();
+  }
+  led_ = leads;
+  if (leads) {
+    PublishHeld();
+  }
+  if (!election_.twin().empty()) {
+    log_.Report(
+        LogId::kPairTwin, "pair_rank_taken",
+        [this] {
+          return "pair=" + options_.name +
+                 " rank=" + std::to_string(options_.rank) +
+                 " other=" + LogValue(election_.twin());
+        },
+        LogLevel::kError);
+  }
+  if (followed_ != election_.leader()) {
+    followed_ = election_.leader();
+    log_.Line(LogLevel::kInfo,
+              "pair_leader pair=" + options_.name + " leader=" +
+                  (followed_.empty() ? "none" : LogValue(followed_)) +
+                  " here=" + (leads ? "true" : "false"));
+  }
+  const std::lock_guard lock(mutex_);
+  status_.leads = leads;
+  status_.leader = followed_;
+  status_.others = election_.others();
+  status_.takeovers += changed && leads ? 1 : 0;
+}
+
+// Of a take-over, or of a moment in which the lease had run out. One vector of
+// a valve at a time, as the writer keeps but one until it is sent.
+void Pair::PublishHeld() {
+  std::unordered_set<std::string> sent;
+  const bool all = held_vectors_.size() > kMostVectors / 2;
+  while (!held_vectors_.empty()) {
+    const idl::DecisionMessage& message = held_vectors_.front().message;
+    if (!IsCovered(message.valve_id, message.verdict)) {
+      if (!sent.insert(message.valve_id).second && !all) {
+        break;
+      }
+      decisions_.Send(message);
+    }
+    held_vectors_.pop_front();
+  }
+  const std::lock_guard lock(mutex_);
+  for (const HeldEvent& held : std::exchange(held_events_, {})) {
+    if (RememberLocked(held.event)) {
+      events_.Publish(held.event, held.event.persisted);
+    }
+  }
+}
+
+// What the leader has published meanwhile, and what it never will.
+void Pair::DropHeard(TimePoint now) {
+  while (!held_vectors_.empty() && !led_) {
+    const HeldVector& first = held_vectors_.front();
+    if (now - first.since < kHoldVectors &&
+        !IsCovered(first.message.valve_id, first.message.verdict)) {
+      break;
+    }
+    held_vectors_.pop_front();
+  }
+  const std::lock_guard lock(mutex_);
+  std::set<std::uint64_t> over;
+  for (const HeldEvent& held : held_events_) {
+    if (held.event.transition.kind == TransitionKind::kClosed &&
+        now - held.since > kHeardWithin) {
+      over.insert(held.event.episode_id);
+    }
+  }
+  std::erase_if(held_events_, [&](const HeldEvent& held) {
+    return over.contains(held.event.episode_id);
+  });
+}
+
+// Of a valve that has not settled nothing of our own is to be waited for.
+void Pair::Adopt(TimePoint now, Pipeline& pipeline) {
+  std::vector<FaultEvent> due;
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(foreign_, [&](HeldEvent& held) {
+      const bool is_due = now - held.since >= kAdoptAfter ||
+                          pipeline.IsSettling(held.event.valve_id);
+      if (is_due) {
+        due.push_back(std::move(held.event));
+      }
+      return is_due;
+    });
+  }
+  for (FaultEvent& event : due) {
+    pipeline.Adopt(std::move(event));
+  }
+}
+
+void Pair::RepeatEvents() {
+  events_lacked_ = -1;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [valve_id, events] : published_) {
+    for (const FaultEvent& event : events) {
+      bus_.Repeat(event);
+    }
+  }
+}
+
+Pair::Status Pair::status() const {
+  const std::lock_guard lock(mutex_);
+  return status_;
+}
+
+bool Pair::HeardAllEvents() const {
+  const TimePoint now = Clock::now();
+  const std::lock_guard lock(mutex_);
+  return std::ranges::all_of(held_events_, [&](const HeldEvent& held) {
+    return now - held.since > kHeardWithin;
+  });
+}
+
+}  // namespace fdi::monitor

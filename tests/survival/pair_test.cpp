@@ -1,0 +1,168 @@
+// A pair of monitors on loopback whose leader is killed, stopped and ended.
+#include <csignal>
+#include <functional>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "storage/history/history_reader.h"
+#include "tests/idl/test_domain.h"
+#include "tests/storage/temporary_directory.h"
+#include "tests/survival/kill_rounds.h"
+#include "tests/survival/pair_plant.h"
+#include "tests/system/monitor_process.h"
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::milliseconds;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kValves = 50;
+constexpr std::size_t kFaulty = 5;
+
+class PairTest : public testing::Test {
+ protected:
+  static constexpr int kRanks = 2;
+
+  PairTest() : plant_(domain_.Options(), kValves, kFaulty, milliseconds(100)) {
+    for (int i = 0; i < kRanks; ++i) {
+      StorePairModels(data_[i].path());
+      Start(i);
+    }
+  }
+
+  void Start(int i) {
+    monitors_[i] = std::make_unique<ChildProcess>(std::vector<std::string>{
+        FDI_MONITOR_PROGRAM, "--data", data_[i].path().string(), "--domain",
+        std::to_string(domain_.id()), "run", "--pair", "test", "--rank",
+        std::to_string(i + 1)});
+    ASSERT_TRUE(monitors_[i]->AwaitLine("monitor_ready"))
+        << monitors_[i]->errors();
+  }
+
+  static bool Await(const std::function<bool()>& condition,
+                    milliseconds patience = milliseconds(30'000)) {
+    const auto end = Clock::now() + patience;
+    while (!condition()) {
+      if (Clock::now() > end) {
+        return false;
+      }
+      std::this_thread::sleep_for(milliseconds(10));
+    }
+    return true;
+  }
+
+  /// Waits until both are ready. @returns which one leads.
+  int Leader() {
+    EXPECT_TRUE(Await([this] { return plant_.Settled(); }));
+    const auto leaders = plant_.Leaders();
+    for (int i = 0; i < kRanks; ++i) {
+      if (leaders == std::vector{std::to_string(monitors_[i]->pid())}) {
+        return i;
+      }
+    }
+    ADD_FAILURE() << "nobody leads";
+    return 0;
+  }
+
+  void BeginEpisodes() {
+    Leader();
+    plant_.CountFromNow();
+    plant_.SetFaulty(true);
+    ASSERT_TRUE(Await([this] { return plant_.Isolated() == kFaulty; }));
+  }
+
+  /// What the take-over since `from` cost subscribers.
+  void ExpectTakeOver(Clock::time_point from) {
+    ASSERT_TRUE(Await([&] {
+      return plant_.NextVectors(from).missing == 0;
+    })) << plant_.NextVectors(from).missing << " valves are silent";
+    const PairPlant::Delay delay = plant_.NextVectors(from);
+    std::printf("next vectors after %.0f ms (median), %.0f ms (worst)\n",
+                delay.median, delay.worst);
+    EXPECT_LE(delay.median, 500.0);
+    EXPECT_LE(delay.worst, 1000.0);
+  }
+
+  /// No sample without a vector, no transition twice, one episode a valve on
+  /// the bus and in both histories.
+  void ExpectWhole() {
+    std::this_thread::sleep_for(milliseconds(3500));
+    const PairPlant::Totals totals = plant_.Count();
+    std::printf("%zu samples, %zu missing, %zu twice; %zu transitions of %zu "
+                "episodes, %zu repeats\n",
+                totals.samples, totals.missing, totals.twice,
+                totals.transitions, totals.episodes, totals.repeats);
+    EXPECT_GT(totals.samples, kValves * 10U);
+    EXPECT_EQ(totals.missing, 0U);
+    EXPECT_EQ(totals.transitions_twice, 0U);
+    EXPECT_EQ(totals.episodes, kFaulty);
+    for (const storage::TemporaryDirectory& data : data_) {
+      EXPECT_EQ(storage::HistoryReader(data.path() / "history.db").List().size(),
+                kFaulty);
+    }
+  }
+
+  void TearDown() override {
+    for (int i = 0; i < kRanks && HasFailure(); ++i) {
+      monitors_[i]->Signal(SIGCONT);
+      monitors_[i]->Signal(SIGTERM);
+      monitors_[i]->AwaitExit();
+      std::printf("monitor %d:\n%s\n", i + 1, monitors_[i]->errors().c_str());
+    }
+  }
+
+  const idl::TestDomain domain_;
+  storage::TemporaryDirectory data_[kRanks];
+  PairPlant plant_;
+  std::unique_ptr<ChildProcess> monitors_[kRanks];
+};
+
+TEST_F(PairTest, OneOfTwoPublishesAndTheOtherTakesOverWhenItIsKilled) {
+  BeginEpisodes();
+  for (int round = 0; round < KillRounds(); ++round) {
+    const int leader = Leader();
+    const auto now = Clock::now();
+    monitors_[leader]->Signal(SIGKILL);
+    ExpectTakeOver(now);
+    Start(leader);
+  }
+  Leader();
+  ExpectWhole();
+}
+
+TEST_F(PairTest, ALeaderThatHangsIsReplacedAndSaysNothingWhenItGoesOn) {
+  BeginEpisodes();
+  for (int round = 0; round < KillRounds(); ++round) {
+    const int leader = Leader();
+    const auto now = Clock::now();
+    monitors_[leader]->Signal(SIGSTOP);
+    ExpectTakeOver(now);
+    monitors_[leader]->Signal(SIGCONT);
+    EXPECT_NE(Leader(), leader);
+  }
+  ExpectWhole();
+}
+
+// An episode that begins while one of the two is away is one episode in both.
+TEST_F(PairTest, IsUpgradedOneAfterTheOtherWithoutAMissingEpisode) {
+  for (int i = 0; i < kRanks; ++i) {
+    const int leader = Leader();
+    const auto now = Clock::now();
+    monitors_[leader]->Signal(SIGTERM);
+    ExpectTakeOver(now);
+    ASSERT_EQ(monitors_[leader]->AwaitExit(), 0);
+    if (i == 0) {
+      plant_.CountFromNow();
+      plant_.SetFaulty(true);
+      ASSERT_TRUE(Await([this] { return plant_.Isolated() == kFaulty; }));
+    }
+    Start(leader);
+  }
+  Leader();
+  ExpectWhole();
+}
+
+}  // namespace
+}  // namespace fdi::monitor
