@@ -313,8 +313,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
 
 template <typename Message>
 Subscriber<Message>::Subscriber(Participant& participant, Profile profile,
-                                Overflow overflow,
-                                const std::string& partition)
+                                Overflow overflow, const std::string& partition)
     : impl_(std::make_unique<Impl>(participant, profile, overflow, partition)) {
 }
 

@@ -82,8 +82,7 @@ void PairElection::Step(std::uint64_t received, int judged, TimePoint now) {
     leaderless_.reset();
   } else {
     leaderless_ = leaderless_.value_or(now);
-    self_.leads =
-        !self_.leaving && now - *leaderless_ >= better * patience_;
+    self_.leads = !self_.leaving && now - *leaderless_ >= better * patience_;
   }
   if (self_.leads) {
     leader_ = self_.monitor;

@@ -379,8 +379,7 @@ void Pipeline::Adopt(FaultEvent event) {
     return;
   }
   const auto open = recovered_.find(event.valve_id);
-  if (open != recovered_.end() &&
-      open->second.episode_id != event.episode_id) {
+  if (open != recovered_.end() && open->second.episode_id != event.episode_id) {
     return;
   }
   if (event.transition.kind == TransitionKind::kClosed) {

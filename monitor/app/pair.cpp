@@ -141,7 +141,8 @@ bool Pair::WantsLast() {
   if (!Leads()) {
     return false;
   }
-  const bool lacks = vectors_lacked_ >= 0 && decisions_.came() > vectors_lacked_;
+  const bool lacks =
+      vectors_lacked_ >= 0 && decisions_.came() > vectors_lacked_;
   if (lacks) {
     vectors_lacked_ = -1;
   }
@@ -217,11 +218,10 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
   }
   ticked_ = now;
   constexpr milliseconds kNow{0};
-  words_.Take({[&](const PairState& word, const auto&) {
-                 election_.Heard(word, now);
-               },
-               {}},
-              kNow);
+  words_.Take(
+      {[&](const PairState& word, const auto&) { election_.Heard(word, now); },
+       {}},
+      kNow);
   heard_vectors_.Take(
       {[&](const idl::DecisionMessage& message, const auto&) { Hear(message); },
        {}},

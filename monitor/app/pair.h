@@ -19,8 +19,8 @@ namespace fdi::monitor {
 
 /// Settings of a monitor that has another one to stand in for it.
 struct PairOptions {
-  std::string name;  ///< The same for both; letters, digits, - and _.
-  int rank{0};       ///< 1..9; the lower one is preferred.
+  std::string name;        ///< The same for both; letters, digits, - and _.
+  int rank{0};             ///< 1..9; the lower one is preferred.
   double patience_s{0.3};  ///< A leader that is silent for longer is replaced.
 };
 
@@ -33,8 +33,8 @@ std::string PartitionOf(const PairOptions& options);
 
 /// One of two monitors that stand in for each other. Both diagnose and record
 /// everything; what they would publish goes through here, and the one that does
-/// not lead holds it until it has heard the same from the leader. Who takes over
-/// publishes what was not heard.
+/// not lead holds it until it has heard the same from the leader. Who takes
+/// over publishes what was not heard.
 ///
 /// The thread of the diagnosis calls Tick(), and nothing else says that this
 /// monitor is alive.

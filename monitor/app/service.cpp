@@ -163,9 +163,9 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
           options.best_effort ? idl::Profile::kBestEffort : idl::Profile::kLive,
           idl::Overflow::kOnTheWay),
       log_(context.log),
-      pair_(options.pair ? std::make_unique<Pair>(
-                               participant_, *options.pair, MonitorName(),
-                               decisions_, events_, EventsOut(), log_)
+      pair_(options.pair ? std::make_unique<Pair>(participant_, *options.pair,
+                                                  MonitorName(), decisions_,
+                                                  events_, EventsOut(), log_)
                          : nullptr),
       pipeline_(WithDelivery(pipeline_options_), Sinks(), assignment_,
                 {counters_, log_, cli::NowNs}),

@@ -43,8 +43,8 @@ struct ServiceOptions {
   bool second_look{true};   ///< Of onboarded valves, by physics.
   double stale_timeout_s{3600.0};
   double trace_before_s{1800.0};
-  double status_period_s{60.0};  ///< Of the status line in the log.
-  std::optional<PairOptions> pair;   ///< Another monitor stands in for us.
+  double status_period_s{60.0};     ///< Of the status line in the log.
+  std::optional<PairOptions> pair;  ///< Another monitor stands in for us.
   /// Runs beside the active sets; without a version the newest one.
   std::optional<storage::ModelReference> shadow;
   std::string shadow_valves{"*"};

@@ -237,19 +237,18 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
        facts.journal.trace_points}};
   measures.insert(measures.end(), others.begin(), others.end());
   if (facts.pair) {
-    measures.insert(
-        measures.end(),
-        {{"pair_leader", "fdi_pair_leader", kGauge,
-          "1 while this monitor publishes for its pair", "", "",
-          std::uint64_t{facts.pair->leads}},
-         {"", "fdi_pair_rank", kGauge, "Of --rank", "", "",
-          number(facts.pair->rank)},
-         {"", "fdi_pair_others", kGauge,
-          "Monitors of the pair that are there to take over", "", "",
-          number(facts.pair->others)},
-         {"", "fdi_pair_takeovers_total", kCounter,
-          "Times this monitor began to publish for its pair", "", "",
-          facts.pair->takeovers}});
+    measures.insert(measures.end(),
+                    {{"pair_leader", "fdi_pair_leader", kGauge,
+                      "1 while this monitor publishes for its pair", "", "",
+                      std::uint64_t{facts.pair->leads}},
+                     {"", "fdi_pair_rank", kGauge, "Of --rank", "", "",
+                      number(facts.pair->rank)},
+                     {"", "fdi_pair_others", kGauge,
+                      "Monitors of the pair that are there to take over", "",
+                      "", number(facts.pair->others)},
+                     {"", "fdi_pair_takeovers_total", kCounter,
+                      "Times this monitor began to publish for its pair", "",
+                      "", facts.pair->takeovers}});
   }
   return measures;
 }
@@ -297,7 +296,8 @@ std::string ManagerLine(const idl::MonitorStatusMessage& status) {
   for (const char* name : {"valves", "valves_stale", "open_episodes"}) {
     line += std::string(" ") + name + "=" + std::to_string(counters.at(name));
   }
-  if (const auto leads = counters.find("pair_leader"); leads != counters.end()) {
+  if (const auto leads = counters.find("pair_leader");
+      leads != counters.end()) {
     line += leads->second != 0 ? " leads its pair" : " stands by";
   }
   return status.text.empty() ? line : line + " (" + status.text + ")";

@@ -85,9 +85,9 @@ Json LargestOf(const Json& factors) {
 
 // "leader host:1 "; of a monitor without a pair nothing.
 std::string PairText(const idl::MonitorStatusMessage& status) {
-  const auto leads = std::ranges::find(
-      status.counters, "pair_leader",
-      &std::pair<std::string, std::uint64_t>::first);
+  const auto leads =
+      std::ranges::find(status.counters, "pair_leader",
+                        &std::pair<std::string, std::uint64_t>::first);
   return leads == status.counters.end()
              ? ""
              : (leads->second != 0 ? "leader " : "standby ") + status.monitor +
@@ -170,8 +170,8 @@ std::string TopBoard::Health(Clock::time_point now) const {
   for (const auto& [monitor, heard] : monitors_) {
     const auto& [status, at] = heard;
     if (now - at <= kMonitorSilence) {
-      text += (text.empty() ? "" : ", ") +
-              PairText(status) + std::string(idl::HealthName(status.health)) +
+      text += (text.empty() ? "" : ", ") + PairText(status) +
+              std::string(idl::HealthName(status.health)) +
               (status.text.empty() ? "" : ": " + status.text);
     }
   }

@@ -116,6 +116,7 @@ for kind in "$@"; do
   for ((round = 1; round <= rounds; ++round)); do
     find_leader
     pid=${monitor[$leader]}
+    sleep "0.$((RANDOM % 10))"  # Valves speak once a second.
     ask mark
     case $kind in
       kill | term)

@@ -114,9 +114,9 @@ class PairPlant {
     std::size_t twice{0};    ///< with more than one.
     std::size_t over_500ms{0};
     double worst_ms{0.0};
-    std::size_t episodes{0};     ///< By id.
-    std::size_t transitions{0};  ///< By episode, kind and stamp.
-    std::size_t repeats{0};      ///< Of these, dropped.
+    std::size_t episodes{0};           ///< By id.
+    std::size_t transitions{0};        ///< By episode, kind and stamp.
+    std::size_t repeats{0};            ///< Of these, dropped.
     std::size_t transitions_twice{0};  ///< With another stamp.
   };
   Totals Count() {
@@ -131,8 +131,8 @@ class PairPlant {
         ++totals.samples;
         totals.missing += vector.heard == 0 ? 1 : 0;
         totals.twice += vector.heard > 1 ? 1 : 0;
-        const double ms =
-            vector.heard == 0 ? 0.0
+        const double ms = vector.heard == 0
+                              ? 0.0
                               : Milliseconds(vector.at - vector.sent).count();
         totals.over_500ms += ms > 500.0 ? 1 : 0;
         totals.worst_ms = std::max(totals.worst_ms, ms);
@@ -175,9 +175,9 @@ class PairPlant {
           const std::lock_guard lock(mutex_);
           sent_[static_cast<std::size_t>(v)][k].sent = Clock::now();
         }
-        samples_.Write({"V" + std::to_string(v),
-                        PlantSample(k, v < faulty_ ? offset_.load() : 0.0,
-                                    source_)});
+        samples_.Write(
+            {"V" + std::to_string(v),
+             PlantSample(k, v < faulty_ ? offset_.load() : 0.0, source_)});
       }
       due += period_;
       std::this_thread::sleep_until(due);

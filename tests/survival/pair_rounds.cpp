@@ -9,7 +9,8 @@
 //     faulty       the faulty valves fail; waits until all are isolated
 //     totals       prints what Count() says, as key=value
 //
-// Usage: pair_rounds prepare DATA | pair_rounds run ADDRESS DOMAIN VALVES FAULTY
+// Usage: pair_rounds prepare DATA | pair_rounds run ADDRESS DOMAIN VALVES
+// FAULTY
 #include <cstdio>
 #include <functional>
 #include <iostream>
@@ -71,8 +72,9 @@ int Run(const fdi::idl::DdsOptions& dds, int valves, int faulty) {
     } else if (command == "faulty") {
       plant.CountFromNow();
       plant.SetFaulty(true);
-      Await([&] { return plant.Isolated() >= static_cast<std::size_t>(faulty); },
-            60);
+      Await(
+          [&] { return plant.Isolated() >= static_cast<std::size_t>(faulty); },
+          60);
       Say(std::to_string(plant.Isolated()));
     } else if (command == "totals") {
       Say(Totals(plant.Count()));

@@ -75,9 +75,8 @@ class PairTest : public testing::Test {
 
   /// What the take-over since `from` cost subscribers.
   void ExpectTakeOver(Clock::time_point from) {
-    ASSERT_TRUE(Await([&] {
-      return plant_.NextVectors(from).missing == 0;
-    })) << plant_.NextVectors(from).missing << " valves are silent";
+    ASSERT_TRUE(Await([&] { return plant_.NextVectors(from).missing == 0; }))
+        << plant_.NextVectors(from).missing << " valves are silent";
     const PairPlant::Delay delay = plant_.NextVectors(from);
     std::printf("next vectors after %.0f ms (median), %.0f ms (worst)\n",
                 delay.median, delay.worst);
@@ -90,17 +89,19 @@ class PairTest : public testing::Test {
   void ExpectWhole() {
     std::this_thread::sleep_for(milliseconds(3500));
     const PairPlant::Totals totals = plant_.Count();
-    std::printf("%zu samples, %zu missing, %zu twice; %zu transitions of %zu "
-                "episodes, %zu repeats\n",
-                totals.samples, totals.missing, totals.twice,
-                totals.transitions, totals.episodes, totals.repeats);
+    std::printf(
+        "%zu samples, %zu missing, %zu twice; %zu transitions of %zu "
+        "episodes, %zu repeats\n",
+        totals.samples, totals.missing, totals.twice, totals.transitions,
+        totals.episodes, totals.repeats);
     EXPECT_GT(totals.samples, kValves * 10U);
     EXPECT_EQ(totals.missing, 0U);
     EXPECT_EQ(totals.transitions_twice, 0U);
     EXPECT_EQ(totals.episodes, kFaulty);
     for (const storage::TemporaryDirectory& data : data_) {
-      EXPECT_EQ(storage::HistoryReader(data.path() / "history.db").List().size(),
-                kFaulty);
+      EXPECT_EQ(
+          storage::HistoryReader(data.path() / "history.db").List().size(),
+          kFaulty);
     }
   }
 
