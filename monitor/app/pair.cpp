@@ -154,7 +154,7 @@ bool Pair::Publish(const FaultEvent& event, bool persisted) {
   const std::lock_guard lock(mutex_);
   FaultEvent own = event;
   own.persisted = persisted;
-  if (Leads()) {
+  if (held_events_.empty() && Leads()) {
     return !RememberLocked(own) || events_.Publish(event, persisted);
   }
   const auto same = [&](const HeldEvent& held) {
@@ -242,6 +242,9 @@ void Pair::Leave() {
   const TimePoint now = Clock::now();
   election_.Leave(now);
   Follow(now);
+  if (led_) {
+    lease_until_ = TimePoint::max();  // Nobody else publishes what is left.
+  }
   own_word_.WaitForAcknowledged(milliseconds(100));
 }
 

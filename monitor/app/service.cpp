@@ -99,6 +99,12 @@ std::string PairPartition(const ServiceOptions& options) {
   return options.pair ? PartitionOf(*options.pair) : "";
 }
 
+std::string PairText(const Pair& pair) {
+  const Pair::Status status = pair.status();
+  const std::string leader = status.leader.empty() ? "nobody" : status.leader;
+  return status.leads ? "leader" : "standby, " + leader + " leads";
+}
+
 // To the service manager (systemd, Type=notify), if there is one that listens.
 void Notify(const std::string& state) {
   sd_notify(0, state.c_str());
@@ -258,9 +264,9 @@ void Service::WatchCauses() {
 void Service::ServeConsole() {
   const auto facts = [this] {
     const idl::MonitorStatusMessage status = StatusOf(Facts());
-    return console::MonitorFacts{idl::HealthName(status.health),
-                                 status.counters,
-                                 pipeline_.census().open_episodes};
+    return console::MonitorFacts{
+        idl::HealthName(status.health), status.counters,
+        pipeline_.census().open_episodes, pair_ ? PairText(*pair_) : ""};
   };
   console_->Start({data_.history(), data_.models(), context_.software,
                    started_ns_, facts, cli::NowNs});

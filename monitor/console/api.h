@@ -31,6 +31,7 @@ struct MonitorFacts {
   std::string_view health;  ///< "OK", "DEGRADED"
   std::vector<std::pair<std::string, std::uint64_t>> counters;
   std::uint64_t open_episodes{0};
+  std::string pair{};  ///< "leader", "standby, host:1 leads"; empty: none.
 };
 
 /// What the console needs of the monitor; called by any thread.

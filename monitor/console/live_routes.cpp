@@ -44,6 +44,7 @@ Json Status(const Api& api, const httplib::Request& /*request*/) {
           {"instance", api.instance},
           {"software", api.sources.software},
           {"health", facts.health},
+          {"pair", facts.pair.empty() ? Json() : Json(facts.pair)},
           {"write", api.access.writable()},
           {"stale_after_s", kStalePeriods * period_s},
           {"counters", std::move(counters)},

@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
   if (size < 5) {
     return 0;
   }
-  switch (data[0] % 5) {
+  switch (data[0] % 6) {
     case 0:
       Receive<fdi::idl::ValveSampleMessage>(data + 1, size - 1);
       break;
@@ -43,8 +43,11 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
     case 3:
       Receive<fdi::idl::ModelSetInfoMessage>(data + 1, size - 1);
       break;
-    default:
+    case 4:
       Receive<fdi::idl::MonitorStatusMessage>(data + 1, size - 1);
+      break;
+    default:
+      Receive<fdi::PairState>(data + 1, size - 1);
   }
   return 0;
 }

@@ -129,6 +129,7 @@ void WriteMessages() {
   status.monitor = "host:1";
   status.counters = {{"received", 12}};
   WriteMessage(4, status);
+  WriteMessage(5, fdi::PairState{"host:1", "plant", 1, 7, true, false, 10, 20});
 }
 
 void WriteDatagrams() {

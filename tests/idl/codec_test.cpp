@@ -227,6 +227,22 @@ TEST(CodecTest, MonitorStatusArrivesWhole) {
   EXPECT_EQ(got.counters, sent.counters);
 }
 
+TEST(CodecTest, PairStateArrivesWhole) {
+  PairState sent{"host:1", "plant", 2,    1ULL << 63U,
+                 true,     true,    1000, 1U << 31U};
+
+  const PairState got = RoundTrip(sent);
+
+  EXPECT_EQ(got.monitor, "host:1");
+  EXPECT_EQ(got.pair, "plant");
+  EXPECT_EQ(got.rank, 2);
+  EXPECT_EQ(got.instance, sent.instance);
+  EXPECT_TRUE(got.leads);
+  EXPECT_TRUE(got.leaving);
+  EXPECT_EQ(got.judged, 1000);
+  EXPECT_EQ(got.received, sent.received);
+}
+
 TEST(CodecTest, ATooLongIdIsRefusedNotCut) {
   ValveSampleMessage message = SomeSample();
   message.valve_id += 'v';

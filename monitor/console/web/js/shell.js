@@ -84,6 +84,7 @@ export function createShell(top, banner) {
     const bad = status && status.health !== 'OK';
     setText(health, !status ? '' :
       (bad ? 'Monitor degraded' : 'Monitor OK') +
+      (status.pair ? `, ${status.pair}` : '') +
       (status.write ? '' : ', read-only'));
     health.classList.toggle('bad', Boolean(bad));
     health.title = !status ? '' :
