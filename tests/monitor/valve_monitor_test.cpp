@@ -128,6 +128,7 @@ TEST_F(ValveMonitorTest, AnEpisodeOfAnotherMonitorGoesOnUnderItsId) {
   for (const TransitionKind kind :
        {TransitionKind::kDetected, TransitionKind::kIsolated}) {
     other.transition.kind = kind;
+    other.transition.faults = kind == TransitionKind::kIsolated ? 0b10 : 0;
     valve_.Adopt(other);
   }
   Feed(505, 600, kF7Offset);
