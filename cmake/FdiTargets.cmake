@@ -98,12 +98,12 @@ function(fdi_program name)
   install(TARGETS ${name} RUNTIME)
 endfunction()
 
-# fdi_test(name [NUMERICAL] [THREADS] LABEL unit|system [TIMEOUT 120]
+# fdi_test(name [NUMERICAL] [THREADS] [ALONE] LABEL unit|system [TIMEOUT 120]
 #          SOURCES a_test.cpp ... LIBRARIES lib ...)
 # NUMERICAL: optimised under sanitizers, too. THREADS: also run under the thread
-# sanitizer (preset tsan).
+# sanitizer (preset tsan). ALONE: not beside other tests, for it measures delays.
 function(fdi_test name)
-  cmake_parse_arguments(ARG "NUMERICAL;THREADS" "LABEL;TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "NUMERICAL;THREADS;ALONE" "LABEL;TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} GTest::gtest
                         GTest::gmock GTest::gtest_main)
@@ -126,5 +126,6 @@ function(fdi_test name)
     set(ARG_TIMEOUT 120)
   endif()
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
-                       PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+                       PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT}
+                                  RUN_SERIAL ${ARG_ALONE})
 endfunction()
