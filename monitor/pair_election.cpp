@@ -43,8 +43,7 @@ bool PairElection::Better(const PairState& a, const PairState& b) {
 
 void PairElection::Step(std::uint64_t received, int judged, TimePoint now) {
   if (now - std::exchange(stepped_, now) > patience_) {
-    self_.leads = false;
-    listen_until_ = now + patience_;
+    Lapse(now);
   }
   if (std::exchange(self_.received, received) != received) {
     for (auto& [instance, other] : heard_) {
@@ -89,6 +88,11 @@ void PairElection::Step(std::uint64_t received, int judged, TimePoint now) {
   } else if (rival != nullptr) {
     leader_ = rival->monitor;
   }
+}
+
+void PairElection::Lapse(TimePoint now) {
+  self_.leads = false;
+  listen_until_ = now + patience_;
 }
 
 void PairElection::Leave(TimePoint now) {

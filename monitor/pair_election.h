@@ -19,9 +19,9 @@ namespace fdi::monitor {
 ///   then the lower rank, then the lower instance. Others wait longer, each by
 ///   one more `patience`, in case the best does not.
 /// - Of two leaders, as after a link was cut, the better one goes on.
-/// - Who did not get on for `patience` does not trust what it knew: it stands
-///   by and listens first. So a leader that was stopped publishes nothing
-///   before it has heard whether it still leads.
+/// - Who did not get on for `patience`, or whose lease has run out, does not
+///   trust what it knew: it stands by and listens first. So a leader that was
+///   stopped publishes nothing before it has heard whether it still leads.
 ///
 /// One thread.
 class PairElection {
@@ -41,6 +41,10 @@ class PairElection {
   /// The diagnosis has got on. To be called several times within `patience`.
   /// @param received samples so far. @param judged valves now.
   void Step(std::uint64_t received, int judged, TimePoint now);
+
+  /// The lease on leading has run out: another may lead by now. It stands by
+  /// and listens first.
+  void Lapse(TimePoint now);
 
   /// Says that it leaves, if another one is there to take over.
   void Leave(TimePoint now);

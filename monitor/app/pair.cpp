@@ -229,6 +229,11 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
   heard_events_.Take(
       {[&](const FaultEvent& event, const auto&) { Hear(event, now); }, {}},
       kNow);
+  // It is counted from our last word, as the others count: that was before the
+  // last step.
+  if (led_ && now >= lease_until_.load()) {
+    election_.Lapse(now);
+  }
   election_.Step(received, static_cast<int>(pipeline.census().judged), now);
   Follow(now);
   DropHeard(now);

@@ -242,5 +242,27 @@ TEST_F(PairElectionTest, AThirdOneTakesOverWhenTheSecondDoesNot) {
   EXPECT_EQ(Leaders(), Who{2});
 }
 
+// Stopped for just so long that another one took over.
+TEST_F(PairElectionTest, WhoseLeaseHasRunOutFollowsWhoLeadsByNow) {
+  for (const bool lapses : {false, true}) {
+    members_.clear();
+    Add(1);
+    Add(2);
+    Pass(kListening + 2 * kStep);
+    ASSERT_EQ(Leaders(), Who{0});
+    Cut(0, 1);
+    Cut(1, 0);
+    Pass(3 * kPatience);
+    ASSERT_EQ(Leaders(), (Who{0, 1}));
+    cut_.clear();
+    if (lapses) {
+      members_[0].election->Lapse(now_);
+      EXPECT_FALSE(members_[0].election->leads());
+    }
+    Pass(3 * kPatience);
+    EXPECT_EQ(Leaders(), Who{lapses ? 1 : 0});
+  }
+}
+
 }  // namespace
 }  // namespace fdi::monitor
