@@ -19,8 +19,8 @@ namespace fdi {
 /// the valve lacks abstains, and so does one whose reading is UNCERTAIN, or
 /// what it is predicted from: that was used in no fit. Where less than half of
 /// the readings would be left, as with slow data, the reading alone decides.
-/// Observers are evaluated four at a time; the bits
-/// of the results are those of one by one, Evaluate() in ts_model.h.
+/// Observers are evaluated four at a time; the bits of the results are those of
+/// one by one, Evaluate() in ts_model.h.
 class ObserverBank {
  public:
   explicit ObserverBank(const std::shared_ptr<const ObserverPlan>& plan,

@@ -222,14 +222,14 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
   const std::size_t size = datagram.size();
   if (size < kHeaderBytes || datagram[0] != 'R' || datagram[1] != 'T' ||
       datagram[2] != 'P' || datagram[3] != 'S' || datagram[4] != 2) {
-    return {DatagramVerdict::kHeader, 0, {}};
+    return {DatagramVerdict::kHeader, 0};
   }
   Speaker speaker(datagram);
   std::size_t sound = kHeaderBytes;  // Up to here, all is handed over.
   std::vector<std::size_t> bare_keys;
   for (std::size_t at = sound; at < size;) {
     if (size - at < kSubmessageHeaderBytes) {
-      return {DatagramVerdict::kLength, 0, {}};
+      return {DatagramVerdict::kLength, 0};
     }
     const std::uint8_t kind = datagram[at];
     const std::uint8_t flags = datagram[at + 1];
@@ -239,24 +239,24 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
     const bool to_end = stated == 0 && kind != kPad && kind != kInfoTs;
     const std::size_t length = to_end ? size - begin : stated;
     if (length > size - begin) {
-      return {DatagramVerdict::kLength, 0, {}};
+      return {DatagramVerdict::kLength, 0};
     }
     const std::size_t end =
         begin + std::min((length + 3) & ~std::size_t{3}, size - begin);
     if (kind < kFirstOfVendors) {
       const int least = LeastBody(kind, flags);
       if (least < 0 || at != sound) {  // Behind a vendor's own.
-        return {DatagramVerdict::kKind, 0, {}};
+        return {DatagramVerdict::kKind, 0};
       }
       if (length < static_cast<std::size_t>(least)) {
-        return {DatagramVerdict::kLength, 0, {}};
+        return {DatagramVerdict::kLength, 0};
       }
       const Body body{datagram.subspan(begin, length), header.little_endian};
       if (!ContentIsSound(kind, flags, body)) {
-        return {DatagramVerdict::kContent, 0, {}};
+        return {DatagramVerdict::kContent, 0};
       }
       if (!KeepsPace(kind, body, speaker, pace, now)) {
-        return {DatagramVerdict::kPace, 0, {}};
+        return {DatagramVerdict::kPace, 0};
       }
       if (kind == kData && IsBareKey(body, flags)) {
         bare_keys.push_back(at + 1);

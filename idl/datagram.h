@@ -32,7 +32,7 @@ struct CheckedDatagram {
   std::size_t bytes{0};
   /// Places of the flags of ends of instances that carry nothing but the key
   /// itself, as Cyclone DDS sends them: see ShowKeys().
-  std::vector<std::size_t> bare_keys;
+  std::vector<std::size_t> bare_keys{};
 };
 
 /// Checks the framing of an RTPS message [OMG formal/2022-04-01, 9.4.5], which

@@ -41,8 +41,8 @@ constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
-constexpr std::size_t kRemembered =
-    64;  // Remote endpoints per topic; strangers.
+// Remote endpoints of each topic, and participants without a key.
+constexpr std::size_t kRemembered = 64;
 
 std::vector<std::string> Addresses(const std::string& interfaces) {
   std::vector<std::string> addresses;

@@ -129,7 +129,9 @@ Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
   systems.uses.push_back(VectorXd::Ones(design.rows()));
   for (std::size_t f = 0; f <= kFolds; ++f) {
     for (std::size_t other = 0; other < kFolds; ++other) {
-      grams[f] += other == f ? zero : own[other];
+      if (other != f) {
+        grams[f] += own[other];
+      }
     }
   }
   for (const double penalty : kPenalties) {

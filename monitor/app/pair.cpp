@@ -161,11 +161,7 @@ bool Pair::Publish(const FaultEvent& event, bool persisted) {
     return Same(held.event, event);
   };
   std::erase_if(foreign_, same);
-  const auto known = published_.find(event.valve_id);
-  if (known != published_.end() &&
-      std::ranges::any_of(known->second, [&](const FaultEvent& each) {
-        return Same(each, event);
-      })) {
+  if (IsPublishedLocked(event)) {
     return true;
   }
   if (held_events_.size() >= kMostEvents) {
@@ -175,13 +171,20 @@ bool Pair::Publish(const FaultEvent& event, bool persisted) {
   return true;
 }
 
+bool Pair::IsPublishedLocked(const FaultEvent& event) const {
+  const auto found = published_.find(event.valve_id);
+  return found != published_.end() &&
+         std::ranges::any_of(found->second, [&](const FaultEvent& each) {
+           return Same(each, event);
+         });
+}
+
 // @returns false if it is on the bus already.
 bool Pair::RememberLocked(const FaultEvent& event) {
-  std::deque<FaultEvent>& last = published_[event.valve_id];
-  if (std::ranges::any_of(
-          last, [&](const FaultEvent& each) { return Same(each, event); })) {
+  if (IsPublishedLocked(event)) {
     return false;
   }
+  std::deque<FaultEvent>& last = published_[event.valve_id];
   if (last.size() >= kEventsPerValve) {
     last.pop_front();
   }

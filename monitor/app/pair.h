@@ -100,6 +100,7 @@ class Pair : public DecisionSink, public EventSink {
   void DropHeard(TimePoint now);
   void Adopt(TimePoint now, Pipeline& pipeline);
   void RepeatEvents();
+  bool IsPublishedLocked(const FaultEvent& event) const;
   bool RememberLocked(const FaultEvent& event);
 
   const PairOptions options_;

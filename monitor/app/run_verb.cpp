@@ -111,19 +111,23 @@ void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
 }
 
 void AddPairOptions(CLI::App& run, PairOptions& pair) {
-  run.add_option("--pair", pair.name,
-                 "Diagnose beside another monitor of the same NAME: one of the "
-                 "two publishes, the other one takes over when it fails")
-      ->type_name("NAME");
+  CLI::Option* name =
+      run.add_option(
+             "--pair", pair.name,
+             "Diagnose beside another monitor of the same NAME: one of the "
+             "two publishes, the other one takes over when it fails")
+          ->type_name("NAME");
   run.add_option("--rank", pair.rank,
                  "Of this monitor in the pair; when both may lead, 1 does "
                  "before 2")
-      ->type_name("1..9");
+      ->type_name("1..9")
+      ->needs(name);
   run.add_option("--pair-patience", pair.patience_s,
                  "Take over when the diagnosis of the leader was not heard for "
                  "so long [s]")
       ->check(CLI::Range(0.1, 60.0))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(name);
 }
 
 int Run(const RunArguments& arguments, const cli::Context& context) {
@@ -142,8 +146,6 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
   }
   if (!arguments.pair.name.empty()) {
     Validate(options.pair.emplace(arguments.pair));
-  } else if (arguments.pair.rank != 0) {
-    throw ConfigError("--rank needs --pair NAME");
   }
   if (arguments.http != "off") {
     options.http = ParseHttpAddress(arguments.http, "--http");

@@ -133,14 +133,15 @@ void EpisodeLooks::Keep(const Sample& sample) {
   const auto value = [&](Signal signal, double otherwise) {
     return sample.Has(signal) ? sample[signal] : otherwise;
   };
+  const SignalMask uncertain = sample.uncertain();
   const RecordRow row{
       {sample[Signal::kCv], value(Signal::kP1, physics_.p1.mean),
        value(Signal::kP2, physics_.p2.mean),
        value(Signal::kT1, physics_.t1.mean)},
       sample[Signal::kX],
       value(Signal::kF, 0.0),
-      (sample.uncertain() & MaskOf(Signal::kX)) == 0,
-      (sample.uncertain() & MaskOf(Signal::kF)) == 0};
+      (uncertain & MaskOf(Signal::kX)) == 0,
+      (uncertain & MaskOf(Signal::kF)) == 0};
   for (std::int64_t held = 1; !rows_.empty() && held < step; ++held) {
     rows_.push_back({rows_.back().stamp_ns + period_ns_, rows_.back().row});
     rows_.back().row.x_measured = rows_.back().row.flow_measured = false;
