@@ -13,9 +13,9 @@ PairElection::PairElection(PairState self, Duration patience,
       stepped_(now),
       listen_until_(now + listening) {}
 
-void PairElection::Heard(const PairState& word, TimePoint now) {
+bool PairElection::Heard(const PairState& word, TimePoint now) {
   if (word.pair != self_.pair || word.instance == self_.instance) {
-    return;
+    return false;
   }
   const auto [found, fresh] =
       heard_.try_emplace(word.instance, Other{word, now, now, std::nullopt});
@@ -26,6 +26,7 @@ void PairElection::Heard(const PairState& word, TimePoint now) {
   }
   other.word = word;
   other.heard = now;
+  return true;
 }
 
 // A leader that receives nothing while we do says that it gets on, and yet has

@@ -35,8 +35,9 @@ class PairElection {
   PairElection(PairState self, Duration patience, Duration listening,
                TimePoint now);
 
-  /// Takes what a monitor said: of another pair, or our own, it does not count.
-  void Heard(const PairState& word, TimePoint now);
+  /// Takes what a monitor said. @returns false if it does not count, as it is
+  /// of another pair, or our own.
+  bool Heard(const PairState& word, TimePoint now);
 
   /// The diagnosis has got on. To be called several times within `patience`.
   /// @param received samples so far. @param judged valves now.

@@ -12,6 +12,9 @@
 // or were settling, is adopted after a while: recorded, and its episode goes on
 // here under the same id.
 //
+// A leader that is killed may have reached us and nobody else. So what it said
+// last is published once more, unless it had said goodbye.
+//
 // Subscribers that come late are given the last vectors and events of each
 // valve by DDS, but only those of a writer that lives. So the first one that
 // comes after a take-over makes us send what the former leader had published;
@@ -42,6 +45,8 @@ constexpr milliseconds kTickPeriod{10};
 constexpr milliseconds kWordPeriod{50};
 constexpr milliseconds kListening{1500};  // Discovery takes some 100 ms.
 constexpr milliseconds kHoldVectors{3000};
+// A writer that lives has sent by then what it wrote, to all that read it.
+constexpr milliseconds kUnderWay{200};
 constexpr std::size_t kMostVectors = 20'000;  // 46 MB
 constexpr std::size_t kMostEvents = 10'000;
 constexpr std::size_t kMostPlaces = 200'000;
@@ -126,14 +131,12 @@ bool Pair::Publish(const std::string& valve_id, const ModelSet* models,
   if (held_vectors_.empty() && Leads()) {
     return decisions_.Publish(valve_id, models, verdict);
   }
-  if (!IsCovered(valve_id, verdict)) {
-    if (held_vectors_.size() >= kMostVectors) {
-      held_vectors_.pop_front();
-    }
-    HeldVector& held = held_vectors_.emplace_back();
-    held.since = Clock::now();
-    BusDecisionSink::Fill(valve_id, models, verdict, held.message);
+  if (held_vectors_.size() >= kMostVectors) {
+    held_vectors_.pop_front();
   }
+  HeldVector& held = held_vectors_.emplace_back();
+  held.since = Clock::now();
+  BusDecisionSink::Fill(valve_id, models, verdict, held.message);
   return true;
 }
 
@@ -174,8 +177,8 @@ bool Pair::Publish(const FaultEvent& event, bool persisted) {
 bool Pair::IsPublishedLocked(const FaultEvent& event) const {
   const auto found = published_.find(event.valve_id);
   return found != published_.end() &&
-         std::ranges::any_of(found->second, [&](const FaultEvent& each) {
-           return Same(each, event);
+         std::ranges::any_of(found->second, [&](const HeldEvent& each) {
+           return Same(each.event, event);
          });
 }
 
@@ -184,11 +187,11 @@ bool Pair::RememberLocked(const FaultEvent& event) {
   if (IsPublishedLocked(event)) {
     return false;
   }
-  std::deque<FaultEvent>& last = published_[event.valve_id];
+  std::deque<HeldEvent>& last = published_[event.valve_id];
   if (last.size() >= kEventsPerValve) {
     last.pop_front();
   }
-  last.push_back(event);
+  last.push_back({Clock::now(), event});
   return true;
 }
 
@@ -222,7 +225,11 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
   ticked_ = now;
   constexpr milliseconds kNow{0};
   words_.Take(
-      {[&](const PairState& word, const auto&) { election_.Heard(word, now); },
+      {[&](const PairState& word, const auto&) {
+         if (election_.Heard(word, now) && (word.leads || word.leaving)) {
+           arrived_ = word.leaving ? now : now - kUnderWay;
+         }
+       },
        {}},
       kNow);
   heard_vectors_.Take(
@@ -238,11 +245,12 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
     election_.Lapse(now);
   }
   election_.Step(received, static_cast<int>(pipeline.census().judged), now);
-  Follow(now);
   DropHeard(now);
+  Follow(now);
   Adopt(now, pipeline);
   if (led_ && events_lacked_ >= 0 && bus_.came() > events_lacked_) {
-    RepeatEvents();
+    events_lacked_ = -1;
+    RepeatEvents(TimePoint{});
   }
 }
 
@@ -277,7 +285,11 @@ void Pair::Follow(TimePoint now) {
     events_lacked_ = published_.empty() ? -1 : bus_.came();
   }
   led_ = leads;
+  if (changed && leads) {
+    RepeatEvents(arrived_);
+  }
   if (leads) {
+    arrived_ = now;
     PublishHeld();
   }
   if (!election_.twin().empty()) {
@@ -311,12 +323,10 @@ void Pair::PublishHeld() {
   const bool all = held_vectors_.size() > kMostVectors / 2;
   while (!held_vectors_.empty()) {
     const idl::DecisionMessage& message = held_vectors_.front().message;
-    if (!IsCovered(message.valve_id, message.verdict)) {
-      if (!sent.insert(message.valve_id).second && !all) {
-        break;
-      }
-      decisions_.Send(message);
+    if (!sent.insert(message.valve_id).second && !all) {
+      break;
     }
+    decisions_.Send(message);
     held_vectors_.pop_front();
   }
   const std::lock_guard lock(mutex_);
@@ -331,8 +341,10 @@ void Pair::PublishHeld() {
 void Pair::DropHeard(TimePoint now) {
   while (!held_vectors_.empty() && !led_) {
     const HeldVector& first = held_vectors_.front();
-    if (now - first.since < kHoldVectors &&
-        !IsCovered(first.message.valve_id, first.message.verdict)) {
+    const bool arrived =
+        first.since < arrived_ &&
+        IsCovered(first.message.valve_id, first.message.verdict);
+    if (now - first.since < kHoldVectors && !arrived) {
       break;
     }
     held_vectors_.pop_front();
@@ -369,12 +381,14 @@ void Pair::Adopt(TimePoint now, Pipeline& pipeline) {
   }
 }
 
-void Pair::RepeatEvents() {
-  events_lacked_ = -1;
+// Those that were heard at that time or later.
+void Pair::RepeatEvents(TimePoint since) {
   const std::lock_guard lock(mutex_);
   for (const auto& [valve_id, events] : published_) {
-    for (const FaultEvent& event : events) {
-      bus_.Repeat(event);
+    for (const HeldEvent& held : events) {
+      if (held.since >= since) {
+        bus_.Repeat(held.event);
+      }
     }
   }
 }

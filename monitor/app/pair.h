@@ -99,7 +99,7 @@ class Pair : public DecisionSink, public EventSink {
   void PublishHeld();
   void DropHeard(TimePoint now);
   void Adopt(TimePoint now, Pipeline& pipeline);
-  void RepeatEvents();
+  void RepeatEvents(TimePoint since);
   bool IsPublishedLocked(const FaultEvent& event) const;
   bool RememberLocked(const FaultEvent& event);
 
@@ -122,6 +122,8 @@ class Pair : public DecisionSink, public EventSink {
   TimePoint said_;
   bool led_{false};
   std::string followed_;
+  // What was heard before has reached subscribers, too: its leader lived on.
+  TimePoint arrived_;
   std::unordered_map<std::string, Place> covered_;  // Heard, by valve.
   std::deque<HeldVector> held_vectors_;             // In the order of coming.
   // A subscriber that comes lacks what the former leader published: how many
@@ -132,7 +134,7 @@ class Pair : public DecisionSink, public EventSink {
   mutable std::mutex mutex_;  // Guards what follows.
   Status status_;
   // The last events of each valve that are on the bus.
-  std::map<std::string, std::deque<FaultEvent>> published_;
+  std::map<std::string, std::deque<HeldEvent>> published_;
   std::deque<HeldEvent> held_events_;  // Ours that were not heard,
   std::deque<HeldEvent> foreign_;      // heard ones that are not ours yet.
 };

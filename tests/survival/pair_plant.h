@@ -108,6 +108,19 @@ class PairPlant {
     return delay;
   }
 
+  /// Vectors of samples since `from` that came more than once.
+  std::size_t Repeated(Clock::time_point from) {
+    const std::lock_guard lock(mutex_);
+    std::size_t repeated = 0;
+    for (const auto& sent : sent_) {
+      repeated += static_cast<std::size_t>(
+          std::ranges::count_if(sent, [&](const auto& each) {
+            return each.second.sent >= from && each.second.heard > 1;
+          }));
+    }
+    return repeated;
+  }
+
   struct Totals {
     std::size_t samples{0};  ///< Older than 3 s,
     std::size_t missing{0};  ///< of these without a vector,

@@ -127,6 +127,10 @@ TEST_F(PairTest, OneOfTwoPublishesAndTheOtherTakesOverWhenItIsKilled) {
     const auto now = Clock::now();
     monitors_[leader]->Signal(SIGKILL);
     ExpectTakeOver(now);
+    // It may have reached the other monitor and nobody else.
+    EXPECT_TRUE(Await([&] {
+      return plant_.Repeated(now - milliseconds(150)) > kValves / 2;
+    }));
     Start(leader);
   }
   Leader();
@@ -154,6 +158,7 @@ TEST_F(PairTest, IsUpgradedOneAfterTheOtherWithoutAMissingEpisode) {
     monitors_[leader]->Signal(SIGTERM);
     ExpectTakeOver(now);
     ASSERT_EQ(monitors_[leader]->AwaitExit(), 0);
+    EXPECT_LT(plant_.Repeated(now - milliseconds(150)), kValves / 2);
     if (i == 0) {
       plant_.CountFromNow();
       plant_.SetFaulty(true);
