@@ -104,16 +104,23 @@ int Publish(const Options& options) {
 
 // Counts what comes until all is there or nothing came for a while.
 template <typename Message>
-int Count(const Options& options, idl::Profile profile, const char* word) {
+int Count(const Options& options, const char* word) {
   idl::Participant participant(DdsOf(options), {}, "fdi-bench-read");
-  idl::Subscriber<Message> subscriber(participant, profile);
+  idl::Subscriber<Message> subscriber(participant);
   const auto expected = static_cast<std::uint64_t>(options.valves) *
                         static_cast<std::uint64_t>(options.samples);
   std::uint64_t count = 0;
   Clock::time_point first;
   Clock::time_point last = Clock::now();
   const idl::Handlers<Message> handlers{
-      [&](const Message&, const idl::Reception&) { ++count; }, {}};
+      [&](const Message& message, const idl::Reception&) {
+        if constexpr (requires { message.vectors; }) {
+          count += message.vectors.size();
+        } else {
+          ++count;
+        }
+      },
+      {}};
   double cpu_before = 0.0;
   while (count < expected &&
          (count == 0 || SecondsBetween(last, Clock::now()) < options.idle_s)) {
@@ -230,13 +237,9 @@ int main(int argc, char** argv) {
     app.add_subcommand(name)->callback([&code, role] { code = role(); });
   };
   add("publish", [&] { return Publish(options); });
-  add("read", [&] {
-    return Count<idl::ValveSampleMessage>(options, idl::Profile::kLive, "read");
-  });
-  add("vectors", [&] {
-    return Count<idl::DecisionMessage>(options, idl::Profile::kLossless,
-                                       "vectors");
-  });
+  add("read", [&] { return Count<idl::ValveSampleMessage>(options, "read"); });
+  add("vectors",
+      [&] { return Count<idl::DecisionBatchMessage>(options, "vectors"); });
   add("echo", [&] { return Echo(options); });
   add("ping", [&] { return Ping(options); });
   CLI11_PARSE(app, argc, argv);

@@ -44,6 +44,7 @@ FDI_LAST(State::kIsolated, v1::State::STATE_ISOLATED)
 FDI_LAST(TransitionKind::kClosed, v1::Transition::TRANSITION_CLOSED)
 FDI_LAST(EndReason::kUnknown, v1::EndReason::END_UNKNOWN)
 FDI_LAST(Health::kFailing, v1::Health::HEALTH_FAILING)
+FDI_LAST(OperatorActionKind::kShelve, v1::OperatorActionKind::ACTION_SHELVE)
 #undef FDI_LAST
 
 template <bool kEncodes>
@@ -117,7 +118,7 @@ class Transfer {
     }
   }
 
-  // A list of records, or of fault numbers.
+  // A list of records, of messages, or of fault numbers.
   template <typename Ours, typename Wire>
   void List(const char* field, Ours& ours, Wire&& wire, std::size_t most) {
     const std::size_t count = kEncodes ? ours.size() : wire.size();
@@ -133,6 +134,9 @@ class Transfer {
       if constexpr (std::same_as<typename Ours::value_type, int>) {
         Fault(field, ours[i], wire[i]);
       } else {
+        if constexpr (requires { ours[i].valve_id; }) {
+          KeyFields(*this, ours[i], wire[i]);
+        }
         Fields(*this, ours[i], wire[i]);
       }
     }
@@ -209,10 +213,10 @@ concept Is = std::same_as<std::remove_const_t<Given>, T>;
 
 template <typename Message>
 void KeyFields(auto& t, Message& m, auto& w) {
-  if constexpr (requires { m.valve_id; }) {
-    t.Id("valve_id", m.valve_id, w.valve_id());
-  } else if constexpr (requires { m.monitor; }) {
+  if constexpr (requires { m.monitor; }) {
     t.Id("monitor", m.monitor, w.monitor());
+  } else if constexpr (requires { m.valve_id; }) {
+    t.Id("valve_id", m.valve_id, w.valve_id());
   } else {
     t.Id("model_set", m.model_set, w.model_set());
     FDI_FIELD(model_hash)
@@ -262,6 +266,10 @@ void Fields(auto& t, Is<DecisionMessage> auto& message, auto& w) {
             w.fault_strengths().size() == w.fault_factors().size());
   t.Array("observer_factors", m.observer_factors, message.observer_count,
           w.observer_factors());
+}
+
+void Fields(auto& t, Is<DecisionBatchMessage> auto& m, auto& w) {
+  t.List("vectors", m.vectors, w.vectors(), kMaxBatch);
 }
 
 void Fields(auto& t, Is<FaultCandidate> auto& m, auto& w) {
@@ -330,6 +338,11 @@ void Fields(auto& t, Is<PairState> auto& m, auto& w) {
                received)
 }
 
+void Fields(auto& t, Is<OperatorAction> auto& m, auto& w) {
+  FDI_FOR_EACH(FDI_FIELD, kind, episode_id, valve_id, value, stamp_ns, who,
+               comment, origin, until_ns, ended_ns, ended_by, ended_origin)
+}
+
 #undef FDI_FIELD
 
 }  // namespace
@@ -357,9 +370,11 @@ bool Codec<Message>::Decode(const Wire& wire, Message& message) {
 
 template struct Codec<ValveSampleMessage>;
 template struct Codec<DecisionMessage>;
+template struct Codec<DecisionBatchMessage>;
 template struct Codec<FaultEvent>;
 template struct Codec<ModelSetInfoMessage>;
 template struct Codec<MonitorStatusMessage>;
 template struct Codec<PairState>;
+template struct Codec<OperatorAction>;
 
 }  // namespace fdi::idl

@@ -34,10 +34,12 @@ struct TopicOf;
   };
 FDI_TOPIC(ValveSampleMessage, ValveSample)
 FDI_TOPIC(DecisionMessage, DecisionVector)
+FDI_TOPIC(DecisionBatchMessage, DecisionBatch)
 FDI_TOPIC(FaultEvent, FaultEvent)
 FDI_TOPIC(ModelSetInfoMessage, ModelSetInfo)
 FDI_TOPIC(MonitorStatusMessage, MonitorStatus)
 FDI_TOPIC(PairState, PairState)
+FDI_TOPIC(OperatorAction, OperatorAction)
 #undef FDI_TOPIC
 
 /// Conversion of the messages of one topic; the fields are listed in codec.cpp,
@@ -58,10 +60,10 @@ struct Codec : TopicOf<Message> {
 /// References to the members of `message` that are its key.
 template <typename Message>
 auto KeyOf(Message& message) {
-  if constexpr (requires { message.valve_id; }) {
-    return std::tie(message.valve_id);
-  } else if constexpr (requires { message.monitor; }) {
+  if constexpr (requires { message.monitor; }) {
     return std::tie(message.monitor);
+  } else if constexpr (requires { message.valve_id; }) {
+    return std::tie(message.valve_id);
   } else {
     return std::tie(message.model_set, message.model_hash);
   }

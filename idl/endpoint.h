@@ -7,6 +7,7 @@
 #include <memory>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 #include "idl/participant.h"
 #include "idl/wire.h"
@@ -44,7 +45,7 @@ struct PublisherStatus {
 /// Writes one topic. Thread safe. What is on the way when it is destroyed is
 /// lost: call WaitForAcknowledged() first.
 ///
-/// Message is one of the six of wire.h; there are no others.
+/// Message is one of the eight of wire.h; there are no others.
 template <typename Message>
 class Publisher {
  public:
@@ -129,6 +130,18 @@ struct Handlers {
   std::function<void(const Message&, const Reception&)> on_ended;
 };
 
+/// Handlers that call `each` with every vector of a batch.
+inline Handlers<DecisionBatchMessage> EachVector(
+    std::function<void(const DecisionMessage&, const Reception&)> each) {
+  return {[each = std::move(each)](const DecisionBatchMessage& batch,
+                                   const Reception& reception) {
+            for (const DecisionMessage& vector : batch.vectors) {
+              each(vector, reception);
+            }
+          },
+          {}};
+}
+
 /// Reads one topic. The messages of one valve from one writer come in the order
 /// of writing; those of different valves as they arrive, or valve by valve
 /// where many have waited. One thread takes; status() and Interrupt() are
@@ -169,15 +182,19 @@ class Subscriber {
 
 extern template class Publisher<ValveSampleMessage>;
 extern template class Publisher<DecisionMessage>;
+extern template class Publisher<DecisionBatchMessage>;
 extern template class Publisher<FaultEvent>;
 extern template class Publisher<ModelSetInfoMessage>;
 extern template class Publisher<MonitorStatusMessage>;
 extern template class Publisher<PairState>;
+extern template class Publisher<OperatorAction>;
 extern template class Subscriber<ValveSampleMessage>;
 extern template class Subscriber<DecisionMessage>;
+extern template class Subscriber<DecisionBatchMessage>;
 extern template class Subscriber<FaultEvent>;
 extern template class Subscriber<ModelSetInfoMessage>;
 extern template class Subscriber<MonitorStatusMessage>;
 extern template class Subscriber<PairState>;
+extern template class Subscriber<OperatorAction>;
 
 }  // namespace fdi::idl

@@ -48,10 +48,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
         options.profile,
         options.valves > 0 ? options.valves : bus.options().max_valves);
     dds::PublisherQos publisher_qos;
-    if (!ours.partition.empty() || !options.also_partition.empty()) {
-      publisher_qos.partition().push_back(ours.partition.c_str());
-    }
     if (!options.also_partition.empty()) {
+      publisher_qos.partition().push_back("");
       publisher_qos.partition().push_back(options.also_partition.c_str());
     }
     publisher = {
@@ -234,9 +232,11 @@ void Publisher<Message>::Forget() {
 
 template class Publisher<ValveSampleMessage>;
 template class Publisher<DecisionMessage>;
+template class Publisher<DecisionBatchMessage>;
 template class Publisher<FaultEvent>;
 template class Publisher<ModelSetInfoMessage>;
 template class Publisher<MonitorStatusMessage>;
 template class Publisher<PairState>;
+template class Publisher<OperatorAction>;
 
 }  // namespace fdi::idl

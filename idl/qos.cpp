@@ -18,6 +18,8 @@ constexpr int kReaderBacklog = 131072;
 // of those that a newer one has replaced: without room beside the history,
 // writing too fast fails with OUT_OF_RESOURCES. Allocated when needed.
 constexpr int kSamplesInDatagram = 1024;
+constexpr int kBatchesInFlight = 64;  // Of at most 48 kB.
+constexpr int kActionsInFlight = 64;
 constexpr int kModelSets = 256;
 constexpr int kMonitors = 64;
 
@@ -182,25 +184,24 @@ EndpointQos QosFor<ValveSampleMessage>(Profile profile, int valves) {
 }
 
 template <>
-EndpointQos QosFor<DecisionMessage>(Profile profile, int valves) {
+EndpointQos QosFor<DecisionMessage>(Profile /*profile*/, int valves) {
   EndpointQos qos = Common("fdi_decision_vector");
   TransientLocal(qos);
   KeepLast(qos, valves, 1, 16);
-  if (profile == Profile::kLossless) {
-    // In a partition of its own: with TRANSIENT_LOCAL and KEEP_ALL the library
-    // holds, and searches, what was acknowledged long ago.
-    qos.name += "_lossless";
-    qos.partition = "lossless";
-    qos.writer.durability().kind = dds::VOLATILE_DURABILITY_QOS;
-    qos.reader.durability().kind = dds::VOLATILE_DURABILITY_QOS;
-    WriterKeepsAll(qos, valves);
-    ReaderKeepsAll(qos, valves);
-    // Samples that have waited come valve by valve, and so do their vectors.
-    SetLimits(qos.writer.resource_limits(), valves,
-              qos.reader.resource_limits().max_samples_per_instance,
-              kSamplesInFlight);
-    HeartbeatPeriod(qos.writer) = Milliseconds(10);
-  }
+  return qos;
+}
+
+// With TRANSIENT_LOCAL and KEEP_ALL the library would hold, and search, what
+// was acknowledged long ago.
+template <>
+EndpointQos QosFor<DecisionBatchMessage>(Profile /*profile*/, int /*valves*/) {
+  EndpointQos qos = Common("fdi_decision_batch");
+  qos.writer.history().kind = dds::KEEP_ALL_HISTORY_QOS;
+  SetLimits(qos.writer.resource_limits(), 1, kBatchesInFlight, 1);
+  qos.writer.resource_limits().extra_samples = 1;
+  qos.reader.history().kind = dds::KEEP_ALL_HISTORY_QOS;
+  SetLimits(qos.reader.resource_limits(), kMonitors, kBatchesInFlight, 1);
+  HeartbeatPeriod(qos.writer) = Milliseconds(10);
   return qos;
 }
 
@@ -243,16 +244,28 @@ EndpointQos QosFor<PairState>(Profile /*profile*/, int /*valves*/) {
   return qos;
 }
 
+template <>
+EndpointQos QosFor<OperatorAction>(Profile /*profile*/, int /*valves*/) {
+  EndpointQos qos = Common("fdi_operator_action");
+  qos.writer.history().kind = dds::KEEP_ALL_HISTORY_QOS;
+  SetLimits(qos.writer.resource_limits(), 1, kActionsInFlight, 1);
+  qos.writer.resource_limits().extra_samples = 1;
+  qos.reader.history().kind = dds::KEEP_ALL_HISTORY_QOS;
+  SetLimits(qos.reader.resource_limits(), kMonitors, kActionsInFlight, 1);
+  return qos;
+}
+
 const std::set<std::string>& EndpointNames() {
   static const std::set<std::string> names{"fdi_valve_sample",
                                            "fdi_valve_sample_lossless",
                                            "fdi_valve_sample_best_effort",
                                            "fdi_decision_vector",
-                                           "fdi_decision_vector_lossless",
+                                           "fdi_decision_batch",
                                            "fdi_fault_event",
                                            "fdi_model_set_info",
                                            "fdi_monitor_status",
-                                           "fdi_pair_state"};
+                                           "fdi_pair_state",
+                                           "fdi_operator_action"};
   return names;
 }
 

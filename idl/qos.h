@@ -16,7 +16,6 @@ namespace fdi::idl {
 
 struct EndpointQos {
   std::string name;  ///< Profiles of --qos: name + "_writer", + "_reader".
-  std::string partition{};  ///< Empty: the default one.
   dds::DataWriterQos writer{};
   dds::DataReaderQos reader{};
 };

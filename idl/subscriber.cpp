@@ -27,8 +27,13 @@ constexpr std::size_t kRefusedLimit = 65536;
 // Messages that wait for Take(), so many as fit into 8 MB; another 8 MB may be
 // taken and not yet handed out. They wait here and not in the library, which
 // searches its history at every release.
-constexpr std::size_t QueueCapacity(std::size_t item_bytes) {
-  return std::clamp<std::size_t>((8U << 20U) / item_bytes, 512, 32768);
+template <typename Message>
+constexpr std::size_t QueueCapacity() {
+  std::size_t bytes = sizeof(Message);
+  if constexpr (requires(Message m) { m.vectors; }) {
+    bytes += kMaxBatch * sizeof(DecisionMessage);
+  }
+  return std::clamp<std::size_t>((8U << 20U) / bytes, 16, 32768);
 }
 
 constexpr std::chrono::hours kLongestWait{1};  // The clock must not overflow.
@@ -78,9 +83,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     // The reader is enabled once `reader` is set: callbacks use it.
     dds::SubscriberQos subscriber_qos;
     subscriber_qos.entity_factory().autoenable_created_entities = false;
-    const std::string& where = partition.empty() ? ours.partition : partition;
-    if (!where.empty()) {
-      subscriber_qos.partition().push_back(where.c_str());
+    if (!partition.empty()) {
+      subscriber_qos.partition().push_back(partition.c_str());
     }
     subscriber = {
         NotNull(bus->create_subscriber(subscriber_qos), "create_subscriber"),
@@ -293,7 +297,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   PolicyTexts policies;
   bool has_lease{false};
   Matched matched;
-  BoundedQueue<Item> queue{QueueCapacity(sizeof(Item))};
+  BoundedQueue<Item> queue{QueueCapacity<Message>()};
   std::vector<Item> batch;  // Taken from it, and handed out up to `next`.
   std::size_t next{0};
   std::atomic<bool> pending{false};
@@ -362,9 +366,11 @@ SubscriberStatus Subscriber<Message>::status() const {
 
 template class Subscriber<ValveSampleMessage>;
 template class Subscriber<DecisionMessage>;
+template class Subscriber<DecisionBatchMessage>;
 template class Subscriber<FaultEvent>;
 template class Subscriber<ModelSetInfoMessage>;
 template class Subscriber<MonitorStatusMessage>;
 template class Subscriber<PairState>;
+template class Subscriber<OperatorAction>;
 
 }  // namespace fdi::idl

@@ -8,6 +8,7 @@
 
 #include "diagnosis/model_set.h"
 #include "diagnosis/records/fault_event.h"
+#include "diagnosis/records/operator_action.h"
 #include "diagnosis/records/pair_state.h"
 #include "diagnosis/sample.h"
 #include "diagnosis/verdict.h"
@@ -22,6 +23,7 @@ inline constexpr std::size_t kMaxNameLength = 32;  ///< Channel, counter.
 inline constexpr std::size_t kMaxTextLength = 255;
 inline constexpr std::size_t kMaxGroups = 64;
 inline constexpr std::size_t kMaxCounters = 64;
+inline constexpr std::size_t kMaxBatch = 128;
 
 /// Stamps of samples, 1900 to 2100: the time between any two has no overflow.
 inline constexpr std::int64_t kMinStampNs = -2'208'988'800'000'000'000;
@@ -43,6 +45,12 @@ struct DecisionMessage {
   int fault_count{0};
   int observer_count{0};
   Verdict verdict;
+};
+
+/// Topic fdi/v1/DecisionBatch, key monitor: vectors in the order of diagnosis.
+struct DecisionBatchMessage {
+  std::string monitor;
+  std::vector<DecisionMessage> vectors;  ///< At most kMaxBatch.
 };
 
 struct ObserverInfo {

@@ -439,9 +439,19 @@ void Pipeline::Publish(const Valve& valve, const ValveOutcome& outcome) {
               [&id] { return "topic=DecisionVector valve=" + LogValue(id); });
 }
 
+void Pipeline::FlushDecisions() {
+  if (const std::uint64_t unsent = decisions_.Flush(); unsent > 0) {
+    counters_.Add(Counter::kDecisionsUnsent, unsent);
+    log_.Report(LogId::kUnsent, "publication_failed", [unsent] {
+      return "topic=DecisionBatch vectors=" + std::to_string(unsent);
+    });
+  }
+}
+
 void Pipeline::Tend(TimePoint now) {
   pulse_.Beat();
   AdoptNextResolver();
+  FlushDecisions();
   if (decisions_.WantsLast()) {
     PublishLast();
   }

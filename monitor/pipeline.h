@@ -114,6 +114,8 @@ class Pipeline {
   /// the bus, another assignment. To be called ten times a second or so, by a
   /// busy thread as well. @param now all samples received before were offered.
   void Tend(TimePoint now = std::chrono::steady_clock::now());
+  /// Sends the decision vectors that the sink kept back, as Tend() does.
+  void FlushDecisions();
 
   /// Asks `resolver` for the models of all valves from the next Tend() on:
   /// between two samples, none is lost or diagnosed twice. Thread safe.

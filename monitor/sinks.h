@@ -54,10 +54,15 @@ class ModelResolver {
 class DecisionSink {
  public:
   virtual ~DecisionSink() = default;
+  /// May keep it back until Flush().
   /// @param models null for a valve without a model set.
   /// @returns false if it was not sent.
   virtual bool Publish(const std::string& valve_id, const ModelSet* models,
                        const Verdict& verdict) = 0;
+  /// Sends what was kept back; to be called whenever no sample waits.
+  /// @returns how many vectors were kept back since the last call and could not
+  ///   be sent.
+  virtual std::uint64_t Flush() { return 0; }
 
   /// True once somebody listens where nobody did: PublishLast() is due for
   /// every valve. Nothing is sent to newcomers before.

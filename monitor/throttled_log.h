@@ -42,6 +42,7 @@ enum class LogId : std::uint8_t {
   kTransport = 141,      ///< transport_loss
   kStalled = 151,        ///< threads_stalled
   kPairTwin = 152,       ///< pair_rank_taken
+  kOperatorSync = 153,   ///< operator_action_waits, operator_action_refused
   kLookDropped = 161,    ///< second_look_dropped
   kLookFailed = 162,     ///< second_look_failed
 };

@@ -55,11 +55,12 @@ const std::vector<RoleRow>& Roles() {
       {Role::kGateway, "gateway", {"fdi/v1/ValveSample"}, {}},
       {Role::kMonitor,
        "monitor",
-       {"fdi/v1/DecisionVector", "fdi/v1/FaultEvent", "fdi/v1/ModelSetInfo",
-        "fdi/v1/MonitorStatus", "fdi/v1/PairState"},
+       {"fdi/v1/DecisionVector", "fdi/v1/DecisionBatch", "fdi/v1/FaultEvent",
+        "fdi/v1/ModelSetInfo", "fdi/v1/MonitorStatus", "fdi/v1/PairState",
+        "fdi/v1/OperatorAction"},
        // Beside samples, what the monitor says that it stands in for.
        {"fdi/v1/ValveSample", "fdi/v1/DecisionVector", "fdi/v1/FaultEvent",
-        "fdi/v1/PairState"}},
+        "fdi/v1/PairState", "fdi/v1/OperatorAction"}},
       {Role::kReader, "reader", {}, {"fdi/v1/*"}}};
   return kRoles;
 }

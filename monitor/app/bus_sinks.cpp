@@ -11,6 +11,18 @@
 namespace fdi::monitor {
 namespace {
 
+// A datagram of UDP has 64 kB at most, of which keys take some.
+constexpr std::size_t kMostBatchBytes = 48'000;
+
+// At most, in CDR.
+std::size_t BytesOf(const idl::DecisionMessage& message) {
+  constexpr std::size_t kFixed = 128;
+  const int values =
+      message.channel_count + 2 * message.fault_count + message.observer_count;
+  return kFixed + message.valve_id.size() +
+         sizeof(double) * static_cast<std::size_t>(values);
+}
+
 std::string IsolatedNames(const FaultEvent& message) {
   std::string names;
   for (const FaultCandidate& candidate : message.candidates) {
@@ -23,14 +35,16 @@ std::string IsolatedNames(const FaultEvent& message) {
 
 }  // namespace
 
-BusDecisionSink::BusDecisionSink(idl::Participant& participant, bool lossless,
+BusDecisionSink::BusDecisionSink(idl::Participant& participant,
+                                 const std::string& batches_of,
                                  std::stop_token stop,
                                  const std::string& partition)
     : live_(participant, {idl::Profile::kLive, 0, partition}),
       stop_(std::move(stop)) {
-  if (lossless) {
-    lossless_.emplace(participant,
-                      idl::PublisherOptions{idl::Profile::kLossless, 0});
+  if (!batches_of.empty()) {
+    batches_.emplace(participant,
+                     idl::PublisherOptions{idl::Profile::kLossless, 0});
+    batch_.monitor = batches_of;
   }
 }
 
@@ -55,7 +69,7 @@ bool BusDecisionSink::ToLive() {
 
 bool BusDecisionSink::Publish(const std::string& valve_id,
                               const ModelSet* models, const Verdict& verdict) {
-  if (!ToLive() && !ToLossless()) {
+  if (!ToLive() && !ToBatches()) {
     return true;
   }
   Fill(valve_id, models, verdict, message_);
@@ -63,16 +77,37 @@ bool BusDecisionSink::Publish(const std::string& valve_id,
 }
 
 bool BusDecisionSink::Send(const idl::DecisionMessage& message) {
-  bool sent = true;
-  if (ToLossless()) {
-    // Each write into a full history takes 50 ms, also after a stop.
-    sent = !stop_.stop_requested() &&
-           lossless_->Write(message, stop_) == idl::WriteResult::kSent;
+  if (ToBatches()) {
+    AddToBatch(message);
   }
-  if (ToLive()) {
-    sent = live_.Write(message) == idl::WriteResult::kSent && sent;
+  return !ToLive() || live_.Write(message) == idl::WriteResult::kSent;
+}
+
+void BusDecisionSink::AddToBatch(const idl::DecisionMessage& message) {
+  const std::size_t bytes = BytesOf(message);
+  if (batch_.vectors.size() >= idl::kMaxBatch ||
+      batch_bytes_ + bytes > kMostBatchBytes) {
+    SendBatch();
   }
-  return sent;
+  batch_.vectors.push_back(message);
+  batch_bytes_ += bytes;
+}
+
+void BusDecisionSink::SendBatch() {
+  // Each write into a full history takes 50 ms, also after a stop.
+  if (stop_.stop_requested() ||
+      batches_->Write(batch_, stop_) != idl::WriteResult::kSent) {
+    unsent_ += batch_.vectors.size();
+  }
+  batch_.vectors.clear();
+  batch_bytes_ = 0;
+}
+
+std::uint64_t BusDecisionSink::Flush() {
+  if (!batch_.vectors.empty()) {
+    SendBatch();
+  }
+  return std::exchange(unsent_, 0);
 }
 
 bool BusDecisionSink::WantsLast() {
@@ -92,14 +127,13 @@ void BusDecisionSink::PublishLast(const std::string& valve_id,
 
 bool BusDecisionSink::WaitForAcknowledged(std::chrono::milliseconds timeout) {
   return live_.WaitForAcknowledged(timeout) &&
-         (!lossless_ || lossless_->WaitForAcknowledged(timeout));
+         (!batches_ || batches_->WaitForAcknowledged(timeout));
 }
 
 idl::PublisherStatus BusDecisionSink::status() const {
   idl::PublisherStatus status = live_.status();
-  if (lossless_) {
-    const idl::PublisherStatus other = lossless_->status();
-    status.written = std::max(status.written, other.written);
+  if (batches_) {
+    const idl::PublisherStatus other = batches_->status();
     status.retries += other.retries;
     status.refused = std::max(status.refused, other.refused);
     status.incompatible += other.incompatible;

@@ -13,18 +13,21 @@
 namespace fdi::monitor {
 
 /// Decision vectors over DDS. What nobody listens to is not sent; who comes
-/// gets the last vector of every valve first. The lossless stream, if asked
-/// for, is a second one: a slow subscriber of it makes Publish() wait, until
-/// `stop` is requested.
+/// gets the last vector of every valve first. The stream of batches, if asked
+/// for, is a second one, which has every vector: a slow subscriber of it makes
+/// Publish() and Flush() wait, until `stop` is requested.
 class BusDecisionSink : public DecisionSink {
  public:
+  /// @param batches_of the monitor as subscribers of batches see it; empty: no
+  ///   batches.
   /// @param partition where a monitor that stands in for us reads; empty:
   ///   nowhere beside the usual one.
-  BusDecisionSink(idl::Participant& participant, bool lossless,
+  BusDecisionSink(idl::Participant& participant, const std::string& batches_of,
                   std::stop_token stop, const std::string& partition = {});
 
   bool Publish(const std::string& valve_id, const ModelSet* models,
                const Verdict& verdict) override;
+  std::uint64_t Flush() override;
   bool WantsLast() override;
   void PublishLast(const std::string& valve_id, const ModelSet* models,
                    const Verdict& verdict) override;
@@ -41,16 +44,21 @@ class BusDecisionSink : public DecisionSink {
 
   /// Waits until all readers have what was published.
   bool WaitForAcknowledged(std::chrono::milliseconds timeout);
-  /// Of both streams; `written` of the one that was written more to.
+  /// Of both streams; `written` without batches.
   idl::PublisherStatus status() const;
 
  private:
   bool ToLive();
-  bool ToLossless() const { return lossless_ && lossless_->matched() > 0; }
+  bool ToBatches() const { return batches_ && batches_->matched() > 0; }
+  void AddToBatch(const idl::DecisionMessage& message);
+  void SendBatch();
 
   idl::Publisher<idl::DecisionMessage> live_;
-  std::optional<idl::Publisher<idl::DecisionMessage>> lossless_;
+  std::optional<idl::Publisher<idl::DecisionBatchMessage>> batches_;
   std::stop_token stop_;
+  idl::DecisionBatchMessage batch_;
+  std::size_t batch_bytes_{0};
+  std::uint64_t unsent_{0};  // Of batches, since the last Flush().
   idl::DecisionMessage message_;
   bool unheard_{false};  // Vectors of some valve were not sent.
 };

@@ -23,8 +23,10 @@ BusView::BusView(const BusOptions& options, const cli::Context& context,
       models_(participant_),
       events_(participant_),
       status_(participant_) {
-  if (options.decisions) {
-    decisions_.emplace(participant_, *options.decisions);
+  if (options.vectors == Vectors::kLive) {
+    decisions_.emplace(participant_);
+  } else if (options.vectors == Vectors::kAll) {
+    batches_.emplace(participant_);
   }
 }
 
@@ -33,7 +35,8 @@ std::uint64_t BusView::lost() const {
     return status.lost + status.undecodable + status.rejected_instances;
   };
   return lost(events_.status()) + lost(status_.status()) +
-         (decisions_ ? lost(decisions_->status()) : 0);
+         (decisions_ ? lost(decisions_->status()) : 0) +
+         (batches_ ? lost(batches_->status()) : 0);
 }
 
 bool BusView::Matches(const std::string& valve_id) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -11,13 +12,19 @@
 
 namespace fdi::monitor {
 
+/// Which decision vectors a program wants.
+enum class Vectors : std::uint8_t {
+  kNone,
+  kLive,  ///< Of each valve the newest; some are overwritten under load.
+  kAll,   ///< Of monitors with --lossless-decisions.
+};
+
 /// Settings of BusView.
 struct BusOptions {
   std::string program;      ///< As other participants see it.
   std::string valves{"*"};  ///< Glob: vectors and events of these only.
   int max_valves{2000};
-  std::optional<idl::Profile> decisions{idl::Profile::kLive};  ///< None: no
-                                                               ///< vectors.
+  Vectors vectors{Vectors::kLive};
 };
 
 /// All that monitors publish, for programs that show it.
@@ -42,13 +49,16 @@ class BusView {
       }
     };
     models_.Take({all, {}}, kNow);
-    events_.Take({matching, {}}, decisions_ ? kNow : kMoment);
+    events_.Take({matching, {}}, decisions_ || batches_ ? kNow : kMoment);
     status_.Take({all, {}}, kNow);
     if (decisions_) {
       decisions_->Take(
           {matching, [&](const auto& message,
                          const auto&) { on_ended(message.valve_id); }},
           kMoment, 1000);
+    }
+    if (batches_) {
+      batches_->Take(idl::EachVector(matching), kMoment, 10);
     }
   }
 
@@ -64,6 +74,7 @@ class BusView {
   idl::Subscriber<FaultEvent> events_;
   idl::Subscriber<idl::MonitorStatusMessage> status_;
   std::optional<idl::Subscriber<idl::DecisionMessage>> decisions_;
+  std::optional<idl::Subscriber<idl::DecisionBatchMessage>> batches_;
 };
 
 /// What the arrays of decision vectors mean, learnt from ModelSetInfo.

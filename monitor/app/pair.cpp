@@ -71,10 +71,6 @@ PairState OwnState(const PairOptions& options, const std::string& monitor) {
   return state;
 }
 
-std::string PatternOfOthers(const PairOptions& options) {
-  return "pair/" + options.name + "/[!" + std::to_string(options.rank) + "]";
-}
-
 }  // namespace
 
 void Validate(const PairOptions& options) {
@@ -96,6 +92,10 @@ std::string PartitionOf(const PairOptions& options) {
   return "pair/" + options.name + "/" + std::to_string(options.rank);
 }
 
+std::string PartitionOfOthers(const PairOptions& options) {
+  return "pair/" + options.name + "/[!" + std::to_string(options.rank) + "]";
+}
+
 Pair::Pair(idl::Participant& participant, const PairOptions& options,
            const std::string& monitor, BusDecisionSink& decisions,
            BusEventSink& bus, EventSink& events, ThrottledLog& log)
@@ -109,9 +109,9 @@ Pair::Pair(idl::Participant& participant, const PairOptions& options,
       own_word_(participant),
       words_(participant),
       heard_vectors_(participant, idl::Profile::kLive, idl::Overflow::kLibrary,
-                     PatternOfOthers(options)),
+                     PartitionOfOthers(options)),
       heard_events_(participant, idl::Profile::kLive, idl::Overflow::kLibrary,
-                    PatternOfOthers(options)),
+                    PartitionOfOthers(options)),
       election_(OwnState(options, monitor), patience_, kListening,
                 Clock::now()) {
   status_.name = options.name;

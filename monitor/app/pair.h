@@ -30,6 +30,8 @@ void Validate(const PairOptions& options);
 /// Where this monitor of a pair publishes beside the usual partition, so that
 /// the other one hears it and it does not hear itself.
 std::string PartitionOf(const PairOptions& options);
+/// Where the other one does, as a pattern.
+std::string PartitionOfOthers(const PairOptions& options);
 
 /// One of two monitors that stand in for each other. Both diagnose and record
 /// everything; what they would publish goes through here, and the one that does
@@ -48,6 +50,7 @@ class Pair : public DecisionSink, public EventSink {
 
   bool Publish(const std::string& valve_id, const ModelSet* models,
                const Verdict& verdict) override;
+  std::uint64_t Flush() override { return decisions_.Flush(); }
   bool WantsLast() override;
   void PublishLast(const std::string& valve_id, const ModelSet* models,
                    const Verdict& verdict) override {

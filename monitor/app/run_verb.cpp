@@ -195,8 +195,8 @@ void AddRunVerb(cli::Program& program) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   run.add_flag("--lossless-decisions", service.lossless_decisions,
-               "A slow subscriber holds the monitor up instead of missing "
-               "decision vectors");
+               "Publish every decision vector on fdi/v1/DecisionBatch, too; a "
+               "slow subscriber of it holds the monitor up");
   run.add_flag("--best-effort", service.best_effort,
                "Take samples without retransmission");
   run.add_flag("!--no-second-look", service.second_look,

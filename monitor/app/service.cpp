@@ -153,7 +153,8 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
       runs_(options.recording == Recording::kOff
                 ? nullptr
                 : std::make_unique<RunStore>(data_.runs(), context.software)),
-      decisions_(participant_, options.lossless_decisions,
+      decisions_(participant_,
+                 options.lossless_decisions ? MonitorName() : std::string(),
                  publication_stop_.get_token(), PairPartition(options)),
       events_(participant_, context.log, PairPartition(options)),
       outward_(
@@ -173,6 +174,10 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
                                                   MonitorName(), decisions_,
                                                   events_, EventsOut(), log_)
                          : nullptr),
+      operators_(options.pair ? std::make_unique<OperatorSync>(
+                                    participant_, *options.pair, MonitorName(),
+                                    data_.history(), log_)
+                              : nullptr),
       pipeline_(WithDelivery(pipeline_options_), Sinks(), assignment_,
                 {counters_, log_, cli::NowNs}),
       heartbeat_(Members(pipeline_, service_pulse_)),
@@ -232,6 +237,9 @@ void Service::Start() {
   pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators(),
                   history_.ShadowAccumulators());
   diagnosis_.Start([this] { Diagnose(); });
+  if (operators_) {
+    operators_->Start();
+  }
   if (http_) {
     ServeProbes();
   }
@@ -327,6 +335,7 @@ void Service::Diagnose() {
   // What is there already; publishers that go on do not keep us.
   while (Clock::now() < drain_until_.load() && take(milliseconds(0)) > 0) {
   }
+  pipeline_.FlushDecisions();
 }
 
 void Service::Serve(cli::StopSignals& signals) {
@@ -504,6 +513,9 @@ void Service::Stop() {
   }
   if (console_) {
     errors.Try([this] { console_->Stop(); });
+  }
+  if (operators_) {
+    operators_->Stop();
   }
   errors.Try([this] { StopDiagnosis(); });
   if (outward_) {

@@ -18,6 +18,7 @@
 #include "monitor/app/event_hook.h"
 #include "monitor/app/history_store.h"
 #include "monitor/app/model_assignment.h"
+#include "monitor/app/operator_sync.h"
 #include "monitor/app/pair.h"
 #include "monitor/app/run_store.h"
 #include "monitor/app/status.h"
@@ -134,7 +135,8 @@ class Service {
   idl::Subscriber<idl::ValveSampleMessage> samples_;
   Counters counters_;
   ThrottledLog log_;
-  std::unique_ptr<Pair> pair_;  // Null: nobody stands in for us.
+  std::unique_ptr<Pair> pair_;               // Null: nobody stands in for us.
+  std::unique_ptr<OperatorSync> operators_;  // With pair_.
   Pipeline pipeline_;
   Pulse service_pulse_;  // Of the thread of Run().
   Heartbeat heartbeat_;

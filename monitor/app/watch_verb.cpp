@@ -66,9 +66,9 @@ void PrintCounts(const WatchCounts& counts, std::uint64_t lost, bool json) {
 
 int RunWatch(WatchOptions options, const cli::Context& context) {
   if (options.events_only) {
-    options.bus.decisions.reset();
+    options.bus.vectors = Vectors::kNone;
   } else if (options.lossless) {
-    options.bus.decisions = idl::Profile::kLossless;
+    options.bus.vectors = Vectors::kAll;
   }
   cli::StopSignals signals;
   BusView bus(options.bus, context, context.log);
@@ -119,7 +119,7 @@ void AddWatchVerb(cli::Program& program) {
                  "Print only how many messages came, at the end");
   watch.add_option("--valves", options->bus.valves, "Only ids that match GLOB");
   watch.add_flag("--lossless", options->lossless,
-                 "Miss no decision vector of a monitor that runs with "
+                 "Every decision vector of monitors that run with "
                  "--lossless-decisions");
   watch.add_flag("--events", options->events_only, "No decision vectors");
   watch

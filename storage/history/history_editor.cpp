@@ -142,6 +142,63 @@ std::uint64_t HistoryEditor::Label(std::string_view id, std::string_view label,
   return episode_id;
 }
 
+bool HistoryEditor::Adopt(const OperatorAction& action) {
+  return action.kind == OperatorActionKind::kShelve ? AdoptShelf(action)
+                                                    : AdoptNote(action);
+}
+
+bool HistoryEditor::AdoptNote(const OperatorAction& action) {
+  const OperatorNote note =
+      Checked({action.who, action.comment, action.origin, action.stamp_ns});
+  const bool label = action.kind == OperatorActionKind::kLabel;
+  const std::optional<std::string> value =
+      label ? std::optional(CheckedLabel(action.value)) : std::nullopt;
+  const std::string episode = EpisodeIdText(action.episode_id);
+  Transaction transaction(database_);
+  ResolveEpisode(database_, episode);
+  database_.Run(sql::insert_note, episode, label ? "LABEL" : "ACK",
+                action.stamp_ns, UtcNow(), value, note.who, note.comment,
+                note.origin);
+  const bool fresh = database_.Changes() > 0;
+  if (fresh && label) {
+    database_.Run(sql::adopt_label, value, episode, action.stamp_ns);
+  } else if (fresh) {
+    database_.Run(sql::adopt_ack, note.who, action.stamp_ns, episode);
+  }
+  transaction.Commit();
+  return fresh;
+}
+
+bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
+  const OperatorNote note =
+      Checked({action.who, action.comment, action.origin, action.stamp_ns});
+  RequireLength(action.valve_id, "valve", 1, kLongestValve);
+  const std::optional<std::string> fault =
+      action.value.empty() ? std::nullopt
+                           : std::optional(CheckedFaults(action.value));
+  Transaction transaction(database_);
+  const auto find = [&] {
+    return database_.QueryInt64(sql::find_shelf, action.valve_id, fault,
+                                action.stamp_ns, note.who);
+  };
+  std::optional<std::int64_t> shelf_id = find();
+  const bool fresh = !shelf_id;
+  if (fresh) {
+    database_.Run(sql::insert_shelf, action.valve_id, fault, action.stamp_ns,
+                  action.until_ns, note.who, note.comment, note.origin);
+    shelf_id = find();
+  }
+  bool ended = false;
+  if (action.ended_ns != 0 && !ReadShelf(database_, *shelf_id).ended_ns) {
+    const OperatorNote end =
+        Checked({action.ended_by, "", action.ended_origin, action.ended_ns});
+    database_.Run(sql::end_shelf, end.now_ns, end.who, end.origin, *shelf_id);
+    ended = true;
+  }
+  transaction.Commit();
+  return fresh || ended;
+}
+
 Shelf HistoryEditor::Shelve(std::string_view valve_id,
                             const std::optional<std::string>& fault,
                             std::int64_t until_ns, const OperatorNote& note) {

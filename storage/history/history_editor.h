@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "diagnosis/records/operator_action.h"
 #include "storage/database/database.h"
 #include "storage/history/alarm.h"
 
@@ -60,7 +61,17 @@ class HistoryEditor {
   /// @throws NotFoundError; DataError if it is over already.
   Shelf EndShelf(std::int64_t shelf_id, const OperatorNote& note);
 
+  /// Records what was done on another monitor, as it was. Both histories show
+  /// the same in the end, whatever comes first: the earliest acknowledgement,
+  /// the latest label.
+  /// @returns false if it is known already.
+  /// @throws NotFoundError if its episode is not there.
+  bool Adopt(const OperatorAction& action);
+
  private:
+  bool AdoptNote(const OperatorAction& action);
+  bool AdoptShelf(const OperatorAction& action);
+
   Database database_;
 };
 

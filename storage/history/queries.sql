@@ -125,6 +125,22 @@ ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
 -- name: acknowledge
 UPDATE episode SET acked_by = ?, acked_ns = ?
 WHERE episode_id = ? AND acked_by IS NULL
+-- name: adopt_ack
+UPDATE episode SET acked_by = ?1, acked_ns = ?2
+WHERE episode_id = ?3 AND (acked_ns IS NULL OR acked_ns > ?2)
+-- name: adopt_label
+UPDATE episode SET label = ?1
+WHERE episode_id = ?2 AND NOT EXISTS (
+  SELECT 1 FROM episode_event
+  WHERE episode_id = ?2 AND kind = 'LABEL' AND stamp_ns > ?3)
+-- name: last_event
+SELECT coalesce(max(event_id), 0) FROM episode_event
+-- name: notes
+SELECT episode_id, kind, stamp_ns, value, who, comment, origin
+FROM episode_event
+WHERE event_id > ? AND event_id <= ? AND recorded_ns >= ?
+  AND kind IN ('ACK', 'LABEL')
+ORDER BY event_id
 -- name: insert_unsent
 INSERT INTO event_outbox (event_id) VALUES (?)
 -- name: delete_unsent
@@ -241,6 +257,9 @@ ORDER BY shelf_id
 -- name: insert_shelf
 INSERT INTO shelf (valve_id, fault, from_ns, until_ns, who, comment, origin)
 VALUES (?, ?, ?, ?, ?, nullif(?, ''), ?)
+-- name: find_shelf
+SELECT shelf_id FROM shelf
+WHERE valve_id = ? AND fault IS ? AND from_ns = ? AND who = ?
 -- name: end_shelf
 UPDATE shelf SET ended_ns = ?, ended_by = ?, ended_origin = ?
 WHERE shelf_id = ?

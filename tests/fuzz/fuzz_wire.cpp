@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
   if (size < 5) {
     return 0;
   }
-  switch (data[0] % 6) {
+  switch (data[0] % 8) {
     case 0:
       Receive<fdi::idl::ValveSampleMessage>(data + 1, size - 1);
       break;
@@ -45,6 +45,12 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
       break;
     case 4:
       Receive<fdi::idl::MonitorStatusMessage>(data + 1, size - 1);
+      break;
+    case 5:
+      Receive<fdi::idl::DecisionBatchMessage>(data + 1, size - 1);
+      break;
+    case 6:
+      Receive<fdi::OperatorAction>(data + 1, size - 1);
       break;
     default:
       Receive<fdi::PairState>(data + 1, size - 1);

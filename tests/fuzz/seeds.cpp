@@ -129,7 +129,13 @@ void WriteMessages() {
   status.monitor = "host:1";
   status.counters = {{"received", 12}};
   WriteMessage(4, status);
-  WriteMessage(5, fdi::PairState{"host:1", "plant", 1, 7, true, false, 10, 20});
+  WriteMessage<fdi::idl::DecisionBatchMessage>(
+      5, {"host:1",
+          {fdi::idl::MakeDecision("V1", models, {}),
+           fdi::idl::MakeDecision("V2", models, {})}});
+  WriteMessage(6, fdi::OperatorAction{"host:1", fdi::OperatorActionKind::kAck,
+                                      7, "", "", 8, "anna", "seen", "console"});
+  WriteMessage(7, fdi::PairState{"host:1", "plant", 1, 7, true, false, 10, 20});
 }
 
 void WriteDatagrams() {

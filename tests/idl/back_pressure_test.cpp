@@ -169,32 +169,33 @@ TEST_F(DeliveryTest, ADecisionSubscriberThatSleepsNeverHoldsTheWriterUp) {
   EXPECT_LT(steady_clock::now() - start, seconds(20));
 }
 
-TEST_F(DeliveryTest, LosslessDecisionsAllArrive) {
+TEST_F(DeliveryTest, BatchesAllArrive) {
   constexpr std::uint64_t kSamples = 1000;
   Participant here(domain_.Options(), log_.Sink());
   Participant there(domain_.Options(), log_.Sink());
-  Subscriber<DecisionMessage> subscriber(here, Profile::kLossless);
-  Publisher<DecisionMessage> publisher(there, {Profile::kLossless});
+  Subscriber<DecisionBatchMessage> subscriber(here);
+  Publisher<DecisionBatchMessage> publisher(there, {Profile::kLossless});
   ASSERT_TRUE(publisher.WaitForReaders(1, kPatience));
 
   std::jthread writer([&] {
     for (std::uint64_t k = 0; k < kSamples; ++k) {
+      DecisionBatchMessage batch{"host:1", {}};
       for (int i = 0; i < 20; ++i) {
-        publisher.Write(DecisionOf(ValveName(i), k));
+        batch.vectors.push_back(DecisionOf(ValveName(i), k));
       }
+      publisher.Write(batch);
     }
   });
   std::map<std::string, std::uint64_t> next;
   std::uint64_t count = 0;
   std::uint64_t out_of_order = 0;
-  const Handlers<DecisionMessage> handlers{
-      [&](const DecisionMessage& message, const Reception&) {
+  const Handlers<DecisionBatchMessage> handlers =
+      EachVector([&](const DecisionMessage& message, const Reception&) {
         std::uint64_t& expected = next[message.valve_id];
         out_of_order += message.verdict.seq != expected ? 1 : 0;
         expected = message.verdict.seq + 1;
         ++count;
-      },
-      nullptr};
+      });
   TakeUntil(subscriber, handlers, [&] { return count == 20 * kSamples; });
 
   EXPECT_EQ(count, 20 * kSamples);

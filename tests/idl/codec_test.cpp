@@ -227,6 +227,29 @@ TEST(CodecTest, MonitorStatusArrivesWhole) {
   EXPECT_EQ(got.counters, sent.counters);
 }
 
+TEST(CodecTest, ABatchArrivesWhole) {
+  DecisionBatchMessage sent{"host:1", {}};
+  for (std::size_t i = 0; i < kMaxBatch; ++i) {
+    DecisionMessage& vector = sent.vectors.emplace_back();
+    vector.valve_id = "V" + std::to_string(i);
+    vector.fault_count = 1;
+    vector.observer_count = 2;
+    vector.verdict.seq = i;
+    vector.verdict.fault_factors[0] = 0.25;
+  }
+
+  const DecisionBatchMessage got = RoundTrip(sent);
+
+  EXPECT_EQ(got.monitor, "host:1");
+  ASSERT_EQ(got.vectors.size(), kMaxBatch);
+  EXPECT_EQ(got.vectors.back().valve_id, "V127");
+  EXPECT_EQ(got.vectors.back().verdict.seq, 127U);
+  EXPECT_EQ(got.vectors.back().verdict.fault_factors[0], 0.25);
+  EXPECT_EQ(got.vectors.back().observer_count, 2);
+  sent.vectors.push_back(sent.vectors.front());
+  EXPECT_THROW(RoundTrip(sent), DataError);
+}
+
 TEST(CodecTest, PairStateArrivesWhole) {
   PairState sent{"host:1", "plant", 2,    1ULL << 63U,
                  true,     true,    1000, 1U << 31U};

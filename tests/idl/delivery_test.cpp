@@ -237,7 +237,9 @@ TEST_F(DeliveryTest, NoMemoryIsTakenForValvesThatAreNotThere) {
   Publisher<ValveSampleMessage> all_out(participant, {Profile::kLossless});
   Subscriber<ValveSampleMessage> samples_in(participant);
   Publisher<DecisionMessage> decisions_out(participant);
-  Subscriber<DecisionMessage> decisions_in(participant, Profile::kLossless);
+  Subscriber<DecisionMessage> decisions_in(participant);
+  Publisher<DecisionBatchMessage> batches_out(participant);
+  Subscriber<DecisionBatchMessage> batches_in(participant);
   Publisher<FaultEvent> events_out(participant);
   Subscriber<FaultEvent> events_in(participant);
 

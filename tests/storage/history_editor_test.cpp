@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "diagnosis/error.h"
+#include "storage/history/operator_log.h"
 #include "tests/storage/history_fixture.h"
 #include "tests/storage/message_of.h"
 
@@ -187,6 +188,56 @@ TEST_F(HistoryEditorTest, FiguresComeFromTheFilterAndTheFile) {
   EXPECT_EQ(HistoryReader(path_).AlarmFigures(filter, now_).valves.size(), 1U);
   filter.since_ns = kDetected + 92 * kSecond;
   EXPECT_TRUE(HistoryReader(path_).AlarmFigures(filter, now_).valves.empty());
+}
+
+// As those of a pair, whose operators worked while the link was cut.
+TEST_F(HistoryEditorTest, TwoHistoriesThatAdoptFromEachOtherShowTheSame) {
+  const std::filesystem::path there = directory_.path() / "there.db";
+  HistoryWriter writer(there);
+  RecordEpisode(writer, 0b010, "LV-1");
+  HistoryEditor editor(there);
+  const std::string id = IdText("LV-1");
+  editor_.Acknowledge(id, By("jan", now_ + 5));
+  editor.Acknowledge(id, By("anna", now_, "seen"));
+  editor.Label(id, "f1", By("anna", now_ + 9));
+  editor_.Label(id, "true", By("jan", now_ + 7));
+  const Shelf shelf = editor_.Shelve("LV-9", "f19|f1", now_ + 60 * kSecond,
+                                     By("jan", now_, "works on it"));
+  editor.Shelve("LV-8", std::nullopt, now_ + 60 * kSecond, By("anna", now_));
+  editor_.Acknowledge(IdText("LV-2"), By("jan", now_));  // Not there.
+
+  OperatorLog done_here(path_);
+  OperatorLog done_there(there);
+  const auto adopt = [this](OperatorLog& from, HistoryEditor& into) {
+    std::size_t fresh = 0;
+    for (const OperatorAction& action : from.Next(now_ - kSecond)) {
+      try {
+        fresh += into.Adopt(action) ? 1 : 0;
+      } catch (const NotFoundError&) {
+      }
+    }
+    return fresh;
+  };
+  EXPECT_EQ(adopt(done_here, editor), 3U);
+  EXPECT_EQ(adopt(done_there, editor_), 3U);
+  EXPECT_EQ(adopt(done_here, editor), 0U);  // What came back.
+  editor_.EndShelf(shelf.shelf_id, By("jan", now_ + kSecond));
+  EXPECT_EQ(adopt(done_here, editor), 1U);
+  done_here.Rewind();
+  EXPECT_EQ(adopt(done_here, editor), 0U);
+
+  for (const std::filesystem::path& path : {path_, there}) {
+    HistoryReader reader(path);
+    EXPECT_EQ(reader.Show(id).acked_by, "anna");
+    EXPECT_EQ(reader.Show(id).acked_ns, now_);
+    EXPECT_EQ(reader.Show(id).label, "f1");
+    const std::vector<Shelf> shelves = reader.Shelves();
+    ASSERT_EQ(shelves.size(), 2U);
+    const Shelf& ended = shelves[shelves[0].valve_id == "LV-9" ? 0 : 1];
+    EXPECT_EQ(ended.fault, "f1|f19");
+    EXPECT_EQ(ended.comment, "works on it");
+    EXPECT_EQ(ended.ended_ns, now_ + kSecond);
+  }
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
 #include "tests/idl/test_domain.h"
 #include "tests/storage/temporary_directory.h"
@@ -148,6 +149,38 @@ TEST_F(PairTest, ALeaderThatHangsIsReplacedAndSaysNothingWhenItGoesOn) {
     EXPECT_NE(Leader(), leader);
   }
   ExpectWhole();
+}
+
+// Whichever of the two an operator uses, and though the other one be away.
+TEST_F(PairTest, WhatOperatorsDoReachesBoth) {
+  BeginEpisodes();
+  const auto history = [&](int i) { return data_[i].path() / "history.db"; };
+  const int leader = Leader();
+  const std::string id =
+      storage::HistoryReader(history(leader)).List().front().episode_id;
+  storage::HistoryEditor(history(leader))
+      .Acknowledge(id, {"anna", "seen", "test", storage::UtcNow()});
+  storage::HistoryEditor(history(1 - leader))
+      .Label(id, "true", {"ben", "", "test", storage::UtcNow()});
+  const auto shown = [&](int i) {
+    const storage::Episode episode =
+        storage::HistoryReader(history(i)).Show(id);
+    return episode.acked_by.value_or("") + " " + episode.label.value_or("");
+  };
+  EXPECT_TRUE(Await([&] {
+    return shown(0) == "anna true" && shown(1) == "anna true";
+  })) << shown(0)
+      << ", " << shown(1);
+
+  monitors_[leader]->Signal(SIGTERM);
+  ASSERT_EQ(monitors_[leader]->AwaitExit(), 0);
+  storage::HistoryEditor(history(1 - leader))
+      .Shelve("V0", std::nullopt, storage::UtcNow() + 3'600'000'000'000,
+              {"carl", "", "test", storage::UtcNow()});
+  Start(leader);
+  EXPECT_TRUE(Await([&] {
+    return storage::HistoryReader(history(leader)).Shelves().size() == 1;
+  }));
 }
 
 // An episode that begins while one of the two is away is one episode in both.

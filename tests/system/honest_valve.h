@@ -86,24 +86,23 @@ class HonestValve {
     }
   }
   void Take(std::chrono::milliseconds patience) {
-    decisions_.Take({[this](const idl::DecisionMessage& m, const auto&) {
-                       const auto found = sent_.find(m.verdict.seq);
-                       if (m.valve_id == kId && found != sent_.end()) {
-                         const std::chrono::duration<double, std::milli> delay =
-                             Clock::now() - found->second;
-                         delays_ms_.push_back(delay.count());
-                         sent_.erase(found);
-                       }
-                     },
-                     {}},
-                    patience);
+    decisions_.Take(
+        idl::EachVector([this](const idl::DecisionMessage& m, const auto&) {
+          const auto found = sent_.find(m.verdict.seq);
+          if (m.valve_id == kId && found != sent_.end()) {
+            const std::chrono::duration<double, std::milli> delay =
+                Clock::now() - found->second;
+            delays_ms_.push_back(delay.count());
+            sent_.erase(found);
+          }
+        }),
+        patience);
   }
 
   idl::Participant participant_;
   idl::Publisher<idl::ValveSampleMessage> samples_{
       participant_, {idl::Profile::kLossless, 0}};
-  idl::Subscriber<idl::DecisionMessage> decisions_{participant_,
-                                                   idl::Profile::kLossless};
+  idl::Subscriber<idl::DecisionBatchMessage> decisions_{participant_};
   std::uint64_t next_{0};
   std::map<std::uint64_t, Clock::time_point> sent_;  // without a vector yet
   std::vector<double> delays_ms_;

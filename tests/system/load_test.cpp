@@ -214,11 +214,11 @@ TEST_F(LoadTest, AModelSetSwappedUnderLoadLosesAndDoublesNothing) {
   const auto await = [&](const auto& condition) {
     const Clock::time_point deadline = Clock::now() + kMonitorPatience;
     while (!condition() && Clock::now() < deadline) {
-      decisions_->Take({[&](const idl::DecisionMessage& vector, const auto&) {
-                          streams[vector.valve_id].Add(vector);
-                        },
-                        {}},
-                       std::chrono::milliseconds(10), 1'000);
+      decisions_->Take(
+          idl::EachVector([&](const idl::DecisionMessage& vector, const auto&) {
+            streams[vector.valve_id].Add(vector);
+          }),
+          std::chrono::milliseconds(10), 10);
     }
     return condition();
   };

@@ -31,7 +31,7 @@ class MonitorFixture : public testing::Test {
     participant_.emplace(dds);
     samples_.emplace(*participant_,
                      idl::PublisherOptions{idl::Profile::kLossless, 100});
-    decisions_.emplace(*participant_, idl::Profile::kLossless);
+    decisions_.emplace(*participant_);
     events_.emplace(*participant_);
     status_.emplace(*participant_);
   }
@@ -110,11 +110,7 @@ class MonitorFixture : public testing::Test {
   }
 
   void Take() {
-    decisions_->Take({[this](const idl::DecisionMessage& m, const auto&) {
-                        vectors_.push_back(m);
-                      },
-                      {}},
-                     std::chrono::milliseconds(10));
+    TakeVectors(std::chrono::milliseconds(10));
     events_->Take(
         {[this](const FaultEvent& m, const auto&) { faults_.push_back(m); },
          {}},
@@ -129,12 +125,20 @@ class MonitorFixture : public testing::Test {
                   std::chrono::milliseconds(0));
   }
 
+  void TakeVectors(std::chrono::milliseconds patience) {
+    decisions_->Take(
+        idl::EachVector([this](const idl::DecisionMessage& m, const auto&) {
+          vectors_.push_back(m);
+        }),
+        patience);
+  }
+
   const idl::TestDomain domain_;
   storage::TemporaryDirectory directory_;
   std::filesystem::path data_{directory_.path()};
   std::optional<idl::Participant> participant_;
   std::optional<idl::Publisher<idl::ValveSampleMessage>> samples_;
-  std::optional<idl::Subscriber<idl::DecisionMessage>> decisions_;
+  std::optional<idl::Subscriber<idl::DecisionBatchMessage>> decisions_;
   std::optional<idl::Subscriber<FaultEvent>> events_;
   std::optional<idl::Subscriber<idl::MonitorStatusMessage>> status_;
   std::vector<idl::DecisionMessage> vectors_;

@@ -130,11 +130,7 @@ TEST_F(MonitorSystemTest, AHundredValvesLoseNothing) {
     for (std::size_t v = 0; v < kValves; ++v) {
       Publish(PlantSample(k), "V" + std::to_string(v));
     }
-    decisions_->Take({[this](const idl::DecisionMessage& m, const auto&) {
-                        vectors_.push_back(m);
-                      },
-                      {}},
-                     milliseconds(0));
+    TakeVectors(milliseconds(0));
   }
   ASSERT_TRUE(AwaitVectors(kSamples * kValves)) << vectors_.size();
   ASSERT_TRUE(Await([this] {

@@ -1,0 +1,105 @@
+#include "monitor/app/operator_sync.h"
+
+#include <exception>
+#include <utility>
+
+#include "diagnosis/error.h"
+#include "diagnosis/printable.h"
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPeriod{200};
+constexpr std::int64_t kBroughtNs = 30LL * 86'400'000'000'000;
+// An event that the other monitor missed is adopted within seconds.
+constexpr std::chrono::seconds kEpisodeMayCome{60};
+constexpr std::size_t kMostReceived = 10'000;
+
+}  // namespace
+
+OperatorSync::OperatorSync(idl::Participant& participant,
+                           const PairOptions& options, std::string monitor,
+                           const std::filesystem::path& history,
+                           ThrottledLog& log)
+    : monitor_(std::move(monitor)),
+      done_here_(history),
+      history_(history),
+      log_(log),
+      out_(participant, {idl::Profile::kLossless, 0, PartitionOf(options)}),
+      in_(participant, idl::Profile::kLive, idl::Overflow::kLibrary,
+          PartitionOfOthers(options)) {}
+
+void OperatorSync::Start() {
+  thread_ = std::jthread([this](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      in_.Take(
+          {[this](const OperatorAction& action, const auto&) {
+             if (received_.size() < kMostReceived) {
+               received_.push_back({std::chrono::steady_clock::now(), action});
+             }
+           },
+           {}},
+          kPeriod);
+      try {
+        Adopt();
+        Bring();
+      } catch (const std::exception& error) {  // It is tried again.
+        const std::string reason = error.what();
+        log_.Report(LogId::kOperatorSync, "operator_action_waits",
+                    [&reason] { return "reason=" + LogValue(reason); });
+      }
+    }
+  });
+}
+
+void OperatorSync::Bring() {
+  if (out_.matched() == 0) {
+    return;
+  }
+  if (const int came = out_.came(); came != came_) {
+    came_ = came;
+    unsent_.clear();
+    done_here_.Rewind();
+  }
+  for (OperatorAction& action :
+       done_here_.Next(storage::UtcNow() - kBroughtNs)) {
+    unsent_.push_back(std::move(action));
+  }
+  while (!unsent_.empty()) {
+    unsent_.front().monitor = monitor_;
+    if (out_.Write(unsent_.front(), {}, kPeriod) != idl::WriteResult::kSent) {
+      return;
+    }
+    unsent_.pop_front();
+  }
+}
+
+// What came back from there is known, which ends the round.
+void OperatorSync::Adopt() {
+  const auto now = std::chrono::steady_clock::now();
+  for (std::size_t waiting = received_.size(); waiting > 0; --waiting) {
+    const Received& received = received_.front();
+    bool keep = false;
+    try {
+      if (history_.Adopt(received.action)) {
+        log_.Line(LogLevel::kInfo, "operator_action_adopted from=" +
+                                       LogValue(received.action.monitor) +
+                                       " who=" + LogValue(received.action.who));
+      }
+    } catch (const NotFoundError&) {
+      keep = now - received.since < kEpisodeMayCome;
+    } catch (const ConfigError& error) {  // Not what our programs accept.
+      const std::string reason = error.what();
+      log_.Report(LogId::kOperatorSync, "operator_action_refused",
+                  [&reason] { return "reason=" + LogValue(reason); });
+    }
+    if (keep) {
+      received_.push_back(received_.front());
+    }
+    received_.pop_front();
+  }
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include "idl/endpoint.h"
+#include "monitor/app/pair.h"
+#include "monitor/throttled_log.h"
+#include "storage/history/history_editor.h"
+#include "storage/history/operator_log.h"
+
+namespace fdi::monitor {
+
+/// Brings what operators do on one monitor of a pair into the history of the
+/// other one: acknowledgements, labels, shelves, by whatever program they were
+/// made. Who was away gets those of the last 30 days when it comes; those of
+/// episodes that it does not have are left out. A thread of its own.
+class OperatorSync {
+ public:
+  /// @throws idl::TransportError; DataError, storage::SqliteError
+  OperatorSync(idl::Participant& participant, const PairOptions& options,
+               std::string monitor, const std::filesystem::path& history,
+               ThrottledLog& log);
+
+  void Start();
+  void Stop() { thread_ = {}; }
+
+ private:
+  struct Received {
+    std::chrono::steady_clock::time_point since;
+    OperatorAction action;
+  };
+
+  void Bring();
+  void Adopt();
+
+  const std::string monitor_;
+  storage::OperatorLog done_here_;
+  storage::HistoryEditor history_;
+  ThrottledLog& log_;
+  idl::Publisher<OperatorAction> out_;
+  idl::Subscriber<OperatorAction> in_;
+  int came_{0};
+  std::deque<OperatorAction> unsent_;
+  std::deque<Received> received_;  // Whose episode may still be adopted.
+  std::jthread thread_;
+};
+
+}  // namespace fdi::monitor
