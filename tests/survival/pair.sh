@@ -2,8 +2,9 @@
 # A pair of monitors in three network namespaces: one monitor in each of two,
 # valves and a subscriber in the third, which is a switch between the others.
 # The leader is killed, stopped, cut off (what it sends; all), the link between
-# the two is cut for 60 s (both lead), FDI_PAIR_ROUNDS times each (default 3, long
-# form 50). Says how late the next vector of every valve came, and fails if it
+# the two is cut for 60 s (both lead), its disk takes 2 s for each sync during 10 s,
+# FDI_PAIR_ROUNDS times each (default 3, long form 50). The clock of the second
+# host is 2 s ahead. Says how late the next vector of every valve came, and fails if it
 # was later than 0.5 s (median) or 1 s (worst), if a sample never got its
 # vector, a transition came twice, or an episode has two ids.
 # Usage: pair.sh BIN_DIRECTORY PAIR_ROUNDS [KIND...]
@@ -12,12 +13,13 @@
 set -euo pipefail
 bin=$1 plant=$2
 shift 2
-[ $# -gt 0 ] || set -- kill stop cut-out cut split term
+[ $# -gt 0 ] || set -- kill stop cut-out cut split slow-disk term
 rounds=${FDI_PAIR_ROUNDS:-3}
 valves=${FDI_PAIR_VALVES:-1000} faulty=${FDI_PAIR_FAULTY:-20}
 split=${FDI_PAIR_SPLIT_SECONDS:-60}
 tag=$$
 out=$(mktemp -d)
+bad_host=$(realpath "$(dirname "$plant")/libfdi_bad_host.so")
 hub=fdi-p-$tag
 space() { echo "fdi-m$1-$tag"; }
 device() { echo "m$1"; }
@@ -69,7 +71,9 @@ for i in 1 2; do
 done
 
 start() {  # MONITOR
-  ip netns exec "$(space "$1")" "$bin/fdi-monitor" --interface "10.78.0.$1" \
+  ip netns exec "$(space "$1")" env "LD_PRELOAD=$bad_host" \
+    "FDI_SLOW_DISK=$out/slow$1" "FDI_CLOCK_AHEAD_S=$((2 * ($1 - 1)))" \
+    "$bin/fdi-monitor" --interface "10.78.0.$1" \
     --data "$out/data$1" run --pair long --rank "$1" 2>>"$out/monitor$1.log" &
   monitor[$1]=$!
 }
@@ -144,6 +148,12 @@ for kind in "$@"; do
         ask mark
         isolate off
         ask late
+        ;;
+      slow-disk)
+        touch "$out/slow$leader"
+        ask late
+        sleep 10
+        rm "$out/slow$leader"
         ;;
       *) fail "there is no kind $kind" ;;
     esac
