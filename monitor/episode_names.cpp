@@ -45,8 +45,11 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
   }
   TakeAnswers();
   const simulator::LookAnswer* answer = AnswerTo(engine, held);
-  const auto named = answer != nullptr ? simulator::NamesOf(*answer)
-                                       : std::optional<std::vector<int>>();
+  const auto named =
+      answer != nullptr
+          ? simulator::NamesOf(
+                *answer, simulator::ObserversName(*models_, engine.isolated))
+          : std::optional<std::vector<int>>();
   const bool kept = kept_ && engine.detected && !held;
   if (!named && !kept && !by_physics_) {
     faults_ = engine.isolated;

@@ -85,7 +85,9 @@ LookWorker::Answer LookWorker::Take(const Look& look) const {
   try {
     const simulator::SecondLook second = simulator::LookAgain(
         *look.physics, look.task.window, stop_.get_token());
-    return second.ranked.empty() ? Answer() : simulator::AnswerOf(second);
+    return second.ranked.empty()
+               ? Answer()
+               : simulator::AnswerOf(second, look.task.early());
   } catch (const std::exception& error) {
     ReportFailure("valve=" + LogValue(look.valve_id), error.what());
     return std::nullopt;

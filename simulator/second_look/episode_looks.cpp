@@ -5,13 +5,16 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/fault_catalogue.h"
+
 namespace fdi::simulator {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::size_t kBefore = 120;   // rows before the detection
 constexpr std::size_t kLongest = 420;  // rows in all
-constexpr std::size_t kShortest = 30;
+constexpr std::size_t kShortest = 20;
+constexpr std::int64_t kEarlyAge = 20 * kSecond;
 constexpr std::int64_t kFirstAge = 40 * kSecond;
 // None of the hypotheses follows the record: errors of so many healthy ones.
 constexpr double kMostMisfit = 12.0;
@@ -21,7 +24,8 @@ constexpr double kMostHealthy = 4.0;
 constexpr double kGoodMisfit = 2.0;
 
 std::int64_t AgeAfter(std::int64_t age_ns) {
-  return age_ns < 150 * kSecond   ? 150 * kSecond
+  return age_ns < kFirstAge       ? kFirstAge
+         : age_ns < 150 * kSecond ? 150 * kSecond
          : age_ns < 300 * kSecond ? 300 * kSecond
                                   : 10 * age_ns;
 }
@@ -76,15 +80,21 @@ void KeepTogether(const SecondLook& look, double nothing,
 
 }  // namespace
 
-LookAnswer AnswerOf(const SecondLook& look) {
+LookAnswer AnswerOf(const SecondLook& look, bool early) {
   LookAnswer answer;
+  answer.early = early;
   answer.misfit = look.misfit;
   answer.simulated = look.best;
   double nothing = std::numeric_limits<double>::infinity();
   for (const Explanation& e : look.ranked) {
     if (e.fault == 0) {
       nothing = e.distance;
-    } else if (e.distance <= kLookMargin && !Has(answer.faults, e.fault)) {
+    }
+  }
+  const double margin =
+      early ? std::max(kLookMargin, kEarlyLookShare * nothing) : kLookMargin;
+  for (const Explanation& e : look.ranked) {
+    if (e.fault != 0 && e.distance <= margin && !Has(answer.faults, e.fault)) {
       answer.faults.push_back(e);
     }
   }
@@ -99,8 +109,23 @@ LookAnswer AnswerOf(const SecondLook& look) {
   return answer;
 }
 
-std::optional<std::vector<int>> NamesOf(const LookAnswer& answer) {
-  if (answer.outcome == LookOutcome::kNothing) {
+bool LookTask::early() const {
+  return stamp_ns - detection_stamp_ns < kFirstAge;
+}
+
+bool ObserversName(const ModelSet& models, FaultSet isolated) {
+  for (std::size_t i = 0; i < models.faults.size(); ++i) {
+    if (((isolated >> i) & 1U) != 0 && IsFault(models.faults[i])) {
+      return true;
+    }
+  }
+  return false;
+}
+
+std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
+                                        bool observers_name) {
+  if (answer.outcome == LookOutcome::kNothing ||
+      (answer.early && observers_name)) {
     return std::nullopt;
   }
   std::vector<int> names;
@@ -187,10 +212,10 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
   for (const Transition& transition : verdict.Transitions()) {
     if (transition.kind == TransitionKind::kDetected) {
       detection_ns_ = transition.detection_stamp_ns;
-      next_age_ns_ = kFirstAge;
+      next_age_ns_ = kEarlyAge;
     } else if (detection_ns_ && (transition.kind == TransitionKind::kCleared ||
                                  transition.kind == TransitionKind::kClosed)) {
-      if (next_age_ns_ == kFirstAge) {
+      if (next_age_ns_ <= kFirstAge) {
         due = Task(sample.stamp_ns);
       }
       detection_ns_.reset();
@@ -211,7 +236,8 @@ void LookBook::Enter(const LookTask& task, LookAnswer answer) {
   });
   constexpr double kMuchWorse = 2.0;
   for (const Entry& entry : entries_) {
-    if (answer.misfit > kMuchWorse * std::max(1.0, entry.answer.misfit)) {
+    if (!entry.answer.early &&
+        answer.misfit > kMuchWorse * std::max(1.0, entry.answer.misfit)) {
       return;
     }
   }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "diagnosis/model_set.h"
 #include "diagnosis/verdict.h"
 #include "simulator/second_look/second_look.h"
 
@@ -15,6 +16,10 @@ struct LookTask {
   LookWindow window;
   std::int64_t stamp_ns{0};            ///< Of the last row.
   std::int64_t detection_stamp_ns{0};  ///< Key of the episode.
+
+  /// So little of the episode is there that the physics, which is off by some
+  /// per cent, may find the wrong fault: see LookAnswer::early.
+  bool early() const;
 };
 
 /// What a second look makes of the name of an episode.
@@ -30,6 +35,10 @@ struct LookAnswer {
   std::vector<Explanation>
       faults;  ///< One each, best first; of kNoneFits none.
   double misfit{0.0};
+  /// Of an early look: its set is wider, it does not overrule the observers,
+  /// and no later look is measured by it. It is there for faults that are over
+  /// before the others.
+  bool early{false};
   /// The valve's answer under the best explanation, a row each.
   std::vector<RecordAnswer> simulated;
   std::int64_t stamp_ns{0};  ///< Of the last row; set by LookBook.
@@ -38,6 +47,9 @@ struct LookAnswer {
 /// Largest distance behind the best explanation at which a fault stays in the
 /// set; see docs/method.md.
 inline constexpr double kLookMargin = 15.0;
+/// Of an early look at least this share of what the best gains over none: by
+/// so much the physics may be off, which a short window does not average out.
+inline constexpr double kEarlyLookShare = 0.1;
 /// A fault that gains less over none, per independent reading, may be what a
 /// healthy valve and its simulation differ by: up to 0.20 were seen without
 /// one.
@@ -45,20 +57,24 @@ inline constexpr double kLeastGain = 0.25;
 /// A set of more faults is a shortlist.
 inline constexpr std::size_t kMostNamed = 4;
 
-LookAnswer AnswerOf(const SecondLook& look);
+LookAnswer AnswerOf(const SecondLook& look, bool early = false);
+
+/// The observers have isolated a fault, and not only what the floor finds.
+bool ObserversName(const ModelSet& models, FaultSet isolated);
 
 /// The faults that an answer names, ascending; empty: unknown. Nothing if what
-/// the engine says stands.
-std::optional<std::vector<int>> NamesOf(const LookAnswer& answer);
+/// the engine says stands. @param observers_name see ObserversName().
+std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
+                                        bool observers_name);
 
 /// Seconds from the last sample of a look to the stamp from which its answer
 /// counts, whatever the computer took.
 inline constexpr std::int64_t kLookDelayNs = 10'000'000'000;
 
 /// Follows the samples and verdicts of one valve and says when the physics
-/// should look at an episode: 40, 150 and 300 s after its detection, then at
-/// ten times the age each time, and at its end if it was shorter. Keeps the
-/// last 420 samples.
+/// should look at an episode: 20 (early), 40, 150 and 300 s after its
+/// detection, then at ten times the age each time, and at its end if it was
+/// shorter. Keeps the last 420 samples.
 class EpisodeLooks {
  public:
   /// `physics` must outlive it.

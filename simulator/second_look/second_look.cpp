@@ -579,8 +579,8 @@ SecondLook Looker::Run(const std::stop_token& stop) {
 
 SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window,
                      const std::stop_token& stop) {
-  Require(window.rows.size() >= 30 && window.detection < window.rows.size(),
-          "a second look takes 30 rows and a detection among them");
+  Require(window.rows.size() >= 20 && window.detection < window.rows.size(),
+          "a second look takes 20 rows and a detection among them");
   return Looker(physics, window).Run(stop);
 }
 

@@ -11,7 +11,7 @@ namespace fdi::simulator {
 
 /// Recorded rows about an episode, one period apart.
 struct LookWindow {
-  std::vector<RecordRow> rows;  ///< At least 30, with X measured in 30.
+  std::vector<RecordRow> rows;  ///< At least 20, with X measured in 20.
   std::size_t detection{0};     ///< Row of the first abnormal sample; 0 if it
                                 ///< lies before the window.
   SignalMask signals{0};        ///< That were measured.

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "simulator/second_look/episode_looks.h"
 #include "tests/simulator/recorded_valve.h"
 
@@ -134,15 +135,15 @@ SecondLook Looked(std::vector<std::pair<int, double>> distances,
 TEST(LookAnswerTest, KeepsLeakAndBypassTogetherUnlessTheLeakIsTooLarge) {
   SecondLook look = Looked({{18, 0.0}, {6, 5.0 * kLookMargin}, {0, 900.0}});
   look.ranked[1].strength = 0.9;
-  EXPECT_EQ(NamesOf(AnswerOf(look)), (std::vector{6, 18}));
+  EXPECT_EQ(NamesOf(AnswerOf(look), true), (std::vector{6, 18}));
   look.ranked[1].strength = 1.0;
-  EXPECT_EQ(NamesOf(AnswerOf(look)), std::vector{18});
+  EXPECT_EQ(NamesOf(AnswerOf(look), true), std::vector{18});
 }
 
 TEST(LookAnswerTest, KeepsStopAndSupplyTogetherWhereTheBestFitsNotWell) {
   const auto named = [](double misfit) {
-    return NamesOf(
-        AnswerOf(Looked({{1, 0.0}, {16, 40.0}, {0, 900.0}}, misfit)));
+    return NamesOf(AnswerOf(Looked({{1, 0.0}, {16, 40.0}, {0, 900.0}}, misfit)),
+                   true);
   };
   EXPECT_EQ(named(3.0), (std::vector{1, 16}));
   EXPECT_EQ(named(1.0), std::vector{1});
@@ -191,30 +192,54 @@ std::vector<LookTask> Follow(int samples, int first,
   return tasks;
 }
 
-TEST(EpisodeLooksTest, LooksThriceInFiveMinutesFromTwoMinutesBefore) {
+TEST(EpisodeLooksTest, LooksOftenInFiveMinutesFromTwoMinutesBefore) {
   const std::vector<LookTask> tasks = Follow(700, 200);
-  ASSERT_EQ(tasks.size(), 3U);
-  EXPECT_EQ(tasks[0].stamp_ns, 240 * kSecond);
-  EXPECT_EQ(tasks[0].window.detection, 120U);
-  EXPECT_EQ(tasks[0].window.rows.size(), 161U);
-  EXPECT_EQ(tasks[2].stamp_ns, 500 * kSecond);
+  ASSERT_EQ(tasks.size(), 4U);
+  EXPECT_EQ(tasks[0].stamp_ns, 220 * kSecond);
+  EXPECT_TRUE(tasks[0].early());
+  EXPECT_EQ(tasks[1].stamp_ns, 240 * kSecond);
+  EXPECT_FALSE(tasks[1].early());
+  EXPECT_EQ(tasks[1].window.detection, 120U);
+  EXPECT_EQ(tasks[1].window.rows.size(), 161U);
+  EXPECT_EQ(tasks[3].stamp_ns, 500 * kSecond);
 }
 
 TEST(EpisodeLooksTest, ManagesWithoutALeadIn) {
   const std::vector<LookTask> tasks = Follow(100, 0);
-  ASSERT_EQ(tasks.size(), 1U);
+  ASSERT_EQ(tasks.size(), 2U);
   EXPECT_EQ(tasks[0].window.detection, 0U);
 }
 
-// Every second sample; a task needs 30 that were measured.
+// Every second sample; a task needs 20 that were measured.
 TEST(EpisodeLooksTest, KnowsWhatWasMeasured) {
-  EXPECT_EQ(Follow(50, 0).size(), 1U);
-  EXPECT_TRUE(Follow(50, 0, SignalQuality::kUncertain).empty());
+  EXPECT_EQ(Follow(30, 0).size(), 1U);
+  EXPECT_TRUE(Follow(30, 0, SignalQuality::kUncertain).empty());
   const std::vector<LookTask> tasks = Follow(400, 0, SignalQuality::kUncertain);
   ASSERT_FALSE(tasks.empty());
   EXPECT_FALSE(tasks[0].window.rows[0].x_measured);
   EXPECT_FALSE(tasks[0].window.rows[0].flow_measured);
   EXPECT_TRUE(tasks[0].window.rows[1].x_measured);
+}
+
+TEST(LookAnswerTest, AnEarlyOneHasAWiderSetAndDoesNotOverruleObservers) {
+  const SecondLook look = Looked({{19, 0.0}, {3, 31.0}, {0, 535.0}});
+  EXPECT_EQ(NamesOf(AnswerOf(look), false), std::vector{19});
+  EXPECT_EQ(NamesOf(AnswerOf(look, true), false), (std::vector{3, 19}));
+  EXPECT_EQ(NamesOf(AnswerOf(look, true), true), std::nullopt);
+
+  ModelSet models;
+  models.faults = {3, kFirstFinding};
+  EXPECT_FALSE(ObserversName(models, 0b10));
+  EXPECT_TRUE(ObserversName(models, 0b11));
+
+  LookBook book;
+  LookTask task;
+  task.stamp_ns = 20 * kSecond;
+  book.Enter(task, AnswerOf(look, task.early()));
+  task.stamp_ns = 40 * kSecond;
+  book.Enter(task, AnswerOf(Looked({{3, 0.0}, {0, 900.0}}, 3.0), task.early()));
+  ASSERT_NE(book.At(0, 60 * kSecond), nullptr);
+  EXPECT_EQ(book.At(0, 60 * kSecond)->faults.front().fault, 3);
 }
 
 TEST(LookBookTest, CountsAfterItsDelayAndDoesNotHearAWorseFit) {

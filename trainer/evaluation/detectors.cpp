@@ -24,12 +24,15 @@ namespace {
 class SecondLooks {
  public:
   explicit SecondLooks(const ModelSet& models)
-      : physics_(simulator::PhysicsFrom(models.physics)), looks_(physics_) {}
+      : models_(models),
+        physics_(simulator::PhysicsFrom(models.physics)),
+        looks_(physics_) {}
 
   void Watch(const Sample& sample, const Verdict& verdict) {
     if (const auto task = looks_.Step(sample, verdict)) {
       book_.Enter(*task, simulator::AnswerOf(
-                             simulator::LookAgain(physics_, task->window)));
+                             simulator::LookAgain(physics_, task->window),
+                             task->early()));
     }
     for (const Transition& transition : verdict.Transitions()) {
       detection_ns_ = transition.detection_stamp_ns;
@@ -39,7 +42,10 @@ class SecondLooks {
     }
     const simulator::LookAnswer* answer =
         verdict.detected ? book_.At(detection_ns_, sample.stamp_ns) : nullptr;
-    sets_.push_back(answer ? simulator::NamesOf(*answer) : std::nullopt);
+    sets_.push_back(
+        answer ? simulator::NamesOf(*answer, simulator::ObserversName(
+                                                 models_, verdict.isolated))
+               : std::nullopt);
   }
 
   void Apply(std::vector<Indication>& indications) const {
@@ -52,6 +58,7 @@ class SecondLooks {
   }
 
  private:
+  const ModelSet& models_;
   simulator::ValvePhysics physics_;
   simulator::EpisodeLooks looks_;
   simulator::LookBook book_;
