@@ -10,9 +10,9 @@
 #include <cstdlib>
 #include <string>
 
-#include "storage/history/history_database.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/history_writer.h"
+#include "tests/storage/many_episodes.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::storage {
@@ -21,62 +21,11 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kNow = 1'795'186'571 * kSecond;
-constexpr std::int64_t kYear = 31'536'000;  // s
+constexpr std::int64_t kNow = kLastDetectedNs;
 
 double MillisecondsSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start)
       .count();
-}
-
-// Episodes at all times of the year, of 19 faults and unknown, nine in ten
-// acknowledged, one in ten labelled, the last hundred open; with their events
-// and a small trace, straight into the tables.
-constexpr const char* kEpisodes = R"sql(
-WITH RECURSIVE n(k) AS (VALUES (0) UNION ALL SELECT k + 1 FROM n
-                        WHERE k + 1 < ?1),
-  t AS (SELECT k, k * 7919 % 1000 AS valve, k * 31 % 20 AS fault,
-               ?2 + k * (?3 / ?1) * 1000000000 AS detected FROM n)
-INSERT INTO episode (episode_id, valve_id, source_id, detected_ns, isolated_ns,
-  cleared_ns, ended_ns, end_reason, fault_bits, peak_factor, strength,
-  model_set, model_hash, flow_unit, channels, faults, label, acked_by, acked_ns,
-  fault)
-SELECT printf('%016x', k), printf('V%04d', valve), 1, detected,
-  iif(fault = 0, NULL, detected + 20000000000),
-  iif(k < ?1 - 100, detected + 600000000000, NULL),
-  iif(k < ?1 - 100, detected + 601000000000, NULL),
-  iif(k < ?1 - 100, 'cleared', NULL), 1, 0.8, 0.5, 'paper@1', 1, 'm3/h', 'X|F',
-  'f1|f7', iif(k % 10 = 3, 'true', NULL), iif(k % 10 = 0, NULL, 'anna'), 1,
-  iif(fault = 0, iif(k < ?1 - 100, 'unknown', NULL), 'f' || fault)
-FROM t)sql";
-
-constexpr const char* kFaults = R"sql(
-INSERT INTO episode_fault (episode_id, fault, fault_bit, first_ns, held,
-  detected_ns)
-SELECT episode_id, fault, 0, isolated_ns, 1, detected_ns FROM episode
-WHERE isolated_ns IS NOT NULL)sql";
-
-constexpr const char* kEvents = R"sql(
-INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns)
-SELECT episode_id, kind, detected_ns + n, detected_ns FROM episode,
-  (SELECT 'DETECTED' AS kind, 0 AS n UNION SELECT 'ISOLATED', 1
-   UNION SELECT 'CLEARED', 2 UNION SELECT 'CLOSED', 3))sql";
-
-constexpr const char* kTraces = R"sql(
-INSERT INTO episode_trace (episode_id, chunk, first_ns, last_ns, instants,
-  sample_codec, sample_crc, samples, vector_crc, vectors)
-SELECT episode_id, 0, detected_ns, detected_ns, 1, 1, 0, zeroblob(600), 0,
-  zeroblob(600) FROM episode)sql";
-
-void Generate(const std::filesystem::path& path, std::int64_t episodes) {
-  Database database(path, HistorySchema(), Access::kWriter);
-  Transaction transaction(database);
-  database.Run(kEpisodes, episodes, kNow - kYear * kSecond, kYear);
-  database.Run(kFaults);
-  database.Run(kEvents);
-  database.Run(kTraces);
-  transaction.Commit();
-  database.Checkpoint();
 }
 
 struct Query {
@@ -189,7 +138,7 @@ void TimeEvents(const std::filesystem::path& path) {
 int Main(std::int64_t episodes) {
   const TemporaryDirectory directory;
   const auto path = directory.path() / "history.db";
-  Generate(path, episodes);
+  GenerateEpisodes(path, episodes);
   std::printf("%lld episodes of 1000 valves, %.1f MB\n",
               static_cast<long long>(episodes),
               static_cast<double>(std::filesystem::file_size(path)) / 1e6);

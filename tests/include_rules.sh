@@ -19,9 +19,11 @@ forbid '^(diagnosis|storage|cli|simulator|trainer|monitor)/' '(fastdds|fastrtps|
   'Fast DDS belongs to idl'
 forbid '^(diagnosis|idl|cli|simulator|trainer|monitor)/' '(sqlite3\.h|SQLiteCpp/)' \
   'SQLite belongs to storage'
+forbid '^(diagnosis|idl|cli|simulator|trainer|monitor|storage/(app|database|history|models|runs))/' 'libpq' \
+  'PostgreSQL belongs to storage/plant'
 forbid '^(diagnosis|idl|cli|storage|trainer|monitor)/' '(cvode|nvector|sun[a-z]+)/' \
   'SUNDIALS belongs to simulator'
-forbid '^((diagnosis|idl|simulator|trainer|monitor)/[^/]+$|storage/(database|runs|models|history)/)' '(CLI/|toml\+\+|spdlog/|nlohmann/)' \
+forbid '^((diagnosis|idl|simulator|trainer|monitor)/[^/]+$|storage/(database|runs|models|history|plant)/)' '(CLI/|toml\+\+|spdlog/|nlohmann/)' \
   'command line, TOML, logging and JSON belong to the programs'
 forbid '^(diagnosis|idl|cli|simulator|trainer|storage)/' 'httplib\.h' \
   'HTTP belongs to the monitor'

@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   fdi::storage::AddPlannerVerbs(program);
   fdi::storage::AddMaintenanceVerbs(program);
   fdi::storage::AddKeysVerbs(program);
+  fdi::storage::AddShipVerb(program);
   program.AddExamples(fdi::storage::Examples());
   return program.Run(argc, argv);
 }

@@ -42,6 +42,7 @@ void AddAlarmVerbs(cli::Program& program, CLI::App& group);
 void AddPlannerVerbs(cli::Program& program);  ///< faults, health, worklist
 void AddMaintenanceVerbs(cli::Program& program);
 void AddKeysVerbs(cli::Program& program);
+void AddShipVerb(cli::Program& program);
 
 /// For --help and the manual pages.
 std::vector<cli::VerbExamples> Examples();

@@ -427,6 +427,21 @@ void Statement::BindBlob(int index, std::span<const std::byte> value) {
   });
 }
 
+ColumnType Statement::TypeOf(int column) const {
+  switch (statement_->getColumn(column).getType()) {
+    case SQLITE_INTEGER:
+      return ColumnType::kInteger;
+    case SQLITE_FLOAT:
+      return ColumnType::kReal;
+    case SQLITE_TEXT:
+      return ColumnType::kText;
+    case SQLITE_BLOB:
+      return ColumnType::kBlob;
+    default:
+      return ColumnType::kNull;
+  }
+}
+
 bool Statement::IsNull(int column) const {
   return statement_->isColumnNull(column);
 }

@@ -90,6 +90,9 @@ struct Schema {
 
 class Database;
 
+/// What SQLite holds in a column of a row.
+enum class ColumnType { kInteger, kReal, kText, kBlob, kNull };
+
 /// A prepared statement. Columns and parameters are typed at the call; columns
 /// count from 0. Must not outlive its Database.
 class Statement {
@@ -117,6 +120,7 @@ class Statement {
   void Run();
   void Reset();
 
+  ColumnType TypeOf(int column) const;
   bool IsNull(int column) const;
   std::int64_t Int64(int column) const;
   int Int(int column) const { return static_cast<int>(Int64(column)); }

@@ -327,13 +327,23 @@ WHERE detected_ns >= ?1 AND ended_ns < ?2 AND acked_by IS NOT NULL
   AND label IS NULL AND NOT EXISTS (
     SELECT 1 FROM event_outbox JOIN episode_event v USING (event_id)
     WHERE v.episode_id = e.episode_id)
+  AND NOT EXISTS (SELECT 1 FROM ship_cursor WHERE copied_ns < e.detected_ns)
+  AND episode_id NOT IN (
+    SELECT key FROM change
+    WHERE number > (SELECT min(number) FROM ship_cursor)
+      AND item IN ('episode', 'trace', 'look'))
 ORDER BY detected_ns LIMIT ?3
 -- name: protected_episodes
 SELECT count(*) FROM episode e WHERE NOT (
   ended_ns IS NOT NULL AND acked_by IS NOT NULL AND label IS NULL
   AND NOT EXISTS (
     SELECT 1 FROM event_outbox JOIN episode_event v USING (event_id)
-    WHERE v.episode_id = e.episode_id))
+    WHERE v.episode_id = e.episode_id)
+  AND NOT EXISTS (SELECT 1 FROM ship_cursor WHERE copied_ns < e.detected_ns)
+  AND episode_id NOT IN (
+    SELECT key FROM change
+    WHERE number > (SELECT min(number) FROM ship_cursor)
+      AND item IN ('episode', 'trace', 'look')))
 -- name: old_health
 SELECT count(*), min(hour), max(hour), sum(length(bytes))
 FROM health_hour WHERE valve_id = ? AND hour < ?

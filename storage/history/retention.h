@@ -38,8 +38,8 @@ PruneResult PruneRuns(const std::filesystem::path& path,
                       const RetentionLimits& limits);
 
 /// Deletes episodes of history.db with events and traces, as PruneRuns().
-/// Protected: episodes that are open, not acknowledged, labelled, or have an
-/// event that was not sent.
+/// Protected: episodes that are open, not acknowledged, labelled, have an event
+/// that was not sent, or a change that a plant's history does not have yet.
 PruneResult PruneHistory(const std::filesystem::path& path,
                          const RetentionLimits& limits);
 

@@ -1,0 +1,269 @@
+-- ---- What fdi-store ship takes of history.db: the rows of the items in the
+-- ---- temporary table batch, each item once. Names and order of columns are
+-- ---- those of the table in the plant's history. CROSS JOIN: SQLite begins with
+-- ---- the batch.
+-- name: make_batch
+CREATE TEMPORARY TABLE batch (
+  item TEXT, key TEXT, part INTEGER, PRIMARY KEY (item, key, part)
+) WITHOUT ROWID
+-- name: empty_batch
+DELETE FROM batch
+-- name: changes_end
+SELECT max(number) FROM (
+  SELECT number FROM change WHERE number > ? ORDER BY number LIMIT ?)
+-- name: take_changes
+INSERT OR IGNORE INTO batch SELECT item, key, part FROM change
+WHERE number > ? AND number <= ?
+-- Up to when episodes and chunks detected after ?1 are ?2 at most, or one
+-- episode.
+-- name: copy_end
+SELECT coalesce(max(detected_ns) FILTER (WHERE items <= ?2), min(detected_ns))
+FROM (
+  SELECT detected_ns, sum(1 + (
+    SELECT count(*) FROM episode_trace t WHERE t.episode_id = e.episode_id))
+    OVER (ORDER BY detected_ns) AS items
+  FROM (SELECT episode_id, detected_ns FROM episode WHERE detected_ns > ?1
+        ORDER BY detected_ns LIMIT ?2) e)
+-- name: take_episodes
+INSERT INTO batch
+SELECT 'episode', episode_id, 0 FROM episode
+WHERE detected_ns > ?1 AND detected_ns <= ?2
+UNION ALL
+SELECT 'trace', e.episode_id, chunk
+FROM episode e CROSS JOIN episode_trace USING (episode_id)
+WHERE detected_ns > ?1 AND detected_ns <= ?2
+UNION ALL
+SELECT 'look', e.episode_id, 0
+FROM episode e CROSS JOIN episode_look USING (episode_id)
+WHERE detected_ns > ?1 AND detected_ns <= ?2
+-- name: next_valve
+SELECT min(valve_id) FROM (
+  SELECT min(valve_id) AS valve_id FROM coverage_day WHERE valve_id > ?1
+  UNION ALL SELECT min(valve_id) FROM health_hour WHERE valve_id > ?1)
+-- name: take_valve
+INSERT OR IGNORE INTO batch
+SELECT 'day', valve_id, day FROM coverage_day WHERE valve_id = ?1
+UNION ALL SELECT 'hour', valve_id, hour FROM health_hour WHERE valve_id = ?1
+-- name: take_rest
+INSERT INTO batch
+SELECT 'gap', '', gap_id FROM data_gap
+UNION ALL SELECT 'shelf', '', shelf_id FROM shelf
+UNION ALL SELECT 'session', '', session_id FROM monitor_session
+-- name: episode
+SELECT e.episode_id, e.valve_id, e.source_id, e.detected_ns, e.isolated_ns,
+  e.cleared_ns, e.ended_ns, e.end_reason, e.fault, e.fault_bits, e.peak_factor,
+  e.strength, e.unknown_kind, e.layer, e.model_set, e.model_hash, e.flow_unit,
+  e.channels, e.faults, e.label, e.acked_by, e.acked_ns, e.session_id
+FROM (SELECT DISTINCT key FROM batch WHERE item IN ('episode', 'trace')) c
+  CROSS JOIN episode e ON e.episode_id = c.key
+-- name: episode_fault
+SELECT f.episode_id, f.fault, f.fault_bit, f.first_ns, f.held, f.detected_ns
+FROM batch c CROSS JOIN episode_fault f ON f.episode_id = c.key
+WHERE c.item = 'episode'
+-- name: episode_event
+SELECT v.episode_id, v.kind, v.stamp_ns, v.event_id, v.recorded_ns, v.faults,
+  v.fault_bits, v.factor, v.strength, v.reason, v.layer, v.value, v.who,
+  v.comment, v.origin
+FROM batch c CROSS JOIN episode_event v ON v.episode_id = c.key
+WHERE c.item = 'episode'
+-- name: episode_trace
+SELECT t.episode_id, t.chunk, t.first_ns, t.last_ns, t.instants,
+  t.sample_codec, t.sample_crc, t.samples, t.vector_crc, t.vectors
+FROM batch c CROSS JOIN episode_trace t
+  ON t.episode_id = c.key AND t.chunk = c.part
+WHERE c.item = 'trace'
+-- name: episode_look
+SELECT l.episode_id, l.first_ns, l.period_ns, l.misfit
+FROM batch c CROSS JOIN episode_look l ON l.episode_id = c.key
+WHERE c.item = 'look'
+-- name: episode_look_fault
+SELECT l.episode_id, l.rank, l.fault, l.strength, l.lowest, l.highest,
+  l.begins_ns, l.growing
+FROM batch c CROSS JOIN episode_look_fault l
+  ON l.episode_id = c.key
+WHERE c.item = 'look'
+-- name: episode_look_row
+SELECT l.episode_id, l.row, l.x_pct, l.flow
+FROM batch c CROSS JOIN episode_look_row l ON l.episode_id = c.key
+WHERE c.item = 'look'
+-- name: coverage_day
+SELECT d.valve_id, d.day, d.quality, d.samples, d.seconds
+FROM batch c CROSS JOIN coverage_day d
+  ON d.valve_id = c.key AND d.day = c.part
+WHERE c.item = 'day'
+-- name: health_hour
+SELECT h.valve_id, h.hour, h.model_hash, h.epoch, h.live_ms, h.bytes
+FROM batch c CROSS JOIN health_hour h
+  ON h.valve_id = c.key AND h.hour = c.part
+WHERE c.item = 'hour'
+-- name: data_gap
+SELECT g.gap_id, g.valve_id, g.from_ns, g.to_ns, g.reason, g.session_id
+FROM batch c CROSS JOIN data_gap g ON g.gap_id = c.part
+WHERE c.item = 'gap'
+-- name: shelf
+SELECT s.shelf_id, s.valve_id, s.fault, s.from_ns, s.until_ns, s.who,
+  s.comment, s.origin, s.ended_ns, s.ended_by, s.ended_origin
+FROM batch c CROSS JOIN shelf s ON s.shelf_id = c.part
+WHERE c.item = 'shelf'
+-- name: monitor_session
+SELECT s.session_id, s.start_ns, s.alive_ns, s.stop_ns, s.clean, s.software
+FROM batch c CROSS JOIN monitor_session s ON s.session_id = c.part
+WHERE c.item = 'session'
+-- name: history_id
+SELECT history_id FROM history_identity
+-- name: repeated_changes
+SELECT number FROM change
+WHERE number NOT IN (SELECT max(number) FROM change GROUP BY item, key, part)
+-- name: ship_cursor
+SELECT number, shipped_ns, copied_ns, copied_valve FROM ship_cursor
+WHERE plant_id = ?
+-- From the smallest time and name on.
+-- name: begin_copy
+INSERT OR REPLACE INTO ship_cursor
+  (plant_id, number, shipped_ns, copied_ns, copied_valve)
+SELECT ?, coalesce(max(number), 0), ?, -9223372036854775807 - 1, '' FROM change
+-- name: set_ship_cursor
+UPDATE ship_cursor SET number = ?, shipped_ns = ?, copied_ns = ?,
+  copied_valve = ?
+WHERE plant_id = ?
+-- name: delete_shipped
+DELETE FROM change WHERE number < (SELECT min(number) FROM ship_cursor)
+
+-- ---- Of models.db: all of it.
+-- name: model_set
+SELECT v.model_set, v.version, m.created_ns, v.content_hash, v.observers,
+  v.training_runs, v.lowest_vaf, v.greatest_mse, v.greatest_bias, v.preset,
+  v.software, v.period_s, v.flow_unit, v.active
+FROM model_summary v JOIN model_set m ON m.name = v.model_set
+  AND m.version = v.version
+
+-- ---- PostgreSQL.
+-- name: encoding
+SELECT current_setting('server_encoding')
+-- The schema may not be there: the table is looked up first.
+-- name: is_there
+SELECT EXISTS (SELECT FROM pg_namespace n JOIN pg_class c
+  ON c.relnamespace = n.oid WHERE nspname = 'fdi' AND relname = 'plant')
+-- name: plant
+SELECT plant_id, version FROM fdi.plant
+-- name: set_version
+INSERT INTO fdi.plant (version) VALUES ($1)
+ON CONFLICT (one) DO UPDATE SET version = EXCLUDED.version
+-- name: announce_monitor
+INSERT INTO fdi.monitor (history_id, host, monitor) VALUES ($1, $2, $3)
+ON CONFLICT (history_id) DO UPDATE
+SET host = EXCLUDED.host, monitor = EXCLUDED.monitor
+RETURNING monitor_id
+-- name: lock_monitor
+SELECT shipped_ns FROM fdi.monitor WHERE monitor_id = $1 FOR UPDATE
+-- name: set_shipped
+UPDATE fdi.monitor SET shipped_ns = $2 WHERE monitor_id = $1
+
+-- ---- Retention, by the rules of history.db. $1: what ended before.
+-- name: protected_in_plant
+SELECT count(*) FROM fdi.episode
+WHERE ended_ns IS NULL OR acked_by IS NULL OR label IS NOT NULL
+-- name: old_in_plant
+SELECT count(*), min(detected_ns), max(detected_ns) FROM fdi.episode
+WHERE ended_ns < $1 AND acked_by IS NOT NULL AND label IS NULL
+-- name: prune_plant
+WITH gone AS (
+  DELETE FROM fdi.episode WHERE (episode_id, monitor_id) IN (
+    SELECT episode_id, monitor_id FROM fdi.episode
+    WHERE ended_ns < $1 AND acked_by IS NOT NULL AND label IS NULL
+      AND fdi.utc(detected_ns) <= fdi.utc($1)
+    ORDER BY fdi.utc(detected_ns) LIMIT 5000)
+  RETURNING episode_id AS e, monitor_id AS m),
+f AS (DELETE FROM fdi.episode_fault USING gone
+      WHERE (episode_id, monitor_id) = (e, m)),
+v AS (DELETE FROM fdi.episode_event USING gone
+      WHERE (episode_id, monitor_id) = (e, m)),
+t AS (DELETE FROM fdi.episode_trace USING gone
+      WHERE (episode_id, monitor_id) = (e, m)),
+l AS (DELETE FROM fdi.episode_look USING gone
+      WHERE (episode_id, monitor_id) = (e, m)),
+lf AS (DELETE FROM fdi.episode_look_fault USING gone
+       WHERE (episode_id, monitor_id) = (e, m)),
+lr AS (DELETE FROM fdi.episode_look_row USING gone
+       WHERE (episode_id, monitor_id) = (e, m))
+SELECT count(*) FROM gone
+-- name: old_health_in_plant
+SELECT count(*), min(hour) * 3600000000000, max(hour) * 3600000000000
+FROM fdi.health_hour WHERE hour < $1::bigint / 3600000000000
+-- name: prune_health_in_plant
+DELETE FROM fdi.health_hour WHERE hour < $1::bigint / 3600000000000
+
+-- ---- The plant's history as fdi-store history shows it, with the schema fdi
+-- ---- in the search path. Parameters: $1 valve, $2 since, $3 until, $4 fault,
+-- ---- $5 now, $6 monitor; all of them occur in each statement. {episodes} is
+-- ---- the condition of the filter, {columns} are those of the record.
+-- name: plant_list
+SELECT * FROM (
+  SELECT e.episode_id, e.valve_id, rfc3339(e.detected_ns) AS detected_utc,
+    rfc3339(e.isolated_ns), rfc3339(e.cleared_ns), e.fault, e.peak_factor,
+    e.model_set, e.end_reason, e.label, e.acked_by, e.source_id, e.model_hash,
+    e.detected_ns, e.isolated_ns, e.cleared_ns, e.ended_ns, e.acked_ns,
+    (SELECT max(last_ns) FROM episode_trace t
+     WHERE (t.episode_id, t.monitor_id) = (e.episode_id, e.monitor_id)),
+    e.session_id, e.fault_bits, e.strength, e.unknown_kind, e.layer,
+    e.flow_unit, e.channels, e.faults, e.host, e.monitor
+  FROM episode e
+  WHERE {episodes}
+  ORDER BY utc(e.detected_ns) DESC, e.valve_id DESC LIMIT {limit}) l
+ORDER BY detected_ns, valve_id, host, monitor
+-- name: plant_statistics
+SELECT e.valve_id, coalesce(e.fault, ''), count(*),
+  count(*) FILTER (WHERE e.ended_ns IS NULL),
+  count(*) FILTER (WHERE e.acked_by IS NULL),
+  count(*) FILTER (WHERE e.label = 'true' OR strpos(
+    '|' || coalesce(e.fault, '') || '|', '|' || e.label || '|') > 0),
+  count(*) FILTER (WHERE NOT (e.label = 'true' OR strpos(
+    '|' || coalesce(e.fault, '') || '|', '|' || e.label || '|') > 0)),
+  avg((e.isolated_ns - e.detected_ns) * 1e-9::float8),
+  avg((e.ended_ns - e.detected_ns) * 1e-9::float8), max(e.peak_factor),
+  max(e.detected_ns)
+FROM episode e
+WHERE {episodes} GROUP BY e.valve_id, e.fault ORDER BY e.valve_id, e.fault
+-- The time is that of the spans, not of their detection.
+-- name: plant_spans
+SELECT e.valve_id, coalesce(e.fault, ''), e.detected_ns, e.ended_ns, e.label,
+  CASE WHEN e.ended_ns IS NULL THEN (
+    SELECT max(last_ns) FROM episode_trace t
+    WHERE (t.episode_id, t.monitor_id) = (e.episode_id, e.monitor_id)) END
+FROM episode e
+WHERE {episodes} AND (e.ended_ns IS NULL OR e.ended_ns >= {since})
+ORDER BY e.detected_ns, e.valve_id
+-- name: plant_gaps
+SELECT {columns} FROM data_gap JOIN monitor m USING (monitor_id)
+WHERE (valve_id IS NULL OR $1 = '*' OR valve_id ~ $1)
+  AND to_ns >= $2 AND from_ns < $3 AND ($4 = '' OR true)
+  AND $5::bigint IS NOT NULL AND ($6 = '' OR m.monitor = $6)
+ORDER BY from_ns, valve_id
+-- name: plant_coverage
+SELECT valve_id, quality, sum(samples)::bigint, sum(seconds) / 3600
+FROM coverage_day JOIN monitor m USING (monitor_id)
+WHERE ($1 = '*' OR valve_id ~ $1)
+  AND day >= $2::bigint / 86400000000000
+  AND day <= $3::bigint / 86400000000000 AND ($4 = '' OR true)
+  AND $5::bigint IS NOT NULL AND ($6 = '' OR m.monitor = $6)
+GROUP BY valve_id, quality ORDER BY valve_id, sum(seconds) DESC
+-- name: plant_newest
+SELECT episode_id FROM episode WHERE $1 = '' OR monitor = $1
+ORDER BY utc(detected_ns) DESC LIMIT 1
+-- name: plant_by_prefix
+SELECT DISTINCT episode_id FROM episode
+WHERE episode_id >= $1 AND episode_id < $1 || 'g'
+  AND ($2 = '' OR monitor = $2) LIMIT 2
+-- Of one episode: $1 is its id, $2 the monitor.
+-- name: of_episode
+episode_id = $1 AND monitor_id = (
+  SELECT monitor_id FROM episode
+  WHERE episode_id = $1 AND ($2 = '' OR monitor = $2)
+  ORDER BY host, monitor, monitor_id LIMIT 1)
+-- name: plant_instants
+SELECT coalesce(sum(instants), 0)::bigint FROM episode_trace WHERE
+-- name: plant_look
+SELECT first_ns, period_ns, misfit FROM episode_look WHERE
+-- name: plant_look_faults
+SELECT fault, strength, lowest, highest, begins_ns, growing
+FROM episode_look_fault WHERE

@@ -1,0 +1,557 @@
+// fdi-store ship against a real server: what is there is what is here, whoever
+// was killed in between.
+#include <chrono>
+#include <random>
+#include <regex>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "storage/history/retention.h"
+#include "tests/storage/many_episodes.h"
+#include "tests/survival/plant_fixture.h"
+
+namespace fdi::storage {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+int Setting(const char* name, int otherwise) {
+  const char* text = std::getenv(name);
+  return text == nullptr ? otherwise : std::atoi(text);
+}
+
+class ShipTest : public PlantFixture {
+ protected:
+  std::vector<std::string> ShipCommand(const std::string& folder,
+                                       const std::string& every) const {
+    return {"ship",        "--data",  (directory_.path() / folder).string(),
+            "--to",        Url(),     "--monitor",
+            folder,        "--every", every,
+            "--log-level", "info"};
+  }
+  std::filesystem::path Log() const { return directory_.path() / "log"; }
+  std::ptrdiff_t Count(const std::string& event) const {
+    const std::string log = Slurp(Log());
+    const std::regex word(event);
+    return std::distance(std::sregex_iterator(log.begin(), log.end(), word),
+                         std::sregex_iterator());
+  }
+  template <typename Condition>
+  static void WaitUntil(Condition holds) {
+    const auto end = Clock::now() + std::chrono::seconds(30);
+    while (!holds()) {
+      ASSERT_LT(Clock::now(), end);
+      std::this_thread::sleep_for(milliseconds(10));
+    }
+  }
+  static CoverageDay Coverage(std::uint64_t live) {
+    CoverageDay day;
+    day.valve_id = "V1";
+    day.day = kDetected / 86'400'000'000'000;
+    day.samples.Add(Quality::kLive, live);
+    return day;
+  }
+  std::int64_t LoggedChanges(const std::string& folder,
+                             const std::string& figure = "count(*)") const {
+    return Database(directory_.path() / folder / "history.db", HistorySchema(),
+                    Access::kReader)
+        .QueryInt64("SELECT " + figure + " FROM change")
+        .value_or(0);
+  }
+  static void Stop(pid_t program) {
+    kill(program, SIGTERM);
+    waitpid(program, nullptr, 0);
+  }
+};
+
+// Every kind of change after the episode was shipped: what is there follows.
+TEST_F(ShipTest, WhatChangesIsShippedAgain) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  HistoryWriter writer(path);
+  writer.BeginSession(kDetected, "test", "");
+  std::int64_t last = 0;
+  const auto follow = [&](const char* what) {
+    const std::int64_t before = last;
+    last = LoggedChanges("a", "max(number)");
+    EXPECT_GT(last, before) << what;
+    const Outcome outcome = Ship("a");
+    ASSERT_EQ(outcome.code, 0) << what << ": " << outcome.err;
+    SCOPED_TRACE(what);
+    ExpectEqual("a");
+    EXPECT_LE(LoggedChanges("a"), 1) << "the last one stays";
+  };
+  ASSERT_EQ(Ship("a").code, 0);
+
+  using Kind = TransitionKind;
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected);
+  follow("detected");
+  std::vector<TracePoint> points;
+  for (int k = 0; k < 400; ++k) {
+    points.push_back(Instant(k));
+  }
+  writer.AppendTrace(Id(), std::span(points).first(250));
+  writer.Commit(kDetected + kSecond);
+  follow("evidence");
+  writer.AppendTrace(Id(), std::span(points).subspan(250));
+  writer.Commit(kDetected + 2 * kSecond);
+  follow("more of the same chunk, and another");
+  writer.Record(Event(Kind::kIsolated, 20, 0b01, 0.8), kDetected);
+  follow("isolated");
+  writer.Record(Event(Kind::kReisolated, 30, 0b10, 0.9), kDetected);
+  follow("isolated as another");
+  writer.Record(Event(Kind::kReisolated, 35, 0, 0.9, EndReason::kNone, "LV-1"),
+                kDetected);
+  follow("isolated as unknown");
+  writer.Resume(Id(), kDetected + 40 * kSecond, kDetected);
+  follow("resumed");
+  EpisodeLook look;
+  look.episode_id = Id();
+  look.first_ns = kDetected;
+  look.period_ns = kSecond;
+  look.faults = {{1, 0.5, 0.4, 0.6, kDetected, false},
+                 {7, 0.2, 0.1, 0.3, kDetected, true}};
+  look.x_pct = {1.0, 2.0};
+  look.flow = {3.0, 4.0};
+  writer.StoreLook(look);
+  follow("a second look");
+  look.faults.pop_back();
+  look.x_pct = {5.0};
+  look.flow = {6.0};
+  writer.StoreLook(look);
+  follow("a shorter one instead");
+  writer.Record(Event(Kind::kCleared, 90, 0b10, 0.1), kDetected);
+  follow("cleared");
+  writer.Record(Event(Kind::kClosed, 91, 0b10, 0.1, EndReason::kCleared),
+                kDetected);
+  follow("closed");
+  writer.Record(Event(Kind::kDetected, 0, 0, 0.3, EndReason::kNone, "lost"),
+                kDetected);
+  writer.Record(End(Id("lost"), kDetected + kSecond), kDetected);
+  follow("ended by the next session");
+  Checkpoint minute;
+  minute.coverage.push_back(Coverage(60));
+  minute.health.emplace_back();
+  minute.health.back().valve_id = "V1";
+  minute.health.back().hour = kDetected / 3'600'000'000'000;
+  minute.health.back().live_ms = 60'000;
+  writer.CommitCheckpoint(minute);
+  follow("hours");
+  writer.CommitCheckpoint(minute);
+  follow("more of the same hours");
+  writer.AddGap({"V1", kDetected, kDetected + kSecond, "test"});
+  writer.Commit(kDetected + 20 * kSecond);
+  follow("a gap, a sign of life");
+  const auto shelf = HistoryEditor(path).Shelve(
+      "V1", std::nullopt, kDetected + 3600 * kSecond, By("anna", kDetected));
+  follow("shelved");
+  HistoryEditor(path).EndShelf(shelf.shelf_id, By("anna", kDetected + kSecond));
+  follow("taken off the shelf");
+  writer.EndSession(kDetected + 30 * kSecond, true);
+  follow("the session ended");
+  writer.BeginSession(kDetected + 40 * kSecond, "test", "");
+  follow("another one");
+  {
+    HistoryEditor editor(path);
+    const std::string id = EpisodeIdText(Id());
+    editor.Label(id, "f7", By("anna", kDetected));
+    follow("labelled");
+    editor.Acknowledge(id, By("anna", kDetected, "Tell the shift"));
+    follow("acknowledged with a comment");
+    OperatorAction action;
+    action.kind = OperatorActionKind::kLabel;
+    action.episode_id = Id();
+    action.value = "f1";
+    action.stamp_ns = kDetected + 2;
+    action.who = "carl";
+    action.origin = "test";
+    editor.Adopt(action);
+    follow("labelled at the other one of a pair");
+    action.kind = OperatorActionKind::kShelve;
+    action.valve_id = "V2";
+    action.until_ns = kDetected + 3600 * kSecond;
+    editor.Adopt(action);
+    follow("shelved there");
+    action.ended_ns = kDetected + kSecond;
+    action.ended_by = "carl";
+    action.ended_origin = "test";
+    editor.Adopt(action);
+    follow("taken off the shelf there");
+    editor.Acknowledge(id, By("bert", kDetected + 1,
+                              "Gr\xfc\xdf"
+                              "e"));
+  }
+  ASSERT_EQ(Ship("a").code, 0);
+  EXPECT_EQ(PlantRowsOf("SELECT comment FROM fdi.episode_event "
+                        "WHERE kind = 'ACK' ORDER BY stamp_ns"),
+            (std::vector<std::string>{"|Tell the shift", "|Gr??e"}));
+}
+
+// The log of changes costs nothing where it serves nobody.
+TEST_F(ShipTest, ChangesAreLoggedForPlantsAlone) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  HistoryWriter writer(path);
+  RecordEpisode(writer, 0b01);
+  EXPECT_EQ(LoggedChanges("a"), 0);
+  ASSERT_EQ(Ship("a").code, 0);
+  EXPECT_EQ(LoggedChanges("a"), 0) << "copied, not logged";
+  RecordEpisode(writer, 0b10, "LV-2");
+  EXPECT_EQ(LoggedChanges("a"), 4) << "one for each event";
+
+  // A second plant gets a copy of all, the first one what changed since.
+  const std::string first = database_;
+  server_->Create("second");
+  database_ = "second";
+  Init();
+  ASSERT_EQ(Ship("a").code, 0);
+  ExpectEqual("a");
+  EXPECT_EQ(LoggedChanges("a"), 4) << "the first one does not have them";
+  database_ = first;
+  ASSERT_EQ(Ship("a").code, 0);
+  ExpectEqual("a");
+  EXPECT_EQ(LoggedChanges("a"), 1) << "both have them";
+
+  // The plant is away for 11 000 minutes.
+  server_->Stop();
+  Checkpoint minutes;
+  minutes.coverage.assign(11'000, Coverage(60));
+  writer.CommitCheckpoint(minutes);
+  EXPECT_EQ(LoggedChanges("a"), 11'001);
+  EXPECT_EQ(Ship("a").code, 3);
+  EXPECT_EQ(LoggedChanges("a"), 2) << "the last of each";
+  server_->Start();
+  ASSERT_EQ(Ship("a").code, 0);
+  ExpectEqual("a");
+
+  RecordEpisode(writer, 0b10, "LV-3");
+  ASSERT_EQ(Store("ship --forget --data " + Folder("a").string()).code, 0);
+  EXPECT_EQ(LoggedChanges("a"), 0);
+  RecordEpisode(writer, 0b10, "LV-4");
+  EXPECT_EQ(LoggedChanges("a"), 0);
+  ASSERT_EQ(Ship("a").code, 0);
+  ExpectEqual("a");
+}
+
+// What an earlier version recorded; a chunk of evidence, a look, hours, gaps
+// and shelves of all ages are among it.
+TEST_F(ShipTest, AHistoryOfVersion8IsShipped) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  Schema old = HistorySchema();
+  old.migrations.resize(8);
+  GenerateEpisodes(path, 2500, "aaaa", 600, old);
+  {
+    Database database(path, old, Access::kWriter);
+    Transaction transaction(database);
+    for (const char* sql :
+         {"INSERT INTO episode_trace SELECT episode_id, 1, first_ns, last_ns, "
+          "instants, 1, 0, samples, 0, vectors FROM episode_trace LIMIT 50",
+          "INSERT INTO episode_look SELECT episode_id, 1, 2, 3.0 FROM episode",
+          "INSERT INTO episode_look_row SELECT episode_id, 0, 1.0, 2.0 "
+          "FROM episode",
+          "INSERT INTO coverage_day SELECT DISTINCT valve_id, 1, 'LIVE', 2, "
+          "3.0 FROM episode WHERE valve_id < 'V0020'",
+          "INSERT INTO health_hour SELECT DISTINCT valve_id, 25, 1, 0, 2, "
+          "x'03' FROM episode WHERE valve_id BETWEEN 'V0010' AND 'V0030'",
+          "INSERT INTO data_gap VALUES (7, NULL, 1, 2, 'test', NULL)",
+          "INSERT INTO monitor_session VALUES (5, 1, 2, 3, 1, 'old', '')"}) {
+      database.Run(sql);
+    }
+    transaction.Commit();
+  }
+  ASSERT_EQ(Ship("a").code, 0);
+  ExpectEqual("a");
+  EXPECT_TRUE(std::filesystem::exists(path.string() + ".v8.backup"));
+}
+
+// Of two histories into one plant, of which one is written meanwhile, with
+// kill -9 of the server and of the programs at random moments; again, and
+// nothing is new.
+TEST_F(ShipTest, NothingIsLostOrTwiceWhoeverIsKilled) {
+  Init();
+  const int episodes = Setting("FDI_SHIP_EPISODES", 3000);
+  const int kills = Setting("FDI_SHIP_KILLS", 3);
+  GenerateEpisodes(Folder("a") / "history.db", episodes / 2, "aaaa");
+  GenerateEpisodes(Folder("b") / "history.db", episodes - episodes / 2, "bbbb");
+  std::mt19937 random(static_cast<unsigned>(Setting("FDI_KILL_SEED", 1)));
+  const auto some = [&random](int most_ms) {
+    std::this_thread::sleep_for(
+        milliseconds(std::uniform_int_distribution<int>(0, most_ms)(random)));
+  };
+  pid_t a = Spawn(ShipCommand("a", "50ms"), Log());
+  const pid_t b = Spawn(ShipCommand("b", "50ms"), Log());
+  HistoryWriter writer(Folder("a") / "history.db");
+  for (int i = 0; i < kills; ++i) {
+    some(300);
+    RecordEpisode(writer, 0b01, "LV-" + std::to_string(i));
+    some(300);
+    if (i % 2 == 0) {
+      server_->Crash();
+    }
+    kill(a, SIGKILL);
+    waitpid(a, nullptr, 0);
+    some(200);
+    a = Spawn(ShipCommand("a", "50ms"), Log());
+    if (i % 2 == 0) {
+      server_->Start();
+    }
+  }
+  kill(a, SIGKILL);
+  kill(b, SIGKILL);
+  waitpid(a, nullptr, 0);
+  waitpid(b, nullptr, 0);
+
+  for (const char* folder : {"a", "b"}) {
+    const Outcome outcome = Ship(folder);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_THAT(Ship(folder).out, HasSubstr("nothing was new"));
+    ExpectEqual(folder);
+  }
+  EXPECT_EQ(PlantRowsOf("SELECT count(*) FROM fdi.fault_history"),
+            std::vector{"|" + std::to_string(episodes + kills)});
+}
+
+// Two transactions of each side: what PostgreSQL does meanwhile is its own
+// affair.
+TEST_F(ShipTest, TheMonitorDoesNotWaitForPostgres) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  HistoryWriter writer(path);
+  RecordEpisode(writer, 0b01);
+  ASSERT_EQ(Ship("a").code, 0);
+  PlantDatabase blocker(Url());
+  blocker.Run("BEGIN");
+  blocker.Run("LOCK fdi.episode IN ACCESS EXCLUSIVE MODE");
+  RecordEpisode(writer, 0b10, "LV-2");
+  const pid_t shipper = Spawn(ShipCommand("a", "1h"), Log());
+  WaitUntil([&] {
+    return PlantRowsOf("SELECT count(*) FROM pg_locks WHERE NOT granted") !=
+           std::vector<std::string>{"|0"};
+  });
+
+  const auto start = Clock::now();
+  RecordEpisode(writer, 0b10, "LV-3");
+  EXPECT_TRUE(writer.database().Checkpoint());
+  EXPECT_LT(Clock::now() - start, milliseconds(1000));
+
+  blocker.Run("COMMIT");
+  WaitUntil([&] {
+    return PlantRowsOf("SELECT count(*) FROM fdi.episode").front() == "|3";
+  });
+  Stop(shipper);
+  ExpectEqual("a");
+}
+
+// Each reason once, and then it goes on where it was.
+TEST_F(ShipTest, WhatIsWrongIsSaidOnce) {
+  Init();
+  HistoryWriter writer(Folder("a") / "history.db");
+  const pid_t shipper = Spawn(ShipCommand("a", "20ms"), Log());
+  RecordEpisode(writer, 0b01);
+  WaitUntil([&] {
+    return PlantRowsOf("SELECT count(*) FROM fdi.episode").front() == "|1";
+  });
+  server_->Stop();
+  RecordEpisode(writer, 0b10, "LV-2");
+  WaitUntil([&] { return Count("ship_failed") > 0; });
+  std::this_thread::sleep_for(milliseconds(1000));
+  // It loses its connection, may be told of the shutdown, and then gets none;
+  // meanwhile it tries after 20, 40, ... ms.
+  EXPECT_LE(Count("ship_failed"), 3) << Slurp(Log());
+  server_->Start();
+  WaitUntil([&] { return Count("ship_goes_on") == 1; });
+  Stop(shipper);
+  ExpectEqual("a");
+}
+
+TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
+  HistoryWriter writer(Folder("a") / "history.db");
+  RecordEpisode(writer, 0b01);
+  const auto refused = [&](const Outcome& outcome, const std::string& reason) {
+    EXPECT_EQ(outcome.code, 3);
+    EXPECT_THAT(outcome.err, HasSubstr(reason));
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1);
+  };
+  refused(Ship("a"), "has no schema fdi: run `fdi-store ship --init");
+  Init();
+  Init();  // Again: nothing happens.
+  PlantDatabase owner(Url());
+  owner.RunScript(
+      "CREATE ROLE nobody LOGIN; CREATE ROLE room LOGIN IN ROLE fdi_writer;"
+      "CREATE ROLE screen LOGIN IN ROLE fdi_reader");
+  refused(Ship("a", "", "nobody"), "permission denied for schema fdi");
+  refused(Ship("a", "", "screen"), "permission denied for table monitor");
+  server_->Create("empty");
+  refused(Store("ship --init --to '" + server_->Url("empty", "room") + "'"),
+          "permission denied for database empty");
+  EXPECT_EQ(Ship("a", "", "room").code, 0);
+  refused(Ship("a", "--prune --history-age 1s", "room"),
+          "permission denied for table episode");
+  owner.Run("UPDATE fdi.plant SET version = version + 1");
+  refused(Ship("a"),
+          "schema fdi has version 2, this program needs 1: update "
+          "this program");
+  refused(Store("ship --data " + Folder("a").string() +
+                " --to 'postgresql://x:secret@/plant?host=/nowhere'"),
+          "No such file or directory");
+  EXPECT_THAT(Store("ship --data " + Folder("a").string() +
+                    " --to 'postgresql://x:secret@[/plant'")
+                  .err,
+              testing::Not(HasSubstr("secret")));
+}
+
+// PostgreSQL was restored from a backup; history.db was; the history is new.
+TEST_F(ShipTest, BothSidesMayComeFromABackup) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  PlantDatabase owner(Url());
+  {
+    HistoryWriter writer(path);
+    RecordEpisode(writer, 0b01);
+  }
+  ASSERT_EQ(Ship("a").code, 0);
+  owner.Run("DELETE FROM fdi.episode");
+  owner.Run("UPDATE fdi.monitor SET shipped_ns = 1");
+  ASSERT_EQ(Ship("a").code, 0);
+  ExpectEqual("a");
+
+  const auto backup = Folder("backup") / "history.db";
+  Database(path, HistorySchema(), Access::kReader).BackupTo(backup);
+  {
+    HistoryWriter writer(path);
+    RecordEpisode(writer, 0b01, "LV-2");
+  }
+  ASSERT_EQ(Ship("a").code, 0);
+  std::filesystem::copy_file(backup, path,
+                             std::filesystem::copy_options::overwrite_existing);
+  {
+    HistoryWriter writer(path);
+    RecordEpisode(writer, 0b10, "LV-3");
+  }
+  ASSERT_EQ(Ship("a").code, 0);
+  EXPECT_EQ(PlantRowsOf("SELECT valve_id FROM fdi.episode ORDER BY 1"),
+            (std::vector<std::string>{"|LV-1", "|LV-2", "|LV-3"}));
+}
+
+// The rules of fdi-store prune; here it waits for the plant.
+TEST_F(ShipTest, RetentionOfBothSides) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  {
+    HistoryWriter writer(path);
+    for (const char* valve : {"old", "unacked", "labelled"}) {
+      RecordEpisode(writer, 0b01, valve);
+    }
+    writer.Record(
+        Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, "open"),
+        kDetected);
+    for (const FaultEvent& event : writer.UnsentEvents()) {
+      writer.MarkSent(event);
+    }
+    writer.Commit(kDetected);
+    HistoryEditor editor(path);
+    for (const char* valve : {"old", "labelled", "open"}) {
+      editor.Acknowledge(EpisodeIdText(Id(valve)), By("anna", kDetected));
+    }
+    editor.Label(EpisodeIdText(Id("labelled")), "true", By("anna", kDetected));
+  }
+  RetentionLimits limits;
+  limits.before_ns = kDetected + 86400 * kSecond;
+  limits.dry_run = true;
+  const auto deleted = [&] { return PruneHistory(path, limits).deleted; };
+  EXPECT_EQ(deleted(), 1);
+  ASSERT_EQ(Ship("a").code, 0);
+  EXPECT_EQ(deleted(), 1);
+  HistoryEditor(path).Acknowledge(EpisodeIdText(Id("old")),
+                                  By("bert", kDetected + 1));
+  EXPECT_EQ(deleted(), 0) << "the plant does not have the second note";
+  ASSERT_EQ(Ship("a").code, 0);
+  EXPECT_EQ(deleted(), 1);
+  {
+    Database history(path, HistorySchema(), Access::kOccasionalWriter);
+    Transaction transaction(history);
+    history.Run("UPDATE ship_cursor SET copied_ns = ?, copied_valve = ''",
+                kDetected - 1);
+    transaction.Commit();
+  }
+  EXPECT_EQ(deleted(), 0) << "the plant does not have the first copy";
+  ASSERT_EQ(Store("ship --forget --data " + Folder("a").string()).code, 0);
+  limits.dry_run = false;
+  EXPECT_EQ(deleted(), 1);
+  ASSERT_EQ(Ship("a").code, 0);  // What went here stays there.
+
+  PlantDatabase plant(Url());
+  const auto there = [&](std::int64_t before_ns, bool dry_run = false) {
+    const PlantPruned pruned = PrunePlantEpisodes(plant, before_ns, dry_run);
+    return std::pair(pruned.deleted, pruned.kept);
+  };
+  const Outcome verb =
+      Store("ship --prune --history-age 36000d --to '" + Url() + "' --json");
+  EXPECT_THAT(verb.out, AllOf(HasSubstr("\"deleted\": 0"),
+                              HasSubstr("\"protected\": 3")));
+  using Pair = std::pair<std::int64_t, std::int64_t>;
+  EXPECT_EQ(there(kDetected + 60 * kSecond), Pair(0, 3));
+  EXPECT_EQ(there(*limits.before_ns, true), Pair(1, 3));
+  EXPECT_EQ(there(*limits.before_ns), Pair(1, 3));
+  EXPECT_EQ(there(*limits.before_ns), Pair(0, 3));
+  for (const char* table : {"episode", "episode_fault", "episode_event"}) {
+    EXPECT_EQ(
+        PlantRowsOf(std::string("SELECT count(*) FROM fdi.") + table +
+                    " WHERE episode_id = '" + EpisodeIdText(Id("old")) + "'"),
+        std::vector<std::string>{"|0"});
+  }
+}
+
+// Each query of the dashboard, with Grafana's macros written out.
+TEST_F(ShipTest, TheDashboardsQueriesRun) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  GenerateEpisodes(path, 100, "aaaa");
+  {
+    HistoryWriter writer(path);
+    writer.BeginSession(kDetected, "test", "");
+    Checkpoint checkpoint;
+    checkpoint.coverage.push_back(Coverage(3600));
+    writer.CommitCheckpoint(checkpoint);
+  }
+  ASSERT_EQ(Ship("a").code, 0);
+  const auto dashboard = nlohmann::json::parse(Slurp(FDI_DASHBOARD));
+  std::vector<std::string> queries;
+  for (const auto& panel : dashboard["panels"]) {
+    for (const auto& target : panel["targets"]) {
+      queries.push_back(target["rawSql"]);
+    }
+  }
+  for (const auto& variable : dashboard["templating"]["list"]) {
+    queries.push_back(variable["query"]);
+  }
+  ASSERT_GT(queries.size(), 9U);
+  const std::vector<std::pair<std::regex, std::string>> macros = {
+      {std::regex(R"(\$__timeGroupAlias\((\w+), '1h'\))"),
+       "floor(extract(epoch from $1) / 3600) * 3600 AS \"time\""},
+      {std::regex(R"(\$__timeFilter\((\w+)\))"),
+       "$1 BETWEEN '2020-01-01T00:00:00Z' AND '2030-01-01T00:00:00Z'"},
+      {std::regex(R"(\$__timeFrom\(\))"), "'2020-01-01T00:00:00Z'"},
+      {std::regex(R"(\$__timeTo\(\))"), "'2030-01-01T00:00:00Z'"},
+      {std::regex(R"(\$monitor)"), "'a','b'"}};
+  for (std::string query : queries) {
+    for (const auto& [macro, text] : macros) {
+      query = std::regex_replace(query, macro, text);
+    }
+    EXPECT_EQ(query.find('$'), std::string::npos) << query;
+    if (query.find("model_summary") == std::string::npos) {
+      EXPECT_FALSE(PlantRowsOf(query).empty()) << query;
+    } else {
+      PlantRowsOf(query);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace fdi::storage
