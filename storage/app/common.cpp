@@ -29,6 +29,12 @@ void EpisodeOptions::AddTo(CLI::App& verb) {
   AddLimit(verb, limit);
 }
 
+void PlantOptions::AddTo(CLI::App& verb) {
+  verb.add_option("--from", url,
+                  "Of the plant's history: postgresql://user@host/database");
+  verb.add_option("--monitor", monitor, "There: of this monitor alone");
+}
+
 EpisodeFilter EpisodeOptions::Filter(const Context& context) const {
   if (!fault.empty() && fault != "unknown" && !ParseFinding(fault)) {
     throw ConfigError("--fault: unknown fault '" + fault + "'" +

@@ -96,8 +96,14 @@ void AddDays(const std::vector<DayAlarms>& days, Report& report) {
   }
 }
 
-Report Statistics(const EpisodeOptions& options, const Context& context) {
-  HistoryReader reader(DataOf(context).history());
+struct StatisticsOptions {
+  EpisodeOptions filter;
+  PlantOptions plant;
+};
+
+template <typename Reader>
+Report StatisticsOf(Reader& reader, const EpisodeOptions& options,
+                    const Context& context) {
   const EpisodeFilter filter = options.Filter(context);
   const AlarmStatistics alarms = reader.AlarmFigures(filter, filter.now_ns);
   const std::vector<DataGap> gaps = reader.Gaps(filter);
@@ -153,6 +159,12 @@ Report Statistics(const EpisodeOptions& options, const Context& context) {
                      std::to_string(alarms.most_in_flood_window) +
                      " episodes in 10 minutes\n" + std::to_string(gaps.size()) +
                      " data gaps, " + SecondsText(gaps_s) + " in all");
+}
+
+Report Statistics(const StatisticsOptions& options, const Context& context) {
+  return ReadHistory(options.plant, context, [&](auto& reader) {
+    return StatisticsOf(reader, options.filter, context);
+  });
 }
 
 struct CausesOptions {
@@ -292,12 +304,13 @@ Report Shadow(const ShadowOptions& options, const Context& context) {
 }  // namespace
 
 void AddHistoryFigures(cli::Program& program, CLI::App& group) {
-  auto [stats, filter] = AddVerb(
+  auto [stats, options] = AddVerb(
       program, group, "stats",
       "Count episodes by valve, fault and day; chattering: 3 or more of a "
       "valve within 30 min; standing: longer than 24 h",
       Statistics);
-  filter.AddTo(stats);
+  options.filter.AddTo(stats);
+  options.plant.AddTo(stats);
 
   auto [causes, cause] =
       AddVerb(program, group, "causes",

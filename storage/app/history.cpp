@@ -61,12 +61,32 @@ EpisodeTexts TextsOf(const std::vector<Alarm>& alarms, const Context& context) {
   return texts;
 }
 
-Report List(const EpisodeOptions& options, const Context& context) {
-  HistoryReader reader(DataOf(context).history());
+// Of an episode, or of one in the plant's history.
+Json ListedJson(const Episode& e) {
+  Json row = EpisodeJson(e);
+  if (!e.monitor.empty()) {
+    row.update({{"host", e.host}, {"monitor", e.monitor}});
+  }
+  return row;
+}
+
+struct ListOptions {
+  EpisodeOptions filter;
+  PlantOptions plant;
+};
+
+template <typename Reader>
+Report ListOf(Reader& reader, const EpisodeOptions& options,
+              const Context& context) {
   auto episodes = reader.List(options.Filter(context));
   Report report;
-  report.document["episodes"] = Rows(episodes, EpisodeJson);
-  report.Csv("episodes", EpisodeKeys());
+  report.document["episodes"] = Rows(episodes, ListedJson);
+  std::vector<std::string> keys = EpisodeKeys();
+  const bool of_plant = std::is_same_v<Reader, PlantReader>;
+  if (of_plant) {
+    keys.insert(keys.end(), {"host", "monitor"});
+  }
+  report.Csv("episodes", keys);
   const auto texts = std::make_shared<const EpisodeTexts>(
       TextsOf(reader.Alarms(std::move(episodes), cli::NowNs()), context));
   const auto of = [texts](const Json& row) -> const EpisodeText& {
@@ -80,28 +100,37 @@ Report List(const EpisodeOptions& options, const Context& context) {
     return row["end_reason"].is_null() ? "open"
                                        : row["end_reason"].get<std::string>();
   };
-  return report.Table(
-      "episodes",
-      {{"episode", "episode_id"},
-       {"valve", "valve_id"},
-       {"detected", "detected_utc", Format::kTime},
-       alarm,
-       {"fault", "fault"},
-       TextColumn(
-           "which is", [of](const Json& row) { return of(row).fault_name; }, 2),
-       {"peak [-]", "peak_factor", Format::kPlain, 3, 4},
-       TextColumn(
-           "isolated after",
-           [of](const Json& row) { return of(row).isolated_after; }, 5,
-           Align::kRight),
-       TextColumn(
-           "lasted", [of](const Json& row) { return of(row).lasted; }, 3,
-           Align::kRight),
-       TextColumn("end", end, 1),
-       {"label", "label", Format::kPlain, 0, 6},
-       {"acked by", "acked_by", Format::kPlain, 0, 7},
-       {"model set", "model_set", Format::kPlain, 0, 8}},
-      "no episode matches");
+  std::vector<Column> columns = {
+      {"episode", "episode_id"},
+      {"valve", "valve_id"},
+      {"detected", "detected_utc", Format::kTime},
+      alarm,
+      {"fault", "fault"},
+      TextColumn(
+          "which is", [of](const Json& row) { return of(row).fault_name; }, 2),
+      {"peak [-]", "peak_factor", Format::kPlain, 3, 4},
+      TextColumn(
+          "isolated after",
+          [of](const Json& row) { return of(row).isolated_after; }, 5,
+          Align::kRight),
+      TextColumn(
+          "lasted", [of](const Json& row) { return of(row).lasted; }, 3,
+          Align::kRight),
+      TextColumn("end", end, 1),
+      {"label", "label", Format::kPlain, 0, 6},
+      {"acked by", "acked_by", Format::kPlain, 0, 7},
+      {"model set", "model_set", Format::kPlain, 0, 8}};
+  if (of_plant) {
+    columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
+                                         {"monitor", "monitor"}});
+  }
+  return report.Table("episodes", columns, "no episode matches");
+}
+
+Report List(const ListOptions& options, const Context& context) {
+  return ReadHistory(options.plant, context, [&](auto& reader) {
+    return ListOf(reader, options.filter, context);
+  });
 }
 
 // Transitions have faults and a factor, what people did has a who.
@@ -242,12 +271,24 @@ std::vector<Column> EpisodeFields(const Alarm& alarm, const Context& context) {
       })};
 }
 
-Report Show(const std::string& id, const Context& context) {
-  HistoryReader reader(DataOf(context).history());
+std::size_t Instants(HistoryReader& reader, std::uint64_t id) {
+  return reader.Trace(id).size();
+}
+std::int64_t Instants(PlantReader& reader, std::uint64_t id) {
+  return reader.TraceInstants(id);
+}
+
+struct ShowOptions {
+  std::string id;
+  PlantOptions plant;
+};
+
+template <typename Reader>
+Report ShowOf(Reader& reader, const std::string& id, const Context& context) {
   const Alarm alarm = reader.Alarms({reader.Show(id)}, cli::NowNs()).front();
   const Episode& e = alarm.episode;
   Report report;
-  report.document = EpisodeJson(e);
+  report.document = ListedJson(e);
   report.document.update(
       {{"source_id", Hex(e.source_id)},
        {"model_hash", Hex(e.model_hash)},
@@ -258,11 +299,20 @@ Report Show(const std::string& id, const Context& context) {
        {"acked_utc", TimeJson(e.acked_ns)},
        {"alarm_state", AlarmStateName(alarm.state)},
        {"shelf", alarm.shelf ? ShelfJson(*alarm.shelf) : Json()},
-       {"trace_instants", reader.Trace(e.id).size()}});
+       {"trace_instants", Instants(reader, e.id)}});
+  if (!e.monitor.empty()) {
+    report.Fields("", {TextField("monitor", e.host + "/" + e.monitor)});
+  }
   report.Fields("", EpisodeFields(alarm, context));
   AddEvents(reader.Events(e.id), context, report);
   AddLook(reader.Look(e.id), context, report);
   return report;
+}
+
+Report Show(const ShowOptions& options, const Context& context) {
+  return ReadHistory(options.plant, context, [&](auto& reader) {
+    return ShowOf(reader, options.id, context);
+  });
 }
 
 // Reads back as the same bits; "nan".
@@ -345,7 +395,7 @@ struct ExportOptions {
 int Export(const ExportOptions& options, const Context& context) {
   HistoryReader reader(DataOf(context).history());
   if (options.id.empty()) {
-    const Report report = List(options.filter, context);
+    const Report report = ListOf(reader, options.filter, context);
     cli::WriteOutput(options.output,
                      [&](std::ostream& out) { report.PrintCsv(out); });
   } else {
@@ -390,13 +440,15 @@ void AddHistoryVerbs(cli::Program& program) {
       "history", "Fault episodes: what happened, how sure, who knows of it");
   auto [list, list_options] = AddVerb(
       program, group, "list", "List the episodes, the newest last", List);
-  list_options.AddTo(list);
+  list_options.filter.AddTo(list);
+  list_options.plant.AddTo(list);
   program.AllowCsv(list, "The columns of fault_history as CSV");
 
   auto [show, shown] =
       AddVerb(program, group, "show",
               "Show an episode, what to check, and its events", Show);
-  AddEpisode(show, shown);
+  AddEpisode(show, shown.id);
+  shown.plant.AddTo(show);
   AddHistoryFigures(program, group);
   AddAlarmVerbs(program, group);
 

@@ -20,6 +20,8 @@
 #include "storage/history/alarm.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_editor.h"
+#include "storage/history/history_reader.h"
+#include "storage/plant/plant_reader.h"
 
 /// The verbs of fdi-store, one file per noun. A verb reads what it needs, fills
 /// the document of a Report, and declares which of its members people see.
@@ -87,6 +89,27 @@ struct EpisodeOptions {
   /// @throws ConfigError
   EpisodeFilter Filter(const Context& context) const;
 };
+
+/// --from, --monitor: another history than that of --data.
+struct PlantOptions {
+  std::string url;
+  std::string monitor;
+
+  void AddTo(CLI::App& verb);
+};
+
+/// What `read` makes of the history of --data or of the plant's: it takes a
+/// HistoryReader or a PlantReader.
+template <typename Read>
+Report ReadHistory(const PlantOptions& plant, const Context& context,
+                   Read read) {
+  if (plant.url.empty()) {
+    HistoryReader reader(DataOf(context).history());
+    return read(reader);
+  }
+  PlantReader reader(plant.url, plant.monitor);
+  return read(reader);
+}
 
 /// The options of what people do: --by, --comment.
 struct NoteOptions {

@@ -50,6 +50,8 @@ struct Episode {
   std::optional<std::string> label;
   std::optional<std::string> acked_by;
 
+  std::string host;  ///< Of the monitor; in the plant's history alone.
+  std::string monitor;
   std::uint64_t id{0};
   std::uint64_t source_id{0};
   std::uint64_t model_hash{0};

@@ -106,9 +106,7 @@ std::string NewestIds(const EpisodeFilter& filter) {
            " ORDER BY f.detected_ns DESC, e.valve_id DESC";
   }
   return std::string("SELECT e.episode_id FROM episode e INDEXED BY ") +
-         IndexFor(filter) +
-         " WHERE e.detected_ns >= ?2 AND e.detected_ns < ?3 AND " +
-         valve_and_state + " AND " + std::string(FaultCondition(filter)) +
+         IndexFor(filter) + " WHERE " + ConditionOf(filter).sql +
          " ORDER BY e.detected_ns DESC, e.valve_id DESC";
 }
 
@@ -133,6 +131,13 @@ std::vector<Episode> ReadEpisodes(Statement& rows) {
 }
 
 }  // namespace
+
+EpisodeCondition ConditionOf(const EpisodeFilter& filter) {
+  return {std::string("e.detected_ns >= ?2 AND e.detected_ns < ?3 AND ") +
+              ValveCondition(filter) + StateCondition(filter.state) + " AND " +
+              std::string(FaultCondition(filter)),
+          FaultOf(filter)};
+}
 
 std::string ListQuery(const EpisodeFilter& filter) {
   return std::string(sql::episodes) + " e.episode_id IN (" + NewestIds(filter) +

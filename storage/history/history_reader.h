@@ -75,6 +75,14 @@ class HistoryReader {
 std::vector<AlarmSpan> ReadAlarmSpans(Database& database,
                                       const EpisodeFilter& filter);
 
+/// Which episodes a filter means, as SQL over `episode e` that SQLite and, but
+/// for the signs of parameters and of GLOB, PostgreSQL understand.
+struct EpisodeCondition {
+  std::string sql;    ///< Parameters ?1 valve, ?2 since, ?3 until, ?4, ?5 now.
+  std::string fault;  ///< The value of ?4.
+};
+EpisodeCondition ConditionOf(const EpisodeFilter& filter);
+
 // The queries behind it, whose plans are tested: parameters are ?1 valve,
 // ?2 since, ?3 until, ?4 fault, ?5 now, ?6 limit, as far as they occur.
 

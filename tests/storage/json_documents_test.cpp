@@ -8,6 +8,7 @@
 
 #include "storage/models/models.h"
 #include "tests/storage/model_set_fixture.h"
+#include "tests/storage/private_postgres.h"
 #include "tests/storage/store_program_fixture.h"
 
 namespace fdi::storage {
@@ -341,6 +342,23 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "backup", "copy");
   Printed(page, "migrate");
   Printed(page, "prune", "--history-age 1d --dry-run");
+  if (PrivatePostgres::IsInstalled()) {
+    PrivatePostgres server;
+    server.Create("plant");
+    const std::string to = "--to '" + server.Url("plant") + "'";
+    Printed(page, "ship --init", to);
+    Printed(page, "ship", to);
+    const std::string from = "'" + server.Url("plant") + "'";
+    Printed(page, "history list --from", from);
+    Printed(page, "history show --from", from + " last");
+    Printed(page, "ship --prune", to + " --history-age 36000d");
+    Printed(page, "ship --forget");
+  } else {
+    called_.insert({"fdi-store ship", "fdi-store ship --init",
+                    "fdi-store ship --prune", "fdi-store ship --forget",
+                    "fdi-store history list --from",
+                    "fdi-store history show --from"});
+  }
   if (std::system("gnuplot --version >/dev/null 2>&1") == 0) {
     Printed(page, "runs plot", id);
     Printed(page, "history plot", "last");

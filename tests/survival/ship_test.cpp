@@ -393,6 +393,7 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   EXPECT_EQ(Ship("a", "", "room").code, 0);
   refused(Ship("a", "--prune --history-age 1s", "room"),
           "permission denied for table episode");
+  EXPECT_EQ(Store("history list --from '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),
           "schema fdi has version 2, this program needs 1: update "
@@ -506,6 +507,71 @@ TEST_F(ShipTest, RetentionOfBothSides) {
                     " WHERE episode_id = '" + EpisodeIdText(Id("old")) + "'"),
         std::vector<std::string>{"|0"});
   }
+}
+
+// list, show and stats say of the plant what they say of the history.
+TEST_F(ShipTest, TheVerbsReadThePlant) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  GenerateEpisodes(path, 500, "aaaa");
+  {
+    HistoryWriter writer(path);
+    RecordEpisode(writer, 0b11, "LV-1");
+    RecordEpisode(writer, 0b10, "LV-[2]");
+    DataGap gap;
+    gap.from_ns = kDetected;
+    gap.to_ns = kDetected + kSecond;
+    gap.reason = "test";
+    writer.AddGap(gap);
+    writer.Commit(kDetected);
+    HistoryEditor(path).Label("last", "f7", By("anna", kDetected));
+  }
+  ASSERT_EQ(Ship("a").code, 0);
+  const auto same = [&](const std::string& arguments) {
+    const Outcome here = Store(arguments + " --json --data " +
+                               (directory_.path() / "a").string());
+    const Outcome there =
+        Store(arguments + " --json --from '" + Url("postgres") + "'");
+    ASSERT_EQ(there.code, here.code) << arguments << ": " << there.err;
+    if (here.code != 0) {
+      return;
+    }
+    auto expected = nlohmann::json::parse(here.out);
+    auto found = nlohmann::json::parse(there.out);
+    const auto without_names = [](nlohmann::json& episode) {
+      episode.erase("host");
+      episode.erase("monitor");
+    };
+    for (auto* document : {&expected, &found}) {
+      without_names(*document);
+      if (document->contains("episodes")) {
+        for (auto& episode : (*document)["episodes"]) {
+          without_names(episode);
+        }
+      }
+    }
+    EXPECT_TRUE(found == expected)
+        << arguments << ": " << nlohmann::json::diff(expected, found);
+  };
+  for (const char* filter :
+       {"", "--limit 7", "--valve V0042", "--valve 'V00[0-4]*'",
+        "--valve 'LV-?'", "--valve 'LV-*'", "--fault f7", "--fault unknown",
+        "--fault f1 --valve 'V*'", "--state open", "--state unacked",
+        "--state rtn_unack", "--state shelved", "--state isolated --limit 3",
+        "--since 2026-01-01 --utc"}) {
+    same(std::string("history list ") + filter);
+    same(std::string("history stats --until 2026-11-21 --utc ") + filter);
+  }
+  same("history show last");
+  same("history show aaaa00000000012");
+  same("history show aaaa");
+  same("history show nothing");
+  const Outcome list =
+      Store("history list --limit 1 --csv --from '" + Url() + "' --monitor a");
+  EXPECT_THAT(list.out, HasSubstr("acked_by,host,monitor\n"));
+  EXPECT_THAT(list.out, HasSubstr(",a\n"));
+  EXPECT_THAT(Store("history list --from '" + Url() + "' --monitor b").out,
+              HasSubstr("no episode matches"));
 }
 
 // Each query of the dashboard, with Grafana's macros written out.

@@ -1,0 +1,252 @@
+#include "storage/plant/plant_reader.h"
+
+#include <cctype>
+#include <cstdlib>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+#include "diagnosis/fault_catalogue.h"
+#include "storage/database/record.h"
+#include "storage/history/history_reader.h"
+#include "storage/plant/sql.h"
+
+namespace fdi::storage {
+namespace sql = plant_sql;
+namespace {
+
+// ---- Values from PostgreSQL's text; NULL as Statement::Read() takes it.
+void Parse(const std::optional<std::string>& text, std::string& field) {
+  field = text.value_or("");
+}
+void Parse(const std::optional<std::string>& text, double& field) {
+  field = text ? std::strtod(text->c_str(), nullptr) : 0.0;
+}
+void Parse(const std::optional<std::string>& text,
+           std::vector<std::string>& names) {
+  names = SplitNames(text.value_or(""));
+}
+template <typename T>
+requires std::is_integral_v<T> || std::is_enum_v<T>
+void Parse(const std::optional<std::string>& text, T& field) {
+  if constexpr (requires { EnumText<T>::last; }) {
+    int i = 0;
+    while (EnumText<T>::name(static_cast<T>(i)) != text) {
+      if (++i > static_cast<int>(EnumText<T>::last)) {
+        RefuseName(text.value_or(""));
+      }
+    }
+    field = static_cast<T>(i);
+  } else {
+    field = static_cast<T>(text ? std::atoll(text->c_str()) : 0);
+  }
+}
+template <typename T>
+void Parse(const std::optional<std::string>& text, std::optional<T>& field) {
+  field.reset();
+  if (text) {
+    Parse(text, field.emplace());
+  }
+}
+
+template <typename Record>
+Record RecordAt(const PlantRows& rows, int row) {
+  Record record;
+  std::apply(
+      [&](const auto&... field) {
+        int column = 0;
+        (Parse(rows.Text(row, column++), field(record)), ...);
+      },
+      kFieldsOf<Record>);
+  return record;
+}
+
+template <typename Record>
+std::vector<Record> Records(const PlantRows& rows) {
+  std::vector<Record> records;
+  for (int r = 0; r < rows.size(); ++r) {
+    records.push_back(RecordAt<Record>(rows, r));
+  }
+  return records;
+}
+
+// ---- Statements.
+std::string Replaced(std::string text, std::string_view what,
+                     std::string_view by) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos;
+       at += by.size()) {
+    text.replace(at, what.size(), by);
+  }
+  return text;
+}
+
+// The regular expression of a glob: * ? [...], all else as it is.
+std::string RegexOf(const std::string& glob) {
+  std::string regex = "^";
+  bool in_set = false;
+  for (const char c : glob) {
+    if (in_set) {
+      regex += c;
+      in_set = c != ']';
+    } else if (c == '*' || c == '?') {
+      regex += c == '*' ? ".*" : ".";
+    } else if (c == '[') {
+      regex += c;
+      in_set = true;
+    } else {
+      regex += (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' ||
+                        (static_cast<unsigned char>(c) & 0x80U) != 0
+                    ? ""
+                    : "\\") +
+               std::string(1, c);
+    }
+  }
+  return regex + "$";
+}
+
+bool IsGlob(const std::string& valve) {
+  return valve != "*" && valve.find_first_of("*?[") != std::string::npos;
+}
+
+}  // namespace
+
+PlantReader::PlantReader(const std::string& url, std::string monitor)
+    : plant_(url), monitor_(std::move(monitor)) {
+  plant_.Run("SET search_path = fdi, pg_catalog");
+}
+
+// Runs `sql` with its {episodes}, the condition of the filter.
+PlantRows PlantReader::Ask(std::string_view sql, const EpisodeFilter& filter) {
+  const EpisodeCondition condition = ConditionOf(filter);
+  const std::string episodes =
+      Replaced(Replaced(condition.sql, "GLOB", "~"), "?", "$") +
+      " AND utc(e.detected_ns) >= utc($2) AND utc(e.detected_ns) <= utc($3)"
+      " AND $5::bigint IS NOT NULL AND ($6 = '' OR e.monitor = $6)";
+  return plant_.Run(
+      Replaced(std::string(sql), "{episodes}", episodes),
+      {IsGlob(filter.valve_glob) ? RegexOf(filter.valve_glob)
+                                 : filter.valve_glob,
+       std::to_string(filter.since_ns), std::to_string(filter.until_ns),
+       condition.fault, std::to_string(filter.now_ns), monitor_});
+}
+
+// Runs `sql`, which ends with WHERE, for the rows of one episode.
+PlantRows PlantReader::AskOf(std::string_view sql, std::uint64_t episode_id,
+                             const char* order) {
+  return plant_.Run(
+      std::string(sql) + " " + std::string(sql::of_episode) + order,
+      {EpisodeIdText(episode_id), monitor_});
+}
+
+std::vector<Episode> PlantReader::List(const EpisodeFilter& filter) {
+  return ListWhere("", filter);
+}
+
+std::vector<Episode> PlantReader::ListWhere(const std::string& more,
+                                            const EpisodeFilter& filter) {
+  std::string list(sql::plant_list);
+  list = Replaced(list, "{limit}",
+                  filter.limit > 0 ? std::to_string(filter.limit) : "ALL");
+  const PlantRows rows =
+      Ask(Replaced(list, "{episodes}", "{episodes}" + more), filter);
+  auto episodes = Records<Episode>(rows);
+  for (int r = 0; r < rows.size(); ++r) {
+    Episode& episode = episodes[static_cast<std::size_t>(r)];
+    episode.id = ParseEpisodeId(episode.episode_id).value_or(0);
+    episode.host = rows.Text(r, rows.columns() - 2).value_or("");
+    episode.monitor = rows.Text(r, rows.columns() - 1).value_or("");
+  }
+  return episodes;
+}
+
+Episode PlantReader::Show(std::string_view id) {
+  const PlantRows found =
+      id == "last"
+          ? plant_.Run(sql::plant_newest, {monitor_})
+          : plant_.Run(sql::plant_by_prefix, {std::string(id), monitor_});
+  const auto only = found.size() == 1
+                        ? ParseEpisodeId(found.Text(0, 0).value_or(""))
+                        : std::nullopt;
+  if (!only) {
+    throw NotFoundError(
+        "episode '" + std::string(id) +
+        (found.size() > 1 ? "' is not unique in " : "' is not in ") +
+        plant_.name());
+  }
+  return ListWhere(" AND e.episode_id = '" + EpisodeIdText(*only) + "'", {})
+      .at(0);
+}
+
+std::vector<HistoryEntry> PlantReader::Events(std::uint64_t episode_id) {
+  return Records<HistoryEntry>(
+      AskOf(SelectSql<HistoryEntry>("FROM episode_event WHERE"), episode_id,
+            " ORDER BY event_id"));
+}
+
+std::optional<EpisodeLook> PlantReader::Look(std::uint64_t episode_id) {
+  const PlantRows header = AskOf(sql::plant_look, episode_id);
+  if (header.size() == 0) {
+    return std::nullopt;
+  }
+  EpisodeLook look;
+  look.episode_id = episode_id;
+  Parse(header.Text(0, 0), look.first_ns);
+  Parse(header.Text(0, 1), look.period_ns);
+  Parse(header.Text(0, 2), look.misfit);
+  const PlantRows rows =
+      AskOf(sql::plant_look_faults, episode_id, " ORDER BY rank");
+  for (int r = 0; r < rows.size(); ++r) {
+    LookFault& f = look.faults.emplace_back();
+    f.fault = RequireFault(rows.Text(r, 0).value_or(""));
+    Parse(rows.Text(r, 1), f.strength);
+    Parse(rows.Text(r, 2), f.lowest);
+    Parse(rows.Text(r, 3), f.highest);
+    Parse(rows.Text(r, 4), f.begins_ns);
+    Parse(rows.Text(r, 5), f.growing);
+  }
+  return look;
+}
+
+std::int64_t PlantReader::TraceInstants(std::uint64_t episode_id) {
+  return AskOf(sql::plant_instants, episode_id).Int64(0, 0);
+}
+
+std::vector<EpisodeStatistics> PlantReader::Statistics(
+    const EpisodeFilter& filter) {
+  return Records<EpisodeStatistics>(Ask(sql::plant_statistics, filter));
+}
+
+std::vector<DataGap> PlantReader::Gaps(const EpisodeFilter& filter) {
+  return Records<DataGap>(Ask(
+      Replaced(std::string(sql::plant_gaps), "{columns}", ColumnsOf<DataGap>()),
+      filter));
+}
+
+std::vector<CoverageTime> PlantReader::Coverage(const EpisodeFilter& filter) {
+  return Records<CoverageTime>(Ask(sql::plant_coverage, filter));
+}
+
+std::vector<Alarm> PlantReader::Alarms(std::vector<Episode> episodes,
+                                       std::int64_t now_ns) {
+  const PlantRows shelves = plant_.Run(
+      SelectSql<Shelf>("FROM shelf WHERE until_ns > $1 AND from_ns <= $1"),
+      {std::to_string(now_ns)});
+  return AsAlarms(std::move(episodes), Records<Shelf>(shelves), now_ns);
+}
+
+// Episodes that touch the time: those that begin in it and those that are open
+// at its beginning.
+AlarmStatistics PlantReader::AlarmFigures(const EpisodeFilter& filter,
+                                          std::int64_t now_ns) {
+  EpisodeFilter any = filter;
+  any.state = EpisodeState::kAny;
+  any.since_ns = EpisodeFilter{}.since_ns;
+  const PlantRows spans =
+      Ask(Replaced(std::string(sql::plant_spans), "{since}",
+                   "'" + std::to_string(filter.since_ns) + "'::bigint"),
+          any);
+  return ComputeAlarmStatistics(Records<AlarmSpan>(spans), filter.since_ns,
+                                filter.until_ns, now_ns);
+}
+
+}  // namespace fdi::storage
