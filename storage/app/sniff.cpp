@@ -84,7 +84,7 @@ double MedianStep(const std::vector<double>& times_s) {
   return *middle;
 }
 
-// "bar g" of "PT101 [bar g]", "P1 (bar g)" or "P1_kPa"; or nothing.
+// "bar g" of "PT101 [bar g]" or "P1 (bar g)", "t/h" of "F_t_h"; or nothing.
 std::string UnitInName(Signal signal, std::string_view name) {
   const std::size_t open = name.find_first_of("[(");
   const std::size_t close = name.find_last_of("])");
@@ -93,11 +93,13 @@ std::string UnitInName(Signal signal, std::string_view name) {
       close > open) {
     candidates.emplace_back(name.substr(open + 1, close - open - 1));
   }
-  for (const char separator : {' ', '_'}) {
-    if (const std::size_t at = name.rfind(separator);
-        at != std::string_view::npos) {
-      candidates.emplace_back(name.substr(at + 1));
-    }
+  if (const std::size_t at = name.rfind(' '); at != std::string_view::npos) {
+    candidates.emplace_back(name.substr(at + 1));
+  }
+  for (std::size_t at = name.find('_'); at != std::string_view::npos;
+       at = name.find('_', at + 1)) {
+    candidates.emplace_back(name.substr(at + 1));
+    std::ranges::replace(candidates.back(), '_', '/');
   }
   for (const std::string& unit : candidates) {
     if (!unit.empty() && unit != "1" && cli::FindUnit(signal, unit)) {

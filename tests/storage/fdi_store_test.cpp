@@ -34,6 +34,21 @@ TEST_F(FdiStoreTest, ImportedRunIsListedAndExportedAsItWas) {
   EXPECT_EQ(Store("runs export " + id + "@1:3").out, header_ + Rows(2, 1));
 }
 
+// Not m3/h: that would be stored without a word.
+TEST_F(FdiStoreTest, SniffTakesTheUnitThatTheNameOfAColumnEndsWith) {
+  Write("a.csv", header_ + Rows(30));
+
+  const json sniffed = StoreJson("runs sniff a.csv --map-output tags.toml");
+
+  EXPECT_THAT(header_, HasSubstr("F_t_h"));
+  const json& columns = sniffed["columns"];
+  const auto flow = std::ranges::find(columns, "F_t_h", [](const json& column) {
+    return column["column"].get<std::string>();
+  });
+  ASSERT_NE(flow, columns.end());
+  EXPECT_EQ((*flow)["unit"], "t/h");
+}
+
 TEST_F(FdiStoreTest, CsvWithoutAColumnIsRefusedAndNothingIsStored) {
   Write("a.csv", "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,F_t_h\n0,1,2,3,4,5\n");
 
