@@ -87,6 +87,7 @@ class Looker {
   double ErrorsOf(const Trajectory& answers) const;
   double InputCost(int fault, double strength, Course course,
                    const Trajectory& answers) const;
+  double CommandCost() const;
   double Cost(int fault, double strength, Course course,
               const Trajectory& answers) const;
   std::vector<Hypothesis> Hypotheses() const;
@@ -332,7 +333,31 @@ double Looker::InputCost(int fault, double strength, Course course,
                    ? usual + s * (i.temperature.high - i.temperature.low)
                    : usual;
       });
-  return cost;
+  return fault == 19 ? cost + CommandCost() : cost;
+}
+
+// A flow transmitter that goes wrong moves no command, unless the loop reads
+// it. One that moved with the fault tells against it.
+double Looker::CommandCost() const {
+  constexpr int kLeastBefore = 60;
+  constexpr int kGap = 10;
+  constexpr int kLeastAfter = 10;
+  const LoopHabit& loop = physics_.loop;
+  const int first = detection_ + kGap;
+  if (loop.reads_flow || loop.command_sd <= 0.0 || detection_ < kLeastBefore ||
+      rows_ < first + kLeastAfter) {
+    return 0.0;
+  }
+  const auto mean = [&](int from, int to) {
+    double sum = 0.0;
+    for (int k = from; k < to; ++k) {
+      sum += window_.rows[static_cast<std::size_t>(k)].input.cv_pct;
+    }
+    return sum / (to - from);
+  };
+  const double away =
+      (mean(first, rows_) - mean(0, detection_)) / loop.command_sd;
+  return away * away;
 }
 
 double Looker::Cost(int fault, double strength, Course course,

@@ -1,6 +1,7 @@
 #include "simulator/second_look/valve_physics.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -106,6 +107,110 @@ InputBand BandOf(const std::vector<double>& input,
   return band;
 }
 
+// What of a series its last values do not predict: the errors of an
+// autoregression, by Levinson's recursion.
+std::vector<double> Innovations(std::vector<double> series) {
+  constexpr std::size_t kOrder = 5;
+  const double mean = Mean(series);
+  for (double& value : series) {
+    value -= mean;
+  }
+  std::array<double, kOrder + 1> r{};
+  for (std::size_t lag = 0; lag <= kOrder; ++lag) {
+    for (std::size_t k = lag; k < series.size(); ++k) {
+      r[lag] += series[k] * series[k - lag];
+    }
+  }
+  std::array<double, kOrder + 1> a{1.0};  // sum_i a_i y_(k-i) is the error.
+  double error = r[0] + 1e-12;
+  for (std::size_t order = 1; order <= kOrder; ++order) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < order; ++i) {
+      sum += a[i] * r[order - i];
+    }
+    const double reflection = -sum / error;
+    const auto before = a;
+    for (std::size_t i = 1; i <= order; ++i) {
+      a[i] = before[i] + reflection * before[order - i];
+    }
+    error *= 1.0 - reflection * reflection;
+  }
+  std::vector<double> errors(series.size());
+  for (std::size_t k = kOrder; k < series.size(); ++k) {
+    for (std::size_t i = 0; i <= kOrder; ++i) {
+      errors[k] += a[i] * series[k - i];
+    }
+  }
+  return errors;
+}
+
+// Gathers, record by record, how the command changes, and whether it follows
+// what F reads beyond what the valve lets pass: its noise is seen by nobody but
+// a controller that reads it.
+class LoopObserver {
+ public:
+  // `unexplained`: measured minus simulated flow. A command that acts before
+  // its stamp (delay < 0) shows in F of the same row.
+  void Add(const std::vector<double>& command,
+           const std::vector<double>& unexplained, int delay) {
+    for (std::size_t k = kBefore; k + kGap + kAfter < command.size(); k += 10) {
+      const auto at = [&](std::size_t row) {
+        return command.begin() + static_cast<std::ptrdiff_t>(row);
+      };
+      changes_.push_back(Mean({at(k + kGap), at(k + kGap + kAfter)}) -
+                         Mean({at(k - kBefore), at(k)}));
+    }
+    std::vector<double> steps(command.size());
+    for (std::size_t k = 1; k < command.size(); ++k) {
+      steps[k] = command[k] - command[k - 1];
+    }
+    const std::vector<double> moved = Innovations(Bounded(steps));
+    const std::vector<double> noise = Innovations(Bounded(unexplained));
+    first_ = delay < 0 ? 1 : 0;
+    for (std::size_t k = 0; k + kLags < moved.size(); ++k) {
+      for (std::size_t lag = first_; lag < kLags; ++lag) {
+        cross_[lag] += moved[k + lag] * noise[k];
+      }
+      moved_ += moved[k] * moved[k];
+      noise_ += noise[k] * noise[k];
+      ++count_;
+    }
+  }
+
+  LoopHabit Habit() const {
+    constexpr double kLeastRows = 1800.0;
+    constexpr double kSignificant = 4.0;
+    LoopHabit habit;
+    if (changes_.empty() || count_ < kLeastRows || moved_ <= 0.0) {
+      return habit;
+    }
+    double squares = 0.0;
+    for (const double change : Bounded(changes_)) {
+      squares += change * change;
+    }
+    habit.command_sd =
+        std::sqrt(squares / static_cast<double>(changes_.size()));
+    habit.reads_flow = std::ranges::any_of(cross_, [&](double cross) {
+      return std::abs(cross) >
+             kSignificant * std::sqrt(moved_ * noise_ / count_);
+    });
+    return habit;
+  }
+
+ private:
+  static constexpr std::size_t kBefore = 120;
+  static constexpr std::size_t kGap = 10;
+  static constexpr std::size_t kAfter = 60;
+  static constexpr std::size_t kLags = 4;
+
+  std::vector<double> changes_;
+  std::size_t first_{0};
+  std::array<double, kLags> cross_{};
+  double moved_{0.0};
+  double noise_{0.0};
+  double count_{0.0};
+};
+
 }  // namespace
 
 ValvePhysics DescribeValve(const ValveParameters& parameters,
@@ -117,13 +222,18 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
   std::vector<double> p1;
   std::vector<double> p2;
   std::vector<double> t1;
+  LoopObserver loop;
   for (const std::vector<RecordRow>& rows : records) {
     if (rows.size() < kShortest) {
       continue;
     }
     const auto answers =
         SimulateRecord(parameters, rows, 0, rows.size(), drive);
+    std::vector<double> command;
+    std::vector<double> unexplained;
     for (std::size_t k = kSettleRows; k < rows.size(); ++k) {
+      command.push_back(rows[k].input.cv_pct);
+      unexplained.push_back(rows[k].flow - answers[k].flow);
       x.push_back(rows[k].x_pct - answers[k].x_pct);
       flow.push_back(rows[k].flow - answers[k].flow);
       level.push_back(rows[k].flow);
@@ -131,6 +241,7 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
       p2.push_back(rows[k].input.p2_kpa);
       t1.push_back(rows[k].input.t1_degc);
     }
+    loop.Add(command, unexplained, drive.command_delay);
   }
   if (x.empty()) {
     throw DataError("healthy records: expected one of at least 180 rows");
@@ -140,6 +251,7 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
   physics.p1 = BandOf(p1, level);
   physics.p2 = BandOf(p2, level);
   physics.t1 = BandOf(t1, level);
+  physics.loop = loop.Habit();
   return physics;
 }
 
@@ -169,7 +281,9 @@ FDI_FIELDS(ValveParameters, actuator, positioner, trim, instruments)
 FDI_FIELDS(RecordDrive, period_s, interpolated_command, command_delay)
 FDI_FIELDS(Scatter, sd, correlation_time, slow_sd)
 FDI_FIELDS(InputBand, mean, slope, sd)
-FDI_FIELDS(ValvePhysics, parameters, drive, x, flow, flow_mean, p1, p2, t1)
+FDI_FIELDS(LoopHabit, command_sd, reads_flow)
+FDI_FIELDS(ValvePhysics, parameters, drive, x, flow, flow_mean, p1, p2, t1,
+           loop)
 
 #undef FDI_FIELDS
 #undef FDI_VISIT
@@ -206,6 +320,9 @@ ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values) {
   ValvePhysics physics;
   std::size_t next = 0;
   auto use = [&](const std::string& name, auto& field) {
+    if (next == values.size() && name.starts_with("loop.")) {
+      return;
+    }
     if (next >= values.size() || values[next].name != name) {
       throw DataError("the physics of the model set lacks " + name +
                       ": onboard the valve anew");

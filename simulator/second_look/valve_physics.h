@@ -23,6 +23,15 @@ struct InputBand {
   double sd{1.0};     ///< > 0.
 };
 
+/// How the loop moves the command while the valve is healthy.
+struct LoopHabit {
+  /// Deviation of how far the mean command of a minute is from that of the two
+  /// minutes before [%]; 0: not known.
+  double command_sd{0.0};
+  /// The command may answer to the reading of F.
+  bool reads_flow{true};
+};
+
 /// A valve as onboarding found it: its physical parameters, how its command
 /// acts, and what is left unexplained while it is healthy.
 struct ValvePhysics {
@@ -34,6 +43,7 @@ struct ValvePhysics {
   InputBand p1{};       ///< [kPa]
   InputBand p2{};       ///< [kPa]
   InputBand t1{};       ///< [degC]
+  LoopHabit loop{};
 };
 
 /// Simulates the healthy records and measures the differences.
@@ -42,7 +52,8 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
                            const RecordDrive& drive,
                            const std::vector<std::vector<RecordRow>>& records);
 
-/// The physics as it is stored in a model set, and back.
+/// The physics as it is stored in a model set, and back. That of a valve that
+/// was onboarded before there was `loop` knows nothing of it.
 /// @throws DataError naming a value that is missing or unknown; ConfigError if
 ///   a parameter is out of its range.
 std::vector<PhysicalValue> ToValues(const ValvePhysics& physics);

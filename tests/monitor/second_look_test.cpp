@@ -378,7 +378,7 @@ TEST_F(LookWorkerTest, ALookThatFailsIsReportedAndTheNextOneTaken) {
 
 TEST_F(LookWorkerTest, PhysicsThatCannotBeUsedAreReported) {
   ModelSet models = *models_;
-  models.physics.pop_back();
+  models.physics.erase(models.physics.begin());
   EXPECT_EQ(worker_.PhysicsOf(models), nullptr);
   EXPECT_EQ(counters_[Counter::kLooksFailed], 1U);
   ASSERT_EQ(lines_.size(), 1U);

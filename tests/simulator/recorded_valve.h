@@ -15,17 +15,19 @@ namespace fdi::simulator {
 inline constexpr std::size_t kLeadIn = 120;
 
 /// What the transmitters of a valve read while its command is set anew every
-/// 10 s; `faults` act from row kLeadIn on.
+/// 10 s; `faults` act from row kLeadIn on, as does the loop, which then moves
+/// the command by `moved`.
 inline std::vector<RecordRow> Recording(
     std::size_t count, std::uint64_t seed,
-    const std::vector<FaultSchedule>& faults) {
+    const std::vector<FaultSchedule>& faults, double moved = 0.0) {
   NormalSource noise(seed, 7);
   RecordedExcitation excitation;
   double level = 60.0;
   for (std::size_t k = 0; k < count; ++k) {
     level = k % 10 == 0 ? std::clamp(60.0 + 8.0 * noise(), 46.0, 80.0) : level;
+    const double command = level + (k < kLeadIn ? 0.0 : moved);
     excitation.rows.push_back(
-        {level, 3555.0 + 20.0 * noise(), 2615.0 + 10.0 * noise(), 100.7});
+        {command, 3555.0 + 20.0 * noise(), 2615.0 + 10.0 * noise(), 100.7});
   }
   ValveSimulationConfig config;
   config.excitation = std::move(excitation);
@@ -52,8 +54,9 @@ inline const ValvePhysics& Physics() {
 }
 
 inline LookWindow Window(const std::vector<FaultSchedule>& faults,
-                         std::uint64_t seed = 2) {
-  return {Recording(kLeadIn + 200, seed, faults), kLeadIn, kBasicSignals};
+                         std::uint64_t seed = 2, double moved = 0.0) {
+  return {Recording(kLeadIn + 200, seed, faults, moved), kLeadIn,
+          kBasicSignals};
 }
 
 inline FaultSchedule Abrupt(int fault, double strength) {

@@ -1,5 +1,6 @@
 #include "simulator/second_look/second_look.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <string>
@@ -115,8 +116,70 @@ TEST(ValvePhysicsTest, IsReadBackAsItWasStored) {
 
 TEST(ValvePhysicsTest, RefusesAValueThatIsMissing) {
   std::vector<PhysicalValue> values = ToValues(Physics());
-  values.pop_back();
+  values.erase(values.end() - 3);
   EXPECT_THROW(PhysicsFrom(values), DataError);
+}
+
+TEST(ValvePhysicsTest, KnowsNothingOfTheLoopWhereItIsOfBefore) {
+  ValvePhysics physics = Physics();
+  physics.loop = {2.0, false};
+  std::vector<PhysicalValue> values = ToValues(physics);
+  EXPECT_FALSE(PhysicsFrom(values).loop.reads_flow);
+  values.resize(values.size() - 2);
+  EXPECT_TRUE(PhysicsFrom(values).loop.reads_flow);
+}
+
+// Of a controller that reads F, its noise moves the command in the next row.
+LoopHabit HabitOf(double gain) {
+  NormalSource noise(5, 1);
+  RecordedExcitation excitation;
+  std::vector<double> in_flow;
+  for (int k = 0; k < 3000; ++k) {
+    const double feedback = k == 0 ? 0.0 : gain * in_flow.back();
+    excitation.rows.push_back(
+        {60.0 + 6.0 * std::sin(0.02 * k) + 0.4 * noise() - feedback, 3555.0,
+         2615.0, 100.7});
+    in_flow.push_back(0.3 * noise());
+  }
+  ValveSimulationConfig config;
+  config.excitation = std::move(excitation);
+  config.duration_s = 3000.0;
+  ValveSimulation simulation(config);
+  std::vector<RecordRow> rows;
+  for (int k = 0; k < 3000; ++k) {
+    const Sample s = simulation.Step().sample;
+    rows.push_back(
+        {{s[Signal::kCv], s[Signal::kP1], s[Signal::kP2], s[Signal::kT1]},
+         s[Signal::kX],
+         s[Signal::kF] + in_flow[static_cast<std::size_t>(k)]});
+  }
+  return DescribeValve(ParameterSet("lublin-actuator-3"), {}, {rows}).loop;
+}
+
+TEST(ValvePhysicsTest, SeesAControllerThatReadsTheFlow) {
+  EXPECT_FALSE(HabitOf(0.0).reads_flow);
+  EXPECT_TRUE(HabitOf(1.0).reads_flow);
+  EXPECT_TRUE(HabitOf(0.2).reads_flow);
+  EXPECT_GT(HabitOf(0.0).command_sd, 1.0);
+  EXPECT_TRUE(Physics().loop.reads_flow);  // Of so few rows not known.
+}
+
+TEST(SecondLookTest, ACommandThatMovedTellsAgainstTheFlowTransmitter) {
+  const LookWindow window = Window({Abrupt(2, 0.5)}, 2, -12.0);
+  // How far f19 is behind f2.
+  const auto behind = [&window](const LoopHabit& loop) {
+    ValvePhysics physics = Physics();
+    physics.loop = loop;
+    const SecondLook look = LookAgain(physics, window);
+    const auto distance = [&look](int fault) {
+      return std::ranges::find(look.ranked, fault, &Explanation::fault)
+          ->distance;
+    };
+    return distance(19) - distance(2);
+  };
+  const double unknown = behind({2.5, true});
+  EXPECT_GT(behind({2.5, false}), unknown + kLookMargin);
+  EXPECT_EQ(behind({0.0, false}), unknown);
 }
 
 SecondLook Looked(std::vector<std::pair<int, double>> distances,
