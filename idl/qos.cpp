@@ -97,6 +97,15 @@ void ReaderKeepsAll(EndpointQos& qos, int instances) {
   SetLimits(qos.reader.resource_limits(), instances, per_instance, 256);
 }
 
+// A writer with one instance and its readers, lossless.
+void KeepInFlight(EndpointQos& qos, int messages) {
+  qos.writer.history().kind = dds::KEEP_ALL_HISTORY_QOS;
+  SetLimits(qos.writer.resource_limits(), 1, messages, 1);
+  qos.writer.resource_limits().extra_samples = 1;
+  qos.reader.history().kind = dds::KEEP_ALL_HISTORY_QOS;
+  SetLimits(qos.reader.resource_limits(), kMonitors, messages, 1);
+}
+
 void TransientLocal(EndpointQos& qos) {
   qos.writer.durability().kind = dds::TRANSIENT_LOCAL_DURABILITY_QOS;
   qos.reader.durability().kind = dds::TRANSIENT_LOCAL_DURABILITY_QOS;
@@ -196,11 +205,7 @@ EndpointQos QosFor<DecisionMessage>(Profile /*profile*/, int valves) {
 template <>
 EndpointQos QosFor<DecisionBatchMessage>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_decision_batch");
-  qos.writer.history().kind = dds::KEEP_ALL_HISTORY_QOS;
-  SetLimits(qos.writer.resource_limits(), 1, kBatchesInFlight, 1);
-  qos.writer.resource_limits().extra_samples = 1;
-  qos.reader.history().kind = dds::KEEP_ALL_HISTORY_QOS;
-  SetLimits(qos.reader.resource_limits(), kMonitors, kBatchesInFlight, 1);
+  KeepInFlight(qos, kBatchesInFlight);
   HeartbeatPeriod(qos.writer) = Milliseconds(10);
   return qos;
 }
@@ -247,11 +252,7 @@ EndpointQos QosFor<PairState>(Profile /*profile*/, int /*valves*/) {
 template <>
 EndpointQos QosFor<OperatorAction>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_operator_action");
-  qos.writer.history().kind = dds::KEEP_ALL_HISTORY_QOS;
-  SetLimits(qos.writer.resource_limits(), 1, kActionsInFlight, 1);
-  qos.writer.resource_limits().extra_samples = 1;
-  qos.reader.history().kind = dds::KEEP_ALL_HISTORY_QOS;
-  SetLimits(qos.reader.resource_limits(), kMonitors, kActionsInFlight, 1);
+  KeepInFlight(qos, kActionsInFlight);
   return qos;
 }
 

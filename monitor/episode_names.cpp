@@ -39,8 +39,7 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
   for (const Transition& transition : engine.Transitions()) {
     detection_ns_ = transition.detection_stamp_ns;
   }
-  // The last look at an episode that has ended would change nothing.
-  if (due && engine.detected && !held) {
+  if (due && !held) {
     Ask(std::move(*due));
   }
   TakeAnswers();

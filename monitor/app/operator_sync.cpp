@@ -67,12 +67,15 @@ void OperatorSync::Bring() {
        done_here_.Next(storage::UtcNow() - kBroughtNs)) {
     unsent_.push_back(std::move(action));
   }
-  while (!unsent_.empty()) {
+  for (; !unsent_.empty(); unsent_.pop_front()) {
     unsent_.front().monitor = monitor_;
-    if (out_.Write(unsent_.front(), {}, kPeriod) != idl::WriteResult::kSent) {
-      return;
+    try {
+      if (out_.Write(unsent_.front(), {}, kPeriod) != idl::WriteResult::kSent) {
+        return;
+      }
+    } catch (const DataError& error) {  // Too long for the wire.
+      ReportRefusal(error);
     }
-    unsent_.pop_front();
   }
 }
 
@@ -91,15 +94,19 @@ void OperatorSync::Adopt() {
     } catch (const NotFoundError&) {
       keep = now - received.since < kEpisodeMayCome;
     } catch (const ConfigError& error) {  // Not what our programs accept.
-      const std::string reason = error.what();
-      log_.Report(LogId::kOperatorSync, "operator_action_refused",
-                  [&reason] { return "reason=" + LogValue(reason); });
+      ReportRefusal(error);
     }
     if (keep) {
       received_.push_back(received_.front());
     }
     received_.pop_front();
   }
+}
+
+void OperatorSync::ReportRefusal(const std::exception& error) {
+  const std::string reason = error.what();
+  log_.Report(LogId::kOperatorSync, "operator_action_refused",
+              [&reason] { return "reason=" + LogValue(reason); });
 }
 
 }  // namespace fdi::monitor

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <exception>
 #include <filesystem>
 #include <string>
 #include <thread>
@@ -37,6 +38,7 @@ class OperatorSync {
 
   void Bring();
   void Adopt();
+  void ReportRefusal(const std::exception& error);
 
   const std::string monitor_;
   storage::OperatorLog done_here_;

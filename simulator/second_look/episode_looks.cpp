@@ -177,14 +177,14 @@ void EpisodeLooks::Keep(const Sample& sample) {
   }
 }
 
-std::optional<LookTask> EpisodeLooks::Task(std::int64_t until_ns) const {
+std::optional<LookTask> EpisodeLooks::Task() const {
   LookTask task;
   task.detection_stamp_ns = *detection_ns_;
   task.window.signals = signals_;
   const std::int64_t from_ns =
       *detection_ns_ - static_cast<std::int64_t>(kBefore) * period_ns_;
   for (const Row& row : rows_) {
-    if (row.stamp_ns < from_ns || row.stamp_ns > until_ns) {
+    if (row.stamp_ns < from_ns) {
       continue;
     }
     if (row.stamp_ns < *detection_ns_) {
@@ -215,9 +215,6 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
       next_age_ns_ = kEarlyAge;
     } else if (detection_ns_ && (transition.kind == TransitionKind::kCleared ||
                                  transition.kind == TransitionKind::kClosed)) {
-      if (next_age_ns_ <= kFirstAge) {
-        due = Task(sample.stamp_ns);
-      }
       detection_ns_.reset();
     }
   }
@@ -225,7 +222,7 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
     while (sample.stamp_ns - *detection_ns_ >= next_age_ns_) {
       next_age_ns_ = AgeAfter(next_age_ns_);
     }
-    due = Task(sample.stamp_ns);
+    due = Task();
   }
   return due;
 }

@@ -72,9 +72,9 @@ std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
 inline constexpr std::int64_t kLookDelayNs = 10'000'000'000;
 
 /// Follows the samples and verdicts of one valve and says when the physics
-/// should look at an episode: 20 (early), 40, 150 and 300 s after its
-/// detection, then at ten times the age each time, and at its end if it was
-/// shorter. Keeps the last 420 samples.
+/// should look at an episode that is open: 20 (early), 40, 150 and 300 s after
+/// its detection, then at ten times the age each time. Keeps the last 420
+/// samples.
 class EpisodeLooks {
  public:
   /// `physics` must outlive it.
@@ -90,7 +90,7 @@ class EpisodeLooks {
   };
 
   void Keep(const Sample& sample);
-  std::optional<LookTask> Task(std::int64_t until_ns) const;
+  std::optional<LookTask> Task() const;
 
   const ValvePhysics& physics_;
   std::int64_t period_ns_;

@@ -69,6 +69,7 @@ class Looker {
         detection_(static_cast<int>(window.detection)) {
     healthy_ = Simulate(0, 0.0, {0, false});
     FindUsualInputs();
+    command_cost_ = CommandCost();
   }
 
   SecondLook Run(const std::stop_token& stop);
@@ -104,6 +105,7 @@ class Looker {
   int rows_;
   int detection_;
   InputRow usual_{};  // Mean inputs before the detection, or in onboarding.
+  double command_cost_{0.0};  // Of f19.
   Trajectory healthy_;
   std::int64_t simulated_{0};
 };
@@ -333,7 +335,7 @@ double Looker::InputCost(int fault, double strength, Course course,
                    ? usual + s * (i.temperature.high - i.temperature.low)
                    : usual;
       });
-  return fault == 19 ? cost + CommandCost() : cost;
+  return fault == 19 ? cost + command_cost_ : cost;
 }
 
 // A flow transmitter that goes wrong moves no command, unless the loop reads

@@ -96,11 +96,6 @@ void AddDays(const std::vector<DayAlarms>& days, Report& report) {
   }
 }
 
-struct StatisticsOptions {
-  EpisodeOptions filter;
-  PlantOptions plant;
-};
-
 template <typename Reader>
 Report StatisticsOf(Reader& reader, const EpisodeOptions& options,
                     const Context& context) {
@@ -161,7 +156,7 @@ Report StatisticsOf(Reader& reader, const EpisodeOptions& options,
                      " data gaps, " + SecondsText(gaps_s) + " in all");
 }
 
-Report Statistics(const StatisticsOptions& options, const Context& context) {
+Report Statistics(const HistoryOptions& options, const Context& context) {
   return ReadHistory(options.plant, context, [&](auto& reader) {
     return StatisticsOf(reader, options.filter, context);
   });
@@ -309,8 +304,7 @@ void AddHistoryFigures(cli::Program& program, CLI::App& group) {
       "Count episodes by valve, fault and day; chattering: 3 or more of a "
       "valve within 30 min; standing: longer than 24 h",
       Statistics);
-  options.filter.AddTo(stats);
-  options.plant.AddTo(stats);
+  options.AddTo(stats);
 
   auto [causes, cause] =
       AddVerb(program, group, "causes",

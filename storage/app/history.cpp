@@ -70,11 +70,6 @@ Json ListedJson(const Episode& e) {
   return row;
 }
 
-struct ListOptions {
-  EpisodeOptions filter;
-  PlantOptions plant;
-};
-
 template <typename Reader>
 Report ListOf(Reader& reader, const EpisodeOptions& options,
               const Context& context) {
@@ -127,7 +122,7 @@ Report ListOf(Reader& reader, const EpisodeOptions& options,
   return report.Table("episodes", columns, "no episode matches");
 }
 
-Report List(const ListOptions& options, const Context& context) {
+Report List(const HistoryOptions& options, const Context& context) {
   return ReadHistory(options.plant, context, [&](auto& reader) {
     return ListOf(reader, options.filter, context);
   });
@@ -440,8 +435,7 @@ void AddHistoryVerbs(cli::Program& program) {
       "history", "Fault episodes: what happened, how sure, who knows of it");
   auto [list, list_options] = AddVerb(
       program, group, "list", "List the episodes, the newest last", List);
-  list_options.filter.AddTo(list);
-  list_options.plant.AddTo(list);
+  list_options.AddTo(list);
   program.AllowCsv(list, "The columns of fault_history as CSV");
 
   auto [show, shown] =

@@ -98,6 +98,17 @@ struct PlantOptions {
   void AddTo(CLI::App& verb);
 };
 
+/// Which episodes, and of which history.
+struct HistoryOptions {
+  EpisodeOptions filter;
+  PlantOptions plant;
+
+  void AddTo(CLI::App& verb) {
+    filter.AddTo(verb);
+    plant.AddTo(verb);
+  }
+};
+
 /// What `read` makes of the history of --data or of the plant's: it takes a
 /// HistoryReader or a PlantReader.
 template <typename Read>

@@ -43,6 +43,13 @@ OperatorNote Checked(const OperatorNote& note) {
           note.now_ns};
 }
 
+// Notes of before there was an origin have none.
+OperatorNote NoteOf(const OperatorAction& action) {
+  return Checked({action.who, action.comment,
+                  action.origin.empty() ? action.monitor : action.origin,
+                  action.stamp_ns});
+}
+
 std::string CheckedLabel(std::string_view label) {
   if (label == "true" || label == "false") {
     return std::string(label);
@@ -148,8 +155,7 @@ bool HistoryEditor::Adopt(const OperatorAction& action) {
 }
 
 bool HistoryEditor::AdoptNote(const OperatorAction& action) {
-  const OperatorNote note =
-      Checked({action.who, action.comment, action.origin, action.stamp_ns});
+  const OperatorNote note = NoteOf(action);
   const bool label = action.kind == OperatorActionKind::kLabel;
   const std::optional<std::string> value =
       label ? std::optional(CheckedLabel(action.value)) : std::nullopt;
@@ -170,8 +176,7 @@ bool HistoryEditor::AdoptNote(const OperatorAction& action) {
 }
 
 bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
-  const OperatorNote note =
-      Checked({action.who, action.comment, action.origin, action.stamp_ns});
+  const OperatorNote note = NoteOf(action);
   RequireLength(action.valve_id, "valve", 1, kLongestValve);
   const std::optional<std::string> fault =
       action.value.empty() ? std::nullopt
@@ -188,12 +193,12 @@ bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
                   action.until_ns, note.who, note.comment, note.origin);
     shelf_id = find();
   }
-  bool ended = false;
-  if (action.ended_ns != 0 && !ReadShelf(database_, *shelf_id).ended_ns) {
+  const bool ended =
+      action.ended_ns != 0 && !ReadShelf(database_, *shelf_id).ended_ns;
+  if (ended) {
     const OperatorNote end =
         Checked({action.ended_by, "", action.ended_origin, action.ended_ns});
     database_.Run(sql::end_shelf, end.now_ns, end.who, end.origin, *shelf_id);
-    ended = true;
   }
   transaction.Commit();
   return fresh || ended;

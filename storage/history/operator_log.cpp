@@ -1,7 +1,6 @@
 #include "storage/history/operator_log.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "storage/history/alarm.h"
 #include "storage/history/episode.h"
@@ -35,7 +34,7 @@ OperatorLog::OperatorLog(const std::filesystem::path& path)
 
 std::vector<OperatorAction> OperatorLog::Next(std::int64_t since_ns) {
   const std::int64_t version = database_.DataVersion();
-  if (std::exchange(data_version_, version) == version) {
+  if (version == data_version_) {
     return {};
   }
   std::vector<OperatorAction> actions;
@@ -65,6 +64,7 @@ std::vector<OperatorAction> OperatorLog::Next(std::int64_t since_ns) {
     }
     known->second = ended;
   }
+  data_version_ = version;  // What throws before is read again.
   return actions;
 }
 

@@ -240,5 +240,17 @@ TEST_F(HistoryEditorTest, TwoHistoriesThatAdoptFromEachOtherShowTheSame) {
   }
 }
 
+// Of version 2: the column is younger.
+TEST_F(HistoryEditorTest, AdoptsANoteWithoutAnOrigin) {
+  OperatorAction action;
+  action.monitor = "host:1";
+  action.episode_id = Id("LV-1");
+  action.who = "anna";
+  action.stamp_ns = now_;
+  EXPECT_TRUE(editor_.Adopt(action));
+  ASSERT_EQ(Notes("LV-1").size(), 1U);
+  EXPECT_EQ(Notes("LV-1")[0].origin, "host:1");
+}
+
 }  // namespace
 }  // namespace fdi::storage
