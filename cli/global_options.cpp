@@ -258,6 +258,10 @@ void AddBusOptions(CLI::App& app, GlobalOptions& options) {
                  "which is the default of Fast DDS")
       ->check(CLI::IsMember({"udp", "shm", "default"}))
       ->type_name("NAME");
+  app.add_option("--partition", options.partition,
+                 "Share of the plant that samples are published to or taken "
+                 "from; a monitor may take several, 'hall-1,pumps-*'")
+      ->type_name("NAME[,NAME]");
   app.add_option("--security", options.security,
                  "Folder of the key that fdi-store keys has made for this "
                  "program or host; without one the bus is open to all")

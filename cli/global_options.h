@@ -20,6 +20,7 @@ struct GlobalOptions {
   /// --transport udp|shm|default (both). Shared memory starts slower, and a
   /// peer that was killed is in the way of the next for seconds.
   std::string transport{"udp"};
+  std::string partition;  ///< --partition NAME[,NAME] of samples, or empty
   std::filesystem::path qos_file;     ///< --qos FILE.xml, or empty
   std::filesystem::path security;     ///< --security DIR, or empty
   std::filesystem::path config_file;  ///< --config FILE.toml, or empty
@@ -36,7 +37,7 @@ struct PrintConfigRequest {};
 /// Adds --help --version --data --config --print-config --json --utc
 /// --log-level to the root `app`; `options` must outlive it.
 void AddGlobalOptions(CLI::App& app, GlobalOptions& options);
-/// Adds --domain --interface --transport --security --qos.
+/// Adds --domain --interface --transport --partition --security --qos.
 void AddBusOptions(CLI::App& app, GlobalOptions& options);
 /// Adds --fault-catalogue.
 void AddFaultCatalogueOption(CLI::App& app, GlobalOptions& options);

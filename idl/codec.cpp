@@ -338,6 +338,10 @@ void Fields(auto& t, Is<PairState> auto& m, auto& w) {
                received)
 }
 
+void Fields(auto& t, Is<MonitorShare> auto& m, auto& w) {
+  FDI_FOR_EACH(FDI_FIELD, pair, valves, partitions)
+}
+
 void Fields(auto& t, Is<OperatorAction> auto& m, auto& w) {
   FDI_FOR_EACH(FDI_FIELD, kind, episode_id, valve_id, value, stamp_ns, who,
                comment, origin, until_ns, ended_ns, ended_by, ended_origin)
@@ -376,5 +380,6 @@ template struct Codec<ModelSetInfoMessage>;
 template struct Codec<MonitorStatusMessage>;
 template struct Codec<PairState>;
 template struct Codec<OperatorAction>;
+template struct Codec<MonitorShare>;
 
 }  // namespace fdi::idl

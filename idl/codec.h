@@ -40,6 +40,7 @@ FDI_TOPIC(ModelSetInfoMessage, ModelSetInfo)
 FDI_TOPIC(MonitorStatusMessage, MonitorStatus)
 FDI_TOPIC(PairState, PairState)
 FDI_TOPIC(OperatorAction, OperatorAction)
+FDI_TOPIC(MonitorShare, MonitorShare)
 #undef FDI_TOPIC
 
 /// Conversion of the messages of one topic; the fields are listed in codec.cpp,

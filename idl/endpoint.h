@@ -8,6 +8,7 @@
 #include <stop_token>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "idl/participant.h"
 #include "idl/wire.h"
@@ -24,8 +25,8 @@ enum class Profile {
 struct PublisherOptions {
   Profile profile{Profile::kLive};
   int valves{0};  ///< How many this publisher speaks for; 0: max_valves.
-  /// Beside the usual partition; empty: none.
-  std::string also_partition{};
+  /// Where it writes; "" is the usual partition, and none means that one.
+  std::vector<std::string> partitions{};
 };
 
 enum class WriteResult {
@@ -45,7 +46,7 @@ struct PublisherStatus {
 /// Writes one topic. Thread safe. What is on the way when it is destroyed is
 /// lost: call WaitForAcknowledged() first.
 ///
-/// Message is one of the eight of wire.h; there are no others.
+/// Message is one of the nine of wire.h; there are no others.
 template <typename Message>
 class Publisher {
  public:
@@ -149,13 +150,13 @@ inline Handlers<DecisionBatchMessage> EachVector(
 template <typename Message>
 class Subscriber {
  public:
-  /// @param partition where to read, a pattern as of fnmatch(); empty: the
+  /// @param partitions where to read, patterns as of fnmatch(); none: the
   ///   usual one.
   /// @throws TransportError if the library refuses the endpoint.
   explicit Subscriber(Participant& participant,
                       Profile profile = Profile::kLive,
                       Overflow overflow = Overflow::kLibrary,
-                      const std::string& partition = {});
+                      const std::vector<std::string>& partitions = {});
   ~Subscriber();
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;
@@ -188,6 +189,7 @@ extern template class Publisher<ModelSetInfoMessage>;
 extern template class Publisher<MonitorStatusMessage>;
 extern template class Publisher<PairState>;
 extern template class Publisher<OperatorAction>;
+extern template class Publisher<MonitorShare>;
 extern template class Subscriber<ValveSampleMessage>;
 extern template class Subscriber<DecisionMessage>;
 extern template class Subscriber<DecisionBatchMessage>;
@@ -196,5 +198,6 @@ extern template class Subscriber<ModelSetInfoMessage>;
 extern template class Subscriber<MonitorStatusMessage>;
 extern template class Subscriber<PairState>;
 extern template class Subscriber<OperatorAction>;
+extern template class Subscriber<MonitorShare>;
 
 }  // namespace fdi::idl

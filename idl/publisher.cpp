@@ -48,9 +48,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
         options.profile,
         options.valves > 0 ? options.valves : bus.options().max_valves);
     dds::PublisherQos publisher_qos;
-    if (!options.also_partition.empty()) {
-      publisher_qos.partition().push_back("");
-      publisher_qos.partition().push_back(options.also_partition.c_str());
+    for (const std::string& partition : options.partitions) {
+      publisher_qos.partition().push_back(partition.c_str());
     }
     publisher = {
         NotNull(bus->create_publisher(publisher_qos), "create_publisher"),
@@ -238,5 +237,6 @@ template class Publisher<ModelSetInfoMessage>;
 template class Publisher<MonitorStatusMessage>;
 template class Publisher<PairState>;
 template class Publisher<OperatorAction>;
+template class Publisher<MonitorShare>;
 
 }  // namespace fdi::idl

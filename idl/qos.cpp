@@ -250,6 +250,13 @@ EndpointQos QosFor<PairState>(Profile /*profile*/, int /*valves*/) {
 }
 
 template <>
+EndpointQos QosFor<MonitorShare>(Profile /*profile*/, int /*valves*/) {
+  EndpointQos qos = Common("fdi_monitor_share");
+  KeepLast(qos, kMonitors, 1, 1);
+  return qos;
+}
+
+template <>
 EndpointQos QosFor<OperatorAction>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_operator_action");
   KeepInFlight(qos, kActionsInFlight);
@@ -266,7 +273,8 @@ const std::set<std::string>& EndpointNames() {
                                            "fdi_model_set_info",
                                            "fdi_monitor_status",
                                            "fdi_pair_state",
-                                           "fdi_operator_action"};
+                                           "fdi_operator_action",
+                                           "fdi_monitor_share"};
   return names;
 }
 

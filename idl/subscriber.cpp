@@ -71,7 +71,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   };
 
   Impl(Participant& participant, Profile profile, Overflow overflow,
-       const std::string& partition)
+       const std::vector<std::string>& partitions)
       : bus(participant.impl()),
         holds_receipt(overflow == Overflow::kOnTheWay),
         max_keys(4 * static_cast<std::size_t>(bus.options().max_valves) +
@@ -83,7 +83,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     // The reader is enabled once `reader` is set: callbacks use it.
     dds::SubscriberQos subscriber_qos;
     subscriber_qos.entity_factory().autoenable_created_entities = false;
-    if (!partition.empty()) {
+    for (const std::string& partition : partitions) {
       subscriber_qos.partition().push_back(partition.c_str());
     }
     subscriber = {
@@ -317,9 +317,10 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
 
 template <typename Message>
 Subscriber<Message>::Subscriber(Participant& participant, Profile profile,
-                                Overflow overflow, const std::string& partition)
-    : impl_(std::make_unique<Impl>(participant, profile, overflow, partition)) {
-}
+                                Overflow overflow,
+                                const std::vector<std::string>& partitions)
+    : impl_(
+          std::make_unique<Impl>(participant, profile, overflow, partitions)) {}
 
 template <typename Message>
 Subscriber<Message>::~Subscriber() = default;
@@ -372,5 +373,6 @@ template class Subscriber<ModelSetInfoMessage>;
 template class Subscriber<MonitorStatusMessage>;
 template class Subscriber<PairState>;
 template class Subscriber<OperatorAction>;
+template class Subscriber<MonitorShare>;
 
 }  // namespace fdi::idl

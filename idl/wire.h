@@ -8,6 +8,7 @@
 
 #include "diagnosis/model_set.h"
 #include "diagnosis/records/fault_event.h"
+#include "diagnosis/records/monitor_share.h"
 #include "diagnosis/records/operator_action.h"
 #include "diagnosis/records/pair_state.h"
 #include "diagnosis/sample.h"

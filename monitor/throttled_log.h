@@ -43,6 +43,7 @@ enum class LogId : std::uint8_t {
   kStalled = 151,        ///< threads_stalled
   kPairTwin = 152,       ///< pair_rank_taken
   kOperatorSync = 153,   ///< operator_action_waits, operator_action_refused
+  kContested = 154,      ///< valves_contested: of two monitors, no pair
   kLookDropped = 161,    ///< second_look_dropped
   kLookFailed = 162,     ///< second_look_failed
 };

@@ -22,6 +22,7 @@
 #include <unistd.h>
 
 #include "diagnosis/error.h"
+#include "diagnosis/records/partitions.h"
 
 namespace fdi::idl {
 namespace {
@@ -41,6 +42,8 @@ constexpr const char* kCaKey = "ca.key";
 constexpr const char* kGovernance = "governance.p7s";
 constexpr const char* kCertificate = "cert.pem";
 constexpr const char* kKey = "key.pem";
+constexpr std::string_view kPartition = "<partition>";
+constexpr std::string_view kPartitionEnd = "</partition>";
 constexpr const char* kPermissions = "permissions.p7s";
 
 struct RoleRow {
@@ -57,10 +60,10 @@ const std::vector<RoleRow>& Roles() {
        "monitor",
        {"fdi/v1/DecisionVector", "fdi/v1/DecisionBatch", "fdi/v1/FaultEvent",
         "fdi/v1/ModelSetInfo", "fdi/v1/MonitorStatus", "fdi/v1/PairState",
-        "fdi/v1/OperatorAction"},
-       // Beside samples, what the monitor says that it stands in for.
+        "fdi/v1/OperatorAction", "fdi/v1/MonitorShare"},
+       // Beside samples, what other monitors say to it.
        {"fdi/v1/ValveSample", "fdi/v1/DecisionVector", "fdi/v1/FaultEvent",
-        "fdi/v1/PairState", "fdi/v1/OperatorAction"}},
+        "fdi/v1/PairState", "fdi/v1/OperatorAction", "fdi/v1/MonitorShare"}},
       {Role::kReader, "reader", {}, {"fdi/v1/*"}}};
   return kRoles;
 }
@@ -340,7 +343,8 @@ std::string ReadSigned(const fs::path& file, X509* authority) {
 }
 
 std::string TopicList(const char* element,
-                      const std::vector<std::string_view>& topics) {
+                      const std::vector<std::string_view>& topics,
+                      const std::vector<std::string>& partitions = {}) {
   if (topics.empty()) {
     return "";
   }
@@ -348,8 +352,12 @@ std::string TopicList(const char* element,
   for (const std::string_view topic : topics) {
     xml += "<topic>" + std::string(topic) + "</topic>";
   }
-  return xml + "</topics><partitions><partition>*</partition></partitions></" +
-         element + ">\n";
+  xml += "</topics><partitions>";
+  for (const std::string& partition :
+       partitions.empty() ? std::vector<std::string>{"*"} : partitions) {
+    xml.append(kPartition).append(partition).append(kPartitionEnd);
+  }
+  return xml + "</partitions></" + element + ">\n";
 }
 
 constexpr std::string_view kHead =
@@ -361,7 +369,7 @@ constexpr std::string_view kHead =
 // The name of the grant is that of the role. Times have a margin: what counts
 // is the certificate.
 std::string PermissionsXml(const std::string& name, Role role,
-                           std::int64_t until) {
+                           const std::string& partitions, std::int64_t until) {
   const auto row = std::ranges::find(Roles(), role, &RoleRow::role);
   return std::string(kHead) +
          "omg_shared_ca_permissions.xsd\">\n"
@@ -379,7 +387,8 @@ std::string PermissionsXml(const std::string& name, Role role,
          "      <allow_rule>\n"
          "        <domains><id_range><min>0</min><max>232</max></id_range>"
          "</domains>\n" +
-         TopicList("publish", row->publishes) +
+         TopicList("publish", row->publishes,
+                   ParsePartitions(partitions, false)) +
          TopicList("subscribe", row->subscribes) +
          "      </allow_rule>\n"
          "      <default>DENY</default>\n"
@@ -436,6 +445,22 @@ void RequireAuthority(const fs::path& folder) {
   }
 }
 
+std::string GatewayPartitions(const std::string& permissions) {
+  std::string names;
+  const std::string_view text =
+      std::string_view(permissions).substr(0, permissions.find("</publish>"));
+  for (std::size_t at = text.find(kPartition); at != std::string_view::npos;
+       at = text.find(kPartition, at)) {
+    at += kPartition.size();
+    const std::string_view name =
+        text.substr(at, text.find(kPartitionEnd, at) - at);
+    if (name != "*") {
+      names.append(names.empty() ? "" : ",").append(name);
+    }
+  }
+  return names;
+}
+
 // CheckKey(), but for the times.
 KeyInfo Examine(const fs::path& folder) {
   const Certificate authority = ReadCertificate(folder / kCaCertificate);
@@ -478,6 +503,7 @@ KeyInfo Examine(const fs::path& folder) {
            "grants the role '" + role + "', expected " + kRoleNames);
   }
   info.role = *parsed;
+  info.partitions = GatewayPartitions(permissions);
   info.from_ns =
       SecondsOf(X509_get0_notBefore(certificate.get())) * kNsPerSecond;
   info.until_ns =
@@ -521,8 +547,11 @@ void MakeAuthority(const fs::path& folder, int days) {
 }
 
 KeyInfo MakeKey(const fs::path& folder, const std::string& name, Role role,
-                int days, bool replace) {
+                int days, bool replace, const std::string& partitions) {
   RequireName(name);
+  if (!partitions.empty() && role != Role::kGateway) {
+    throw ConfigError("--partition is for keys of gateways");
+  }
   RequireDays(days);
   RequireAuthority(folder);
   const fs::path target = folder / name;
@@ -546,7 +575,7 @@ KeyInfo MakeKey(const fs::path& folder, const std::string& name, Role role,
   Write(fresh / kKey, Pem(key.get()), 0600);
   Write(fresh / kCertificate, Pem(certificate.get()), 0644);
   Write(fresh / kPermissions,
-        Sign(PermissionsXml(name, role, until), authority.get(),
+        Sign(PermissionsXml(name, role, partitions, until), authority.get(),
              authority_key.get()),
         0644);
   Write(fresh / kCaCertificate, Read(folder / kCaCertificate), 0644);

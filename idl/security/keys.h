@@ -35,6 +35,8 @@ inline constexpr int kDaysOfWarning = 30;
 struct KeyInfo {
   std::string name;  ///< Common name of the certificate, name of the folder.
   Role role{Role::kReader};
+  /// Where a gateway may publish samples, as in --partition; empty: anywhere.
+  std::string partitions{};
   std::int64_t from_ns{0};   ///< UTC
   std::int64_t until_ns{0};  ///< UTC; the authority's, if that is earlier.
 };
@@ -48,12 +50,15 @@ void MakeAuthority(const std::filesystem::path& folder, int days);
 /// Makes the key `name` in `folder`/`name`; with `replace` in place of the one
 /// that is there, whole or not at all.
 /// @param name 1..64 letters, digits, '.', '_', '-'; no '.' in front.
+/// @param partitions of a gateway, see KeyInfo.
 /// @param days 1..36500; it ends with the authority at the latest.
 /// @throws ConfigError if there is no authority, the key is there (without
-///   `replace`: is not there), or the name or `days` is not accepted.
+///   `replace`: is not there), or the name, `partitions` or `days` is not
+///   accepted.
 /// @throws DataError if a file cannot be read or written.
 KeyInfo MakeKey(const std::filesystem::path& folder, const std::string& name,
-                Role role, int days, bool replace);
+                Role role, int days, bool replace,
+                const std::string& partitions = {});
 
 /// The keys in `folder`, by name. @throws as CheckKey(), without its times.
 std::vector<KeyInfo> ListKeys(const std::filesystem::path& folder);

@@ -38,8 +38,8 @@ std::string IsolatedNames(const FaultEvent& message) {
 BusDecisionSink::BusDecisionSink(idl::Participant& participant,
                                  const std::string& batches_of,
                                  std::stop_token stop,
-                                 const std::string& partition)
-    : live_(participant, {idl::Profile::kLive, 0, partition}),
+                                 const std::vector<std::string>& partitions)
+    : live_(participant, {idl::Profile::kLive, 0, partitions}),
       stop_(std::move(stop)) {
   if (!batches_of.empty()) {
     batches_.emplace(participant,
@@ -143,8 +143,8 @@ idl::PublisherStatus BusDecisionSink::status() const {
 }
 
 BusEventSink::BusEventSink(idl::Participant& participant, LogSink log,
-                           const std::string& partition)
-    : publisher_(participant, {idl::Profile::kLive, 0, partition}),
+                           const std::vector<std::string>& partitions)
+    : publisher_(participant, {idl::Profile::kLive, 0, partitions}),
       log_(std::move(log)) {}
 
 bool BusEventSink::Publish(const FaultEvent& event, bool persisted) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "diagnosis/log.h"
 #include "idl/endpoint.h"
@@ -20,10 +21,11 @@ class BusDecisionSink : public DecisionSink {
  public:
   /// @param batches_of the monitor as subscribers of batches see it; empty: no
   ///   batches.
-  /// @param partition where a monitor that stands in for us reads; empty:
-  ///   nowhere beside the usual one.
+  /// @param partitions where subscribers read, and a monitor that stands in
+  ///   for us; none: the usual one.
   BusDecisionSink(idl::Participant& participant, const std::string& batches_of,
-                  std::stop_token stop, const std::string& partition = {});
+                  std::stop_token stop,
+                  const std::vector<std::string>& partitions = {});
 
   bool Publish(const std::string& valve_id, const ModelSet* models,
                const Verdict& verdict) override;
@@ -66,9 +68,9 @@ class BusDecisionSink : public DecisionSink {
 /// Fault events over DDS; each is a line of the log as well.
 class BusEventSink : public EventSink {
  public:
-  /// @param partition as of BusDecisionSink.
+  /// @param partitions as of BusDecisionSink.
   BusEventSink(idl::Participant& participant, LogSink log,
-               const std::string& partition = {});
+               const std::vector<std::string>& partitions = {});
 
   bool Publish(const FaultEvent& event, bool persisted) override;
   /// For subscribers that came after `event` was published by another one.

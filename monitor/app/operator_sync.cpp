@@ -27,7 +27,7 @@ OperatorSync::OperatorSync(idl::Participant& participant,
       done_here_(history),
       history_(history),
       log_(log),
-      out_(participant, {idl::Profile::kLossless, 0, PartitionOf(options)}),
+      out_(participant, {idl::Profile::kLossless, 0, PartitionsOf(options)}),
       in_(participant, idl::Profile::kLive, idl::Overflow::kLibrary,
           PartitionOfOthers(options)) {}
 

@@ -88,12 +88,12 @@ void Validate(const PairOptions& options) {
   }
 }
 
-std::string PartitionOf(const PairOptions& options) {
-  return "pair/" + options.name + "/" + std::to_string(options.rank);
+std::vector<std::string> PartitionsOf(const PairOptions& options) {
+  return {"", "pair/" + options.name + "/" + std::to_string(options.rank)};
 }
 
-std::string PartitionOfOthers(const PairOptions& options) {
-  return "pair/" + options.name + "/[!" + std::to_string(options.rank) + "]";
+std::vector<std::string> PartitionOfOthers(const PairOptions& options) {
+  return {"pair/" + options.name + "/[!" + std::to_string(options.rank) + "]"};
 }
 
 Pair::Pair(idl::Participant& participant, const PairOptions& options,

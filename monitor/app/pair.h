@@ -8,6 +8,7 @@
 #include <mutex>
 #include <string>
 #include <unordered_map>
+#include <vector>
 
 #include "idl/endpoint.h"
 #include "monitor/app/bus_sinks.h"
@@ -27,11 +28,11 @@ struct PairOptions {
 /// @throws ConfigError naming the option and what is accepted.
 void Validate(const PairOptions& options);
 
-/// Where this monitor of a pair publishes beside the usual partition, so that
-/// the other one hears it and it does not hear itself.
-std::string PartitionOf(const PairOptions& options);
+/// Where this monitor of a pair publishes: in the usual partition, and in one
+/// where the other monitor hears it and it does not hear itself.
+std::vector<std::string> PartitionsOf(const PairOptions& options);
 /// Where the other one does, as a pattern.
-std::string PartitionOfOthers(const PairOptions& options);
+std::vector<std::string> PartitionOfOthers(const PairOptions& options);
 
 /// One of two monitors that stand in for each other. Both diagnose and record
 /// everything; what they would publish goes through here, and the one that does

@@ -18,6 +18,7 @@
 #include <systemd/sd-daemon.h>
 
 #include "cli/time_text.h"
+#include "diagnosis/records/partitions.h"
 #include "monitor/app/cause_groups.h"
 #include "monitor/app/shadow.h"
 #include "monitor/app/verbs.h"
@@ -95,8 +96,9 @@ int IntakeValves(int max_valves) {
   return std::min(max_valves + kStrangers, kMost);
 }
 
-std::string PairPartition(const ServiceOptions& options) {
-  return options.pair ? PartitionOf(*options.pair) : "";
+std::vector<std::string> Partitions(const ServiceOptions& options) {
+  return options.pair ? PartitionsOf(*options.pair)
+                      : std::vector<std::string>{};
 }
 
 std::string PairText(const Pair& pair) {
@@ -155,8 +157,8 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
                 : std::make_unique<RunStore>(data_.runs(), context.software)),
       decisions_(participant_,
                  options.lossless_decisions ? MonitorName() : std::string(),
-                 publication_stop_.get_token(), PairPartition(options)),
-      events_(participant_, context.log, PairPartition(options)),
+                 publication_stop_.get_token(), Partitions(options)),
+      events_(participant_, context.log, Partitions(options)),
       outward_(
           delivery_ == nullptr
               ? nullptr
@@ -168,7 +170,8 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
       samples_(
           intake_participant_,
           options.best_effort ? idl::Profile::kBestEffort : idl::Profile::kLive,
-          idl::Overflow::kOnTheWay),
+          idl::Overflow::kOnTheWay,
+          ParsePartitions(context.options.partition, true)),
       log_(context.log),
       pair_(options.pair ? std::make_unique<Pair>(participant_, *options.pair,
                                                   MonitorName(), decisions_,
@@ -178,6 +181,10 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
                                     participant_, *options.pair, MonitorName(),
                                     data_.history(), log_)
                               : nullptr),
+      shares_(participant_,
+              {MonitorName(), options.pair ? options.pair->name : "",
+               options.valves, context.options.partition},
+              log_),
       pipeline_(WithDelivery(pipeline_options_), Sinks(), assignment_,
                 {counters_, log_, cli::NowNs}),
       heartbeat_(Members(pipeline_, service_pulse_)),
@@ -399,6 +406,7 @@ void Service::Tick() {
     log_.Report(LogId::kModelFailure, "models_unreadable",
                 [&reason] { return "reason=\"" + reason + "\""; });
   }
+  shares_.Tick(pipeline_.valve_names());
   ReportLoss();
   ReportStall();
   PublishStatus();
@@ -446,7 +454,8 @@ StatusFacts Service::Facts() const {
           pipeline_.history_degraded(),
           pipeline_.recording_degraded(),
           heartbeat_.StalledSince(Clock::now() - kStallLimit),
-          pair_ ? std::optional(pair_->status()) : std::nullopt};
+          pair_ ? std::optional(pair_->status()) : std::nullopt,
+          shares_.contested()};
 }
 
 std::string Service::Metrics() const {

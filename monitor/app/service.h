@@ -21,6 +21,7 @@
 #include "monitor/app/operator_sync.h"
 #include "monitor/app/pair.h"
 #include "monitor/app/run_store.h"
+#include "monitor/app/share_watch.h"
 #include "monitor/app/status.h"
 #include "monitor/console/console.h"
 #include "monitor/heartbeat.h"
@@ -137,6 +138,7 @@ class Service {
   ThrottledLog log_;
   std::unique_ptr<Pair> pair_;               // Null: nobody stands in for us.
   std::unique_ptr<OperatorSync> operators_;  // With pair_.
+  ShareWatch shares_;
   Pipeline pipeline_;
   Pulse service_pulse_;  // Of the thread of Run().
   Heartbeat heartbeat_;

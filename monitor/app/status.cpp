@@ -219,6 +219,9 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
        "stale", census.stale},
       {"valves_ended", "fdi_valves_silent", kGauge, kSilentHelp, "reason",
        "ended", census.ended},
+      {"valves_contested", "fdi_valves_contested", kGauge,
+       "Valves that another monitor takes, too, which is not of our pair", "",
+       "", facts.contested.count},
       {"open_episodes", "fdi_open_episodes", kGauge, "Fault episodes now", "",
        "", census.open_episodes},
       {"trace_bytes", "fdi_trace_bytes", kGauge,
@@ -270,6 +273,12 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   if (facts.pair && facts.pair->others == 0) {
     status.text += status.text.empty() ? "" : "; ";
     status.text += "nobody stands by";
+  }
+  if (facts.contested.count > 0) {
+    status.text += status.text.empty() ? "" : "; ";
+    status.text += facts.contested.monitor + " takes " +
+                   std::to_string(facts.contested.count) +
+                   " of these valves, too: " + facts.contested.example;
   }
   status.health =
       status.text.empty() ? idl::Health::kOk : idl::Health::kDegraded;

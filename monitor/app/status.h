@@ -11,6 +11,7 @@
 #include "idl/endpoint.h"
 #include "idl/wire.h"
 #include "monitor/app/pair.h"
+#include "monitor/app/share_watch.h"
 #include "monitor/console/access.h"
 #include "monitor/console/live_stream.h"
 #include "monitor/counters.h"
@@ -37,6 +38,7 @@ struct StatusFacts {
   bool recording_degraded{false};
   std::vector<std::string_view> stalled;  ///< Threads.
   std::optional<Pair::Status> pair{};     ///< If there is one.
+  ContestedValves contested{};
 };
 
 /// All that is counted and measured, the counters first.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "cli/logging.h"
+#include "diagnosis/records/partitions.h"
 
 namespace fdi::simulator {
 namespace {
@@ -22,9 +23,10 @@ constexpr milliseconds kLiveAcknowledge(2000);
 constexpr milliseconds kLosslessAcknowledge(60'000);
 
 idl::PublisherOptions WriterOptions(const SamplePublisherOptions& options,
-                                    std::size_t valves) {
+                                    std::size_t valves,
+                                    const std::string& partition) {
   return {options.lossless ? idl::Profile::kLossless : idl::Profile::kLive,
-          static_cast<int>(valves)};
+          static_cast<int>(valves), ParsePartitions(partition, false)};
 }
 
 std::string Seconds(double seconds) {
@@ -58,7 +60,8 @@ SamplePublisher::SamplePublisher(const SamplePublisherOptions& options,
       signals_(signals),
       participant_(DdsOptionsOf(context.options, valve_ids_.size()), log_,
                    "fdi-simulator"),
-      writer_(participant_, WriterOptions(options, valve_ids_.size())) {}
+      writer_(participant_, WriterOptions(options, valve_ids_.size(),
+                                          context.options.partition)) {}
 
 void SamplePublisher::AwaitReader() {
   const bool needed = options_.needs_reader;

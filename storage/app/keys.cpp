@@ -15,6 +15,7 @@ struct KeyOptions {
   std::string folder;
   std::string name;
   std::string role;
+  std::string partitions;
   int days{kKeyDays};
 };
 
@@ -22,6 +23,7 @@ struct KeyOptions {
 Json KeyJson(const idl::KeyInfo& key) {
   return {{"name", key.name},
           {"role", idl::RoleName(key.role)},
+          {"partitions", key.partitions},
           {"from_utc", TimeJson(key.from_ns)},
           {"until_utc", TimeJson(key.until_ns)},
           {"days_left",
@@ -34,6 +36,7 @@ Report ShowKeys(Json keys) {
   report.Table("keys",
                {{"key", "name"},
                 {"role", "role"},
+                {"partitions", "partitions"},
                 {"valid until", "until_utc", cli::Format::kTime},
                 {.heading = "days left",
                  .key = "days_left",
@@ -66,7 +69,8 @@ Report Add(const KeyOptions& options, const Context&) {
                       idl::kRoleNames);
   }
   return ShowKeys(Json::array({KeyJson(idl::MakeKey(
-      options.folder, options.name, *role, options.days, false))}));
+      options.folder, options.name, *role, options.days, false,
+      options.partitions))}));
 }
 
 Report Renew(const KeyOptions& options, const Context&) {
@@ -76,7 +80,8 @@ Report Renew(const KeyOptions& options, const Context&) {
     throw NotFoundError("no key '" + options.name + "' in " + options.folder);
   }
   return ShowKeys(Json::array({KeyJson(idl::MakeKey(
-      options.folder, options.name, key->role, options.days, true))}));
+      options.folder, options.name, key->role, options.days, true,
+      key->partitions))}));
 }
 
 Report List(const KeyOptions& options, const Context&) {
@@ -121,12 +126,15 @@ void AddKeysVerbs(cli::Program& program) {
                     "gateway (publishes samples), monitor, or reader (of all "
                     "topics)")
         ->required();
+    verb.add_option("--partition", options.partitions,
+                    "Where a gateway may publish (default: anywhere)")
+        ->type_name("NAME[,NAME]");
     AddDays(verb, options);
   }
   {
     auto [verb, options] =
         AddVerb(program, group, "renew",
-                "Make a key anew in its folder, with the same role", Renew);
+                "Make a key anew in its folder, with the same rights", Renew);
     AddFolder(verb, options);
     AddName(verb, options);
     AddDays(verb, options);

@@ -3,8 +3,12 @@
 
 #include "cli/signal_list.h"
 #include "diagnosis/error.h"
+#include "diagnosis/records/valve_glob.h"
 #include "storage/app/verbs.h"
+#include "storage/database/locks.h"
+#include "storage/history/history_database.h"
 #include "storage/history/history_reader.h"
+#include "storage/history/valve_move.h"
 #include "storage/models/models.h"
 
 namespace fdi::storage {
@@ -287,6 +291,99 @@ Report Remove(const std::string& pattern, const Context& context) {
   return report.Line(pattern + " removed");
 }
 
+struct MoveOptions {
+  std::string pattern;
+  std::string target;
+};
+
+ExclusiveLock LockOf(const DataDirectory& data) {
+  std::filesystem::path path = data.history();
+  return {path += ".lock", "recording faults; stop it to move valves"};
+}
+
+// Ids in models.db and history.db, of those that the glob matches.
+std::vector<std::string> ValvesToMove(ModelStore& models, Database& history,
+                                      const std::string& glob) {
+  std::vector<std::string> valves = ValvesInProgress(history, glob);
+  for (const ValveEntry& entry : models.Valves()) {
+    if (entry.pattern.find_first_of("*?[") == std::string::npos &&
+        GlobMatches(glob, entry.pattern)) {
+      valves.push_back(entry.pattern);
+    }
+  }
+  std::ranges::sort(valves);
+  valves.erase(std::ranges::unique(valves).begin(), valves.end());
+  return valves;
+}
+
+// First all is copied, then all is deleted: what is interrupted is done anew.
+Report Move(const MoveOptions& options, const Context& context) {
+  const DataDirectory from = DataOf(context);
+  const DataDirectory to{options.target};
+  std::error_code error;
+  if (std::filesystem::equivalent(from.path, to.path, error)) {
+    throw ConfigError("--to is the data directory that the valves are in");
+  }
+  if (!std::filesystem::exists(from.history())) {
+    throw NotFoundError("no monitor has run in " + from.path.string());
+  }
+  const ExclusiveLock lock = LockOf(from);
+  Database history(from.history(), HistorySchema(), Access::kOccasionalWriter);
+  ModelStore models(from.models(), Access::kOccasionalWriter);
+  const auto valves = ValvesToMove(models, history, options.pattern);
+  if (valves.empty()) {
+    throw NotFoundError("no valve that matches '" + options.pattern + "' in " +
+                        from.path.string());
+  }
+  EnsureExists(to);
+  const ExclusiveLock lock_there = LockOf(to);
+  Database there(to.history(), HistorySchema(), Access::kOccasionalWriter);
+  ModelStore models_there(to.models(), Access::kOccasionalWriter);
+  Report report;
+  Json rows = Json::array();
+  for (const std::string& valve : valves) {
+    const auto hash = history.QueryInt64(
+        "SELECT model_hash FROM accumulator WHERE valve_id = ?", valve);
+    const auto set = models_there.TakeValve(
+        models, valve,
+        hash ? std::optional(static_cast<std::uint64_t>(*hash)) : std::nullopt);
+    const MovedHistory moved =
+        CopyProgress(there, from.history(), valve, cli::NowNs());
+    rows.push_back({{"valve_id", valve},
+                    {"model_set", SetJson(set)},
+                    {"accumulators", moved.accumulators},
+                    {"open_episodes", moved.episodes},
+                    {"shelves", moved.shelves}});
+  }
+  for (const std::string& valve : valves) {
+    RemoveProgress(history, valve);
+    const auto entry = models.FindValve(valve);
+    if (entry && entry->pattern == valve) {
+      models.RemoveValve(valve);
+    }
+  }
+  report.document["to"] = to.path.string();
+  report.document["valves"] = std::move(rows);
+  return report.Table("valves", {{"valve", "valve_id"},
+                                 {"model set", "model_set"},
+                                 {"accumulators", "accumulators"},
+                                 {"open episodes", "open_episodes"},
+                                 {"shelves", "shelves"}});
+}
+
+void AddMove(cli::Program& program, CLI::App& group) {
+  auto [verb, options] = AddVerb(
+      program, group, "move",
+      "Bring valves to another monitor, which goes on where this one is: "
+      "model set, entry, accumulators, open episodes, shelves",
+      Move);
+  verb.add_option("valve", options.pattern, "Id or glob")->required();
+  verb.add_option("--to", options.target,
+                  "Its data directory, or a new one to carry there")
+      ->type_name("DIR")
+      ->required();
+}
+
 void AddAdd(cli::Program& program, CLI::App& group) {
   auto [verb, options] =
       AddVerb(program, group, "add",
@@ -339,6 +436,7 @@ void AddValvesVerbs(cli::Program& program) {
   assign.add_option("model-set", assigned.set, "NAME[@VERSION] or none")
       ->required();
   AddEvent(program, group);
+  AddMove(program, group);
   auto [remove, removed] =
       AddVerb(program, group, "remove", "Remove an entry", Remove);
   remove.add_option("valve", removed, "Id, or the glob of an entry")

@@ -369,3 +369,77 @@ SELECT 'episode_event ' || event_id || ': its episode id ' ||
       ' (in event_outbox, not sent)', '')
 FROM episode_event v
 WHERE length(episode_id) <> 16 OR episode_id GLOB '*[^0-9a-f]*'
+
+-- ---- What a monitor is at with a valve, from another history, which is
+-- ---- attached as `source` and of the same version.
+-- name: valves_in_progress
+SELECT valve_id FROM accumulator WHERE valve_id GLOB ?1
+UNION SELECT valve_id FROM episode
+WHERE ended_ns IS NULL AND valve_id GLOB ?1 ORDER BY 1
+-- name: copy_accumulator
+INSERT INTO accumulator SELECT * FROM source.accumulator WHERE valve_id = ?
+ON CONFLICT (valve_id) DO UPDATE SET source_id = excluded.source_id,
+  model_hash = excluded.model_hash, stamp_ns = excluded.stamp_ns,
+  bytes = excluded.bytes
+WHERE excluded.stamp_ns > accumulator.stamp_ns
+-- name: copy_shadow_accumulator
+INSERT INTO shadow_accumulator
+SELECT * FROM source.shadow_accumulator WHERE valve_id = ?
+ON CONFLICT (valve_id) DO UPDATE SET source_id = excluded.source_id,
+  model_hash = excluded.model_hash, stamp_ns = excluded.stamp_ns,
+  bytes = excluded.bytes
+WHERE excluded.stamp_ns > shadow_accumulator.stamp_ns
+-- name: copy_open_episodes
+INSERT OR IGNORE INTO episode (episode_id, valve_id, source_id, detected_ns,
+  isolated_ns, cleared_ns, fault_bits, peak_factor, strength, model_set,
+  model_hash, flow_unit, channels, faults, label, acked_by, acked_ns,
+  unknown_kind, fault, layer)
+SELECT episode_id, valve_id, source_id, detected_ns, isolated_ns, cleared_ns,
+  fault_bits, peak_factor, strength, model_set, model_hash, flow_unit,
+  channels, faults, label, acked_by, acked_ns, unknown_kind, fault, layer
+FROM source.episode WHERE valve_id = ? AND ended_ns IS NULL
+-- name: copy_open_faults
+INSERT OR IGNORE INTO episode_fault
+SELECT s.* FROM source.episode_fault s JOIN source.episode e USING (episode_id)
+WHERE e.valve_id = ? AND e.ended_ns IS NULL
+-- name: copy_open_events
+INSERT OR IGNORE INTO episode_event (episode_id, kind, stamp_ns, recorded_ns,
+  faults, fault_bits, factor, strength, reason, value, who, comment, origin,
+  layer)
+SELECT s.episode_id, s.kind, s.stamp_ns, s.recorded_ns, s.faults, s.fault_bits,
+  s.factor, s.strength, s.reason, s.value, s.who, s.comment, s.origin, s.layer
+FROM source.episode_event s JOIN source.episode e USING (episode_id)
+WHERE e.valve_id = ? AND e.ended_ns IS NULL ORDER BY s.event_id
+-- name: copy_open_outbox
+INSERT OR IGNORE INTO event_outbox
+SELECT t.event_id FROM source.event_outbox o
+  JOIN source.episode_event s USING (event_id)
+  JOIN source.episode e USING (episode_id)
+  JOIN main.episode_event t USING (episode_id, kind, stamp_ns)
+WHERE e.valve_id = ? AND e.ended_ns IS NULL
+-- name: copy_open_traces
+INSERT OR IGNORE INTO episode_trace
+SELECT s.* FROM source.episode_trace s JOIN source.episode e USING (episode_id)
+WHERE e.valve_id = ? AND e.ended_ns IS NULL
+-- name: copy_open_looks
+INSERT OR IGNORE INTO episode_look
+SELECT s.* FROM source.episode_look s JOIN source.episode e USING (episode_id)
+WHERE e.valve_id = ? AND e.ended_ns IS NULL
+-- name: copy_open_look_faults
+INSERT OR IGNORE INTO episode_look_fault
+SELECT s.* FROM source.episode_look_fault s
+  JOIN source.episode e USING (episode_id)
+WHERE e.valve_id = ? AND e.ended_ns IS NULL
+-- name: copy_open_look_rows
+INSERT OR IGNORE INTO episode_look_row
+SELECT s.* FROM source.episode_look_row s
+  JOIN source.episode e USING (episode_id)
+WHERE e.valve_id = ? AND e.ended_ns IS NULL
+-- name: copy_shelves
+INSERT INTO shelf (valve_id, fault, from_ns, until_ns, who, comment, origin)
+SELECT valve_id, fault, from_ns, until_ns, who, comment, origin
+FROM source.shelf s
+WHERE valve_id = ?1 AND until_ns > ?2 AND ended_ns IS NULL
+  AND NOT EXISTS (SELECT 1 FROM main.shelf t
+    WHERE (t.valve_id, t.fault, t.from_ns, t.until_ns, t.who) IS
+      (s.valve_id, s.fault, s.from_ns, s.until_ns, s.who))

@@ -250,6 +250,17 @@ class ModelStore {
   /// set whose name is the valve's id, else none: the valve is UNASSIGNED.
   std::optional<ModelReference> AssignedModelSet(std::string_view valve_id);
 
+  /// Takes over from `other` what it knows of a valve: the model set that
+  /// diagnoses it, and as its own entry the one that matches, with baselines
+  /// and events. Twice is once.
+  /// @param in_use content hash of the set that counts if none is assigned.
+  /// @returns the set here; nothing if there is none.
+  /// @throws ConfigError if an entry of a glob stands first and gives the valve
+  ///   another set.
+  std::optional<ModelReference> TakeValve(ModelStore& other,
+                                          const std::string& valve_id,
+                                          std::optional<std::uint64_t> in_use);
+
   /// Counts changes of active sets, assignments and valve entries.
   std::int64_t Generation();
 
@@ -264,6 +275,9 @@ class ModelStore {
                         const std::optional<ModelReference>& reference);
   /// Within a transaction.
   void StoreEntry(const ValveEntry& entry);
+  std::optional<ModelReference> FindContent(std::uint64_t hash);
+  ModelReference TakeModelSet(ModelStore& other,
+                              const ModelReference& reference);
 
   Database database_;
 };

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -95,6 +96,19 @@ std::string JsonOf(const std::vector<ChannelFigures>& channels) {
             ", \"vaf\": " + JsonNumber(c.vaf) + '}';
   }
   return text + ']';
+}
+
+void InsertBaseline(Database& database, std::string_view pattern,
+                    const BaselineRecord& record) {
+  database.Run(sql::insert_baseline, pattern, record.epoch, record.model_set,
+               record.version, record.created_ns, record.hours,
+               JsonOf(record.parameters), JsonOf(record.channels));
+}
+
+void InsertEvent(Database& database, std::string_view pattern,
+                 const ValveEvent& event) {
+  database.Run(sql::insert_valve_event, pattern, event.epoch, event.kind,
+               event.note, event.at_ns, event.who);
 }
 
 double NumberOf(const Statement& row, int column) {
@@ -223,6 +237,73 @@ std::optional<ModelReference> ModelStore::AssignedModelSet(
   return reference;
 }
 
+std::optional<ModelReference> ModelStore::FindContent(std::uint64_t hash) {
+  const std::vector<ModelSummary> sets = List();
+  const auto found = std::ranges::find(sets, hash, &ModelSummary::content_hash);
+  return found == sets.end()
+             ? std::nullopt
+             : std::optional(ModelReference{found->name, found->version});
+}
+
+ModelReference ModelStore::TakeModelSet(ModelStore& other,
+                                        const ModelReference& reference) {
+  const ModelSet models = other.Load(reference);
+  if (const auto found = FindContent(models.content_hash)) {
+    return *found;
+  }
+  const ModelSet saved =
+      Save(models, Activation::kIfFirst, other.LineageOf(reference));
+  return {saved.name, saved.version};
+}
+
+std::optional<ModelReference> ModelStore::TakeValve(
+    ModelStore& other, const std::string& valve_id,
+    std::optional<std::uint64_t> in_use) {
+  auto assigned = other.AssignedModelSet(valve_id);
+  if (!assigned && in_use) {
+    assigned = other.FindContent(*in_use);
+  }
+  const auto theirs = other.FindValve(valve_id);
+  const bool of_its_own = theirs && theirs->pattern == valve_id;
+  const auto ours = AssignedModelSet(valve_id);
+  const bool same =
+      assigned && ours &&
+      other.Summary(*assigned).content_hash == Summary(*ours).content_hash;
+  if (same && !of_its_own) {
+    return ours;
+  }
+  if (!assigned && !of_its_own) {
+    return std::nullopt;
+  }
+  const auto first = FindValve(valve_id);
+  if (!same && first && first->pattern != valve_id) {
+    throw ConfigError("valve '" + valve_id + "': the entry '" + first->pattern +
+                      "' in " + database_.path().string() +
+                      " stands first and gives it " +
+                      (ours ? ToString(*ours) : "no model set") +
+                      "; remove it, or add one for the valve before it");
+  }
+  ValveEntry entry = theirs ? *theirs : other.EntryOrNew(valve_id, assigned);
+  entry.pattern = valve_id;
+  if (assigned) {
+    entry.model_set = TakeModelSet(other, *assigned);
+  }
+  const bool has_past =
+      !Baselines(valve_id).empty() || !ValveEvents(valve_id).empty();
+  Transaction transaction(database_);
+  StoreEntry(entry);
+  if (of_its_own && !has_past) {
+    for (const BaselineRecord& each : other.Baselines(valve_id)) {
+      InsertBaseline(database_, valve_id, each);
+    }
+    for (const ValveEvent& each : other.ValveEvents(valve_id)) {
+      InsertEvent(database_, valve_id, each);
+    }
+  }
+  transaction.Commit();
+  return entry.model_set;
+}
+
 std::int64_t ModelStore::Generation() {
   return database_.QueryInt64("SELECT value FROM generation").value_or(0);
 }
@@ -276,9 +357,9 @@ void ModelStore::SetBaseline(std::string_view pattern,
   entry.baseline_epoch = record.epoch;
   Transaction transaction(database_);
   StoreEntry(entry);
-  database_.Run(sql::insert_baseline, entry.pattern, record.epoch,
-                record.model_set, record.version, UtcNow(), record.hours,
-                JsonOf(record.parameters), JsonOf(record.channels));
+  BaselineRecord stored = record;
+  stored.created_ns = UtcNow();
+  InsertBaseline(database_, entry.pattern, stored);
   transaction.Commit();
 }
 
@@ -305,8 +386,9 @@ ValveEntry ModelStore::AddValveEvent(std::string_view pattern,
   ++entry.epoch;
   Transaction transaction(database_);
   StoreEntry(entry);
-  database_.Run(sql::insert_valve_event, entry.pattern, entry.epoch, event.kind,
-                event.note, event.at_ns, event.who);
+  ValveEvent stored = event;
+  stored.epoch = entry.epoch;
+  InsertEvent(database_, entry.pattern, stored);
   transaction.Commit();
   return entry;
 }

@@ -135,7 +135,8 @@ void WriteMessages() {
            fdi::idl::MakeDecision("V2", models, {})}});
   WriteMessage(6, fdi::OperatorAction{"host:1", fdi::OperatorActionKind::kAck,
                                       7, "", "", 8, "anna", "seen", "console"});
-  WriteMessage(7, fdi::PairState{"host:1", "plant", 1, 7, true, false, 10, 20});
+  WriteMessage(7, fdi::MonitorShare{"host:1", "plant", "FV-*", "hall-1"});
+  WriteMessage(8, fdi::PairState{"host:1", "plant", 1, 7, true, false, 10, 20});
 }
 
 void WriteDatagrams() {

@@ -266,6 +266,16 @@ TEST(CodecTest, PairStateArrivesWhole) {
   EXPECT_EQ(got.received, sent.received);
 }
 
+TEST(CodecTest, MonitorShareArrivesWhole) {
+  const MonitorShare got =
+      RoundTrip(MonitorShare{"host:1", "plant", "FV-*", "hall-1,yard"});
+
+  EXPECT_EQ(got.monitor, "host:1");
+  EXPECT_EQ(got.pair, "plant");
+  EXPECT_EQ(got.valves, "FV-*");
+  EXPECT_EQ(got.partitions, "hall-1,yard");
+}
+
 TEST(CodecTest, ATooLongIdIsRefusedNotCut) {
   ValveSampleMessage message = SomeSample();
   message.valve_id += 'v';

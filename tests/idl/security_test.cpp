@@ -101,6 +101,24 @@ TEST_F(SecurityTest, ARoleGivesItsTopicsAndNoOthers) {
   EXPECT_TRUE(events.WaitForReaders(1, kPatience));
 }
 
+TEST_F(SecurityTest, AGatewayPublishesInItsPartitionAlone) {
+  MakeKey(Keys(), "hall-1", Role::kGateway, 10, false, "hall-1");
+  Participant gateway(With("hall-1"));
+  for (const auto& partitions : std::vector<std::vector<std::string>>{
+           {}, {""}, {"hall-2"}, {"hall-1", "hall-2"}, {"*"}, {"hall-?"}}) {
+    EXPECT_THROW((Publisher<ValveSampleMessage>{
+                     gateway, {Profile::kLive, 0, partitions}}),
+                 TransportError)
+        << (partitions.empty() ? "none" : partitions.front());
+  }
+  Participant monitor(With("monitor"));
+  Subscriber<ValveSampleMessage> subscriber(monitor, Profile::kLive,
+                                            Overflow::kLibrary, {"hall-*"});
+  const Publisher<ValveSampleMessage> publisher(
+      gateway, {Profile::kLive, 0, {"hall-1"}});
+  EXPECT_TRUE(publisher.WaitForReaders(1, kPatience));
+}
+
 TEST_F(SecurityTest, ABadKeyIsRefusedBeforeTheBusIsTouched) {
   std::filesystem::remove(Keys() / "monitor" / "cert.pem");
   EXPECT_THROW(Participant{With("monitor")}, ConfigError);

@@ -319,6 +319,7 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   Printed(page, "valves assign", "LV-1 pump@2");
   Printed(page, "valves list");
   Printed(page, "valves show", "LV-1");
+  Printed(page, "valves move", "LV-1 --to moved");
   Printed(page, "valves remove", "'PV-*'");
   Printed(page, "history shelve", "LV-1 --for 1h --comment ordered");
   Printed(page, "history shelf");

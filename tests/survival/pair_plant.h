@@ -54,12 +54,13 @@ class PairPlant {
 
   void SetFaulty(bool on) { offset_ = on ? kF7Offset : 0.0; }
 
-  /// The newest words of the monitors that spoke within 200 ms.
+  /// The newest words of the monitors that spoke within 200 ms and stay.
   std::map<std::string, PairState> Words() {
     const std::lock_guard lock(mutex_);
     std::map<std::string, PairState> words;
     for (const auto& [monitor, heard] : words_heard_) {
-      if (Clock::now() - heard.second < std::chrono::milliseconds(200)) {
+      if (!heard.first.leaving &&
+          Clock::now() - heard.second < std::chrono::milliseconds(200)) {
         words[monitor] = heard.first;
       }
     }
@@ -131,6 +132,7 @@ class PairPlant {
     std::size_t transitions{0};        ///< By episode, kind and stamp.
     std::size_t repeats{0};            ///< Of these, dropped.
     std::size_t transitions_twice{0};  ///< With another stamp.
+    std::string twice_of;              ///< The first of these, or empty.
   };
   Totals Count() {
     const std::lock_guard lock(mutex_);
@@ -153,10 +155,17 @@ class PairPlant {
     }
     totals.transitions = transitions_.size();
     totals.episodes = episodes_.size();
-    std::map<std::pair<std::uint64_t, TransitionKind>, int> kinds;
+    std::map<std::pair<std::uint64_t, TransitionKind>, std::int64_t> stamps;
     for (const auto& [episode, kind, stamp] : transitions_) {
-      const bool once = kind != TransitionKind::kReisolated;
-      totals.transitions_twice += once && kinds[{episode, kind}]++ > 0 ? 1 : 0;
+      if (kind == TransitionKind::kReisolated) {
+        continue;
+      }
+      const auto [first, fresh] = stamps.try_emplace({episode, kind}, stamp);
+      if (!fresh && totals.transitions_twice++ == 0) {
+        totals.twice_of = std::string(TransitionName(kind)) + "@" +
+                          std::to_string(first->second) + "," +
+                          std::to_string(stamp);
+      }
     }
     return totals;
   }

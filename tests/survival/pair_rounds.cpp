@@ -44,7 +44,8 @@ std::string Totals(const PairPlant::Totals& t) {
        << " twice=" << t.twice << " over_500ms=" << t.over_500ms
        << " worst_ms=" << t.worst_ms << " episodes=" << t.episodes
        << " transitions=" << t.transitions << " repeats=" << t.repeats
-       << " transitions_twice=" << t.transitions_twice;
+       << " transitions_twice=" << t.transitions_twice
+       << " twice_of=" << t.twice_of;
   return text.str();
 }
 

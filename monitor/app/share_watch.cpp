@@ -1,0 +1,101 @@
+#include "monitor/app/share_watch.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "diagnosis/printable.h"
+#include "diagnosis/records/partitions.h"
+#include "diagnosis/records/valve_glob.h"
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::milliseconds;
+
+// It says so once a second.
+constexpr milliseconds kGoneAfter{3500};
+constexpr std::size_t kMostMonitors = 64;
+
+// Whether a publisher may be in both. Of two patterns that is known only if one
+// matches the other as text.
+bool Overlap(const std::string& a, const std::string& b) {
+  if (a == b) {
+    return true;
+  }
+  const auto names = PartitionNames(b);
+  return std::ranges::any_of(PartitionNames(a), [&](const std::string& x) {
+    return std::ranges::any_of(names, [&](const std::string& y) {
+      return GlobMatches(x, y) || GlobMatches(y, x);
+    });
+  });
+}
+
+bool Rivals(const MonitorShare& own, const MonitorShare& other) {
+  const bool stands_in = !own.pair.empty() && other.pair == own.pair;
+  return other.monitor != own.monitor && !stands_in &&
+         Overlap(own.partitions, other.partitions);
+}
+
+}  // namespace
+
+ContestedValves FindContested(const MonitorShare& own,
+                              const std::vector<MonitorShare>& others,
+                              const std::vector<std::string>& valves) {
+  std::vector<MonitorShare> rivals;
+  std::ranges::copy_if(others, std::back_inserter(rivals),
+                       [&](const auto& other) { return Rivals(own, other); });
+  ContestedValves contested;
+  if (rivals.empty()) {
+    return contested;
+  }
+  for (const std::string& valve : valves) {
+    const auto rival = std::ranges::find_if(rivals, [&](const auto& other) {
+      return GlobMatches(other.valves, valve);
+    });
+    if (rival != rivals.end() && contested.count++ == 0) {
+      contested.example = valve;
+      contested.monitor = rival->monitor;
+    }
+  }
+  return contested;
+}
+
+ShareWatch::ShareWatch(idl::Participant& participant, MonitorShare own,
+                       ThrottledLog& log)
+    : own_(std::move(own)), log_(log), out_(participant), in_(participant) {}
+
+void ShareWatch::Tick(const std::vector<std::string>& valves) {
+  out_.Write(own_);
+  const Clock::time_point now = Clock::now();
+  in_.Take(
+      {[&](const MonitorShare& share, const auto&) {
+         if (heard_.size() < kMostMonitors || heard_.contains(share.monitor)) {
+           heard_[share.monitor] = {share, now};
+         }
+       },
+       {}},
+      milliseconds(0));
+  std::erase_if(heard_, [&](const auto& each) {
+    return now - each.second.at > kGoneAfter;
+  });
+  std::vector<MonitorShare> others;
+  for (const auto& [monitor, heard] : heard_) {
+    others.push_back(heard.share);
+  }
+  const ContestedValves found = FindContested(own_, others, valves);
+  if (found.count > 0) {
+    log_.Report(
+        LogId::kContested, "valves_contested",
+        [&found] {
+          return "valves=" + std::to_string(found.count) +
+                 " first=" + LogValue(found.example) +
+                 " other=" + LogValue(found.monitor);
+        },
+        LogLevel::kError);
+  }
+  const std::lock_guard lock(mutex_);
+  contested_ = found;
+}
+
+}  // namespace fdi::monitor

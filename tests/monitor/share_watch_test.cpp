@@ -1,0 +1,59 @@
+#include "monitor/app/share_watch.h"
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/error.h"
+#include "diagnosis/records/partitions.h"
+
+namespace fdi::monitor {
+namespace {
+
+const MonitorShare kOwn{"host:1", "", "V*", ""};
+
+std::size_t Contested(const MonitorShare& own, const MonitorShare& other) {
+  return FindContested(own, {other}, {"V1", "V2", "W1"}).count;
+}
+
+TEST(FindContestedTest, AnotherMonitorContestsWhatItsGlobMatches) {
+  const ContestedValves found =
+      FindContested(kOwn, {{"host:2", "", "*1", ""}}, {"V2", "V1"});
+  EXPECT_EQ(found.count, 1U);
+  EXPECT_EQ(found.example, "V1");
+  EXPECT_EQ(found.monitor, "host:2");
+  EXPECT_EQ(Contested(kOwn, {"host:2", "", "X*", ""}), 0U);
+}
+
+TEST(FindContestedTest, ThePairAndTheMonitorItselfDoNot) {
+  EXPECT_EQ(Contested(kOwn, kOwn), 0U);
+  MonitorShare own = kOwn;
+  own.pair = "plant";
+  EXPECT_EQ(Contested(own, {"host:2", "plant", "V*", ""}), 0U);
+  EXPECT_EQ(Contested(own, {"host:2", "other", "V*", ""}), 2U);
+  EXPECT_EQ(Contested(own, {"host:2", "", "V*", ""}), 2U);
+}
+
+TEST(FindContestedTest, OnlyWherePartitionsOverlap) {
+  const auto contested = [](const char* a, const char* b) {
+    return Contested({"host:1", "", "V*", a}, {"host:2", "", "V*", b}) > 0;
+  };
+  EXPECT_TRUE(contested("hall-1", "hall-1"));
+  EXPECT_TRUE(contested("hall-*", "yard,hall-1"));
+  EXPECT_TRUE(contested("hall-1", "hall-?"));
+  EXPECT_FALSE(contested("hall-1", "hall-2"));
+  EXPECT_FALSE(contested("", "hall-1"));
+}
+
+TEST(ParsePartitionsTest, NamesAreCheckedAndPatternsOnlyWhereTheyMakeSense) {
+  EXPECT_TRUE(ParsePartitions("", false).empty());
+  EXPECT_EQ(ParsePartitions("hall-1,a/b.c_2", false),
+            (std::vector<std::string>{"hall-1", "a/b.c_2"}));
+  EXPECT_EQ(ParsePartitions("hall-[!2]*", true).size(), 1U);
+  for (const char* text :
+       {"hall-*", "a,,b", ",", "a b", "<x>", "1,2,3,4,5,6,7,8,9",
+        "0123456789012345678901234567890"}) {
+    EXPECT_THROW(ParsePartitions(text, false), ConfigError) << text;
+  }
+}
+
+}  // namespace
+}  // namespace fdi::monitor
