@@ -18,10 +18,24 @@ constexpr int kReaderBacklog = 131072;
 // of those that a newer one has replaced: without room beside the history,
 // writing too fast fails with OUT_OF_RESOURCES. Allocated when needed.
 constexpr int kSamplesInDatagram = 1024;
+// Samples of all valves that a live writer keeps, in case one got lost.
+constexpr int kLiveHistory = 32768;
 constexpr int kBatchesInFlight = 64;  // Of at most 48 kB.
 constexpr int kActionsInFlight = 64;
 constexpr int kModelSets = 256;
 constexpr int kMonitors = 64;
+
+// Fast DDS 2.9.1 deadlocks if a VOLATILE writer removes a reader, e.g. one that
+// died, while it is sending: what that reader had not acknowledged is removed,
+// which waits for the sending thread, which waits for the removal (upstream
+// pull requests 3468 and 5432). A TRANSIENT_LOCAL writer removes nothing then:
+// it keeps what was acknowledged until it needs the room. Readers that ask for
+// VOLATILE get nothing old from either.
+#if FDI_FAST_DDS == 2
+constexpr auto kWriterDurability = dds::TRANSIENT_LOCAL_DURABILITY_QOS;
+#else
+constexpr auto kWriterDurability = dds::VOLATILE_DURABILITY_QOS;
+#endif
 
 Duration Milliseconds(int count) {
   return {count / 1000, static_cast<std::uint32_t>(count % 1000) * 1000000U};
@@ -55,7 +69,7 @@ EndpointQos Common(const std::string& name) {
   dds::DataWriterQos& writer = qos.writer;
   writer.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
   writer.reliability().max_blocking_time = Milliseconds(50);
-  writer.durability().kind = dds::VOLATILE_DURABILITY_QOS;
+  writer.durability().kind = kWriterDurability;
   writer.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
   writer.data_sharing().off();
   writer.resource_limits().extra_samples = kSamplesInDatagram;
@@ -179,7 +193,7 @@ PolicyTexts TextsOfRemote(const auto& qos) {
 template <>
 EndpointQos QosFor<ValveSampleMessage>(Profile profile, int valves) {
   EndpointQos qos = Common("fdi_valve_sample");
-  KeepLast(qos, valves, 16, 16);
+  KeepLast(qos, valves, std::clamp(kLiveHistory / valves, 2, 16), 16);
   ReaderKeepsAll(qos, valves);
   if (profile == Profile::kLossless) {
     qos.name += "_lossless";
