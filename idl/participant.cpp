@@ -38,6 +38,11 @@ using transport::UDPv6TransportDescriptor;
 constexpr int kMaxDomain = 232;
 constexpr int kMaxValvesLimit = 100000;
 constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
+// More than the 208 kB that the kernel keeps for a host which does not answer
+// (net.ipv4.neigh.default.unres_qlen_bytes), or sending to all others waits for
+// up to 3 s until that host is given up. Capped by net.core.wmem_max, of which
+// the kernel takes the double: its default suffices.
+constexpr std::uint32_t kSendBufferBytes = 4U << 20U;
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
@@ -214,6 +219,7 @@ void SetTransports(const DdsOptions& options, dds::DomainParticipantQos& qos) {
   if (options.transport != "shm") {
     auto udp = std::make_shared<UDPv4TransportDescriptor>();
     udp->receiveBufferSize = kReceiveBufferBytes;
+    udp->sendBufferSize = kSendBufferBytes;
     if (options.interfaces != "all") {
       udp->interfaceWhiteList = Addresses(options.interfaces);
     }

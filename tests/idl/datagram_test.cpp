@@ -145,6 +145,16 @@ TEST(DatagramTest, VendorsSubmessagesAreCutOffAtTheEndAndRefusedElsewhere) {
   EXPECT_EQ(VerdictOn(StatisticsInFront()), DatagramVerdict::kKind);
 }
 
+// As Fast DDS 2.9.1 sends them when a datagram is full.
+TEST(DatagramTest, AVendorsSubmessageAtTheEndMayBeCut) {
+  const Bytes pad = With(Header(), 0x01, Zeros(4));
+  Bytes cut = With(pad, 0x80, Zeros(56));
+  cut.resize(cut.size() - 4);
+  const CheckedDatagram checked = Check(cut);
+  EXPECT_EQ(checked.verdict, DatagramVerdict::kSound);
+  EXPECT_EQ(checked.bytes, pad.size());
+}
+
 TEST(DatagramTest, SequenceNumbersAreThoseOfWriters) {
   EXPECT_EQ(VerdictOn(With(Header(), 0x07, Heartbeat(Sequence(4, 9)))),
             DatagramVerdict::kSound);
