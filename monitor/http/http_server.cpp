@@ -52,6 +52,8 @@ constexpr Refusal kForeignHost{
     "host"};
 constexpr Refusal kSlow{408, "Request Timeout",
                         "expected a whole request within 2 s", "slow"};
+constexpr Refusal kPlainHttp{400, "Bad Request", "this port speaks https alone",
+                             "tls"};
 constexpr Refusal kBusy{503, "Service Unavailable",
                         "too many such requests wait already", "busy"};
 
@@ -67,27 +69,48 @@ class Inline : public httplib::TaskQueue {
   void shutdown() override {}
 };
 
-// A connected socket that does not block; closed with the object.
+// A connected socket that does not block, with TLS or without; closed with the
+// object.
 class Socket {
  public:
-  explicit Socket(int handle) : handle_(handle) {
+  Socket(int handle, const TlsContext* tls) : handle_(handle) {
     fcntl(handle, F_SETFD, FD_CLOEXEC);
     fcntl(handle, F_SETFL, O_NONBLOCK);
+    if (tls != nullptr) {
+      tls_ = tls->Accept(handle);
+    }
   }
   ~Socket() {
+    tls_.reset();  // Says farewell.
     if (handle_ >= 0) {
       close(handle_);
     }
   }
-  Socket(Socket&& other) noexcept : handle_(std::exchange(other.handle_, -1)) {}
+  Socket(Socket&& other) noexcept
+      : handle_(std::exchange(other.handle_, -1)),
+        tls_(std::move(other.tls_)) {}
   Socket& operator=(Socket&& other) noexcept {
     std::swap(handle_, other.handle_);
+    std::swap(tls_, other.tls_);
     return *this;
   }
   int handle() const { return handle_; }
+  short events() const { return tls_ ? tls_->events() : short{POLLIN}; }
+  bool pending() const { return tls_ && tls_->pending(); }
+
+  // As recv() and send(); see TlsSession for what errno says.
+  ssize_t Receive(char* to, std::size_t size) const {
+    return tls_ ? tls_->Receive(to, size) : recv(handle_, to, size, 0);
+  }
+  ssize_t Send(const char* from, std::size_t size) const {
+    return tls_ ? tls_->Send(from, size)
+                : send(handle_, from, size, MSG_NOSIGNAL);
+  }
+  void EndTls() { tls_.reset(); }
 
  private:
   int handle_;
+  std::unique_ptr<TlsSession> tls_;
 };
 
 // A client whose request is not whole yet, or that was refused and still sends.
@@ -104,7 +127,7 @@ struct Client {
 class AnswerStream : public httplib::Stream {
  public:
   AnswerStream(const Client& client, const std::atomic<bool>& ended)
-      : socket_(client.socket.handle()),
+      : socket_(client.socket),
         request_(client.head->text + client.bytes.substr(client.head->size)),
         ended_(ended) {}
 
@@ -117,7 +140,7 @@ class AnswerStream : public httplib::Stream {
   }
   ssize_t write(const char* from, std::size_t size) override {
     while (writable_) {
-      const ssize_t count = send(socket_, from, size, MSG_NOSIGNAL);
+      const ssize_t count = socket_.Send(from, size);
       if (count >= 0) {
         written_ += static_cast<std::size_t>(count);
         paused_ = {};
@@ -132,7 +155,7 @@ class AnswerStream : public httplib::Stream {
     socklen_t size = sizeof address;
     std::array<char, NI_MAXHOST> host{};
     auto* const plain = reinterpret_cast<sockaddr*>(&address);
-    if (getpeername(socket_, plain, &size) == 0 &&
+    if (getpeername(socket_.handle(), plain, &size) == 0 &&
         getnameinfo(plain, size, host.data(), host.size(), nullptr, 0,
                     NI_NUMERICHOST) == 0) {
       ip = host.data();
@@ -146,7 +169,7 @@ class AnswerStream : public httplib::Stream {
  private:
   bool AwaitClient() {
     const Clock::time_point begin = Clock::now();
-    pollfd entry{socket_, POLLOUT, 0};
+    pollfd entry{socket_.handle(), POLLOUT, 0};
     const int ready = poll(&entry, 1, 100);
     const Clock::duration waited = Clock::now() - begin;
     waited_ += waited;
@@ -157,7 +180,7 @@ class AnswerStream : public httplib::Stream {
     return ready > 0 || (paused_ < kPausePatience && waited_ < patience);
   }
 
-  const int socket_;
+  const Socket& socket_;
   const std::string request_;
   const std::atomic<bool>& ended_;
   std::size_t place_{0};
@@ -221,6 +244,7 @@ std::string ToString(const HttpAddress& address) {
 class HttpServer::Gate : public httplib::Server {
  public:
   explicit Gate(const HttpServerOptions& options) : options_(options) {
+    RenewTls();
     if (pipe2(wake_.data(), O_CLOEXEC | O_NONBLOCK) != 0) {
       throw std::system_error(errno, std::generic_category(), "pipe2");
     }
@@ -262,6 +286,16 @@ class HttpServer::Gate : public httplib::Server {
     return counts_;
   }
 
+  std::optional<int> RenewTls() {
+    if (!options_.tls) {
+      return std::nullopt;
+    }
+    auto tls = std::make_unique<const TlsContext>(*options_.tls);
+    const std::lock_guard lock(mutex_);
+    tls_ = std::move(tls);
+    return tls_->days_left();
+  }
+
  private:
   struct Lane {
     explicit Lane(HttpLane lane) : options(std::move(lane)) {}
@@ -271,8 +305,8 @@ class HttpServer::Gate : public httplib::Server {
 
   // Called by the thread that accepts.
   bool process_and_close_socket(socket_t socket) override {
-    Client client{Socket(socket), Clock::now() + kRequestPatience};
     std::unique_lock lock(mutex_);
+    Client client{Socket(socket, tls_.get()), Clock::now() + kRequestPatience};
     changed_.wait(lock,
                   [this] { return ended_ || accepted_.size() < kMaxAccepted; });
     accepted_.push_back(std::move(client));
@@ -296,7 +330,7 @@ class HttpServer::Gate : public httplib::Server {
       entries.assign(1, {wake_[0], POLLIN, 0});
       Clock::time_point next = Clock::now() + kRequestPatience;
       for (const Client& client : clients_) {
-        entries.push_back({client.socket.handle(), POLLIN, 0});
+        entries.push_back({client.socket.handle(), client.socket.events(), 0});
         next = std::min(next, client.deadline);
       }
       const auto pause = std::chrono::ceil<milliseconds>(next - Clock::now());
@@ -340,32 +374,45 @@ class HttpServer::Gate : public httplib::Server {
   }
 
   bool Read(Client& client) {
-    std::array<char, 4096> part{};
-    const ssize_t size =
-        recv(client.socket.handle(), part.data(), part.size(), 0);
-    if (size < 0 && (errno == EAGAIN || errno == EINTR)) {
-      return true;
-    }
-    if (size <= 0) {
-      if (!client.refused) {
-        Count("left");
+    do {
+      std::array<char, 4096> part{};
+      const ssize_t size = client.socket.Receive(part.data(), part.size());
+      if (size < 0 && (errno == EAGAIN || errno == EINTR)) {
+        return true;
       }
+      if (size <= 0) {
+        return Left(client, size < 0 ? errno : 0);
+      }
+      if (client.refused) {
+        continue;
+      }
+      client.bytes.append(part.data(), static_cast<std::size_t>(size));
+      if (!client.head) {
+        if (const auto refusal =
+                ParseRequestHead(client.bytes, options_.max_body, client.head,
+                                 options_.user_header)) {
+          return Refuse(client, *refusal);
+        }
+      }
+      if (client.head &&
+          client.bytes.size() >= client.head->size + client.head->body_size) {
+        return Dispatch(client);
+      }
+    } while (client.socket.pending());
+    return true;
+  }
+
+  // @returns as Serve().
+  bool Left(Client& client, int error) {
+    if (client.refused) {
       return false;
     }
-    if (client.refused) {
-      return true;
+    if (error == EPROTONOSUPPORT) {
+      client.socket.EndTls();
+      return Refuse(client, kPlainHttp);
     }
-    client.bytes.append(part.data(), static_cast<std::size_t>(size));
-    if (!client.head) {
-      if (const auto refusal =
-              ParseRequestHead(client.bytes, options_.max_body, client.head)) {
-        return Refuse(client, *refusal);
-      }
-    }
-    const bool whole =
-        client.head &&
-        client.bytes.size() >= client.head->size + client.head->body_size;
-    return !whole || Dispatch(client);
+    Count(error == EPROTO ? "tls" : "left");
+    return false;
   }
 
   bool Dispatch(Client& client) {
@@ -402,10 +449,9 @@ class HttpServer::Gate : public httplib::Server {
         .append(refusal.status == 503 ? "Retry-After: 5\r\n" : "")
         .append("Connection: close\r\n\r\n")
         .append(body);
-    const int socket = client.socket.handle();
-    const ssize_t sent =
-        send(socket, answer.data(), answer.size(), MSG_NOSIGNAL);
-    shutdown(socket, SHUT_WR);
+    const ssize_t sent = client.socket.Send(answer.data(), answer.size());
+    client.socket.EndTls();
+    shutdown(client.socket.handle(), SHUT_WR);
     client.refused = true;
     client.bytes = {};
     client.deadline = Clock::now() + kRefusalPatience;
@@ -459,11 +505,13 @@ class HttpServer::Gate : public httplib::Server {
   std::atomic<bool> ended_{false};
 
   mutable std::mutex mutex_;
+  std::unique_ptr<const TlsContext> tls_;  // Null: plain HTTP.
   std::condition_variable changed_;
   std::deque<Client> accepted_;
   Counts counts_{{"answered", 0}, {"malformed", 0}, {"too_large", 0},
                  {"encoded", 0},  {"host", 0},      {"slow", 0},
-                 {"failed", 0},   {"busy", 0},      {"left", 0}};
+                 {"failed", 0},   {"busy", 0},      {"left", 0},
+                 {"tls", 0}};
 };
 
 HttpServer::HttpServer(const HttpServerOptions& options)
@@ -499,6 +547,10 @@ void HttpServer::Stop() {
 
 httplib::Server& HttpServer::routes() {
   return *gate_;
+}
+
+std::optional<int> HttpServer::RenewTls() {
+  return gate_->RenewTls();
 }
 
 HttpServer::Counts HttpServer::counts() const {

@@ -4,10 +4,13 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
 #include <vector>
+
+#include "monitor/http/tls.h"
 
 namespace httplib {
 class Server;
@@ -51,6 +54,8 @@ struct HttpServerOptions {
   std::vector<HttpLane> lanes{{}};   ///< The first that takes it answers.
   std::size_t max_body{0};           ///< Of a request [bytes].
   std::vector<std::string> names{};  ///< See HostAllowed().
+  std::optional<TlsFiles> tls{};     ///< Nothing: plain HTTP.
+  std::string user_header{};         ///< See ParseRequestHead().
 };
 
 /// Answers HTTP by threads of its own. A request is read whole, in bounded
@@ -63,12 +68,14 @@ class HttpServer {
   /// From path to what makes the page, called by any of the threads.
   using Pages = std::map<std::string, std::function<HttpPage()>>;
   /// Clients by what became of them since the start: "answered", "failed",
-  /// "malformed", "too_large", "encoded", "host", "slow", "busy" or "left".
+  /// "malformed", "too_large", "encoded", "host", "slow", "busy", "left" or
+  /// "tls": no handshake that we understand.
   using Counts = std::map<std::string_view, std::uint64_t>;
 
   /// Binds the address; nothing is answered yet. A second server on the same
   /// address is an error.
-  /// @throws std::runtime_error naming the address and the reason.
+  /// @throws std::runtime_error naming the address and the reason; ConfigError
+  ///   as TlsContext.
   explicit HttpServer(const HttpServerOptions& options);
   /// Answers what it is at, which may take a second, and no more.
   ~HttpServer();
@@ -86,6 +93,11 @@ class HttpServer {
 
   /// Takes no further connections. Does not wait.
   void Stop();
+
+  /// Takes the files of the certificate as they are now, for clients that come
+  /// from now on. @returns days until it ends; nothing without TLS.
+  /// @throws ConfigError as TlsContext; the old one stays.
+  std::optional<int> RenewTls();
 
   /// With the port that was found, if any was asked for.
   const HttpAddress& address() const { return address_; }

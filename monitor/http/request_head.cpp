@@ -135,6 +135,7 @@ std::optional<Refusal> TakeLength(std::string_view value, std::size_t max_body,
 
 // Headers that no page reads are dropped.
 std::optional<Refusal> TakeHeader(std::string_view line, std::size_t max_body,
+                                  std::string_view user_header,
                                   RequestHead& head) {
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos || colon == 0 || !IsPlain(line) ||
@@ -163,8 +164,18 @@ std::optional<Refusal> TakeHeader(std::string_view line, std::size_t max_body,
     }
     head.host = value;
     pass("Host", value);
+  } else if (!user_header.empty() && name == Lower(user_header)) {
+    if (!head.user.empty()) {
+      return kMalformed;
+    }
+    head.user = value;
+    pass(user_header, value);
   } else if (name == "authorization") {
     pass("Authorization", value);
+  } else if (name == "cookie") {
+    pass("Cookie", value);
+  } else if (name == "origin") {
+    pass("Origin", value);
   } else if (name == "accept-encoding" &&
              Lower(value).find("gzip") != std::string::npos) {
     pass("Accept-Encoding", "gzip");  // Brotli takes seconds of a processor.
@@ -198,7 +209,8 @@ std::string MachineName() {
 
 std::optional<Refusal> ParseRequestHead(std::string_view bytes,
                                         std::size_t max_body,
-                                        std::optional<RequestHead>& head) {
+                                        std::optional<RequestHead>& head,
+                                        std::string_view user_header) {
   const std::size_t line_end = bytes.find("\r\n");
   if (std::min(line_end, bytes.size()) > kMaxTarget) {
     return kTarget;
@@ -217,10 +229,10 @@ std::optional<Refusal> ParseRequestHead(std::string_view bytes,
   std::size_t begin = line_end + 2;
   for (std::size_t lines = 0; begin < end && !refusal; ++lines) {
     const std::size_t stop = bytes.find("\r\n", begin);
-    refusal =
-        lines == kMaxHeaders
-            ? kHeaders
-            : TakeHeader(bytes.substr(begin, stop - begin), max_body, parsed);
+    refusal = lines == kMaxHeaders
+                  ? kHeaders
+                  : TakeHeader(bytes.substr(begin, stop - begin), max_body,
+                               user_header, parsed);
     begin = stop + 2;
   }
   if (!refusal) {

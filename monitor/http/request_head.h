@@ -16,6 +16,7 @@ struct RequestHead {
   std::string text;     ///< Request line and headers as the library gets them.
   std::string path;     ///< Decoded, without query.
   std::string host;     ///< Header Host.
+  std::string user;     ///< The header that names a user, see there.
   std::size_t size{0};  ///< Of the head as it came [bytes].
   std::size_t body_size{0};  ///< Content-Length [bytes].
 };
@@ -36,10 +37,12 @@ inline constexpr std::size_t kMaxHeaders = 100;
 /// Reads the head at the beginning of `bytes`.
 /// @param head is set once it is whole.
 /// @param max_body of a body [bytes].
+/// @param user_header by which a proxy says who asks; it may be there once.
 /// @returns why it is refused; nothing if it is good so far.
 std::optional<Refusal> ParseRequestHead(std::string_view bytes,
                                         std::size_t max_body,
-                                        std::optional<RequestHead>& head);
+                                        std::optional<RequestHead>& head,
+                                        std::string_view user_header = {});
 
 /// A loopback address, or the name for it.
 bool IsLoopback(std::string_view host);
