@@ -23,8 +23,18 @@ std::vector<fdi::cli::VerbExamples> Examples() {
          "all"},
         {"A page on which people may acknowledge and label",
          "fdi-monitor run --console=127.0.0.1:8080 --console-write token"},
+        {"The page for the control room, over https and with logins",
+         "fdi-monitor run --console=0.0.0.0:8443 --console-tls console.pem "
+         "--console-users users"},
         {"See what a new set would say, beside the old one",
          "fdi-monitor run --shadow paper@3"}}},
+      {"console-user",
+       {{"Add a user; the password is asked for twice",
+         "fdi-monitor console-user anna --role acknowledge --users users"},
+        {"Read the password from a pipe",
+         "pwgen 16 1 | fdi-monitor console-user bo --role view --users users"},
+        {"Remove one",
+         "fdi-monitor console-user anna --remove --users users"}}},
       {"watch",
        {{"All fault events as JSON lines", "fdi-monitor watch --events --json"},
         {"How many vectors come in ten seconds",
@@ -46,6 +56,7 @@ int main(int argc, char** argv) {
   program.MapError<fdi::storage::SqliteError>(fdi::cli::kExitData);
   program.MapError<fdi::idl::TransportError>(fdi::cli::kExitTransport);
   fdi::monitor::AddRunVerb(program);
+  fdi::monitor::AddConsoleUserVerb(program);
   fdi::monitor::AddWatchVerb(program);
   fdi::monitor::AddTopVerb(program);
   program.AddExamples(Examples());

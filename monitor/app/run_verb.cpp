@@ -1,9 +1,11 @@
+#include <array>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <arpa/inet.h>
 
 #include "cli/program.h"
 #include "cli/stop_signals.h"
@@ -23,6 +25,8 @@ struct RunArguments {
   std::string console{"off"};
   console::ConsoleOptions console_options;
   std::string console_token;
+  std::string console_users;
+  TlsFiles console_tls;
   PairOptions pair;
   ServiceOptions service;
 };
@@ -52,13 +56,23 @@ std::function<std::string(std::string)> AddressOr(const std::string& usual) {
   };
 }
 
+std::string CheckAddress(const std::string& text) {
+  std::array<unsigned char, sizeof(in6_addr)> ignored{};
+  return inet_pton(AF_INET, text.c_str(), ignored.data()) == 1 ||
+                 inet_pton(AF_INET6, text.c_str(), ignored.data()) == 1
+             ? ""
+             : text + " is no IPv4 or IPv6 address";
+}
+
 void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
   const bool writable = !arguments.console_token.empty();
+  const bool users = !arguments.console_users.empty();
+  const bool tls = !arguments.console_tls.certificate.empty();
   if (arguments.console == "off") {
-    if (writable || !arguments.console_options.files.empty()) {
+    if (writable || users || tls || !arguments.console_options.files.empty()) {
       throw ConfigError(
-          "--console-write and --console-files need "
-          "--console[=[ADDRESS:]PORT]");
+          "--console-write, --console-users, --console-tls and "
+          "--console-files need --console[=[ADDRESS:]PORT]");
     }
     return;
   }
@@ -67,7 +81,13 @@ void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
   console.address = ParseHttpAddress(arguments.console, "--console");
   console.names = options.http_names;
   if (writable) {
-    console.token_file = arguments.console_token;
+    console.admission.token_file = arguments.console_token;
+  }
+  if (users) {
+    console.admission.users_file = arguments.console_users;
+  }
+  if (tls) {
+    console.tls = arguments.console_tls;
   }
 }
 
@@ -78,10 +98,41 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
       ->default_str("127.0.0.1:8080")
       ->transform(AddressOr("127.0.0.1:8080"))
       ->type_name("[=[ADDRESS:]PORT]");
-  run.add_option("--console-write", arguments.console_token,
-                 "Let who has the token in FILE acknowledge, shelve and label; "
-                 "made with a random one if it is not there")
-      ->type_name("FILE");
+  CLI::Option* token =
+      run.add_option(
+             "--console-write", arguments.console_token,
+             "Let who has the token in FILE acknowledge, shelve and label; "
+             "made with a random one if it is not there")
+          ->type_name("FILE");
+  CLI::Option* users =
+      run.add_option(
+             "--console-users", arguments.console_users,
+             "Ask for a name and a password of FILE, which console-user "
+             "makes, and let everybody do what their role may")
+          ->excludes(token)
+          ->type_name("FILE");
+  console::AdmissionOptions& admission = arguments.console_options.admission;
+  CLI::Option* header =
+      run.add_option("--console-proxy-user", admission.proxy_header,
+                     "Header by which a proxy says which of those users asks")
+          ->needs(users)
+          ->type_name("HEADER");
+  CLI::Option* proxy =
+      run.add_option("--console-proxy-from", admission.proxy_address,
+                     "Address of that proxy; the header is ignored from others")
+          ->needs(header)
+          ->check(CheckAddress)
+          ->type_name("ADDRESS");
+  header->needs(proxy);
+  CLI::Option* tls =
+      run.add_option("--console-tls", arguments.console_tls.certificate,
+                     "Serve https with this certificate, its issuers and, "
+                     "without --console-key, its key; SIGHUP reads them anew")
+          ->type_name("FILE.pem");
+  run.add_option("--console-key", arguments.console_tls.key,
+                 "Its key, without passphrase and only for the service to read")
+      ->needs(tls)
+      ->type_name("FILE.pem");
   run.add_option("--console-files", arguments.console_options.files,
                  "Folder of the page instead of the installed one")
       ->type_name("DIR");

@@ -378,6 +378,9 @@ void Service::Serve(cli::StopSignals& signals) {
     if (event == cli::StopSignals::Event::kReload) {
       Notify("RELOADING=1\nMONOTONIC_USEC=" + MonotonicMicroseconds());
       Reload("signal");
+      if (console_) {
+        console_->Reload();
+      }
       Notify("READY=1");
     }
   }
@@ -468,7 +471,7 @@ std::string Service::Metrics() const {
     for (const auto& [outcome, count] : console_->requests()) {
       facts.requests[outcome] += count;
     }
-    facts.tokens = console_->tokens();
+    facts.admissions = console_->admissions();
   }
   std::string page = MetricsPage(Facts(), facts);
   if (const ShadowCounts* counts = pipeline_.shadow_counts()) {

@@ -75,6 +75,23 @@ void AddThreads(const std::vector<Heartbeat::Member>& threads,
   }
 }
 
+void AddAdmissions(const console::AdmissionCounts& counts, Exposition& page) {
+  page.Family("fdi_console_actions_total", Type::kCounter,
+              "What people did at the console, and when they came and went");
+  for (const auto& [action, count] : counts.actions) {
+    page.Value(count, {"action", action});
+  }
+  page.Family("fdi_console_refused_total", Type::kCounter,
+              "Requests that the console refused, by reason");
+  for (const auto& [reason, count] : counts.refused) {
+    page.Value(count, {"reason", reason});
+  }
+  if (counts.sessions) {
+    page.Family("fdi_console_sessions", Type::kGauge, "People logged in");
+    page.Value(std::uint64_t{*counts.sessions});
+  }
+}
+
 std::vector<Measure> ConsoleMeasures(const MetricsFacts& facts) {
   constexpr std::string_view kStreams = "fdi_console_streams_total";
   constexpr std::string_view kTokens = "fdi_console_token_failures_total";
@@ -91,9 +108,9 @@ std::vector<Measure> ConsoleMeasures(const MetricsFacts& facts) {
       {"", kTokens, Type::kCounter,
        "Requests to change something with a wrong token, or not looked at "
        "after too many of those",
-       "outcome", "wrong", facts.tokens.wrong},
+       "outcome", "wrong", facts.admissions.tokens.wrong},
       {"", kTokens, Type::kCounter, "", "outcome", "not_looked_at",
-       facts.tokens.unread},
+       facts.admissions.tokens.unread},
       {"", "fdi_console_bytes", Type::kGauge,
        "Memory of the trends that the console shows", "", "",
        facts.board_bytes}};
@@ -338,6 +355,7 @@ std::string MetricsPage(const StatusFacts& status, const MetricsFacts& facts) {
   AddThreads(facts.threads, page);
   if (facts.streams) {
     page.Add(ConsoleMeasures(facts));
+    AddAdmissions(facts.admissions, page);
   }
   AddRequests(facts.requests, page);
   AddProcess(facts, page);

@@ -12,7 +12,7 @@
 #include "idl/wire.h"
 #include "monitor/app/pair.h"
 #include "monitor/app/share_watch.h"
-#include "monitor/console/access.h"
+#include "monitor/console/admission.h"
 #include "monitor/console/live_stream.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
@@ -81,7 +81,7 @@ struct MetricsFacts {
   std::vector<Heartbeat::Member> threads;
   std::optional<console::StreamCounts> streams{};  ///< If there is a console.
   std::uint64_t board_bytes{0};                    ///< Of the console.
-  console::TokenGuard::Counts tokens{};            ///< Of the console.
+  console::AdmissionCounts admissions{};           ///< Of the console.
   HttpServer::Counts requests{};
 };
 

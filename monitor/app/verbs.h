@@ -25,6 +25,9 @@ inline idl::DdsOptions DdsOptionsOf(const cli::GlobalOptions& options,
 /// `run`: diagnoses the valves on the bus.
 void AddRunVerb(cli::Program& program);
 
+/// `console-user`: adds, changes or removes a user of the console.
+void AddConsoleUserVerb(cli::Program& program);
+
 /// `watch`: prints or counts what monitors publish.
 void AddWatchVerb(cli::Program& program);
 

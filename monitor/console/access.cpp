@@ -1,38 +1,21 @@
 #include "monitor/console/access.h"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <cstdio>
 #include <system_error>
 
 #include <fcntl.h>
-#include <sys/random.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "diagnosis/error.h"
+#include "monitor/console/users.h"
+#include "monitor/http/private_file.h"
 
 namespace fdi::console {
 namespace {
 
-constexpr std::size_t kRandomBytes = 24;
 constexpr double kAttempts = 5.0;
 constexpr std::size_t kMaxOrigins = 256;
-
-std::string RandomToken() {
-  std::array<unsigned char, kRandomBytes> bytes{};
-  if (getrandom(bytes.data(), bytes.size(), 0) !=
-      static_cast<ssize_t>(bytes.size())) {
-    throw std::system_error(errno, std::generic_category(), "getrandom");
-  }
-  std::string token;
-  for (const unsigned char byte : bytes) {
-    token += "0123456789abcdef"[byte >> 4U];
-    token += "0123456789abcdef"[byte & 15U];
-  }
-  return token;
-}
 
 // Does nothing if the file is there.
 void MakeTokenFile(const std::filesystem::path& path) {
@@ -54,48 +37,12 @@ void MakeTokenFile(const std::filesystem::path& path) {
   }
 }
 
-// The first line of the file, which may be 4 KB long.
-std::string FirstLine(const std::filesystem::path& path) {
-  const std::string option = "--console-write " + path.string();
-  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  struct stat facts {};
-  std::array<char, 4096> text{};
-  ssize_t size = -1;
-  if (file >= 0 && fstat(file, &facts) == 0 && S_ISREG(facts.st_mode)) {
-    size = read(file, text.data(), text.size());
-  }
-  close(file);
-  if (size < 0) {
-    throw DataError(option + ": cannot be read");
-  }
-  if ((facts.st_mode & 0027U) != 0 ||
-      (facts.st_uid != geteuid() && facts.st_uid != 0)) {
-    char mode[8];
-    std::snprintf(mode, sizeof mode, "%04o", facts.st_mode & 07777U);
-    throw ConfigError(option + ": mode " + mode +
-                      " lets others read or change the token; expected a file "
-                      "of the service's user or root with mode 0600 or 0640");
-  }
-  const std::string_view all(text.data(), static_cast<std::size_t>(size));
-  return std::string(all.substr(0, all.find('\n')));
-}
-
-// Takes the same time wherever the texts differ.
-bool SameSecret(std::string_view given, std::string_view secret) {
-  unsigned difference = given.size() == secret.size() ? 0U : 1U;
-  for (std::size_t i = 0; i < secret.size(); ++i) {
-    const char c = i < given.size() ? given[i] : '\0';
-    difference |= static_cast<unsigned>(static_cast<unsigned char>(c) ^
-                                        static_cast<unsigned char>(secret[i]));
-  }
-  return difference == 0;
-}
-
 }  // namespace
 
 std::string LoadToken(const std::filesystem::path& path) {
   MakeTokenFile(path);
-  std::string token = FirstLine(path);
+  std::string token = monitor::ReadPrivateFile(path, "--console-write");
+  token.resize(std::min(token.find('\n'), token.size()));
   if (token.ends_with('\r')) {
     token.pop_back();
   }
@@ -111,37 +58,19 @@ std::string LoadToken(const std::filesystem::path& path) {
   return token;
 }
 
-Permission TokenGuard::Check(std::string_view authorization,
-                             const std::string& origin, Clock::time_point now) {
-  if (token_.empty()) {
-    return Permission::kReadOnly;
-  }
-  const std::lock_guard lock(mutex_);
+bool FailureLimit::Allows(const std::string& origin, Clock::time_point now) {
   const bool known = failing_.contains(origin);
-  if (known || failing_.size() >= kMaxOrigins) {
-    if (AllowanceOf(origin, now).attempts < 1.0) {
-      ++counts_.unread;
-      return Permission::kTooMany;
-    }
-  }
-  constexpr std::string_view kScheme = "Bearer ";
-  if (authorization.starts_with(kScheme) &&
-      SameSecret(authorization.substr(kScheme.size()), token_)) {
-    failing_.erase(origin);
-    return Permission::kGranted;
-  }
-  AllowanceOf(origin, now).attempts -= 1.0;
-  ++counts_.wrong;
-  log_(LogLevel::kWarning,
-       "console_token_refused origin=" + origin +
-           " failures=" + std::to_string(counts_.wrong) +
-           " not_looked_at=" + std::to_string(counts_.unread));
-  return Permission::kWrongToken;
+  return (!known && failing_.size() < kMaxOrigins) ||
+         AllowanceOf(origin, now).attempts >= 1.0;
 }
 
-// With the mutex locked. Once there are too many, all others share one.
-TokenGuard::Allowance& TokenGuard::AllowanceOf(const std::string& origin,
-                                               Clock::time_point now) {
+void FailureLimit::Add(const std::string& origin, Clock::time_point now) {
+  AllowanceOf(origin, now).attempts -= 1.0;
+}
+
+// Once there are too many, all others share one.
+FailureLimit::Allowance& FailureLimit::AllowanceOf(const std::string& origin,
+                                                   Clock::time_point now) {
   const auto refilled = [now](const Allowance& allowance) {
     const std::chrono::duration<double> passed = now - allowance.stamp;
     return std::min(allowance.attempts + passed.count(), kAttempts);
@@ -158,6 +87,31 @@ TokenGuard::Allowance& TokenGuard::AllowanceOf(const std::string& origin,
           .first->second;
   allowance = {refilled(allowance), now};
   return allowance;
+}
+
+Permission TokenGuard::Check(std::string_view authorization,
+                             const std::string& origin, Clock::time_point now) {
+  if (token_.empty()) {
+    return Permission::kReadOnly;
+  }
+  const std::lock_guard lock(mutex_);
+  if (!failures_.Allows(origin, now)) {
+    ++counts_.unread;
+    return Permission::kTooMany;
+  }
+  constexpr std::string_view kScheme = "Bearer ";
+  if (authorization.starts_with(kScheme) &&
+      SameSecret(authorization.substr(kScheme.size()), token_)) {
+    failures_.Forget(origin);
+    return Permission::kGranted;
+  }
+  failures_.Add(origin, now);
+  ++counts_.wrong;
+  log_(LogLevel::kWarning,
+       "console_token_refused origin=" + origin +
+           " failures=" + std::to_string(counts_.wrong) +
+           " not_looked_at=" + std::to_string(counts_.unread));
+  return Permission::kWrongToken;
 }
 
 TokenGuard::Counts TokenGuard::counts() const {

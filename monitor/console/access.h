@@ -29,12 +29,35 @@ enum class Permission : std::uint8_t {
   kTooMany
 };
 
-/// Decides who may change something. From an address that failed five times in
-/// a row one attempt per second is looked at, the right token or not. Failures
-/// are counted and logged with where they came from. Thread safe.
-class TokenGuard {
+/// Slows guesses down: from an address that failed five times in a row one
+/// attempt per second is looked at. In bounded memory; not thread safe.
+class FailureLimit {
  public:
   using Clock = std::chrono::steady_clock;
+
+  /// Whether to look at an attempt from there.
+  bool Allows(const std::string& origin, Clock::time_point now);
+  /// It was looked at, and failed.
+  void Add(const std::string& origin, Clock::time_point now);
+  void Forget(const std::string& origin) { failing_.erase(origin); }
+
+ private:
+  // Attempts that are left, which grow by one per second.
+  struct Allowance {
+    double attempts;
+    Clock::time_point stamp;
+  };
+  Allowance& AllowanceOf(const std::string& origin, Clock::time_point now);
+
+  std::map<std::string, Allowance> failing_;  // By origin, a bounded number.
+};
+
+/// Decides who may change something. What FailureLimit does not allow is not
+/// looked at, the right token or not. Failures are counted and logged with
+/// where they came from. Thread safe.
+class TokenGuard {
+ public:
+  using Clock = FailureLimit::Clock;
   struct Counts {
     std::uint64_t wrong{0};
     std::uint64_t unread{0};  ///< Refused with kTooMany.
@@ -52,17 +75,10 @@ class TokenGuard {
   Counts counts() const;
 
  private:
-  // Attempts that are left, which grow by one per second.
-  struct Allowance {
-    double attempts;
-    Clock::time_point stamp;
-  };
-  Allowance& AllowanceOf(const std::string& origin, Clock::time_point now);
-
   const std::string token_;
   const LogSink log_;
   mutable std::mutex mutex_;
-  std::map<std::string, Allowance> failing_;  // By origin, a bounded number.
+  FailureLimit failures_;
   Counts counts_;
 };
 

@@ -13,14 +13,6 @@ namespace {
 constexpr std::int64_t kNsPerMinute = 60'000'000'000;
 constexpr std::int64_t kMaxMinutes = storage::kLongestShelfNs / kNsPerMinute;
 
-Json BodyOf(const httplib::Request& request) {
-  Json body = Json::parse(request.body, nullptr, /*allow_exceptions=*/false);
-  if (!body.is_object()) {
-    throw ConfigError("the body: expected a JSON object");
-  }
-  return body;
-}
-
 std::string TextOf(const Json& body, const char* key) {
   const auto found = body.find(key);
   if (found == body.end() || found->is_null()) {
@@ -32,6 +24,7 @@ std::string TextOf(const Json& body, const char* key) {
   return found->get<std::string>();
 }
 
+// `body` has the name of the user if there is one.
 storage::OperatorNote NoteOf(const Json& body, const httplib::Request& request,
                              const Api& api) {
   return {TextOf(body, "who"), TextOf(body, "comment"),
@@ -91,43 +84,53 @@ Json EndShelf(const Api& api, const httplib::Request& request,
   }
 }
 
+// What it was done to, for the log.
+std::string SubjectOf(const httplib::Request& request, const Json& result) {
+  const auto valve = result.find("valve");
+  std::string subject = "valve=";
+  subject += valve == result.end() ? "-" : valve->dump(-1, ' ', true);
+  if (const auto episode = result.find("episode"); episode != result.end()) {
+    return subject + " episode=" + request.matches[1].str();
+  }
+  return subject + " shelf=" + result.value("shelf_id", Json()).dump();
+}
+
 struct Action {
   const char* path;
+  const char* name;
+  Role role;
   Json (*perform)(const Api&, const httplib::Request&, const Json& body);
 };
 
 constexpr Action kActions[] = {
-    {"/api/v1/episodes/([0-9a-f]{1,16})/ack", Acknowledge},
-    {"/api/v1/episodes/([0-9a-f]{1,16})/label", Label},
-    {"/api/v1/shelf", Shelve},
-    {"/api/v1/shelf/([0-9]{1,18})/end", EndShelf}};
+    {"/api/v1/episodes/([0-9a-f]{1,16})/ack", "ack", Role::kAcknowledge,
+     Acknowledge},
+    {"/api/v1/episodes/([0-9a-f]{1,16})/label", "label", Role::kEngineer,
+     Label},
+    {"/api/v1/shelf", "shelve", Role::kAcknowledge, Shelve},
+    {"/api/v1/shelf/([0-9]{1,18})/end", "unshelve", Role::kAcknowledge,
+     EndShelf}};
 
-// @returns whether the request may change anything; if not, it is answered.
-bool Admitted(const Api& api, const httplib::Request& request,
-              httplib::Response& response) {
-  switch (api.access.Check(request.get_header_value("Authorization"),
-                           request.remote_addr)) {
-    case Permission::kReadOnly:
-      SendError(response, 403,
-                "this console is read-only: start the monitor with "
-                "--console-write FILE");
-      return false;
-    case Permission::kWrongToken:
-      response.set_header("WWW-Authenticate", "Bearer");
-      SendError(response, 401,
-                "Authorization: expected Bearer and the token of the file "
-                "named by --console-write");
-      return false;
-    case Permission::kTooMany:
-      response.set_header("Retry-After", "1");
-      SendError(response, 429,
-                "too many wrong tokens came from this address: one attempt "
-                "per second is looked at");
-      return false;
-    case Permission::kGranted:
-      break;
+void Perform(const Api& api, const Action& action,
+             const httplib::Request& request, httplib::Response& response) {
+  Json body = Json::parse(request.body, nullptr, /*allow_exceptions=*/false);
+  const bool named =
+      body.is_object() && body.contains("who") && body["who"].is_string();
+  std::string who = named ? body["who"].get<std::string>() : "";
+  // First of all: who may not act does not learn what is wrong with the body.
+  if (!api.access.MayAct(request, response, action.role, who)) {
+    return;
   }
-  return true;
+  if (!body.is_object()) {
+    throw ConfigError("the body: expected a JSON object");
+  }
+  if (!who.empty()) {
+    body["who"] = who;
+  }
+  const Json result = action.perform(api, request, body);
+  SendJson(response, result);
+  api.access.Acted(request, action.name, who, SubjectOf(request, result));
+  api.stream.Wake();
 }
 
 }  // namespace
@@ -136,12 +139,7 @@ void AddActionRoutes(httplib::Server& server, const Api& api) {
   for (const Action& action : kActions) {
     server.Post(action.path, [&api, action](const httplib::Request& request,
                                             httplib::Response& response) {
-      if (Admitted(api, request, response)) {
-        Guarded(response, [&] {
-          SendJson(response, action.perform(api, request, BodyOf(request)));
-          api.stream.Wake();
-        });
-      }
+      Guarded(response, [&] { Perform(api, action, request, response); });
     });
   }
 }

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "cli/fault_texts.h"
-#include "monitor/console/access.h"
+#include "monitor/console/admission.h"
 #include "monitor/console/alarm_book.h"
 #include "monitor/console/live_board.h"
 #include "monitor/console/live_stream.h"
@@ -62,7 +62,7 @@ struct Api {
   StoredModels& models;
   WorkListCache& work_list;
   const cli::FaultTexts& texts;
-  TokenGuard& access;
+  Admission& access;
   std::string instance;  ///< Differs after a restart.
   std::stop_token stopping{};
 
@@ -98,7 +98,7 @@ void AddRoutes(httplib::Server& server, const Api& api,
                std::span<const Route> routes);
 /// /api/v1/stream
 void AddStreamRoute(httplib::Server& server, const Api& api);
-/// POST: changes to the history, for clients that have the token.
+/// POST: changes to the history, for those whom Admission lets act.
 void AddActionRoutes(httplib::Server& server, const Api& api);
 
 void SendJson(httplib::Response& response, const Json& json);

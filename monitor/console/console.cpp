@@ -11,6 +11,7 @@
 namespace fdi::console {
 namespace {
 
+constexpr int kDaysOfWarning = 30;
 constexpr std::size_t kMaxBody = std::size_t{16} * 1024;
 constexpr const char* kPolicy =
     "default-src 'self'; img-src 'self' data:; base-uri 'none'; "
@@ -28,12 +29,26 @@ std::string NewInstance() {
 std::vector<monitor::HttpLane> Lanes() {
   return {{StreamOptions{}.max_clients + 1, 16,
            [](std::string_view path) { return path == "/api/v1/stream"; }},
+          {1, 8,  // A password's hash takes a processor for 30 ms.
+           [](std::string_view path) { return path == "/api/v1/login"; }},
           {1, 2,
            [](std::string_view path) {
              return path.starts_with("/api/v1/episodes/") &&
                     (path.ends_with(".svg") || path.ends_with(".png"));
            }},
           {4}};
+}
+
+monitor::HttpServerOptions ServerOptions(const ConsoleOptions& options) {
+  monitor::HttpServerOptions server;
+  server.address = options.address;
+  server.option = "--console";
+  server.lanes = Lanes();
+  server.max_body = kMaxBody;
+  server.names = options.names;
+  server.tls = options.tls;
+  server.user_header = options.admission.proxy_header;
+  return server;
 }
 
 }  // namespace
@@ -77,16 +92,11 @@ std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked) {
 
 Console::Console(const ConsoleOptions& options,
                  const cli::GlobalOptions& global, LogSink log)
-    : server_(std::make_unique<monitor::HttpServer>(monitor::HttpServerOptions{
-          options.address, "--console", Lanes(), kMaxBody, options.names})),
+    : server_(std::make_unique<monitor::HttpServer>(ServerOptions(options))),
       files_(FindConsoleFiles(options.files)),
       log_(std::move(log)),
-      access_(options.token_file ? LoadToken(*options.token_file) : "", log_),
-      texts_(cli::LoadFaultTexts(global)) {
-  if (options.token_file) {
-    log_(LogLevel::kInfo, "console_token file=" + options.token_file->string());
-  }
-}
+      access_(options.admission, log_),
+      texts_(cli::LoadFaultTexts(global)) {}
 
 Console::~Console() {
   Close();
@@ -104,7 +114,10 @@ void Console::Start(ConsoleSources sources) {
       Api{std::move(sources), board_, stream_, *alarms_, *models_, work_list_,
           texts_, access_, NewInstance(), stopping_.get_token()});
   SetRulesOfEveryAnswer();
+  RenewTls();
   httplib::Server& routes = server_->routes();
+  // Cookies know no port, and a host may have two consoles.
+  access_.AddTo(routes, "fdi_" + std::to_string(server_->address().port));
   for (const auto group : {LiveRoutes(), HistoryRoutes(), PlannerRoutes()}) {
     AddRoutes(routes, *api_, group);
   }
@@ -113,11 +126,45 @@ void Console::Start(ConsoleSources sources) {
   routes.set_mount_point("/", files_.string(), {{"Cache-Control", "no-cache"}});
   stream_.Start({board_, *alarms_, texts_, api_->sources.utc_now_ns, log_});
   server_->Start();
-  const std::string& host = server_->address().host;
-  log_(monitor::IsLoopback(host) ? LogLevel::kInfo : LogLevel::kWarning,
-       "console_listening address=" + ToString(server_->address()) +
-           " write=" + (access_.writable() ? "on" : "off") +
-           (monitor::IsLoopback(host) ? "" : " open_to_network=yes"));
+  SayWhereItListens();
+}
+
+void Console::SayWhereItListens() const {
+  const bool local = monitor::IsLoopback(server_->address().host);
+  log_(local ? LogLevel::kInfo : LogLevel::kWarning,
+       "console_listening address=" + ToString(server_->address()) + " write=" +
+           (access_.writable() ? "on" : "off") + " access=" + access_.mode() +
+           " tls=" + (server_->has_tls() ? "on" : "off") +
+           (local ? "" : " open_to_network=yes"));
+  if (!local && !server_->has_tls() && access_.writable()) {
+    log_(LogLevel::kWarning,
+         "console_unencrypted passwords and tokens can be read on the "
+         "network; give --console-tls, or listen on 127.0.0.1 behind a proxy "
+         "with TLS");
+  }
+}
+
+void Console::RenewTls() {
+  if (const std::optional<int> days = server_->RenewTls()) {
+    log_(LogLevel::kInfo, "console_certificate days=" + std::to_string(*days));
+    if (*days < kDaysOfWarning) {
+      log_(LogLevel::kWarning,
+           "console_certificate_expires days=" + std::to_string(*days));
+    }
+  }
+}
+
+void Console::Reload() {
+  const auto attempt = [this](const auto& reload) {
+    try {
+      reload();
+    } catch (const std::exception& error) {
+      log_(LogLevel::kError, "console_reload_failed reason=\"" +
+                                 std::string(error.what()) + "\"");
+    }
+  };
+  attempt([this] { RenewTls(); });
+  attempt([this] { access_.Reload(); });
 }
 
 void Console::Stop() {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diagnosis/log.h"
+#include "monitor/console/admission.h"
 #include "monitor/console/api.h"
 #include "monitor/http/http_server.h"
 #include "monitor/sinks.h"
@@ -19,9 +20,9 @@ struct ConsoleOptions {
   monitor::HttpAddress address;
   /// Of the page; empty: those installed with the program.
   std::filesystem::path files;
-  /// Holds the token of who may act on alarms; none: read-only.
-  std::optional<std::filesystem::path> token_file;
   std::vector<std::string> names;  ///< See monitor::HostAllowed().
+  AdmissionOptions admission;
+  std::optional<monitor::TlsFiles> tls;
 };
 
 /// Folder with index.html. @throws ConfigError naming `asked`, or DataError if
@@ -29,9 +30,9 @@ struct ConsoleOptions {
 std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked);
 
 /// The live page of a monitor and its API (docs/console.md): it shows what the
-/// pipeline passes to live(), reads the history, and lets those act who have
-/// the token. It has threads of its own; neither diagnosis nor bus waits for
-/// any of them.
+/// pipeline passes to live(), reads the history, and lets those act whom
+/// Admission lets. It has threads of its own; neither diagnosis nor bus waits
+/// for any of them.
 class Console {
  public:
   /// Binds the address and finds its files; nothing is answered yet.
@@ -52,6 +53,9 @@ class Console {
   /// Answers from now on. Once, with a history, before the pipeline starts.
   /// What throws in here leaves no thread behind.
   void Start(ConsoleSources sources);
+  /// Reads the certificate and the users anew. What is wrong with them is
+  /// logged, and the old ones stay.
+  void Reload();
   /// Ends all streams and takes no further connections. Does not wait.
   void Stop();
   /// Stops and waits for all threads: from here on `sources` are not called.
@@ -60,16 +64,18 @@ class Console {
   StreamCounts streams() const { return stream_.counts(); }
   std::size_t board_bytes() const { return board_.bytes(); }
   monitor::HttpServer::Counts requests() const { return server_->counts(); }
-  TokenGuard::Counts tokens() const { return access_.counts(); }
+  AdmissionCounts admissions() const { return access_.counts(); }
 
  private:
   class Events;
   void SetRulesOfEveryAnswer();
+  void RenewTls();
+  void SayWhereItListens() const;
 
   std::unique_ptr<monitor::HttpServer> server_;
   std::filesystem::path files_;
   LogSink log_;
-  TokenGuard access_;
+  Admission access_;
   cli::FaultTexts texts_;
   LiveBoard board_;
   LiveStream stream_;

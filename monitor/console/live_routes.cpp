@@ -15,7 +15,8 @@ constexpr std::int64_t kNsPerS = 1'000'000'000;
 constexpr std::chrono::milliseconds kPingPeriod{5000};
 constexpr std::size_t kMaxIdLength = 64;
 
-Json Status(const Api& api, const httplib::Request& /*request*/) {
+Json Status(const Api& api, const httplib::Request& request) {
+  const std::optional<Visitor> visitor = api.access.WhoSent(request);
   const MonitorFacts facts = api.sources.facts();
   Json counters = Json::object();
   for (const auto& [name, value] : facts.counters) {
@@ -45,7 +46,10 @@ Json Status(const Api& api, const httplib::Request& /*request*/) {
           {"software", api.sources.software},
           {"health", facts.health},
           {"pair", facts.pair.empty() ? Json() : Json(facts.pair)},
-          {"write", api.access.writable()},
+          {"write", api.access.MayWrite(request)},
+          {"user", visitor ? Json(visitor->name) : Json()},
+          {"role", visitor ? Json(RoleName(visitor->role)) : Json()},
+          {"session", api.access.HasSession(request)},
           {"stale_after_s", kStalePeriods * period_s},
           {"counters", std::move(counters)},
           {"valves",
@@ -142,9 +146,13 @@ void Stream(const Api& api, const httplib::Request& request,
   response.set_header("Cache-Control", "no-store");
   response.set_chunked_content_provider(
       "text/event-stream",
-      [&stream = api.stream, client](std::size_t /*offset*/,
-                                     httplib::DataSink& sink) {
+      [&stream = api.stream, client,
+       admitted = api.access.StillAdmits(request)](std::size_t /*offset*/,
+                                                   httplib::DataSink& sink) {
         Message message;
+        if (!admitted()) {
+          return false;
+        }
         switch (stream.Next(*client, kPingPeriod, message)) {
           case LiveStream::Outcome::kMessage:
             return sink.write(message->data(), message->size());

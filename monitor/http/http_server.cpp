@@ -515,7 +515,9 @@ class HttpServer::Gate : public httplib::Server {
 };
 
 HttpServer::HttpServer(const HttpServerOptions& options)
-    : gate_(std::make_unique<Gate>(options)), address_(options.address) {
+    : gate_(std::make_unique<Gate>(options)),
+      address_(options.address),
+      has_tls_(options.tls.has_value()) {
   const HttpAddress& address = options.address;
   gate_->set_socket_options(SetListenerOptions);
   gate_->new_task_queue = [] { return new Inline; };

@@ -101,6 +101,7 @@ class HttpServer {
 
   /// With the port that was found, if any was asked for.
   const HttpAddress& address() const { return address_; }
+  bool has_tls() const { return has_tls_; }
 
   Counts counts() const;
 
@@ -108,6 +109,7 @@ class HttpServer {
   class Gate;
   std::unique_ptr<Gate> gate_;
   HttpAddress address_;
+  bool has_tls_{false};
   std::thread thread_;
 };
 

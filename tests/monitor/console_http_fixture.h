@@ -48,7 +48,7 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
     options.address.host = "127.0.0.1";
     options.files = directory_.path() / "page";
     if (writable) {
-      options.token_file = directory_.path() / "token";
+      options.admission.token_file = directory_.path() / "token";
     }
     console_.emplace(options, cli::GlobalOptions{},
                      [this](LogLevel, std::string_view line) {

@@ -1,0 +1,317 @@
+#include "monitor/console/admission.h"
+
+#include <utility>
+
+#include <httplib.h>
+
+#include "diagnosis/error.h"
+#include "monitor/console/api.h"
+
+namespace fdi::console {
+namespace {
+
+constexpr const char* kApi = "/api/";
+constexpr const char* kLogIn = "/api/v1/login";
+constexpr std::size_t kShownPath = 200;
+
+// A text of anybody's as one word of a log line.
+std::string Quoted(const std::string& text) {
+  return Json(text).dump(-1, ' ', true, Json::error_handler_t::replace);
+}
+
+// "10.0.0.1" for "::ffff:10.0.0.1", as a socket for both versions has it.
+std::string_view PlainAddress(std::string_view address) {
+  constexpr std::string_view kMapped = "::ffff:";
+  return address.starts_with(kMapped) ? address.substr(kMapped.size())
+                                      : address;
+}
+
+// Whether a page of this server sent it: browsers say with each POST which
+// page did, and no page can change that.
+bool OfOurPage(const httplib::Request& request) {
+  const std::string origin = request.get_header_value("Origin");
+  const std::string host = request.get_header_value("Host");
+  return origin == "http://" + host || origin == "https://" + host;
+}
+
+}  // namespace
+
+Admission::Admission(const AdmissionOptions& options, LogSink log)
+    : options_(options),
+      log_(std::move(log)),
+      token_(options.token_file ? LoadToken(*options.token_file) : "", log_) {
+  if (options.token_file) {
+    log_(LogLevel::kInfo, "console_token file=" + options.token_file->string());
+  }
+  Reload();
+}
+
+void Admission::Reload() {
+  if (!options_.users_file) {
+    return;
+  }
+  Users users = LoadUsers(*options_.users_file);
+  log_(LogLevel::kInfo, "console_users file=" + options_.users_file->string() +
+                            " users=" + std::to_string(users.size()));
+  if (logins_) {
+    logins_->Take(std::move(users));
+  } else {
+    logins_.emplace(std::move(users));
+  }
+}
+
+void Admission::AddTo(httplib::Server& server, const std::string& cookie) {
+  if (!logins_) {
+    return;
+  }
+  cookie_ = cookie;
+  using Handler = httplib::Server::HandlerResponse;
+  server.set_pre_routing_handler(
+      [this](const httplib::Request& request, httplib::Response& response) {
+        return Admit(request, response) ? Handler::Unhandled : Handler::Handled;
+      });
+  server.Post(kLogIn, [this](const httplib::Request& request,
+                             httplib::Response& response) {
+    Guarded(response, [&] { LogIn(request, response); });
+  });
+  server.Post("/api/v1/logout", [this](const httplib::Request& request,
+                                       httplib::Response& response) {
+    Guarded(response, [&] { LogOut(request, response); });
+  });
+}
+
+bool Admission::Admit(const httplib::Request& request,
+                      httplib::Response& response) {
+  if (!UserHeader(request).empty() && !FromProxy(request)) {
+    Note(request, "proxy_header", UserHeader(request));
+  }
+  if (request.method == "POST" && !OfOurPage(request)) {
+    Refuse(request, response, 403, "origin",
+           "Origin: expected http:// or https:// and " +
+               request.get_header_value("Host"));
+    return false;
+  }
+  if (!request.path.starts_with(kApi) || request.path == kLogIn ||
+      WhoSent(request)) {
+    return true;
+  }
+  if (FromProxy(request)) {
+    Refuse(request, response, 403, "proxy_user",
+           "the proxy names a user who is not in the file of --console-users");
+  } else {
+    Refuse(request, response, 401, "no_session",
+           std::string("expected a session: POST ") + kLogIn);
+  }
+  return false;
+}
+
+bool Admission::FromProxy(const httplib::Request& request) const {
+  return !UserHeader(request).empty() &&
+         PlainAddress(request.remote_addr) ==
+             PlainAddress(options_.proxy_address);
+}
+
+std::string Admission::UserHeader(const httplib::Request& request) const {
+  return options_.proxy_header.empty()
+             ? std::string()
+             : request.get_header_value(options_.proxy_header.c_str());
+}
+
+// "a=1; NAME=SECRET; b=2"
+std::string Admission::SessionOf(const httplib::Request& request) const {
+  const std::string cookies = "; " + request.get_header_value("Cookie");
+  const std::size_t begin = cookies.find("; " + cookie_ + "=");
+  if (begin == std::string::npos) {
+    return {};
+  }
+  const std::size_t from = begin + cookie_.size() + 3;
+  return cookies.substr(from, cookies.find(';', from) - from);
+}
+
+std::optional<Visitor> Admission::WhoSent(const httplib::Request& request) {
+  if (!logins_) {
+    return std::nullopt;
+  }
+  return FromProxy(request) ? logins_->OfName(UserHeader(request))
+                            : logins_->OfSession(SessionOf(request));
+}
+
+std::function<bool()> Admission::StillAdmits(const httplib::Request& request) {
+  if (!logins_) {
+    return [] { return true; };
+  }
+  if (FromProxy(request)) {
+    return [this, name = UserHeader(request)] {
+      return logins_->OfName(name).has_value();
+    };
+  }
+  return [this, session = SessionOf(request)] {
+    return logins_->OfSession(session).has_value();
+  };
+}
+
+bool Admission::HasSession(const httplib::Request& request) const {
+  return logins_ && !FromProxy(request);
+}
+
+bool Admission::MayWrite(const httplib::Request& request) {
+  const std::optional<Visitor> visitor = WhoSent(request);
+  return visitor ? visitor->role >= Role::kAcknowledge : token_.writable();
+}
+
+void Admission::LogIn(const httplib::Request& request,
+                      httplib::Response& response) {
+  const Json body = Json::parse(request.body, nullptr, false);
+  const bool texts = body.is_object() && body.contains("user") &&
+                     body["user"].is_string() && body.contains("password") &&
+                     body["password"].is_string();
+  if (!texts) {
+    throw ConfigError(R"(the body: expected {"user": TEXT, "password": TEXT})");
+  }
+  const std::string name = body["user"];
+  std::string session;
+  switch (logins_->LogIn(name, body["password"].get<std::string>(),
+                         request.remote_addr, session)) {
+    case Logins::Outcome::kTooMany:
+      response.set_header("Retry-After", "1");
+      return Refuse(request, response, 429, "slowed",
+                    "too many wrong passwords came from this address: one "
+                    "attempt per second is looked at");
+    case Logins::Outcome::kWrong:
+      Note(request, "password", name);
+      return SendError(response, 401, "the name or the password is wrong");
+    case Logins::Outcome::kAdmitted:
+      break;
+  }
+  logins_->LogOut(SessionOf(request));
+  // Over https as the browser sees it, which may end at a proxy.
+  const bool secure =
+      request.get_header_value("Origin").starts_with("https://");
+  response.set_header("Set-Cookie", cookie_ + "=" + session +
+                                        "; Path=/; HttpOnly; SameSite=Strict" +
+                                        (secure ? "; Secure" : ""));
+  Acted(request, "login", name, "");
+  SendJson(response, {{"user", name}});
+}
+
+void Admission::LogOut(const httplib::Request& request,
+                       httplib::Response& response) {
+  const std::optional<Visitor> visitor = WhoSent(request);
+  logins_->LogOut(SessionOf(request));
+  Acted(request, "logout", visitor ? visitor->name : "", "");
+  response.set_header("Set-Cookie", cookie_ + "=; Path=/; Max-Age=0; HttpOnly");
+  SendJson(response, Json::object());
+}
+
+bool Admission::MayAct(const httplib::Request& request,
+                       httplib::Response& response, Role needed,
+                       std::string& who) {
+  if (const std::optional<Visitor> visitor = WhoSent(request)) {
+    if (visitor->role < needed) {
+      Refuse(request, response, 403, "role",
+             visitor->name + " has the role " + RoleName(visitor->role) +
+                 "; expected " + RoleName(needed));
+      return false;
+    }
+    if (!who.empty() && who != visitor->name) {
+      Refuse(request, response, 403, "name",
+             "who: expected " + visitor->name + ", who is logged in");
+      return false;
+    }
+    who = visitor->name;
+    return true;
+  }
+  switch (token_.Check(request.get_header_value("Authorization"),
+                       request.remote_addr)) {
+    case Permission::kReadOnly:
+      Refuse(request, response, 403, "read_only",
+             "this console is read-only: start the monitor with "
+             "--console-write FILE or --console-users FILE");
+      return false;
+    case Permission::kWrongToken:  // The guard has logged it.
+      response.set_header("WWW-Authenticate", "Bearer");
+      SendError(response, 401,
+                "Authorization: expected Bearer and the token of the file "
+                "named by --console-write");
+      return false;
+    case Permission::kTooMany:
+      response.set_header("Retry-After", "1");
+      Refuse(request, response, 429, "slowed",
+             "too many wrong tokens came from this address: one attempt "
+             "per second is looked at");
+      return false;
+    case Permission::kGranted:
+      break;
+  }
+  return true;
+}
+
+void Admission::Acted(const httplib::Request& request, const char* action,
+                      const std::string& who, const std::string& subject) {
+  const auto visitor = logins_ ? logins_->OfName(who) : std::nullopt;
+  std::string line = "console_action user=" + Quoted(who) + " role=";
+  line.append(visitor ? RoleName(visitor->role) : "token")
+      .append(" action=")
+      .append(action)
+      .append(subject.empty() ? "" : " ")
+      .append(subject)
+      .append(" from=")
+      .append(request.remote_addr);
+  log_(LogLevel::kInfo, line);
+  const std::lock_guard lock(mutex_);
+  ++counts_.actions[action];
+}
+
+void Admission::Note(const httplib::Request& request, std::string_view reason,
+                     const std::string& user) {
+  {
+    const std::lock_guard lock(mutex_);
+    ++counts_.refused[reason];
+  }
+  std::uint64_t not_shown = 0;
+  if (!refusals_.Admit(reason, not_shown)) {
+    return;
+  }
+  std::string line = "console_refused reason=";
+  line.append(reason)
+      .append(" user=")
+      .append(Quoted(user.substr(0, kShownPath)))
+      .append(" method=")
+      .append(request.method)
+      .append(" path=")
+      .append(Quoted(request.path.substr(0, kShownPath)))
+      .append(" from=")
+      .append(request.remote_addr);
+  if (not_shown > 0) {
+    line.append(" not_shown=").append(std::to_string(not_shown));
+  }
+  log_(LogLevel::kWarning, line);
+}
+
+void Admission::Refuse(const httplib::Request& request,
+                       httplib::Response& response, int status,
+                       std::string_view reason, const std::string& what) {
+  const std::optional<Visitor> visitor = WhoSent(request);
+  Note(request, reason, visitor ? visitor->name : "");
+  response.set_header("Cache-Control", "no-store");
+  SendError(response, status, what);
+}
+
+const char* Admission::mode() const {
+  return logins_ ? "users" : token_.writable() ? "token" : "off";
+}
+
+AdmissionCounts Admission::counts() const {
+  AdmissionCounts counts;
+  {
+    const std::lock_guard lock(mutex_);
+    counts = counts_;
+  }
+  counts.tokens = token_.counts();
+  if (logins_) {
+    counts.sessions = logins_->sessions();
+  }
+  return counts;
+}
+
+}  // namespace fdi::console
