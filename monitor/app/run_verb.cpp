@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -64,6 +66,14 @@ std::string CheckAddress(const std::string& text) {
              : text + " is no IPv4 or IPv6 address";
 }
 
+std::string CheckHeader(const std::string& text) {
+  return std::all_of(
+             text.begin(), text.end(),
+             [](unsigned char c) { return std::isalnum(c) != 0 || c == '-'; })
+             ? ""
+             : text + " has more than letters, digits and '-'";
+}
+
 void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
   const bool writable = !arguments.console_token.empty();
   const bool users = !arguments.console_users.empty();
@@ -116,6 +126,7 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
       run.add_option("--console-proxy-user", admission.proxy_header,
                      "Header by which a proxy says which of those users asks")
           ->needs(users)
+          ->check(CheckHeader)
           ->type_name("HEADER");
   CLI::Option* proxy =
       run.add_option("--console-proxy-from", admission.proxy_address,

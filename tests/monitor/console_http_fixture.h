@@ -2,9 +2,10 @@
 
 #include <filesystem>
 #include <fstream>
-#include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <httplib.h>
@@ -44,17 +45,21 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
   }
 
   void Start(bool writable = true) {
+    AdmissionOptions admission;
+    if (writable) {
+      admission.token_file = directory_.path() / "token";
+    }
+    Start(admission);
+  }
+  void Start(const AdmissionOptions& admission) {
     ConsoleOptions options;
     options.address.host = "127.0.0.1";
     options.files = directory_.path() / "page";
-    if (writable) {
-      options.admission.token_file = directory_.path() / "token";
-    }
+    options.admission = admission;
     console_.emplace(options, cli::GlobalOptions{},
                      [this](LogLevel, std::string_view line) {
-                       if (line.starts_with("console_listening")) {
-                         listening_ = line;
-                       }
+                       const std::lock_guard lock(log_mutex_);
+                       log_.append(line).append("\n");
                      });
     events_ = &console_->Before(bus_);
     console_->Start({path_, directory_.path() / "models.db", "0.0", kDetected,
@@ -62,8 +67,10 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
                        return MonitorFacts{"OK", {{"received", 7}}, 1};
                      },
                      cli::NowNs});
-    const std::size_t colon = listening_.find(':');
-    client_.emplace("127.0.0.1", std::stoi(listening_.substr(colon + 1)));
+    const std::string log = TakeLog();
+    const std::size_t line = log.find("console_listening");
+    port_ = std::stoi(log.substr(log.find(':', line) + 1));
+    client_.emplace("127.0.0.1", port_);
   }
 
   /// Begins an episode so many seconds after the others.
@@ -106,13 +113,20 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
     EXPECT_EQ(answer->status, status) << path << answer->body;
     return Json::parse(answer->body);
   }
+  /// What was logged since this was called last.
+  std::string TakeLog() {
+    const std::lock_guard lock(log_mutex_);
+    return std::exchange(log_, {});
+  }
   std::string IdText() const { return storage::EpisodeIdText(Id()); }
 
   storage::HistoryWriter writer_;
   NoBus bus_;
   std::optional<Console> console_;
   monitor::EventSink* events_{nullptr};
-  std::string listening_;
+  std::mutex log_mutex_;
+  std::string log_;
+  int port_{0};
   std::optional<httplib::Client> client_;
 };
 

@@ -19,7 +19,7 @@ using Clock = std::chrono::steady_clock;
 
 class HttpServerTest : public testing::Test {
  protected:
-  void Start(HttpServerOptions options = {}) {
+  void Start(HttpServerOptions options = HttpServerOptions()) {
     options.address.host = "127.0.0.1";
     server_.emplace(options);
     server_->Add({{"/small", [] { return HttpPage{.body = "small"}; }},

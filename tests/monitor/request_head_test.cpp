@@ -8,6 +8,8 @@
 namespace fdi::monitor {
 namespace {
 
+using testing::HasSubstr;
+
 constexpr std::size_t kBody = 100;
 
 // 200: good; 0: not whole yet.
@@ -26,7 +28,8 @@ TEST(RequestHeadTest, PassesOnOnlyWhatPagesRead) {
   const std::string bytes =
       "GET /api/v1/stream?valve=V1 HTTP/1.1\r\nhOST:  localhost:8080 \r\n"
       "Range: bytes=0-,0-,0-\r\nExpect: 100-continue\r\n"
-      "REMOTE_ADDR: 10.0.0.1\r\nCookie: a=b\r\n"
+      "REMOTE_ADDR: 10.0.0.1\r\nX-User: anna\r\n"
+      "Cookie: a=b\r\nOrigin: null\r\n"
       "Content-Type: multipart/form-data; boundary=x\r\n"
       "Accept-Encoding: gzip, deflate, br\r\nContent-Length: 4\r\n"
       "Authorization: Bearer abc\r\n\r\n";
@@ -39,8 +42,23 @@ TEST(RequestHeadTest, PassesOnOnlyWhatPagesRead) {
   EXPECT_EQ(head->body_size, 4U);
   EXPECT_EQ(head->text,
             "GET /api/v1/stream?valve=V1 HTTP/1.1\r\nHost: localhost:8080\r\n"
+            "Cookie: a=b\r\nOrigin: null\r\n"
             "Accept-Encoding: gzip\r\nContent-Length: 4\r\n"
             "Authorization: Bearer abc\r\n\r\n");
+}
+
+TEST(RequestHeadTest, TheHeaderOfAProxyIsPassedOnIfItIsThereOnce) {
+  std::optional<RequestHead> head;
+  const std::string bytes = "GET / HTTP/1.1\r\nx-USER: anna\r\n";
+  ASSERT_FALSE(ParseRequestHead(bytes + "\r\n", kBody, head, "X-User"));
+  EXPECT_THAT(head->text, HasSubstr("\r\nX-User: anna\r\n"));
+  head.reset();
+
+  const auto twice =
+      ParseRequestHead(bytes + "X-User: root\r\n\r\n", kBody, head, "X-User");
+
+  ASSERT_TRUE(twice);
+  EXPECT_EQ(twice->status, 400);
 }
 
 TEST(RequestHeadTest, APathHasOneForm) {

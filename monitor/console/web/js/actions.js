@@ -1,5 +1,6 @@
 // What an operator does to alarms: acknowledge, shelve, label. Each is a dialog
-// that asks who and why; the token is asked for once a session.
+// that asks who and why; the token is asked for once a session. Who is logged in
+// is asked for neither.
 
 import {path, post, token} from './api.js';
 import {button, field, h, replace, select, showDialog} from './dom.js';
@@ -9,22 +10,24 @@ import {store} from './store.js';
 
 /** Whether the monitor takes actions at all. */
 export const canAct = () => store.status?.write === true;
+const canLabel = () => [null, 'engineer'].includes(store.status.role);
 
 /**
  * A dialog with who and comment; `send` gets both and may throw.
  * @returns a promise of whether it was sent.
  */
 function ask({title, subject, fields, verb, commentNeeded, send}) {
-  const who = h('input', {'value': settings.get('who'), 'required': true,
-    'autocomplete': 'name', 'maxlength': 100});
+  const {user} = store.status;
+  const who = h('input', {'value': user ?? settings.get('who'),
+    'required': true, 'autocomplete': 'name', 'maxlength': 100});
   const comment = h('textarea', {rows: 2, maxlength: 1000,
     required: commentNeeded});
-  const secret = token.get() ? null :
+  const secret = user || token.get() ? null :
     h('input', {type: 'password', required: true, autocomplete: 'off'});
   const wrong = h('p', {class: 'wrong', role: 'alert', hidden: true});
   const submit = h('button', {class: 'primary'}, verb);
   const form = h('form', {method: 'dialog'}, h('p', {}, subject), fields,
-      field('Your name', who),
+      user ? null : field('Your name', who),
       field(commentNeeded ? 'Reason' : 'Comment', comment),
       secret ? field('Token of the monitor (file of --console-write)',
           secret) : null, wrong,
@@ -37,7 +40,7 @@ function ask({title, subject, fields, verb, commentNeeded, send}) {
       event.preventDefault();
       submit.disabled = true;
       if (secret) token.set(secret.value);
-      settings.set('who', who.value);
+      if (!user) settings.set('who', who.value);
       try {
         await send({who: who.value, comment: comment.value});
         sent = true;
@@ -45,7 +48,7 @@ function ask({title, subject, fields, verb, commentNeeded, send}) {
       } catch (error) {
         if (error.status === 401) token.clear();
         wrong.hidden = false;
-        replace(wrong, error.status === 401 && !secret ?
+        replace(wrong, error.status === 401 && !secret && !user ?
           'The token is no longer valid: close this and try again.' :
           error.message);
         submit.disabled = false;
@@ -106,6 +109,7 @@ export function unshelve(row) {
 }
 
 export function label(row) {
+  if (!canLabel()) return false;
   const own = members(row.fault);
   const choice = select([
     ['true', own.length > 0 ? `True: it was ${faultTitle(row.fault)}` :
@@ -134,6 +138,6 @@ export function actionButtons(row, done) {
     open ? acting('Acknowledge', acknowledge, [row]) : null,
     row.shelved ? acting('Unshelve', unshelve, row) :
       row.state !== 'CLOSED' ? acting('Shelve', shelve, row) : null,
-    acting('Label', label, row),
+    canLabel() ? acting('Label', label, row) : null,
   ];
 }

@@ -45,11 +45,16 @@ async function request(address, options) {
 
 export async function get(where, query, signal) {
   const timeout = AbortSignal.timeout(15000);
-  const response = await request(url(where, query), {
-    signal: signal && AbortSignal.any ? AbortSignal.any([signal, timeout]) :
-      timeout,
-  });
-  return response.json();
+  try {
+    const response = await request(url(where, query), {
+      signal: signal && AbortSignal.any ? AbortSignal.any([signal, timeout]) :
+        timeout,
+    });
+    return await response.json();
+  } catch (error) {
+    if (error.status === 401) location.reload();  // The session has ended.
+    throw error;
+  }
 }
 
 /** Null instead of an error where there is nothing of that name. */
@@ -73,7 +78,7 @@ export async function post(where, body) {
     method: 'POST',
     headers: {
       'Content-Type': 'application/json',
-      'Authorization': `Bearer ${token.get() ?? ''}`,
+      ...(token.get() && {'Authorization': `Bearer ${token.get()}`}),
     },
     body: JSON.stringify(body),
   });

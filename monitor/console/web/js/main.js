@@ -1,6 +1,7 @@
 // Starts the page: what is on top, which view a link means.
 
 import {replace} from './dom.js';
+import {logIn} from './login.js';
 import {parseRoute} from './route.js';
 import {applyTheme, settings} from './settings.js';
 import {createShell, startAnnouncements} from './shell.js';
@@ -37,6 +38,7 @@ function show(byUser) {
 }
 
 applyTheme();
+await logIn(main);
 const shell = createShell(document.getElementById('top'),
     document.getElementById('banner'));
 startAnnouncements(document.getElementById('announcer'));

@@ -6,6 +6,7 @@ import {faultTitle, groups, groupOf, priorityNames, priorityOf, prioritySign}
   from './faults.js';
 import {clockText, dateText, durationText, timeText, zoneName}
   from './format.js';
+import {logOut} from './login.js';
 import {nextTheme, settings} from './settings.js';
 import {showHelp} from './shortcuts.js';
 import {store} from './store.js';
@@ -63,13 +64,16 @@ export function createShell(top, banner) {
   const summary = h('a', {class: 'summary', href: '#/alarms'});
   const health = h('span', {class: 'health'});
   const clock = h('span', {class: 'clock'});
+  const user = h('span', {class: 'user'});
+  const leave = button('Log out', logOut, {hidden: true});
   const theme = button('', nextTheme, {title: 'Light or dark (key T)'});
   const utc = button('', () => settings.set('utc', !settings.get('utc')),
       {title: 'Local time or UTC (key U)'});
   const help = button('Keys', showHelp, {title: 'Keys (key ?)'});
   replace(top, h('span', {class: 'brand'}, 'Valves'),
       h('nav', {'aria-label': 'Views'}, links), summary,
-      h('div', {class: 'tools'}, health, clock, utc, theme, help));
+      h('div', {class: 'tools'}, health, clock, user, leave, utc,
+          theme, help));
 
   let title = '';
   const showSummary = () => {
@@ -87,6 +91,8 @@ export function createShell(top, banner) {
       (status.pair ? `, ${status.pair}` : '') +
       (status.write ? '' : ', read-only'));
     health.classList.toggle('bad', Boolean(bad));
+    setText(user, status?.user ? `${status.user}, ${status.role}` : '');
+    leave.hidden = !status?.session;
     health.title = !status ? '' :
       `${status.software}, running for ` +
       durationText(store.nowMs() - status.started_ms);

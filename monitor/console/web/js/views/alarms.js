@@ -27,8 +27,7 @@ class Alarms extends View {
   #nothing = h('p', {class: 'nothing', hidden: true});
   #bulk = button('', () => this.#acknowledgeSelected(),
       {class: 'primary', hidden: true});
-  #readOnly = h('p', {class: 'note', hidden: true}, 'Read-only: the monitor ' +
-    'was started without --console-write.');
+  #readOnly = h('p', {class: 'note', hidden: true});
 
   constructor({query}) {
     super();
@@ -81,6 +80,9 @@ class Alarms extends View {
       if (!store.alarms.has(episode)) this.#selected.delete(episode);
     }
     this.#readOnly.hidden = !store.status || canAct();
+    setText(this.#readOnly, store.status?.user ?
+      'Read-only: your role is view.' :
+      'Read-only: the monitor was started without --console-write.');
     replace(this.#head, headRow([
       ...(canAct() ? [{text: h('span', {class: 'sr-only'}, 'Selected')}] : []),
       ...kColumns, ...(canAct() ? [{text: 'Actions'}] : [])]));
