@@ -1,6 +1,6 @@
 // Our programs as children of a test.
 
-import {execFile, spawn} from 'node:child_process';
+import {execFile, execFileSync, spawn} from 'node:child_process';
 import {mkdtempSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import path from 'node:path';
@@ -24,6 +24,7 @@ export async function until(condition, what, patienceMs = kPatienceMs) {
 export class Plant {
   data = mkdtempSync(path.join(tmpdir(), 'fdi-console-'));
   tokenFile = path.join(this.data, 'token');
+  access = ['--console-write', this.tokenFile];
   #domain = String(70 + process.pid % 20);
   #children = new Set();
 
@@ -41,6 +42,13 @@ export class Plant {
         ['--data', this.data, ...words],
         {timeout: kPatienceMs, maxBuffer: 1 << 26});
     return stdout;
+  }
+
+  /** A user of the console, with the name of the role, and `password`. */
+  addUser(file, role, password) {
+    execFileSync(path.join(bin, 'fdi-monitor'),
+        ['console-user', role, '--role', role, '--users', file],
+        {input: password + '\n'});
   }
 
   /** Starts a program; `errors` is what it has said on stderr. */
@@ -63,13 +71,13 @@ export class Plant {
   /** A monitor with a console on `port`, and the address of its page. */
   async startMonitor(port = 0, ...words) {
     const monitor = this.start('fdi-monitor', 'run', '--model-set', 'quick',
-        `--console=127.0.0.1:${port}`, '--console-write', this.tokenFile,
-        ...words);
+        `--console=127.0.0.1:${port}`, ...this.access, ...words);
     await until(() => monitor.errors.includes('monitor_ready') ||
         monitor.exitCode !== null, `monitor_ready\n${monitor.errors}`);
     const found = /console\S* .*?(127\.0\.0\.1:\d+)/.exec(monitor.errors);
     if (!found) throw new Error(`no address of a console:\n${monitor.errors}`);
-    return {monitor, address: `http://${found[1]}`};
+    const scheme = this.access.includes('--console-tls') ? 'https' : 'http';
+    return {monitor, address: `${scheme}://${found[1]}`};
   }
 
   /** A simulator of the conditions that the model set was trained in. */
