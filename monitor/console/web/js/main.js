@@ -38,11 +38,11 @@ function show(byUser) {
 }
 
 applyTheme();
+startShortcuts();
 await logIn(main);
 const shell = createShell(document.getElementById('top'),
     document.getElementById('banner'));
 startAnnouncements(document.getElementById('announcer'));
-startShortcuts();
 settings.addEventListener('change', ({detail}) => {
   if (detail === 'theme') applyTheme();
   if (detail === 'theme' || detail === 'utc') show(false);
