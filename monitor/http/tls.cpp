@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <iterator>
 #include <new>
 #include <string>
 
@@ -18,9 +21,12 @@
 namespace fdi::monitor {
 namespace {
 
-// What OpenSSL says about the call that failed last.
+// What OpenSSL says about the call that failed, first cause first.
 std::string Reason() {
-  const char* reason = ERR_reason_error_string(ERR_peek_last_error());
+  const unsigned long error = ERR_peek_error();
+  const char* reason = ERR_SYSTEM_ERROR(error)
+                           ? std::strerror(ERR_GET_REASON(error))
+                           : ERR_reason_error_string(error);
   ERR_clear_error();
   return reason == nullptr ? "unknown reason" : reason;
 }
@@ -84,6 +90,11 @@ void TakeKey(SSL_CTX* context, const TlsFiles& files) {
   const bool apart = !files.key.empty();
   const char* const option = apart ? "--console-key" : "--console-tls";
   const std::filesystem::path& file = apart ? files.key : files.certificate;
+  std::ifstream stream(file);
+  const std::string content{std::istreambuf_iterator<char>(stream), {}};
+  if (!apart && content.find(" PRIVATE KEY-") == std::string::npos) {
+    Refuse(option, file, "has no private key; give its file by --console-key");
+  }
   const std::string text = ReadPrivateFile(file, option);
   const std::unique_ptr<BIO, void (*)(BIO*)> bio(
       BIO_new_mem_buf(text.data(), static_cast<int>(text.size())),

@@ -147,7 +147,13 @@ TEST_F(TlsTest, TheKeyMayStandInTheFileOfTheCertificate) {
   EXPECT_EQ(Client()->Get("/small")->body, "small");
   std::filesystem::permissions(files_.certificate,
                                std::filesystem::perms(0644));
-  EXPECT_THAT(Complaint(), HasSubstr("--console-tls"));
+  EXPECT_THAT(Complaint(),
+              HasSubstr("--console-tls " + files_.certificate.string() +
+                        ": mode 0644 lets others read"));
+  MakeCertificate(files_.certificate, directory_.path() / "key");
+  EXPECT_THAT(Complaint(), HasSubstr("give its file by --console-key"));
+  files_.certificate = directory_.path() / "none";
+  EXPECT_THAT(Complaint(), HasSubstr("No such file or directory"));
 }
 
 }  // namespace
