@@ -292,7 +292,10 @@ void Admission::Refuse(const httplib::Request& request,
                        httplib::Response& response, int status,
                        std::string_view reason, const std::string& what) {
   const std::optional<Visitor> visitor = WhoSent(request);
-  Note(request, reason, visitor ? visitor->name : "");
+  Note(request, reason,
+       visitor              ? visitor->name
+       : FromProxy(request) ? UserHeader(request)
+                            : "");
   response.set_header("Cache-Control", "no-store");
   SendError(response, status, what);
 }

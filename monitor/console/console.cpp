@@ -138,9 +138,9 @@ void Console::SayWhereItListens() const {
            (local ? "" : " open_to_network=yes"));
   if (!local && !server_->has_tls() && access_.writable()) {
     log_(LogLevel::kWarning,
-         "console_unencrypted passwords and tokens can be read on the "
-         "network; give --console-tls, or listen on 127.0.0.1 behind a proxy "
-         "with TLS");
+         "console_unencrypted reason=\"passwords and tokens can be read on the "
+         "network: give --console-tls, or listen on 127.0.0.1 behind a proxy "
+         "with TLS\"");
   }
 }
 

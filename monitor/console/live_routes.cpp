@@ -150,10 +150,11 @@ void Stream(const Api& api, const httplib::Request& request,
        admitted = api.access.StillAdmits(request)](std::size_t /*offset*/,
                                                    httplib::DataSink& sink) {
         Message message;
+        const auto outcome = stream.Next(*client, kPingPeriod, message);
         if (!admitted()) {
           return false;
         }
-        switch (stream.Next(*client, kPingPeriod, message)) {
+        switch (outcome) {
           case LiveStream::Outcome::kMessage:
             return sink.write(message->data(), message->size());
           case LiveStream::Outcome::kTimeout:

@@ -230,6 +230,7 @@ TEST_F(ConsoleAdmissionTest, WhoLogsOutOrIsRemovedIsAStranger) {
         return true;
       });
   EXPECT_THAT(stream, HasSubstr("hello"));
+  EXPECT_THAT(stream, Not(HasSubstr("tiles")));
   EXPECT_EQ(Look("/api/v1/status"), 401);
 }
 
@@ -257,6 +258,7 @@ TEST_F(ConsoleAdmissionTest, AProxyThatIsTrustedSaysWhoAsks) {
   EXPECT_EQ(Look("/api/v1/status", {{kUserHeader, "nobody"}}), 403);
   EXPECT_EQ(Look("/api/v1/status"), 401);
   EXPECT_EQ(Refused("proxy_user"), 1U);
+  EXPECT_THAT(TakeLog(), HasSubstr("reason=proxy_user user=\"nobody\""));
 }
 
 TEST_F(ConsoleAdmissionTest, TheHeaderOfAnybodyElseIsIgnored) {
