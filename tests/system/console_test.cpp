@@ -377,6 +377,30 @@ TEST_F(ConsoleTest, WhatTheConsoleCannotUseIsRefusedAtTheStart) {
   ChildProcess no_console(Command({"--console-write", nowhere}));
   EXPECT_EQ(no_console.AwaitExit(), 2);
   EXPECT_THAT(no_console.errors(), HasSubstr("need --console"));
+
+  const std::vector<std::string> console{"--console=127.0.0.1:0",
+                                         "--console-files", page().string()};
+  const std::pair<std::vector<std::string>, std::string> kRefused[] = {
+      {{"--console-tls", nowhere}, nowhere + ": expected a certificate"},
+      {{"--console-key", nowhere}, "--console-tls"},
+      {{"--console-users", nowhere}, nowhere + ": cannot be read: No such"},
+      {{"--console-users", nowhere, "--console-write", nowhere}, "excludes"},
+      {{"--console-proxy-user", "X-User"}, "--console-users"},
+      {{"--console-users", nowhere, "--console-proxy-user", "X-User"},
+       "--console-proxy-from"},
+      {{"--console-users", nowhere, "--console-proxy-user", "X_User",
+        "--console-proxy-from", "127.0.0.1"},
+       "letters, digits and '-'"},
+      {{"--console-users", nowhere, "--console-proxy-user", "X-User",
+        "--console-proxy-from", "proxy"},
+       "proxy is no IPv4 or IPv6 address"}};
+  for (const auto& [options, complaint] : kRefused) {
+    std::vector<std::string> words = console;
+    words.insert(words.end(), options.begin(), options.end());
+    ChildProcess refused(Command(words));
+    EXPECT_NE(refused.AwaitExit(), 0) << complaint;
+    EXPECT_THAT(refused.errors(), HasSubstr(complaint));
+  }
 }
 
 }  // namespace
