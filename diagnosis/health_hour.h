@@ -57,6 +57,8 @@ struct HealthHour {
   std::uint64_t model_hash{0};  ///< 0: none assigned.
   std::uint32_t epoch{0};
 
+  std::string host;  ///< Of the monitor; in the plant's history alone.
+  std::string monitor;
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   std::int64_t seen_ms{0};
   std::int64_t live_ms{0};

@@ -80,20 +80,24 @@ Json HourJson(const HealthHour& hour) {
   }
   const double normal_factor = static_cast<double>(hour.normal_factor) /
                                static_cast<double>(hour.live_samples);
-  return {{"hour_utc", cli::FormatTime(hour.hour * kNsPerHour, true)},
-          {"epoch", hour.epoch},
-          {"model_hash", storage::EpisodeIdText(hour.model_hash)},
-          {"seen_h", Hours(hour.seen_ms)},
-          {"live_h", Hours(hour.live_ms)},
-          {"alarm_h", Hours(hour.alarm_ms)},
-          {"open_h", Hours(hour.open_ms)},
-          {"shut_h", Hours(hour.shut_ms)},
-          {"d0", SixDigits(normal_factor * HealthHour::kShare)},
-          {"travel_strokes", SixDigits(static_cast<double>(hour.travel) *
-                                       HealthHour::kTravel / kFullStroke)},
-          {"reversals", hour.reversals},
-          {"channels", std::move(channels)},
-          {"strengths", std::move(strengths)}};
+  Json json{{"hour_utc", cli::FormatTime(hour.hour * kNsPerHour, true)},
+            {"epoch", hour.epoch},
+            {"model_hash", storage::EpisodeIdText(hour.model_hash)},
+            {"seen_h", Hours(hour.seen_ms)},
+            {"live_h", Hours(hour.live_ms)},
+            {"alarm_h", Hours(hour.alarm_ms)},
+            {"open_h", Hours(hour.open_ms)},
+            {"shut_h", Hours(hour.shut_ms)},
+            {"d0", SixDigits(normal_factor * HealthHour::kShare)},
+            {"travel_strokes", SixDigits(static_cast<double>(hour.travel) *
+                                         HealthHour::kTravel / kFullStroke)},
+            {"reversals", hour.reversals},
+            {"channels", std::move(channels)},
+            {"strengths", std::move(strengths)}};
+  if (!hour.monitor.empty()) {
+    json.update({{"host", hour.host}, {"monitor", hour.monitor}});
+  }
+  return json;
 }
 
 std::string DayText(double day) {
@@ -191,6 +195,8 @@ std::vector<HealthHour> DaysOf(std::span<const HealthHour> hours) {
         });
     if (place != days.rend()) {
       place->Add(hour);
+      place->host = hour.host;
+      place->monitor = hour.monitor;
     } else {
       days.push_back(std::move(hour));
     }

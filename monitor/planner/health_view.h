@@ -37,7 +37,8 @@ cli::Json TrendsJson(std::span<const LimitTrend> trends);
 /// "reversals", "channels": [{"signal", "unit", "mean", "rms", "percent",
 /// "bins": [{"cv_from", "cv_to", "samples", "mean", "rms"}]}], "strengths":
 /// [{"fault", "strength", "samples"}]}]. `percent` is the mean in % of what the
-/// normal model expects. Null where nothing was judged.
+/// normal model expects. Null where nothing was judged. Hours of the plant's
+/// history also have "host" and "monitor".
 cli::Json HealthHoursJson(std::span<const HealthHour> hours);
 
 /// The hours of each day as one, with all model sets and epochs apart.

@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "cli/text_table.h"
@@ -166,7 +167,7 @@ void AddEpisode(const Episode& episode, const cli::FaultTexts& texts,
   place->last_ns = episode.trace_end_ns.value_or(episode.detected_ns);
 }
 
-std::vector<Episode> EpisodesOf(storage::HistoryReader& history,
+std::vector<Episode> EpisodesOf(storage::History& history,
                                 const WorkQuery& query) {
   storage::EpisodeFilter filter;
   filter.valve_glob = query.valve_glob;
@@ -179,6 +180,11 @@ std::vector<Episode> EpisodesOf(storage::HistoryReader& history,
   for (Episode& episode : history.List(filter)) {
     episodes.push_back(std::move(episode));
   }
+  // In the plant's history both of a pair have an episode.
+  std::set<std::string> seen;
+  std::erase_if(episodes, [&seen](const Episode& episode) {
+    return !seen.insert(episode.episode_id).second;
+  });
   return episodes;
 }
 
@@ -198,6 +204,8 @@ void AddHealth(const std::vector<HealthHour>& hours, const WorkQuery& query,
   }
   work.live_share = work.service_hours > 0.0 ? live / work.service_hours : 0.0;
   work.last_ns = hours.back().hour * kHourNs;
+  work.host = hours.back().host;
+  work.monitor = hours.back().monitor;
   work.trends = TrendsOf(hours, query.limits);
 }
 
@@ -219,6 +227,9 @@ Json RowJson(const WorkRow& row) {
             {"valve_id", work.valve_id},
             {"score", SixDigits(row.score)},
             {"why", row.why}};
+  if (!work.monitor.empty()) {
+    json.update({{"host", work.host}, {"monitor", work.monitor}});
+  }
   for (const char* key :
        {"fault", "name", "discipline", "namur", "severity", "check", "strength",
         "open", "episodes", "episode_id", "detected_utc", "confirmed"}) {
@@ -250,9 +261,11 @@ Json RowJson(const WorkRow& row) {
 
 std::string RowText(const WorkRow& row) {
   const ValveWork& work = row.work;
-  std::string text = std::to_string(row.rank) + ". " + work.valve_id + "  (" +
-                     cli::FormatNumber(row.score, 2) + ")\n   because " +
-                     row.why;
+  const std::string where =
+      work.monitor.empty() ? "" : " of " + work.host + "/" + work.monitor;
+  std::string text = std::to_string(row.rank) + ". " + work.valve_id + where +
+                     "  (" + cli::FormatNumber(row.score, 2) +
+                     ")\n   because " + row.why;
   if (!work.faults.empty()) {
     const cli::FaultWords& words = work.faults.front().words;
     text += "\n   " + words.discipline + ": " + words.check;
@@ -332,7 +345,7 @@ std::string WhyText(const ValveWork& work, const WorkOptions& options) {
   return why;
 }
 
-std::vector<WorkRow> ReadWorkList(storage::HistoryReader& history,
+std::vector<WorkRow> ReadWorkList(storage::History& history,
                                   const cli::FaultTexts& texts,
                                   const WorkQuery& query) {
   if (!query.discipline.empty()) {
@@ -342,14 +355,15 @@ std::vector<WorkRow> ReadWorkList(storage::HistoryReader& history,
   const std::vector<Episode> episodes = EpisodesOf(history, query);
   for (const Episode& episode : episodes) {
     if (episode.label != "false") {
-      AddEpisode(episode, texts, valves[episode.valve_id].faults);
+      ValveWork& work = valves[episode.valve_id];
+      AddEpisode(episode, texts, work.faults);
+      work.host = episode.host;
+      work.monitor = episode.monitor;
     }
   }
   const std::map<std::string, Record> records = RecordsOf(episodes);
-  for (const std::string& valve :
-       HealthValves(history.database(), query.valve_glob)) {
-    AddHealth(ReadHealth(history.database(), {valve, query.since_ns}), query,
-              valves[valve]);
+  for (const std::string& valve : history.HealthValves(query.valve_glob)) {
+    AddHealth(history.Health({valve, query.since_ns}), query, valves[valve]);
   }
   std::vector<ValveWork> work;
   for (auto& [valve, facts] : valves) {
@@ -384,11 +398,17 @@ cli::Report WorkListReport(std::span<const WorkRow> rows) {
   if (rows.empty()) {
     report.Line("Nothing to do.");
   }
-  report.Csv("rows", {"rank", "valve_id", "score", "severity", "discipline",
-                      "namur", "fault", "name", "why", "check", "strength",
-                      "open", "episodes", "episode_id", "confirmed",
-                      "detected_utc", "travel_strokes", "service_hours"});
-  return report;
+  std::vector<std::string> keys = {
+      "rank",         "valve_id",       "score",
+      "severity",     "discipline",     "namur",
+      "fault",        "name",           "why",
+      "check",        "strength",       "open",
+      "episodes",     "episode_id",     "confirmed",
+      "detected_utc", "travel_strokes", "service_hours"};
+  if (!list.empty() && list.front().contains("monitor")) {
+    keys.insert(keys.end(), {"host", "monitor"});
+  }
+  return report.Csv("rows", keys);
 }
 
 }  // namespace fdi::planner

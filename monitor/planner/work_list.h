@@ -9,7 +9,7 @@
 #include "cli/fault_texts.h"
 #include "cli/report.h"
 #include "monitor/planner/health_view.h"
-#include "storage/history/history_reader.h"
+#include "storage/history/history.h"
 
 namespace fdi::planner {
 
@@ -41,6 +41,9 @@ struct ValveWork {
   double service_hours{0.0};
   double live_share{1.0};  ///< Of that time, the part that could be judged.
   std::optional<std::int64_t> last_ns;  ///< The newest hour of it.
+  /// Where the newest of it is from; in the plant's history alone.
+  std::string host;
+  std::string monitor;
 };
 
 /// One line of the list.
@@ -89,10 +92,10 @@ struct WorkQuery {
   WorkOptions options;     ///< now_ns is needed.
 };
 
-/// What history.db knows of the plant, ranked; see RankWork(). Trends are those
-/// of the hours of health from since_ns on.
+/// What the history knows of the plant, ranked; see RankWork(). Trends are
+/// those of the hours of health from since_ns on.
 /// @throws ConfigError for an unknown discipline, naming the accepted ones.
-std::vector<WorkRow> ReadWorkList(storage::HistoryReader& history,
+std::vector<WorkRow> ReadWorkList(storage::History& history,
                                   const cli::FaultTexts& texts,
                                   const WorkQuery& query);
 
@@ -101,7 +104,8 @@ std::vector<WorkRow> ReadWorkList(storage::HistoryReader& history,
 /// "episode_id", "detected_utc", "confirmed", "trends": TrendsJson(),
 /// "travel_strokes", "service_hours", "live_share", "last_utc"}]}, for people
 /// as sentences. `fault` to `confirmed` are those of the weightiest fault; null
-/// where there is none.
+/// where there is none. Rows of the plant's history also have "host" and
+/// "monitor".
 cli::Report WorkListReport(std::span<const WorkRow> rows);
 
 }  // namespace fdi::planner

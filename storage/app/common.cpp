@@ -4,6 +4,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/app/verbs.h"
+#include "storage/plant/plant_reader.h"
 
 namespace fdi::storage {
 
@@ -33,6 +34,14 @@ void PlantOptions::AddTo(CLI::App& verb) {
   verb.add_option("--from", url,
                   "Of the plant's history: postgresql://user@host/database");
   verb.add_option("--monitor", monitor, "There: of this monitor alone");
+}
+
+std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
+                                     const Context& context) {
+  if (plant.asked()) {
+    return std::make_unique<PlantReader>(plant.url, plant.monitor);
+  }
+  return std::make_unique<HistoryReader>(DataOf(context).history());
 }
 
 EpisodeFilter EpisodeOptions::Filter(const Context& context) const {

@@ -96,19 +96,18 @@ void AddDays(const std::vector<DayAlarms>& days, Report& report) {
   }
 }
 
-template <typename Reader>
-Report StatisticsOf(Reader& reader, const EpisodeOptions& options,
-                    const Context& context) {
-  const EpisodeFilter filter = options.Filter(context);
-  const AlarmStatistics alarms = reader.AlarmFigures(filter, filter.now_ns);
-  const std::vector<DataGap> gaps = reader.Gaps(filter);
-  const std::vector<CoverageTime> coverage = reader.Coverage(filter);
+Report Statistics(const HistoryOptions& options, const Context& context) {
+  const EpisodeFilter filter = options.filter.Filter(context);
+  const auto history = OpenHistory(options.plant, context);
+  const AlarmStatistics alarms = history->AlarmFigures(filter, filter.now_ns);
+  const std::vector<DataGap> gaps = history->Gaps(filter);
+  const std::vector<CoverageTime> coverage = history->Coverage(filter);
   double gaps_s = 0.0;
   for (const DataGap& gap : gaps) {
     gaps_s += static_cast<double>(gap.to_ns - gap.from_ns) * 1e-9;
   }
   Report report;
-  report.document["statistics"] = Rows(reader.Statistics(filter), AnswerJson);
+  report.document["statistics"] = Rows(history->Statistics(filter), AnswerJson);
   report.document.update(StatisticsJson(alarms));
   report.document["hours"] = HoursJson(coverage);
   report.document["gaps"] = gaps.size();
@@ -154,12 +153,6 @@ Report StatisticsOf(Reader& reader, const EpisodeOptions& options,
                      std::to_string(alarms.most_in_flood_window) +
                      " episodes in 10 minutes\n" + std::to_string(gaps.size()) +
                      " data gaps, " + SecondsText(gaps_s) + " in all");
-}
-
-Report Statistics(const HistoryOptions& options, const Context& context) {
-  return ReadHistory(options.plant, context, [&](auto& reader) {
-    return StatisticsOf(reader, options.filter, context);
-  });
 }
 
 struct CausesOptions {

@@ -70,20 +70,18 @@ Json ListedJson(const Episode& e) {
   return row;
 }
 
-template <typename Reader>
-Report ListOf(Reader& reader, const EpisodeOptions& options,
-              const Context& context) {
-  auto episodes = reader.List(options.Filter(context));
+Report List(const HistoryOptions& options, const Context& context) {
+  const auto history = OpenHistory(options.plant, context);
+  auto episodes = history->List(options.filter.Filter(context));
   Report report;
   report.document["episodes"] = Rows(episodes, ListedJson);
   std::vector<std::string> keys = EpisodeKeys();
-  const bool of_plant = std::is_same_v<Reader, PlantReader>;
-  if (of_plant) {
+  if (options.plant.asked()) {
     keys.insert(keys.end(), {"host", "monitor"});
   }
   report.Csv("episodes", keys);
   const auto texts = std::make_shared<const EpisodeTexts>(
-      TextsOf(reader.Alarms(std::move(episodes), cli::NowNs()), context));
+      TextsOf(history->Alarms(std::move(episodes), cli::NowNs()), context));
   const auto of = [texts](const Json& row) -> const EpisodeText& {
     return texts->at(row["episode_id"]);
   };
@@ -115,17 +113,11 @@ Report ListOf(Reader& reader, const EpisodeOptions& options,
       {"label", "label", Format::kPlain, 0, 6},
       {"acked by", "acked_by", Format::kPlain, 0, 7},
       {"model set", "model_set", Format::kPlain, 0, 8}};
-  if (of_plant) {
+  if (options.plant.asked()) {
     columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
                                          {"monitor", "monitor"}});
   }
   return report.Table("episodes", columns, "no episode matches");
-}
-
-Report List(const HistoryOptions& options, const Context& context) {
-  return ReadHistory(options.plant, context, [&](auto& reader) {
-    return ListOf(reader, options.filter, context);
-  });
 }
 
 // Transitions have faults and a factor, what people did has a who.
@@ -266,21 +258,15 @@ std::vector<Column> EpisodeFields(const Alarm& alarm, const Context& context) {
       })};
 }
 
-std::size_t Instants(HistoryReader& reader, std::uint64_t id) {
-  return reader.Trace(id).size();
-}
-std::int64_t Instants(PlantReader& reader, std::uint64_t id) {
-  return reader.TraceInstants(id);
-}
-
 struct ShowOptions {
   std::string id;
   PlantOptions plant;
 };
 
-template <typename Reader>
-Report ShowOf(Reader& reader, const std::string& id, const Context& context) {
-  const Alarm alarm = reader.Alarms({reader.Show(id)}, cli::NowNs()).front();
+Report Show(const ShowOptions& options, const Context& context) {
+  const auto history = OpenHistory(options.plant, context);
+  const Alarm alarm =
+      history->Alarms({history->Show(options.id)}, cli::NowNs()).front();
   const Episode& e = alarm.episode;
   Report report;
   report.document = ListedJson(e);
@@ -294,20 +280,14 @@ Report ShowOf(Reader& reader, const std::string& id, const Context& context) {
        {"acked_utc", TimeJson(e.acked_ns)},
        {"alarm_state", AlarmStateName(alarm.state)},
        {"shelf", alarm.shelf ? ShelfJson(*alarm.shelf) : Json()},
-       {"trace_instants", Instants(reader, e.id)}});
+       {"trace_instants", history->Trace(e.id).size()}});
   if (!e.monitor.empty()) {
     report.Fields("", {TextField("monitor", e.host + "/" + e.monitor)});
   }
   report.Fields("", EpisodeFields(alarm, context));
-  AddEvents(reader.Events(e.id), context, report);
-  AddLook(reader.Look(e.id), context, report);
+  AddEvents(history->Events(e.id), context, report);
+  AddLook(history->Look(e.id), context, report);
   return report;
-}
-
-Report Show(const ShowOptions& options, const Context& context) {
-  return ReadHistory(options.plant, context, [&](auto& reader) {
-    return ShowOf(reader, options.id, context);
-  });
 }
 
 // Reads back as the same bits; "nan".
@@ -388,12 +368,12 @@ struct ExportOptions {
 };
 
 int Export(const ExportOptions& options, const Context& context) {
-  HistoryReader reader(DataOf(context).history());
   if (options.id.empty()) {
-    const Report report = ListOf(reader, options.filter, context);
+    const Report report = List({options.filter, {}}, context);
     cli::WriteOutput(options.output,
                      [&](std::ostream& out) { report.PrintCsv(out); });
   } else {
+    HistoryReader reader(DataOf(context).history());
     const Episode episode = reader.Show(options.id);
     const auto trace = reader.Trace(episode.id);
     cli::WriteOutput(options.output, [&](std::ostream& out) {

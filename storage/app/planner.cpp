@@ -7,8 +7,7 @@
 #include "monitor/planner/health_view.h"
 #include "monitor/planner/work_list.h"
 #include "storage/app/verbs.h"
-#include "storage/history/health.h"
-#include "storage/history/history_reader.h"
+#include "storage/history/history.h"
 
 namespace fdi::storage {
 namespace {
@@ -59,14 +58,15 @@ struct HealthOptions {
   bool hourly{false};
   const CLI::Option* csv{nullptr};
   std::vector<std::string> limits;
+  PlantOptions plant;
 };
 
 std::vector<HealthHour> Hours(const HealthOptions& options,
                               const Context& context) {
-  HistoryReader reader(DataOf(context).history());
-  std::vector<HealthHour> hours = ReadHealth(
-      reader.database(), {options.valve, options.window.since_ns(context),
-                          options.window.until_ns(context)});
+  std::vector<HealthHour> hours =
+      OpenHistory(options.plant, context)
+          ->Health({options.valve, options.window.since_ns(context),
+                    options.window.until_ns(context)});
   if (hours.empty()) {
     throw NotFoundError("no health of valve '" + options.valve +
                         "' in that time; `fdi-store worklist --top 0` and "
@@ -90,7 +90,7 @@ std::string ChannelsText(const Json& hour) {
 
 // The CSV has a line per hour and channel, and so is another table than that
 // for people, whose line is an hour. An hour without channels has a line, too.
-Report CsvOf(const Json& hours) {
+Report CsvOf(const Json& hours, bool of_plant) {
   Report report;
   Json& rows = report.document["hours"] = Json::array();
   for (const Json& hour : hours) {
@@ -101,10 +101,15 @@ Report CsvOf(const Json& hours) {
       rows.back().update(channel);
     }
   }
-  return report.Csv("hours",
-                    {"hour_utc", "epoch", "model_hash", "seen_h", "live_h",
-                     "alarm_h", "open_h", "shut_h", "d0", "travel_strokes",
-                     "reversals", "signal", "unit", "mean", "rms", "percent"});
+  std::vector<std::string> keys = {
+      "hour_utc", "epoch",          "model_hash", "seen_h",
+      "live_h",   "alarm_h",        "open_h",     "shut_h",
+      "d0",       "travel_strokes", "reversals",  "signal",
+      "unit",     "mean",           "rms",        "percent"};
+  if (of_plant) {
+    keys.insert(keys.end(), {"host", "monitor"});
+  }
+  return report.Csv("hours", std::move(keys));
 }
 
 Report ShowHealth(const HealthOptions& options, const Context& context) {
@@ -114,21 +119,26 @@ Report ShowHealth(const HealthOptions& options, const Context& context) {
   }
   const Json rows = planner::HealthHoursJson(hours);
   if (options.csv->count() > 0) {
-    return CsvOf(rows);
+    return CsvOf(rows, options.plant.asked());
   }
   Report report;
   report.document = {{"valve_id", options.valve}, {"hours", rows}};
-  return report.Table("hours",
-                      {{"from", "hour_utc", Format::kTime},
-                       {"seen [h]", "seen_h"},
-                       {"LIVE [h]", "live_h"},
-                       {"alarm [h]", "alarm_h"},
-                       {"open [h]", "open_h"},
-                       {"shut [h]", "shut_h"},
-                       {"d_0", "d0", Format::kPlain, 3},
-                       {"strokes", "travel_strokes"},
-                       {"turns", "reversals"},
-                       TextColumn("residual mean (rms)", ChannelsText)});
+  std::vector<cli::Column> columns = {
+      {"from", "hour_utc", Format::kTime},
+      {"seen [h]", "seen_h"},
+      {"LIVE [h]", "live_h"},
+      {"alarm [h]", "alarm_h"},
+      {"open [h]", "open_h"},
+      {"shut [h]", "shut_h"},
+      {"d_0", "d0", Format::kPlain, 3},
+      {"strokes", "travel_strokes"},
+      {"turns", "reversals"},
+      TextColumn("residual mean (rms)", ChannelsText)};
+  if (options.plant.asked()) {
+    columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
+                                         {"monitor", "monitor"}});
+  }
+  return report.Table("hours", std::move(columns));
 }
 
 Report Trend(const HealthOptions& options, const Context& context) {
@@ -152,6 +162,7 @@ struct WorkListOptions {
   std::vector<std::string> limits;
   std::size_t top{10};
   double horizon_days{180.0};
+  PlantOptions plant;
 };
 
 Report WorkList(const WorkListOptions& options, const Context& context) {
@@ -164,9 +175,9 @@ Report WorkList(const WorkListOptions& options, const Context& context) {
   query.top = options.top;
   query.discipline = options.discipline;
   query.limits = planner::ParseLimits(options.limits);
-  HistoryReader history(DataOf(context).history());
+  const auto history = OpenHistory(options.plant, context);
   return planner::WorkListReport(planner::ReadWorkList(
-      history, cli::LoadFaultTexts(context.options), query));
+      *history, cli::LoadFaultTexts(context.options), query));
 }
 
 }  // namespace
@@ -195,6 +206,7 @@ void AddPlannerVerbs(cli::Program& program) {
   for (auto [verb, options] : {std::pair(&show, &shown), {&trend, &limits}}) {
     verb->add_option("--valve", options->valve, "Id of the valve")->required();
     options->window.AddTo(*verb);
+    options->plant.AddTo(*verb);
   }
   show.add_flag("--hourly", shown.hourly, "Hours instead of days");
   program.AllowCsv(show, "CSV with a line per time and signal");
@@ -224,6 +236,7 @@ void AddPlannerVerbs(cli::Program& program) {
                   "Trends that need more days do not count")
       ->check(CLI::Range(1.0, 36500.0))
       ->type_name("DAYS");
+  options.plant.AddTo(list);
   program.AllowCsv(list, "CSV, a line per valve");
 }
 

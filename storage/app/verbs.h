@@ -21,7 +21,6 @@
 #include "storage/history/episode.h"
 #include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
-#include "storage/plant/plant_reader.h"
 
 /// The verbs of fdi-store, one file per noun. A verb reads what it needs, fills
 /// the document of a Report, and declares which of its members people see.
@@ -95,6 +94,7 @@ struct PlantOptions {
   std::string url;
   std::string monitor;
 
+  bool asked() const { return !url.empty(); }
   void AddTo(CLI::App& verb);
 };
 
@@ -109,18 +109,9 @@ struct HistoryOptions {
   }
 };
 
-/// What `read` makes of the history of --data or of the plant's: it takes a
-/// HistoryReader or a PlantReader.
-template <typename Read>
-Report ReadHistory(const PlantOptions& plant, const Context& context,
-                   Read read) {
-  if (plant.url.empty()) {
-    HistoryReader reader(DataOf(context).history());
-    return read(reader);
-  }
-  PlantReader reader(plant.url, plant.monitor);
-  return read(reader);
-}
+/// The history of --data, or the plant's.
+std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
+                                     const Context& context);
 
 /// The options of what people do: --by, --comment.
 struct NoteOptions {

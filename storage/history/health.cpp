@@ -112,11 +112,6 @@ void ForEachNumber(Hour& hour, Visit visit) {
 
 constexpr std::int64_t kHourNs = 3'600'000'000'000;
 
-// The first hour that begins at `stamp_ns` or later.
-std::int64_t HourFrom(std::int64_t stamp_ns) {
-  return stamp_ns / kHourNs + (stamp_ns % kHourNs > 0 ? 1 : 0);
-}
-
 HealthHour Unpacked(const Statement& row, int column, HealthHour hour) {
   hour.live_ms = row.Int64(column);
   UnpackHealth(row.Blob(column + 1), hour);
@@ -200,6 +195,10 @@ void StoreHealth(Database& database, std::span<const HealthHour> hours) {
              std::span<const std::byte>(bytes))
         .Run();
   }
+}
+
+std::int64_t HourFrom(std::int64_t stamp_ns) {
+  return stamp_ns / kHourNs + (stamp_ns % kHourNs > 0 ? 1 : 0);
 }
 
 std::vector<HealthHour> ReadHealth(Database& database,

@@ -30,6 +30,9 @@ struct HealthFilter {
   std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
 };
 
+/// The first hour that begins at `stamp_ns` or later.
+std::int64_t HourFrom(std::int64_t stamp_ns);
+
 /// The hours of one valve that begin in the window, by time.
 std::vector<HealthHour> ReadHealth(Database& database,
                                    const HealthFilter& filter);

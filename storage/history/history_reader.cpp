@@ -257,22 +257,28 @@ std::vector<Alarm> HistoryReader::AlarmList(std::int64_t now_ns,
   return Alarms(ReadEpisodes(rows), now_ns);
 }
 
-std::vector<Alarm> HistoryReader::Alarms(std::vector<Episode> episodes,
-                                         std::int64_t now_ns) {
-  return AsAlarms(std::move(episodes), Shelves(now_ns), now_ns);
-}
-
 AlarmStatistics HistoryReader::AlarmFigures(const EpisodeFilter& filter,
-                                            std::int64_t now_ns,
-                                            const AlarmCriteria& criteria) {
+                                            std::int64_t now_ns) {
   return ComputeAlarmStatistics(ReadAlarmSpans(database_, filter),
-                                filter.since_ns, filter.until_ns, now_ns,
-                                criteria);
+                                filter.since_ns, filter.until_ns, now_ns);
 }
 
 std::vector<Shelf> HistoryReader::Shelves(
     std::optional<std::int64_t> in_force_at_ns) {
   return ReadShelves(database_, in_force_at_ns);
+}
+
+std::vector<HealthHour> HistoryReader::Health(const HealthFilter& filter) {
+  return ReadHealth(database_, filter);
+}
+
+std::vector<std::string> HistoryReader::HealthValves(const std::string& glob) {
+  return storage::HealthValves(database_, glob);
+}
+
+// SQLite changes it when another connection commits.
+std::string HistoryReader::Version() {
+  return std::to_string(database_.DataVersion());
 }
 
 }  // namespace fdi::storage

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <new>
+#include <span>
 
 #include <libpq-fe.h>
 
@@ -65,6 +67,19 @@ std::optional<std::string> PlantRows::Text(int row, int column) const {
 
 std::int64_t PlantRows::Int64(int row, int column) const {
   return std::atoll(PQgetvalue(result_.get(), row, column));
+}
+
+std::vector<std::byte> PlantRows::Bytes(int row, int column) const {
+  const char* text = PQgetvalue(result_.get(), row, column);
+  std::size_t size = 0;
+  const std::unique_ptr<unsigned char, void (*)(void*)> bytes(
+      PQunescapeBytea(reinterpret_cast<const unsigned char*>(text), &size),
+      PQfreemem);
+  if (!bytes) {
+    throw std::bad_alloc();
+  }
+  const auto all = std::as_bytes(std::span(bytes.get(), size));
+  return {all.begin(), all.end()};
 }
 
 // A host that is gone is noticed within half a minute. What the URL says comes

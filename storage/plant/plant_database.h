@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -36,6 +37,8 @@ class PlantRows {
   std::optional<std::string> Text(int row, int column) const;
   /// Of a column that is not NULL.
   std::int64_t Int64(int row, int column) const;
+  /// Of a bytea; NULL is empty.
+  std::vector<std::byte> Bytes(int row, int column) const;
 
  private:
   std::unique_ptr<pg_result, void (*)(pg_result*)> result_;

@@ -1,7 +1,11 @@
 #include "storage/plant/plant_reader.h"
 
+#include <algorithm>
 #include <cctype>
 #include <cstdlib>
+#include <functional>
+#include <iterator>
+#include <set>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -9,6 +13,7 @@
 #include "diagnosis/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/history/history_reader.h"
+#include "storage/history/trace.h"
 #include "storage/plant/sql.h"
 
 namespace fdi::storage {
@@ -118,8 +123,11 @@ PlantReader::PlantReader(const std::string& url, std::string monitor)
 // Runs `sql` with its {episodes}, the condition of the filter.
 PlantRows PlantReader::Ask(std::string_view sql, const EpisodeFilter& filter) {
   const EpisodeCondition condition = ConditionOf(filter);
+  // The index of what is open goes by end_reason, the column of the view.
+  const std::string open =
+      Replaced(condition.sql, "e.ended_ns IS NULL", "e.end_reason IS NULL");
   const std::string episodes =
-      Replaced(Replaced(condition.sql, "GLOB", "~"), "?", "$") +
+      Replaced(Replaced(open, "GLOB", "~"), "?", "$") +
       " AND utc(e.detected_ns) >= utc($2) AND utc(e.detected_ns) <= utc($3)"
       " AND $5::bigint IS NOT NULL AND ($6 = '' OR e.monitor = $6)";
   return plant_.Run(
@@ -204,11 +212,31 @@ std::optional<EpisodeLook> PlantReader::Look(std::uint64_t episode_id) {
     Parse(rows.Text(r, 4), f.begins_ns);
     Parse(rows.Text(r, 5), f.growing);
   }
+  const PlantRows simulated =
+      AskOf(sql::plant_look_rows, episode_id, " ORDER BY row");
+  for (int r = 0; r < simulated.size(); ++r) {
+    Parse(simulated.Text(r, 0), look.x_pct.emplace_back());
+    Parse(simulated.Text(r, 1), look.flow.emplace_back());
+  }
   return look;
 }
 
-std::int64_t PlantReader::TraceInstants(std::uint64_t episode_id) {
-  return AskOf(sql::plant_instants, episode_id).Int64(0, 0);
+std::vector<TracePoint> PlantReader::Trace(std::uint64_t episode_id) {
+  const PlantRows rows = AskOf(sql::plant_trace, episode_id, " ORDER BY chunk");
+  std::vector<TracePoint> trace;
+  for (int r = 0; r < rows.size(); ++r) {
+    TraceChunk chunk;
+    Parse(rows.Text(r, 0), chunk.samples.codec);
+    Parse(rows.Text(r, 1), chunk.samples.crc);
+    Parse(rows.Text(r, 2), chunk.samples.count);
+    chunk.samples.bytes = rows.Bytes(r, 3);
+    Parse(rows.Text(r, 4), chunk.vector_crc);
+    chunk.vectors = rows.Bytes(r, 5);
+    auto part = DecodeTrace(
+        chunk, plant_.name() + ": trace of " + EpisodeIdText(episode_id));
+    std::ranges::move(part, std::back_inserter(trace));
+  }
+  return trace;
 }
 
 std::vector<EpisodeStatistics> PlantReader::Statistics(
@@ -226,12 +254,68 @@ std::vector<CoverageTime> PlantReader::Coverage(const EpisodeFilter& filter) {
   return Records<CoverageTime>(Ask(sql::plant_coverage, filter));
 }
 
-std::vector<Alarm> PlantReader::Alarms(std::vector<Episode> episodes,
-                                       std::int64_t now_ns) {
-  const PlantRows shelves = plant_.Run(
-      SelectSql<Shelf>("FROM shelf WHERE until_ns > $1 AND from_ns <= $1"),
-      {std::to_string(now_ns)});
-  return AsAlarms(std::move(episodes), Records<Shelf>(shelves), now_ns);
+std::vector<Alarm> PlantReader::AlarmList(std::int64_t now_ns,
+                                          std::int64_t limit) {
+  EpisodeFilter filter;
+  filter.limit = limit;
+  filter.state = EpisodeState::kOpen;
+  std::vector<Episode> episodes = List(filter);
+  filter.limit -= static_cast<std::int64_t>(episodes.size());
+  if (filter.limit > 0) {
+    filter.state = EpisodeState::kUnacked;
+    std::ranges::move(ListWhere(" AND e.end_reason IS NOT NULL", filter),
+                      std::back_inserter(episodes));
+  }
+  std::set<std::uint64_t> seen;  // The other one of a pair has it, too.
+  std::erase_if(episodes,
+                [&](const Episode& e) { return !seen.insert(e.id).second; });
+  std::ranges::stable_sort(episodes, std::greater{}, &Episode::detected_ns);
+  return Alarms(std::move(episodes), now_ns);
+}
+
+std::vector<Shelf> PlantReader::Shelves(
+    std::optional<std::int64_t> in_force_at_ns) {
+  const auto at = in_force_at_ns
+                      ? std::optional(std::to_string(*in_force_at_ns))
+                      : std::nullopt;
+  return Records<Shelf>(
+      plant_.Run(SelectSql<Shelf>(sql::plant_shelves), {at, monitor_}));
+}
+
+std::vector<HealthHour> PlantReader::Health(const HealthFilter& filter) {
+  const PlantRows rows =
+      plant_.Run(sql::plant_health,
+                 {filter.valve_id, std::to_string(HourFrom(filter.since_ns)),
+                  std::to_string(HourFrom(filter.until_ns)), monitor_});
+  std::vector<HealthHour> hours(static_cast<std::size_t>(rows.size()));
+  for (int r = 0; r < rows.size(); ++r) {
+    HealthHour& hour = hours[static_cast<std::size_t>(r)];
+    hour.valve_id = filter.valve_id;
+    Parse(rows.Text(r, 0), hour.hour);
+    Parse(rows.Text(r, 1), hour.model_hash);
+    Parse(rows.Text(r, 2), hour.epoch);
+    Parse(rows.Text(r, 3), hour.live_ms);
+    UnpackHealth(rows.Bytes(r, 4), hour);
+    Parse(rows.Text(r, 5), hour.host);
+    Parse(rows.Text(r, 6), hour.monitor);
+  }
+  return hours;
+}
+
+std::vector<std::string> PlantReader::HealthValves(const std::string& glob) {
+  const PlantRows rows = plant_.Run(sql::plant_health_valves, {RegexOf(glob)});
+  std::vector<std::string> valves;
+  for (int r = 0; r < rows.size(); ++r) {
+    valves.push_back(rows.Text(r, 0).value_or(""));
+  }
+  return valves;
+}
+
+// Each shipping sets its time.
+std::string PlantReader::Version() {
+  return plant_.Run("SELECT sum(shipped_ns) FROM monitor")
+      .Text(0, 0)
+      .value_or("");
 }
 
 // Episodes that touch the time: those that begin in it and those that are open

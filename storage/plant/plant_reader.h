@@ -6,36 +6,38 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/records/episode_look.h"
-#include "diagnosis/records/service_records.h"
-#include "storage/history/alarm.h"
-#include "storage/history/episode.h"
+#include "storage/history/history.h"
 #include "storage/plant/plant_database.h"
 
 namespace fdi::storage {
 
-/// Reads the plant's history as HistoryReader reads one monitor's: the
-/// functions of the same name give the same, over all monitors or those of one
-/// name. Episodes have their host and monitor.
-class PlantReader {
+/// Reads the plant's history, over all monitors or those of one name. Of an id
+/// that several monitors have, Show(), Events(), Look(), Trace() and
+/// AlarmList() give that of the first by host and name; of an hour of a valve,
+/// Health() the one with the longest LIVE time.
+class PlantReader : public History {
  public:
   /// @param monitor a name; empty: all. @throws PlantError as PlantDatabase.
-  PlantReader(const std::string& url, std::string monitor);
+  explicit PlantReader(const std::string& url, std::string monitor = {});
 
-  std::vector<Episode> List(const EpisodeFilter& filter = {});
-  /// Of an id that several monitors have, that of the first by host and name;
-  /// so do the next three.
-  Episode Show(std::string_view id);
-  std::vector<HistoryEntry> Events(std::uint64_t episode_id);
-  std::optional<EpisodeLook> Look(std::uint64_t episode_id);
-  /// Instants of evidence. What is in them is not read here.
-  std::int64_t TraceInstants(std::uint64_t episode_id);
-  std::vector<EpisodeStatistics> Statistics(const EpisodeFilter& filter = {});
-  std::vector<DataGap> Gaps(const EpisodeFilter& filter = {});
-  std::vector<CoverageTime> Coverage(const EpisodeFilter& filter = {});
-  std::vector<Alarm> Alarms(std::vector<Episode> episodes, std::int64_t now_ns);
+  std::vector<Episode> List(const EpisodeFilter& filter) override;
+  Episode Show(std::string_view id) override;
+  std::vector<HistoryEntry> Events(std::uint64_t episode_id) override;
+  std::optional<EpisodeLook> Look(std::uint64_t episode_id) override;
+  std::vector<TracePoint> Trace(std::uint64_t episode_id) override;
+  std::vector<EpisodeStatistics> Statistics(
+      const EpisodeFilter& filter) override;
+  std::vector<DataGap> Gaps(const EpisodeFilter& filter) override;
+  std::vector<CoverageTime> Coverage(const EpisodeFilter& filter) override;
+  std::vector<Alarm> AlarmList(std::int64_t now_ns,
+                               std::int64_t limit) override;
   AlarmStatistics AlarmFigures(const EpisodeFilter& filter,
-                               std::int64_t now_ns);
+                               std::int64_t now_ns) override;
+  std::vector<Shelf> Shelves(
+      std::optional<std::int64_t> in_force_at_ns) override;
+  std::vector<HealthHour> Health(const HealthFilter& filter) override;
+  std::vector<std::string> HealthValves(const std::string& glob) override;
+  std::string Version() override;
 
  private:
   std::vector<Episode> ListWhere(const std::string& more,

@@ -260,10 +260,35 @@ episode_id = $1 AND monitor_id = (
   SELECT monitor_id FROM episode
   WHERE episode_id = $1 AND ($2 = '' OR monitor = $2)
   ORDER BY host, monitor, monitor_id LIMIT 1)
--- name: plant_instants
-SELECT coalesce(sum(instants), 0)::bigint FROM episode_trace WHERE
+-- name: plant_trace
+SELECT sample_codec, sample_crc, instants, samples, vector_crc, vectors
+FROM episode_trace WHERE
 -- name: plant_look
 SELECT first_ns, period_ns, misfit FROM episode_look WHERE
 -- name: plant_look_faults
 SELECT fault, strength, lowest, highest, begins_ns, growing
 FROM episode_look_fault WHERE
+-- name: plant_look_rows
+SELECT x_pct, flow FROM episode_look_row WHERE
+-- The columns are kFieldsOf<Shelf>; $1 when, or NULL, $2 the monitor.
+-- name: plant_shelves
+FROM shelf JOIN monitor m USING (monitor_id)
+WHERE ($1::bigint IS NULL OR until_ns > $1 AND from_ns <= $1
+       AND (ended_ns IS NULL OR ended_ns > $1))
+  AND ($2 = '' OR m.monitor = $2)
+ORDER BY from_ns, shelf_id
+-- $1 valve, $2 first hour, $3 hour behind the last, $4 monitor.
+-- name: plant_health
+SELECT DISTINCT ON (hour, epoch, model_hash)
+  hour, model_hash, epoch, live_ms, bytes, m.host, m.monitor
+FROM health_hour JOIN monitor m USING (monitor_id)
+WHERE valve_id = $1 AND hour >= $2 AND hour < $3 AND ($4 = '' OR m.monitor = $4)
+ORDER BY hour, epoch, model_hash, live_ms DESC, m.host, m.monitor
+-- Skips from valve to valve along the key.
+-- name: plant_health_valves
+WITH RECURSIVE valve(id) AS (
+  SELECT min(valve_id) FROM health_hour
+  UNION ALL
+  SELECT (SELECT min(valve_id) FROM health_hour WHERE valve_id > id)
+  FROM valve WHERE id IS NOT NULL)
+SELECT id FROM valve WHERE id ~ $1 ORDER BY id

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "storage/history/retention.h"
+#include "storage/plant/plant_reader.h"
 #include "tests/storage/many_episodes.h"
 #include "tests/survival/plant_fixture.h"
 
@@ -55,6 +56,24 @@ class ShipTest : public PlantFixture {
     day.day = kDetected / 86'400'000'000'000;
     day.samples.Add(Quality::kLive, live);
     return day;
+  }
+  // Two hours, of which the second one travelled.
+  static Checkpoint HoursOfHealth(const std::string& valve) {
+    Checkpoint checkpoint;
+    for (int i = 0; i < 2; ++i) {
+      HealthHour& hour = checkpoint.health.emplace_back();
+      hour.valve_id = valve;
+      hour.hour = kDetected / 3'600'000'000'000 + i;
+      hour.model_hash = 0x8000'0000'0000'0001;
+      hour.seen_ms = 3'600'000;
+      hour.live_ms = 1'800'000;
+      hour.live_samples = 1800;
+      hour.normal_factor = 900'000;
+      hour.travel = 400'000 * i;
+      hour.channels = {{Signal::kX, -10}};
+      hour.bins[5] = {{1800, 3600, 14'400, 1'000'000}};
+    }
+    return checkpoint;
   }
   std::int64_t LoggedChanges(const std::string& folder,
                              const std::string& figure = "count(*)") const {
@@ -509,7 +528,7 @@ TEST_F(ShipTest, RetentionOfBothSides) {
   }
 }
 
-// list, show and stats say of the plant what they say of the history.
+// The verbs say of the plant what they say of the history.
 TEST_F(ShipTest, TheVerbsReadThePlant) {
   Init();
   const auto path = Folder("a") / "history.db";
@@ -523,7 +542,24 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
     gap.to_ns = kDetected + kSecond;
     gap.reason = "test";
     writer.AddGap(gap);
+    EpisodeLook look;
+    look.episode_id = Id("LV-1");
+    look.period_ns = kSecond;
+    look.faults = {{1, 0.5, 0.4, 0.6, kDetected, false}};
+    look.x_pct = {1.0};
+    look.flow = {2.0};
+    writer.StoreLook(look);
+    std::vector<TracePoint> points;
+    for (int k = 0; k < 400; ++k) {
+      points.push_back(Instant(k));
+    }
+    FaultEvent later =
+        Event(TransitionKind::kDetected, 10, 0, 0.3, EndReason::kNone, "LV-3");
+    later.transition.detection_stamp_ns = later.transition.stamp_ns;
+    writer.Record(later, kDetected);
+    writer.AppendTrace(later.episode_id, points);
     writer.Commit(kDetected);
+    writer.CommitCheckpoint(HoursOfHealth("LV-3"));
     HistoryEditor(path).Label("last", "f7", By("anna", kDetected));
   }
   ASSERT_EQ(Ship("a").code, 0);
@@ -541,12 +577,13 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
     const auto without_names = [](nlohmann::json& episode) {
       episode.erase("host");
       episode.erase("monitor");
+      episode.erase("score");  // It sinks with the time that passes.
     };
     for (auto* document : {&expected, &found}) {
       without_names(*document);
-      if (document->contains("episodes")) {
-        for (auto& episode : (*document)["episodes"]) {
-          without_names(episode);
+      for (const char* list : {"episodes", "hours", "rows"}) {
+        for (auto& row : (*document)[list]) {
+          without_names(row);
         }
       }
     }
@@ -566,12 +603,56 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
   same("history show aaaa00000000012");
   same("history show aaaa");
   same("history show nothing");
+  same("health show --valve LV-3");
+  same("health show --valve LV-3 --hourly --until 2026-11-20T10:00");
+  same("health show --valve nothing");
+  same("health trend --valve LV-3 --limit travel=3");
+  const std::string since = " --since 2000d --limit travel=3";
+  same("worklist --top 0" + since);
+  same("worklist --valve 'LV-*' --discipline instrument" + since);
   const Outcome list =
       Store("history list --limit 1 --csv --from '" + Url() + "' --monitor a");
   EXPECT_THAT(list.out, HasSubstr("acked_by,host,monitor\n"));
   EXPECT_THAT(list.out, HasSubstr(",a\n"));
   EXPECT_THAT(Store("history list --from '" + Url() + "' --monitor b").out,
               HasSubstr("no episode matches"));
+  EXPECT_THAT(Store("worklist --monitor b --from '" + Url() + "'" + since).out,
+              HasSubstr("Nothing to do."));
+}
+
+// Both of a pair have an episode and an hour: there is one in the work list,
+// and one alarm. The fuller hour counts.
+TEST_F(ShipTest, WhatAPairSawCountsOnce) {
+  Init();
+  for (const char* monitor : {"a", "b"}) {
+    HistoryWriter writer(Folder(monitor) / "history.db");
+    writer.Record(Event(TransitionKind::kDetected, 0, 0, 0.3), kDetected);
+    Checkpoint checkpoint = HoursOfHealth("V1");
+    checkpoint.health.front().live_ms += *monitor == 'b' ? 1 : 0;
+    writer.CommitCheckpoint(checkpoint);
+    ASSERT_EQ(Ship(monitor).code, 0);
+  }
+
+  PlantReader reader(Url());
+  EXPECT_EQ(reader.List({}).size(), 2U);
+  EXPECT_EQ(reader.AlarmList(kDetected, 500).size(), 1U);
+  const auto hours = reader.Health({"V1"});
+  ASSERT_EQ(hours.size(), 2U);
+  EXPECT_EQ(hours[0].monitor, "b");
+  EXPECT_EQ(hours[1].monitor, "a");
+  const auto list = nlohmann::json::parse(
+      Store("worklist --json --since 2000d --from '" + Url() + "'").out);
+  ASSERT_EQ(list["rows"].size(), 1U);
+  EXPECT_EQ(list["rows"][0]["episodes"], 1);
+  EXPECT_EQ(list["rows"][0]["monitor"], "a");
+
+  const std::string before = reader.Version();
+  EXPECT_EQ(reader.Version(), before);
+  ASSERT_EQ(Ship("a").code, 0);
+  HistoryWriter(Folder("a") / "history.db")
+      .CommitCheckpoint(HoursOfHealth("V1"));
+  ASSERT_EQ(Ship("a").code, 0);
+  EXPECT_NE(reader.Version(), before);
 }
 
 // Each query of the dashboard, with Grafana's macros written out.
