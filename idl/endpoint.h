@@ -87,9 +87,10 @@ class Publisher {
 
 /// What DDS says about a received message.
 struct Reception {
-  std::int64_t sent_ns{0};      ///< UTC at the writer.
-  std::int64_t received_ns{0};  ///< UTC here.
-  std::uint64_t writer_id{0};   ///< Differs between writers of one domain.
+  std::int64_t sent_ns{0};          ///< UTC at the writer.
+  std::int64_t received_ns{0};      ///< UTC here.
+  std::uint64_t writer_id{0};       ///< Differs between writers of one domain.
+  std::uint64_t participant_id{0};  ///< The same for all of one participant.
 };
 
 /// What became of the messages. Nothing is lost in silence.

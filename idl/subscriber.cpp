@@ -48,10 +48,11 @@ struct HandleHash {
   }
 };
 
-// 64-bit FNV-1a over the 16 bytes of the writer's GUID.
-std::uint64_t WriterId(const dds::InstanceHandle_t& writer) {
+// 64-bit FNV-1a over the first bytes of the writer's GUID: 12 of the
+// participant, 4 of the entity.
+std::uint64_t HashOf(const dds::InstanceHandle_t& writer, std::size_t bytes) {
   std::uint64_t hash = 14695981039346656037U;
-  for (std::size_t i = 0; i < 16; ++i) {
+  for (std::size_t i = 0; i < bytes; ++i) {
     hash = (hash ^ writer.value[i]) * 1099511628211U;
   }
   return hash;
@@ -204,7 +205,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     Item item;
     item.reception = {info.source_timestamp.to_ns(),
                       info.reception_timestamp.to_ns(),
-                      WriterId(info.publication_handle)};
+                      HashOf(info.publication_handle, 16),
+                      HashOf(info.publication_handle, 12)};
     item.ended = !info.valid_data;
     gaps.Count(item.reception.writer_id,
                info.sample_identity.sequence_number().to64long(),

@@ -142,6 +142,7 @@ enum class Silence : std::uint8_t {
   kNone,
   kStale,  ///< No sample for three periods.
   kEnded,  ///< Its publisher ended the stream.
+  kMonitor,  ///< Its monitor is silent; the page of a plant alone says so.
 };
 
 /// Shows people how the valves are. Diagnosis thread, which must not wait.

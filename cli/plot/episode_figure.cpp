@@ -399,7 +399,7 @@ std::string Subtitle(const Episode& e) {
 
 }  // namespace
 
-EpisodeEvidence LoadEvidence(storage::HistoryReader& history,
+EpisodeEvidence LoadEvidence(storage::History& history,
                              std::string_view id,
                              const std::filesystem::path& models_path) {
   EpisodeEvidence evidence;

@@ -8,7 +8,7 @@
 
 #include "cli/plot/figure.h"
 #include "diagnosis/model_set.h"
-#include "storage/history/history_reader.h"
+#include "storage/history/history.h"
 
 namespace fdi::plot {
 
@@ -27,7 +27,7 @@ struct EpisodeEvidence {
 ///   left out if the file has none of this version and content, or
 ///   of an older format.
 /// @throws NotFoundError; DataError if stored bytes of the trace are damaged.
-EpisodeEvidence LoadEvidence(storage::HistoryReader& history,
+EpisodeEvidence LoadEvidence(storage::History& history,
                              std::string_view id,
                              const std::filesystem::path& models_path);
 

@@ -33,24 +33,22 @@ class BusView {
   /// @throws TransportError
   BusView(const BusOptions& options, const cli::Context& context, LogSink log);
 
-  /// Calls `on_message` with each message that has come, model sets first
-  /// because they explain decision vectors, and `on_ended` with the id of each
-  /// valve whose monitor ended it. Waits a moment if there is nothing.
+  /// Calls `on_message` with each message that has come and its Reception,
+  /// model sets first because they explain decision vectors, and `on_ended`
+  /// with the id of each valve whose monitor ended it. Waits a moment if there
+  /// is nothing.
   template <typename OnMessage, typename OnEnded>
   void Take(OnMessage on_message, OnEnded on_ended) {
     constexpr std::chrono::milliseconds kNow{0};
     constexpr std::chrono::milliseconds kMoment{50};
-    const auto all = [&](const auto& message, const auto&) {
-      on_message(message);
-    };
-    const auto matching = [&](const auto& message, const auto&) {
+    const auto matching = [&](const auto& message, const auto& reception) {
       if (Matches(message.valve_id)) {
-        on_message(message);
+        on_message(message, reception);
       }
     };
-    models_.Take({all, {}}, kNow);
+    models_.Take({on_message, {}}, kNow);
     events_.Take({matching, {}}, decisions_ || batches_ ? kNow : kMoment);
-    status_.Take({all, {}}, kNow);
+    status_.Take({on_message, {}}, kNow);
     if (decisions_) {
       decisions_->Take(
           {matching, [&](const auto& message,

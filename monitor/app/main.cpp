@@ -43,6 +43,12 @@ std::vector<fdi::cli::VerbExamples> Examples() {
        {{"The worst valves first; q quits, s sorts, / filters",
          "fdi-monitor top"},
         {"Once, for a script", "fdi-monitor top --once --valves 'FV-1*'"}}},
+      {"console",
+       {{"One page of all monitors, with the plant's history",
+         "fdi-monitor console --from postgresql://screen@db.example/plant"},
+        {"Open to the plant network, of one hall",
+         "fdi-monitor console --from postgresql://screen@db.example/plant "
+         "--listen 10.1.2.9:8081 --valves 'H1-*'"}}},
   };
 }
 
@@ -59,6 +65,7 @@ int main(int argc, char** argv) {
   fdi::monitor::AddConsoleUserVerb(program);
   fdi::monitor::AddWatchVerb(program);
   fdi::monitor::AddTopVerb(program);
+  fdi::monitor::AddConsoleVerb(program);
   program.AddExamples(Examples());
   return program.Run(argc, argv);
 }

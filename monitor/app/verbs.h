@@ -31,6 +31,9 @@ void AddConsoleUserVerb(cli::Program& program);
 /// `watch`: prints or counts what monitors publish.
 void AddWatchVerb(cli::Program& program);
 
+/// `console`: the live page of all monitors.
+void AddConsoleVerb(cli::Program& program);
+
 /// `top`: a live table of what they publish.
 void AddTopVerb(cli::Program& program);
 

@@ -86,7 +86,7 @@ int RunWatch(WatchOptions options, const cli::Context& context) {
   while (!signals.stop_requested() && !Passed(start, options.for_s) &&
          !Passed(last_message, options.idle_s) && !satisfied()) {
     bus.Take(
-        [&](const auto& message) {
+        [&](const auto& message, const auto&) {
           counts.Add(message);
           if constexpr (requires { message.valve_id; }) {
             last_message = Clock::now();

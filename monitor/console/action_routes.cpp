@@ -33,9 +33,9 @@ storage::OperatorNote NoteOf(const Json& body, const httplib::Request& request,
 
 // The alarm as it is now.
 Json AlarmRow(const Api& api, const std::string& id) {
-  storage::HistoryReader reader(api.sources.history);
+  const auto reader = api.History();
   return AlarmJson(
-      reader.Alarms({reader.Show(id)}, api.sources.utc_now_ns()).front(),
+      reader->Alarms({reader->Show(id)}, api.sources.utc_now_ns()).front(),
       api.texts);
 }
 
@@ -113,6 +113,11 @@ constexpr Action kActions[] = {
 
 void Perform(const Api& api, const Action& action,
              const httplib::Request& request, httplib::Response& response) {
+  if (api.sources.monitors) {
+    return SendError(response, 403,
+                     "the page of a plant is read-only: use that of the "
+                     "monitor, or fdi-store");
+  }
   Json body = Json::parse(request.body, nullptr, /*allow_exceptions=*/false);
   const bool named =
       body.is_object() && body.contains("who") && body["who"].is_string();

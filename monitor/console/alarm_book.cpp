@@ -1,6 +1,7 @@
 #include "monitor/console/alarm_book.h"
 
 #include <algorithm>
+#include <exception>
 #include <limits>
 #include <utility>
 
@@ -41,14 +42,32 @@ ValveAlarm AlarmFor(const AlarmBook::ByValveMap& alarms,
 }
 
 std::vector<Json> AlarmBook::Refresh(std::int64_t now_ns) {
-  // SQLite changes the data version when another connection commits. A shelf
-  // that runs out changes alarms without a commit.
-  const std::int64_t version = reader_.database().DataVersion();
-  if (data_version_ == version && now_ns < earliest_shelf_end_ns_) {
+  try {
+    if (!history_) {
+      history_ = open_();
+      version_.reset();
+    }
+    std::vector<Json> changed = Read(*history_, now_ns);
+    const std::lock_guard lock(mutex_);
+    away_.reset();
+    return changed;
+  } catch (const std::exception& error) {
+    history_.reset();
+    const std::lock_guard lock(mutex_);
+    away_ = {away_ ? away_->since_ns : now_ns, error.what()};
+    throw;
+  }
+}
+
+std::vector<Json> AlarmBook::Read(storage::History& history,
+                                  std::int64_t now_ns) {
+  // A shelf that runs out changes alarms without a commit.
+  const std::string version = history.Version();
+  if (version_ == version && now_ns < earliest_shelf_end_ns_) {
     return {};
   }
-  const std::vector<Alarm> alarms = reader_.AlarmList(now_ns);
-  const auto shelves = reader_.Shelves(now_ns);
+  const std::vector<Alarm> alarms = history.AlarmList(now_ns, kMostAlarms);
+  const auto shelves = history.Shelves(now_ns);
   std::map<std::string, std::string> rows;
   std::vector<Json> changed;
   for (const Alarm& alarm : alarms) {
@@ -65,16 +84,15 @@ std::vector<Json> AlarmBook::Refresh(std::int64_t now_ns) {
       continue;
     }
     try {
-      const auto left = reader_.Alarms({reader_.Show(id)}, now_ns);
+      const auto left = history.Alarms({history.Show(id)}, now_ns);
       changed.push_back(AlarmJson(left.front(), texts_));
     } catch (const NotFoundError&) {  // Pruned.
     }
   }
-  if (!data_version_) {
+  if (!std::exchange(read_, true)) {
     changed.clear();
   }
-  rows_ = std::move(rows);
-  data_version_ = version;
+  version_ = version;
   earliest_shelf_end_ns_ = std::numeric_limits<std::int64_t>::max();
   for (const storage::Shelf& shelf : shelves) {
     earliest_shelf_end_ns_ = std::min(earliest_shelf_end_ns_, shelf.until_ns);
@@ -82,6 +100,7 @@ std::vector<Json> AlarmBook::Refresh(std::int64_t now_ns) {
   auto by_valve =
       std::make_shared<const ByValveMap>(ByValveOf(alarms, shelves));
   const std::lock_guard lock(mutex_);
+  rows_ = std::move(rows);
   by_valve_ = std::move(by_valve);
   return changed;
 }
@@ -89,6 +108,16 @@ std::vector<Json> AlarmBook::Refresh(std::int64_t now_ns) {
 std::shared_ptr<const AlarmBook::ByValveMap> AlarmBook::ByValve() const {
   const std::lock_guard lock(mutex_);
   return by_valve_;
+}
+
+bool AlarmBook::Has(const std::string& episode_id) const {
+  const std::lock_guard lock(mutex_);
+  return rows_.contains(episode_id);
+}
+
+std::optional<HistoryAway> AlarmBook::away() const {
+  const std::lock_guard lock(mutex_);
+  return away_;
 }
 
 }  // namespace fdi::console

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -10,20 +10,31 @@
 #include <vector>
 
 #include "monitor/console/json.h"
-#include "storage/history/history_reader.h"
+#include "storage/history/history.h"
 
 namespace fdi::console {
 
-/// The alarms of the history, followed by polling history.db: this also notices
-/// what other programs did and shelves that ran out.
+inline constexpr std::int64_t kMostAlarms = 500;
+
+/// Opens the history that the console shows; it may be away.
+using OpenHistory = std::function<std::unique_ptr<storage::History>()>;
+
+/// Why the history cannot be read, and since when.
+struct HistoryAway {
+  std::int64_t since_ns{0};
+  std::string reason;
+};
+
+/// The alarms of the history, followed by polling it: this also notices what
+/// other programs did and shelves that ran out.
 class AlarmBook {
  public:
   using ByValveMap = std::map<std::string, ValveAlarm>;
 
-  AlarmBook(const std::filesystem::path& history, const cli::FaultTexts& texts)
-      : reader_(history), texts_(texts) {}
+  AlarmBook(OpenHistory open, const cli::FaultTexts& texts)
+      : open_(std::move(open)), texts_(texts) {}
 
-  /// Polls the history. One thread.
+  /// Polls the history, and opens it anew where that failed. One thread.
   /// @returns what is new, has changed or has left the list, as JSON rows; of
   ///   the first call nothing.
   /// @throws storage::SqliteError, DataError
@@ -31,15 +42,24 @@ class AlarmBook {
 
   /// By valve id, as of the last Refresh(). Thread safe.
   std::shared_ptr<const ByValveMap> ByValve() const;
+  /// The episode was on the list then. Thread safe.
+  bool Has(const std::string& episode_id) const;
+  /// What the last Refresh() threw, if it did. Thread safe.
+  std::optional<HistoryAway> away() const;
 
  private:
-  storage::HistoryReader reader_;
-  const cli::FaultTexts& texts_;
-  std::optional<std::int64_t> data_version_;
-  std::int64_t earliest_shelf_end_ns_{0};
-  std::map<std::string, std::string> rows_;  // By episode, as last returned.
+  std::vector<Json> Read(storage::History& history, std::int64_t now_ns);
 
-  mutable std::mutex mutex_;
+  OpenHistory open_;
+  const cli::FaultTexts& texts_;
+  std::unique_ptr<storage::History> history_;
+  std::optional<std::string> version_;
+  std::int64_t earliest_shelf_end_ns_{0};
+  bool read_{false};
+
+  mutable std::mutex mutex_;  // Guards what follows.
+  std::optional<HistoryAway> away_;
+  std::map<std::string, std::string> rows_;  // By episode, as last returned.
   std::shared_ptr<const ByValveMap> by_valve_{std::make_shared<ByValveMap>()};
 };
 

@@ -7,6 +7,8 @@
 #include <httplib.h>
 
 #include "diagnosis/error.h"
+#include "storage/history/history_reader.h"
+#include "storage/plant/plant_database.h"
 
 namespace fdi::console {
 namespace {
@@ -27,6 +29,16 @@ std::string PlainName(const cli::FaultTexts& texts, std::string_view fault) {
 
 }  // namespace
 
+std::unique_ptr<storage::History> Api::History() const {
+  if (!sources.plant_history) {
+    return std::make_unique<storage::HistoryReader>(sources.history);
+  }
+  if (const auto away = alarms.away()) {
+    throw storage::PlantError(away->reason);
+  }
+  return sources.plant_history();
+}
+
 Json Api::Words(const ModelFacts* facts, const TracePoint* point) const {
   if (facts == nullptr || point == nullptr) {
     return {};
@@ -46,6 +58,8 @@ void Guarded(httplib::Response& response, const std::function<void()>& send) {
     SendError(response, 400, error.what());
   } catch (const NotFoundError& error) {
     SendError(response, 404, error.what());
+  } catch (const storage::PlantError& error) {
+    SendError(response, 503, error.what());
   } catch (const storage::SqliteError& error) {
     SendError(response, error.IsBusy() ? 503 : 500, error.what());
   } catch (const std::exception& error) {
@@ -70,6 +84,30 @@ void AddRoutes(httplib::Server& server, const Api& api,
       });
     });
   }
+}
+
+Json PlantJson(const Api& api) {
+  if (!api.sources.monitors) {
+    return {};
+  }
+  Json list = Json::array();
+  for (const MonitorLine& m : api.sources.monitors()) {
+    list.push_back({{"monitor", m.name},
+                    {"host", m.name.substr(0, m.name.rfind(':'))},
+                    {"software", m.software},
+                    {"health", TextOrNull(m.health)},
+                    {"text", TextOrNull(m.text)},
+                    {"pair", TextOrNull(m.pair)},
+                    {"valves", m.valves},
+                    {"heard_ms", Ms(m.heard_ns)},
+                    {"silent", m.silent}});
+  }
+  Json plant{{"monitors", std::move(list)}, {"history_away", Json()}};
+  if (const auto away = api.alarms.away()) {
+    plant["history_away"] = {{"since_ms", Ms(away->since_ns)},
+                             {"reason", away->reason}};
+  }
+  return plant;
 }
 
 void SendJson(httplib::Response& response, const Json& json) {

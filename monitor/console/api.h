@@ -34,6 +34,18 @@ struct MonitorFacts {
   std::string pair{};  ///< "leader", "standby, host:1 leads"; empty: none.
 };
 
+/// A monitor whose valves the page of a plant shows.
+struct MonitorLine {
+  std::string name;  ///< "host:pid", as in MonitorStatus.
+  std::string software;
+  std::string health;       ///< "OK", ...; empty: it has said nothing yet.
+  std::string text;         ///< Why it is not OK.
+  std::string pair;         ///< "leader", "standby"; empty: it stands alone.
+  std::uint64_t valves{0};  ///< That it judged last.
+  std::int64_t heard_ns{0};
+  bool silent{false};
+};
+
 /// What the console needs of the monitor; called by any thread.
 struct ConsoleSources {
   std::filesystem::path history;
@@ -42,6 +54,10 @@ struct ConsoleSources {
   std::int64_t started_ns{0};
   std::function<MonitorFacts()> facts;
   std::function<std::int64_t()> utc_now_ns;
+  /// Of the page of a plant, which shows several monitors and has no database
+  /// of its own: `history` and `models` do not count.
+  OpenHistory plant_history{};
+  std::function<std::vector<MonitorLine>()> monitors{};
 };
 
 /// The last work list that was asked for. Reading months of all valves takes a
@@ -66,6 +82,8 @@ struct Api {
   std::string instance;  ///< Differs after a restart.
   std::stop_token stopping{};
 
+  /// @throws storage::PlantError at once while the plant's history is away.
+  std::unique_ptr<storage::History> History() const;
   /// Explain(), with the faults called as the catalogue does.
   Json Words(const ModelFacts* facts, const TracePoint* point) const;
 };
@@ -93,13 +111,18 @@ std::span<const Route> PlannerRoutes();
 
 /// An exception becomes {"error"} with 400 for ConfigError and
 /// std::invalid_argument, 404 for NotFoundError, 503 for a history that is
-/// busy, else 500.
+/// busy or away, else 500.
 void AddRoutes(httplib::Server& server, const Api& api,
                std::span<const Route> routes);
 /// /api/v1/stream
 void AddStreamRoute(httplib::Server& server, const Api& api);
 /// POST: changes to the history, for those whom Admission lets act.
 void AddActionRoutes(httplib::Server& server, const Api& api);
+
+/// Of a plant: {"monitors": [{"monitor", "host", "software", "health", "text",
+/// "pair", "valves", "heard_ms", "silent"}], "history_away": {"since_ms",
+/// "reason"}, or null}. Else null.
+Json PlantJson(const Api& api);
 
 void SendJson(httplib::Response& response, const Json& json);
 void SendError(httplib::Response& response, int status,

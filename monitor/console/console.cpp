@@ -7,6 +7,7 @@
 #include "cli/shared_files.h"
 #include "diagnosis/error.h"
 #include "monitor/http/request_head.h"
+#include "storage/history/history_reader.h"
 
 namespace fdi::console {
 namespace {
@@ -75,6 +76,15 @@ class Console::Events : public monitor::EventSink {
   Console& console_;
 };
 
+// What is shipped later takes its place; a known one changes with the history,
+// which also knows who has acknowledged it.
+void Console::Hear(const FaultEvent& event) {
+  board_.Mark(event);
+  if (!alarms_->Has(storage::EpisodeIdText(event.episode_id))) {
+    stream_.AddUnstored(event);
+  }
+}
+
 std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked) {
   const std::filesystem::path folder =
       asked.empty() ? cli::SharedFile("console") : asked;
@@ -109,7 +119,13 @@ monitor::EventSink& Console::Before(monitor::EventSink& bus) {
 
 void Console::Start(ConsoleSources sources) {
   models_ = std::make_unique<StoredModels>(sources.models);
-  alarms_ = std::make_unique<AlarmBook>(sources.history, texts_);
+  alarms_ = std::make_unique<AlarmBook>(
+      sources.plant_history
+          ? sources.plant_history
+          : [path = sources.history]() -> std::unique_ptr<storage::History> {
+        return std::make_unique<storage::HistoryReader>(path);
+      },
+      texts_);
   api_ = std::make_unique<Api>(
       Api{std::move(sources), board_, stream_, *alarms_, *models_, work_list_,
           texts_, access_, NewInstance(), stopping_.get_token()});
@@ -124,7 +140,11 @@ void Console::Start(ConsoleSources sources) {
   AddStreamRoute(routes, *api_);
   AddActionRoutes(routes, *api_);
   routes.set_mount_point("/", files_.string(), {{"Cache-Control", "no-cache"}});
-  stream_.Start({board_, *alarms_, texts_, api_->sources.utc_now_ns, log_});
+  FeedParts parts{board_, *alarms_, texts_, api_->sources.utc_now_ns, log_};
+  if (api_->sources.monitors) {
+    parts.plant = [this] { return PlantJson(*api_); };
+  }
+  stream_.Start(std::move(parts));
   server_->Start();
   SayWhereItListens();
 }

@@ -31,8 +31,8 @@ std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked);
 
 /// The live page of a monitor and its API (docs/console.md): it shows what the
 /// pipeline passes to live(), reads the history, and lets those act whom
-/// Admission lets. It has threads of its own; neither diagnosis nor bus waits
-/// for any of them.
+/// Admission lets. Or that of a plant: it shows what was heard on the bus. It
+/// has threads of its own; neither diagnosis nor bus waits for any of them.
 class Console {
  public:
   /// Binds the address and finds its files; nothing is answered yet.
@@ -44,14 +44,21 @@ class Console {
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
 
-  /// For the pipeline.
-  monitor::LiveSink& live() { return board_; }
+  /// For the pipeline, or for who hears the monitors of a plant.
+  LiveBoard& live() { return board_; }
   /// For the pipeline, in front of `bus`: an event is shown once it is on the
   /// bus, by which time it is in the history, unless that failed.
   monitor::EventSink& Before(monitor::EventSink& bus);
 
+  /// Of a plant: a model set, or an event, that was heard; after Start().
+  void Hear(std::shared_ptr<const ModelFacts> models) {
+    models_->Learn(std::move(models));
+  }
+  void Hear(const FaultEvent& event);
+
   /// Answers from now on. Once, with a history, before the pipeline starts.
-  /// What throws in here leaves no thread behind.
+  /// What throws in here leaves no thread behind. The history of a plant may be
+  /// away.
   void Start(ConsoleSources sources);
   /// Reads the certificate and the users anew. What is wrong with them is
   /// logged, and the old ones stay.

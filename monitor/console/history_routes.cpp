@@ -18,16 +18,15 @@
 namespace fdi::console {
 namespace {
 
-using storage::HistoryReader;
-
 constexpr std::int64_t kNsPerDay = 86'400'000'000'000;
 constexpr std::int64_t kPageLimit = 1000;
 
 Json Alarms(const Api& api, const httplib::Request& /*request*/) {
   const std::int64_t now_ns = api.sources.utc_now_ns();
-  HistoryReader reader(api.sources.history);
+  const auto reader = api.History();
   return {{"now_ms", Ms(now_ns)},
-          {"alarms", AlarmsJson(reader.AlarmList(now_ns), api.texts)}};
+          {"alarms",
+           AlarmsJson(reader->AlarmList(now_ns, kMostAlarms), api.texts)}};
 }
 
 storage::EpisodeFilter FilterOf(const Api& api,
@@ -53,17 +52,17 @@ Json History(const Api& api, const httplib::Request& request) {
       filter.until_ns, TimeParameter(request, "before_ms",
                                      std::numeric_limits<std::int64_t>::max()));
   filter.limit = limit + 1;
-  HistoryReader reader(api.sources.history);
-  std::vector<storage::Episode> episodes = reader.List(filter);
+  const auto reader = api.History();
+  std::vector<storage::Episode> episodes = reader->List(filter);
   std::reverse(episodes.begin(), episodes.end());
   const bool more = static_cast<std::int64_t>(episodes.size()) > limit;
   if (more) {
     episodes.pop_back();
   }
-  return {
-      {"episodes", AlarmsJson(reader.Alarms(std::move(episodes), filter.now_ns),
-                              api.texts)},
-      {"more", more}};
+  return {{"episodes",
+           AlarmsJson(reader->Alarms(std::move(episodes), filter.now_ns),
+                      api.texts)},
+          {"more", more}};
 }
 
 Json DaysJson(const storage::AlarmStatistics& statistics) {
@@ -105,10 +104,10 @@ Json FaultsJson(const storage::AlarmStatistics& statistics, const Api& api) {
 
 Json Statistics(const Api& api, const httplib::Request& request) {
   const storage::EpisodeFilter filter = FilterOf(api, request);
-  HistoryReader reader(api.sources.history);
-  const auto statistics = reader.AlarmFigures(filter, filter.now_ns);
+  const auto reader = api.History();
+  const auto statistics = reader->AlarmFigures(filter, filter.now_ns);
   Json gaps = Json::array();
-  for (const DataGap& gap : reader.Gaps(filter)) {
+  for (const DataGap& gap : reader->Gaps(filter)) {
     gaps.push_back(GapJson(gap));
   }
   return {{"per_day", DaysJson(statistics)},
@@ -123,9 +122,10 @@ Json Statistics(const Api& api, const httplib::Request& request) {
 }
 
 Json Shelves(const Api& api, const httplib::Request& /*request*/) {
-  HistoryReader reader(api.sources.history);
+  const auto reader = api.History();
   Json list = Json::array();
-  for (const storage::Shelf& shelf : reader.Shelves(api.sources.utc_now_ns())) {
+  for (const storage::Shelf& shelf :
+       reader->Shelves(api.sources.utc_now_ns())) {
     list.push_back(ShelfJson(shelf));
   }
   return {{"shelf", std::move(list)}};
@@ -161,7 +161,7 @@ Json MarksOf(const std::vector<storage::HistoryEntry>& events) {
   return marks;
 }
 
-Json GapsOf(HistoryReader& reader, const storage::Episode& episode,
+Json GapsOf(storage::History& history, const storage::Episode& episode,
             const std::vector<TracePoint>& points) {
   Json gaps = Json::array();
   if (points.empty()) {
@@ -170,7 +170,7 @@ Json GapsOf(HistoryReader& reader, const storage::Episode& episode,
   storage::EpisodeFilter filter;
   filter.since_ns = points.front().sample.stamp_ns;
   filter.until_ns = points.back().sample.stamp_ns;
-  for (const DataGap& gap : reader.Gaps(filter)) {
+  for (const DataGap& gap : history.Gaps(filter)) {
     if (gap.valve_id.empty() || gap.valve_id == episode.valve_id) {
       gaps.push_back(GapJson(gap));
     }
@@ -221,26 +221,26 @@ Json LookJson(const std::optional<EpisodeLook>& look,
 }
 
 Json Episode(const Api& api, const httplib::Request& request) {
-  HistoryReader reader(api.sources.history);
+  const auto reader = api.History();
   const storage::Alarm alarm =
       reader
-          .Alarms({reader.Show(std::string(request.matches[1]))},
-                  api.sources.utc_now_ns())
+          ->Alarms({reader->Show(std::string(request.matches[1]))},
+                   api.sources.utc_now_ns())
           .front();
   const storage::Episode& episode = alarm.episode;
-  const auto events = reader.Events(episode.id);
-  const std::vector<TracePoint> points = reader.Trace(episode.id);
+  const auto events = reader->Events(episode.id);
+  const std::vector<TracePoint> points = reader->Trace(episode.id);
   const auto models = api.models.For(episode);
 
   Json trace = TrendJson(models.get(), episode.valve_id, points);
-  trace["gaps"] = GapsOf(reader, episode, points);
+  trace["gaps"] = GapsOf(*reader, episode, points);
   trace["marks"] = MarksOf(events);
   trace["words"] = api.Words(models.get(), Telling(episode, points));
   Json list = Json::array();
   for (const storage::HistoryEntry& event : events) {
     list.push_back(EventJson(event));
   }
-  Json look = LookJson(reader.Look(episode.id), points, trace);
+  Json look = LookJson(reader->Look(episode.id), points, trace);
   return {{"episode", AlarmJson(alarm, api.texts)},
           {"events", std::move(list)},
           {"look", std::move(look)},
@@ -287,10 +287,10 @@ Json CsvRow(const TracePoint& point, SignalMask signals,
 // import, then residuals r_CHANNEL, d0 and d_FAULT.
 File EpisodeCsv(const Api& api, const httplib::Request& request) {
   const std::string id = request.matches[1];
-  HistoryReader reader(api.sources.history);
-  const storage::Episode episode = reader.Show(id);
+  const auto reader = api.History();
+  const storage::Episode episode = reader->Show(id);
   const auto models = api.models.For(episode);
-  const std::vector<TracePoint> points = reader.Trace(episode.id);
+  const std::vector<TracePoint> points = reader->Trace(episode.id);
   SignalMask signals = 0;
   for (const TracePoint& point : points) {
     signals = static_cast<SignalMask>(signals | point.sample.present);
@@ -318,9 +318,9 @@ File EpisodePicture(const Api& api, const httplib::Request& request) {
     throw NotFoundError(
         "gnuplot is not installed; on Debian it is in gnuplot-nox");
   }
-  HistoryReader reader(api.sources.history);
+  const auto reader = api.History();
   const plot::EpisodeEvidence evidence =
-      plot::LoadEvidence(reader, id, api.sources.models);
+      plot::LoadEvidence(*reader, id, api.sources.models);
   plot::EpisodeFigureOptions options;
   options.fault_name =
       api.texts.Words(evidence.episode.fault.value_or(""), 0.0).name;

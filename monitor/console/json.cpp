@@ -34,6 +34,8 @@ std::string_view QualityOf(const ValveState& valve) {
       return "STALE";
     case monitor::Silence::kEnded:
       return "ENDED";
+    case monitor::Silence::kMonitor:
+      return "MONITOR_SILENT";
     case monitor::Silence::kNone:
       break;
   }
@@ -145,6 +147,12 @@ Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
       {"model_set", valve.models ? Json(valve.models->model_set) : Json()},
       {"shelved_until_ms", Ms(alarm.shelved_until_ns)},
       {"unacked", alarm.unacked}};
+  if (!valve.monitor.empty()) {
+    tile["monitor"] = valve.monitor;
+    tile["monitor_silent_since_ms"] =
+        valve.silence == monitor::Silence::kMonitor ? Ms(valve.heard_ns)
+                                                    : Json();
+  }
   if (newest_only) {
     tile["v"] = valve.spark.empty()
                     ? Json()
@@ -244,29 +252,33 @@ Json AlarmJson(const storage::Alarm& alarm, const cli::FaultTexts& texts) {
   const storage::Episode& e = alarm.episode;
   const cli::FaultWords words =
       texts.Words(e.fault.value_or("unknown"), e.strength);
-  return {{"episode", e.episode_id},
-          {"valve", e.valve_id},
-          {"fault", TextOrNull(e.fault)},
-          {"layer", TextOrNull(e.layer)},
-          {"state", StateOf(e)},
-          {"isa", storage::AlarmStateName(alarm.state)},
-          {"shelved", alarm.shelf ? ShelfJson(*alarm.shelf) : Json()},
-          {"detected_ms", Ms(e.detected_ns)},
-          {"isolated_ms", Ms(e.isolated_ns)},
-          {"cleared_ms", Ms(e.cleared_ns)},
-          {"ended_ms", Ms(e.ended_ns)},
-          {"end_reason", TextOrNull(e.end_reason)},
-          {"peak_factor", Rounded(e.peak_factor, kFactorDecimals)},
-          {"strength", Rounded(e.strength, kFactorDecimals)},
-          {"label", TextOrNull(e.label)},
-          {"acked_by", TextOrNull(e.acked_by)},
-          {"acked_ms", Ms(e.acked_ns)},
-          {"model_set", e.model_set},
-          {"severity", cli::SeverityName(words.severity)},
-          {"discipline", words.discipline},
-          {"namur", cli::NamurName(words.namur)},
-          {"name", words.name},
-          {"check", words.check}};
+  Json json{{"episode", e.episode_id},
+            {"valve", e.valve_id},
+            {"fault", TextOrNull(e.fault)},
+            {"layer", TextOrNull(e.layer)},
+            {"state", StateOf(e)},
+            {"isa", storage::AlarmStateName(alarm.state)},
+            {"shelved", alarm.shelf ? ShelfJson(*alarm.shelf) : Json()},
+            {"detected_ms", Ms(e.detected_ns)},
+            {"isolated_ms", Ms(e.isolated_ns)},
+            {"cleared_ms", Ms(e.cleared_ns)},
+            {"ended_ms", Ms(e.ended_ns)},
+            {"end_reason", TextOrNull(e.end_reason)},
+            {"peak_factor", Rounded(e.peak_factor, kFactorDecimals)},
+            {"strength", Rounded(e.strength, kFactorDecimals)},
+            {"label", TextOrNull(e.label)},
+            {"acked_by", TextOrNull(e.acked_by)},
+            {"acked_ms", Ms(e.acked_ns)},
+            {"model_set", e.model_set},
+            {"severity", cli::SeverityName(words.severity)},
+            {"discipline", words.discipline},
+            {"namur", cli::NamurName(words.namur)},
+            {"name", words.name},
+            {"check", words.check}};
+  if (!e.monitor.empty()) {
+    json.update({{"host", e.host}, {"monitor", e.monitor}});
+  }
+  return json;
 }
 
 Json AlarmsJson(const std::vector<storage::Alarm>& alarms,

@@ -196,24 +196,44 @@ void LiveBoard::NoteGap(Slot& slot, const Sample& sample) {
 void LiveBoard::Show(const std::string& valve_id, const Sample& sample,
                      const monitor::ValveOutcome& outcome) {
   const ModelSet* const models = outcome.models;
-  const Verdict& verdict = outcome.verdict;
   Slot& slot = At(valve_id);
   const std::lock_guard lock(slot.mutex);
+  auto facts = slot.now.models;
   if (models != slot.models || outcome.model_swapped) {
     slot.models = models;
-    const auto facts = models != nullptr ? Facts(*models) : nullptr;
-    if (facts != slot.now.models) {
-      slot.now.models = facts;  // Residuals and factors mean other things.
-      slot.ClearTrend();
-    }
+    facts = models != nullptr ? Facts(*models) : nullptr;
+  }
+  slot.now.missing = outcome.missing;
+  ShowLocked(slot, sample, outcome.verdict, std::move(facts));
+}
+
+void LiveBoard::ShowHeard(const std::string& valve_id, const Verdict& verdict,
+                          std::shared_ptr<const ModelFacts> models,
+                          const std::string& monitor) {
+  Sample sample;
+  sample.source_id = verdict.source_id;
+  sample.seq = verdict.seq;
+  sample.stamp_ns = verdict.stamp_ns;
+  Slot& slot = At(valve_id);
+  const std::lock_guard lock(slot.mutex);
+  slot.now.monitor = monitor;
+  ShowLocked(slot, sample, verdict, std::move(models));
+}
+
+void LiveBoard::ShowLocked(Slot& slot, const Sample& sample,
+                           const Verdict& verdict,
+                           std::shared_ptr<const ModelFacts> models) {
+  if (models != slot.now.models) {
+    slot.now.models = std::move(models);
+    slot.ClearTrend();  // Residuals and factors mean other things.
   }
   NoteGap(slot, sample);
   slot.Describe(verdict);
-  slot.now.missing = outcome.missing;
   slot.AddSpark(verdict);
+  const ModelFacts* const facts = slot.now.models.get();
   slot.Push(sample, verdict,
-            models != nullptr ? static_cast<int>(models->channels.size()) : 0,
-            models != nullptr ? static_cast<int>(models->faults.size()) : 0);
+            facts != nullptr ? static_cast<int>(facts->channels.size()) : 0,
+            facts != nullptr ? static_cast<int>(facts->faults.size()) : 0);
   ++slot.now.version;
 }
 
@@ -222,6 +242,15 @@ void LiveBoard::ShowSilence(const std::string& valve_id,
   Slot& slot = At(valve_id);
   const std::lock_guard lock(slot.mutex);
   slot.now.silence = silence;
+  ++slot.now.version;
+}
+
+void LiveBoard::ShowMonitorSilence(const std::string& valve_id,
+                                   std::int64_t heard_ns) {
+  Slot& slot = At(valve_id);
+  const std::lock_guard lock(slot.mutex);
+  slot.now.silence = monitor::Silence::kMonitor;
+  slot.now.heard_ns = heard_ns;
   ++slot.now.version;
 }
 

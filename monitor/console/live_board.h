@@ -34,6 +34,8 @@ struct ValveState {
   double d0{0.0};
   std::int64_t stamp_ns{0};
   std::vector<double> spark;  ///< 1 − d_0, each second or slower; last newest.
+  std::string monitor;        ///< On the page of a plant: who judges it,
+  std::int64_t heard_ns{0};   ///< and, once that is silent, since when.
   std::uint64_t version{0};   ///< Grows with every change.
 };
 
@@ -77,6 +79,13 @@ class LiveBoard : public monitor::LiveSink {
                    monitor::Silence silence) override;
   void Forget(const std::string& valve_id) override;
 
+  /// As Show(), of a verdict that came over the bus without the readings.
+  void ShowHeard(const std::string& valve_id, const Verdict& verdict,
+                 std::shared_ptr<const ModelFacts> models,
+                 const std::string& monitor);
+  /// Nothing was heard of the valve's monitor since `heard_ns`.
+  void ShowMonitorSilence(const std::string& valve_id, std::int64_t heard_ns);
+
   /// An event of an episode. Any thread.
   void Mark(const FaultEvent& event);
 
@@ -100,6 +109,8 @@ class LiveBoard : public monitor::LiveSink {
   Slot& At(const std::string& valve_id);
   std::shared_ptr<Slot> Find(std::string_view valve_id) const;
   std::shared_ptr<const ModelFacts> Facts(const ModelSet& models);
+  void ShowLocked(Slot& slot, const Sample& sample, const Verdict& verdict,
+                  std::shared_ptr<const ModelFacts> models);
   void NoteGap(Slot& slot, const Sample& sample);
 
   mutable std::shared_mutex slots_mutex_;

@@ -46,7 +46,8 @@ Json Status(const Api& api, const httplib::Request& request) {
           {"software", api.sources.software},
           {"health", facts.health},
           {"pair", facts.pair.empty() ? Json() : Json(facts.pair)},
-          {"write", api.access.MayWrite(request)},
+          {"plant", PlantJson(api)},
+          {"write", !api.sources.monitors && api.access.MayWrite(request)},
           {"user", visitor ? Json(visitor->name) : Json()},
           {"role", visitor ? Json(RoleName(visitor->role)) : Json()},
           {"session", api.access.HasSession(request)},
@@ -73,10 +74,10 @@ Json Valves(const Api& api, const httplib::Request& /*request*/) {
 // Gaps of the valve and of the whole monitor, as the history has them.
 void AddStoredGaps(const Api& api, const std::string& valve_id,
                    std::int64_t since_ns, Json& gaps) {
-  storage::HistoryReader reader(api.sources.history);
+  const auto reader = api.History();
   storage::EpisodeFilter filter;
   filter.since_ns = since_ns;
-  for (const DataGap& gap : reader.Gaps(filter)) {
+  for (const DataGap& gap : reader->Gaps(filter)) {
     if (gap.valve_id.empty() ||
         (gap.valve_id == valve_id && gap.reason != "stream")) {
       gaps.push_back(GapJson(gap));
@@ -102,7 +103,9 @@ Json Trend(const Api& api, const httplib::Request& request) {
   for (const DataGap& gap : trend->gaps) {
     json["gaps"].push_back(GapJson(gap));
   }
-  AddStoredGaps(api, valve_id, since_ns, json["gaps"]);
+  if (!api.sources.plant_history) {  // A page asks for words each 2 s.
+    AddStoredGaps(api, valve_id, since_ns, json["gaps"]);
+  }
   json["marks"] = Json::array();
   for (const Mark& mark : trend->marks) {
     json["marks"].push_back({{"t_ms", Ms(mark.stamp_ns)},

@@ -1,5 +1,6 @@
 #include "monitor/console/live_stream.h"
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -12,6 +13,8 @@ constexpr milliseconds kTick{250};
 constexpr milliseconds kTilePeriod{1000};
 // Latency of what other programs do to the history.
 constexpr milliseconds kAlarmPeriod{2000};
+// Between attempts to read a history that is away.
+constexpr milliseconds kLongestPause{60'000};
 constexpr std::size_t kUnstoredLimit = 1000;
 
 }  // namespace
@@ -101,8 +104,11 @@ StreamCounts LiveStream::counts() const {
 
 void LiveStream::Start(FeedParts parts) {
   parts_ = std::make_unique<FeedParts>(std::move(parts));
-  parts_->alarms.Refresh(parts_->utc_now_ns());  // The alarms of before.
+  if (!parts_->plant) {
+    parts_->alarms.Refresh(parts_->utc_now_ns());  // The alarms of before.
+  }
   thread_ = std::thread([this] { Run(); });
+  alarms_thread_ = std::thread([this] { FollowAlarms(); });
 }
 
 void LiveStream::Close() {
@@ -116,8 +122,10 @@ void LiveStream::Close() {
 
 void LiveStream::Stop() {
   Close();
-  if (thread_.joinable()) {
-    thread_.join();
+  for (std::thread* thread : {&thread_, &alarms_thread_}) {
+    if (thread->joinable()) {
+      thread->join();
+    }
   }
 }
 
@@ -132,7 +140,6 @@ void LiveStream::AddUnstored(const FaultEvent& event) {
   if (unstored_.size() < kUnstoredLimit) {
     unstored_.push_back(event);
   }
-  woken_ = true;
   changed_.notify_all();
 }
 
@@ -140,15 +147,12 @@ void LiveStream::Run() {
   while (true) {
     {
       std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, kTick, [this] { return closed_ || woken_; });
+      changed_.wait_for(lock, kTick,
+                        [this] { return closed_ || !unstored_.empty(); });
       if (closed_) {
         return;
       }
-      if (std::exchange(woken_, false)) {
-        next_alarms_ = {};
-      }
     }
-    // A history that is busy now may answer next time.
     try {
       Step(std::chrono::steady_clock::now());
     } catch (const std::exception& error) {
@@ -159,11 +163,41 @@ void LiveStream::Run() {
   }
 }
 
-void LiveStream::Step(std::chrono::steady_clock::time_point now) {
-  if (now >= next_alarms_) {
-    next_alarms_ = now + kAlarmPeriod;
-    SendAlarms();
+// A history that is busy or away is asked again after 2, 4, 8, ... s. Each
+// reason is logged once.
+void LiveStream::FollowAlarms() {
+  milliseconds pause{0};
+  std::string reason;
+  while (true) {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait_for(lock, pause, [this] { return closed_ || woken_; });
+      if (closed_) {
+        return;
+      }
+      woken_ = false;
+    }
+    try {
+      for (const Json& row : parts_->alarms.Refresh(parts_->utc_now_ns())) {
+        Broadcast(StreamEvent("alarm", Dump(row)));
+      }
+      pause = kAlarmPeriod;
+      if (!std::exchange(reason, "").empty()) {
+        parts_->log(LogLevel::kInfo, "console_history_goes_on");
+      }
+    } catch (const std::exception& error) {
+      pause = std::clamp(2 * pause, kAlarmPeriod, kLongestPause);
+      if (reason != error.what()) {
+        reason = error.what();
+        parts_->log(LogLevel::kWarning,
+                    "console_history_failed reason=\"" + reason + "\"");
+      }
+    }
   }
+}
+
+void LiveStream::Step(std::chrono::steady_clock::time_point now) {
+  SendUnstored();
   if (counts().clients == 0) {
     return;
   }
@@ -174,10 +208,13 @@ void LiveStream::Step(std::chrono::steady_clock::time_point now) {
   if (now >= next_tiles_) {
     next_tiles_ = now + kTilePeriod;
     SendTiles();
+    if (parts_->plant) {
+      Broadcast(StreamEvent("plant", Dump(parts_->plant())));
+    }
   }
 }
 
-void LiveStream::SendAlarms() {
+void LiveStream::SendUnstored() {
   std::vector<FaultEvent> unstored;
   {
     const std::lock_guard lock(mutex_);
@@ -186,9 +223,6 @@ void LiveStream::SendAlarms() {
   for (const FaultEvent& event : unstored) {
     Broadcast(
         StreamEvent("alarm", Dump(AlarmJson(AlarmOf(event), parts_->texts))));
-  }
-  for (const Json& row : parts_->alarms.Refresh(parts_->utc_now_ns())) {
-    Broadcast(StreamEvent("alarm", Dump(row)));
   }
 }
 

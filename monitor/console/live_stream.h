@@ -45,14 +45,17 @@ struct FeedParts {
   const cli::FaultTexts& texts;
   std::function<std::int64_t()> utc_now_ns;
   LogSink log;
+  /// Of a plant, whose history may be away: PlantJson(), sent each second.
+  std::function<Json()> plant{};
 };
 
-/// The pages that listen, and a thread that sends them what changes: tiles each
-/// second, samples of the valves that they show four times a second, alarms at
-/// once. Between that thread and the HTTP thread that writes to a page's socket
-/// is a bounded queue; a client whose queue is full is dropped, so that nothing
-/// ever waits for a client. While there is no client only the alarms are
-/// followed. Thread safe.
+/// The pages that listen, and two threads that send them what changes: tiles
+/// each second and samples of the valves that they show four times a second;
+/// alarms at once, by a thread of their own, because the history may be slow or
+/// away. Between these and the HTTP thread that writes to a page's socket is a
+/// bounded queue; a client whose queue is full is dropped, so that nothing ever
+/// waits for a client. While there is no client only the alarms are followed.
+/// Thread safe.
 class LiveStream {
  public:
   enum class Outcome : std::uint8_t { kMessage, kTimeout, kEnded };
@@ -63,12 +66,12 @@ class LiveStream {
   LiveStream(const LiveStream&) = delete;
   LiveStream& operator=(const LiveStream&) = delete;
 
-  /// Starts the thread; changes from now on are sent. Once.
-  /// @throws storage::SqliteError, DataError
+  /// Starts the threads; changes from now on are sent. Once.
+  /// @throws storage::SqliteError, DataError, but for a plant.
   void Start(FeedParts parts);
   /// Ends all clients and admits none. Does not wait.
   void Close();
-  /// Closes, and waits for the thread.
+  /// Closes, and waits for the threads.
   void Stop();
 
   /// @param valve whose samples the client wants, from `next_sample` of
@@ -92,8 +95,9 @@ class LiveStream {
 
  private:
   void Run();
+  void FollowAlarms();
   void Step(std::chrono::steady_clock::time_point now);
-  void SendAlarms();
+  void SendUnstored();
   void SendSamples();
   void SendTiles();
   void Push(Client& client, const Message& message);
@@ -103,7 +107,6 @@ class LiveStream {
   // Version and alarm of each valve as of the last tile that was sent.
   std::map<std::string, std::pair<std::uint64_t, ValveAlarm>> sent_;
   std::chrono::steady_clock::time_point next_tiles_;
-  std::chrono::steady_clock::time_point next_alarms_;
 
   mutable std::mutex mutex_;  // Guards all below, and what is in clients.
   std::condition_variable changed_;
@@ -113,6 +116,7 @@ class LiveStream {
   bool woken_{false};
   bool closed_{false};
   std::thread thread_;
+  std::thread alarms_thread_;
 };
 
 }  // namespace fdi::console

@@ -117,18 +117,30 @@ std::shared_ptr<const ModelFacts> StoredModels::For(
   }
   std::shared_ptr<const ModelFacts> facts;
   try {
-    facts = FactsOf(storage::ModelStore(path_).Load(episode.model_set));
+    if (!path_.empty()) {
+      facts = FactsOf(storage::ModelStore(path_).Load(episode.model_set));
+    }
   } catch (const NotFoundError&) {
   }
   // A set of the same name and version in another models.db differs by hash.
   if (!facts || facts->hash != episode.model_hash) {
     return FactsOf(episode);
   }
+  Remember(facts);
+  return facts;
+}
+
+void StoredModels::Learn(std::shared_ptr<const ModelFacts> facts) {
+  const std::lock_guard lock(mutex_);
+  Remember(std::move(facts));
+}
+
+void StoredModels::Remember(std::shared_ptr<const ModelFacts> facts) {
   if (known_.size() >= kCachedSets) {
     known_.erase(known_.begin());
   }
-  known_[episode.model_set] = facts;
-  return facts;
+  const std::string name = facts->model_set;
+  known_[name] = std::move(facts);
 }
 
 std::string_view ShownState(State state, Quality quality) {

@@ -38,18 +38,23 @@ struct ModelFacts {
 
 std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models);
 
-/// The facts of model sets in models.db that found the episodes of the history.
-/// Thread safe; caches 32 of them.
+/// The facts of model sets that found the episodes of the history, of models.db
+/// or heard on the bus. Thread safe; caches 32 of them.
 class StoredModels {
  public:
+  /// @param models empty: there is no models.db.
   explicit StoredModels(std::filesystem::path models)
       : path_(std::move(models)) {}
 
   /// Of the set that made the episode. If that set is gone, what the episode
   /// itself tells: names, without thresholds (NaN).
   std::shared_ptr<const ModelFacts> For(const storage::Episode& episode);
+  /// What models.db need not be asked for.
+  void Learn(std::shared_ptr<const ModelFacts> facts);
 
  private:
+  void Remember(std::shared_ptr<const ModelFacts> facts);
+
   std::filesystem::path path_;
   std::mutex mutex_;
   std::map<std::string, std::shared_ptr<const ModelFacts>> known_;

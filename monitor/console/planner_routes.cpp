@@ -43,8 +43,8 @@ cli::Report ReadReport(const Api& api, const httplib::Request& request) {
         IntegerParameter(request, "top", 10, 1, kMostRows));
     work.discipline = Parameter(request, "discipline").value_or("");
     work.limits = LimitsOf(request);
-    storage::HistoryReader history(api.sources.history);
-    cache.rows = planner::ReadWorkList(history, api.texts, work);
+    const auto history = api.History();
+    cache.rows = planner::ReadWorkList(*history, api.texts, work);
     cache.query = query;
     cache.read_ns = now_ns;
   }
@@ -112,9 +112,9 @@ Json Health(const Api& api, const httplib::Request& request) {
       TimeParameter(request, "since_ms", now_ns - kDays * kNsPerDay);
   const bool hourly = IntegerParameter(request, "hourly", 0, 0, 1) == 1;
   const auto limits = LimitsOf(request);
-  storage::HistoryReader history(api.sources.history);
-  const std::vector<HealthHour> hours = storage::ReadHealth(
-      history.database(), {valve_id, since_ns, now_ns + kNsPerHour});
+  const auto history = api.History();
+  const std::vector<HealthHour> hours =
+      history->Health({valve_id, since_ns, now_ns + kNsPerHour});
   Json json{{"valve", valve_id}, {"step", hourly ? "hour" : "day"}};
   json.update(ColumnsJson(hourly ? hours : planner::DaysOf(hours)));
   json["trends"] = planner::TrendsJson(planner::TrendsOf(hours, limits));

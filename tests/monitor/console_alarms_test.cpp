@@ -4,6 +4,7 @@
 #include "monitor/console/alarm_book.h"
 #include "monitor/console/model_facts.h"
 #include "storage/history/history_editor.h"
+#include "storage/history/history_reader.h"
 #include "storage/models/models.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/history_fixture.h"
@@ -29,7 +30,9 @@ class AlarmBookTest : public storage::HistoryFixture {
 
   storage::HistoryWriter writer_{path_};
   cli::FaultTexts texts_{cli::SharedFile("faults.toml")};
-  AlarmBook book_{path_, texts_};
+  AlarmBook book_{
+      [this] { return std::make_unique<storage::HistoryReader>(path_); },
+      texts_};
 };
 
 TEST_F(AlarmBookTest, TellsWhatChangesFromTheFirstLookOn) {

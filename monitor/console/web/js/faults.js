@@ -94,11 +94,13 @@ const kQualityWords = {
   LIVE: 'live', STALE: 'no data', BAD_INPUT: 'bad input',
   SETTLING: 'settling', INHIBITED: 'inhibited', UNCOVERED: 'untrained region',
   MODEL_UNSUITED: 'model unsuited', UNASSIGNED: 'no model set',
-  ENDED: 'stream ended',
+  ENDED: 'stream ended', MONITOR_SILENT: 'monitor silent',
 };
 /** Why a valve is not judged; empty if it is. */
-export function qualityText({quality, stamp_ms: stamp, reasons, missing}) {
+export function qualityText({quality, stamp_ms: stamp, reasons, missing,
+  monitor, monitor_silent_since_ms: silent}) {
   if (quality === 'LIVE') return '';
+  if (silent) return `monitor ${monitor} silent since ${timeText(silent)}`;
   return (kQualityWords[quality] ?? plain(quality)) +
       (quality === 'STALE' && stamp ? ` since ${timeText(stamp)}` : '') +
       (quality === 'BAD_INPUT' && missing?.length ?

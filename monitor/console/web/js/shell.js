@@ -56,6 +56,22 @@ function bannerText() {
       ` (${stream.reason}). Trying again by itself.`;
 }
 
+function historyText() {
+  const away = store.status?.plant?.history_away;
+  return away ? `The plant's history is not there since ` +
+      `${timeText(away.since_ms)} (${away.reason}). The valves are live; ` +
+      'episodes come back by themselves.' : '';
+}
+
+// Of a plant how many monitors there are; of a monitor how it is.
+function healthText({plant, health, pair, write}) {
+  const silent = plant?.monitors.filter((m) => m.silent).length;
+  return (!plant ? (health === 'OK' ? 'Monitor OK' : 'Monitor degraded') :
+    `${plant.monitors.length} monitors` +
+      (silent ? `, ${silent} silent` : health === 'OK' ? '' : ', degraded')) +
+      (pair ? `, ${pair}` : '') + (write ? '' : ', read-only');
+}
+
 export function createShell(top, banner) {
   const links = kEntries.map(({name, text, key}) => h('a', {
     'href': `#/${name}`, 'data-name': name, 'aria-keyshortcuts': key,
@@ -86,10 +102,7 @@ export function createShell(top, banner) {
     const {status} = store;
     links[3].hidden = !store.hasWorklist;
     const bad = status && status.health !== 'OK';
-    setText(health, !status ? '' :
-      (bad ? 'Monitor degraded' : 'Monitor OK') +
-      (status.pair ? `, ${status.pair}` : '') +
-      (status.write ? '' : ', read-only'));
+    setText(health, status ? healthText(status) : '');
     health.classList.toggle('bad', Boolean(bad));
     setText(user, status?.user ? `${status.user}, ${status.role}` : '');
     leave.hidden = !status?.session;
@@ -104,10 +117,11 @@ export function createShell(top, banner) {
   const tick = () => {
     const now = store.nowMs();
     setText(clock, `${dateText(now)} ${clockText(now)} ${zoneName()}`);
-    const text = bannerText();
+    const lost = bannerText();
+    const text = lost || historyText();
     banner.hidden = text === '';
     setText(banner, text);
-    document.body.classList.toggle('stale', text !== '');
+    document.body.classList.toggle('stale', lost !== '');
   };
   store.addEventListener('alarms', showSummary);
   store.addEventListener('status', showStatus);

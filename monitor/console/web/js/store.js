@@ -1,7 +1,8 @@
 // What the page knows of the plant, kept up to date by the stream. Emits
 // 'tiles' (detail: ids or null for all), 'alarms' (detail: the row or null),
 // 'samples', 'gap', 'resync' (the connection is back; `gapFromMs`, and whether
-// the monitor was restarted), 'connection' and 'status'.
+// the monitor was restarted), 'connection', 'status' and, on the page of a
+// plant, 'plant' each second.
 
 import {get, getOptional} from './api.js';
 import {Stream} from './stream.js';
@@ -19,6 +20,7 @@ class Store extends EventTarget {
   stream = new Stream();
   #instance = null;
   #lostMs = null;
+  #historyAway = false;
 
   /** @returns a promise that the names of faults are known, or cannot be. */
   start() {
@@ -62,6 +64,7 @@ class Store extends EventTarget {
       this.status = await get('/status');
       this.offsetMs = this.status.now_ms - Date.now();
       this.#emit('status');
+      this.#updatePlant(this.status.plant);
     } catch {
       // The stream says so already.
     }
@@ -86,16 +89,37 @@ class Store extends EventTarget {
     }
   }
 
-  async #resync() {
+  // Each by itself: of a plant, the history may be away.
+  #resync() {
+    return Promise.all([
+      this.#fetch('/valves', ({valves}) => {
+        this.tiles = new Map(valves.map((tile) => [tile.id, tile]));
+        this.#emit('tiles', null);
+      }),
+      this.#fetch('/alarms', ({alarms}) => {
+        this.alarms = new Map(alarms.map((row) => [row.episode, row]));
+        this.#emit('alarms', null);
+      }),
+    ]);
+  }
+
+  async #fetch(where, take) {
     try {
-      const [valves, alarms] =
-          await Promise.all([get('/valves'), get('/alarms')]);
-      this.tiles = new Map(valves.valves.map((tile) => [tile.id, tile]));
-      this.alarms = new Map(alarms.alarms.map((row) => [row.episode, row]));
-      this.#emit('tiles', null);
-      this.#emit('alarms', null);
+      take(await get(where));
     } catch {
       // Comes again with the next connection.
+    }
+  }
+
+  #updatePlant(plant) {
+    if (!plant) return;
+    const returned = this.#historyAway && !plant.history_away;
+    this.#historyAway = Boolean(plant.history_away);
+    if (this.status) this.status.plant = plant;
+    this.#emit('plant', plant);
+    if (returned) {
+      this.#resync();
+      this.#probeWorklist();
     }
   }
 
@@ -112,6 +136,7 @@ class Store extends EventTarget {
       case 'tiles': return this.#updateTiles(data.tiles);
       case 'alarm': return this.#updateAlarm(data);
       case 'sample': return this.#emit('samples', data);
+      case 'plant': return this.#updatePlant(data);
       case 'gap': return this.#emit('gap', data);
     }
   }

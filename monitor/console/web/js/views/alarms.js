@@ -80,8 +80,9 @@ class Alarms extends View {
       if (!store.alarms.has(episode)) this.#selected.delete(episode);
     }
     this.#readOnly.hidden = !store.status || canAct();
-    setText(this.#readOnly, store.status?.user ?
-      'Read-only: your role is view.' :
+    setText(this.#readOnly, store.status?.plant ? 'Read-only: acknowledge, ' +
+      'shelve and label on the page of the monitor, or with fdi-store.' :
+      store.status?.user ? 'Read-only: your role is view.' :
       'Read-only: the monitor was started without --console-write.');
     replace(this.#head, headRow([
       ...(canAct() ? [{text: h('span', {class: 'sr-only'}, 'Selected')}] : []),

@@ -1,12 +1,13 @@
 // Every valve as a tile. Thousands of them: only the rows in sight are in the
 // document, only what changed is touched, a few milliseconds of it a frame.
 
-import {button, cssColor, h, select, setText} from '../dom.js';
+import {button, cssColor, h, replace, select, setText} from '../dom.js';
 import {faultTitle, inAlarm} from '../faults.js';
 import {compareNames} from '../format.js';
 import {rememberQuery} from '../route.js';
 import {settings} from '../settings.js';
 import {store} from '../store.js';
+import {dataTable, timeCell} from './table.js';
 import {rankOf, Tile} from './tile.js';
 import {oncePerFrame, View} from './view.js';
 
@@ -24,8 +25,8 @@ const kFilters = [
 function matches(tile, words) {
   if (words.length === 0) return true;
   const fault = inAlarm(tile) ? faultTitle(tile.faults.join('|')) : '';
-  const text = `${tile.id} ${fault} ${tile.quality} ${tile.model_set ?? ''}`
-      .toLowerCase();
+  const text = [tile.id, fault, tile.quality, tile.model_set, tile.monitor]
+      .join(' ').toLowerCase();
   return words.every((word) => text.includes(word));
 }
 
@@ -44,6 +45,9 @@ class Plant extends View {
   #order;
   #search;
   #buttons = new Map();
+  #monitor;  // Only its valves; empty: all.
+  #monitors = h('div', {});
+  #shownMonitors = '';
   #grid = h('ul', {class: 'tiles', role: 'list'});
   #nothing = h('p', {class: 'nothing', hidden: true});
   #workSoon = oncePerFrame(this, () => this.#work());
@@ -53,17 +57,53 @@ class Plant extends View {
     super();
     this.#filter = query.get('show') ?? 'all';
     this.#order = query.get('order') ?? 'worst';
+    this.#monitor = query.get('monitor') ?? '';
     this.#setWords(query.get('q') ?? '');
     this.element = h('section', {'class': 'plant', 'aria-label': 'Plant'},
-        this.#controls(query.get('q') ?? ''), this.#nothing, this.#grid);
+        this.#controls(query.get('q') ?? ''), this.#monitors, this.#nothing,
+        this.#grid);
     this.on(store, 'tiles', (ids) => this.#changed(ids));
+    this.on(store, 'plant', () => this.#showMonitors());
     this.on(settings, 'change', () => this.#showDensity());
     this.on(window, 'scroll', this.#placeSoon);
     this.on(window, 'resize', this.#placeSoon);
     this.every(kReorderPeriodMs, () => this.#needsOrder && this.#reorder());
     this.key('/', 'Search the valves', () => this.#search.focus());
     this.#showDensity();
+    this.#showMonitors();
     this.#changed(null);
+  }
+
+  // Each second; focus and selection stay where nothing but a time changed.
+  #showMonitors() {
+    const monitors = store.status?.plant?.monitors ?? [];
+    const key = JSON.stringify([this.#monitor, monitors.map(
+        ({heard_ms: heard, silent, ...rest}) => [rest, silent && heard])]);
+    if (key === this.#shownMonitors) return;
+    this.#shownMonitors = key;
+    const columns = [
+      {text: 'Monitor', header: true, cell: ({monitor}) => button(monitor,
+          () => this.#choose(monitor), {'class': 'chip',
+            'aria-pressed': String(monitor === this.#monitor)})},
+      {text: 'Host', cell: ({host}) => host},
+      {text: 'Pair', cell: ({pair}) => pair === null ? '–' :
+        pair === 'leader' ? 'leads' : 'stands by'},
+      {text: 'Health', cell: ({health, text, silent}) => silent ? 'silent' :
+        [health ?? '–', text && `: ${text}`]},
+      {text: 'Valves', class: 'num', cell: ({valves}) => String(valves)},
+      {text: 'Last heard', cell: ({silent, heard_ms: heard}) => silent ?
+        timeCell(heard) : 'now'},
+    ];
+    replace(this.#monitors, monitors.length > 0 && dataTable(
+        'Monitors: press one for its valves alone', columns, monitors,
+        {attributesOf: ({silent}) => ({class: silent ? 'out' : ''})}));
+    this.#placeSoon();
+  }
+
+  #choose(monitor) {
+    this.#monitor = monitor === this.#monitor ? '' : monitor;
+    this.#showMonitors();
+    this.#refilter();
   }
 
   #controls(text) {
@@ -137,7 +177,8 @@ class Plant extends View {
 
   #shows(tile) {
     const filter = kFilters.find((f) => f.key === this.#filter) ?? kFilters[0];
-    return filter.test(tile) && matches(tile, this.#words);
+    return (this.#monitor === '' || tile.monitor === this.#monitor) &&
+        filter.test(tile) && matches(tile, this.#words);
   }
 
   #refilter() {
@@ -147,6 +188,7 @@ class Plant extends View {
       q: this.#search.value,
       show: this.#filter === 'all' ? '' : this.#filter,
       order: this.#order === 'worst' ? '' : this.#order,
+      monitor: this.#monitor,
     });
   }
 

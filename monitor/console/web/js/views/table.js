@@ -82,11 +82,16 @@ function personText(row) {
 
 export const valveLink = (valve) => h('a', {href: link('valve', valve)}, valve);
 
+/** A valve and, of a plant, the monitor that `row` is from. */
+export const valveCell = (valve, {host, monitor}) => [valveLink(valve),
+  monitor && h('div', {class: 'number'}, `${host}/${monitor}`)];
+
 /** The columns of alarms. */
 export const columns = {
   priority: {text: 'Priority', cell: priorityCell},
   detected: {text: 'Detected', cell: (row) => timeCell(row.detected_ms)},
-  valve: {text: 'Valve', header: true, cell: (row) => valveLink(row.valve)},
+  valve: {text: 'Valve', header: true, cell: (row) =>
+    valveCell(row.valve, row)},
   fault: {text: 'Fault', class: 'fault', cell: faultCell},
   group: {text: 'State', class: 'remark', cell: (row) => [
     groupName(row), h('div', {class: 'number'}, personText(row))]},

@@ -52,7 +52,7 @@ export class Tile {
     const alarm = inAlarm(tile);
     const [rank, priority] = rankOf(tile);
     const what = whatText(tile);
-    const quality = qualityText(tile);
+    const quality = qualityText(tile) || (tile.monitor ?? '');
     this.element.className = 'tile' + (alarm ? ` alarm p${priority}` : '') +
         ` rank${rank}` + (tile.quality === 'LIVE' ? '' : ' not-live');
     this.#showSign(alarm ? priority : 0, tile.state === 'ISOLATED');

@@ -24,7 +24,8 @@ const kWordsPeriodMs = 2000;
 function stateLine(tile) {
   if (!tile) return ['not heard of yet'];
   const reason = qualityText(tile);
-  const quality = reason && h('span', {class: 'tag dashed'}, reason);
+  const quality = [reason && h('span', {class: 'tag dashed'}, reason),
+    tile.monitor && h('span', {class: 'tag'}, `monitor ${tile.monitor}`)];
   if (!inAlarm(tile)) {
     return [h('span', {class: 'tag'}, stateWord(tile.state)), quality];
   }

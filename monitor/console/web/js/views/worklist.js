@@ -4,13 +4,14 @@ import {get, url} from '../api.js';
 import {button, errorNote, h, replace} from '../dom.js';
 import {faultTitle} from '../faults.js';
 import {link} from '../route.js';
-import {columns, dataTable, valveLink} from './table.js';
+import {columns, dataTable, valveCell} from './table.js';
 import {View} from './view.js';
 
 const kColumns = [
   {text: 'Rank', class: 'num', cell: (row) => String(row.rank)},
   columns.priority,
-  {text: 'Valve', header: true, cell: (row) => valveLink(row.valve_id)},
+  {text: 'Valve', header: true, cell: (row) =>
+    valveCell(row.valve_id, row)},
   {text: 'Why', class: 'remark', cell: (row) => row.why},
   {text: 'Probable fault', cell: (row) => !row.fault ? row.name ?? '–' :
     row.episode_id ? h('a', {href: link('episode', row.episode_id)},

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "idl/endpoint.h"
+#include "monitor/console/api.h"
+
+namespace fdi::monitor {
+
+/// Shows on a board what the monitors of a plant say, and which of them are
+/// silent. A valve belongs to the monitor whose vector of it came last; of a
+/// pair that is who leads. A monitor is known by its participant, which both
+/// its vectors and its status come from. One thread, but for monitors().
+class PlantFeed {
+ public:
+  using Clock = std::chrono::steady_clock;
+  /// A monitor publishes its status each second.
+  static constexpr std::chrono::milliseconds kMonitorSilence{1800};
+
+  explicit PlantFeed(console::LiveBoard& board) : board_(board) {}
+
+  /// What the arrays of vectors with its hash mean.
+  std::shared_ptr<const console::ModelFacts> Add(
+      const idl::ModelSetInfoMessage& info);
+  void Add(const idl::DecisionMessage& message, const idl::Reception& reception,
+           Clock::time_point now);
+  void Add(const idl::MonitorStatusMessage& status,
+           const idl::Reception& reception, Clock::time_point now);
+
+  /// Marks valves that are silent: for three periods of theirs and at least
+  /// 3 s, or because their monitor is. Forgets monitors that were silent for a
+  /// minute and have no valve. Several times a second.
+  void Tend(Clock::time_point now);
+
+  /// By name; thread safe.
+  std::vector<console::MonitorLine> monitors() const;
+
+ private:
+  struct Monitor {
+    console::MonitorLine line;
+    Clock::time_point heard;
+  };
+  struct Valve {
+    std::uint64_t participant{0};
+    std::uint64_t source_id{0};
+    std::uint64_t seq{0};
+    Clock::time_point heard;
+    Clock::duration patience{0};
+    Silence silence{Silence::kNone};
+  };
+  console::MonitorLine& Hear(const idl::Reception& reception,
+                             Clock::time_point now);
+  void Mark(const std::string& valve_id, Valve& valve, const Monitor& monitor,
+            Clock::time_point now);
+
+  console::LiveBoard& board_;
+  std::map<std::uint64_t, std::shared_ptr<const console::ModelFacts>> models_;
+  std::map<std::string, Valve> valves_;
+  mutable std::mutex mutex_;                   // Guards what follows.
+  std::map<std::uint64_t, Monitor> monitors_;  // By participant.
+};
+
+}  // namespace fdi::monitor
