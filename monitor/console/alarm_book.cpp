@@ -13,17 +13,20 @@ namespace {
 using storage::Alarm;
 using storage::AlarmState;
 
+void AddTo(ValveAlarm& valve, const Alarm& alarm) {
+  valve.unacked |= alarm.state == AlarmState::kUnacked ||
+                   alarm.state == AlarmState::kReturnedUnacked;
+  if (!alarm.episode.ended_ns) {
+    valve.since_ns = alarm.episode.detected_ns;
+    valve.episode = alarm.episode.episode_id;
+  }
+}
+
 AlarmBook::ByValveMap ByValveOf(const std::vector<Alarm>& alarms,
                                 const std::vector<storage::Shelf>& shelves) {
   AlarmBook::ByValveMap by_valve;
   for (const Alarm& alarm : alarms) {
-    ValveAlarm& valve = by_valve[alarm.episode.valve_id];
-    valve.unacked |= alarm.state == AlarmState::kUnacked ||
-                     alarm.state == AlarmState::kReturnedUnacked;
-    if (!alarm.episode.ended_ns) {
-      valve.since_ns = alarm.episode.detected_ns;
-      valve.episode = alarm.episode.episode_id;
-    }
+    AddTo(by_valve[alarm.episode.valve_id], alarm);
   }
   for (const storage::Shelf& shelf : shelves) {
     std::optional<std::int64_t>& until =
@@ -97,10 +100,14 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   for (const storage::Shelf& shelf : shelves) {
     earliest_shelf_end_ns_ = std::min(earliest_shelf_end_ns_, shelf.until_ns);
   }
-  auto by_valve =
-      std::make_shared<const ByValveMap>(ByValveOf(alarms, shelves));
+  auto by_valve = std::make_shared<ByValveMap>(ByValveOf(alarms, shelves));
   const std::lock_guard lock(mutex_);
   rows_ = std::move(rows);
+  std::erase_if(
+      heard_, [this](const auto& item) { return rows_.contains(item.first); });
+  for (const auto& [id, alarm] : heard_) {
+    AddTo((*by_valve)[alarm.episode.valve_id], alarm);
+  }
   by_valve_ = std::move(by_valve);
   return changed;
 }
@@ -110,9 +117,33 @@ std::shared_ptr<const AlarmBook::ByValveMap> AlarmBook::ByValve() const {
   return by_valve_;
 }
 
-bool AlarmBook::Has(const std::string& episode_id) const {
+bool AlarmBook::Hear(const FaultEvent& event) {
+  const Alarm alarm = AlarmOf(event);
+  const std::string& id = alarm.episode.episode_id;
   const std::lock_guard lock(mutex_);
-  return rows_.contains(episode_id);
+  if (rows_.contains(id)) {
+    return false;
+  }
+  auto by_valve = std::make_shared<ByValveMap>(*by_valve_);
+  ValveAlarm& valve = (*by_valve)[event.valve_id];
+  if (alarm.episode.ended_ns) {
+    heard_.erase(id);
+    valve = {};
+  } else {
+    heard_[id] = alarm;
+    AddTo(valve, alarm);
+  }
+  by_valve_ = std::move(by_valve);
+  return true;
+}
+
+std::vector<Alarm> AlarmBook::Heard() const {
+  std::vector<Alarm> alarms;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [id, alarm] : heard_) {
+    alarms.push_back(alarm);
+  }
+  return alarms;
 }
 
 std::optional<HistoryAway> AlarmBook::away() const {

@@ -42,8 +42,12 @@ class AlarmBook {
 
   /// By valve id, as of the last Refresh(). Thread safe.
   std::shared_ptr<const ByValveMap> ByValve() const;
-  /// The episode was on the list then. Thread safe.
-  bool Has(const std::string& episode_id) const;
+  /// An event that came over the bus: its episode is an alarm from now on,
+  /// until the history has it or it is closed. @returns false if the history
+  /// has it, which also knows who has acknowledged it. Thread safe.
+  bool Hear(const FaultEvent& event);
+  /// What was heard and is not in the history. Thread safe.
+  std::vector<storage::Alarm> Heard() const;
   /// What the last Refresh() threw, if it did. Thread safe.
   std::optional<HistoryAway> away() const;
 
@@ -60,6 +64,7 @@ class AlarmBook {
   mutable std::mutex mutex_;  // Guards what follows.
   std::optional<HistoryAway> away_;
   std::map<std::string, std::string> rows_;  // By episode, as last returned.
+  std::map<std::string, storage::Alarm> heard_;  // By episode.
   std::shared_ptr<const ByValveMap> by_valve_{std::make_shared<ByValveMap>()};
 };
 

@@ -76,11 +76,9 @@ class Console::Events : public monitor::EventSink {
   Console& console_;
 };
 
-// What is shipped later takes its place; a known one changes with the history,
-// which also knows who has acknowledged it.
 void Console::Hear(const FaultEvent& event) {
   board_.Mark(event);
-  if (!alarms_->Has(storage::EpisodeIdText(event.episode_id))) {
+  if (alarms_->Hear(event)) {
     stream_.AddUnstored(event);
   }
 }

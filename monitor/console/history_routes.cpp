@@ -1,6 +1,7 @@
 // What the history tells: alarms, episodes with their evidence, figures,
 // shelves.
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <sstream>
 
@@ -23,10 +24,13 @@ constexpr std::int64_t kPageLimit = 1000;
 
 Json Alarms(const Api& api, const httplib::Request& /*request*/) {
   const std::int64_t now_ns = api.sources.utc_now_ns();
-  const auto reader = api.History();
-  return {{"now_ms", Ms(now_ns)},
-          {"alarms",
-           AlarmsJson(reader->AlarmList(now_ns, kMostAlarms), api.texts)}};
+  // Of a plant whose history is away, what came over the bus has to do.
+  std::vector<storage::Alarm> alarms = api.alarms.Heard();
+  if (!api.sources.plant_history || !api.alarms.away()) {
+    std::ranges::move(api.History()->AlarmList(now_ns, kMostAlarms),
+                      std::back_inserter(alarms));
+  }
+  return {{"now_ms", Ms(now_ns)}, {"alarms", AlarmsJson(alarms, api.texts)}};
 }
 
 storage::EpisodeFilter FilterOf(const Api& api,

@@ -36,6 +36,12 @@ Json Status(const Api& api, const httplib::Request& request) {
       period_s = std::max(period_s, valve.models->period_s);
     }
   }
+  std::uint64_t open = facts.open_episodes;
+  if (api.sources.monitors) {
+    open = static_cast<std::uint64_t>(std::ranges::count_if(
+        *api.alarms.ByValve(),
+        [](const auto& item) { return item.second.since_ns.has_value(); }));
+  }
   Json model_sets = Json::array();
   for (const auto& models : sets) {
     model_sets.push_back(ModelFactsJson(*models));
@@ -57,7 +63,7 @@ Json Status(const Api& api, const httplib::Request& request) {
            {{"known", valves.size()},
             {"live", live},
             {"stale", stale},
-            {"open_episodes", facts.open_episodes}}},
+            {"open_episodes", open}}},
           {"model_sets", std::move(model_sets)}};
 }
 

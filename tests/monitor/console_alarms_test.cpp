@@ -6,6 +6,7 @@
 #include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
+#include "storage/plant/plant_database.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/history_fixture.h"
 
@@ -65,6 +66,49 @@ TEST_F(AlarmBookTest, TellsWhatAnotherProgramDidAndWhatIsOffTheList) {
   EXPECT_EQ(ended[0]["isa"], "NORMAL");
   EXPECT_EQ(ended[0]["state"], "CLOSED");
   EXPECT_TRUE(book_.ByValve()->empty());
+}
+
+// As PostgreSQL may be: what happened meanwhile is told when it is back.
+TEST_F(AlarmBookTest, TellsSinceWhenTheHistoryIsAway) {
+  bool away = true;
+  AlarmBook book(
+      [&]() -> std::unique_ptr<storage::History> {
+        if (away) {
+          throw storage::PlantError("PostgreSQL: Connection refused");
+        }
+        return std::make_unique<storage::HistoryReader>(path_);
+      },
+      texts_);
+  EXPECT_THROW(book.Refresh(kDetected), storage::PlantError);
+  EXPECT_THROW(book.Refresh(kDetected + kSecond), storage::PlantError);
+  ASSERT_TRUE(book.away());
+  EXPECT_EQ(book.away()->since_ns, kDetected);
+  EXPECT_EQ(book.away()->reason, "PostgreSQL: Connection refused");
+
+  away = false;
+  Begin("V");
+  EXPECT_TRUE(book.Refresh(kDetected).empty()) << "the first one";
+  EXPECT_FALSE(book.away());
+}
+
+// As on the page of a plant: the history comes later, by shipping.
+TEST_F(AlarmBookTest, WhatWasHeardIsAnAlarmUntilTheHistoryHasIt) {
+  book_.Refresh(kDetected);
+  const auto event = [this](TransitionKind kind, const std::string& valve) {
+    return Event(kind, 0, 0, 0.3, EndReason::kNone, valve);
+  };
+  EXPECT_TRUE(book_.Hear(event(TransitionKind::kDetected, "V")));
+  EXPECT_TRUE(book_.Hear(event(TransitionKind::kDetected, "W")));
+  EXPECT_EQ(book_.Heard().size(), 2U);
+  EXPECT_EQ(book_.ByValve()->at("V").episode, IdOf("V"));
+  EXPECT_TRUE(book_.ByValve()->at("W").unacked);
+
+  EXPECT_TRUE(book_.Hear(event(TransitionKind::kClosed, "W")));
+  EXPECT_EQ(book_.ByValve()->at("W"), ValveAlarm{});
+  Begin("V");
+  EXPECT_EQ(book_.Refresh(kDetected).size(), 1U);
+  EXPECT_TRUE(book_.Heard().empty());
+  EXPECT_FALSE(book_.Hear(event(TransitionKind::kIsolated, "V")));
 }
 
 TEST_F(AlarmBookTest, TellsWhenAShelfRunsOut) {

@@ -352,13 +352,17 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
     const std::string from = "'" + server.Url("plant") + "'";
     Printed(page, "history list --from", from);
     Printed(page, "history show --from", from + " last");
+    Printed(page, "health show --from", from + " --valve LV-1");
+    Printed(page, "worklist --from",
+            from + " --since 2020-01-01 --limit X=0.01");
     Printed(page, "ship --prune", to + " --history-age 36000d");
     Printed(page, "ship --forget");
   } else {
-    called_.insert({"fdi-store ship", "fdi-store ship --init",
-                    "fdi-store ship --prune", "fdi-store ship --forget",
-                    "fdi-store history list --from",
-                    "fdi-store history show --from"});
+    called_.insert(
+        {"fdi-store ship", "fdi-store ship --init", "fdi-store ship --prune",
+         "fdi-store ship --forget", "fdi-store history list --from",
+         "fdi-store history show --from", "fdi-store health show --from",
+         "fdi-store worklist --from"});
   }
   if (std::system("gnuplot --version >/dev/null 2>&1") == 0) {
     Printed(page, "runs plot", id);

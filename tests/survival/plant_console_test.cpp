@@ -142,6 +142,9 @@ TEST_F(PlantConsoleTest, ShowsThreeMonitorsAndWhichOneWasKilled) {
 
   plant_->SetFaulty(true);
   ASSERT_TRUE(Await([this] { return AllAre(Tiles("state"), "ISOLATED"); }));
+  ASSERT_TRUE(Await([this] { return Get("alarms")["alarms"].size() == 6U; }))
+      << "heard";
+  EXPECT_EQ(Get("history")["episodes"].size(), 0U);
   for (const char* name : {"a", "b", "c"}) {
     const Outcome outcome = Ship(name);
     ASSERT_EQ(outcome.code, 0) << outcome.err;
@@ -156,7 +159,12 @@ TEST_F(PlantConsoleTest, ShowsThreeMonitorsAndWhichOneWasKilled) {
               testing::ElementsAre(std::pair("V0", "a"), std::pair("V1", "a"),
                                    std::pair("V2", "b"), std::pair("V3", "b"),
                                    std::pair("V4", "c"), std::pair("V5", "c")));
-  EXPECT_EQ(Get("alarms")["alarms"].size(), 6U);
+  ASSERT_TRUE(Await([this] {
+    const json alarms = Get("alarms")["alarms"];
+    return std::ranges::count_if(alarms, [](const json& row) {
+             return row.contains("monitor");
+           }) == 6;
+  }));
   const json episode = Get("episodes/last");
   EXPECT_GT(episode["trace"]["t_ms"].size(), 5U);
   EXPECT_TRUE(episode["trace"]["T"].is_number()) << "heard on the bus";

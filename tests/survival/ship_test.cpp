@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "storage/history/history_reader.h"
 #include "storage/history/retention.h"
 #include "storage/plant/plant_reader.h"
 #include "tests/storage/many_episodes.h"
@@ -603,6 +604,13 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
   same("history show aaaa00000000012");
   same("history show aaaa");
   same("history show nothing");
+  const auto looks = [](auto reader, std::uint64_t id) {
+    return reader.Look(id).value();
+  };
+  EXPECT_EQ(looks(PlantReader(Url()), Id("LV-1")).x_pct,
+            looks(HistoryReader(path), Id("LV-1")).x_pct);
+  EXPECT_EQ(looks(PlantReader(Url()), Id("LV-1")).flow,
+            looks(HistoryReader(path), Id("LV-1")).flow);
   same("health show --valve LV-3");
   same("health show --valve LV-3 --hourly --until 2026-11-20T10:00");
   same("health show --valve nothing");

@@ -78,10 +78,13 @@ export function panelsOf(data, table) {
     ...channels.map((channel, c) => residualPanel(channel, c, tall)),
     decisionPanel(data.meta),
   ];
+  // The page of a plant has no readings.
+  const read = data.size === 0 ||
+      ['cv', 'x', 'f'].some((name) => data.has(name));
   for (const panel of panels) {
     panel.lines = panel.lines.filter(({column}) =>
       table[column]?.some((value) => value !== null) ||
-      panel.key === 'decision' || column === 'x' || column === 'f' ||
+      panel.key === 'decision' || read && (column === 'x' || column === 'f') ||
       panel.band);
   }
   return panels.filter((panel) => panel.lines.length > 0);

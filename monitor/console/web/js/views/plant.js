@@ -46,7 +46,7 @@ class Plant extends View {
   #search;
   #buttons = new Map();
   #monitor;  // Only its valves; empty: all.
-  #monitors = h('div', {});
+  #monitors = h('div', {class: 'monitors'});
   #shownMonitors = '';
   #grid = h('ul', {class: 'tiles', role: 'list'});
   #nothing = h('p', {class: 'nothing', hidden: true});

@@ -39,7 +39,7 @@ function stateLine(tile) {
       h('span', {class: 'tag'}, `factor ${factorText(tile.factor)}`),
     tile.strength === null || tile.strength === undefined ? null :
       h('span', {class: 'tag'}, `strength ${percentText(tile.strength)}`),
-    h('span', {class: 'tag'},
+    tile.since_ms === null ? null : h('span', {class: 'tag'},
         `for ${durationText(store.valveNowMs(tile.id) - tile.since_ms)}`),
     quality,
     tile.episode ? h('a', {href: link('episode', tile.episode)},

@@ -1,0 +1,148 @@
+#include "monitor/app/plant_feed.h"
+
+#include <gtest/gtest.h>
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+class PlantFeedTest : public testing::Test {
+ protected:
+  static constexpr std::uint64_t kA = 1;
+  static constexpr std::uint64_t kB = 2;
+
+  idl::Reception From(std::uint64_t participant) const {
+    idl::Reception reception;
+    reception.participant_id = participant;
+    reception.received_ns = (now_ - start_).count();
+    return reception;
+  }
+  void Status(std::uint64_t participant, int leads = -1) {
+    idl::MonitorStatusMessage status;
+    status.monitor = participant == kA ? "room:1" : "room:2";
+    if (leads >= 0) {
+      status.counters = {{"pair_leader", static_cast<std::uint64_t>(leads)}};
+    }
+    feed_.Add(status, From(participant), now_);
+  }
+  void Vector(std::uint64_t participant, std::uint64_t seq,
+              const std::string& valve = "V1", std::uint64_t hash = 0) {
+    idl::DecisionMessage message;
+    message.valve_id = valve;
+    message.model_hash = hash;
+    message.channel_count = hash == 0 ? 0 : 1;
+    message.verdict.source_id = 7;
+    message.verdict.seq = seq;
+    message.verdict.stamp_ns = static_cast<std::int64_t>(seq) * 1'000'000'000;
+    feed_.Add(message, From(participant), now_);
+  }
+  void Pass(PlantFeed::Clock::duration time) {
+    now_ += time;
+    feed_.Tend(now_);
+  }
+  console::ValveState Valve(const std::string& id = "V1") const {
+    return board_.Trend(id).value().now;
+  }
+
+  const PlantFeed::Clock::time_point start_{seconds(1000)};
+  PlantFeed::Clock::time_point now_{start_};
+  console::LiveBoard board_;
+  PlantFeed feed_{board_};
+};
+
+TEST_F(PlantFeedTest, ASilentMonitorIsToldFromASilentValve) {
+  Status(kA);
+  Status(kB);
+  Vector(kA, 1);
+  Vector(kB, 1, "V2");
+  for (int i = 0; i < 4; ++i) {
+    Pass(milliseconds(500));
+    Status(kB);
+  }
+  const console::ValveState of_a = Valve();
+  EXPECT_EQ(of_a.silence, Silence::kMonitor);
+  EXPECT_EQ(of_a.monitor, "room:1");
+  EXPECT_EQ(of_a.heard_ns, 0);
+  EXPECT_EQ(Valve("V2").silence, Silence::kNone) << "not yet";
+
+  for (int i = 0; i < 4; ++i) {
+    Pass(milliseconds(500));
+    Status(kB);
+  }
+  EXPECT_EQ(Valve("V2").silence, Silence::kStale);
+  const auto lines = feed_.monitors();
+  ASSERT_EQ(lines.size(), 2U);
+  EXPECT_TRUE(lines[0].silent);
+  EXPECT_FALSE(lines[1].silent);
+
+  Vector(kA, 2);
+  Vector(kB, 2, "V2");
+  Pass(milliseconds(50));
+  EXPECT_EQ(Valve().silence, Silence::kNone);
+  EXPECT_EQ(Valve("V2").silence, Silence::kNone);
+}
+
+TEST_F(PlantFeedTest, AValveFollowsWhoLeadsThePair) {
+  Status(kA, 1);
+  Status(kB, 0);
+  Vector(kA, 1);
+  Vector(kA, 2);
+  EXPECT_EQ(feed_.monitors()[0].pair, "leader");
+  EXPECT_EQ(feed_.monitors()[1].pair, "standby");
+
+  Pass(milliseconds(1000));
+  Status(kB, 1);
+  Vector(kB, 2);  // Repeated by who took over.
+  Pass(milliseconds(1000));
+  EXPECT_EQ(Valve().silence, Silence::kNone);
+  Vector(kB, 3);
+  Pass(milliseconds(10));
+  EXPECT_EQ(Valve().monitor, "room:2");
+  EXPECT_EQ(feed_.monitors()[0].valves, 0U);
+  EXPECT_EQ(feed_.monitors()[1].valves, 1U);
+  EXPECT_EQ(board_.Trend("V1")->points.size(), 3U);
+}
+
+TEST_F(PlantFeedTest, AMonitorWithoutValvesIsForgottenAfterAMinute) {
+  Status(kA);
+  Status(kB);
+  Vector(kB, 1);
+  Pass(seconds(59));
+  EXPECT_EQ(feed_.monitors().size(), 2U);
+  Pass(seconds(2));
+  ASSERT_EQ(feed_.monitors().size(), 1U);
+  EXPECT_EQ(feed_.monitors()[0].name, "room:2");
+  EXPECT_EQ(Valve().silence, Silence::kMonitor);
+}
+
+TEST_F(PlantFeedTest, TrendsHaveTheirNamesFromTheModelSet) {
+  idl::ModelSetInfoMessage info;
+  info.model_set = "paper";
+  info.version = 2;
+  info.model_hash = 9;
+  info.sample_period_s = 2.0;
+  info.isolation_threshold = 0.8;
+  info.channels.resize(1);
+  info.channels[0].name = std::string("X");
+  info.faults = {1, 7};
+  const auto facts = feed_.Add(info);
+  EXPECT_EQ(facts->model_set, "paper@2");
+  EXPECT_EQ(facts->isolation_threshold, 0.8);
+  EXPECT_EQ(facts->faults, (std::vector<std::string>{"f1", "f7"}));
+  EXPECT_EQ(feed_.Add(info), facts) << "announced by another monitor";
+
+  Status(kA);
+  Vector(kA, 1, "V1", 9);
+  EXPECT_EQ(Valve().models, facts);
+  EXPECT_EQ(board_.Trend("V1")->points.front().residuals.size(), 1U);
+  for (int i = 0; i < 5; ++i) {
+    Pass(seconds(1));
+    Status(kA);
+  }
+  EXPECT_EQ(Valve().silence, Silence::kNone) << "three periods are 6 s";
+}
+
+}  // namespace
+}  // namespace fdi::monitor
