@@ -79,4 +79,20 @@ void ApplyFault(int fault, double strength, FaultEffects& effects) {
   }
 }
 
+bool LeavesRod(int fault) {
+  FaultEffects effects;
+  ApplyFault(fault, 1.0, effects);
+  const FaultEffects none;
+  effects.kv_factor = none.kv_factor;
+  effects.opening_offset = none.opening_offset;
+  effects.external_loss = none.external_loss;
+  effects.bypass_opening = none.bypass_opening;
+  effects.flow_reading_factor = none.flow_reading_factor;
+  effects.chamber_reading_factor = none.chamber_reading_factor;
+  effects.temperature_reading_step = none.temperature_reading_step;
+  effects.inlet_reading_step = none.inlet_reading_step;
+  effects.outlet_reading_step = none.outlet_reading_step;
+  return effects == none;
+}
+
 }  // namespace fdi::simulator

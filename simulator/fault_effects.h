@@ -46,4 +46,9 @@ inline constexpr double kMaxTemperatureC = 300.0;
 ///   outside [0, 1] ([-1, 1] for the signed faults of the catalogue).
 void ApplyFault(int fault, double strength, FaultEffects& effects);
 
+/// True if `fault` acts behind the rod, on the flow or on readings: X is that
+/// of the valve without it, as long as nobody answers to what is read.
+/// @throws std::invalid_argument if `fault` is not of the catalogue.
+bool LeavesRod(int fault);
+
 }  // namespace fdi::simulator

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "diagnosis/error.h"
+#include "simulator/control_valve.h"
+#include "simulator/valve_equations.h"
 #include "simulator/valve_simulation.h"
 
 namespace fdi::simulator {
@@ -19,7 +21,8 @@ double DelayedCommand(const std::vector<RecordRow>& record, std::size_t k,
 std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
                                          const std::vector<RecordRow>& record,
                                          std::size_t first, std::size_t last,
-                                         const RecordDrive& drive) {
+                                         const RecordDrive& drive,
+                                         double tolerance_scale) {
   Require(first < last && last <= record.size(),
           "rows to compare must lie inside the record");
   RecordedExcitation excitation;
@@ -34,6 +37,7 @@ std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
   config.period_s = drive.period_s;
   config.duration_s = static_cast<double>(last - first) * drive.period_s;
   config.continuous_inputs = drive.interpolated_command;
+  config.tolerance_scale = tolerance_scale;
   config.noise = false;
   config.resolution = false;
   ValveSimulation simulation(config);
@@ -43,6 +47,21 @@ std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
     answers.push_back({sample[Signal::kX], sample[Signal::kF]});
   }
   return answers;
+}
+
+double FlowReading(const ValveParameters& parameters,
+                   const FaultEffects& effects, const InputRow& input,
+                   double x_pct) {
+  const InstrumentParameters& i = parameters.instruments;
+  double flow = FlowM3PerHour(parameters.trim, effects,
+                              {0.01 * input.cv_pct, 1e3 * input.p1_kpa,
+                               1e3 * input.p2_kpa, input.t1_degc},
+                              0.01 * x_pct, 0.0);
+  if (i.flow_unit == FlowUnit::kTPerHour) {
+    flow *= LiquidDensity(input.t1_degc) / 1000.0;
+  }
+  return std::clamp(flow * effects.flow_reading_factor, i.flow.low,
+                    i.flow.high);
 }
 
 RecordFit FitToRecord(const ValveParameters& parameters,

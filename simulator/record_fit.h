@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "simulator/excitation.h"
+#include "simulator/fault_effects.h"
 #include "simulator/valve_parameters.h"
 
 namespace fdi::simulator {
@@ -49,12 +50,21 @@ struct RecordFit {
 
 /// Answers of a fault-free valve to the inputs of rows [first, last): noise and
 /// resolution off, in equilibrium with the first of them.
+/// @param tolerance_scale On the integrator's tolerances, > 0: 10 takes half
+///   the time of 1 and errs by 0.02 % of X.
 /// @throws ConfigError if `parameters`, `drive` or a row is not valid.
 /// @throws std::invalid_argument unless first < last <= record.size().
 std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
                                          const std::vector<RecordRow>& record,
                                          std::size_t first, std::size_t last,
-                                         const RecordDrive& drive = {});
+                                         const RecordDrive& drive = {},
+                                         double tolerance_scale = 10.0);
+
+/// What the flow transmitter reads of a valve with its rod at `x_pct`, without
+/// noise; pressures and temperature of `input` act as they are.
+double FlowReading(const ValveParameters& parameters,
+                   const FaultEffects& effects, const InputRow& input,
+                   double x_pct);
 
 /// Drives the valve with all rows and compares X and F over [first, last).
 /// @throws as SimulateRecord().

@@ -27,25 +27,6 @@ double CommandTravel(const RecordSegment& segment) {
   return travel;
 }
 
-MatrixXd Residuals(const ValveCandidate& candidate,
-                   const RecordSegment& segment, std::size_t settle_rows,
-                   bool has_flow) {
-  const auto answers =
-      SimulateRecord(candidate.parameters, *segment.rows, segment.first,
-                     segment.last, candidate.drive);
-  MatrixXd result(static_cast<Index>(segment.size() - settle_rows),
-                  has_flow ? 2 : 1);
-  for (std::size_t k = settle_rows; k < segment.size(); ++k) {
-    const RecordRow& row = (*segment.rows)[segment.first + k];
-    const auto at = static_cast<Index>(k - settle_rows);
-    result(at, 0) = row.x_measured ? answers[k].x_pct - row.x_pct : 0.0;
-    if (has_flow) {
-      result(at, 1) = row.flow_measured ? answers[k].flow - row.flow : 0.0;
-    }
-  }
-  return result;
-}
-
 }  // namespace
 
 std::vector<RecordSegment> LiveliestSegments(
@@ -78,17 +59,29 @@ std::vector<RecordSegment> LiveliestSegments(
   return segments;
 }
 
-std::vector<MatrixXd> SegmentResiduals(
-    const std::vector<ValveCandidate>& candidates,
-    const std::vector<RecordSegment>& segments, std::size_t settle_rows,
-    bool has_flow, int threads) {
-  std::vector<MatrixXd> parts(candidates.size() * segments.size());
+namespace {
+
+using Motion = std::vector<std::vector<RecordAnswer>>;  // By segment.
+
+// Tolerances of the integrator: a difference of simulations at points 2 % apart
+// needs finer ones than a simulation that is compared with a record.
+constexpr double kFine = 1.0;
+constexpr double kCoarse = 10.0;
+
+// Simulates on `threads` threads.
+std::vector<Motion> Simulate(const std::vector<ValveCandidate>& candidates,
+                             const std::vector<RecordSegment>& segments,
+                             double tolerance_scale, int threads) {
+  std::vector<Motion> motions(candidates.size(), Motion(segments.size()));
+  const std::size_t count = candidates.size() * segments.size();
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t i = next++; i < parts.size(); i = next++) {
-      parts[i] =
-          Residuals(candidates[i / segments.size()],
-                    segments[i % segments.size()], settle_rows, has_flow);
+    for (std::size_t i = next++; i < count; i = next++) {
+      const ValveCandidate& candidate = candidates[i / segments.size()];
+      const RecordSegment& segment = segments[i % segments.size()];
+      motions[i / segments.size()][i % segments.size()] =
+          SimulateRecord(candidate.parameters, *segment.rows, segment.first,
+                         segment.last, candidate.drive, tolerance_scale);
     }
   };
   std::vector<std::future<void>> helpers;
@@ -99,25 +92,36 @@ std::vector<MatrixXd> SegmentResiduals(
   for (std::future<void>& helper : helpers) {
     helper.get();
   }
-  std::vector<MatrixXd> result;
-  for (std::size_t c = 0; c < candidates.size(); ++c) {
-    const auto* part = &parts[c * segments.size()];
-    Index rows = 0;
-    for (std::size_t s = 0; s < segments.size(); ++s) {
-      rows += part[s].rows();
+  return motions;
+}
+
+// Differences simulation - record: one row per instant, columns X [%] and, if
+// `has_flow`, F by `parameters`; the first `settle_rows` of every segment are
+// left out.
+MatrixXd Residuals(const ValveParameters& parameters, const Motion& motion,
+                   const std::vector<RecordSegment>& segments,
+                   std::size_t settle_rows, bool has_flow) {
+  std::size_t count = 0;
+  for (const RecordSegment& segment : segments) {
+    count += segment.size() - settle_rows;
+  }
+  MatrixXd result(static_cast<Index>(count), has_flow ? 2 : 1);
+  Index at = 0;
+  for (std::size_t s = 0; s < segments.size(); ++s) {
+    for (std::size_t k = settle_rows; k < segments[s].size(); ++k, ++at) {
+      const RecordRow& row = (*segments[s].rows)[segments[s].first + k];
+      const double x_pct = motion[s][k].x_pct;
+      result(at, 0) = row.x_measured ? x_pct - row.x_pct : 0.0;
+      if (has_flow) {
+        result(at, 1) =
+            row.flow_measured
+                ? FlowReading(parameters, {}, row.input, x_pct) - row.flow
+                : 0.0;
+      }
     }
-    MatrixXd whole(rows, has_flow ? 2 : 1);
-    Index at = 0;
-    for (std::size_t s = 0; s < segments.size(); ++s) {
-      whole.middleRows(at, part[s].rows()) = part[s];
-      at += part[s].rows();
-    }
-    result.push_back(std::move(whole));
   }
   return result;
 }
-
-namespace {
 
 // `factor` to both sides of the nominal value, inside [least, most].
 ValveUnknown Unknown(const char* name, double& (*in)(ValveParameters&),
@@ -315,6 +319,17 @@ std::vector<Index> AllOf(const std::vector<ValveUnknown>& unknowns) {
   return all;
 }
 
+// Kv and exponent do not move the rod.
+VectorXd WithoutTrim(const std::vector<ValveUnknown>& unknowns,
+                     VectorXd point) {
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    if (unknowns[i].name.starts_with("trim.")) {
+      point[static_cast<Index>(i)] = 0.0;
+    }
+  }
+  return point;
+}
+
 FittedParameter Rejected(const ValveUnknown& u, double sd) {
   return {u.name, u.nominal, u.nominal, u.lower, u.upper, sd, false};
 }
@@ -369,14 +384,15 @@ class Identification {
                    const RecordDrive& drive) const;
   Hypothesis BestStart() const;
   RobustFit Fit(const Hypothesis& hypothesis,
-                const std::vector<RecordSegment>& segments,
-                int iterations) const;
+                const std::vector<RecordSegment>& segments, int iterations,
+                double tolerance_scale) const;
   Hypothesis Best(std::vector<Hypothesis> hypotheses) const;
   void KeepIdentified(Hypothesis& hypothesis,
                       std::vector<FittedParameter>& rejected) const;
   void AddStated(Hypothesis& hypothesis,
                  std::vector<FittedParameter>& rejected) const;
-  RecordFit Compare(const ValveCandidate& candidate) const;
+  std::vector<RecordFit> Compare(
+      const std::vector<ValveCandidate>& candidates) const;
   ValveCandidate Candidate(const Hypothesis& h, const VectorXd& point) const {
     return {WithUnknowns(h.base.parameters, h.unknowns, point), h.base.drive};
   }
@@ -432,15 +448,39 @@ Hypothesis Identification::BestStart() const {
 
 RobustFit Identification::Fit(const Hypothesis& hypothesis,
                               const std::vector<RecordSegment>& segments,
-                              int iterations) const {
+                              int iterations, double tolerance_scale) const {
+  // Points that differ in the trim alone share a simulation; the last point
+  // that came alone is where the fit is.
+  std::vector<VectorXd> simulated;
+  std::vector<Motion> motions;
   const auto residuals = [&](const std::vector<VectorXd>& points) {
+    std::vector<VectorXd> wanted;
     std::vector<ValveCandidate> candidates;
     for (const VectorXd& point : points) {
-      candidates.push_back(Candidate(hypothesis, point));
+      const VectorXd key = WithoutTrim(hypothesis.unknowns, point);
+      if (std::ranges::find(simulated, key) == simulated.end()) {
+        wanted.push_back(key);
+        candidates.push_back(Candidate(hypothesis, point));
+      }
     }
-    return SegmentResiduals(candidates, segments,
-                            static_cast<std::size_t>(options_.settle_rows),
-                            options_.has_flow, options_.threads);
+    std::vector<Motion> added =
+        Simulate(candidates, segments, tolerance_scale, options_.threads);
+    if (points.size() == 1 && !added.empty()) {
+      simulated.clear();
+      motions.clear();
+    }
+    simulated.insert(simulated.end(), wanted.begin(), wanted.end());
+    std::ranges::move(added, std::back_inserter(motions));
+    std::vector<MatrixXd> result;
+    for (const VectorXd& point : points) {
+      const auto at =
+          std::ranges::find(simulated, WithoutTrim(hypothesis.unknowns, point));
+      result.push_back(Residuals(
+          Candidate(hypothesis, point).parameters,
+          motions[static_cast<std::size_t>(at - simulated.begin())], segments,
+          static_cast<std::size_t>(options_.settle_rows), options_.has_flow));
+    }
+    return result;
   };
   RobustFitOptions options;
   options.max_iterations = iterations;
@@ -460,16 +500,18 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
   constexpr int kIterations = 4;
   std::vector<ValveCandidate> candidates;
   for (Hypothesis& h : hypotheses) {
-    h.point = Fit(h, {segments_.front()}, kIterations).point;
+    h.point = Fit(h, {segments_.front()}, kIterations, kCoarse).point;
     candidates.push_back(Candidate(h, h.point));
   }
-  const auto residuals = SegmentResiduals(
-      candidates, segments_, static_cast<std::size_t>(options_.settle_rows),
-      options_.has_flow, options_.threads);
+  const std::vector<Motion> motions =
+      Simulate(candidates, segments_, kCoarse, options_.threads);
   std::size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    const double loss = residuals[i].col(0).norm();
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const double loss =
+        Residuals(candidates[i].parameters, motions[i], segments_,
+                  static_cast<std::size_t>(options_.settle_rows), false)
+            .norm();
     // A lag of the valve looks like a part of a sample of delay.
     const bool same_delay = hypotheses[i].base.drive.command_delay ==
                             hypotheses[best].base.drive.command_delay;
@@ -486,7 +528,7 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
 void Identification::KeepIdentified(
     Hypothesis& hypothesis, std::vector<FittedParameter>& rejected) const {
   for (bool changed = true; changed && !hypothesis.unknowns.empty();) {
-    hypothesis.fit = Fit(hypothesis, segments_, kMostIterations);
+    hypothesis.fit = Fit(hypothesis, segments_, kMostIterations, kFine);
     hypothesis.point = hypothesis.fit.point;
     const PointBounds bounds = BoundsOf(hypothesis.unknowns);
     std::vector<Index> kept = AllOf(hypothesis.unknowns);
@@ -517,7 +559,7 @@ void Identification::AddStated(Hypothesis& hypothesis,
     trial.unknowns.push_back(unknown);
     trial.point.conservativeResize(trial.point.size() + 1);
     trial.point.tail<1>() = BoundsOf({unknown}).prior_mean;
-    trial.fit = Fit(trial, segments_, kMostIterations);
+    trial.fit = Fit(trial, segments_, kMostIterations, kFine);
     trial.point = trial.fit.point;
     const double sd =
         StandardDeviations(trial.fit, BoundsOf(trial.unknowns),
@@ -539,18 +581,14 @@ void Identification::AddStated(Hypothesis& hypothesis,
   }
 }
 
-RecordFit Identification::Compare(const ValveCandidate& candidate) const {
+std::vector<RecordFit> Identification::Compare(
+    const std::vector<ValveCandidate>& candidates) const {
   std::vector<RecordSegment> whole;
   for (const HealthyRecord& record : records_) {
     if (record.rows.size() > static_cast<std::size_t>(options_.settle_rows)) {
       whole.push_back({&record.rows, 0, record.rows.size()});
     }
   }
-  const Eigen::MatrixXd r =
-      SegmentResiduals({candidate}, whole,
-                       static_cast<std::size_t>(options_.settle_rows),
-                       options_.has_flow, options_.threads)
-          .front();
   // Rows that were filled in have a difference of 0.
   const auto count = [&](Index j) {
     double measured = 0.0;
@@ -563,17 +601,24 @@ RecordFit Identification::Compare(const ValveCandidate& candidate) const {
     }
     return std::max(1.0, measured);
   };
-  const auto rmse = [&](Index j) {
-    return r.col(j).norm() / std::sqrt(count(j));
-  };
-  RecordFit fit;
-  fit.x_rmse_pct = rmse(0);
-  fit.x_bias_pct = r.col(0).sum() / count(0);
-  if (options_.has_flow) {
-    fit.flow_rmse = rmse(1);
-    fit.flow_bias = r.col(1).sum() / count(1);
+  const std::vector<Motion> motions =
+      Simulate(candidates, whole, kCoarse, options_.threads);
+  std::vector<RecordFit> fits(candidates.size());
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    const MatrixXd r = Residuals(candidates[i].parameters, motions[i], whole,
+                                 static_cast<std::size_t>(options_.settle_rows),
+                                 options_.has_flow);
+    const auto rmse = [&](Index j) {
+      return r.col(j).norm() / std::sqrt(count(j));
+    };
+    fits[i].x_rmse_pct = rmse(0);
+    fits[i].x_bias_pct = r.col(0).sum() / count(0);
+    if (options_.has_flow) {
+      fits[i].flow_rmse = rmse(1);
+      fits[i].flow_bias = r.col(1).sum() / count(1);
+    }
   }
-  return fit;
+  return fits;
 }
 
 ValveFit Identification::Run() {
@@ -595,8 +640,10 @@ ValveFit Identification::Run() {
   result.parameters = candidate.parameters;
   result.interpolated_command = candidate.drive.interpolated_command;
   result.command_delay = candidate.drive.command_delay;
-  result.fitted = Compare(candidate);
-  result.nominal = Compare({nominal_, candidate.drive});
+  const std::vector<RecordFit> fits =
+      Compare({candidate, {nominal_, candidate.drive}});
+  result.fitted = fits[0];
+  result.nominal = fits[1];
   return result;
 }
 

@@ -37,15 +37,6 @@ struct ValveCandidate {
   RecordDrive drive;
 };
 
-/// Differences simulation - record of each candidate: one row per instant,
-/// columns X [%] and, if `has_flow`, F; the first `settle_rows` of every
-/// segment are left out. Simulates on `threads` threads.
-/// @throws as SimulateRecord().
-std::vector<Eigen::MatrixXd> SegmentResiduals(
-    const std::vector<ValveCandidate>& candidates,
-    const std::vector<RecordSegment>& segments, std::size_t settle_rows,
-    bool has_flow, int threads);
-
 /// A physical parameter that a healthy record may tell. It is sought as the
 /// logarithm of its value.
 struct ValveUnknown {

@@ -398,7 +398,7 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
                 models, held_out.commands);
   BalanceThresholds(models);
   FitInterpolationErrors(compared, models);
-  FindGroups(compared, models);
+  FindGroups(compared, options.threads, models);
   FitDriftLimits(compared, models);
   Validate(models);
   reporter.Tell(1.0, "done");

@@ -104,6 +104,8 @@ MatrixXd Design(const TsModel& model, const MatrixXd& x, const Scale& scale) {
 // the targets.
 struct Systems {
   std::vector<VectorXd> uses;                 // per fold: 1 where a row counts
+  std::vector<std::vector<Index>> members;    // per fold: where it is 0
+  std::vector<MatrixXd> parts;                // the design of these rows
   std::vector<Eigen::LLT<MatrixXd>> factors;  // per penalty: folds, then all
 };
 
@@ -122,8 +124,10 @@ Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
         use(k) = 0.0;
       }
     }
-    const MatrixXd part = design(members, Eigen::all);
-    own[f].selfadjointView<Eigen::Lower>().rankUpdate(part.transpose());
+    systems.parts.emplace_back(design(members, Eigen::all));
+    own[f].selfadjointView<Eigen::Lower>().rankUpdate(
+        systems.parts.back().transpose());
+    systems.members.push_back(std::move(members));
     systems.uses.push_back(std::move(use));
   }
   systems.uses.push_back(VectorXd::Ones(design.rows()));
@@ -143,6 +147,13 @@ Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
   }
   return systems;
 }
+
+// What a model is fitted to.
+struct Target {
+  VectorXd y;
+  bool censored{false};          // Some y are at the limit.
+  std::vector<VectorXd> scores;  // per fold, then all: Dᵀ(y − base); else empty
+};
 
 // Residuals as the engine forms them; NaN where they say nothing.
 std::vector<double> Residuals(const TsModel& limits, const VectorXd& y,
@@ -213,9 +224,10 @@ struct Adaptation::Impl {
   VectorXd Predicted(const VectorXd& theta) const {
     return base + design * theta;
   }
-  VectorXd Solve(const VectorXd& y, std::size_t penalty, std::size_t fold,
+  Target TargetOf(const VectorXd& y) const;
+  VectorXd Solve(const Target& target, std::size_t penalty, std::size_t fold,
                  VectorXd theta) const;
-  VectorXd CrossPredict(const VectorXd& y, std::size_t penalty,
+  VectorXd CrossPredict(const Target& target, std::size_t penalty,
                         std::vector<VectorXd>& thetas) const;
 
   TsModel normal;
@@ -227,19 +239,41 @@ struct Adaptation::Impl {
   Systems systems;
 };
 
+Target Adaptation::Impl::TargetOf(const VectorXd& y) const {
+  Target target{y, y.maxCoeff() >= normal.saturation, {}};
+  if (target.censored) {
+    return target;
+  }
+  const VectorXd off = y - base;
+  std::vector<VectorXd> own;
+  VectorXd all = VectorXd::Zero(design.cols());
+  for (std::size_t f = 0; f < kFolds; ++f) {
+    own.push_back(systems.parts[f].transpose() * off(systems.members[f]));
+    all += own.back();
+  }
+  for (const VectorXd& left_out : own) {
+    target.scores.push_back(all - left_out);
+  }
+  target.scores.push_back(std::move(all));
+  return target;
+}
+
 // θ for the rows that `fold` uses (kFolds: all), starting from `theta`.
-VectorXd Adaptation::Impl::Solve(const VectorXd& y, std::size_t penalty,
+VectorXd Adaptation::Impl::Solve(const Target& target, std::size_t penalty,
                                  std::size_t fold, VectorXd theta) const {
   const Eigen::LLT<MatrixXd>& factor =
       systems.factors[penalty * (kFolds + 1) + fold];
-  const bool censored = y.maxCoeff() >= normal.saturation;
+  if (!target.censored) {
+    return factor.solve(target.scores[fold]);
+  }
+  const VectorXd& y = target.y;
   const double span = y.maxCoeff() - y.minCoeff();
   VectorXd predicted = Predicted(theta);
-  for (int round = 0; round < (censored ? kCensoredRounds : 1); ++round) {
-    const VectorXd target =
+  for (int round = 0; round < kCensoredRounds; ++round) {
+    const VectorXd reached =
         (y.array() >= normal.saturation).select(y.cwiseMax(predicted), y);
     theta = factor.solve(design.transpose() *
-                         (target - base).cwiseProduct(systems.uses[fold]));
+                         (reached - base).cwiseProduct(systems.uses[fold]));
     const VectorXd before = std::exchange(predicted, Predicted(theta));
     if ((predicted - before).lpNorm<Eigen::Infinity>() <
         kCensoredTolerance * span) {
@@ -251,13 +285,13 @@ VectorXd Adaptation::Impl::Solve(const VectorXd& y, std::size_t penalty,
 
 // Every row predicted by a model of the other folds; those of the penalty
 // before, in `thetas`, are where they start.
-VectorXd Adaptation::Impl::CrossPredict(const VectorXd& y, std::size_t penalty,
+VectorXd Adaptation::Impl::CrossPredict(const Target& target,
+                                        std::size_t penalty,
                                         std::vector<VectorXd>& thetas) const {
-  VectorXd predicted(y.size());
+  VectorXd predicted = base;
   for (std::size_t f = 0; f < kFolds; ++f) {
-    thetas[f] = Solve(y, penalty, f, thetas[f]);
-    const VectorXd all = Predicted(thetas[f]);
-    predicted = (systems.uses[f].array() > 0.0).select(predicted, all);
+    thetas[f] = Solve(target, penalty, f, thetas[f]);
+    predicted(systems.members[f]) += systems.parts[f] * thetas[f];
   }
   return predicted;
 }
@@ -283,10 +317,11 @@ AdaptedModel Adaptation::Fit(const Condition& condition) const {
   std::vector<double> best = Residuals(adapted.model, y, impl_->base);
   double error = kWorthAdapting * MeanSquare(best);
   std::optional<std::size_t> chosen;
+  const Target target = impl_->TargetOf(y);
   std::vector<VectorXd> thetas(kFolds, VectorXd::Zero(impl_->design.cols()));
   for (std::size_t p = 0; p < kPenalties.size(); ++p) {
     std::vector<double> residuals =
-        Residuals(adapted.model, y, impl_->CrossPredict(y, p, thetas));
+        Residuals(adapted.model, y, impl_->CrossPredict(target, p, thetas));
     const double square = MeanSquare(residuals);
     if (square < error) {
       error = square;
@@ -295,7 +330,7 @@ AdaptedModel Adaptation::Fit(const Condition& condition) const {
     }
   }
   if (chosen) {
-    AddTo(adapted.model, impl_->Solve(y, *chosen, kFolds, thetas.front()),
+    AddTo(adapted.model, impl_->Solve(target, *chosen, kFolds, thetas.front()),
           impl_->scale);
   } else {
     adapted.model = impl_->normal;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <numeric>
 
 #include "diagnosis/fault_bank.h"
@@ -183,6 +184,17 @@ struct InterpolationSums {
   double samples{0.0};
 };
 
+// The set with some of its observers alone, normal first: what the others
+// predict takes the same time and is not asked for.
+ModelSet WithObservers(const ModelSet& models, const std::vector<int>& chosen) {
+  ModelSet some = models;
+  some.observers.clear();
+  for (const int i : chosen) {
+    some.observers.push_back(models.observers[static_cast<std::size_t>(i)]);
+  }
+  return some;
+}
+
 // Squares of: neighbours' interpolation less the observer between them, and
 // how far the interpolation moved from the nearer neighbour.
 std::vector<InterpolationSums> CompareWithNeighbours(
@@ -195,8 +207,11 @@ std::vector<InterpolationSums> CompareWithNeighbours(
       (strength(middle) - strength(low)) / (strength(high) - strength(low));
   std::vector<InterpolationSums> sums(models.channels.size());
   const Condition& condition = conditions[static_cast<std::size_t>(middle)];
+  // 0 normal, 1 low, 2 middle, 3 high.
+  const ModelSet four = WithObservers(models, {0, low, middle, high});
+  const auto plan = std::make_shared<const ObserverPlan>(four);
   for (const Stretch& stretch : condition.validation) {
-    ObserverBank bank(models);
+    ObserverBank bank(plan);
     bank.Initialise(stretch.samples.front());
     for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
       bank.Step(stretch.samples[k]);
@@ -208,11 +223,11 @@ std::vector<InterpolationSums> CompareWithNeighbours(
         if (!bank.active(channel)) {
           continue;
         }
-        const double from = bank.prediction(low, channel);
-        const double to = bank.prediction(high, channel);
+        const double from = bank.prediction(1, channel);
+        const double to = bank.prediction(3, channel);
         const double between = from + w * (to - from);
         const double nearer = w < 0.5 ? from : to;
-        const double error = between - bank.prediction(middle, channel);
+        const double error = between - bank.prediction(2, channel);
         sums[c].samples += 1.0;
         sums[c].error += error * error;
         sums[c].move += (between - nearer) * (between - nearer);
@@ -246,6 +261,15 @@ struct Shares {
   double samples{0.0};
   double abnormal{0.0};
   std::vector<double> accepted;
+
+  void Add(const Shares& other) {
+    samples += other.samples;
+    abnormal += other.abnormal;
+    accepted.resize(other.accepted.size());
+    for (std::size_t i = 0; i < accepted.size(); ++i) {
+      accepted[i] += other.accepted[i];
+    }
+  }
 };
 
 // True if a residual or a window of the normal observer is beyond its limits.
@@ -266,10 +290,13 @@ bool IsAbnormal(const ModelSet& models, const ObserverBank& bank,
   return false;
 }
 
-void ScoreStretch(const Stretch& stretch, const ModelSet& models,
+void ScoreStretch(const Stretch& stretch,
+                  const std::shared_ptr<const ObserverPlan>& observers,
+                  const std::shared_ptr<const FaultPlan>& plan,
                   Shares& shares) {
-  ObserverBank bank(models);
-  FaultBank faults(models);
+  const ModelSet& models = observers->models();
+  ObserverBank bank(observers);
+  FaultBank faults(plan);
   Verdict verdict;
   bank.Initialise(stretch.samples.front());
   ResidualWindows windows(models);
@@ -334,8 +361,11 @@ struct WindowAverage {
   double excess{0.0};  // of the log-deviation over its limit
 };
 
-std::vector<WindowAverage> AverageWindows(const Condition& condition,
-                                          const ModelSet& models) {
+// `plan` needs the normal observer alone.
+std::vector<WindowAverage> AverageWindows(
+    const Condition& condition,
+    const std::shared_ptr<const ObserverPlan>& plan) {
+  const ModelSet& models = plan->models();
   std::vector<WindowAverage> averages(models.channels.size());
   // Faults that were put onto healthy data have a validation part alone.
   for (const Stretch& stretch : condition.training.empty()
@@ -344,7 +374,7 @@ std::vector<WindowAverage> AverageWindows(const Condition& condition,
     if (stretch.samples.empty()) {
       continue;
     }
-    ObserverBank bank(models);
+    ObserverBank bank(plan);
     ResidualWindows windows(models);
     bank.Initialise(stretch.samples.front());
     for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
@@ -420,12 +450,14 @@ void FitDriftLimits(const std::vector<Condition>& conditions,
                        kMostDrift * limits.upper_mean, std::log(kMostDrift)};
     }
   }
+  const ModelSet healthy = WithObservers(models, {0});
+  const auto normal = std::make_shared<const ObserverPlan>(healthy);
   for (const int fault : models.faults) {
     for (const bool negative : {false, true}) {
       Witness witness;
       for (const int i : Chain(models, fault, negative)) {
         if (i > 0) {
-          Hear(AverageWindows(conditions[static_cast<std::size_t>(i)], models),
+          Hear(AverageWindows(conditions[static_cast<std::size_t>(i)], normal),
                models, witness);
         }
       }
@@ -437,18 +469,26 @@ void FitDriftLimits(const std::vector<Condition>& conditions,
   }
 }
 
-void FindGroups(const std::vector<Condition>& conditions, ModelSet& models) {
+void FindGroups(const std::vector<Condition>& conditions, int threads,
+                ModelSet& models) {
   models.groups.clear();
   models.undetectable.clear();
-  std::map<int, Shares> by_fault;
-  for (const Condition& condition : conditions) {
-    if (condition.fault == 0) {
-      continue;
+  const Shares none{0.0, 0.0, std::vector<double>(models.faults.size())};
+  std::vector<Shares> parts(conditions.size(), none);
+  const auto observers = std::make_shared<const ObserverPlan>(models);
+  const auto plan = std::make_shared<const FaultPlan>(observers);
+  ParallelFor(static_cast<int>(conditions.size()), threads, [&](int i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (conditions[at].fault != 0) {
+      for (const Stretch& stretch : conditions[at].validation) {
+        ScoreStretch(stretch, observers, plan, parts[at]);
+      }
     }
-    Shares& shares = by_fault[condition.fault];
-    shares.accepted.resize(models.faults.size(), 0.0);
-    for (const Stretch& stretch : condition.validation) {
-      ScoreStretch(stretch, models, shares);
+  });
+  std::map<int, Shares> by_fault;
+  for (std::size_t i = 0; i < conditions.size(); ++i) {
+    if (conditions[i].fault != 0) {
+      by_fault[conditions[i].fault].Add(parts[i]);
     }
   }
   std::vector<std::size_t> root(models.faults.size());

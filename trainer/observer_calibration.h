@@ -81,6 +81,7 @@ void FitDriftLimits(const std::vector<Condition>& conditions, ModelSet& models);
 /// acts d_l ≥ T in more than half of the samples.
 ///
 /// @param conditions parallel to models.observers.
-void FindGroups(const std::vector<Condition>& conditions, ModelSet& models);
+void FindGroups(const std::vector<Condition>& conditions, int threads,
+                ModelSet& models);
 
 }  // namespace fdi::trainer

@@ -89,7 +89,7 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
                 models, normal_data.commands);
   reporter.Tell(0.9, "comparing faults");
   FitInterpolationErrors(conditions, models);
-  FindGroups(conditions, models);
+  FindGroups(conditions, options.threads, models);
   FitDriftLimits(conditions, models);
   Validate(models);
   reporter.Tell(1.0, "done");

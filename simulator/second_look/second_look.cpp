@@ -47,7 +47,7 @@ struct Hypothesis {
 };
 
 bool ActsOnFlowAlone(int fault) {
-  return fault == 5 || fault == 6 || fault == 18 || fault == 19;
+  return fault != 0 && LeavesRod(fault) && !TransmitterOf(fault);
 }
 
 bool ActsOnInputs(int fault) {
@@ -202,23 +202,14 @@ Trajectory Looker::Simulate(int fault, double strength, Course course) {
 
 // X as in the healthy valve, the flow by (12).
 Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
-  const InstrumentParameters& i = physics_.parameters.instruments;
   Trajectory answers = healthy_;
   for (int k = course.start; k < rows_; ++k) {
     FaultEffects effects;
     ApplyFault(fault, StrengthAt(k, strength, course), effects);
     RecordAnswer& answer = answers[static_cast<std::size_t>(k)];
-    const InputRow& in = window_.rows[static_cast<std::size_t>(k)].input;
-    double flow = FlowM3PerHour(
-        physics_.parameters.trim, effects,
-        {0.01 * in.cv_pct, 1e3 * in.p1_kpa, 1e3 * in.p2_kpa, in.t1_degc},
-        0.01 * answer.x_pct, 0.0);
-    if (i.flow_unit == FlowUnit::kTPerHour) {
-      flow *= LiquidDensity(in.t1_degc) / 1000.0;
-    }
-    answer.flow = std::clamp(
-        std::clamp(flow, -kInfinity, kInfinity) * effects.flow_reading_factor,
-        i.flow.low, i.flow.high);
+    answer.flow = FlowReading(physics_.parameters, effects,
+                              window_.rows[static_cast<std::size_t>(k)].input,
+                              answer.x_pct);
   }
   return answers;
 }

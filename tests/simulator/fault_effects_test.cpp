@@ -1,13 +1,45 @@
 #include "simulator/fault_effects.h"
 
 #include <stdexcept>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "diagnosis/fault_catalogue.h"
+#include "simulator/record_fit.h"
+#include "simulator/valve_simulation.h"
 
 namespace fdi::simulator {
 namespace {
+
+std::vector<InputRow> RisingCommand() {
+  std::vector<InputRow> rows;
+  for (int k = 0; k < 60; ++k) {
+    rows.push_back({30.0 + k, 3500.0 + 5.0 * (k % 7), 2600.0, 100.0});
+  }
+  return rows;
+}
+
+// Without noise, `fault` at half its strength from the start; 0 is none.
+std::vector<Sample> Answers(int fault) {
+  ValveSimulationConfig config;
+  config.parameters = ParameterSet("lublin-actuator-3");
+  config.excitation = RecordedExcitation{RisingCommand()};
+  config.noise = false;
+  config.resolution = false;
+  if (fault != 0) {
+    FaultSchedule schedule;
+    schedule.fault = fault;
+    schedule.final_strength = 0.5;
+    config.faults = {schedule};
+  }
+  ValveSimulation simulation(config);
+  std::vector<Sample> samples;
+  while (!simulation.finished()) {
+    samples.push_back(simulation.Step().sample);
+  }
+  return samples;
+}
 
 TEST(FaultEffectsTest, StrengthZeroLeavesTheValveHealthy) {
   FaultEffects effects;
@@ -52,6 +84,29 @@ TEST(FaultEffectsTest, RefusesUnknownFaultsAndStrengths) {
   EXPECT_THROW(ApplyFault(kLastFault + 1, 0.5, effects), std::invalid_argument);
   EXPECT_THROW(ApplyFault(1, -0.5, effects), std::invalid_argument);
   EXPECT_THROW(ApplyFault(19, 1.5, effects), std::invalid_argument);
+}
+
+// The oracle is the integration with the fault.
+TEST(FaultEffectsTest, FaultsThatLeaveTheRodShowInTheFlowAlone) {
+  const std::vector<InputRow> rows = RisingCommand();
+  const std::vector<Sample> healthy = Answers(0);
+  for (int fault = 1; fault <= kLastFault; ++fault) {
+    FaultEffects effects;
+    ApplyFault(fault, 0.5, effects);
+    bool same = true;
+    const std::vector<Sample> faulty = Answers(fault);
+    for (std::size_t k = 0; k < faulty.size(); ++k) {
+      const double x = faulty[k][Signal::kX];
+      same = same && x == healthy[k][Signal::kX];
+      if (LeavesRod(fault)) {
+        EXPECT_NEAR(
+            FlowReading(ParameterSet("lublin-actuator-3"), effects, rows[k], x),
+            faulty[k][Signal::kF], 1e-9);
+      }
+    }
+    EXPECT_EQ(LeavesRod(fault), same) << FaultName(fault);
+  }
+  EXPECT_THROW(LeavesRod(0), std::invalid_argument);
 }
 
 }  // namespace

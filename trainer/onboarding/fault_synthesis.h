@@ -58,6 +58,9 @@ class FaultSynthesizer {
   const ValveType& type() const { return type_; }
 
  private:
+  // What a fault that leaves the rod makes of a simulation without it.
+  std::vector<Sample> BehindRod(const FaultCondition& fault,
+                                std::vector<Sample> samples) const;
   std::vector<Sample> Simulate(const FaultCondition& fault,
                                const std::vector<Sample>& inputs) const;
   std::vector<Sample> Healthy(const Stretch& stretch) const;
