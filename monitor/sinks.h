@@ -140,8 +140,8 @@ struct ValveOutcome {
 /// Why nothing comes from a valve.
 enum class Silence : std::uint8_t {
   kNone,
-  kStale,  ///< No sample for three periods.
-  kEnded,  ///< Its publisher ended the stream.
+  kStale,    ///< No sample for three periods.
+  kEnded,    ///< Its publisher ended the stream.
   kMonitor,  ///< Its monitor is silent; the page of a plant alone says so.
 };
 

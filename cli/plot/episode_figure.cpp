@@ -399,8 +399,7 @@ std::string Subtitle(const Episode& e) {
 
 }  // namespace
 
-EpisodeEvidence LoadEvidence(storage::History& history,
-                             std::string_view id,
+EpisodeEvidence LoadEvidence(storage::History& history, std::string_view id,
                              const std::filesystem::path& models_path) {
   EpisodeEvidence evidence;
   evidence.episode = history.Show(id);

@@ -27,8 +27,7 @@ struct EpisodeEvidence {
 ///   left out if the file has none of this version and content, or
 ///   of an older format.
 /// @throws NotFoundError; DataError if stored bytes of the trace are damaged.
-EpisodeEvidence LoadEvidence(storage::History& history,
-                             std::string_view id,
+EpisodeEvidence LoadEvidence(storage::History& history, std::string_view id,
                              const std::filesystem::path& models_path);
 
 /// Settings of EpisodeFigure().

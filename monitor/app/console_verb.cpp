@@ -26,7 +26,7 @@ struct PlantConsoleOptions {
   BusOptions bus{.program = "fdi-monitor console"};
 };
 
-// The worst of all, with a word on the first that is not well.
+// OK if there are monitors and all of them are well.
 console::MonitorFacts FactsOf(const std::vector<console::MonitorLine>& lines) {
   const bool well =
       !lines.empty() && std::ranges::all_of(lines, [](const auto& line) {
@@ -93,9 +93,10 @@ void AddConsoleVerb(cli::Program& program) {
       ->type_name("URL");
   console
       .add_option("--listen", options->listen,
-                  "Where to serve it; port 0: any free one")
+                  "Where to serve it; a PORT alone is on loopback, port 0 any "
+                  "free one")
       ->capture_default_str()
-      ->type_name("[ADDRESS:]PORT");
+      ->type_name("ADDRESS:PORT");
   console
       .add_option("--console-files", options->console.files,
                   "Folder of the page instead of the installed one")

@@ -184,7 +184,8 @@ bool OnKey(const std::string& key, std::size_t height, TopView& view) {
 }
 
 void Take(BusView& bus, TopBoard& board) {
-  bus.Take([&board](const auto& message, const auto&) { board.Add(message, Clock::now()); },
+  bus.Take([&board](const auto& message,
+                    const auto&) { board.Add(message, Clock::now()); },
            [&board](const std::string& valve_id) { board.Remove(valve_id); });
 }
 
