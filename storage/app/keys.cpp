@@ -68,9 +68,9 @@ Report Add(const KeyOptions& options, const Context&) {
     throw ConfigError("--role is '" + options.role + "', accepted are " +
                       idl::kRoleNames);
   }
-  return ShowKeys(Json::array({KeyJson(idl::MakeKey(
-      options.folder, options.name, *role, options.days, false,
-      options.partitions))}));
+  return ShowKeys(Json::array(
+      {KeyJson(idl::MakeKey(options.folder, options.name, *role, options.days,
+                            false, options.partitions))}));
 }
 
 Report Renew(const KeyOptions& options, const Context&) {
@@ -79,9 +79,9 @@ Report Renew(const KeyOptions& options, const Context&) {
   if (key == keys.end()) {
     throw NotFoundError("no key '" + options.name + "' in " + options.folder);
   }
-  return ShowKeys(Json::array({KeyJson(idl::MakeKey(
-      options.folder, options.name, key->role, options.days, true,
-      key->partitions))}));
+  return ShowKeys(Json::array(
+      {KeyJson(idl::MakeKey(options.folder, options.name, key->role,
+                            options.days, true, key->partitions))}));
 }
 
 Report List(const KeyOptions& options, const Context&) {
