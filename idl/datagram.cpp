@@ -209,6 +209,32 @@ bool KeepsPace(std::uint8_t kind, const Body& body, Speaker& speaker,
   }
 }
 
+// Of a sound acknowledgement, whose body is at `begin` of the datagram:
+// reader(4) writer(4) base(8) bits(4) bitmap count(4).
+void TakeCount(const Body& body, std::size_t begin, Speaker& speaker,
+               AckCounts& acks, CheckedDatagram& checked) {
+  const auto bits = static_cast<std::size_t>(body.U32(16));
+  const std::size_t at = 20 + (bits + 31) / 32 * 4;
+  if (at + 4 > body.bytes.size()) {
+    return;  // The library refuses it.
+  }
+  const auto count = static_cast<std::uint32_t>(body.U32(at));
+  const Body entity{body.bytes.subspan(4, 4), true};
+  const bool first_word = body.Sequence(8) == 0 && bits == 0;
+  const std::uint32_t next =
+      acks.Next(speaker.Writer(body.bytes),
+                static_cast<std::uint32_t>(entity.U32(0)), count, first_word);
+  if (next == count) {
+    return;
+  }
+  std::array<std::uint8_t, 4> bytes{};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const std::size_t shift = 8 * (body.little_endian ? i : 3 - i);
+    bytes.at(i) = static_cast<std::uint8_t>(next >> shift);
+  }
+  checked.counts.emplace_back(begin + at, bytes);
+}
+
 }  // namespace
 
 std::string_view DatagramVerdictName(DatagramVerdict verdict) {
@@ -218,7 +244,8 @@ std::string_view DatagramVerdictName(DatagramVerdict verdict) {
 }
 
 CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
-                              WriterPace::Clock::time_point now) {
+                              WriterPace::Clock::time_point now,
+                              AckCounts* acks) {
   const std::size_t size = datagram.size();
   if (size < kHeaderBytes || datagram[0] != 'R' || datagram[1] != 'T' ||
       datagram[2] != 'P' || datagram[3] != 'S' || datagram[4] != 2) {
@@ -226,7 +253,7 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
   }
   Speaker speaker(datagram);
   std::size_t sound = kHeaderBytes;  // Up to here, all is handed over.
-  std::vector<std::size_t> bare_keys;
+  CheckedDatagram checked;
   for (std::size_t at = sound; at < size;) {
     if (size - at < kSubmessageHeaderBytes) {
       return {DatagramVerdict::kLength, 0};
@@ -261,19 +288,26 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
         return {DatagramVerdict::kPace, 0};
       }
       if (kind == kData && IsBareKey(body, flags)) {
-        bare_keys.push_back(at + 1);
+        checked.bare_keys.push_back(at + 1);
+      }
+      if (kind == kAckNack && acks != nullptr) {
+        TakeCount(body, begin, speaker, *acks, checked);
       }
       sound = end;
     }
     at = end;
   }
-  return {DatagramVerdict::kSound, sound, std::move(bare_keys)};
+  checked.bytes = sound;
+  return checked;
 }
 
-void ShowKeys(const std::vector<std::size_t>& bare_keys,
-              std::span<std::uint8_t> datagram) {
-  for (const std::size_t at : bare_keys) {
+void Amend(const CheckedDatagram& checked, std::span<std::uint8_t> datagram) {
+  for (const std::size_t at : checked.bare_keys) {
     datagram[at] ^= kKeyFlag | kDataFlag;
+  }
+  for (const auto& [at, bytes] : checked.counts) {
+    std::ranges::copy(bytes,
+                      datagram.begin() + static_cast<std::ptrdiff_t>(at));
   }
 }
 

@@ -162,18 +162,18 @@ class CheckedTransport : public transport::ChainingTransport {
       bytes -= std::min(bytes, kStatisticsBytes);
     }
 #endif
-    const CheckedDatagram checked =
-        CheckDatagram({buffer, bytes}, log_->pace(), WriterPace::Clock::now());
+    const CheckedDatagram checked = CheckDatagram(
+        {buffer, bytes}, log_->pace(), WriterPace::Clock::now(), &log_->acks());
     log_->Count(checked.verdict, bytes, remote);
     if (checked.verdict != DatagramVerdict::kSound) {
       return;
     }
     const auto sound = static_cast<std::uint32_t>(checked.bytes);
-    if (checked.bare_keys.empty()) {
+    if (checked.as_it_is()) {
       receiver->OnDataReceived(buffer, sound, local, remote);
     } else {
       std::vector<rtps::octet> copy(buffer, buffer + sound);
-      ShowKeys(checked.bare_keys, copy);
+      Amend(checked, copy);
       receiver->OnDataReceived(copy.data(), sound, local, remote);
     }
   }

@@ -103,10 +103,12 @@ class DatagramLog {
              const rtps::Locator_t& sender);
   DatagramCounts counts() const;
   WriterPace& pace() { return pace_; }
+  AckCounts& acks() { return acks_; }
 
  private:
   LogSink log_;
   WriterPace pace_;
+  AckCounts acks_;
   std::array<std::atomic<std::uint64_t>, kDatagramVerdictCount> counts_{};
 };
 

@@ -30,7 +30,7 @@ std::string NewInstance() {
 std::vector<monitor::HttpLane> Lanes() {
   return {{StreamOptions{}.max_clients + 1, 16,
            [](std::string_view path) { return path == "/api/v1/stream"; }},
-          {1, 8,  // A password's hash takes a processor for 30 ms.
+          {1, 8,  // A password's hash takes a processor for 20 ms.
            [](std::string_view path) { return path == "/api/v1/login"; }},
           {1, 2,
            [](std::string_view path) {

@@ -102,8 +102,46 @@ TEST(DatagramTest, ABareKeyIsDeclaredAsData) {
   Bytes datagram = With(Header(), 0x15, Data(16) + status + key, kEnd);
   const CheckedDatagram checked = Check(datagram);
   ASSERT_EQ(checked.verdict, DatagramVerdict::kSound);
-  ShowKeys(checked.bare_keys, datagram);
+  Amend(checked, datagram);
   EXPECT_EQ(datagram, With(Header(), 0x15, Data(16) + status + key, kWhole));
+}
+
+// The count of an acknowledgement from `reader`, as it is handed over.
+std::uint8_t CountOf(AckCounts& acks, std::uint8_t reader, std::uint8_t count,
+                     bool first_word, bool little_endian) {
+  const Bytes number =
+      little_endian ? Bytes{count, 0, 0, 0} : Bytes{0, 0, 0, count};
+  const Bytes base = Sequence(little_endian ? 4 : 7, first_word ? 0 : 1);
+  Bytes body = Bytes{0, 0, reader, 0xc7} + Bytes{0, 0, 3, 0xc2} + base +
+               Zeros(4) + number;
+  Bytes datagram = With(Header(), 0x06, body, little_endian ? 1 : 0);
+  if (!little_endian) {
+    std::swap(datagram[22], datagram[23]);
+  }
+  WriterPace pace;
+  const CheckedDatagram checked = CheckDatagram(datagram, pace, {}, &acks);
+  EXPECT_EQ(checked.verdict, DatagramVerdict::kSound);
+  Amend(checked, datagram);
+  return datagram[datagram.size() - (little_endian ? 4 : 1)];
+}
+
+TEST(DatagramTest, AReaderThatCountsAnewGoesOnWhereItWas) {
+  for (const bool little_endian : {true, false}) {
+    AckCounts acks;
+    const auto count = [&](std::uint8_t number, bool first_word = false,
+                           std::uint8_t reader = 4) {
+      return CountOf(acks, reader, number, first_word, little_endian);
+    };
+    EXPECT_EQ(count(1, true), 1);
+    EXPECT_EQ(count(70), 70);
+    EXPECT_EQ(count(69), 69);       // Overtaken.
+    EXPECT_EQ(count(1, true), 71);  // Its first word, once more.
+    EXPECT_EQ(count(2, true), 72);
+    EXPECT_EQ(count(9), 79);
+    EXPECT_EQ(count(2, true, 5), 2);  // Another reader.
+    EXPECT_EQ(count(90), 160);
+    EXPECT_EQ(count(3), 163);  // The first word was lost.
+  }
 }
 
 TEST(DatagramTest, HeaderIsOfRtps2) {

@@ -165,7 +165,8 @@ std::vector<Sample> FaultSynthesizer::BehindRod(
 std::vector<Sample> FaultSynthesizer::operator()(const FaultCondition& fault,
                                                  const Stretch& healthy) const {
   const std::vector<Sample> without = Healthy(healthy);
-  const std::vector<Sample> with = simulator::LeavesRod(fault.fault)
+  const std::vector<Sample> with = fault.fault == 0 ? without
+                                   : simulator::LeavesRod(fault.fault)
                                        ? BehindRod(fault, without)
                                        : Simulate(fault, healthy.samples);
   std::vector<Sample> samples = healthy.samples;
