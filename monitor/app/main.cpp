@@ -31,8 +31,6 @@ std::vector<fdi::cli::VerbExamples> Examples() {
       {"console-user",
        {{"Add a user; the password is asked for twice",
          "fdi-monitor console-user anna --role acknowledge --users users"},
-        {"Read the password from a file",
-         "fdi-monitor console-user bo --role view --users users <password"},
         {"Remove one",
          "fdi-monitor console-user anna --remove --users users"}}},
       {"watch",
