@@ -13,6 +13,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "diagnosis/printable.h"
+
 namespace fdi::monitor {
 namespace {
 
@@ -293,9 +295,10 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   }
   if (facts.contested.count > 0) {
     status.text += status.text.empty() ? "" : "; ";
-    status.text += facts.contested.monitor + " takes " +
-                   std::to_string(facts.contested.count) +
-                   " of these valves, too: " + facts.contested.example;
+    status.text +=
+        Printable(facts.contested.monitor) + " takes " +
+        std::to_string(facts.contested.count) +
+        " of these valves, too: " + Printable(facts.contested.example);
   }
   status.health =
       status.text.empty() ? idl::Health::kOk : idl::Health::kDegraded;
@@ -303,6 +306,10 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
     status.health = idl::Health::kFailing;
     status.text += (status.text.empty() ? "stalled: " : "; stalled: ") +
                    Joined(facts.stalled);
+  }
+  // Names of other monitors and of valves may be long.
+  if (status.text.size() > idl::kMaxTextLength) {
+    status.text.resize(idl::kMaxTextLength);
   }
   return status;
 }

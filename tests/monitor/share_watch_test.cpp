@@ -4,6 +4,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/records/partitions.h"
+#include "monitor/app/status.h"
 
 namespace fdi::monitor {
 namespace {
@@ -41,6 +42,25 @@ TEST(FindContestedTest, OnlyWherePartitionsOverlap) {
   EXPECT_TRUE(contested("hall-1", "hall-?"));
   EXPECT_FALSE(contested("hall-1", "hall-2"));
   EXPECT_FALSE(contested("", "hall-1"));
+}
+
+// Whatever others call themselves, the status goes out.
+TEST(ContestedStatusTest, LongAndStrangeNamesFitTheWire) {
+  const Counters counters;
+  StatusFacts facts{.counters = counters,
+                    .census = {},
+                    .samples = {},
+                    .datagrams = {},
+                    .refused_participants = 0,
+                    .decisions = {},
+                    .journal = {}};
+  EXPECT_EQ(StatusOf(facts).health, idl::Health::kOk);
+  facts.contested = {2, "V1", "host:2"};
+  EXPECT_EQ(StatusOf(facts).health, idl::Health::kDegraded);
+  EXPECT_EQ(StatusOf(facts).text, "host:2 takes 2 of these valves, too: V1");
+  facts.contested = {100'000, std::string(64, 'V'), std::string(64, '\n')};
+  EXPECT_EQ(StatusOf(facts).text.size(), idl::kMaxTextLength);
+  EXPECT_EQ(StatusOf(facts).text.find('\n'), std::string::npos);
 }
 
 TEST(ParsePartitionsTest, NamesAreCheckedAndPatternsOnlyWhereTheyMakeSense) {
