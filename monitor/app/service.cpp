@@ -409,7 +409,7 @@ void Service::Tick() {
     log_.Report(LogId::kModelFailure, "models_unreadable",
                 [&reason] { return "reason=\"" + reason + "\""; });
   }
-  shares_.Tick(pipeline_.valve_names());
+  shares_.Tick([this] { return pipeline_.valve_names(); });
   ReportLoss();
   ReportStall();
   PublishStatus();

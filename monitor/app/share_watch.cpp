@@ -4,6 +4,7 @@
 #include <iterator>
 #include <utility>
 
+#include "diagnosis/error.h"
 #include "diagnosis/printable.h"
 #include "diagnosis/records/partitions.h"
 #include "diagnosis/records/valve_glob.h"
@@ -63,9 +64,14 @@ ContestedValves FindContested(const MonitorShare& own,
 
 ShareWatch::ShareWatch(idl::Participant& participant, MonitorShare own,
                        ThrottledLog& log)
-    : own_(std::move(own)), log_(log), out_(participant), in_(participant) {}
+    : own_(std::move(own)), log_(log), out_(participant), in_(participant) {
+  if (own_.valves.size() > idl::kMaxTextLength) {
+    throw ConfigError("--valves: expected a glob of at most " +
+                      std::to_string(idl::kMaxTextLength) + " characters");
+  }
+}
 
-void ShareWatch::Tick(const std::vector<std::string>& valves) {
+void ShareWatch::Tick(const std::function<std::vector<std::string>()>& valves) {
   out_.Write(own_);
   const Clock::time_point now = Clock::now();
   in_.Take(
@@ -81,9 +87,13 @@ void ShareWatch::Tick(const std::vector<std::string>& valves) {
   });
   std::vector<MonitorShare> others;
   for (const auto& [monitor, heard] : heard_) {
-    others.push_back(heard.share);
+    if (Rivals(own_, heard.share)) {
+      others.push_back(heard.share);
+    }
   }
-  const ContestedValves found = FindContested(own_, others, valves);
+  const ContestedValves found = others.empty()
+                                    ? ContestedValves{}
+                                    : FindContested(own_, others, valves());
   if (found.count > 0) {
     log_.Report(
         LogId::kContested, "valves_contested",

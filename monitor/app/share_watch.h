@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <string>
@@ -29,13 +30,14 @@ ContestedValves FindContested(const MonitorShare& own,
 /// reports valves that two of them take. One thread, if nothing else is said.
 class ShareWatch {
  public:
-  /// @throws idl::TransportError
+  /// @throws ConfigError if the glob does not fit the wire;
+  /// idl::TransportError.
   ShareWatch(idl::Participant& participant, MonitorShare own,
              ThrottledLog& log);
 
-  /// About once a second. @param valves that this monitor has seen.
-  /// @throws DataError if the own share does not fit the wire.
-  void Tick(const std::vector<std::string>& valves);
+  /// About once a second. @param valves that this monitor has seen; asked for
+  /// only where another one takes samples, too.
+  void Tick(const std::function<std::vector<std::string>()>& valves);
   /// As of the last Tick(). Any thread.
   ContestedValves contested() const {
     const std::lock_guard lock(mutex_);

@@ -21,6 +21,11 @@ class SharesTest : public MonitorFixture {
     StoreModels(data_, LinearModels());
     auto monitor = std::make_unique<ChildProcess>(Command(arguments));
     EXPECT_TRUE(monitor->AwaitLine("monitor_ready")) << monitor->errors();
+    // It sends no vector before it knows of us.
+    speaker_ = ":" + std::to_string(monitor->pid());
+    counters_.clear();
+    EXPECT_TRUE(
+        Await([this] { return counters_["dds_decision_readers"] > 0; }));
     return monitor;
   }
 
