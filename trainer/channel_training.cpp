@@ -160,6 +160,12 @@ TsModel FitRows(const ChannelPlan& plan,
   const auto validation_error = [&](const std::vector<TsRule>& rules) {
     const TsModel model =
         MakeModel(rules, data, regressors, plan.output, plan.parallel);
+    if (plan.from_any_past && RunsOnItself(model)) {
+      const double error = ErrorFromAnyPast(model, condition.validation);
+      if (!std::isnan(error)) {
+        return error;
+      }
+    }
     return ErrorOf(RunResiduals(model, condition.validation, options.settling,
                                 past_output));
   };
@@ -174,6 +180,40 @@ TsModel FitRows(const ChannelPlan& plan,
 }
 
 }  // namespace
+
+double ErrorFromAnyPast(const TsModel& model,
+                        const std::vector<Stretch>& stretches) {
+  constexpr std::size_t kPiece = 40;
+  constexpr int kSettling = 10;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const Stretch& stretch : stretches) {
+    for (const Sample& sample : stretch.samples) {
+      low = std::min(low, sample[model.output]);
+      high = std::max(high, sample[model.output]);
+    }
+  }
+  double sum = 0.0;
+  double pieces = 0.0;
+  for (const Stretch& stretch : stretches) {
+    for (std::size_t k = 0; k + kPiece <= stretch.samples.size();
+         k += kPiece / 2) {
+      const auto begin =
+          stretch.samples.begin() + static_cast<std::ptrdiff_t>(k);
+      const Stretch piece{stretch.run_id,
+                          {begin, begin + static_cast<std::ptrdiff_t>(kPiece)}};
+      for (const double past : {low, high}) {
+        const auto residuals = RunResiduals(model, piece, kSettling, past);
+        if (!residuals.empty()) {
+          const double error = MeanSquare(residuals);
+          sum += error * error;
+          pieces += 1.0;
+        }
+      }
+    }
+  }
+  return std::sqrt(sum / pieces);
+}
 
 FitOptions FitOptionsOf(const ChannelPlan& plan, FitOptions options) {
   const std::vector<int>& counts = plan.rule_counts;

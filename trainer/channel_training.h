@@ -59,9 +59,11 @@ struct ChannelPlan {
   std::vector<int> rule_counts{};  ///< To try; empty: as FitOptions says.
   /// Fault observers are the normal one with other consequents (AdaptModel).
   bool adapted{false};
-  /// What a normal observer that runs on its own past may read beside it, for
-  /// difference observers (FitNormalChannel); empty: it never does.
-  std::vector<Regressor> own_past_pool{};
+  /// What a normal observer that runs on its own past reads, for difference
+  /// observers (FitNormalChannel); empty: it never does.
+  std::vector<Regressor> own_past{};
+  /// Models that run on their own past are told apart by ErrorFromAnyPast().
+  bool from_any_past{false};
   bool saturates{false};       ///< The transmitter may be at its upper limit.
   std::vector<int> windows{};  ///< Lengths N of the windows [samples].
 };
@@ -74,6 +76,16 @@ struct FitOptions {
   int settling{30};       ///< Samples left out of every parallel run.
   int max_rows{6000};     ///< Rows of a fit, evenly taken where there are more.
 };
+
+/// The root mean square, over pieces of 40 samples of the stretches, of the
+/// mean squared residual of each, run from the lowest and from the highest of
+/// their outputs as its past; the first 10 samples are left out. A valve
+/// forgets in seconds where it was. A model on its own past may not: fitted one
+/// step ahead, it can rest for half a minute where no valve would, now and then
+/// over a day, and the plain error of some hours does not show it. NaN where no
+/// stretch has 40 samples.
+double ErrorFromAnyPast(const TsModel& model,
+                        const std::vector<Stretch>& stretches);
 
 /// `options` with the numbers of rules that the plan tries.
 FitOptions FitOptionsOf(const ChannelPlan& plan, FitOptions options);

@@ -24,9 +24,10 @@ constexpr double kHighestPosition = 100.0;
 // The plan of a normal model that runs on its own past.
 ChannelPlan OwnPastPlan(const ChannelPlan& plan) {
   ChannelPlan own = plan;
-  own.pools = {plan.own_past_pool};
-  own.antecedents.clear();
-  own.rule_counts = {1, 4, 8, 16};
+  own.pools = {plan.own_past};
+  own.antecedents = plan.own_past;
+  own.rule_counts = {4, 8, 16, 24};
+  own.from_any_past = true;
   own.parallel = true;
   return own;
 }
@@ -162,7 +163,7 @@ NormalChannel ChooseNormal(const ChannelPlan& plan, const Condition& normal,
   NormalChannel channel{
       plan, FitPlan(plan, normal, options, saturation), {}, false, {}};
   channel.inputs = channel.normal;
-  if (plan.own_past_pool.empty()) {
+  if (plan.own_past.empty()) {
     return channel;
   }
   const ChannelPlan own_plan = OwnPastPlan(plan);

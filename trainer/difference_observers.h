@@ -33,7 +33,7 @@ struct NormalChannel {
 };
 
 /// Fits both; ŷ_0 runs on its own past where the plan has candidates for that
-/// (ChannelPlan::own_past_pool) and it errs less on the validation stretches.
+/// (ChannelPlan::own_past) and it errs less on the validation stretches.
 ///
 /// @param healthy The stretches that faults will be put onto.
 /// @param saturation Readings from here on are at the transmitter's limit.

@@ -10,6 +10,8 @@
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/observer_bank.h"
 #include "trainer/evaluation.h"
+#include "trainer/regression.h"
+#include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
@@ -60,7 +62,7 @@ TrainingOptions TwoChannels() {
   options.channels.resize(2);  // X and F(X)
   options.channels[0].rule_counts = {1, 4};
   options.channels[1].rule_counts = {2};
-  options.channels[0].own_past_pool = {
+  options.channels[0].own_past = {
       {Signal::kCv, 0}, {Signal::kCv, 1}, {Signal::kX, 1}};
   return options;
 }
@@ -71,6 +73,35 @@ const ModelSet& Trained() {
       {{13, 0.1}, {13, 0.2}, {19, 0.02}, {19, 0.25}, {19, 0.5}}, WithFault,
       100.0, TwoChannels());
   return models;
+}
+
+// x(k) = memory x(k-1) + (1 - memory) CV.
+TsModel WithMemory(double memory) {
+  TsModel model;
+  model.regressors = {{Signal::kX, 1}, {Signal::kCv, 0}};
+  model.output_max = 100.0;
+  TsRule rule;
+  rule.antecedents = {{0.0, 0.0, 1e6, 1e6}, {0.0, 0.0, 1e6, 1e6}};
+  rule.slopes = {memory, 1.0 - memory};
+  model.rules = {rule};
+  return model;
+}
+
+// At rest at 50, but for one sample each at 0 and 100 % at the end.
+TEST(DifferenceObserversTest, AModelThatDoesNotForgetErrsFromAnyPast) {
+  Stretch stretch{"r", {}};
+  for (int k = 0; k < 200; ++k) {
+    Sample sample;
+    sample.Set(Signal::kCv, 50.0);
+    sample.Set(Signal::kX, k == 198 ? 0.0 : k == 199 ? 100.0 : 50.0);
+    stretch.samples.push_back(sample);
+  }
+  const std::vector<Stretch> but_last{
+      {"r", {stretch.samples.begin(), stretch.samples.end() - 2}}};
+
+  EXPECT_LT(MeanSquare(RunResiduals(WithMemory(0.99), but_last, 30)), 1e-9);
+  EXPECT_GT(ErrorFromAnyPast(WithMemory(0.99), {stretch}), 400.0);
+  EXPECT_LT(ErrorFromAnyPast(WithMemory(0.5), {stretch}), 1.5e2);
 }
 
 // 2 % of a flow of 18 is half its noise: fitted to the noisy readings the

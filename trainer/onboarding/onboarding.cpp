@@ -189,13 +189,12 @@ TrainingOptions OnboardingPreset(SignalMask signals) {
   using enum Signal;
   for (ChannelPlan& plan : options.channels) {
     if (plan.name == "X") {
-      plan.own_past_pool = {{kCv, 0}, {kCv, 1}, {kCv, 2}, {kP1, 0},
-                            {kP2, 0}, {kX, 1},  {kX, 2}};
+      // Without the pressures, which are elsewhere on another day.
+      plan.own_past = {{kCv, 0}, {kCv, 1}, {kCv, 2}, {kX, 1}, {kX, 2}};
     }
     for (std::vector<Regressor>& pool : plan.pools) {
       Restrict(signals, pool);
     }
-    Restrict(signals, plan.own_past_pool);
   }
   return options;
 }
