@@ -344,6 +344,17 @@ NormalResiduals CalibrateHealthy(const Healthy& healthy,
   return held_out;
 }
 
+void FitLimits(const Healthy& healthy, const NormalResiduals& held_out,
+               const TrainingOptions& options, ModelSet& models) {
+  std::vector<std::vector<int>> windows;
+  for (const NormalChannel& channel : healthy.channels) {
+    windows.push_back(channel.plan.windows);
+  }
+  FitThresholds(held_out.residuals, windows, options.false_alarms_per_hour,
+                models, held_out.commands);
+  BalanceThresholds(models);
+}
+
 // Fits the observer of every fault. Returns the data on which faults are
 // compared, parallel to the observers.
 std::vector<Condition> FitFaults(const Healthy& healthy,
@@ -391,16 +402,170 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
   const std::vector<Condition> compared =
       FitFaults(fitted, faults, synthesize, options, reporter, models);
   reporter.Tell(kNormalShare + kObserverShare, "comparing faults");
-  std::vector<std::vector<int>> windows;
-  for (const NormalChannel& channel : fitted.channels) {
-    windows.push_back(channel.plan.windows);
-  }
-  FitThresholds(held_out.residuals, windows, options.false_alarms_per_hour,
-                models, held_out.commands);
-  BalanceThresholds(models);
+  FitLimits(fitted, held_out, options, models);
   FitInterpolationErrors(compared, models);
   FindGroups(compared, options.threads, models);
   FitDriftLimits(compared, models);
+  Validate(models);
+  reporter.Tell(1.0, "done");
+  return models;
+}
+
+namespace {
+
+bool SameAntecedents(const Observer& normal, const Observer& fault) {
+  for (std::size_t c = 0; c < normal.channels.size(); ++c) {
+    if (!fault.channels[c].difference &&
+        !SharesAntecedents(normal.channels[c].model, fault.channels[c].model)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+double ShareWithin(const ValidityRegion& region,
+                   const std::vector<TrainingRun>& runs) {
+  double inside = 0.0;
+  double all = 0.0;
+  const auto holds = [](const SignalRange& range, double value) {
+    return range.minimum <= value && value <= range.maximum;
+  };
+  for (const TrainingRun& run : runs) {
+    for (const LabelledSample& labelled : run.samples) {
+      const Sample& sample = labelled.sample;
+      using enum Signal;
+      all += 1.0;
+      inside += holds(region.cv, sample[kCv]) &&
+                (!sample.Has(kT1) || holds(region.t1, sample[kT1])) &&
+                (!sample.Has(kP1) || !sample.Has(kP2) ||
+                 holds(region.dp, sample[kP1] - sample[kP2]));
+    }
+  }
+  return inside / std::max(1.0, all);
+}
+
+// The normal models of the type, fitted anew.
+Healthy RefitHealthy(const ModelSet& of_type,
+                     const std::vector<TrainingRun>& runs,
+                     const TrainingOptions& options) {
+  Healthy healthy;
+  healthy.normal = BuildConditions(runs, options.dataset).front();
+  healthy.channels.resize(options.channels.size());
+  ParallelFor(
+      static_cast<int>(options.channels.size()), options.threads, [&](int c) {
+        const auto i = static_cast<std::size_t>(c);
+        const TsModel& model = of_type.observers.front().channels[i].model;
+        NormalChannel& channel = healthy.channels[i];
+        channel.plan = RunsOnItself(model) ? OwnPastPlan(options.channels[i])
+                                           : options.channels[i];
+        channel.plan.rule_counts = {static_cast<int>(model.rules.size())};
+        channel.normal = FitChannel(
+            channel.plan, model.regressors, healthy.normal,
+            FitOptionsOf(channel.plan, options.fit), model.saturation);
+      });
+  return healthy;
+}
+
+// What a fault adds to the normal model with the same antecedents.
+TsModel Difference(TsModel fault, const TsModel& normal) {
+  for (std::size_t i = 0; i < fault.rules.size(); ++i) {
+    TsRule& rule = fault.rules[i];
+    const TsRule& without = normal.rules[i];
+    rule.intercept -= without.intercept;
+    for (std::size_t j = 0; j < rule.slopes.size(); ++j) {
+      rule.slopes[j] -= without.slopes[j];
+    }
+  }
+  const double low = fault.output_min - normal.output_max;
+  fault.output_max -= normal.output_min;
+  fault.output_min = low;
+  return fault;
+}
+
+ChannelObserver Transfer(ChannelObserver fault, const ChannelObserver& of_type,
+                         const ChannelObserver& normal) {
+  if (!fault.difference) {
+    fault.model = Difference(std::move(fault.model), of_type.model);
+    fault.difference = true;
+  }
+  const auto square = [](double value) { return value * value; };
+  const double own =
+      std::max(square(kLeastDeviation * normal.residual_sd),
+               square(fault.residual_sd) - square(of_type.residual_sd) +
+                   square(normal.residual_sd));
+  const double factor = std::sqrt(own) / fault.residual_sd;
+  fault.residual_sd *= factor;
+  for (double* corner : {&fault.membership.a, &fault.membership.b,
+                         &fault.membership.c, &fault.membership.d}) {
+    *corner *= factor;
+  }
+  fault.correlation_time =
+      std::max(fault.correlation_time, normal.correlation_time);
+  return fault;
+}
+
+// In proportion to the limits that they move.
+DriftLimits Transfer(DriftLimits drift, const ChannelSpec& of_type,
+                     const ChannelSpec& channel) {
+  if (!channel.windows.empty() && !of_type.windows.empty()) {
+    const WindowLimits& limits = channel.windows.back();
+    const WindowLimits& before = of_type.windows.back();
+    drift.lower_mean *= limits.lower_mean / before.lower_mean;
+    drift.upper_mean *= limits.upper_mean / before.upper_mean;
+  }
+  return drift;
+}
+
+}  // namespace
+
+bool ServesAnother(const ModelSet& of_type,
+                   const std::vector<TrainingRun>& healthy,
+                   const TrainingOptions& options) {
+  constexpr double kLeastShare = 0.95;
+  const bool same_channels =
+      std::ranges::equal(of_type.channels, options.channels, {},
+                         &ChannelSpec::name, &ChannelPlan::name);
+  return same_channels && of_type.sample_period_s == healthy.front().period_s &&
+         of_type.flow_unit == healthy.front().flow_unit &&
+         std::ranges::all_of(of_type.observers,
+                             [&](const Observer& fault) {
+                               return SameAntecedents(of_type.observers.front(),
+                                                      fault);
+                             }) &&
+         ShareWithin(of_type.validity, healthy) >= kLeastShare;
+}
+
+ModelSet TransferDifferenceSet(const ModelSet& of_type,
+                               const std::vector<TrainingRun>& healthy,
+                               const TrainingOptions& options,
+                               const Progress& progress) {
+  Reporter reporter(progress);
+  reporter.Tell(0.0, "fitting the normal observer");
+  const Healthy fitted = RefitHealthy(of_type, healthy, options);
+  std::vector<FaultCondition> faults;
+  for (const Observer& observer : of_type.observers) {
+    if (observer.fault != 0) {
+      faults.push_back({observer.fault, observer.strength});
+    }
+  }
+  ModelSet models = Describe(healthy, fitted.normal, faults, options);
+  reporter.Tell(0.5, "setting the limits");
+  FitLimits(fitted, CalibrateHealthy(fitted, options, models.observers.front()),
+            options, models);
+  const Observer& normal = models.observers.front();
+  for (std::size_t i = 1; i < models.observers.size(); ++i) {
+    for (std::size_t c = 0; c < models.channels.size(); ++c) {
+      models.observers[i].channels[c] =
+          Transfer(of_type.observers[i].channels[c],
+                   of_type.observers.front().channels[c], normal.channels[c]);
+    }
+  }
+  for (std::size_t c = 0; c < models.channels.size(); ++c) {
+    models.channels[c].drift = Transfer(
+        of_type.channels[c].drift, of_type.channels[c], models.channels[c]);
+  }
+  models.groups = of_type.groups;
+  models.undetectable = of_type.undetectable;
   Validate(models);
   reporter.Tell(1.0, "done");
   return models;

@@ -84,4 +84,29 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
                             const TrainingOptions& options,
                             const Progress& progress = {});
 
+/// True if TransferDifferenceSet() may take `of_type` for this valve: period,
+/// flow unit and channels are the same, the observers are differences or share
+/// the normal one's antecedents, and 95 % of the samples lie where the set
+/// was trained (CV, dP, T1).
+bool ServesAnother(const ModelSet& of_type,
+                   const std::vector<TrainingRun>& healthy,
+                   const TrainingOptions& options);
+
+/// The same for a further valve of a type, without a simulation: the normal
+/// observer has regressors and number of rules of the type's, is fitted to the
+/// healthy runs and sets all limits; fault observers are what the fault added
+/// there,
+///
+///     y_i = y_0 + (y_i,type - y_0,type),
+///
+/// with memberships and deviations widened (or narrowed) as the normal
+/// observer's deviation s_0 differs, s_i^2 = s_i,type^2 - s_0,type^2 + s_0^2.
+/// Groups, what cannot be seen and interpolation errors are those of the type.
+///
+/// @throws DataError as TrainDifferenceSet().
+ModelSet TransferDifferenceSet(const ModelSet& of_type,
+                               const std::vector<TrainingRun>& healthy,
+                               const TrainingOptions& options,
+                               const Progress& progress = {});
+
 }  // namespace fdi::trainer

@@ -128,11 +128,11 @@ TEST(DifferenceObserversTest, FaultObserversFollowTheDynamicsOfTheNormalOne) {
 }
 
 // A fault was never seen on this valve, but is named.
-TEST(DifferenceObserversTest, FaultsNeverSeenAreNamed) {
-  const auto models = std::make_shared<const ModelSet>(Trained());
+void ExpectNamed(const std::shared_ptr<const ModelSet>& models,
+                 TrainingRun (*healthy)(unsigned, int)) {
   for (const FaultCondition& fault :
        {FaultCondition{19, 0.35}, FaultCondition{13, 0.15}}) {
-    TrainingRun run = HealthyRun(3, 900);
+    TrainingRun run = healthy(3, 900);
     Stretch stretch{run.id, {}};
     for (const LabelledSample& labelled : run.samples) {
       stretch.samples.push_back(labelled.sample);
@@ -146,6 +146,45 @@ TEST(DifferenceObserversTest, FaultsNeverSeenAreNamed) {
     EXPECT_EQ(indices.r_fd, 0.0) << fault.fault;
     EXPECT_EQ(indices.final_set, std::vector<int>{fault.fault});
   }
+}
+
+TEST(DifferenceObserversTest, FaultsNeverSeenAreNamed) {
+  ExpectNamed(std::make_shared<const ModelSet>(Trained()), HealthyRun);
+}
+
+// Passes 5 % more, and its rod stands 1 % further.
+TrainingRun FurtherValve(unsigned seed, int count) {
+  TrainingRun run = HealthyRun(seed, count);
+  for (LabelledSample& labelled : run.samples) {
+    Sample& sample = labelled.sample;
+    sample.Set(Signal::kF, 1.05 * sample[Signal::kF]);
+    sample.Set(Signal::kX, sample[Signal::kX] + 1.0);
+  }
+  return run;
+}
+
+TEST(DifferenceObserversTest, AFurtherValveOfTheTypeTakesTheFaultsOver) {
+  const std::vector<TrainingRun> healthy{FurtherValve(7, 1500)};
+  ASSERT_TRUE(ServesAnother(Trained(), healthy, TwoChannels()));
+
+  const auto models = std::make_shared<const ModelSet>(
+      TransferDifferenceSet(Trained(), healthy, TwoChannels()));
+
+  EXPECT_EQ(ComputeIndices(ScoreRun(models, FurtherValve(4, 7200))).episodes,
+            0);
+  ExpectNamed(models, FurtherValve);
+}
+
+TEST(DifferenceObserversTest, OtherWorkOrChannelsAreNotServed) {
+  TrainingRun elsewhere = HealthyRun(7, 1500);
+  for (LabelledSample& labelled : elsewhere.samples) {
+    labelled.sample.Set(Signal::kCv, labelled.sample[Signal::kCv] + 60.0);
+  }
+  EXPECT_FALSE(ServesAnother(Trained(), {elsewhere}, TwoChannels()));
+
+  TrainingOptions without_flow = TwoChannels();
+  without_flow.channels.pop_back();
+  EXPECT_FALSE(ServesAnother(Trained(), {HealthyRun(7, 1500)}, without_flow));
 }
 
 TEST(DifferenceObserversTest, HealthyDataGiveNoEpisode) {

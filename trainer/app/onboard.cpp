@@ -75,13 +75,15 @@ std::string Shortest(double value) {
 
 struct FoundType {
   ValveType type;
-  bool stored{false};  // In models.db: made for this type, taken as it is.
+  bool stored{false};       // In models.db: made for this type, taken as it is.
+  std::string model_set{};  // Of the valve it was saved from, NAME@VERSION.
 };
 
 // A stored type is a scenario in TOML that has the parameters, behind a line
-// `levels = [CV, P1, P2, T1]` and the delay of the command. A sine is the one
-// excitation that may be continuous without a file.
-std::string TypeText(const ValveType& type) {
+// `levels = [CV, P1, P2, T1]`, the delay of the command and the model set that
+// it was saved with. A sine is the one excitation that may be continuous
+// without a file.
+std::string TypeText(const ValveType& type, const std::string& model_set) {
   simulator::Scenario scenario;
   scenario.config.parameters = type.parameters;
   scenario.config.excitation = simulator::SineExcitation{};
@@ -90,25 +92,28 @@ std::string TypeText(const ValveType& type) {
   return "levels = [" + Shortest(levels.cv_pct) + ", " +
          Shortest(levels.p1_kpa) + ", " + Shortest(levels.p2_kpa) + ", " +
          Shortest(levels.t1_degc) +
-         "]\ncommand_delay = " + std::to_string(type.command_delay) + "\n" +
-         ScenarioText(scenario);
+         "]\ncommand_delay = " + std::to_string(type.command_delay) +
+         "\nmodel_set = \"" + model_set + "\"\n" + ScenarioText(scenario);
 }
 
-ValveType ParseType(const std::string& text, const std::string& name) {
+FoundType ParseType(const std::string& text, const std::string& name) {
   cli::TomlReader reader(text, "valve type " + name);
   const std::vector<double> levels = reader.Numbers("levels");
   if (levels.size() != 4) {
     throw DataError("valve type " + name + ": levels must be 4 numbers");
   }
   const auto delay = reader.Integer("command_delay");
+  const auto model_set = reader.Text("model_set");
   simulator::Scenario scenario;
   ApplyScenario(reader, {}, scenario);
   reader.Finish();
-  return {name,
-          scenario.config.parameters,
-          scenario.config.continuous_inputs,
-          static_cast<int>(delay.value_or(0)),
-          {levels[0], levels[1], levels[2], levels[3]}};
+  return {{name,
+           scenario.config.parameters,
+           scenario.config.continuous_inputs,
+           static_cast<int>(delay.value_or(0)),
+           {levels[0], levels[1], levels[2], levels[3]}},
+          true,
+          model_set.value_or("")};
 }
 
 // The type called `name`: one stored in models.db, a shipped parameter set, or
@@ -117,10 +122,8 @@ FoundType FindType(const std::string& name, storage::ModelStore& store) {
   for (const storage::ValveType& stored : store.ListTemplates()) {
     if (stored.name == name) {
       const std::vector<std::byte> bytes = store.LoadTemplate(name).bytes;
-      return {
-          ParseType({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
-                    name),
-          true};
+      return ParseType(
+          {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, name);
     }
   }
   ValveType type;
@@ -129,8 +132,22 @@ FoundType FindType(const std::string& name, storage::ModelStore& store) {
   return {std::move(type), false};
 }
 
-void SaveType(const ValveType& type, storage::ModelStore& store) {
-  const std::string text = TypeText(type);
+// Nothing if the set of the type is not there any more.
+std::optional<ModelSet> SetOf(const FoundType& found,
+                              storage::ModelStore& store) {
+  if (found.model_set.empty()) {
+    return std::nullopt;
+  }
+  try {
+    return store.Load(found.model_set);
+  } catch (const NotFoundError&) {
+    return std::nullopt;
+  }
+}
+
+void SaveType(const ValveType& type, const std::string& model_set,
+              storage::ModelStore& store) {
+  const std::string text = TypeText(type, model_set);
   store.SaveTemplate(type.name, std::as_bytes(std::span(text)),
                      type.parameters.name + ", Kv " +
                          Shortest(type.parameters.trim.kv_m3_h) +
@@ -186,9 +203,12 @@ void AddCoverage(const CoverageTable& table, const std::string& path,
                                 {"isolates also", "isolable"}});
 }
 
-Json OnboardingJson(const Onboarding& onboarding) {
+Json OnboardingJson(const Onboarding& onboarding,
+                    const std::optional<ModelSet>& of_type) {
   Json json = ModelsJson(onboarding.models);
   json["hours"] = onboarding.hours;
+  json["fault_observers_of"] =
+      onboarding.transferred ? Json(NameOf(*of_type)) : Json();
   json["parameters"] = Json::array();
   if (onboarding.fit) {
     for (const simulator::FittedParameter& value : onboarding.fit->values) {
@@ -242,10 +262,12 @@ void AddFit(const simulator::ValveFit& fit, cli::Report& report) {
 
 // Physical parameters, fit of the normal observer against a naive model, model
 // set, coverage.
-cli::Report ReportOf(const Onboarding& onboarding, const std::string& title) {
+cli::Report ReportOf(const Onboarding& onboarding,
+                     const std::optional<ModelSet>& of_type,
+                     const std::string& title) {
   const ModelSet& models = onboarding.models;
   cli::Report report;
-  report.document = OnboardingJson(onboarding);
+  report.document = OnboardingJson(onboarding, of_type);
   report.Line(title + "\n");
   if (onboarding.fit) {
     AddFit(*onboarding.fit, report);
@@ -263,6 +285,14 @@ cli::Report ReportOf(const Onboarding& onboarding, const std::string& title) {
   report.Line("model set " + NameOf(models) + ", hash " +
               storage::HashHex(models.content_hash) + ", " +
               std::to_string(models.observers.size()) + " observers");
+  if (of_type) {
+    report.Line("fault observers: " +
+                (onboarding.transferred
+                     ? "those of " + NameOf(*of_type) + ", the type's set"
+                     : "simulated, since " + NameOf(*of_type) +
+                           ", the type's set, has other channels or was made "
+                           "for other commands, pressures or temperatures"));
+  }
   report.Line(AlarmRateText(models));
   if (onboarding.left_out_s > 0.0) {
     report.Line(FormatNumber(onboarding.left_out_s, 0) +
@@ -345,7 +375,7 @@ void Store(const OnboardOptions& options, Onboarding& onboarding,
       store.Save(onboarding.models, storage::Activation::kAlways);
   if (!options.save_type.empty()) {
     onboarding.type.name = options.save_type;
-    SaveType(onboarding.type, store);
+    SaveType(onboarding.type, NameOf(onboarding.models), store);
   }
   storage::BaselineRecord record;
   record.epoch = EpochOf(options.valve, onboarding, store);
@@ -385,6 +415,7 @@ cli::Report OnboardValve(const OnboardOptions& options,
   settings.name = options.name.empty() ? options.valve : options.name;
   settings.type = found.type;
   settings.fit = options.fit && !found.stored;
+  settings.of_type = SetOf(found, store);
   settings.false_alarms_per_hour = options.false_alarms_per_hour;
   settings.threads = options.threads;
   settings.assess = options.assess;
@@ -404,11 +435,11 @@ cli::Report OnboardValve(const OnboardOptions& options,
   Store(options, onboarding, store);
   const std::chrono::duration<double> seconds =
       std::chrono::steady_clock::now() - start;
-  return ReportOf(onboarding, "valve " + options.valve + ": " +
-                                  FormatNumber(onboarding.hours, 2) +
-                                  " h of healthy data, onboarded in " +
-                                  std::to_string(std::lround(seconds.count())) +
-                                  " s");
+  return ReportOf(onboarding, settings.of_type,
+                  "valve " + options.valve + ": " +
+                      FormatNumber(onboarding.hours, 2) +
+                      " h of healthy data, onboarded in " +
+                      std::to_string(std::lround(seconds.count())) + " s");
 }
 
 cli::Report Assess(const CoverageOptions& options,

@@ -484,10 +484,15 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   }
   const FaultSynthesizer synthesize(result.type);
   const std::vector<FaultCondition> faults = OnboardingFaults(signals);
+  const Progress part = Part(progress, kFitShare, kTrainShare);
+  result.transferred =
+      options.of_type && ServesAnother(*options.of_type, runs, training);
   result.models =
-      TrainDifferenceSet(runs, faults, std::ref(synthesize),
-                         result.type.parameters.instruments.flow.high, training,
-                         Part(progress, kFitShare, kTrainShare));
+      result.transferred
+          ? TransferDifferenceSet(*options.of_type, runs, training, part)
+          : TrainDifferenceSet(runs, faults, std::ref(synthesize),
+                               result.type.parameters.instruments.flow.high,
+                               training, part);
   result.models.physics = Physics(result.type, runs);
   result.channels = FitsOf(result.models, runs);
   result.hours = Hours(all);

@@ -78,6 +78,9 @@ struct OnboardingOptions {
   double false_alarms_per_hour{1e-3};  ///< Over all channels together.
   int threads{0};                      ///< 0: all of the machine.
   bool assess{true};                   ///< Score every fault for the table.
+  /// Set of another valve of the type, which serves this one where it can
+  /// (TransferDifferenceSet); none: every fault is simulated.
+  std::optional<ModelSet> of_type{};
   std::string software;
   std::int64_t created_ns{0};
 };
@@ -103,6 +106,7 @@ struct Onboarding {
   SignalMask signals{0};   ///< That the valve measures.
   double hours{0.0};       ///< Of healthy data.
   double left_out_s{0.0};  ///< Of them at a stop, or just after (WithoutStops).
+  bool transferred{false};  ///< OnboardingOptions::of_type served.
 };
 
 /// The runs without the samples at which X is at a stop, and the minute after
