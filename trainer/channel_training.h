@@ -59,9 +59,9 @@ struct ChannelPlan {
   std::vector<int> rule_counts{};  ///< To try; empty: as FitOptions says.
   /// Fault observers are the normal one with other consequents (AdaptModel).
   bool adapted{false};
-  /// What a normal observer that runs on its own past reads, for difference
+  /// What a normal observer that runs on its own past may read, for difference
   /// observers (FitNormalChannel); empty: it never does.
-  std::vector<Regressor> own_past{};
+  std::vector<std::vector<Regressor>> own_past{};
   /// Models that run on their own past are told apart by ErrorFromAnyPast().
   bool from_any_past{false};
   bool saturates{false};       ///< The transmitter may be at its upper limit.

@@ -22,10 +22,11 @@ constexpr double kLowestPosition = 0.0;  // ends of the position transmitter [%]
 constexpr double kHighestPosition = 100.0;
 
 // The plan of a normal model that runs on its own past.
-ChannelPlan OwnPastPlan(const ChannelPlan& plan) {
+ChannelPlan OwnPastPlan(const ChannelPlan& plan,
+                        const std::vector<Regressor>& regressors) {
   ChannelPlan own = plan;
-  own.pools = {plan.own_past};
-  own.antecedents = plan.own_past;
+  own.pools = {regressors};
+  own.antecedents = regressors;
   own.rule_counts = {4, 8, 16, 24};
   own.from_any_past = true;
   own.parallel = true;
@@ -163,15 +164,18 @@ NormalChannel ChooseNormal(const ChannelPlan& plan, const Condition& normal,
   NormalChannel channel{
       plan, FitPlan(plan, normal, options, saturation), {}, false, {}};
   channel.inputs = channel.normal;
-  if (plan.own_past.empty()) {
-    return channel;
-  }
-  const ChannelPlan own_plan = OwnPastPlan(plan);
-  TsModel own = FitPlan(own_plan, normal, options, saturation);
-  if (RunsOnItself(own) && error(own) < kWorthOwnPast * error(channel.normal)) {
-    channel.plan = own_plan;
-    channel.normal = std::move(own);
-    channel.difference = true;
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::vector<Regressor>& regressors : plan.own_past) {
+    const ChannelPlan own_plan = OwnPastPlan(plan, regressors);
+    TsModel own = FitPlan(own_plan, normal, options, saturation);
+    const double from_any_past = ErrorFromAnyPast(own, normal.validation);
+    if (RunsOnItself(own) && from_any_past < least &&
+        error(own) < kWorthOwnPast * error(channel.inputs)) {
+      least = from_any_past;
+      channel.plan = own_plan;
+      channel.normal = std::move(own);
+      channel.difference = true;
+    }
   }
   return channel;
 }
@@ -456,8 +460,9 @@ Healthy RefitHealthy(const ModelSet& of_type,
         const auto i = static_cast<std::size_t>(c);
         const TsModel& model = of_type.observers.front().channels[i].model;
         NormalChannel& channel = healthy.channels[i];
-        channel.plan = RunsOnItself(model) ? OwnPastPlan(options.channels[i])
-                                           : options.channels[i];
+        channel.plan = RunsOnItself(model)
+                           ? OwnPastPlan(options.channels[i], model.regressors)
+                           : options.channels[i];
         channel.plan.rule_counts = {static_cast<int>(model.rules.size())};
         channel.normal = FitChannel(
             channel.plan, model.regressors, healthy.normal,

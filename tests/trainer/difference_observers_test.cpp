@@ -63,7 +63,7 @@ TrainingOptions TwoChannels() {
   options.channels[0].rule_counts = {1, 4};
   options.channels[1].rule_counts = {2};
   options.channels[0].own_past = {
-      {Signal::kCv, 0}, {Signal::kCv, 1}, {Signal::kX, 1}};
+      {{Signal::kCv, 0}, {Signal::kCv, 1}, {Signal::kX, 1}}};
   return options;
 }
 

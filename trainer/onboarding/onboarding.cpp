@@ -190,7 +190,8 @@ TrainingOptions OnboardingPreset(SignalMask signals) {
   for (ChannelPlan& plan : options.channels) {
     if (plan.name == "X") {
       // Without the pressures, which are elsewhere on another day.
-      plan.own_past = {{kCv, 0}, {kCv, 1}, {kCv, 2}, {kX, 1}, {kX, 2}};
+      plan.own_past = {{{kCv, 0}, {kCv, 1}, {kX, 1}, {kX, 2}},
+                       {{kCv, 0}, {kCv, 1}, {kCv, 2}, {kX, 1}, {kX, 2}}};
     }
     for (std::vector<Regressor>& pool : plan.pools) {
       Restrict(signals, pool);
