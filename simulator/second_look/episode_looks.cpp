@@ -62,6 +62,10 @@ constexpr Likeness kLikenesses[] = {
 
 void KeepTogether(const SecondLook& look, double nothing,
                   std::vector<Explanation>& set) {
+  if (look.perforation && look.perforation->distance <= kLookMargin &&
+      !Has(set, look.perforation->fault)) {
+    set.push_back(*look.perforation);
+  }
   for (const Likeness& likeness : kLikenesses) {
     const auto& alike = likeness.faults;
     if (std::none_of(alike.begin(), alike.end(),

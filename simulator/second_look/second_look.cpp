@@ -36,11 +36,18 @@ struct Course {
   friend bool operator==(const Course&, const Course&) = default;
 };
 
+// A healthy record hardly tells the supply pressure, of which a positioner in
+// control takes what it needs; a torn diaphragm shows it. Deviation of its
+// logarithm.
+constexpr double kSupplyDeviation = 0.15;
+constexpr std::array kSupplies{0.7, 0.8, 0.9, 1.12, 1.25};
+
 // A fault in one direction with what is known about its strength so far.
 struct Hypothesis {
   int fault;
   double sign;
   Course course;
+  double supply{1.0};  // Of what onboarding took for the supply pressure.
   std::map<double, Trajectory> simulated{};  // By |strength|.
   double cost{kInfinity};                    // The least that was simulated,
   double strength{0.0};                      // and its |strength|.
@@ -81,7 +88,8 @@ class Looker {
   double StrengthAt(int row, double strength, Course course) const;
   void FindUsualInputs();
   InputRow InputAt(int row, int fault, double strength) const;
-  Trajectory Simulate(int fault, double strength, Course course);
+  Trajectory Simulate(int fault, double strength, Course course,
+                      double supply = 1.0);
   Trajectory FlowOnly(int fault, double strength, Course course) const;
   ChannelFit FitChannel(const Trajectory& answers, bool flow,
                         double slow_sd) const;
@@ -91,10 +99,13 @@ class Looker {
   double CommandCost() const;
   double Cost(int fault, double strength, Course course,
               const Trajectory& answers) const;
+  double CostOf(const Hypothesis& hypothesis, double strength,
+                const Trajectory& answers) const;
   std::vector<Hypothesis> Hypotheses() const;
   double StopAsSeen() const;
   void Try(Hypothesis& hypothesis, double strength);
   void TryCourse(Hypothesis& hypothesis, Course course);
+  Hypothesis PerforationLike(const Hypothesis& supply_drop, Course course);
   void Refine(Hypothesis& hypothesis);
   template <typename Use>
   void Between(const Hypothesis& hypothesis, Use&& use) const;
@@ -162,7 +173,8 @@ InputRow Looker::InputAt(int row, int fault, double strength) const {
   return input;
 }
 
-Trajectory Looker::Simulate(int fault, double strength, Course course) {
+Trajectory Looker::Simulate(int fault, double strength, Course course,
+                            double supply) {
   if (ActsOnFlowAlone(fault)) {
     return FlowOnly(fault, strength, course);
   }
@@ -174,6 +186,7 @@ Trajectory Looker::Simulate(int fault, double strength, Course course) {
         InputAt(k, fault, StrengthAt(k, strength, course)));
   }
   config.parameters = physics_.parameters;
+  config.parameters.actuator.supply_pressure_gauge_pa *= supply;
   config.excitation = std::move(excitation);
   config.period_s = physics_.drive.period_s;
   config.duration_s = rows_ * config.period_s;
@@ -363,6 +376,12 @@ double Looker::Cost(int fault, double strength, Course course,
   return cost;
 }
 
+double Looker::CostOf(const Hypothesis& h, double strength,
+                      const Trajectory& answers) const {
+  const double away = std::log(h.supply) / kSupplyDeviation;
+  return Cost(h.fault, h.sign * strength, h.course, answers) + away * away;
+}
+
 std::vector<Hypothesis> Looker::Hypotheses() const {
   std::vector<Hypothesis> hypotheses;
   for (int fault = 1; fault <= kLastFault; ++fault) {
@@ -397,8 +416,8 @@ void Looker::Try(Hypothesis& h, double strength) {
   if (h.simulated.contains(strength)) {
     return;
   }
-  Trajectory answers = Simulate(h.fault, h.sign * strength, h.course);
-  const double cost = Cost(h.fault, h.sign * strength, h.course, answers);
+  Trajectory answers = Simulate(h.fault, h.sign * strength, h.course, h.supply);
+  const double cost = CostOf(h, strength, answers);
   if (cost < h.cost) {
     h.cost = cost;
     h.strength = strength;
@@ -418,6 +437,29 @@ void Looker::TryCourse(Hypothesis& h, Course course) {
     Try(other, std::min(1.0, 1.3 * h.strength));
     h = std::move(other);
   }
+}
+
+// f10 in the place of f16: both leave the actuator less force, and which of
+// them it is rests on the supply pressure.
+Hypothesis Looker::PerforationLike(const Hypothesis& supply_drop,
+                                   Course course) {
+  constexpr int kRefinements = 3;
+  Hypothesis best{10, 1.0, course};
+  for (const double supply : kSupplies) {
+    Hypothesis other{10, 1.0, course, supply};
+    // The force that is left, A (1 - s) P, is about that of f16.
+    const double alike = 1.0 - (1.0 - supply_drop.strength) / supply;
+    for (const double share : {0.6, 0.75, 0.9, 1.0, 1.15}) {
+      Try(other, std::clamp(share * alike, 0.02, 1.0));
+    }
+    for (int i = 0; i < kRefinements; ++i) {
+      Refine(other);
+    }
+    if (other.cost < best.cost) {
+      best = std::move(other);
+    }
+  }
+  return best;
 }
 
 // use(|strength|, answers) for strengths between the simulated ones, the
@@ -447,7 +489,7 @@ void Looker::Refine(Hypothesis& h) {
   double least = kInfinity;
   double where = h.strength;
   Between(h, [&](double strength, const Trajectory& answers) {
-    const double cost = Cost(h.fault, h.sign * strength, h.course, answers);
+    const double cost = CostOf(h, strength, answers);
     if (cost < least) {
       least = cost;
       where = strength;
@@ -470,7 +512,7 @@ Explanation Looker::Explain(const Hypothesis& h, double scale) const {
   Explanation e{h.fault,    h.sign * h.strength,         h.strength,
                 h.strength, h.course.start - detection_, h.course.growing};
   Between(h, [&](double strength, const Trajectory& answers) {
-    const double cost = Cost(h.fault, h.sign * strength, h.course, answers);
+    const double cost = CostOf(h, strength, answers);
     if (cost - h.cost <= kQuantile * scale) {
       e.lowest = std::min(e.lowest, strength);
       e.highest = std::max(e.highest, strength);
@@ -589,6 +631,16 @@ SecondLook Looker::Run(const std::stop_token& stop) {
                    [](const Explanation& a, const Explanation& b) {
                      return a.distance < b.distance;
                    });
+  if (faulty && first.fault == 16) {
+    Hypothesis torn = PerforationLike(first, first.course);
+    const auto f10 = std::ranges::find(hypotheses, 10, &Hypothesis::fault);
+    if (f10->course != first.course) {
+      Hypothesis other = PerforationLike(first, f10->course);
+      torn = other.cost < torn.cost ? std::move(other) : std::move(torn);
+    }
+    look.perforation = Explain(torn, scale);
+    look.perforation->distance = (torn.cost + kPriceOfFault - best) / scale;
+  }
   look.simulated_rows = simulated_;
   return look;
 }

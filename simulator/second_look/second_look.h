@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
@@ -32,6 +33,10 @@ struct Explanation {
 struct SecondLook {
   /// All hypotheses, best first.
   std::vector<Explanation> ranked;
+  /// f10 with the supply pressure that suits it best, where f16 is the best
+  /// explanation: a healthy record does not tell that pressure, which decides
+  /// between the two.
+  std::optional<Explanation> perforation{};
   /// Mean square of the best explanation's errors in units of the healthy
   /// ones; far above 1 where none fits.
   double misfit{0.0};

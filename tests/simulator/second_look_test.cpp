@@ -61,6 +61,18 @@ TEST(SecondLookTest, MisfitDoesNotGrowWithTheEffectOfAFault) {
   EXPECT_LT(look.misfit, 1.2);
 }
 
+// The supply pressure, which a healthy record leaves open, decides between the
+// two: f10 gains by another one, here not enough.
+TEST(SecondLookTest, ComparesASupplyDropWithPerforationAtAnotherSupply) {
+  const SecondLook look = LookAgain(Physics(), Window({Abrupt(16, 0.7)}));
+  const auto f10 = std::ranges::find(look.ranked, 10, &Explanation::fault);
+  ASSERT_TRUE(look.perforation);
+  EXPECT_EQ(look.perforation->fault, 10);
+  EXPECT_LT(look.perforation->distance, f10->distance);
+  EXPECT_GT(look.perforation->distance, kLookMargin);
+  EXPECT_FALSE(LookAgain(Physics(), Window({Abrupt(13, -0.2)})).perforation);
+}
+
 TEST(SecondLookTest, EndsWithoutAnAnswerIfItIsAskedToStop) {
   std::stop_source stop;
   stop.request_stop();
@@ -210,6 +222,15 @@ TEST(LookAnswerTest, KeepsStopAndSupplyTogetherWhereTheBestFitsNotWell) {
   };
   EXPECT_EQ(named(3.0), (std::vector{1, 16}));
   EXPECT_EQ(named(1.0), std::vector{1});
+}
+
+TEST(LookAnswerTest, KeepsPerforationBesideASupplyDropWhereSupplyDecides) {
+  SecondLook look = Looked({{16, 0.0}, {10, 40.0}, {0, 900.0}});
+  look.perforation = look.ranked[1];
+  look.perforation->distance = kLookMargin - 1.0;
+  EXPECT_EQ(NamesOf(AnswerOf(look), true), (std::vector{10, 16}));
+  look.perforation->distance = kLookMargin + 1.0;
+  EXPECT_EQ(NamesOf(AnswerOf(look), true), std::vector{16});
 }
 
 // What neither a fault nor health explains is not for observers that were made
