@@ -237,8 +237,10 @@ void LookBook::Enter(const LookTask& task, LookAnswer answer) {
   });
   constexpr double kMuchWorse = 2.0;
   for (const Entry& entry : entries_) {
+    const bool named = entry.answer.outcome == LookOutcome::kNamed;
     if (!entry.answer.early &&
-        answer.misfit > kMuchWorse * std::max(1.0, entry.answer.misfit)) {
+        (answer.misfit > kMuchWorse * std::max(1.0, entry.answer.misfit) ||
+         (named && answer.outcome == LookOutcome::kNothing))) {
       return;
     }
   }

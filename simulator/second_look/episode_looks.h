@@ -102,7 +102,8 @@ class EpisodeLooks {
 
 /// The answer of the layer that speaks last: that of the last look at the open
 /// episode that was conclusive, else the engine's. A look that fits much worse
-/// than an earlier one is not heard: the fault may have gone meanwhile.
+/// than an earlier one, or finds nothing after one that named a fault, is not
+/// heard: the fault may have gone meanwhile, or show less.
 class LookBook {
  public:
   void Enter(const LookTask& task, LookAnswer answer);

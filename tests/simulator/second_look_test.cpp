@@ -337,6 +337,11 @@ TEST(LookBookTest, CountsAfterItsDelayAndDoesNotHearAWorseFit) {
   EXPECT_EQ(book.At(7, 109 * kSecond), nullptr);
   ASSERT_NE(book.At(7, 110 * kSecond), nullptr);
   EXPECT_EQ(book.At(7, 300 * kSecond)->faults.front().fault, 1);
+  task.stamp_ns = 300 * kSecond;
+  const LookAnswer nothing = AnswerOf(Looked({{2, 0.0}, {0, 10.0}}));
+  ASSERT_EQ(nothing.outcome, LookOutcome::kNothing);
+  book.Enter(task, nothing);
+  EXPECT_EQ(book.At(7, 400 * kSecond)->faults.front().fault, 1);
   EXPECT_EQ(book.At(8, 300 * kSecond), nullptr);
 }
 
