@@ -51,16 +51,6 @@ std::string Entry(const std::string& heading, const std::string& text) {
   return entry + '\n';
 }
 
-std::string Joined(const std::vector<std::string>& words,
-                   const char* separator) {
-  std::string text;
-  for (const std::string& word : words) {
-    text += text.empty() ? "" : separator;
-    text += word;
-  }
-  return text;
-}
-
 class HelpFormatter : public CLI::Formatter {
  public:
   HelpFormatter() {
@@ -78,8 +68,7 @@ class HelpFormatter : public CLI::Formatter {
     for (const std::string& name : option->get_lnames()) {
       names.push_back("--" + name);
     }
-    std::string heading =
-        positional ? option->get_name(true) : Joined(names, ", ");
+    std::string heading = positional ? option->get_name(true) : Joined(names);
     const std::string value = option->get_type_name();
     if (!value.empty() && !(positional && value == "TEXT")) {
       heading += value.front() == '[' ? value : ' ' + value;
@@ -114,7 +103,7 @@ std::string NamesOf(const std::set<CLI::Option*>& options) {
     names.push_back(option->get_name());
   }
   std::sort(names.begin(), names.end());
-  return Joined(names, ", ");
+  return Joined(names);
 }
 
 bool NamesAFile(const std::string& description) {
@@ -225,6 +214,16 @@ void ForEachApp(CLI::App& app, const F& act) {
 }
 
 }  // namespace
+
+std::string Joined(const std::vector<std::string>& words,
+                   const char* separator) {
+  std::string text;
+  for (const std::string& word : words) {
+    text += text.empty() ? "" : separator;
+    text += word;
+  }
+  return text;
+}
 
 void PrepareHelp(CLI::App& root) {
   const auto formatter = std::make_shared<HelpFormatter>();

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 namespace CLI {
 class App;
 }
@@ -15,6 +18,10 @@ namespace fdi::cli {
 /// What an option accepts, its default and what it excludes are taken from the
 /// parser. Call it once, after the last option was added.
 void PrepareHelp(CLI::App& root);
+
+/// "a, b, c".
+std::string Joined(const std::vector<std::string>& words,
+                   const char* separator = ", ");
 
 /// The files and folders that options name need not exist any more.
 void AllowMissingFiles(CLI::App& root);

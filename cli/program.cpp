@@ -77,14 +77,6 @@ std::vector<std::string> OptionNames(const CLI::App& app) {
   return names;
 }
 
-std::string Joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) {
-    text += (text.empty() ? "" : ", ") + word;
-  }
-  return text;
-}
-
 // What was not understood, with the word that was probably meant.
 std::string Unexpected(const CLI::App& app, const std::string& word) {
   const bool is_option = word.size() > 1 && word.front() == '-';

@@ -11,11 +11,10 @@
 #include "cli/json_text.h"
 #include "cli/time_text.h"
 #include "diagnosis/printable.h"
+#include "diagnosis/time_units.h"
 
 namespace fdi::cli {
 namespace {
-
-constexpr double kNsPerSecond = 1e9;
 
 // The value at "a/b" within `json`; null where a member on the way is missing.
 // JSON pointers would do, but they throw where a member is missing.

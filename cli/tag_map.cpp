@@ -46,7 +46,7 @@ struct UnitEntry {
 
 constexpr FlowUnit kVolume = FlowUnit::kM3PerHour;
 constexpr FlowUnit kMass = FlowUnit::kTPerHour;
-constexpr UnitEntry kUnits[] = {
+constexpr UnitEntry kSignalUnits[] = {
     {"%", Quantity::kPercent, {1.0, 0.0, kVolume}},
     {"1", Quantity::kPercent, {100.0, 0.0, kVolume}},
     {"kPa", Quantity::kPressure, {1.0, 0.0, kVolume}},
@@ -225,7 +225,7 @@ void ReadFile(TomlReader table, ColumnMap& map) {
 std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
   std::string plain = Plain(name);
   const auto find = [&]() -> std::optional<UnitConversion> {
-    for (const UnitEntry& unit : kUnits) {
+    for (const UnitEntry& unit : kSignalUnits) {
       // mPa is no MPa.
       if (unit.quantity == QuantityOf(signal) &&
           (unit.name == plain ||
@@ -253,7 +253,7 @@ std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
 
 std::string UnitNames(Signal signal) {
   std::string names;
-  for (const UnitEntry& unit : kUnits) {
+  for (const UnitEntry& unit : kSignalUnits) {
     if (unit.quantity == QuantityOf(signal)) {
       names += " " + std::string(unit.name);
     }

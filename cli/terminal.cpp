@@ -15,7 +15,7 @@ std::string_view Environment(const char* name) {
 }
 
 // COLUMNS, where it is set, overrules the terminal: as `less` and scripts do.
-std::size_t Columns() {
+std::size_t TerminalColumns() {
   const long asked = std::strtol(Environment("COLUMNS").data(), nullptr, 10);
   if (asked > 0) {
     return static_cast<std::size_t>(asked);
@@ -32,7 +32,7 @@ TextStyle StdoutStyle() {
   }
   const bool colour =
       Environment("NO_COLOR").empty() && Environment("TERM") != "dumb";
-  return {colour, Columns()};
+  return {colour, TerminalColumns()};
 }
 
 }  // namespace fdi::cli

@@ -13,11 +13,11 @@
 #include <regex>
 
 #include "diagnosis/error.h"
+#include "diagnosis/time_units.h"
 
 namespace fdi::cli {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 /// A regular expression recurses with the length of a text.
 constexpr std::size_t kLongestTime = 64;
 
@@ -68,7 +68,7 @@ class Scanner {
     return word;
   }
   std::int64_t Fraction() {
-    std::int64_t unit = kSecond;
+    std::int64_t unit = kNsPerSecond;
     std::int64_t fraction = 0;
     for (; std::isdigit(static_cast<unsigned char>(next())) != 0;
          rest_.remove_prefix(1)) {
@@ -210,9 +210,9 @@ struct Unit {
   std::string_view name;
   double seconds;
 };
-constexpr Unit kUnits[] = {{"ns", 1e-9},  {"us", 1e-6},   {"ms", 1e-3},
-                           {"s", 1.0},    {"min", 60.0},  {"m", 60.0},
-                           {"h", 3600.0}, {"d", 86400.0}, {"w", 604800.0}};
+constexpr Unit kDurationUnits[] = {
+    {"ns", 1e-9}, {"us", 1e-6},  {"ms", 1e-3},   {"s", 1.0},     {"min", 60.0},
+    {"m", 60.0},  {"h", 3600.0}, {"d", 86400.0}, {"w", 604800.0}};
 
 [[noreturn]] void RefuseDuration(std::string_view text) {
   throw ConfigError("'" + std::string(text) +
@@ -229,9 +229,10 @@ bool IsDuration(std::string_view text) {
 
 std::string FormatTime(std::int64_t stamp_ns, bool utc) {
   // 0 or more, also before 1970, where % would give a negative rest.
-  const std::int64_t fraction = ((stamp_ns % kSecond) + kSecond) % kSecond;
+  const std::int64_t fraction =
+      ((stamp_ns % kNsPerSecond) + kNsPerSecond) % kNsPerSecond;
   const std::time_t seconds =
-      stamp_ns / kSecond - (stamp_ns % kSecond < 0 ? 1 : 0);
+      stamp_ns / kNsPerSecond - (stamp_ns % kNsPerSecond < 0 ? 1 : 0);
   std::tm fields{};
   utc ? gmtime_r(&seconds, &fields) : localtime_r(&seconds, &fields);
   char text[64];
@@ -326,7 +327,8 @@ std::optional<std::int64_t> LocalClock::Utc(const CivilTime& time,
   }
   std::optional<std::int64_t> found;
   for (const int offset : offsets) {
-    const std::int64_t stamp = (shown - offset) * kSecond + time.fraction_ns;
+    const std::int64_t stamp =
+        (shown - offset) * kNsPerSecond + time.fraction_ns;
     if (!found || *found < last_ns) {
       found = stamp;
     }
@@ -351,7 +353,7 @@ std::int64_t ParseTime(std::string_view text, bool utc) {
   if (seconds < -kLimit || seconds > kLimit) {
     RefuseTime(text);
   }
-  return seconds * kSecond + time->fraction_ns;
+  return seconds * kNsPerSecond + time->fraction_ns;
 }
 
 std::int64_t ParseTimeOrAgo(std::string_view text, bool utc,
@@ -377,7 +379,7 @@ std::int64_t ParseDuration(std::string_view text) {
     while (std::regex_search(rest, found, part,
                              std::regex_constants::match_continuous)) {
       const std::string name = found[2];
-      const auto unit = std::ranges::find(kUnits, name, &Unit::name);
+      const auto unit = std::ranges::find(kDurationUnits, name, &Unit::name);
       seconds += std::strtod(found.str(1).c_str(), nullptr) * unit->seconds;
       rest = found.suffix();
     }

@@ -46,6 +46,10 @@ std::string Lower(std::string_view text) {
 
 }  // namespace
 
+bool Contains(const std::vector<int>& faults, int fault) {
+  return std::ranges::find(faults, fault) != faults.end();
+}
+
 const std::string kFaultNames = JoinedNames();
 
 const FaultFacts& FaultFactsOf(int fault) {

@@ -97,6 +97,9 @@ inline constexpr auto kFaultsAndFindings = [] {
   return numbers;
 }();
 
+/// Whether `fault` is one of `faults`.
+bool Contains(const std::vector<int>& faults, int fault);
+
 /// The names of all faults, for messages and help: "f1..f19, t1, p1, p2".
 extern const std::string kFaultNames;
 

@@ -51,6 +51,7 @@ struct StrengthSums {
 struct HealthHour {
   static constexpr double kShare = 1e-3;   ///< Quantum of d_0 and strength [-].
   static constexpr double kTravel = 1e-3;  ///< Of the travel [% of stroke].
+  static constexpr double kFullStroke = 100.0;  ///< Of the travel [%].
 
   std::string valve_id;
   std::int64_t hour{0};         ///< UTC, since 1970-01-01.

@@ -11,8 +11,6 @@ namespace fdi {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-// Keeps the difference of two exponents a number however far x is.
-constexpr double kFarthestExponent = -1e300;
 // So many observers with the same antecedents are worth weighing rules once.
 constexpr std::size_t kFewestShared = 8;
 

@@ -18,8 +18,6 @@ namespace {
 constexpr double kCoveredExponent = -18.420680743952367;
 // A rule of less than 4e-18 of the strongest adds nothing to a double.
 constexpr double kFiringExponent = -40.0;
-// Keeps the difference of two exponents a number however far x is.
-constexpr double kFarthestExponent = -1e300;
 
 // log μ(x) of one set; an infinite width gives 0 on its side.
 double LogMembership(const FuzzySet& set, double x) {

@@ -8,6 +8,9 @@
 
 namespace fdi {
 
+/// Keeps the difference of two exponents a number however far x is.
+inline constexpr double kFarthestExponent = -1e300;
+
 inline constexpr int kMaxLag = 16;
 inline constexpr int kMaxRegressors = 16;
 inline constexpr int kMaxRules = 32;

@@ -13,6 +13,7 @@
 #include <netinet/in.h>
 
 #include "diagnosis/error.h"
+#include "diagnosis/time_units.h"
 #include "idl/participant_impl.h"
 #include "idl/security/keys.h"
 #if FDI_FAST_DDS == 2
@@ -45,7 +46,6 @@ constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
 constexpr std::uint32_t kSendBufferBytes = 4U << 20U;
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
-constexpr std::int64_t kDayNs = 86'400'000'000'000;
 // Remote endpoints of each topic, and participants without a key.
 constexpr std::size_t kRemembered = 64;
 
@@ -256,7 +256,7 @@ void Secure(const std::filesystem::path& folder, const LogSink& log,
             dds::DomainParticipantQos& qos) {
   const std::int64_t now = NowNs();
   const KeyInfo key = CheckKey(folder, now);
-  const std::int64_t days = (key.until_ns - now) / kDayNs;
+  const std::int64_t days = (key.until_ns - now) / kNsPerDay;
   if (days < kDaysOfWarning && log) {
     log(LogLevel::kWarning, "security_key_expires name=" + key.name +
                                 " days=" + std::to_string(days));

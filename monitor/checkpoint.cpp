@@ -5,14 +5,15 @@
 #include <tuple>
 #include <utility>
 
+#include "diagnosis/time_units.h"
+
 namespace fdi::monitor {
 namespace {
 
-constexpr std::int64_t kDayNs = 86'400'000'000'000;
 constexpr std::size_t kMostRecords = 100'000;
 
 std::int64_t DayOf(std::int64_t stamp_ns) {
-  return stamp_ns / kDayNs - (stamp_ns % kDayNs < 0 ? 1 : 0);
+  return stamp_ns / kNsPerDay - (stamp_ns % kNsPerDay < 0 ? 1 : 0);
 }
 
 // Puts each record of `newer` on top of the one in `older` with its key, by

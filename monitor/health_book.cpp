@@ -4,12 +4,12 @@
 #include <cmath>
 #include <utility>
 
+#include "diagnosis/time_units.h"
 #include "monitor/checkpoint.h"
 
 namespace fdi::monitor {
 namespace {
 
-constexpr std::int64_t kHourNs = 3'600'000'000'000;
 // A threshold band is cut into so many quanta, noise into some tens: rounding
 // does not show in a mean. The limits keep the sums of an hour from overflow.
 constexpr double kQuantaPerBand = 512.0;
@@ -17,7 +17,7 @@ constexpr double kMaxResidual = 1'048'576.0;        // [quanta]
 constexpr double kMaxOutput = 1'099'511'627'776.0;  // [quanta]
 
 std::int64_t HourOf(std::int64_t stamp_ns) {
-  return stamp_ns / kHourNs - (stamp_ns % kHourNs < 0 ? 1 : 0);
+  return stamp_ns / kNsPerHour - (stamp_ns % kNsPerHour < 0 ? 1 : 0);
 }
 
 std::int64_t Quanta(double value, double quantum, double limit) {

@@ -9,14 +9,13 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/time_units.h"
 
 namespace fdi::monitor {
 namespace {
 
-constexpr double kMsPerHour = 3.6e6;
 constexpr double kLeastLiveHours = 1.0;  // of a day that counts
 constexpr double kCoveredShare = 0.2;
-constexpr double kFullStroke = 100.0;  // [%]
 
 using Kind = HealthLimit::Kind;
 using Answer = HealthForecast::Answer;
@@ -198,7 +197,7 @@ std::vector<DailyValue> Totals(std::span<const HealthHour> hours, Kind kind) {
   for (const HealthHour& hour : hours) {
     days[DayOf(hour)] += kind == Kind::kTravel
                              ? static_cast<double>(hour.travel) *
-                                   HealthHour::kTravel / kFullStroke
+                                   HealthHour::kTravel / HealthHour::kFullStroke
                              : static_cast<double>(hour.reversals);
   }
   std::vector<DailyValue> values;

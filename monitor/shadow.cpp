@@ -5,11 +5,11 @@
 
 #include "diagnosis/printable.h"
 #include "diagnosis/records/valve_glob.h"
+#include "diagnosis/time_units.h"
 
 namespace fdi::monitor {
 namespace {
 
-constexpr std::int64_t kHourNs = 3'600'000'000'000;
 constexpr std::array<std::string_view, kShadowFitCount> kFitNames = {
     "compared", "unassigned", "same_set", "signals", "unit", "period"};
 
@@ -166,7 +166,7 @@ void ShadowValve::Extend(const Verdict& active) {
     return;
   }
   open_->counted = true;
-  const std::int64_t hour = open_->difference.from_ns / kHourNs;
+  const std::int64_t hour = open_->difference.from_ns / kNsPerHour;
   in_hour_ = hour == hour_ ? in_hour_ + 1 : 1;
   hour_ = hour;
   open_->recorded = in_hour_ <= limits_.max_per_hour;

@@ -61,7 +61,7 @@ std::vector<RecordSegment> LiveliestSegments(
 
 namespace {
 
-using Motion = std::vector<std::vector<RecordAnswer>>;  // By segment.
+using Answers = std::vector<std::vector<RecordAnswer>>;  // By segment.
 
 // Tolerances of the integrator: a difference of simulations at points 2 % apart
 // needs finer ones than a simulation that is compared with a record.
@@ -69,10 +69,10 @@ constexpr double kFine = 1.0;
 constexpr double kCoarse = 10.0;
 
 // Simulates on `threads` threads.
-std::vector<Motion> Simulate(const std::vector<ValveCandidate>& candidates,
-                             const std::vector<RecordSegment>& segments,
-                             double tolerance_scale, int threads) {
-  std::vector<Motion> motions(candidates.size(), Motion(segments.size()));
+std::vector<Answers> Simulate(const std::vector<ValveCandidate>& candidates,
+                              const std::vector<RecordSegment>& segments,
+                              double tolerance_scale, int threads) {
+  std::vector<Answers> motions(candidates.size(), Answers(segments.size()));
   const std::size_t count = candidates.size() * segments.size();
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
@@ -98,7 +98,7 @@ std::vector<Motion> Simulate(const std::vector<ValveCandidate>& candidates,
 // Differences simulation - record: one row per instant, columns X [%] and, if
 // `has_flow`, F by `parameters`; the first `settle_rows` of every segment are
 // left out.
-MatrixXd Residuals(const ValveParameters& parameters, const Motion& motion,
+MatrixXd Residuals(const ValveParameters& parameters, const Answers& motion,
                    const std::vector<RecordSegment>& segments,
                    std::size_t settle_rows, bool has_flow) {
   std::size_t count = 0;
@@ -452,7 +452,7 @@ RobustFit Identification::Fit(const Hypothesis& hypothesis,
   // Points that differ in the trim alone share a simulation; the last point
   // that came alone is where the fit is.
   std::vector<VectorXd> simulated;
-  std::vector<Motion> motions;
+  std::vector<Answers> motions;
   const auto residuals = [&](const std::vector<VectorXd>& points) {
     std::vector<VectorXd> wanted;
     std::vector<ValveCandidate> candidates;
@@ -463,7 +463,7 @@ RobustFit Identification::Fit(const Hypothesis& hypothesis,
         candidates.push_back(Candidate(hypothesis, point));
       }
     }
-    std::vector<Motion> added =
+    std::vector<Answers> added =
         Simulate(candidates, segments, tolerance_scale, options_.threads);
     if (points.size() == 1 && !added.empty()) {
       simulated.clear();
@@ -503,7 +503,7 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
     h.point = Fit(h, {segments_.front()}, kIterations, kCoarse).point;
     candidates.push_back(Candidate(h, h.point));
   }
-  const std::vector<Motion> motions =
+  const std::vector<Answers> motions =
       Simulate(candidates, segments_, kCoarse, options_.threads);
   std::size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
@@ -601,7 +601,7 @@ std::vector<RecordFit> Identification::Compare(
     }
     return std::max(1.0, measured);
   };
-  const std::vector<Motion> motions =
+  const std::vector<Answers> motions =
       Simulate(candidates, whole, kCoarse, options_.threads);
   std::vector<RecordFit> fits(candidates.size());
   for (std::size_t i = 0; i < fits.size(); ++i) {

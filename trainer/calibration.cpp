@@ -107,7 +107,7 @@ constexpr double kSeenLogRms = 0.25;  // more than what the record showed
 constexpr double kMargin = 1.25;      // on what correlation makes plausible
 constexpr double kCommandedDrift = 0.75;  // deviations
 constexpr double kLeastMean = 0.5;        // deviations
-constexpr double kLeastDeviation = 1.4;
+constexpr double kLeastRms = 1.4;
 constexpr double kCommandMargin = 0.5;           // of the range
 constexpr double kLeastCommandMargin = 2.0;      // %
 constexpr double kLeastActivityVariance = 1e-6;  // to tell a slope from
@@ -277,7 +277,7 @@ std::optional<WindowLimits> FitWindow(const ResidualSeries& residuals,
   limits.upper_log_rms =
       std::max(Level(history.energy, share, length,
                      std::max(plausible.log_rms, seen + kSeenLogRms)),
-               std::log(kLeastDeviation * sd));
+               std::log(kLeastRms * sd));
   return limits;
 }
 

@@ -72,7 +72,6 @@ namespace {
 
 constexpr double kReuseTolerance = 1.02;
 constexpr double kPoolTolerance = 1.1;
-constexpr double kLimitShare = 0.005;
 constexpr double kSaturatedShare = 0.02;
 
 double ErrorOf(const std::vector<double>& residuals) {

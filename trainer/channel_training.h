@@ -10,6 +10,10 @@
 
 namespace fdi::trainer {
 
+/// A reading this close to the end of its transmitter may stand for more [of
+/// the range].
+inline constexpr double kLimitShare = 0.005;
+
 /// Error of a model with these candidates as regressors, on data it was not
 /// fitted to; ascending indices, never empty. Infinite or NaN: unusable.
 using StructureCriterion = std::function<double(const std::vector<int>&)>;

@@ -7,6 +7,7 @@
 
 #include "diagnosis/error.h"
 #include "trainer/calibration.h"
+#include "trainer/channel_training.h"
 #include "trainer/model_set_description.h"
 #include "trainer/observer_calibration.h"
 #include "trainer/parallel_for.h"
@@ -220,8 +221,6 @@ ChannelObserver FitDifference(const NormalChannel& channel,
 }
 
 namespace {
-
-constexpr double kLimitShare = 0.005;  // of the range of the transmitter
 
 // Shares of the work, for the progress bar.
 constexpr double kNormalShare = 0.1;

@@ -11,10 +11,6 @@ namespace {
 
 constexpr double kBeforeFault = 600.0;  // s of r_fd before the fault
 
-bool Contains(const std::vector<int>& set, int fault) {
-  return std::find(set.begin(), set.end(), fault) != set.end();
-}
-
 int WrongFaults(const Indication& indication) {
   const int count = static_cast<int>(indication.isolated.size());
   const bool right = indication.truth.fault != 0 &&

@@ -19,9 +19,9 @@ constexpr double kLargestError = 10.0;  // counts; one more is an outlier [%]
 constexpr double kTolerance = 1.1;      // of the smallest squared error
 constexpr double kSlower = 0.5;       // than any rate that explains the record
 constexpr double kLeastError = 0.05;  // [%²], that of the reading
-constexpr double kMargin = 2.0;       // times what the record showed
-constexpr double kLeastDeviation = 8.0;
-constexpr double kMostDeviation = 15.0;  // a positioner's alert is at 20 %
+constexpr double kFloorMargin = 2.0;  // times what the record showed
+constexpr double kLeastFloorDeviation = 8.0;
+constexpr double kMostFloorDeviation = 15.0;  // a positioner's alert is at 20 %
 constexpr double kDeviationS = 5.0;
 constexpr double kLeastStuckTravel = 5.0;
 constexpr double kFlowS = 10.0;
@@ -134,8 +134,9 @@ void FitDeviation(const std::vector<Stretch>& stretches, FloorLimits& floor) {
     most = std::max({most, Sustained(above, floor.deviation_samples),
                      Sustained(below, floor.deviation_samples)});
   }
-  floor.deviation = std::clamp(kMargin * most, kLeastDeviation, kMostDeviation);
-  floor.stuck_travel = std::max(kLeastStuckTravel, kMargin * repeated);
+  floor.deviation = std::clamp(kFloorMargin * most, kLeastFloorDeviation,
+                               kMostFloorDeviation);
+  floor.stuck_travel = std::max(kLeastStuckTravel, kFloorMargin * repeated);
 }
 
 bool HasDp(const Sample& sample) {

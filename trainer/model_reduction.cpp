@@ -9,10 +9,6 @@
 namespace fdi::trainer {
 namespace {
 
-bool Contains(const std::vector<int>& faults, int fault) {
-  return std::find(faults.begin(), faults.end(), fault) != faults.end();
-}
-
 void Erase(std::vector<int>& from, const std::vector<int>& faults) {
   std::erase_if(from, [&](int fault) { return Contains(faults, fault); });
 }

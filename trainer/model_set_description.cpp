@@ -15,8 +15,8 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr double kCommandMargin = 0.1;  // of the range
-constexpr double kLeastCommandMargin = 5.0;
+constexpr double kValidMargin = 0.1;  // of the range
+constexpr double kLeastValidMargin = 5.0;
 constexpr double kMeanCommandMargin = 0.25;  // of the range
 constexpr double kLeastMeanCommandMargin = 2.0;
 constexpr double kStepFactor = 2.0;
@@ -144,8 +144,8 @@ ValidityRegion TrainedRegion(const std::vector<Condition>& conditions) {
                    kMeanCommandMargin * (mean.maximum - mean.minimum));
       region.cv_mean = {mean.minimum - room, mean.maximum + room};
     }
-    const double margin = std::max(kLeastCommandMargin,
-                                   kCommandMargin * (cv.maximum - cv.minimum));
+    const double margin =
+        std::max(kLeastValidMargin, kValidMargin * (cv.maximum - cv.minimum));
     region.cv = {cv.minimum - margin, cv.maximum + margin};
     region.cv_step = std::max(kStepFactor * step, kLeastStep);
   }

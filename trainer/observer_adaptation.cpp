@@ -22,12 +22,12 @@ using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t kFolds = 4;
+constexpr std::size_t kPenaltyFolds = 4;
 constexpr int kFewest = 20;
 constexpr std::array<double, 5> kPenalties{0.03, 0.3, 3.0, 30.0, 300.0};
 constexpr double kSharedPenalty = 0.01;  // of what all rules have in common
 constexpr double kWorthAdapting = 0.98;  // of the normal model's error
-constexpr int kCensoredRounds = 40;
+constexpr int kAdaptationRounds = 40;
 constexpr double kCensoredTolerance = 1e-3;  // of the span of the output
 
 // The rows of all stretches of a condition in order of time.
@@ -48,7 +48,8 @@ Rows CollectRows(const TsModel& normal, const Condition& condition) {
     const Index n = parts.back().y.size();
     const std::size_t lag = whole.samples.size() - static_cast<std::size_t>(n);
     for (Index k = 0; k < n; ++k) {
-      rows.fold.push_back(static_cast<int>(k * static_cast<Index>(kFolds) / n));
+      rows.fold.push_back(
+          static_cast<int>(k * static_cast<Index>(kPenaltyFolds) / n));
       rows.shares.push_back(
           whole.strengths.empty()
               ? 1.0
@@ -113,9 +114,9 @@ Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
   Systems systems;
   // Lower triangles; of the rows of each fold, then of those that it uses.
   const MatrixXd zero = MatrixXd::Zero(design.cols(), design.cols());
-  std::vector<MatrixXd> own(kFolds, zero);
-  std::vector<MatrixXd> grams(kFolds + 1, zero);
-  for (std::size_t f = 0; f < kFolds; ++f) {
+  std::vector<MatrixXd> own(kPenaltyFolds, zero);
+  std::vector<MatrixXd> grams(kPenaltyFolds + 1, zero);
+  for (std::size_t f = 0; f < kPenaltyFolds; ++f) {
     std::vector<Index> members;
     VectorXd use = VectorXd::Ones(design.rows());
     for (Index k = 0; k < design.rows(); ++k) {
@@ -131,8 +132,8 @@ Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
     systems.uses.push_back(std::move(use));
   }
   systems.uses.push_back(VectorXd::Ones(design.rows()));
-  for (std::size_t f = 0; f <= kFolds; ++f) {
-    for (std::size_t other = 0; other < kFolds; ++other) {
+  for (std::size_t f = 0; f <= kPenaltyFolds; ++f) {
+    for (std::size_t other = 0; other < kPenaltyFolds; ++other) {
       if (other != f) {
         grams[f] += own[other];
       }
@@ -247,7 +248,7 @@ Target Adaptation::Impl::TargetOf(const VectorXd& y) const {
   const VectorXd off = y - base;
   std::vector<VectorXd> own;
   VectorXd all = VectorXd::Zero(design.cols());
-  for (std::size_t f = 0; f < kFolds; ++f) {
+  for (std::size_t f = 0; f < kPenaltyFolds; ++f) {
     own.push_back(systems.parts[f].transpose() * off(systems.members[f]));
     all += own.back();
   }
@@ -258,18 +259,18 @@ Target Adaptation::Impl::TargetOf(const VectorXd& y) const {
   return target;
 }
 
-// θ for the rows that `fold` uses (kFolds: all), starting from `theta`.
+// θ for the rows that `fold` uses (kPenaltyFolds: all), starting from `theta`.
 VectorXd Adaptation::Impl::Solve(const Target& target, std::size_t penalty,
                                  std::size_t fold, VectorXd theta) const {
   const Eigen::LLT<MatrixXd>& factor =
-      systems.factors[penalty * (kFolds + 1) + fold];
+      systems.factors[penalty * (kPenaltyFolds + 1) + fold];
   if (!target.censored) {
     return factor.solve(target.scores[fold]);
   }
   const VectorXd& y = target.y;
   const double span = y.maxCoeff() - y.minCoeff();
   VectorXd predicted = Predicted(theta);
-  for (int round = 0; round < kCensoredRounds; ++round) {
+  for (int round = 0; round < kAdaptationRounds; ++round) {
     const VectorXd reached =
         (y.array() >= normal.saturation).select(y.cwiseMax(predicted), y);
     theta = factor.solve(design.transpose() *
@@ -289,7 +290,7 @@ VectorXd Adaptation::Impl::CrossPredict(const Target& target,
                                         std::size_t penalty,
                                         std::vector<VectorXd>& thetas) const {
   VectorXd predicted = base;
-  for (std::size_t f = 0; f < kFolds; ++f) {
+  for (std::size_t f = 0; f < kPenaltyFolds; ++f) {
     thetas[f] = Solve(target, penalty, f, thetas[f]);
     predicted(systems.members[f]) += systems.parts[f] * thetas[f];
   }
@@ -318,7 +319,8 @@ AdaptedModel Adaptation::Fit(const Condition& condition) const {
   double error = kWorthAdapting * MeanSquare(best);
   std::optional<std::size_t> chosen;
   const Target target = impl_->TargetOf(y);
-  std::vector<VectorXd> thetas(kFolds, VectorXd::Zero(impl_->design.cols()));
+  std::vector<VectorXd> thetas(kPenaltyFolds,
+                               VectorXd::Zero(impl_->design.cols()));
   for (std::size_t p = 0; p < kPenalties.size(); ++p) {
     std::vector<double> residuals =
         Residuals(adapted.model, y, impl_->CrossPredict(target, p, thetas));
@@ -330,7 +332,8 @@ AdaptedModel Adaptation::Fit(const Condition& condition) const {
     }
   }
   if (chosen) {
-    AddTo(adapted.model, impl_->Solve(target, *chosen, kFolds, thetas.front()),
+    AddTo(adapted.model,
+          impl_->Solve(target, *chosen, kPenaltyFolds, thetas.front()),
           impl_->scale);
   } else {
     adapted.model = impl_->normal;

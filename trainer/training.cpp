@@ -14,7 +14,7 @@ namespace {
 
 // Shares of the work, for the progress bar.
 constexpr double kStructureShare = 0.3;
-constexpr double kObserverShare = 0.5;
+constexpr double kFitShare = 0.5;
 
 ChannelObserver FitObserver(const ChannelPlan& plan,
                             const ChannelObserver& normal_channel,
@@ -73,10 +73,10 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
     models.observers[o].channels[c] =
         FitObserver(options.channels[c], normal.channels[c], conditions.front(),
                     conditions[o], options.fit);
-    reporter.Tell(kStructureShare + kObserverShare * ++done / fits,
+    reporter.Tell(kStructureShare + kFitShare * ++done / fits,
                   "fitting " + models.observers[o].name);
   });
-  reporter.Tell(kStructureShare + kObserverShare, "setting thresholds");
+  reporter.Tell(kStructureShare + kFitShare, "setting thresholds");
   const NormalResiduals normal_data =
       CrossValidate(conditions.front(), models.observers.front(),
                     options.channels, options.fit, options.threads);

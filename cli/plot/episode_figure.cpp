@@ -18,7 +18,6 @@ namespace {
 using storage::Episode;
 using storage::HistoryEntry;
 
-constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 // Faults with a line of their own colour; others are grey.
 constexpr std::array<const char*, 5> kFaultInks = {
     ink::kVermilion, ink::kBlue, ink::kGreen, ink::kOrange, ink::kSky};

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -26,6 +27,9 @@ inline constexpr const char* kOrange = "#e69f00";
 inline constexpr const char* kSky = "#56b4e9";
 inline constexpr const char* kPurple = "#cc79a7";
 }  // namespace ink
+
+/// A value of a series that is not there: a gap in its line.
+inline constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 enum class Dash { kSolid = 1, kDashed = 2, kDotted = 3, kDashDot = 4 };
 

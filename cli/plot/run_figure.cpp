@@ -15,8 +15,6 @@ namespace {
 using storage::StoredRun;
 using storage::StoredSample;
 
-constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-
 std::vector<double> Readings(const std::vector<StoredSample>& samples,
                              Signal signal) {
   std::vector<double> values;

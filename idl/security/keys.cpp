@@ -23,6 +23,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/records/partitions.h"
+#include "diagnosis/time_units.h"
 
 namespace fdi::idl {
 namespace {
@@ -31,7 +32,6 @@ namespace fs = std::filesystem;
 
 constexpr int kMaxDays = 36500;
 constexpr std::int64_t kDay = 86400;
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::size_t kMaxName = 64;
 constexpr std::size_t kMaxFile = 1U << 20U;
 // Of the other hosts, whose clocks may be behind.

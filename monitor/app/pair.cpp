@@ -41,7 +41,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kTickPeriod{10};
+constexpr milliseconds kElectionPeriod{10};
 constexpr milliseconds kWordPeriod{50};
 constexpr milliseconds kListening{1500};  // Discovery takes some 100 ms.
 constexpr milliseconds kHoldVectors{3000};
@@ -219,7 +219,7 @@ void Pair::Hear(const FaultEvent& event, TimePoint now) {
 
 void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
   const TimePoint now = Clock::now();
-  if (now - ticked_ < kTickPeriod) {
+  if (now - ticked_ < kElectionPeriod) {
     return;
   }
   ticked_ = now;

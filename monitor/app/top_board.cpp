@@ -10,6 +10,7 @@
 #include "cli/time_text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/printable.h"
+#include "diagnosis/time_units.h"
 #include "monitor/console/model_facts.h"
 
 namespace fdi::monitor {
@@ -94,7 +95,6 @@ std::string PairText(const idl::MonitorStatusMessage& status) {
                    " ";
 }
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
 // Lines that are no rows: title, blank, heading, "too narrow", blank, keys.
 constexpr std::size_t kOtherLines = 6;
 
@@ -103,9 +103,10 @@ std::string Title(const TopBoard& board, const TopView& view,
   const auto abnormal = std::ranges::count_if(document["valves"], Abnormal);
   std::string title =
       "fdi-monitor top  " +
-      cli::FormatTime(view.now_ns / kSecondNs * kSecondNs, view.utc) + "  " +
-      std::to_string(board.valves()) + " valves, " + std::to_string(abnormal) +
-      " abnormal, " + std::string(TopSortName(view.sort));
+      cli::FormatTime(view.now_ns / kNsPerSecond * kNsPerSecond, view.utc) +
+      "  " + std::to_string(board.valves()) + " valves, " +
+      std::to_string(abnormal) + " abnormal, " +
+      std::string(TopSortName(view.sort));
   if (!view.filter.empty()) {
     title += ", " + std::to_string(view.rows) + " with '" + view.filter + "'";
   }

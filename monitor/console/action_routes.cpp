@@ -2,6 +2,7 @@
 #include <httplib.h>
 
 #include "diagnosis/error.h"
+#include "diagnosis/time_units.h"
 #include "monitor/console/api.h"
 #include "storage/history/alarm.h"
 #include "storage/history/history_editor.h"
@@ -10,7 +11,6 @@
 namespace fdi::console {
 namespace {
 
-constexpr std::int64_t kNsPerMinute = 60'000'000'000;
 constexpr std::int64_t kMaxMinutes = storage::kLongestShelfNs / kNsPerMinute;
 
 std::string TextOf(const Json& body, const char* key) {

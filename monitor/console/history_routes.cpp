@@ -14,12 +14,12 @@
 #include "cli/time_text.h"
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/time_units.h"
 #include "monitor/console/api.h"
 
 namespace fdi::console {
 namespace {
 
-constexpr std::int64_t kNsPerDay = 86'400'000'000'000;
 constexpr std::int64_t kPageLimit = 1000;
 
 Json Alarms(const Api& api, const httplib::Request& /*request*/) {
@@ -335,7 +335,7 @@ File EpisodePicture(const Api& api, const httplib::Request& request) {
                            {.stop = api.stopping})};
 }
 
-constexpr Route kRoutes[] = {
+constexpr Route kHistoryRoutes[] = {
     {"/api/v1/alarms", Alarms},
     {"/api/v1/history", History},
     {"/api/v1/statistics", Statistics},
@@ -348,7 +348,7 @@ constexpr Route kRoutes[] = {
 }  // namespace
 
 std::span<const Route> HistoryRoutes() {
-  return kRoutes;
+  return kHistoryRoutes;
 }
 
 }  // namespace fdi::console

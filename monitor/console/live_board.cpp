@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/time_units.h"
 #include "monitor/trace.h"
 
 namespace fdi::console {
@@ -15,7 +16,6 @@ constexpr std::size_t kGapsOfValve = 32;
 constexpr std::size_t kGapsWaiting = 256;
 constexpr double kGapPeriods = 3.0;
 constexpr std::size_t kEarlierSources = 3;
-constexpr std::int64_t kDayNs = 86'400'000'000'000;
 constexpr std::int64_t kSparkStepNs = 1'000'000'000;
 
 template <typename T>
@@ -27,7 +27,7 @@ void PushBounded(std::deque<T>& queue, T value, std::size_t limit) {
 }
 
 monitor::Trace EmptyTrace() {
-  return {kTrendInstants, kDayNs, /*keeps_isolated=*/false};
+  return {kTrendInstants, kNsPerDay, /*keeps_isolated=*/false};
 }
 
 }  // namespace

@@ -5,13 +5,13 @@
 #include <httplib.h>
 
 #include "diagnosis/error.h"
+#include "diagnosis/time_units.h"
 #include "monitor/console/api.h"
 
 namespace fdi::console {
 namespace {
 
 constexpr double kStalePeriods = 3.0;
-constexpr std::int64_t kNsPerS = 1'000'000'000;
 constexpr std::chrono::milliseconds kPingPeriod{5000};
 constexpr std::size_t kMaxIdLength = 64;
 
@@ -100,7 +100,7 @@ Json Trend(const Api& api, const httplib::Request& request) {
     throw NotFoundError("valve " + valve_id +
                         " has sent nothing since the monitor started");
   }
-  const std::int64_t since_ns = trend->now.stamp_ns - seconds * kNsPerS;
+  const std::int64_t since_ns = trend->now.stamp_ns - seconds * kNsPerSecond;
   std::erase_if(trend->points, [since_ns](const TracePoint& point) {
     return point.sample.stamp_ns < since_ns;
   });
@@ -128,10 +128,10 @@ Json Faults(const Api& api, const httplib::Request& /*request*/) {
   return cli::FaultTextsJson(api.texts);
 }
 
-constexpr Route kRoutes[] = {{"/api/v1/status", Status},
-                             {"/api/v1/faults", Faults},
-                             {"/api/v1/valves", Valves},
-                             {"/api/v1/valves/(.+)/trend", Trend}};
+constexpr Route kLiveRoutes[] = {{"/api/v1/status", Status},
+                                 {"/api/v1/faults", Faults},
+                                 {"/api/v1/valves", Valves},
+                                 {"/api/v1/valves/(.+)/trend", Trend}};
 
 void Stream(const Api& api, const httplib::Request& request,
             httplib::Response& response) {
@@ -181,7 +181,7 @@ void Stream(const Api& api, const httplib::Request& request,
 }  // namespace
 
 std::span<const Route> LiveRoutes() {
-  return kRoutes;
+  return kLiveRoutes;
 }
 
 void AddStreamRoute(httplib::Server& server, const Api& api) {

@@ -4,14 +4,13 @@
 
 #include <httplib.h>
 
+#include "diagnosis/time_units.h"
 #include "monitor/console/api.h"
 #include "storage/history/health.h"
 
 namespace fdi::console {
 namespace {
 
-constexpr std::int64_t kNsPerDay = 86'400'000'000'000;
-constexpr std::int64_t kNsPerHour = 3'600'000'000'000;
 constexpr std::int64_t kDays = 90;  // Unless since_ms says otherwise.
 constexpr std::int64_t kMostRows = 1000;
 constexpr std::int64_t kCacheNs = 60'000'000'000;
@@ -121,14 +120,15 @@ Json Health(const Api& api, const httplib::Request& request) {
   return json;
 }
 
-constexpr Route kRoutes[] = {{"/api/v1/worklist", WorkList},
-                             {"/api/v1/worklist.csv", nullptr, WorkListCsv},
-                             {"/api/v1/valves/(.+)/health", Health}};
+constexpr Route kPlannerRoutes[] = {
+    {"/api/v1/worklist", WorkList},
+    {"/api/v1/worklist.csv", nullptr, WorkListCsv},
+    {"/api/v1/valves/(.+)/health", Health}};
 
 }  // namespace
 
 std::span<const Route> PlannerRoutes() {
-  return kRoutes;
+  return kPlannerRoutes;
 }
 
 }  // namespace fdi::console

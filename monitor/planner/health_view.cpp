@@ -6,6 +6,7 @@
 
 #include "cli/time_text.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/time_units.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_database.h"
 
@@ -13,10 +14,6 @@ namespace fdi::planner {
 namespace {
 
 using cli::Json;
-
-constexpr std::int64_t kNsPerHour = 3'600'000'000'000;
-constexpr double kMsPerHour = 3.6e6;
-constexpr double kFullStroke = 100.0;  // [%]
 
 Json Hours(std::int64_t ms) {
   return SixDigits(static_cast<double>(ms) / kMsPerHour);
@@ -89,8 +86,9 @@ Json HourJson(const HealthHour& hour) {
             {"open_h", Hours(hour.open_ms)},
             {"shut_h", Hours(hour.shut_ms)},
             {"d0", SixDigits(normal_factor * HealthHour::kShare)},
-            {"travel_strokes", SixDigits(static_cast<double>(hour.travel) *
-                                         HealthHour::kTravel / kFullStroke)},
+            {"travel_strokes",
+             SixDigits(static_cast<double>(hour.travel) * HealthHour::kTravel /
+                       HealthHour::kFullStroke)},
             {"reversals", hour.reversals},
             {"channels", std::move(channels)},
             {"strengths", std::move(strengths)}};

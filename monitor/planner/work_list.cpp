@@ -12,6 +12,7 @@
 #include "cli/time_text.h"
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/time_units.h"
 #include "storage/history/health.h"
 
 namespace fdi::planner {
@@ -20,11 +21,6 @@ namespace {
 using cli::Json;
 using storage::Episode;
 
-constexpr double kNsPerDay = 86'400e9;
-constexpr double kNsPerHour = 3'600e9;
-constexpr std::int64_t kHourNs = 3'600'000'000'000;
-constexpr double kMsPerHour = 3.6e6;
-constexpr double kFullStroke = 100.0;  // [%]
 constexpr double kOtherReasons = 0.25;
 constexpr double kRepetition = 0.1;
 constexpr double kMostRepetition = 2.0;
@@ -196,14 +192,14 @@ void AddHealth(const std::vector<HealthHour>& hours, const WorkQuery& query,
   double live = 0.0;
   for (const HealthHour& hour : hours) {
     if (hour.epoch == hours.back().epoch) {
-      work.travel_strokes +=
-          static_cast<double>(hour.travel) * HealthHour::kTravel / kFullStroke;
+      work.travel_strokes += static_cast<double>(hour.travel) *
+                             HealthHour::kTravel / HealthHour::kFullStroke;
       work.service_hours += static_cast<double>(hour.seen_ms) / kMsPerHour;
       live += static_cast<double>(hour.live_ms) / kMsPerHour;
     }
   }
   work.live_share = work.service_hours > 0.0 ? live / work.service_hours : 0.0;
-  work.last_ns = hours.back().hour * kHourNs;
+  work.last_ns = hours.back().hour * kNsPerHour;
   work.host = hours.back().host;
   work.monitor = hours.back().monitor;
   work.trends = TrendsOf(hours, query.limits);

@@ -6,16 +6,16 @@
 #include <limits>
 
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/time_units.h"
 
 namespace fdi::simulator {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::size_t kBefore = 120;   // rows before the detection
 constexpr std::size_t kLongest = 420;  // rows in all
-constexpr std::size_t kShortest = 20;
-constexpr std::int64_t kEarlyAge = 20 * kSecond;
-constexpr std::int64_t kFirstAge = 40 * kSecond;
+constexpr std::size_t kFewestMeasured = 20;
+constexpr std::int64_t kEarlyAge = 20 * kNsPerSecond;
+constexpr std::int64_t kFirstAge = 40 * kNsPerSecond;
 // None of the hypotheses follows the record: errors of so many healthy ones.
 constexpr double kMostMisfit = 12.0;
 // Nor does no fault, where no fault gains on it.
@@ -24,10 +24,10 @@ constexpr double kMostHealthy = 4.0;
 constexpr double kGoodMisfit = 2.0;
 
 std::int64_t AgeAfter(std::int64_t age_ns) {
-  return age_ns < kFirstAge       ? kFirstAge
-         : age_ns < 150 * kSecond ? 150 * kSecond
-         : age_ns < 300 * kSecond ? 300 * kSecond
-                                  : 10 * age_ns;
+  return age_ns < kFirstAge            ? kFirstAge
+         : age_ns < 150 * kNsPerSecond ? 150 * kNsPerSecond
+         : age_ns < 300 * kNsPerSecond ? 300 * kNsPerSecond
+                                       : 10 * age_ns;
 }
 
 }  // namespace
@@ -144,7 +144,7 @@ std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
 
 EpisodeLooks::EpisodeLooks(const ValvePhysics& physics)
     : physics_(physics),
-      period_ns_(std::llround(physics.drive.period_s * kSecond)) {}
+      period_ns_(std::llround(physics.drive.period_s * kNsPerSecond)) {}
 
 // One row a period; up to three missing ones are held, a longer gap begins
 // anew.
@@ -199,7 +199,7 @@ std::optional<LookTask> EpisodeLooks::Task() const {
   }
   const auto measured = static_cast<std::size_t>(
       std::ranges::count_if(task.window.rows, &RecordRow::x_measured));
-  if (measured < kShortest ||
+  if (measured < kFewestMeasured ||
       task.window.detection + 10 > task.window.rows.size()) {
     return std::nullopt;
   }

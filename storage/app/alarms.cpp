@@ -65,13 +65,14 @@ Report Acknowledge(const AckOptions& options, const Context& context) {
   return report;
 }
 
-struct LabelOptions {
+struct EpisodeLabelOptions {
   std::string id;
   std::string label;
   NoteOptions note;
 };
 
-Report Label(const LabelOptions& options, const Context& context) {
+Report LabelEpisode(const EpisodeLabelOptions& options,
+                    const Context& context) {
   const auto path = DataOf(context).history();
   HistoryReader reader(path);
   HistoryEditor editor(path);
@@ -212,9 +213,9 @@ void AddAlarmVerbs(cli::Program& program, CLI::App& group) {
   acked.filter.AddTo(ack);
   acked.note.AddTo(ack);
 
-  auto [label, labelled] =
-      AddVerb(program, group, "label",
-              "Say what an episode really was, for the next training", Label);
+  auto [label, labelled] = AddVerb(
+      program, group, "label",
+      "Say what an episode really was, for the next training", LabelEpisode);
   AddEpisode(label, labelled.id);
   label
       .add_option("label", labelled.label,

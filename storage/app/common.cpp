@@ -4,6 +4,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/app/verbs.h"
+#include "storage/models/models.h"
 #include "storage/plant/plant_reader.h"
 
 namespace fdi::storage {
@@ -16,6 +17,11 @@ DataDirectory WritableDataOf(const Context& context) {
   const DataDirectory data = DataOf(context);
   EnsureExists(data);
   return data;
+}
+
+ModelStore WritableModels(const Context& context) {
+  return ModelStore(WritableDataOf(context).models(),
+                    Access::kOccasionalWriter);
 }
 
 void EpisodeOptions::AddTo(CLI::App& verb) {

@@ -1,7 +1,5 @@
 // fdi-store history: list, show, export, plot. The other verbs of the group are
 // in figures.cpp and alarms.cpp.
-#include <array>
-#include <charconv>
 #include <map>
 
 #include "cli/csv_cells.h"
@@ -70,7 +68,7 @@ Json ListedJson(const Episode& e) {
   return row;
 }
 
-Report List(const HistoryOptions& options, const Context& context) {
+Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   const auto history = OpenHistory(options.plant, context);
   auto episodes = history->List(options.filter.Filter(context));
   Report report;
@@ -121,7 +119,7 @@ Report List(const HistoryOptions& options, const Context& context) {
 }
 
 // Transitions have faults and a factor, what people did has a who.
-Json EventJson(const HistoryEntry& event) {
+Json HistoryEntryJson(const HistoryEntry& event) {
   const bool by_hand = !event.who.empty();
   return {{"kind", event.kind},
           {"stamp_utc", TimeJson(event.stamp_ns)},
@@ -154,7 +152,7 @@ std::string NoteText(const HistoryEntry& event) {
 
 void AddEvents(const std::vector<HistoryEntry>& events, const Context& context,
                Report& report) {
-  report.document["events"] = Rows(events, EventJson);
+  report.document["events"] = Rows(events, HistoryEntryJson);
   cli::TextTable table({{"event"},
                         {"at"},
                         {"faults"},
@@ -263,7 +261,7 @@ struct ShowOptions {
   PlantOptions plant;
 };
 
-Report Show(const ShowOptions& options, const Context& context) {
+Report ShowEpisode(const ShowOptions& options, const Context& context) {
   const auto history = OpenHistory(options.plant, context);
   const Alarm alarm =
       history->Alarms({history->Show(options.id)}, cli::NowNs()).front();
@@ -295,9 +293,7 @@ std::string CsvNumber(double value) {
   if (std::isnan(value)) {
     return "nan";
   }
-  std::array<char, 64> text{};
-  const auto end = std::to_chars(text.begin(), text.end(), value);
-  return {text.begin(), end.ptr};
+  return cli::NumberText(value);
 }
 
 // Heading of a signal, as in the CSV contract.
@@ -361,15 +357,16 @@ void WriteTrace(const Episode& episode, const std::vector<TracePoint>& trace,
   }
 }
 
-struct ExportOptions {
+struct EpisodeExportOptions {
   std::string id;
   std::string output;
   EpisodeOptions filter;
 };
 
-int Export(const ExportOptions& options, const Context& context) {
+int ExportEpisodes(const EpisodeExportOptions& options,
+                   const Context& context) {
   if (options.id.empty()) {
-    const Report report = List({options.filter, {}}, context);
+    const Report report = ListEpisodes({options.filter, {}}, context);
     cli::WriteOutput(options.output,
                      [&](std::ostream& out) { report.PrintCsv(out); });
   } else {
@@ -389,7 +386,7 @@ struct PlotOptions {
   plot::EpisodeFigureOptions figure;
 };
 
-Report Plot(const PlotOptions& options, const Context& context) {
+Report PlotEpisode(const PlotOptions& options, const Context& context) {
   const DataDirectory data = DataOf(context);
   HistoryReader reader(data.history());
   const plot::EpisodeEvidence evidence =
@@ -413,31 +410,33 @@ Report Plot(const PlotOptions& options, const Context& context) {
 void AddHistoryVerbs(cli::Program& program) {
   CLI::App& group = program.AddGroup(
       "history", "Fault episodes: what happened, how sure, who knows of it");
-  auto [list, list_options] = AddVerb(
-      program, group, "list", "List the episodes, the newest last", List);
+  auto [list, list_options] =
+      AddVerb(program, group, "list", "List the episodes, the newest last",
+              ListEpisodes);
   list_options.AddTo(list);
   program.AllowCsv(list, "The columns of fault_history as CSV");
 
   auto [show, shown] =
       AddVerb(program, group, "show",
-              "Show an episode, what to check, and its events", Show);
+              "Show an episode, what to check, and its events", ShowEpisode);
   AddEpisode(show, shown.id);
   shown.plant.AddTo(show);
   AddHistoryFigures(program, group);
   AddAlarmVerbs(program, group);
 
-  auto exported = std::make_shared<ExportOptions>();
+  auto exported = std::make_shared<EpisodeExportOptions>();
   CLI::App& exporting = program.AddVerb(
       group, "export",
       "Write as CSV the list of episodes, or the trace of one of them",
-      [exported](const Context& c) { return Export(*exported, c); });
+      [exported](const Context& c) { return ExportEpisodes(*exported, c); });
   AddEpisode(exporting, exported->id, false);
   AddOutput(exporting, exported->output);
   exported->filter.AddTo(exporting);
 
-  auto [plot, plotted] = AddVerb(
-      program, group, "plot",
-      "Draw the evidence of an episode for a report, with gnuplot", Plot);
+  auto [plot, plotted] =
+      AddVerb(program, group, "plot",
+              "Draw the evidence of an episode for a report, with gnuplot",
+              PlotEpisode);
   AddEpisode(plot, plotted.id);
   plot.add_option("-o,--output", plotted.output,
                   "FILE.png or FILE.svg (ID.png)");

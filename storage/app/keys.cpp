@@ -2,6 +2,7 @@
 #include "idl/security/keys.h"
 
 #include "diagnosis/error.h"
+#include "diagnosis/time_units.h"
 #include "storage/app/verbs.h"
 
 namespace fdi::storage {
@@ -9,7 +10,6 @@ namespace {
 
 constexpr int kAuthorityDays = 3650;
 constexpr int kKeyDays = 365;
-constexpr double kNsPerDay = 86400e9;
 
 struct KeyOptions {
   std::string folder;
@@ -52,7 +52,7 @@ Report ShowKeys(Json keys) {
   return report;
 }
 
-Report Init(const KeyOptions& options, const Context&) {
+Report InitAuthority(const KeyOptions& options, const Context&) {
   idl::MakeAuthority(options.folder, options.days);
   Report report;
   report.document["folder"] = options.folder;
@@ -62,7 +62,7 @@ Report Init(const KeyOptions& options, const Context&) {
   return report;
 }
 
-Report Add(const KeyOptions& options, const Context&) {
+Report AddKey(const KeyOptions& options, const Context&) {
   const std::optional<idl::Role> role = idl::ParseRole(options.role);
   if (!role) {
     throw ConfigError("--role is '" + options.role + "', accepted are " +
@@ -84,7 +84,7 @@ Report Renew(const KeyOptions& options, const Context&) {
                             options.days, true, key->partitions))}));
 }
 
-Report List(const KeyOptions& options, const Context&) {
+Report ListKeys(const KeyOptions& options, const Context&) {
   return ShowKeys(Rows(idl::ListKeys(options.folder), KeyJson));
 }
 
@@ -100,7 +100,7 @@ void AddName(CLI::App& verb, KeyOptions& options) {
       ->required();
 }
 
-void AddDays(CLI::App& verb, KeyOptions& options) {
+void AddDaysOption(CLI::App& verb, KeyOptions& options) {
   verb.add_option("--days", options.days, "How long it is valid")
       ->capture_default_str();
 }
@@ -111,15 +111,16 @@ void AddKeysVerbs(cli::Program& program) {
   CLI::App& group = program.AddGroup(
       "keys", "Keys of DDS Security, for --security of the other programs");
   {
-    auto [verb, options] = AddVerb(program, group, "init",
-                                   "Make an authority, which signs keys", Init);
+    auto [verb, options] =
+        AddVerb(program, group, "init", "Make an authority, which signs keys",
+                InitAuthority);
     options.days = kAuthorityDays;
     AddFolder(verb, options);
-    AddDays(verb, options);
+    AddDaysOption(verb, options);
   }
   {
     auto [verb, options] = AddVerb(program, group, "add",
-                                   "Make the key of a program or host", Add);
+                                   "Make the key of a program or host", AddKey);
     AddFolder(verb, options);
     AddName(verb, options);
     verb.add_option("--role", options.role,
@@ -129,7 +130,7 @@ void AddKeysVerbs(cli::Program& program) {
     verb.add_option("--partition", options.partitions,
                     "Where a gateway may publish (default: anywhere)")
         ->type_name("NAME[,NAME]");
-    AddDays(verb, options);
+    AddDaysOption(verb, options);
   }
   {
     auto [verb, options] =
@@ -137,11 +138,12 @@ void AddKeysVerbs(cli::Program& program) {
                 "Make a key anew in its folder, with the same rights", Renew);
     AddFolder(verb, options);
     AddName(verb, options);
-    AddDays(verb, options);
+    AddDaysOption(verb, options);
   }
   {
-    auto [verb, options] = AddVerb(
-        program, group, "list", "The keys and how long they are valid", List);
+    auto [verb, options] =
+        AddVerb(program, group, "list", "The keys and how long they are valid",
+                ListKeys);
     AddFolder(verb, options);
   }
 }

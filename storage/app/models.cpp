@@ -14,11 +14,6 @@ namespace {
 using cli::Format;
 using cli::FormatNumber;
 
-ModelStore OpenToChange(const Context& context) {
-  return ModelStore(WritableDataOf(context).models(),
-                    Access::kOccasionalWriter);
-}
-
 Json SummaryJson(const ModelSummary& set) {
   return {{"model_set", set.name},
           {"version", set.version},
@@ -41,7 +36,7 @@ std::string NameText(const ModelSummary& set) {
   return set.name + "@" + std::to_string(set.version);
 }
 
-Report List(const NoOptions&, const Context& context) {
+Report ListModels(const NoOptions&, const Context& context) {
   Report report;
   report.document["model_sets"] =
       Rows(ModelStore(DataOf(context).models()).List(), SummaryJson);
@@ -147,7 +142,7 @@ void AddObservers(const ModelSet& models, Report& report) {
   }
 }
 
-Report Show(const std::string& reference, const Context& context) {
+Report ShowModel(const std::string& reference, const Context& context) {
   ModelStore store(DataOf(context).models());
   const ModelSet models = store.Load(reference);
   const ModelSummary summary = store.Summary({models.name, models.version});
@@ -189,7 +184,7 @@ Report Show(const std::string& reference, const Context& context) {
 }
 
 Report Activate(const std::string& text, const Context& context) {
-  ModelStore store = OpenToChange(context);
+  ModelStore store = WritableModels(context);
   const ModelReference reference = ParseModelReference(text);
   store.Activate(reference);
   const ModelSummary summary = store.Summary({reference.name, std::nullopt});
@@ -198,12 +193,12 @@ Report Activate(const std::string& text, const Context& context) {
   return report.Line(NameText(summary) + " is active");
 }
 
-struct ExportOptions {
+struct ModelExportOptions {
   std::string reference;
   std::string output;
 };
 
-Report Export(const ExportOptions& options, const Context& context) {
+Report ExportModel(const ModelExportOptions& options, const Context& context) {
   ModelStore(DataOf(context).models())
       .ExportFile(ParseModelReference(options.reference), options.output);
   Report report;
@@ -212,16 +207,16 @@ Report Export(const ExportOptions& options, const Context& context) {
   return report.Line(options.reference + " written to " + options.output);
 }
 
-struct ImportOptions {
+struct ModelImportOptions {
   std::string file;
   bool activate{false};
 };
 
-Report Import(const ImportOptions& options, const Context& context) {
+Report ImportModel(const ModelImportOptions& options, const Context& context) {
   if (!std::filesystem::exists(options.file)) {
     throw NotFoundError("no file " + options.file);
   }
-  ModelStore store = OpenToChange(context);
+  ModelStore store = WritableModels(context);
   const ModelSet models =
       store.ImportFile(options.file, options.activate ? Activation::kAlways
                                                       : Activation::kIfFirst);
@@ -260,7 +255,7 @@ Report ShowType(const std::string& name, const Context& context) {
 }
 
 Report DeleteType(const std::string& name, const Context& context) {
-  OpenToChange(context).DeleteTemplate(name);
+  WritableModels(context).DeleteTemplate(name);
   Report report;
   report.document["deleted"] = name;
   return report.Line(name + " deleted");
@@ -270,18 +265,19 @@ Report DeleteType(const std::string& name, const Context& context) {
 
 void AddModelsVerbs(cli::Program& program) {
   CLI::App& group = program.AddGroup("models", "Trained model sets");
-  AddVerb(program, group, "list", "List the model sets", List);
+  AddVerb(program, group, "list", "List the model sets", ListModels);
 
-  auto [show, shown] = AddVerb(program, group, "show",
-                               "Show a model set with its validation", Show);
+  auto [show, shown] =
+      AddVerb(program, group, "show", "Show a model set with its validation",
+              ShowModel);
   show.add_option("model-set", shown, "NAME[@VERSION]")->required();
 
   auto [activate, activated] = AddVerb(
       program, group, "activate", "Let a version answer to the name", Activate);
   activate.add_option("model-set", activated, "NAME@VERSION")->required();
 
-  auto [exporting, exported] =
-      AddVerb(program, group, "export", "Write a model set to a file", Export);
+  auto [exporting, exported] = AddVerb(
+      program, group, "export", "Write a model set to a file", ExportModel);
   exporting.add_option("model-set", exported.reference, "NAME[@VERSION]")
       ->required();
   exporting.add_option("-o,--output", exported.output, "File to make")
@@ -289,7 +285,7 @@ void AddModelsVerbs(cli::Program& program) {
 
   auto [importing, imported] =
       AddVerb(program, group, "import",
-              "Store a file as the next version of its model set", Import);
+              "Store a file as the next version of its model set", ImportModel);
   importing.add_option("file", imported.file, "File that export wrote")
       ->required();
   importing.add_flag("--activate", imported.activate,

@@ -10,6 +10,7 @@
 #include "cli/text_table.h"
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/time_units.h"
 #include "storage/app/verbs.h"
 
 namespace fdi::storage {
@@ -85,7 +86,7 @@ std::string TruthText(const Json& run) {
   return labels.size() > 1 ? text + ", ..." : text;
 }
 
-Report List(const ListOptions& options, const Context& context) {
+Report ListRuns(const ListOptions& options, const Context& context) {
   RunFilter filter;
   filter.valve_glob = options.valve;
   filter.origin = OriginOf(options.origin);
@@ -124,7 +125,7 @@ std::string LabelText(const RunLabel& label) {
                                     : "end");
 }
 
-Report Show(const std::string& id, const Context& context) {
+Report ShowRun(const std::string& id, const Context& context) {
   const RunInfo info = RunStore(DataOf(context).runs()).Info(id);
   Report report;
   report.document = RunJson(info);
@@ -154,7 +155,7 @@ Report Show(const std::string& id, const Context& context) {
   return report;
 }
 
-struct ImportOptions {
+struct RunImportOptions {
   std::string file;
   std::string valve;
   cli::TableOptions table;
@@ -170,11 +171,10 @@ std::uint64_t RandomSource() {
   return (std::uint64_t{device()} << 32U) | device();
 }
 
-Report Import(const ImportOptions& options, const Context& context) {
-  constexpr std::int64_t kSecond = 1'000'000'000;
+Report ImportRuns(const RunImportOptions& options, const Context& context) {
   const std::int64_t start_ns =
       options.start.empty()
-          ? cli::NowNs() / kSecond * kSecond
+          ? cli::NowNs() / kNsPerSecond * kNsPerSecond
           : cli::ParseTime(options.start, context.options.utc);
   const cli::CsvTable table = cli::ReadCsvFile(
       options.file, {.map = options.table.Read(context.options.utc),
@@ -229,7 +229,7 @@ struct FileOptions {
   std::string output;
 };
 
-int Export(const FileOptions& options, const Context& context) {
+int ExportRun(const FileOptions& options, const Context& context) {
   const StoredRun run = RunStore(DataOf(context).runs()).Load(options.selector);
   std::vector<LabelledSample> samples;
   for (const StoredSample& stored : run.samples) {
@@ -247,14 +247,14 @@ int Export(const FileOptions& options, const Context& context) {
   return cli::kExitOk;
 }
 
-struct LabelOptions {
+struct RunLabelOptions {
   std::string run;
   std::string fault;
   double strength{1.0};
   bool remove{false};
 };
 
-Report Label(const LabelOptions& options, const Context& context) {
+Report LabelRun(const RunLabelOptions& options, const Context& context) {
   RunStore store(DataOf(context).runs(), Access::kOccasionalWriter);
   Report report;
   if (options.remove) {
@@ -287,7 +287,7 @@ Report Delete(const std::vector<std::string>& ids, const Context& context) {
   return report;
 }
 
-Report Plot(const FileOptions& options, const Context& context) {
+Report PlotRun(const FileOptions& options, const Context& context) {
   const StoredRun run = RunStore(DataOf(context).runs()).Load(options.selector);
   const std::filesystem::path path =
       options.output.empty() ? run.info.id + ".png" : options.output;
@@ -304,7 +304,7 @@ Report Plot(const FileOptions& options, const Context& context) {
 void AddImport(cli::Program& program, CLI::App& group) {
   auto [verb, options] =
       AddVerb(program, group, "import",
-              "Store a CSV file as a run; all of it or nothing", Import);
+              "Store a CSV file as a run; all of it or nothing", ImportRuns);
   verb.add_option("file", options.file, "CSV file, or - for stdin")->required();
   verb.add_option("--valve", options.valve, "Id of the valve")->required();
   options.table.AddTo(verb);
@@ -326,13 +326,13 @@ void AddRunsVerbs(cli::Program& program) {
   constexpr const char* kSelector = "ID or last, or ID@from:to in s";
   CLI::App& group = program.AddGroup("runs", "Stored runs");
   auto [list, list_options] =
-      AddVerb(program, group, "list", "List the runs", List);
+      AddVerb(program, group, "list", "List the runs", ListRuns);
   list.add_option("--valve", list_options.valve, "Glob over valve ids");
   list.add_option("--origin", list_options.origin,
                   "simulated, imported or recorded");
   list_options.window.AddTo(list);
 
-  auto [show, id] = AddVerb(program, group, "show", "Show one run", Show);
+  auto [show, id] = AddVerb(program, group, "show", "Show one run", ShowRun);
   show.add_option("run", id, "ID or a unique beginning of it")->required();
 
   AddSniffVerb(program, group);
@@ -341,13 +341,13 @@ void AddRunsVerbs(cli::Program& program) {
   auto exported = std::make_shared<FileOptions>();
   CLI::App& exporting = program.AddVerb(
       group, "export", "Write a run, or a stretch of it, as CSV",
-      [exported](const Context& c) { return Export(*exported, c); });
+      [exported](const Context& c) { return ExportRun(*exported, c); });
   exporting.add_option("run", exported->selector, kSelector)->required();
   AddOutput(exporting, exported->output);
 
   auto [label, label_options] =
       AddVerb(program, group, "label",
-              "Say what was true in a run, or a stretch of it", Label);
+              "Say what was true in a run, or a stretch of it", LabelRun);
   label.add_option("run", label_options.run, kSelector)->required();
   label.add_option("fault", label_options.fault,
                    "normal or " + std::string(kFaultNames));
@@ -364,7 +364,7 @@ void AddRunsVerbs(cli::Program& program) {
   auto [plot, plotted] = AddVerb(
       program, group, "plot",
       "Draw the signals and the truth of a run for a report, with gnuplot",
-      Plot);
+      PlotRun);
   plot.add_option("run", plotted.selector, kSelector)->required();
   plot.add_option("-o,--output", plotted.output,
                   "FILE.png or FILE.svg (ID.png)");

@@ -35,7 +35,7 @@ std::string HostName() {
                                                         : "localhost";
 }
 
-Report Init(const ShipOptions& options) {
+Report InitPlant(const ShipOptions& options) {
   const PlantDatabase plant = PlantDatabase::Init(options.url);
   Report report;
   report.document = {{"plant", plant.name()}, {"plant_id", plant.plant_id()}};
@@ -162,7 +162,7 @@ Report Ship(const ShipOptions& given, const Context& context) {
     throw ConfigError("ship: say where to: --to postgresql://user@host/plant");
   }
   if (options.init) {
-    return Init(options);
+    return InitPlant(options);
   }
   if (options.prune) {
     return PruneThere(options);

@@ -16,7 +16,7 @@ namespace fdi::storage {
 namespace {
 
 // A column, or a tag of a long table.
-struct Column {
+struct SniffedColumn {
   std::string name;
   std::vector<double> times_s;
   std::vector<double> values;
@@ -47,7 +47,7 @@ struct Sniffed {
   std::string date{};  // Of [time]
   bool dated{false};
   std::string time_guess{};
-  std::vector<Column> columns;
+  std::vector<SniffedColumn> columns;
   std::string resample{};
   double period_s{0.0};
   double jitter_s{0.0};
@@ -179,7 +179,7 @@ std::optional<Signal> SignalOfName(const std::string& name) {
   }
 }
 
-void GuessUnit(Column& column) {
+void GuessUnit(SniffedColumn& column) {
   column.unit = UnitInName(*column.signal, column.name);
   if (!column.unit.empty()) {
     return;
@@ -207,7 +207,7 @@ void GuessUnit(Column& column) {
 }
 
 // Of b with a as it was 0, 1 or 2 periods before, the strongest.
-double Correlation(const Column& a, const Column& b) {
+double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
   std::map<double, double> at;
   for (std::size_t k = 0; k < a.values.size(); ++k) {
     at[a.times_s[k]] = a.values[k];
@@ -231,16 +231,16 @@ double Correlation(const Column& a, const Column& b) {
 }
 
 // The signals by name, one column each, then units and senses.
-void GuessSignals(std::vector<Column>& columns) {
-  for (Column& column : columns) {
+void GuessSignals(std::vector<SniffedColumn>& columns) {
+  for (SniffedColumn& column : columns) {
     if (column.values.empty() || column.words > column.values.size()) {
       continue;
     }
     column.signal = SignalOfName(column.name);
   }
   const auto of = [&](Signal signal) {
-    std::vector<Column*> found;
-    for (Column& column : columns) {
+    std::vector<SniffedColumn*> found;
+    for (SniffedColumn& column : columns) {
       if (column.signal == signal) {
         found.push_back(&column);
       }
@@ -249,19 +249,19 @@ void GuessSignals(std::vector<Column>& columns) {
   };
   // What flows from 1 to 2 loses pressure. A P2 that says so in its name, as in
   // the contract, keeps it.
-  std::vector<Column*> pressures = of(Signal::kP1);
+  std::vector<SniffedColumn*> pressures = of(Signal::kP1);
   if (pressures.size() == 2 && of(Signal::kP2).empty()) {
-    Column* low = pressures[0]->Median() < pressures[1]->Median()
-                      ? pressures[0]
-                      : pressures[1];
+    SniffedColumn* low = pressures[0]->Median() < pressures[1]->Median()
+                             ? pressures[0]
+                             : pressures[1];
     low->signal = Signal::kP2;
-    for (Column* column : pressures) {
+    for (SniffedColumn* column : pressures) {
       column->guessed += "P1 is the higher pressure; ";
     }
   }
   for (std::size_t i = 0; i < kSignalCount; ++i) {
     const auto signal = static_cast<Signal>(i);
-    const std::vector<Column*> found = of(signal);
+    const std::vector<SniffedColumn*> found = of(signal);
     for (std::size_t k = 1; k < found.size(); ++k) {
       found[k]->signal.reset();
       found[k]->guessed = "another " + std::string(SignalName(signal)) + "?";
@@ -274,9 +274,9 @@ void GuessSignals(std::vector<Column>& columns) {
   // command.
   const auto flow = of(Signal::kF);
   const auto cv = of(Signal::kCv);
-  std::vector<Column*> moving = of(Signal::kX);
+  std::vector<SniffedColumn*> moving = of(Signal::kX);
   moving.insert(moving.end(), cv.begin(), cv.end());
-  for (Column* column : moving) {
+  for (SniffedColumn* column : moving) {
     const bool led = column != moving.front();
     const double r = led            ? Correlation(*column, *moving.front())
                      : flow.empty() ? 0.0
@@ -288,7 +288,7 @@ void GuessSignals(std::vector<Column>& columns) {
                        : r < -0.3 ? "closing: the flow falls with it; "
                                   : "sense cannot be told from the flow; ";
   }
-  for (Column& column : columns) {
+  for (SniffedColumn& column : columns) {
     if (column.guessed.ends_with("; ")) {
       column.guessed.resize(column.guessed.size() - 2);
     }
@@ -398,7 +398,7 @@ std::optional<std::size_t> FindTime(const std::vector<Cells>& rows,
 }
 
 void AddCell(const std::string& cell, double t_s, char decimal,
-             Column& column) {
+             SniffedColumn& column) {
   ++column.cells;
   if (cli::IsNoReading(cell)) {
     ++column.missing;
@@ -416,19 +416,20 @@ void AddCell(const std::string& cell, double t_s, char decimal,
 // A table with a column of few names beside one of values is long.
 void FindTags(const std::vector<Cells>& rows, const std::vector<double>& times,
               Sniffed& found) {
-  std::vector<Column>& columns = found.columns;
-  const auto tag = std::ranges::find_if(columns, [&](const Column& c) {
+  std::vector<SniffedColumn>& columns = found.columns;
+  const auto tag = std::ranges::find_if(columns, [&](const SniffedColumn& c) {
     return c.words == c.cells && c.texts.size() >= 2 && c.texts.size() < 500 &&
            c.texts.size() * 10 < c.cells && columns.size() <= 4;
   });
-  const auto value = std::ranges::find_if(
-      columns, [](const Column& c) { return c.values.size() * 2 > c.cells; });
+  const auto value = std::ranges::find_if(columns, [](const SniffedColumn& c) {
+    return c.values.size() * 2 > c.cells;
+  });
   if (tag == columns.end() || value == columns.end()) {
     return;
   }
   const Cells& header = rows.front();
   cli::LongTable tall{tag->name, value->name, "", {}};
-  for (const Column& column : columns) {
+  for (const SniffedColumn& column : columns) {
     const std::string name = Lower(column.name);
     if (column.name != tall.tag && column.name != tall.value &&
         (Has(name, {"qual", "stat"}) || column.texts.contains("Good"))) {
@@ -441,10 +442,10 @@ void FindTags(const std::vector<Cells>& rows, const std::vector<double>& times,
   };
   const std::size_t tag_at = at(tall.tag);
   const std::size_t value_at = at(tall.value);
-  std::map<std::string, Column> tags;
+  std::map<std::string, SniffedColumn> tags;
   for (std::size_t r = 1; r < rows.size(); ++r) {
     if (rows[r].size() == header.size()) {
-      Column& column = tags[rows[r][tag_at]];
+      SniffedColumn& column = tags[rows[r][tag_at]];
       column.name = rows[r][tag_at];
       AddCell(rows[r][value_at], times[r], found.map.decimal, column);
     }
@@ -473,7 +474,7 @@ void JudgeTiming(Sniffed& found) {
   times.erase(std::unique(times.begin(), times.end()), times.end());
   found.period_s = Rounded(MedianStep(times));
   std::size_t missing = 0;
-  for (const Column& column : found.columns) {
+  for (const SniffedColumn& column : found.columns) {
     missing += column.signal ? column.missing : 0;
     const double usual = MedianStep(column.times_s);
     std::size_t odd = 0;
@@ -602,7 +603,7 @@ std::string MapText(const Sniffed& found, const std::string& file) {
       text += "quality = " + TomlText(tall.quality) + "\n";
     }
   }
-  for (const Column& column : found.columns) {
+  for (const SniffedColumn& column : found.columns) {
     if (!column.signal) {
       continue;
     }
@@ -623,7 +624,7 @@ struct SniffOptions {
   std::string output;
 };
 
-Json ColumnJson(const Column& column) {
+Json ColumnJson(const SniffedColumn& column) {
   const bool numbers = !column.values.empty();
   return {{"column", column.name},
           {"signal", column.signal ? Json(SignalName(*column.signal)) : Json()},

@@ -17,11 +17,6 @@ namespace {
 using cli::Align;
 using cli::Format;
 
-ModelStore OpenToChange(const Context& context) {
-  return ModelStore(WritableDataOf(context).models(),
-                    Access::kOccasionalWriter);
-}
-
 Json SetJson(const std::optional<ModelReference>& reference) {
   return reference ? Json(ToString(*reference)) : Json();
 }
@@ -40,7 +35,7 @@ Json EntryJson(const ValveEntry& entry) {
           {"model_set", SetJson(entry.model_set)}};
 }
 
-Report List(const NoOptions&, const Context& context) {
+Report ListValves(const NoOptions&, const Context& context) {
   Report report;
   report.document["valves"] =
       Rows(ModelStore(DataOf(context).models()).Valves(), EntryJson);
@@ -55,7 +50,7 @@ Report List(const NoOptions&, const Context& context) {
                                  {"model set", "model_set"}});
 }
 
-Json EventJson(const ValveEvent& event) {
+Json ValveEventJson(const ValveEvent& event) {
   return {{"epoch", event.epoch},
           {"kind", ValveEventKindName(event.kind)},
           {"at_utc", TimeJson(event.at_ns)},
@@ -166,7 +161,7 @@ void AddEntry(ModelStore& store, const ValveEntry& entry,
   report.Fields("", std::move(fields));
   const auto events = store.ValveEvents(entry.pattern);
   const auto baselines = store.Baselines(entry.pattern);
-  report.document["events"] = Rows(events, EventJson);
+  report.document["events"] = Rows(events, ValveEventJson);
   report.document["baselines"] = Rows(baselines, BaselineJson);
   if (!events.empty()) {
     report.Line("").Table("events", {{"epoch", "epoch"},
@@ -179,7 +174,7 @@ void AddEntry(ModelStore& store, const ValveEntry& entry,
 }
 
 // What counts for one valve: the entry that matches it and the set it gets.
-Report Show(const std::string& valve_id, const Context& context) {
+Report ShowValve(const std::string& valve_id, const Context& context) {
   ModelStore store(DataOf(context).models());
   const auto entry = store.FindValve(valve_id);
   const auto assigned = store.AssignedModelSet(valve_id);
@@ -227,7 +222,7 @@ struct AddOptions {
   std::uint32_t epoch{0};
 };
 
-Report Add(const AddOptions& options, const Context& context) {
+Report AddValves(const AddOptions& options, const Context& context) {
   ValveEntry entry;
   entry.pattern = options.pattern;
   entry.type = options.type;
@@ -236,7 +231,7 @@ Report Add(const AddOptions& options, const Context& context) {
   entry.signals = cli::ParseSignals(options.signals);
   entry.period_s = options.period_s;
   entry.epoch = options.epoch;
-  ModelStore store = OpenToChange(context);
+  ModelStore store = WritableModels(context);
   if (!options.model_set.empty()) {
     entry.model_set = ParseModelReference(options.model_set);
     store.Summary(*entry.model_set);  // It must exist.
@@ -251,7 +246,7 @@ struct AssignOptions {
 };
 
 Report Assign(const AssignOptions& options, const Context& context) {
-  ModelStore store = OpenToChange(context);
+  ModelStore store = WritableModels(context);
   store.AssignModelSet(options.pattern,
                        options.set == "none"
                            ? std::nullopt
@@ -281,11 +276,11 @@ Report Event(const EventOptions& options, const Context& context) {
   event.at_ns =
       options.at.empty() ? cli::NowNs() : cli::ParseTime(options.at, true);
   event.who = options.who;
-  return Changed(OpenToChange(context).AddValveEvent(options.pattern, event));
+  return Changed(WritableModels(context).AddValveEvent(options.pattern, event));
 }
 
 Report Remove(const std::string& pattern, const Context& context) {
-  OpenToChange(context).RemoveValve(pattern);
+  WritableModels(context).RemoveValve(pattern);
   Report report;
   report.document["removed"] = pattern;
   return report.Line(pattern + " removed");
@@ -387,7 +382,7 @@ void AddMove(cli::Program& program, CLI::App& group) {
 void AddAdd(cli::Program& program, CLI::App& group) {
   auto [verb, options] =
       AddVerb(program, group, "add",
-              "Describe a valve, or all whose id matches a glob", Add);
+              "Describe a valve, or all whose id matches a glob", AddValves);
   verb.add_option("valve", options.pattern, "Id or glob")->required();
   verb.add_option("--type", options.type, "Free text");
   verb.add_option("--flow-unit", options.flow_unit, "m3/h or t/h")
@@ -423,10 +418,11 @@ void AddEvent(cli::Program& program, CLI::App& group) {
 
 void AddValvesVerbs(cli::Program& program) {
   CLI::App& group = program.AddGroup("valves", "Valves and their model sets");
-  AddVerb(program, group, "list", "List the entries, first match first", List);
+  AddVerb(program, group, "list", "List the entries, first match first",
+          ListValves);
   auto [show, shown] =
       AddVerb(program, group, "show",
-              "Show which entry and model set a valve gets", Show);
+              "Show which entry and model set a valve gets", ShowValve);
   show.add_option("valve", shown, "Id, or the glob of an entry")->required();
   AddAdd(program, group);
   auto [assign, assigned] =

@@ -26,6 +26,8 @@
 /// the document of a Report, and declares which of its members people see.
 namespace fdi::storage {
 
+class ModelStore;
+
 using cli::Context;
 using cli::Json;
 using cli::Report;
@@ -75,6 +77,8 @@ std::pair<CLI::App&, Options&> AddVerb(cli::Program& program, CLI::App& group,
 DataDirectory DataOf(const Context& context);
 /// --data, made if it is not there; for verbs that write.
 DataDirectory WritableDataOf(const Context& context);
+/// The models in it, to change.
+ModelStore WritableModels(const Context& context);
 
 /// The options that narrow a list of episodes.
 struct EpisodeOptions {

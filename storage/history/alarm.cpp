@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <map>
 
+#include "diagnosis/time_units.h"
 #include "storage/database/record.h"
 #include "storage/history/sql.h"
 
 namespace fdi::storage {
 namespace {
-
-constexpr std::int64_t kDayNs = 86'400'000'000'000;
 
 std::int64_t Nanoseconds(double seconds) {
   return static_cast<std::int64_t>(seconds * 1e9);
@@ -26,8 +25,8 @@ struct Stretch {
 
 void AddDays(const Stretch& stretch, std::map<std::int64_t, DayAlarms>& days) {
   for (std::int64_t from = stretch.from_ns; from < stretch.to_ns;) {
-    const std::int64_t day = from / kDayNs;
-    const std::int64_t to = std::min(stretch.to_ns, (day + 1) * kDayNs);
+    const std::int64_t day = from / kNsPerDay;
+    const std::int64_t to = std::min(stretch.to_ns, (day + 1) * kNsPerDay);
     days[day].alarm_s += static_cast<double>(to - from) * 1e-9;
     from = to;
   }
@@ -192,7 +191,7 @@ AlarmStatistics ComputeAlarmStatistics(const std::vector<AlarmSpan>& spans,
     }
     ++valve.episodes;
     valve.last_detected_ns = std::max(valve.last_detected_ns, span.detected_ns);
-    ++days[span.detected_ns / kDayNs].episodes;
+    ++days[span.detected_ns / kNsPerDay].episodes;
     AddLabel(span, statistics);
     by_valve[span.valve_id].push_back(span.detected_ns);
     all.push_back(span.detected_ns);

@@ -4,6 +4,7 @@
 
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/model_set.h"
+#include "diagnosis/time_units.h"
 #include "storage/database/bytes.h"
 #include "storage/history/sql.h"
 
@@ -110,8 +111,6 @@ void ForEachNumber(Hour& hour, Visit visit) {
   visit(hour.reversals);
 }
 
-constexpr std::int64_t kHourNs = 3'600'000'000'000;
-
 HealthHour Unpacked(const Statement& row, int column, HealthHour hour) {
   hour.live_ms = row.Int64(column);
   UnpackHealth(row.Blob(column + 1), hour);
@@ -198,7 +197,7 @@ void StoreHealth(Database& database, std::span<const HealthHour> hours) {
 }
 
 std::int64_t HourFrom(std::int64_t stamp_ns) {
-  return stamp_ns / kHourNs + (stamp_ns % kHourNs > 0 ? 1 : 0);
+  return stamp_ns / kNsPerHour + (stamp_ns % kNsPerHour > 0 ? 1 : 0);
 }
 
 std::vector<HealthHour> ReadHealth(Database& database,

@@ -4,6 +4,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/time_units.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
 #include "storage/history/look.h"
@@ -14,7 +15,6 @@ namespace fdi::storage {
 namespace sql = history_sql;
 namespace {
 
-constexpr std::int64_t kDayNs = 86'400'000'000'000;
 constexpr const char* kUnknown = "unknown";
 
 bool IsExact(const EpisodeFilter& filter) {
@@ -238,8 +238,8 @@ std::vector<DataGap> HistoryReader::Gaps(const EpisodeFilter& filter) {
 
 std::vector<CoverageTime> HistoryReader::Coverage(const EpisodeFilter& filter) {
   Statement rows = database_.Prepare(sql::coverage);
-  rows.Bind(filter.valve_glob, filter.since_ns / kDayNs,
-            filter.until_ns / kDayNs);
+  rows.Bind(filter.valve_glob, filter.since_ns / kNsPerDay,
+            filter.until_ns / kNsPerDay);
   return ReadRecords<CoverageTime>(rows);
 }
 

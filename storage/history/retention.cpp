@@ -6,6 +6,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "diagnosis/time_units.h"
 #include "storage/history/health.h"
 #include "storage/history/history_database.h"
 #include "storage/history/sql.h"
@@ -132,8 +133,6 @@ class Pruner {
   PruneResult result_;
 };
 
-constexpr std::int64_t kHourNs = 3'600'000'000'000;
-
 // Counts what is older than `hour` into `result`. @returns its bytes.
 std::uintmax_t CountHealth(Database& database, const std::string& valve,
                            std::int64_t hour, PruneResult& result) {
@@ -142,8 +141,8 @@ std::uintmax_t CountHealth(Database& database, const std::string& valve,
     return 0;
   }
   result.deleted += row.Int64(0);
-  const std::int64_t from_ns = row.Int64(1) * kHourNs;
-  const std::int64_t to_ns = row.Int64(2) * kHourNs;
+  const std::int64_t from_ns = row.Int64(1) * kNsPerHour;
+  const std::int64_t to_ns = row.Int64(2) * kNsPerHour;
   result.from_ns = std::min(result.from_ns.value_or(from_ns), from_ns);
   result.to_ns = std::max(result.to_ns.value_or(to_ns), to_ns);
   return row.Uint64(3);
@@ -178,7 +177,8 @@ PruneResult PruneHealth(const std::filesystem::path& path,
   PruneResult result;
   result.bytes_before = database.UsedBytes();
   std::uintmax_t gone = 0;
-  const std::int64_t hour = limits.before_ns ? *limits.before_ns / kHourNs : 0;
+  const std::int64_t hour =
+      limits.before_ns ? *limits.before_ns / kNsPerHour : 0;
   for (const std::string& valve : HealthValves(database, "*")) {
     const std::uintmax_t bytes = CountHealth(database, valve, hour, result);
     gone += bytes;

@@ -10,6 +10,7 @@
 #include "cli/tag_map.h"
 #include "cli/time_text.h"
 #include "diagnosis/error.h"
+#include "diagnosis/time_units.h"
 #include "simulator/app/scenario_toml.h"
 #include "storage/database/data_directory.h"
 #include "storage/runs/run_recorder.h"
@@ -80,7 +81,6 @@ storage::StoredRun LoadRun(const InjectOptions& options, SignalMask signals,
 // Returns the id of the new run.
 std::string Store(const InjectedRun& injected, const InjectOptions& options,
                   const cli::Context& context) {
-  constexpr std::int64_t kSecond = 1'000'000'000;
   const storage::DataDirectory directory{context.options.data_dir};
   storage::NewRun row = injected.run.info.run;
   row.valve_id = options.valve.empty() ? row.valve_id : options.valve;
@@ -89,7 +89,7 @@ std::string Store(const InjectedRun& injected, const InjectOptions& options,
   }
   // A file whose times have no date becomes a record that starts now.
   const std::int64_t shift =
-      row.start_ns != 0 ? 0 : cli::NowNs() / kSecond * kSecond;
+      row.start_ns != 0 ? 0 : cli::NowNs() / kNsPerSecond * kNsPerSecond;
   row.start_ns = injected.run.samples.front().sample.stamp_ns + shift;
   row.origin = storage::RunOrigin::kImported;
   row.scenario = injected.source + " with " + Joined(injected.faults);

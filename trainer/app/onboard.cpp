@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -8,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/csv_cells.h"
 #include "cli/program.h"
 #include "cli/progress.h"
 #include "cli/report.h"
@@ -68,11 +68,6 @@ struct OnboardOptions : TypeOptions {
   bool gains{false};
 };
 
-std::string Shortest(double value) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
-}
-
 struct FoundType {
   ValveType type;
   bool stored{false};       // In models.db: made for this type, taken as it is.
@@ -89,9 +84,10 @@ std::string TypeText(const ValveType& type, const std::string& model_set) {
   scenario.config.excitation = simulator::SineExcitation{};
   scenario.config.continuous_inputs = type.interpolated_command;
   const simulator::InputRow& levels = type.levels;
-  return "levels = [" + Shortest(levels.cv_pct) + ", " +
-         Shortest(levels.p1_kpa) + ", " + Shortest(levels.p2_kpa) + ", " +
-         Shortest(levels.t1_degc) +
+  return "levels = [" + cli::NumberText(levels.cv_pct) + ", " +
+         cli::NumberText(levels.p1_kpa) + ", " +
+         cli::NumberText(levels.p2_kpa) + ", " +
+         cli::NumberText(levels.t1_degc) +
          "]\ncommand_delay = " + std::to_string(type.command_delay) +
          "\nmodel_set = \"" + model_set + "\"\n" + ScenarioText(scenario);
 }
@@ -150,7 +146,7 @@ void SaveType(const ValveType& type, const std::string& model_set,
   const std::string text = TypeText(type, model_set);
   store.SaveTemplate(type.name, std::as_bytes(std::span(text)),
                      type.parameters.name + ", Kv " +
-                         Shortest(type.parameters.trim.kv_m3_h) +
+                         cli::NumberText(type.parameters.trim.kv_m3_h) +
                          " m3/h, command " +
                          (type.interpolated_command ? "interpolated" : "held"));
 }

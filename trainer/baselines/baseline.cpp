@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "trainer/calibration.h"
 #include "trainer/regression.h"
 
@@ -330,8 +331,7 @@ void FillTable(const std::vector<Condition>& conditions, Baseline& baseline) {
       continue;
     }
     std::vector<int>& faults = baseline.table[signature];
-    if (std::find(faults.begin(), faults.end(), condition.fault) ==
-        faults.end()) {
+    if (!Contains(faults, condition.fault)) {
       faults.push_back(condition.fault);
       std::sort(faults.begin(), faults.end());
     }

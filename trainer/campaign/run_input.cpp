@@ -1,19 +1,13 @@
 #include "trainer/campaign/run_input.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <map>
 
+#include "cli/csv_cells.h"
+
 namespace fdi::trainer {
 namespace {
-
-std::string Shortest(double value) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), end.ptr};
-}
 
 // The signals that most accepted samples have: a transmitter that failed for a
 // while costs those samples, not the signal.
@@ -56,7 +50,7 @@ std::string SelectorOf(const std::string& id,
     return id;
   }
   const auto bound = [](double seconds) {
-    return std::isfinite(seconds) ? Shortest(seconds) : std::string();
+    return std::isfinite(seconds) ? cli::NumberText(seconds) : std::string();
   };
   return id + '@' + bound(part.from_s) + ':' + bound(part.to_s);
 }

@@ -26,12 +26,12 @@ using std::filesystem::path;
 
 // Work orders.
 
-enum Column : std::size_t { kValve, kTime, kFound };
+enum OrderColumn : std::size_t { kOrderValve, kOrderTime, kOrderFound };
 
 std::int64_t TimeOf(const CsvRows& rows, std::size_t row) {
-  const std::string& cell = rows.Cell(row, kTime);
+  const std::string& cell = rows.Cell(row, kOrderTime);
   if (cell.find_first_not_of("0123456789.") == std::string::npos) {
-    return std::llround(rows.Number(row, kTime) * 1e9);
+    return std::llround(rows.Number(row, kOrderTime) * 1e9);
   }
   try {
     return cli::ParseTime(cell, true);
@@ -41,7 +41,7 @@ std::int64_t TimeOf(const CsvRows& rows, std::size_t row) {
 }
 
 int FoundOf(const CsvRows& rows, std::size_t row) {
-  const std::string& cell = rows.Cell(row, kFound);
+  const std::string& cell = rows.Cell(row, kOrderFound);
   if (cell == "nothing") {
     return 0;
   }
@@ -359,10 +359,11 @@ std::vector<WorkOrder> ReadWorkOrders(const std::filesystem::path& file) {
   const CsvRows rows(file, {"valve", "time", "found"});
   std::vector<WorkOrder> orders;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows.Cell(i, kValve).empty()) {
+    if (rows.Cell(i, kOrderValve).empty()) {
       rows.Refuse(i, "the valve is missing");
     }
-    orders.push_back({rows.Cell(i, kValve), TimeOf(rows, i), FoundOf(rows, i)});
+    orders.push_back(
+        {rows.Cell(i, kOrderValve), TimeOf(rows, i), FoundOf(rows, i)});
   }
   std::sort(
       orders.begin(), orders.end(), [](const WorkOrder& a, const WorkOrder& b) {

@@ -148,7 +148,11 @@ std::string SignatureTable(const Baseline& baseline) {
 }
 
 // Columns of a file of verdicts.
-enum Column : std::size_t { kTime, kDetected, kFaults };
+enum VerdictColumn : std::size_t {
+  kVerdictTime,
+  kVerdictDetected,
+  kVerdictFaults
+};
 
 // A row belongs to a sample within this share of the period: t_s is decimal
 // text and has been rounded.
@@ -156,7 +160,7 @@ constexpr double kTimeTolerance = 0.01;
 
 std::vector<int> FaultsIn(const CsvRows& rows, std::size_t row) {
   std::vector<int> faults;
-  std::string rest = rows.Cell(row, kFaults);
+  std::string rest = rows.Cell(row, kVerdictFaults);
   while (!rest.empty()) {
     const std::size_t bar = rest.find('|');
     const std::string name = rest.substr(0, bar);
@@ -170,7 +174,8 @@ std::vector<int> FaultsIn(const CsvRows& rows, std::size_t row) {
   }
   std::sort(faults.begin(), faults.end());
   if (std::adjacent_find(faults.begin(), faults.end()) != faults.end()) {
-    rows.Refuse(row, "a fault is there twice: " + rows.Cell(row, kFaults));
+    rows.Refuse(row,
+                "a fault is there twice: " + rows.Cell(row, kVerdictFaults));
   }
   return faults;
 }
@@ -178,10 +183,10 @@ std::vector<int> FaultsIn(const CsvRows& rows, std::size_t row) {
 Indication IndicationIn(const CsvRows& rows, std::size_t row) {
   Indication indication;
   indication.settled = true;
-  const double detected = rows.Number(row, kDetected);
+  const double detected = rows.Number(row, kVerdictDetected);
   if (detected != 0.0 && detected != 1.0) {
-    rows.Refuse(
-        row, "detected is " + rows.Cell(row, kDetected) + ", expected 0 or 1");
+    rows.Refuse(row, "detected is " + rows.Cell(row, kVerdictDetected) +
+                         ", expected 0 or 1");
   }
   indication.detected = detected == 1.0;
   indication.isolated = FaultsIn(rows, row);
@@ -195,7 +200,7 @@ Indication IndicationIn(const CsvRows& rows, std::size_t row) {
 Answer ReadVerdicts(const std::string& file, const storage::StoredRun& run) {
   const CsvRows rows(file, {"t_s", "detected"}, {"faults"});
   for (std::size_t i = 1; i < rows.size(); ++i) {
-    if (!(rows.Number(i, kTime) > rows.Number(i - 1, kTime))) {
+    if (!(rows.Number(i, kVerdictTime) > rows.Number(i - 1, kVerdictTime))) {
       rows.Refuse(i, "t_s does not rise");
     }
   }
@@ -210,10 +215,12 @@ Answer ReadVerdicts(const std::string& file, const storage::StoredRun& run) {
     const double t_s =
         static_cast<double>(stored.sample.stamp_ns - run.info.run.start_ns) *
         1e-9;
-    while (row < rows.size() && rows.Number(row, kTime) < t_s - tolerance) {
+    while (row < rows.size() &&
+           rows.Number(row, kVerdictTime) < t_s - tolerance) {
       ++row;
     }
-    if (row == rows.size() || rows.Number(row, kTime) > t_s + tolerance) {
+    if (row == rows.size() ||
+        rows.Number(row, kVerdictTime) > t_s + tolerance) {
       throw DataError(file + ": no row for t_s = " + cli::FormatNumber(t_s, 3) +
                       " of " + RunName(run));
     }

@@ -1,6 +1,5 @@
 #include "trainer/evaluation/evaluation_report.h"
 
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <sstream>
@@ -39,13 +38,6 @@ constexpr std::array<IndexField, 12> kIndexFields{{
     {"fs_i", "fs_i", 2, &RunIndices::fs_i},
     {"d_acc", "d_acc", 2, &RunIndices::d_acc},
 }};
-
-// Reads back as the same bits, and is as short as that allows.
-std::string Shortest(double value) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), end.ptr};
-}
 
 Json RunJson(const EvaluatedRun& run) {
   Json json{{"run_id", run.indices.run_id},
@@ -228,15 +220,17 @@ void WriteEvaluationCsv(std::ostream& out,
   cli::WriteCsvLine(out, header);
   for (const EvaluatedRun& run : runs) {
     const RunIndices& i = run.indices;
-    std::vector<std::string> cells{i.run_id, TruthText(run),
-                                   run.has_truth ? Shortest(i.strength) : "",
-                                   IsDetected(run) ? "true" : "false"};
+    std::vector<std::string> cells{
+        i.run_id, TruthText(run),
+        run.has_truth ? cli::NumberText(i.strength) : "",
+        IsDetected(run) ? "true" : "false"};
     for (const IndexField& field : kIndexFields) {
-      cells.push_back(Shortest(i.*field.value));
+      cells.push_back(cli::NumberText(i.*field.value));
     }
-    cells.insert(cells.end(), {SetText(Outcome(run)), Shortest(i.t_exact),
-                               std::to_string(i.episodes),
-                               std::to_string(i.wrong_isolations)});
+    cells.insert(
+        cells.end(),
+        {SetText(Outcome(run)), cli::NumberText(i.t_exact),
+         std::to_string(i.episodes), std::to_string(i.wrong_isolations)});
     cli::WriteCsvLine(out, cells);
   }
 }

@@ -377,8 +377,7 @@ class ReportPage::RunPicture {
       return kOpen;
     }
     const bool acts = fault != 0 && band.to_s > fault_start_s;
-    const bool has_fault = std::find(band.faults.begin(), band.faults.end(),
-                                     fault) != band.faults.end();
+    const bool has_fault = Contains(band.faults, fault);
     if (!run.has_truth || (acts && band.faults.size() > 1 && has_fault)) {
       return kPartly;
     }

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "simulator/second_look/valve_physics.h"
 #include "simulator/valve_equations.h"
 #include "trainer/evaluation.h"
@@ -50,7 +51,7 @@ TrainingRun FaultyRun(const Stretch& healthy, const std::vector<Sample>& faulty,
 bool Isolated(const RunIndices& indices) {
   const std::vector<int>& set = indices.final_set;
   return indices.detected && set.size() <= kIsolableSize &&
-         std::find(set.begin(), set.end(), indices.fault) != set.end();
+         Contains(set, indices.fault);
 }
 
 // By rising |strength|: from where on `holds` does not fail any more.
