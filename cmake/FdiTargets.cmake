@@ -65,6 +65,17 @@ function(fdi_test_headers target)
   target_include_directories(${target} PUBLIC ${root})
 endfunction()
 
+# With FDI_UNITY the files of a library or program are compiled in groups: half
+# the time of a build from nothing, most of which goes into the same headers.
+function(fdi_unity target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${FDI_UNITY}
+                                             UNITY_BUILD_BATCH_SIZE 16)
+  if(FDI_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    # GCC takes the .cpp files of a group for headers.
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+  endif()
+endfunction()
+
 # Tests and command lines under sanitizers: twice as fast to build without
 # optimisation. Not where numerical templates are: the linker takes any copy.
 function(fdi_quick_build target)
@@ -80,6 +91,7 @@ function(fdi_library name)
   target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   fdi_settings(${name})
   fdi_headers(${name} PUBLIC)
+  fdi_unity(${name})
   if(name MATCHES "_(app|console)$")
     fdi_quick_build(${name})
   endif()
@@ -94,6 +106,7 @@ function(fdi_program name)
                         RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
   fdi_settings(${name})
   fdi_headers(${name} PRIVATE)
+  fdi_unity(${name})
   fdi_quick_build(${name})
   install(TARGETS ${name} RUNTIME)
 endfunction()
