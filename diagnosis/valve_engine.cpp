@@ -81,6 +81,7 @@ class ValveEngine::Impl {
   std::optional<Transition> EndEpisode(EndReason reason);
   std::optional<Transition> Adopt(EngineParts parts);
   void HoldIsolation(bool hold);
+  void Suspect(bool suspected) { suspected_ = suspected; }
   std::vector<std::byte> Save() const;
   bool Restore(std::span<const std::byte> bytes);
 
@@ -101,6 +102,7 @@ class ValveEngine::Impl {
   SourceOrder order_;
   Verdict verdict_;
   bool isolation_held_{false};
+  bool suspected_{false};
   bool has_source_{false};
   bool needs_initialisation_{true};
   SignalMask present_{0};
@@ -243,9 +245,11 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   if (findings.settled) {
     findings.stuck = diagnosis_->stuck.faults();
     findings.abnormal = detection.Push(diagnosis_->bank, sample) ||
-                        findings.stuck != 0 || findings.abnormal;
+                        findings.stuck != 0 || findings.abnormal || suspected_;
+    const auto suspicion =
+        suspected_ ? std::optional(sample.stamp_ns) : std::nullopt;
     for (const auto& stamp :
-         {detection.stamp_ns(), diagnosis_->stuck.stamp_ns()}) {
+         {detection.stamp_ns(), diagnosis_->stuck.stamp_ns(), suspicion}) {
       findings.detected = findings.detected ? findings.detected : stamp;
     }
   }
@@ -260,6 +264,7 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
 
 std::optional<Transition> ValveEngine::Impl::EndEpisode(EndReason reason) {
   needs_initialisation_ = true;
+  suspected_ = false;
   if (!episode_open()) {
     return std::nullopt;
   }
@@ -333,6 +338,10 @@ std::optional<Transition> ValveEngine::Adopt(EngineParts parts) {
 
 void ValveEngine::HoldIsolation(bool hold) {
   impl_->HoldIsolation(hold);
+}
+
+void ValveEngine::Suspect(bool suspected) {
+  impl_->Suspect(suspected);
 }
 
 std::vector<std::byte> ValveEngine::Save() const {

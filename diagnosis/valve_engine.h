@@ -50,6 +50,11 @@ class ValveEngine {
   /// baseline is not trusted. Stays over Adopt().
   void HoldIsolation(bool hold);
 
+  /// What is known of the valve outside of the engine is abnormal, or is not
+  /// any more: while it is, a valve that is judged has an episode, which does
+  /// not clear. Ends with EndEpisode() and Adopt().
+  void Suspect(bool suspected);
+
   /// The slow accumulators, for Restore() after a restart of the program:
   /// windows of detection and whether the valve is armed (Coverage), with the
   /// stamp of the last sample and the content hash of the model set. An open

@@ -63,6 +63,8 @@ constexpr std::array<CounterInfo, kCounterCount> kInfos{{
      "Model sets that could not be loaded"},
     {"looks", "fdi_second_looks_total",
      "Second looks by physics at fault episodes"},
+    {"routine_looks", "fdi_routine_looks_total",
+     "Routine looks by physics at valves without an episode of the observers"},
     {"looks_dropped", "fdi_second_looks_dropped_total",
      "Second looks that were left out, as too many waited"},
     {"looks_failed", "fdi_second_looks_failed_total",

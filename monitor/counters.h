@@ -41,6 +41,7 @@ enum class Counter : std::uint8_t {
   kModelSwaps,
   kModelFailures,
   kLooks,
+  kRoutineLooks,
   kLooksDropped,
   kLooksFailed,
   kCount_

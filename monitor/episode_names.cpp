@@ -43,6 +43,7 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     Ask(std::move(*due));
   }
   TakeAnswers();
+  suspects_ = looks_->suspects() && !held;
   const simulator::LookAnswer* answer = AnswerTo(engine, held);
   const auto named =
       answer != nullptr
@@ -87,7 +88,7 @@ const simulator::LookAnswer* EpisodeNames::AnswerTo(const Verdict& engine,
   if (!engine.detected || held) {
     return nullptr;
   }
-  const simulator::LookAnswer* answer = book_.At(detection_ns_, stamp_ns_);
+  const simulator::LookAnswer* answer = looks_->Answer();
   if (answer != nullptr) {
     kept_.reset();
   }
@@ -96,7 +97,9 @@ const simulator::LookAnswer* EpisodeNames::AnswerTo(const Verdict& engine,
 
 void EpisodeNames::Ask(simulator::LookTask task) {
   simulator::LookTask key;
+  key.occasion = task.occasion;
   key.stamp_ns = task.stamp_ns;
+  key.window.detection = task.window.detection;
   key.detection_stamp_ns = task.detection_stamp_ns;
   asked_.push_back(
       {std::move(key), worker_->Submit(valve_id_, physics_, std::move(task))});
@@ -108,9 +111,8 @@ void EpisodeNames::TakeAnswers() {
   while (!asked_.empty() &&
          asked_.front().answer.wait_for(kNow) == future_status::ready) {
     LookWorker::Answer answer = asked_.front().answer.get();
-    // An answer about an earlier episode would displace those about this one.
-    if (answer && asked_.front().task.detection_stamp_ns == detection_ns_) {
-      book_.Enter(asked_.front().task, std::move(*answer));
+    if (answer) {
+      looks_->Enter(asked_.front().task, std::move(*answer));
     }
     asked_.pop_front();
   }
@@ -201,6 +203,7 @@ Transition EpisodeNames::End(Transition closed) {
     WriteName(closed);
   }
   looks_.emplace(*physics_);
+  suspects_ = false;
   asked_.clear();
   Forget();
   return closed;

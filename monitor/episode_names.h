@@ -19,7 +19,8 @@ namespace fdi::monitor {
 /// Names the episodes of one valve: as its engine does, until a second look has
 /// an answer. While one counts, it is the name, and what the engine isolates
 /// meanwhile is not; see simulator::LookBook. So what leaves the monitor is
-/// what `fdi-trainer evaluate` scores.
+/// what `fdi-trainer evaluate` scores. Routine looks may open an episode that
+/// the engine does not see.
 class EpisodeNames {
  public:
   /// @param worker outlives this.
@@ -35,6 +36,9 @@ class EpisodeNames {
   /// @returns the verdict with the name that counts; stands as long as `engine`
   ///   and until the next call.
   const Verdict& Step(const Sample& sample, const Verdict& engine, bool held);
+
+  /// Whether the engine should have an episode: ValveEngine::Suspect().
+  bool suspects() const { return suspects_; }
 
   /// The look whose answer counts since the last Step(), but for the id of its
   /// episode. Nothing if none began to count then.
@@ -68,12 +72,12 @@ class EpisodeNames {
   std::shared_ptr<const ModelSet> models_;
   LookWorker::Physics physics_;
   LookWorker* worker_;
-  std::optional<simulator::EpisodeLooks> looks_;  // Made anew at an end.
-  simulator::LookBook book_;
+  std::optional<simulator::ValveLooks> looks_;  // Made anew at an end.
   std::deque<Asked> asked_;
   std::optional<FaultSet> kept_;
   std::int64_t stamp_ns_{0};
   std::int64_t detection_ns_{0};
+  bool suspects_{false};
   // Of the open episode.
   bool by_physics_{false};  // An answer counts.
   FaultSet faults_{0};      // Its name,

@@ -36,12 +36,14 @@ std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
   Look look{std::move(valve_id), std::move(physics), std::move(task)};
   std::future<Answer> answer = look.answer.get_future();
   const std::lock_guard lock(mutex_);
-  const auto same = std::ranges::find(waiting_, look.valve_id, &Look::valve_id);
-  if (same != waiting_.end()) {
+  const bool routine = look.task.occasion != simulator::LookOccasion::kEpisode;
+  std::deque<Look>& waiting = routine ? routine_ : waiting_;
+  const auto same = std::ranges::find(waiting, look.valve_id, &Look::valve_id);
+  if (same != waiting.end()) {
     same->answer.set_value(std::nullopt);
     *same = std::move(look);
-  } else if (waiting_.size() < capacity_) {
-    waiting_.push_back(std::move(look));
+  } else if (waiting.size() < (routine ? kMostRoutine : capacity_)) {
+    waiting.push_back(std::move(look));
     arrival_.notify_one();
   } else {
     look.answer.set_value(std::nullopt);
@@ -68,26 +70,26 @@ void LookWorker::TakeLooks() {
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
   const std::stop_token stop = stop_.get_token();
   std::unique_lock lock(mutex_);
-  while (arrival_.wait(lock, stop, [this] { return !waiting_.empty(); }) &&
-         !stop.stop_requested()) {
-    Look look = std::move(waiting_.front());
-    waiting_.pop_front();
+  const auto due = [this] { return !waiting_.empty() || !routine_.empty(); };
+  while (arrival_.wait(lock, stop, due) && !stop.stop_requested()) {
+    std::deque<Look>& first = waiting_.empty() ? routine_ : waiting_;
+    Look look = std::move(first.front());
+    first.pop_front();
     lock.unlock();
     Answer answer = Take(look);
     const bool taken = answer.has_value();
+    const bool routine =
+        look.task.occasion != simulator::LookOccasion::kEpisode;
     look.answer.set_value(std::move(answer));
-    context_.counters.Add(Counter::kLooks, taken ? 1 : 0);
+    context_.counters.Add(routine ? Counter::kRoutineLooks : Counter::kLooks,
+                          taken ? 1 : 0);
     lock.lock();
   }
 }
 
 LookWorker::Answer LookWorker::Take(const Look& look) const {
   try {
-    const simulator::SecondLook second = simulator::LookAgain(
-        *look.physics, look.task.window, stop_.get_token());
-    return second.ranked.empty()
-               ? Answer()
-               : simulator::AnswerOf(second, look.task.early());
+    return simulator::TakeLook(*look.physics, look.task, stop_.get_token());
   } catch (const std::exception& error) {
     ReportFailure("valve=" + LogValue(look.valve_id), error.what());
     return std::nullopt;

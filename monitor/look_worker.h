@@ -20,7 +20,8 @@ namespace fdi::monitor {
 /// Takes second looks at episodes on a thread of its own, in the order in which
 /// they were asked for. A look costs up to some seconds of processor time: the
 /// thread runs at low priority, and whoever asks never waits for it. A few
-/// looks may wait, one of each valve; what does not fit is dropped and counted.
+/// looks may wait, one of each valve, and behind them the routine ones; what
+/// does not fit is dropped and counted.
 ///
 /// Built idle. Thread safe, but for Start() and Stop().
 class LookWorker {
@@ -46,7 +47,7 @@ class LookWorker {
   void Start();
   /// Ends the thread, at once between two hypotheses; what waits is given up.
   void Stop();
-  /// Looks that wait for the thread. Any thread.
+  /// Looks at episodes that wait for the thread. Any thread.
   std::size_t waiting() const {
     const std::lock_guard lock(mutex_);
     return waiting_.size();
@@ -67,11 +68,14 @@ class LookWorker {
   void ReportFailure(const std::string& whose, const char* reason) const;
 
   MonitorContext context_;
+  // 27 kB each: what 2000 valves that start at once ask for.
+  static constexpr std::size_t kMostRoutine = 2000;
   const std::size_t capacity_;
   std::stop_source stop_;
   mutable std::mutex mutex_;  // Guards what follows.
   std::condition_variable_any arrival_;
   std::deque<Look> waiting_;
+  std::deque<Look> routine_;
   Worker thread_;
 };
 

@@ -113,6 +113,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   const Verdict& engine = engine_->Step(sample);
   const Verdict& verdict =
       names_ ? names_->Step(sample, engine, isolation_held_) : engine;
+  engine_->Suspect(names_ && names_->suspects());
   answer_ = &verdict;
   if (CountsAsTime(verdict)) {
     Place(sample);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/time_units.h"
@@ -16,6 +17,9 @@ constexpr std::size_t kLongest = 420;  // rows in all
 constexpr std::size_t kFewestMeasured = 20;
 constexpr std::int64_t kEarlyAge = 20 * kNsPerSecond;
 constexpr std::int64_t kFirstAge = 40 * kNsPerSecond;
+constexpr std::int64_t kLastAge = 300 * kNsPerSecond;  // Then ten times each.
+constexpr std::int64_t kRoutineNs = 300 * kNsPerSecond;
+constexpr std::ptrdiff_t kRoutineMeasured = 300;  // of its rows
 // None of the hypotheses follows the record: errors of so many healthy ones.
 constexpr double kMostMisfit = 12.0;
 // Nor does no fault, where no fault gains on it.
@@ -26,7 +30,7 @@ constexpr double kGoodMisfit = 2.0;
 std::int64_t AgeAfter(std::int64_t age_ns) {
   return age_ns < kFirstAge            ? kFirstAge
          : age_ns < 150 * kNsPerSecond ? 150 * kNsPerSecond
-         : age_ns < 300 * kNsPerSecond ? 300 * kNsPerSecond
+         : age_ns < kLastAge           ? kLastAge
                                        : 10 * age_ns;
 }
 
@@ -113,8 +117,36 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
   return answer;
 }
 
+std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
+                                   const LookTask& task,
+                                   const std::stop_token& stop) {
+  double without_fault = 0.0;
+  if (task.occasion != LookOccasion::kEpisode) {
+    without_fault = MisfitWithoutFault(physics, task.window);
+    if (task.occasion == LookOccasion::kStill ||
+        without_fault <= kHealthyMisfit) {
+      LookAnswer answer;
+      answer.outcome = LookOutcome::kNothing;
+      answer.misfit = answer.without_fault = without_fault;
+      return answer;
+    }
+  }
+  const SecondLook look = LookAgain(physics, task.window, stop);
+  if (look.ranked.empty()) {
+    return std::nullopt;
+  }
+  LookAnswer answer = AnswerOf(look, task.early());
+  answer.without_fault = without_fault;
+  if (task.occasion == LookOccasion::kRoutine &&
+      answer.misfit + kRoutineGain > without_fault) {
+    answer.outcome = LookOutcome::kNothing;
+  }
+  return answer;
+}
+
 bool LookTask::early() const {
-  return stamp_ns - detection_stamp_ns < kFirstAge;
+  return occasion == LookOccasion::kEpisode &&
+         stamp_ns - detection_stamp_ns < kFirstAge;
 }
 
 bool ObserversName(const ModelSet& models, FaultSet isolated) {
@@ -142,9 +174,16 @@ std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
   return names;
 }
 
+namespace {
+
+std::int64_t PeriodOf(const ValvePhysics& physics) {
+  return std::llround(physics.drive.period_s * kNsPerSecond);
+}
+
+}  // namespace
+
 EpisodeLooks::EpisodeLooks(const ValvePhysics& physics)
-    : physics_(physics),
-      period_ns_(std::llround(physics.drive.period_s * kNsPerSecond)) {}
+    : physics_(physics), period_ns_(PeriodOf(physics)) {}
 
 // One row a period; up to three missing ones are held, a longer gap begins
 // anew.
@@ -185,13 +224,16 @@ std::optional<LookTask> EpisodeLooks::Task() const {
   LookTask task;
   task.detection_stamp_ns = *detection_ns_;
   task.window.signals = signals_;
+  // A routine look finds what has been there for minutes.
   const std::int64_t from_ns =
-      *detection_ns_ - static_cast<std::int64_t>(kBefore) * period_ns_;
+      by_routine_
+          ? rows_.front().stamp_ns
+          : *detection_ns_ - static_cast<std::int64_t>(kBefore) * period_ns_;
   for (const Row& row : rows_) {
     if (row.stamp_ns < from_ns) {
       continue;
     }
-    if (row.stamp_ns < *detection_ns_) {
+    if (row.stamp_ns < *detection_ns_ && !by_routine_) {
       task.window.detection = task.window.rows.size() + 1;
     }
     task.window.rows.push_back(row.row);
@@ -206,8 +248,23 @@ std::optional<LookTask> EpisodeLooks::Task() const {
   return task;
 }
 
+std::optional<LookTask> EpisodeLooks::RoutineTask(bool suspected) const {
+  LookTask task;
+  task.occasion = suspected ? LookOccasion::kStill : LookOccasion::kRoutine;
+  task.stamp_ns = rows_.back().stamp_ns;
+  task.window.signals = signals_;
+  for (const Row& row : rows_) {
+    task.window.rows.push_back(row.row);
+  }
+  return std::ranges::count_if(task.window.rows, &RecordRow::x_measured) <
+                 kRoutineMeasured
+             ? std::nullopt
+             : std::optional(std::move(task));
+}
+
 std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
-                                           const Verdict& verdict) {
+                                           const Verdict& verdict,
+                                           bool suspected) {
   if (verdict.intake != Intake::kAccepted) {
     return std::nullopt;
   }
@@ -216,7 +273,8 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
   for (const Transition& transition : verdict.Transitions()) {
     if (transition.kind == TransitionKind::kDetected) {
       detection_ns_ = transition.detection_stamp_ns;
-      next_age_ns_ = kEarlyAge;
+      by_routine_ = suspected;
+      next_age_ns_ = suspected ? kLastAge : kEarlyAge;
     } else if (detection_ns_ && (transition.kind == TransitionKind::kCleared ||
                                  transition.kind == TransitionKind::kClosed)) {
       detection_ns_.reset();
@@ -227,6 +285,14 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
       next_age_ns_ = AgeAfter(next_age_ns_);
     }
     due = Task();
+  }
+  const bool judged = verdict.quality == Quality::kLive &&
+                      (!detection_ns_ || suspected) &&
+                      rows_.size() > std::min(judged_, kLongest - 1);
+  judged_ = judged ? judged_ + 1 : 0;
+  const std::int64_t slot = sample.stamp_ns / kRoutineNs;
+  if (std::exchange(slot_, slot) != slot && judged_ >= kLongest && !due) {
+    due = RoutineTask(suspected);
   }
   return due;
 }
@@ -247,6 +313,97 @@ void LookBook::Enter(const LookTask& task, LookAnswer answer) {
   answer.stamp_ns = task.stamp_ns;
   entries_.push_back({task.detection_stamp_ns, task.stamp_ns + kLookDelayNs,
                       std::move(answer)});
+}
+
+void Suspicion::Enter(std::int64_t stamp_ns, LookAnswer answer) {
+  answer.stamp_ns = stamp_ns;
+  waiting_.emplace_back(stamp_ns + kRoutineDelayNs, std::move(answer));
+}
+
+void Suspicion::Advance(std::int64_t stamp_ns) {
+  while (!waiting_.empty() && waiting_.front().first <= stamp_ns) {
+    LookAnswer answer = std::move(waiting_.front().second);
+    waiting_.pop_front();
+    Take(std::move(answer));
+  }
+}
+
+void Suspicion::Dismiss() {
+  last_.reset();
+  found_.reset();
+}
+
+void Suspicion::Take(LookAnswer answer) {
+  if (found_) {
+    if (answer.without_fault <= kHealthyMisfit) {
+      Dismiss();
+    }
+    return;
+  }
+  const bool named = answer.outcome == LookOutcome::kNamed;
+  const bool again =
+      named && last_ && std::ranges::any_of(answer.faults, [&](const auto& e) {
+        return Has(last_->faults, e.fault);
+      });
+  if (again) {
+    found_ = std::move(answer);
+  } else if (named) {
+    last_ = std::move(answer);
+  } else {
+    last_.reset();
+  }
+}
+
+ValveLooks::ValveLooks(const ValvePhysics& physics)
+    : looks_(physics), period_ns_(PeriodOf(physics)) {}
+
+std::optional<LookTask> ValveLooks::Step(const Sample& sample,
+                                         const Verdict& verdict) {
+  if (!OutOfOrder(verdict.intake)) {
+    stamp_ns_ = sample.stamp_ns;
+  }
+  const LookAnswer* found = suspicion_.found();
+  auto due = looks_.Step(sample, verdict, found != nullptr);
+  open_ = verdict.detected;
+  for (const Transition& transition : verdict.Transitions()) {
+    detection_ns_ = transition.detection_stamp_ns;
+    if (transition.kind == TransitionKind::kDetected && found != nullptr) {
+      LookTask task;
+      task.stamp_ns = found->stamp_ns;
+      task.detection_stamp_ns = detection_ns_;
+      EnterInBook(task, *found);
+    }
+  }
+  suspicion_.Advance(stamp_ns_);
+  return due;
+}
+
+// Row `detection` of the window, from which its explanations count, need not be
+// that of the detection: that may lie before the window, or behind it where a
+// routine look opened the episode.
+void ValveLooks::EnterInBook(const LookTask& task, LookAnswer answer) {
+  const auto behind = static_cast<std::int64_t>(answer.simulated.size()) - 1 -
+                      static_cast<std::int64_t>(task.window.detection);
+  const std::int64_t from_ns = task.stamp_ns - behind * period_ns_;
+  for (Explanation& e : answer.faults) {
+    e.start += static_cast<int>((from_ns - detection_ns_) / period_ns_);
+  }
+  book_.Enter(task, std::move(answer));
+}
+
+void ValveLooks::Enter(const LookTask& task, LookAnswer answer) {
+  if (task.occasion != LookOccasion::kEpisode) {
+    suspicion_.Enter(task.stamp_ns, std::move(answer));
+  } else if (task.detection_stamp_ns == detection_ns_) {
+    if (answer.outcome == LookOutcome::kNothing && !answer.early) {
+      suspicion_.Dismiss();
+    }
+    EnterInBook(task, std::move(answer));
+  }
+}
+
+const LookAnswer* ValveLooks::Answer() const {
+  return open_ ? book_.At(detection_ns_, stamp_ns_) : nullptr;
 }
 
 const LookAnswer* LookBook::At(std::int64_t detection_stamp_ns,

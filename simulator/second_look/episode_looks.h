@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <stop_token>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/model_set.h"
@@ -11,11 +13,19 @@
 
 namespace fdi::simulator {
 
-/// A second look that is due: at what, and for which episode.
+/// Why a look is due.
+enum class LookOccasion : std::uint8_t {
+  kEpisode,  ///< To name an open episode.
+  kRoutine,  ///< There is no episode: should there be one?
+  kStill,    ///< A routine look opened it: is the valve abnormal still?
+};
+
+/// A look that is due: at what, and for which episode.
 struct LookTask {
   LookWindow window;
   std::int64_t stamp_ns{0};            ///< Of the last row.
   std::int64_t detection_stamp_ns{0};  ///< Key of the episode.
+  LookOccasion occasion{LookOccasion::kEpisode};
 
   /// So little of the episode is there that the physics, which is off by some
   /// per cent, may find the wrong fault: see LookAnswer::early.
@@ -42,6 +52,8 @@ struct LookAnswer {
   /// The valve's answer under the best explanation, a row each.
   std::vector<RecordAnswer> simulated;
   std::int64_t stamp_ns{0};  ///< Of the last row; set by LookBook.
+  /// Misfit without any fault, of a routine look alone.
+  double without_fault{0.0};
 };
 
 /// Largest distance behind the best explanation at which a fault stays in the
@@ -57,7 +69,20 @@ inline constexpr double kLeastGain = 0.25;
 /// A set of more faults is a shortlist.
 inline constexpr std::size_t kMostNamed = 4;
 
+/// A window that the valve without a fault follows with a larger misfit is not
+/// that of a healthy valve, for which it is about 1.
+inline constexpr double kHealthyMisfit = 1.5;
+/// A routine look names a fault only where that takes so much off the misfit:
+/// as much as a healthy valve has.
+inline constexpr double kRoutineGain = 1.0;
+
 LookAnswer AnswerOf(const SecondLook& look, bool early = false);
+
+/// Takes the look that is due. Nothing if it was asked to stop.
+/// @throws CvodeError.
+std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
+                                   const LookTask& task,
+                                   const std::stop_token& stop = {});
 
 /// The observers have isolated a fault, and not only what the floor finds.
 bool ObserversName(const ModelSet& models, FaultSet isolated);
@@ -71,17 +96,24 @@ std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
 /// counts, whatever the computer took.
 inline constexpr std::int64_t kLookDelayNs = 10'000'000'000;
 
+/// The answer of a routine look counts later: there may be one for every valve
+/// at once.
+inline constexpr std::int64_t kRoutineDelayNs = 60'000'000'000;
+
 /// Follows the samples and verdicts of one valve and says when the physics
 /// should look at an episode that is open: 20 (early), 40, 150 and 300 s after
-/// its detection, then at ten times the age each time. Keeps the last 420
-/// samples.
+/// its detection, then at ten times the age each time. While there is none, or
+/// one that a routine look opened, a routine look is due every 300 s, at the
+/// same stamps whenever a program was started. Keeps the last 420 samples.
 class EpisodeLooks {
  public:
   /// `physics` must outlive it.
   explicit EpisodeLooks(const ValvePhysics& physics);
 
   /// The next sample and what the engine said about it.
-  std::optional<LookTask> Step(const Sample& sample, const Verdict& verdict);
+  /// @param suspected a routine look found the valve abnormal.
+  std::optional<LookTask> Step(const Sample& sample, const Verdict& verdict,
+                               bool suspected = false);
 
  private:
   struct Row {
@@ -91,6 +123,7 @@ class EpisodeLooks {
 
   void Keep(const Sample& sample);
   std::optional<LookTask> Task() const;
+  std::optional<LookTask> RoutineTask(bool suspected) const;
 
   const ValvePhysics& physics_;
   std::int64_t period_ns_;
@@ -98,6 +131,9 @@ class EpisodeLooks {
   std::deque<Row> rows_{};
   std::optional<std::int64_t> detection_ns_{};
   std::int64_t next_age_ns_{0};
+  bool by_routine_{false};  // The open episode.
+  std::size_t judged_{0};   // Rows in a row that a routine look may have.
+  std::int64_t slot_{0};    // Of 300 s.
 };
 
 /// The answer of the layer that speaks last: that of the last look at the open
@@ -119,6 +155,58 @@ class LookBook {
     LookAnswer answer;
   };
   std::vector<Entry> entries_;
+};
+
+/// What routine looks find. Two in a row that name the same fault make the
+/// valve suspect, until one finds that it follows its physics without a fault.
+class Suspicion {
+ public:
+  void Enter(std::int64_t stamp_ns, LookAnswer answer);
+  /// The answers up to now count.
+  void Advance(std::int64_t stamp_ns);
+  void Dismiss();
+
+  /// Of the look that made the valve suspect; null: it is not.
+  const LookAnswer* found() const { return found_ ? &*found_ : nullptr; }
+
+ private:
+  void Take(LookAnswer answer);
+
+  std::deque<std::pair<std::int64_t, LookAnswer>> waiting_;  // By stamp.
+  std::optional<LookAnswer> last_;  // Of the last look, if it named a fault.
+  std::optional<LookAnswer> found_;
+};
+
+/// The looks at one valve and what they make of it: when one is due, the name
+/// of the open episode, and whether there should be one.
+class ValveLooks {
+ public:
+  /// `physics` must outlive it.
+  explicit ValveLooks(const ValvePhysics& physics);
+
+  /// The next sample, whatever its intake, and what the engine said about it.
+  std::optional<LookTask> Step(const Sample& sample, const Verdict& verdict);
+
+  /// The answer to a look that was due; of an earlier episode it counts for
+  /// nothing.
+  void Enter(const LookTask& task, LookAnswer answer);
+
+  /// What counts for the open episode at the last sample, if there is one.
+  const LookAnswer* Answer() const;
+
+  /// The engine should have an episode (ValveEngine::Suspect).
+  bool suspects() const { return suspicion_.found() != nullptr; }
+
+ private:
+  void EnterInBook(const LookTask& task, LookAnswer answer);
+
+  EpisodeLooks looks_;
+  std::int64_t period_ns_;
+  LookBook book_;
+  Suspicion suspicion_;
+  std::int64_t stamp_ns_{0};
+  std::int64_t detection_ns_{0};
+  bool open_{false};
 };
 
 }  // namespace fdi::simulator

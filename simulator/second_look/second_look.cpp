@@ -80,6 +80,7 @@ class Looker {
   }
 
   SecondLook Run(const std::stop_token& stop);
+  double MisfitOfHealthy() const { return ErrorsOf(healthy_) / Readings(); }
 
  private:
   bool Measures(Signal signal) const {
@@ -94,6 +95,7 @@ class Looker {
   ChannelFit FitChannel(const Trajectory& answers, bool flow,
                         double slow_sd) const;
   double ErrorsOf(const Trajectory& answers) const;
+  double Readings() const;
   double InputCost(int fault, double strength, Course course,
                    const Trajectory& answers) const;
   double CommandCost() const;
@@ -284,6 +286,19 @@ double Looker::ErrorsOf(const Trajectory& answers) const {
          (Measures(Signal::kF)
               ? FitChannel(answers, true, physics_.flow.slow_sd).errors
               : 0.0);
+}
+
+// Of X and F, as many as count as independent.
+double Looker::Readings() const {
+  const bool has_flow = Measures(Signal::kF);
+  double readings = 0.0;
+  for (const RecordRow& row : std::span(window_.rows).subspan(10)) {
+    readings += row.x_measured ? 1.0 / physics_.x.correlation_time : 0.0;
+    readings += has_flow && row.flow_measured
+                    ? 1.0 / physics_.flow.correlation_time
+                    : 0.0;
+  }
+  return readings;
 }
 
 // How unusual the inputs are, behind the detection, if the fault is there.
@@ -601,13 +616,7 @@ SecondLook Looker::Run(const std::stop_token& stop) {
       hypotheses.begin(), hypotheses.end(),
       [](const auto& a, const auto& b) { return a.cost < b.cost; });
 
-  double readings = 0.0;
-  for (const RecordRow& row : std::span(window_.rows).subspan(10)) {
-    readings += row.x_measured ? 1.0 / physics_.x.correlation_time : 0.0;
-    readings += has_flow && row.flow_measured
-                    ? 1.0 / physics_.flow.correlation_time
-                    : 0.0;
-  }
+  const double readings = Readings();
   const Hypothesis& first = hypotheses.front();
   const bool faulty = first.cost + kPriceOfFault < unmoved.cost;
   const double best = faulty ? first.cost + kPriceOfFault : unmoved.cost;
@@ -647,11 +656,25 @@ SecondLook Looker::Run(const std::stop_token& stop) {
 
 }  // namespace
 
-SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window,
-                     const std::stop_token& stop) {
+namespace {
+
+void RequireRows(const LookWindow& window) {
   Require(window.rows.size() >= 20 && window.detection < window.rows.size(),
           "a second look takes 20 rows and a detection among them");
+}
+
+}  // namespace
+
+SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window,
+                     const std::stop_token& stop) {
+  RequireRows(window);
   return Looker(physics, window).Run(stop);
+}
+
+double MisfitWithoutFault(const ValvePhysics& physics,
+                          const LookWindow& window) {
+  RequireRows(window);
+  return Looker(physics, window).MisfitOfHealthy();
 }
 
 }  // namespace fdi::simulator

@@ -66,4 +66,10 @@ struct SecondLook {
 SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window,
                      const std::stop_token& stop = {});
 
+/// Misfit of the window without any fault, but for a constant shift of X or F:
+/// 0.7 to 1.1 of a healthy valve. A hundredth of the work of LookAgain().
+/// @throws CvodeError; std::invalid_argument as LookAgain().
+double MisfitWithoutFault(const ValvePhysics& physics,
+                          const LookWindow& window);
+
 }  // namespace fdi::simulator

@@ -240,6 +240,26 @@ TEST(ValveEngineTest, EpisodeClearsAfterTcNormalSamples) {
   EXPECT_FALSE(engine.episode_open());
 }
 
+TEST(ValveEngineTest, ASuspectValveHasAnEpisodeThatDoesNotClear) {
+  ValveEngine engine(SharedPlant());
+  StepRange(engine, 0, 50);
+  engine.Suspect(true);
+  const Seen seen = StepRange(engine, 50, 200);
+  ASSERT_EQ(seen.transitions.size(), 1U);
+  EXPECT_EQ(seen.transitions[0].kind, TransitionKind::kDetected);
+  EXPECT_EQ(seen.transitions[0].stamp_ns, StampOf(50));
+  EXPECT_TRUE(engine.episode_open());
+  engine.Suspect(false);
+  EXPECT_TRUE(StepRange(engine, 200, 219).transitions.empty());
+  EXPECT_EQ(StepRange(engine, 219, 220).transitions.size(), 2U);
+  EXPECT_FALSE(engine.episode_open());
+
+  engine.Suspect(true);
+  StepRange(engine, 220, 222);
+  EXPECT_TRUE(engine.EndEpisode(EndReason::kStreamEnded));
+  EXPECT_TRUE(StepRange(engine, 222, 300).transitions.empty());
+}
+
 TEST(ValveEngineTest, ValveThatStandsStillAfterwardsStaysInItsEpisode) {
   ModelSet models = testing::LinearPlant();
   models.decision.clearing_samples = 60;

@@ -56,14 +56,15 @@ class SecondLookTest : public testing::Test {
  protected:
   ~SecondLookTest() override { worker_.Stop(); }
 
-  bool AwaitLooks(std::uint64_t count) {
+  bool Await(Counter counter, std::uint64_t count) {
     const auto until = std::chrono::steady_clock::now() + seconds(300);
-    while (counters_[Counter::kLooks] < count &&
+    while (counters_[counter] < count &&
            std::chrono::steady_clock::now() < until) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
-    return counters_[Counter::kLooks] == count;
+    return counters_[counter] == count;
   }
+  bool AwaitLooks(std::uint64_t count) { return Await(Counter::kLooks, count); }
 
   static Sample SampleOf(const RecordRow& row, std::uint64_t k) {
     Sample sample = PlantSample(k);
@@ -157,8 +158,8 @@ class SecondLookTest : public testing::Test {
 };
 
 TEST_F(SecondLookTest, TheSimulationCorrectsTheNameTenSecondsAfterItsSamples) {
-  worker_.Start();
   Feed(0, kFirstLook + 1);
+  worker_.Start();  // The early look, replaced, is not taken.
   ASSERT_TRUE(AwaitLooks(1));
   Feed(kFirstLook + 1, kCounts);
   ASSERT_THAT(Kinds(), ElementsAre(TransitionKind::kDetected,
@@ -203,8 +204,8 @@ TEST_F(SecondLookTest, TheSimulationCorrectsTheNameTenSecondsAfterItsSamples) {
 }
 
 TEST_F(SecondLookTest, ThatNameStaysWhateverTheEngineIsolates) {
-  worker_.Start();
   Feed(0, kFirstLook + 1);
+  worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));
   Feed(kFirstLook + 1, kCounts + 20);
   engine_.isolated = 0b0100;
@@ -235,8 +236,8 @@ TEST_F(SecondLookTest, SamplesDoNotWaitForAnAnswerWhichCountsOnceItIsThere) {
 }
 
 TEST_F(SecondLookTest, AnEpisodeThatTheEngineEndsKeepsTheName) {
-  worker_.Start();
   Feed(0, kFirstLook + 1);
+  worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));
   Feed(kFirstLook + 1, kCounts + 1);
   Transition closed;
@@ -254,8 +255,8 @@ TEST_F(SecondLookTest, WhatNoFaultExplainsBecomesUnknown) {
     rows_[k].x_pct = k % 2 == 0 ? 10.0 : 90.0;
     rows_[k].flow *= k % 3 == 0 ? 0.1 : 1.5;
   }
-  worker_.Start();
   Feed(0, kFirstLook + 1);
+  worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));
   Feed(kFirstLook + 1, kCounts);
   Observe(kCounts);
@@ -273,8 +274,8 @@ TEST_F(SecondLookTest, WhatNoFaultExplainsBecomesUnknown) {
 
 TEST_F(SecondLookTest, TheObserversNameStandsIfTheValveLooksHealthy) {
   rows_ = simulator::Recording(kLeadIn + 100, 2, {});
-  worker_.Start();
   Feed(0, kFirstLook + 1);
+  worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));
   Feed(kFirstLook + 1, kCounts + 20);
   EXPECT_EQ(outlet_.events.size(), 2U);
@@ -295,8 +296,8 @@ TEST_F(SecondLookTest, AResumedEpisodeKeepsItsNameUntilALookAnswers) {
   tracker_ = EpisodeTracker("V1", {});
   tracker_.Recover(open);
   names_.Keep(open.faults);
-  worker_.Start();
   Feed(kAtOnce - 40, kFirstLook + 1);
+  worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));
   Observe(kFirstLook + 1);
   EXPECT_EQ(Step(kFirstLook + 1).isolated, 0b0100U);
@@ -312,6 +313,45 @@ TEST_F(SecondLookTest, NothingIsNamedWhileIsolationIsHeld) {
   held_ = true;
   Feed(0, kFirstLook + 5);
   EXPECT_EQ(worker_.waiting(), 0U);
+}
+
+// Follows a valve of which the observers see nothing.
+TEST_F(SecondLookTest, ARoutineLookAsksForAnEpisodeAndNamesIt) {
+  rows_ = simulator::Recording(1100, 2, {Abrupt(13, -0.2)});
+  worker_.Start();
+  const auto observe = [this](std::uint64_t k) {
+    engine_.stamp_ns = PlantSample(k).stamp_ns;
+    engine_.source_id = 1;
+    engine_.quality = Quality::kLive;
+    engine_.transition_count = 0;
+    if (names_.suspects() && !engine_.detected) {
+      engine_.detected = true;
+      engine_.state = State::kDetected;
+      Transit(TransitionKind::kDetected);
+      engine_.transitions[0].detection_stamp_ns = engine_.stamp_ns;
+    }
+    Step(k);
+  };
+  constexpr std::uint64_t kFirst = 700;  // At a multiple of 300 s.
+  constexpr std::uint64_t kAgain = kFirst + 300;
+  for (std::uint64_t k = 0; k <= kAgain + 60; ++k) {
+    observe(k);
+    if (k == kFirst || k == kAgain) {  // The answer is there before it counts.
+      ASSERT_TRUE(Await(Counter::kRoutineLooks, k == kFirst ? 1 : 2));
+    }
+  }
+  EXPECT_TRUE(names_.suspects());
+  EXPECT_THAT(outlet_.events, IsEmpty());
+  for (std::uint64_t k = kAgain + 61; k < rows_.size(); ++k) {
+    observe(k);
+  }
+  ASSERT_THAT(Kinds(), ElementsAre(TransitionKind::kDetected,
+                                   TransitionKind::kIsolated));
+  EXPECT_EQ(outlet_.events[1].transition.faults, 0b0100U);
+  EXPECT_EQ(outlet_.events[1].transition.layer, Layer::kPhysics);
+  EXPECT_NEAR(outlet_.events[1].transition.strength, -0.2, 0.05);
+  ASSERT_EQ(outlet_.looks.size(), 1U);
+  EXPECT_EQ(outlet_.looks[0].faults.at(0).begins_ns, outlet_.looks[0].first_ns);
 }
 
 class LookWorkerTest : public SecondLookTest {

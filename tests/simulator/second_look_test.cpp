@@ -345,5 +345,122 @@ TEST(LookBookTest, CountsAfterItsDelayAndDoesNotHearAWorseFit) {
   EXPECT_EQ(book.At(8, 300 * kSecond), nullptr);
 }
 
+TEST(SecondLookTest, KnowsAHealthyWindowWithoutTryingFaults) {
+  EXPECT_LT(MisfitWithoutFault(Physics(), Window({})), kHealthyMisfit);
+  EXPECT_GT(MisfitWithoutFault(Physics(), Window({Abrupt(13, -0.2)})),
+            kHealthyMisfit + kRoutineGain);
+}
+
+// A valve with an engine that sees nothing but what routine looks suspect, as
+// the monitor and `fdi-trainer evaluate` connect the two.
+class RoutineLookTest : public ::testing::Test {
+ protected:
+  void Feed(const std::vector<RecordRow>& rows) {
+    for (const RecordRow& row : rows) {
+      Step(row);
+    }
+  }
+
+  void Step(const RecordRow& row) {
+    Sample sample;
+    sample.stamp_ns = count_ * kSecond;
+    sample.Set(Signal::kCv, row.input.cv_pct);
+    sample.Set(Signal::kP1, row.input.p1_kpa);
+    sample.Set(Signal::kP2, row.input.p2_kpa);
+    sample.Set(Signal::kT1, row.input.t1_degc);
+    sample.Set(Signal::kX, row.x_pct);
+    sample.Set(Signal::kF, row.flow);
+    Verdict verdict;
+    verdict.stamp_ns = sample.stamp_ns;
+    verdict.quality = quality_;
+    verdict.detected = looks_.suspects();
+    if (verdict.detected != open_) {
+      open_ = verdict.detected;
+      detection_ns_ = open_ ? sample.stamp_ns : detection_ns_;
+      verdict.transitions[0] = {
+          open_ ? TransitionKind::kDetected : TransitionKind::kCleared,
+          sample.stamp_ns, detection_ns_};
+      verdict.transition_count = 1;
+      (open_ ? opened_ : cleared_).push_back(count_);
+    }
+    if (const auto task = looks_.Step(sample, verdict)) {
+      due_.emplace_back(count_, task->occasion);
+      looks_.Enter(*task, TakeLook(Physics(), *task).value());
+    }
+    ++count_;
+  }
+
+  ValveLooks looks_{Physics()};
+  Quality quality_{Quality::kLive};
+  std::int64_t count_{0};
+  std::int64_t detection_ns_{0};
+  bool open_{false};
+  std::vector<std::pair<std::int64_t, LookOccasion>> due_;
+  std::vector<std::int64_t> opened_;
+  std::vector<std::int64_t> cleared_;
+};
+
+TEST_F(RoutineLookTest, OpensAndNamesAnEpisodeUntilTheValveIsHealthyAgain) {
+  Feed(Recording(1080, 2, {Abrupt(13, -0.2)}));
+  ASSERT_EQ(opened_.size(), 1U);
+  EXPECT_EQ(opened_[0], 900 + 60 + 1);  // The second look, its delay.
+  ASSERT_NE(looks_.Answer(), nullptr);
+  EXPECT_EQ(NamesOf(*looks_.Answer(), false), std::vector{13});
+  EXPECT_NEAR(looks_.Answer()->faults.front().strength, -0.2, 0.05);
+  EXPECT_TRUE(cleared_.empty());
+
+  Feed(Recording(700, 3, {}));
+  ASSERT_EQ(cleared_.size(), 1U);
+  EXPECT_EQ(cleared_[0], 1500 + 60 + 1);  // The first without the fault.
+  EXPECT_EQ(looks_.Answer(), nullptr);
+  EXPECT_EQ(opened_.size(), 1U);
+}
+
+TEST_F(RoutineLookTest, FindsNothingInAHealthyValve) {
+  Feed(Recording(1100, 4, {}));
+  using enum LookOccasion;
+  EXPECT_EQ(due_, (std::vector<std::pair<std::int64_t, LookOccasion>>{
+                      {600, kRoutine}, {900, kRoutine}}));
+  EXPECT_TRUE(opened_.empty());
+}
+
+TEST_F(RoutineLookTest, TakesOnlyWindowsThatAreJudgedThroughout) {
+  const std::vector<RecordRow> rows = Recording(1000, 4, {});
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    quality_ = k == 300 ? Quality::kUncovered : Quality::kLive;
+    Step(rows[k]);
+  }
+  ASSERT_EQ(due_.size(), 1U);
+  EXPECT_EQ(due_[0].first, 900);  // 420 rows since.
+}
+
+TEST(SuspicionTest, TakesTwoLooksInARowThatNameTheSameFault) {
+  const auto named = [](int fault) {
+    LookAnswer answer = AnswerOf(Looked({{fault, 0.0}, {0, 900.0}}));
+    answer.without_fault = 3.0;
+    return answer;
+  };
+  LookAnswer healthy;
+  healthy.outcome = LookOutcome::kNothing;
+  healthy.without_fault = 1.0;
+  Suspicion suspicion;
+  auto after = [&suspicion,
+                k = std::int64_t{0}](const LookAnswer& answer) mutable {
+    k += 300 * kSecond;
+    suspicion.Enter(k, answer);
+    suspicion.Advance(k + kRoutineDelayNs - 1);
+    const bool before = suspicion.found() != nullptr;
+    suspicion.Advance(k + kRoutineDelayNs);
+    return std::pair(before, suspicion.found() != nullptr);
+  };
+  EXPECT_EQ(after(named(12)), (std::pair(false, false)));
+  EXPECT_EQ(after(healthy), (std::pair(false, false)));
+  EXPECT_EQ(after(named(12)), (std::pair(false, false)));
+  EXPECT_EQ(after(named(3)), (std::pair(false, false)));
+  EXPECT_EQ(after(named(3)), (std::pair(false, true)));
+  EXPECT_EQ(after(named(12)), (std::pair(true, true)));
+  EXPECT_EQ(after(healthy), (std::pair(true, false)));
+}
+
 }  // namespace
 }  // namespace fdi::simulator

@@ -26,22 +26,21 @@ class SecondLooks {
   explicit SecondLooks(const ModelSet& models)
       : models_(models),
         physics_(simulator::PhysicsFrom(models.physics)),
-        looks_(physics_) {}
+        looks_(std::in_place, physics_) {}
+
+  bool suspects() const { return looks_->suspects(); }
+  void BeginAnew() { looks_.emplace(physics_); }
 
   void Watch(const Sample& sample, const Verdict& verdict) {
-    if (const auto task = looks_.Step(sample, verdict)) {
-      book_.Enter(*task, simulator::AnswerOf(
-                             simulator::LookAgain(physics_, task->window),
-                             task->early()));
-    }
-    for (const Transition& transition : verdict.Transitions()) {
-      detection_ns_ = transition.detection_stamp_ns;
+    if (const auto task = looks_->Step(sample, verdict)) {
+      if (auto answer = simulator::TakeLook(physics_, *task)) {
+        looks_->Enter(*task, std::move(*answer));
+      }
     }
     if (OutOfOrder(verdict.intake)) {
       return;
     }
-    const simulator::LookAnswer* answer =
-        verdict.detected ? book_.At(detection_ns_, sample.stamp_ns) : nullptr;
+    const simulator::LookAnswer* answer = looks_->Answer();
     sets_.push_back(
         answer ? simulator::NamesOf(*answer, simulator::ObserversName(
                                                  models_, verdict.isolated))
@@ -60,9 +59,7 @@ class SecondLooks {
  private:
   const ModelSet& models_;
   simulator::ValvePhysics physics_;
-  simulator::EpisodeLooks looks_;
-  simulator::LookBook book_;
-  std::int64_t detection_ns_{0};
+  std::optional<simulator::ValveLooks> looks_;
   std::vector<std::optional<std::vector<int>>> sets_;
 };
 
@@ -73,19 +70,24 @@ Answer FollowEngine(const std::shared_ptr<const ModelSet>& models,
   if (!models->physics.empty()) {
     looks.emplace(*models);
   }
+  OutsideKnowledge outside;
+  if (looks) {
+    outside = {[&looks] { return looks->suspects(); },
+               [&looks] { looks->BeginAnew(); }};
+  }
+  const auto watch = [&](const Sample& sample, const Verdict& verdict) {
+    if (CountsAsTime(verdict)) {
+      samples.Add(verdict.quality);
+    }
+    if (looks) {
+      looks->Watch(sample, verdict);
+    }
+    if (sink) {
+      sink(sample, verdict);
+    }
+  };
   Answer answer;
-  answer.indications =
-      Rescore(models, scored.run, [&](const Sample& s, const Verdict& verdict) {
-        if (CountsAsTime(verdict)) {
-          samples.Add(verdict.quality);
-        }
-        if (looks) {
-          looks->Watch(s, verdict);
-        }
-        if (sink) {
-          sink(s, verdict);
-        }
-      });
+  answer.indications = Rescore(models, scored.run, watch, outside);
   if (looks) {
     looks->Apply(answer.indications);
   }

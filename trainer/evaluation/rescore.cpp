@@ -88,7 +88,8 @@ void BackdateDetections(const Verdict& verdict, std::int64_t start_ns,
 
 std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
                                 const storage::StoredRun& run,
-                                const VerdictSink& sink) {
+                                const VerdictSink& sink,
+                                const OutsideKnowledge& outside) {
   RequireSuited(*models, run);
   ValveEngine engine(models);
   InitialisationWatch watch(run.info.run.period_s);
@@ -103,8 +104,12 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
         (all.empty() && OutOfOrder(stored.intake))) {
       continue;
     }
-    if (watch.CameFromOutside(stored)) {
+    const bool came_from_outside = watch.CameFromOutside(stored);
+    if (came_from_outside) {
       engine.EndEpisode(EndReason::kUnknown);
+    }
+    if ((came_from_outside || stored.model_swapped) && outside.begins_anew) {
+      outside.begins_anew();
     }
     if (stored.model_swapped) {
       engine.Adopt(models);
@@ -112,6 +117,9 @@ std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
     const Verdict& verdict = engine.Step(stored.sample);
     if (sink) {
       sink(stored.sample, verdict);
+    }
+    if (outside.suspects) {
+      engine.Suspect(outside.suspects());
     }
     if (OutOfOrder(verdict.intake)) {
       continue;

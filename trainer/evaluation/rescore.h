@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -7,6 +8,12 @@
 #include "trainer/evaluation.h"
 
 namespace fdi::trainer {
+
+/// What is known of a valve outside of its engine (ValveEngine::Suspect).
+struct OutsideKnowledge {
+  std::function<bool()> suspects{};     ///< Asked behind each sample.
+  std::function<void()> begins_anew{};  ///< The monitor forgot what it knew.
+};
 
 /// Runs the monitor's own engine over a stored run as the live one met it: all
 /// samples in the order of arrival, those of a superseded source left out; the
@@ -18,6 +25,7 @@ namespace fdi::trainer {
 ///   differ.
 std::vector<Indication> Rescore(const std::shared_ptr<const ModelSet>& models,
                                 const storage::StoredRun& run,
-                                const VerdictSink& sink = {});
+                                const VerdictSink& sink = {},
+                                const OutsideKnowledge& outside = {});
 
 }  // namespace fdi::trainer
