@@ -10,6 +10,11 @@ _fdi_listed() {
     sed -n "s/^ *\"$key\": \"\(.*\)\",\{0,1\}\$/\1/p" | sort -u
 }
 
+# Of the catalogue, without what the floor finds.
+_fdi_faults() {
+  _fdi_listed fault faults | grep -vE '_|^unknown$'
+}
+
 # The headings in a section of the help of `program $path`.
 _fdi_section() {
   "$program" $path --help 2>/dev/null |
@@ -42,8 +47,7 @@ _fdi_candidates() {
   local value=${2%%  *} words
   words=$(grep -oE '[a-z0-9-]+(\|[a-z0-9-]+)+' <<<"$2" | head -1)
   case "$1 $value" in
-    *SPEC*) printf '%s\n' f{1..19} t1 p1 p2 ;;
-    fault\ * | without\ *) printf '%s\n' f{1..19} t1 p1 p2 ;;
+    *SPEC* | fault\ * | without\ *) _fdi_faults ;;
     valve\ * | valves\ *)
       _fdi_listed pattern valves list
       _fdi_listed valve_id history list

@@ -1,9 +1,11 @@
 // fdi-store faults, health show|trend, worklist: what a maintenance planner
 // asks.
 #include <algorithm>
+#include <string>
 
 #include "cli/fault_texts.h"
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "monitor/planner/health_view.h"
 #include "monitor/planner/work_list.h"
 #include "storage/app/verbs.h"
@@ -189,7 +191,7 @@ void AddPlannerVerbs(cli::Program& program) {
               "one fault what to check",
               Faults);
   faults.add_option("fault", name,
-                    "f1..f19, t1, p1, p2 or unknown; all without");
+                    std::string(kFaultNames) + " or unknown; all without");
 
   CLI::App& group = program.AddGroup(
       "health", "What months did to a valve, and how long until a limit");

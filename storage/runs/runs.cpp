@@ -89,7 +89,7 @@ std::optional<double> BoundOf(double t_s) {
 void CheckLabel(int fault, double strength) {
   if (fault < 0 || fault > kLastFault) {
     throw ConfigError("label: fault " + std::to_string(fault) +
-                      " is not in 0..22");
+                      " is not in 0.." + std::to_string(kLastFault));
   }
   const bool fits = fault == 0 ? strength == 0.0
                                : strength != 0.0 && std::abs(strength) <= 1.0;

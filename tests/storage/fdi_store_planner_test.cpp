@@ -1,6 +1,7 @@
 // What a planner asks fdi-store.
 #include <gmock/gmock.h>
 
+#include "diagnosis/fault_catalogue.h"
 #include "tests/storage/store_program_fixture.h"
 
 namespace fdi::storage {
@@ -62,7 +63,8 @@ TEST_F(FdiStorePlannerTest, WorkListAndCausesOfAnEmptyHistoryAreEmpty) {
 }
 
 TEST_F(FdiStorePlannerTest, CatalogueIsListedAndOverridden) {
-  EXPECT_EQ(StoreJson("faults")["faults"].size(), 28u);
+  EXPECT_EQ(StoreJson("faults")["faults"].size(),
+            kFaultsAndFindings.size() + 1);  // And unknown.
   Write("faults.toml", "[f9]\nname = 'West header leaks'\n");
   EXPECT_EQ(StoreJson("faults f9")["faults"][0]["name"], "West header leaks");
   Write("faults.toml", "[f9]\nnane = 'x'\n");
