@@ -41,7 +41,6 @@ enum class Counter : std::uint8_t {
   kModelSwaps,
   kModelFailures,
   kLooks,
-  kRoutineLooks,
   kLooksDropped,
   kLooksFailed,
   kCount_

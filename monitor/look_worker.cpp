@@ -78,11 +78,8 @@ void LookWorker::TakeLooks() {
     lock.unlock();
     Answer answer = Take(look);
     const bool taken = answer.has_value();
-    const bool routine =
-        look.task.occasion != simulator::LookOccasion::kEpisode;
     look.answer.set_value(std::move(answer));
-    context_.counters.Add(routine ? Counter::kRoutineLooks : Counter::kLooks,
-                          taken ? 1 : 0);
+    context_.counters.Add(Counter::kLooks, taken ? 1 : 0);
     lock.lock();
   }
 }

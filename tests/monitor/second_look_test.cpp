@@ -337,7 +337,7 @@ TEST_F(SecondLookTest, ARoutineLookAsksForAnEpisodeAndNamesIt) {
   for (std::uint64_t k = 0; k <= kAgain + 60; ++k) {
     observe(k);
     if (k == kFirst || k == kAgain) {  // The answer is there before it counts.
-      ASSERT_TRUE(Await(Counter::kRoutineLooks, k == kFirst ? 1 : 2));
+      ASSERT_TRUE(AwaitLooks(k == kFirst ? 1 : 2));
     }
   }
   EXPECT_TRUE(names_.suspects());
