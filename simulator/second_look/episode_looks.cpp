@@ -34,9 +34,9 @@ std::int64_t AgeAfter(std::int64_t age_ns) {
                                        : 10 * age_ns;
 }
 
-}  // namespace
-
-namespace {
+std::int64_t PeriodOf(const ValvePhysics& physics) {
+  return std::llround(physics.drive.period_s * kNsPerSecond);
+}
 
 bool Has(const std::vector<Explanation>& faults, int fault) {
   return std::any_of(faults.begin(), faults.end(),
@@ -174,14 +174,6 @@ std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
   return names;
 }
 
-namespace {
-
-std::int64_t PeriodOf(const ValvePhysics& physics) {
-  return std::llround(physics.drive.period_s * kNsPerSecond);
-}
-
-}  // namespace
-
 EpisodeLooks::EpisodeLooks(const ValvePhysics& physics)
     : physics_(physics), period_ns_(PeriodOf(physics)) {}
 
@@ -256,10 +248,11 @@ std::optional<LookTask> EpisodeLooks::RoutineTask(bool suspected) const {
   for (const Row& row : rows_) {
     task.window.rows.push_back(row.row);
   }
-  return std::ranges::count_if(task.window.rows, &RecordRow::x_measured) <
-                 kRoutineMeasured
-             ? std::nullopt
-             : std::optional(std::move(task));
+  if (std::ranges::count_if(task.window.rows, &RecordRow::x_measured) <
+      kRoutineMeasured) {
+    return std::nullopt;
+  }
+  return task;
 }
 
 std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,

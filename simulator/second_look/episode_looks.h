@@ -51,7 +51,7 @@ struct LookAnswer {
   bool early{false};
   /// The valve's answer under the best explanation, a row each.
   std::vector<RecordAnswer> simulated;
-  std::int64_t stamp_ns{0};  ///< Of the last row; set by LookBook.
+  std::int64_t stamp_ns{0};  ///< Of the last row.
   /// Misfit without any fault, of a routine look alone.
   double without_fault{0.0};
 };

@@ -654,10 +654,6 @@ SecondLook Looker::Run(const std::stop_token& stop) {
   return look;
 }
 
-}  // namespace
-
-namespace {
-
 void RequireRows(const LookWindow& window) {
   Require(window.rows.size() >= 20 && window.detection < window.rows.size(),
           "a second look takes 20 rows and a detection among them");

@@ -56,24 +56,18 @@ class SecondLookTest : public testing::Test {
  protected:
   ~SecondLookTest() override { worker_.Stop(); }
 
-  bool Await(Counter counter, std::uint64_t count) {
+  bool AwaitLooks(std::uint64_t count) {
     const auto until = std::chrono::steady_clock::now() + seconds(300);
-    while (counters_[counter] < count &&
+    while (counters_[Counter::kLooks] < count &&
            std::chrono::steady_clock::now() < until) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
-    return counters_[counter] == count;
+    return counters_[Counter::kLooks] == count;
   }
-  bool AwaitLooks(std::uint64_t count) { return Await(Counter::kLooks, count); }
 
   static Sample SampleOf(const RecordRow& row, std::uint64_t k) {
     Sample sample = PlantSample(k);
-    sample.Set(Signal::kCv, row.input.cv_pct);
-    sample.Set(Signal::kP1, row.input.p1_kpa);
-    sample.Set(Signal::kP2, row.input.p2_kpa);
-    sample.Set(Signal::kT1, row.input.t1_degc);
-    sample.Set(Signal::kX, row.x_pct);
-    sample.Set(Signal::kF, row.flow);
+    simulator::SetReadings(row, sample);
     return sample;
   }
 

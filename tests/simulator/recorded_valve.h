@@ -59,6 +59,15 @@ inline LookWindow Window(const std::vector<FaultSchedule>& faults,
           kBasicSignals};
 }
 
+inline void SetReadings(const RecordRow& row, Sample& sample) {
+  sample.Set(Signal::kCv, row.input.cv_pct);
+  sample.Set(Signal::kP1, row.input.p1_kpa);
+  sample.Set(Signal::kP2, row.input.p2_kpa);
+  sample.Set(Signal::kT1, row.input.t1_degc);
+  sample.Set(Signal::kX, row.x_pct);
+  sample.Set(Signal::kF, row.flow);
+}
+
 inline FaultSchedule Abrupt(int fault, double strength) {
   FaultSchedule schedule;
   schedule.fault = fault;

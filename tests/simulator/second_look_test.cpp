@@ -364,12 +364,7 @@ class RoutineLookTest : public ::testing::Test {
   void Step(const RecordRow& row) {
     Sample sample;
     sample.stamp_ns = count_ * kSecond;
-    sample.Set(Signal::kCv, row.input.cv_pct);
-    sample.Set(Signal::kP1, row.input.p1_kpa);
-    sample.Set(Signal::kP2, row.input.p2_kpa);
-    sample.Set(Signal::kT1, row.input.t1_degc);
-    sample.Set(Signal::kX, row.x_pct);
-    sample.Set(Signal::kF, row.flow);
+    SetReadings(row, sample);
     Verdict verdict;
     verdict.stamp_ns = sample.stamp_ns;
     verdict.quality = quality_;
