@@ -111,7 +111,8 @@ class Excitation {
 
   /// True if the inputs do not depend on the valve. They are then known one
   /// period ahead, and the pressures run linearly from sample to sample. A
-  /// closed loop's pressures, found at a sample, are reached one period later.
+  /// closed loop's pressures, found at a sample, are reached, and read, one
+  /// period later.
   virtual bool is_open_loop() const { return true; }
 
   /// Inputs under which a closed loop starts; its first Next() follows.

@@ -266,7 +266,7 @@ class ValveSimulation::Impl {
   NormalSource noise_;
   NormalSource positioner_noise_;
   ControlValve valve_;
-  ProcessInputs inputs_;   // Of the last sample.
+  ProcessInputs inputs_;   // Command, and the pressures to be reached next.
   ProcessInputs reached_;  // Pressures up to which the valve is integrated.
   std::vector<std::optional<double>> held_;  // Per schedule: its flatline.
 
@@ -391,8 +391,11 @@ void ValveSimulation::Impl::HoldFlatlines(double time_s, Sample& sample) {
 Sample ValveSimulation::Impl::ReadAll(std::uint64_t k) {
   const InstrumentParameters& i = config_.parameters.instruments;
   const FaultEffects effects = EffectsAt(config_.faults, TimeOf(k));
-  const ProcessInputs seen = valve_.Effective(inputs_);
-  double flow = valve_.FlowM3PerHour(inputs_, excitation_->bypass_opening());
+  ProcessInputs present = inputs_;
+  present.inlet_pressure_pa = reached_.inlet_pressure_pa;
+  present.outlet_pressure_pa = reached_.outlet_pressure_pa;
+  const ProcessInputs seen = valve_.Effective(present);
+  double flow = valve_.FlowM3PerHour(present, excitation_->bypass_opening());
   if (i.flow_unit == FlowUnit::kTPerHour) {
     flow *= LiquidDensity(seen.temperature_c) / 1000.0;
   }

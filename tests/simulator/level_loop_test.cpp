@@ -1,9 +1,11 @@
 #include "simulator/level_loop.h"
 
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "simulator/record_fit.h"
 #include "simulator/valve_simulation.h"
 
 namespace fdi::simulator {
@@ -115,6 +117,27 @@ TEST(LevelLoopTest, LoopRunsAtThePlantsOperatingPoint) {
   EXPECT_NEAR(f.mean, 17.4, 0.5);
   EXPECT_NEAR(f.sd, 3.3, 0.6);
   EXPECT_NEAR(MomentsOf(Signal::kP2, loop).mean, 2617.0, 5.0);
+}
+
+// The transmitters read the pressures that act on the plug, not those to come.
+TEST(LevelLoopTest, ItsRecordDrivesTheValveToTheSameAnswers) {
+  ValveSimulationConfig config;
+  config.excitation = LevelLoopExcitation{};
+  config.duration_s = 600.0;
+  config.noise = false;
+  config.resolution = false;
+  ValveSimulation loop(config);
+  std::vector<RecordRow> rows;
+  while (!loop.finished()) {
+    const Sample s = loop.Step().sample;
+    rows.push_back(
+        {{s[Signal::kCv], s[Signal::kP1], s[Signal::kP2], s[Signal::kT1]},
+         s[Signal::kX],
+         s[Signal::kF]});
+  }
+  const RecordFit fit = FitToRecord(config.parameters, rows, 60, rows.size());
+  EXPECT_LT(fit.x_rmse_pct, 0.05);
+  EXPECT_LT(fit.flow_rmse, 0.05);
 }
 
 TEST(LevelLoopTest, OpenBypassLetsTheControllerCloseTheValve) {
