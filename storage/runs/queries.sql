@@ -18,8 +18,9 @@ FROM run WHERE
 SELECT from_s, to_s, fault, strength FROM run_label
 WHERE run_id = ? ORDER BY label_id
 -- name: insert_label
-INSERT INTO run_label (run_id, from_s, to_s, fault, strength, created_ns)
-VALUES (?, ?, ?, ?, ?, ?)
+INSERT INTO run_label (run_id, from_s, to_s, fault, fault_name, strength,
+  created_ns)
+VALUES (?, ?, ?, ?, ?, ?, ?)
 -- name: insert_run
 INSERT INTO run (id, valve_id, source_id, start_ns, period_s, flow_unit,
   origin, scenario, seed, software, state, recorder_id, created_ns)

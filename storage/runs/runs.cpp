@@ -113,7 +113,7 @@ std::string ImportPart(Database& database, const SampleSeries& part,
     counters.Count(stored);
     samples.push_back(stored);
   }
-  const std::string id = NewRunId();
+  std::string id = NewRunId();
   const std::int64_t run_id = InsertRun(database, id, run, std::nullopt);
   InsertChunks(database, run_id, 0, samples, kImportChunk);
   AddCounters(database, run_id, counters);
@@ -316,7 +316,8 @@ void RunStore::Label(std::string_view text, int fault, double strength) {
     throw NotFoundError("run " + std::string(text) + " holds no sample");
   }
   database_->Run(sql::insert_label, info.row_id, BoundOf(selector.from_s),
-                 BoundOf(selector.to_s), fault, strength, UtcNow());
+                 BoundOf(selector.to_s), fault, FaultName(fault), strength,
+                 UtcNow());
   transaction.Commit();
 }
 

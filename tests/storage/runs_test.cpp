@@ -7,6 +7,7 @@
 
 #include "cli/csv.h"
 #include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
 #include "storage/runs/run_recorder.h"
 #include "tests/storage/runs_fixture.h"
 
@@ -128,7 +129,7 @@ TEST_F(RunsTest, LabelsOverrideTheTruthOfTheirStretch) {
   ASSERT_TRUE(labels.Step());
   EXPECT_EQ(labels.Text(0), "normal, f18 -0.5 @1.0:3.0");
 
-  EXPECT_THROW(store.Label(id, 23, 0.5), ConfigError);
+  EXPECT_THROW(store.Label(id, kLastFault + 1, 0.5), ConfigError);
   EXPECT_THROW(store.Label(id, 1, -1.5), ConfigError);
   EXPECT_THROW(store.Label(id, 1, 0.0), ConfigError);
   EXPECT_THROW(store.Label(id, 0, 0.5), ConfigError);
@@ -137,11 +138,11 @@ TEST_F(RunsTest, LabelsOverrideTheTruthOfTheirStretch) {
   EXPECT_FALSE(store.Load(id).samples[0].truth);
 }
 
-TEST_F(RunsTest, LabelsOfAnOlderFileStayAndTransmitterFaultsCanBeAdded) {
-  Schema first = RunsSchema();
-  first.migrations.resize(1);
+TEST_F(RunsTest, LabelsOfAnOlderFileStayAndSayTheNamesOfTheirFaults) {
+  Schema second = RunsSchema();
+  second.migrations.resize(2);
   {
-    Database old(file_, first, Access::kOccasionalWriter);
+    Database old(file_, second, Access::kOccasionalWriter);
     Transaction transaction(old);
     old.Run(
         "INSERT INTO run (id, valve_id, source_id, start_ns, period_s, "
@@ -150,18 +151,13 @@ TEST_F(RunsTest, LabelsOfAnOlderFileStayAndTransmitterFaultsCanBeAdded) {
         "'complete', 0)");
     old.Run(
         "INSERT INTO run_label (run_id, fault, strength, created_ns) "
-        "VALUES (1, 6, 0.5, 0)");
+        "VALUES (1, 6, 0.5, 0), (1, 21, -0.5, 0), (1, 0, 0, 0)");
     transaction.Commit();
   }
   Database database(file_, RunsSchema(), Access::kOccasionalWriter);
-  Transaction transaction(database);
-  database.Run(
-      "INSERT INTO run_label (run_id, fault, strength, created_ns) "
-      "VALUES (1, 21, -0.5, 0)");
-  transaction.Commit();
   Statement labels = database.Prepare("SELECT labels FROM run_summary");
   ASSERT_TRUE(labels.Step());
-  EXPECT_EQ(labels.Text(0), "f6 0.5, p1 -0.5");
+  EXPECT_EQ(labels.Text(0), "f6 0.5, p1 -0.5, normal");
 }
 
 TEST_F(RunsTest, ListSelectsByValveOriginAndTime) {

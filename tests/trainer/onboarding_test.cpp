@@ -110,6 +110,16 @@ TEST(OnboardingFaultsTest, FaultsOfMissingTransmittersAreLeftOut) {
             static_cast<std::size_t>(kMaxObservers));
 }
 
+TEST(OnboardingFaultsTest, WhereThereIsNoRoomForAllTheWeakestAreLeftOut) {
+  const auto all = OnboardingFaults(kBasicSignals);
+  const auto most = OnboardingFaults(kBasicSignals, all.size() - 5);
+  EXPECT_EQ(most.size(), all.size() - 5);
+  for (const FaultCondition& condition : all) {
+    EXPECT_TRUE(std::abs(condition.strength) == 0.1 ||
+                std::ranges::find(most, condition) != most.end());
+  }
+}
+
 std::string Refusal(const std::function<void(Sample&)>& change) {
   TrainingRun run = RunOf({"r", SimulateHealthy(Lublin(), 900.0, 3)});
   for (LabelledSample& labelled : run.samples) {

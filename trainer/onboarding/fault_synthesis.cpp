@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <iterator>
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
@@ -28,7 +30,8 @@ void Add(int fault, const auto& strengths, bool both_ways,
 
 }  // namespace
 
-std::vector<FaultCondition> OnboardingFaults(SignalMask signals) {
+std::vector<FaultCondition> OnboardingFaults(SignalMask signals,
+                                             std::size_t most) {
   const auto measured = [&](Signal signal) {
     return (signals & MaskOf(signal)) != 0;
   };
@@ -46,6 +49,14 @@ std::vector<FaultCondition> OnboardingFaults(SignalMask signals) {
     } else {  // f4 too: there is no less play than none.
       Add(fault, kStrengths, false, faults);
     }
+  }
+  while (faults.size() > most) {
+    const auto weakest =
+        std::find_if(faults.rbegin(), faults.rend(), [](const auto& f) {
+          return std::abs(f.strength) == kStrengths.front();
+        });
+    faults.erase(weakest == faults.rend() ? faults.end() - 1
+                                          : std::next(weakest).base());
   }
   return faults;
 }

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "diagnosis/model_set.h"
 #include "diagnosis/sample.h"
 #include "simulator/excitation.h"
 #include "simulator/valve_parameters.h"
@@ -28,8 +30,11 @@ struct ValveType {
 
 /// Faults that onboarding prepares observers for, each at several strengths, by
 /// fault. Those of transmitters that are not among `signals` are left out, and
-/// f14, which the basic signals never show.
-std::vector<FaultCondition> OnboardingFaults(SignalMask signals);
+/// f14, which the basic signals never show. Of more than `most` the weakest are
+/// left out, of the last faults first.
+std::vector<FaultCondition> OnboardingFaults(SignalMask signals,
+                                             std::size_t most = kMaxObservers -
+                                                                1);
 
 /// The inputs of a simulation: what the sample has, else the level.
 simulator::InputRow InputsOf(const Sample& sample,
