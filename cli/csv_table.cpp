@@ -135,6 +135,12 @@ ColumnMap WithSigns(std::string_view text, ColumnMap map,
 
 namespace {
 
+struct TimedReading {
+  double t_s;
+  double value;
+  SignalQuality quality;
+};
+
 // Reads the rows of a whole table and brings them onto a grid of time.
 class TableReader {
  public:
@@ -154,6 +160,9 @@ class TableReader {
   void FindPeriod();
   bool IsSteady() const;
   void PutOnGrid();
+  std::array<std::vector<TimedReading>, kSignalCount> Readings() const;
+  void NoteResampling(const std::array<std::size_t, kSignalCount>& filled,
+                      std::size_t samples);
   void Resample();
   void CheckValues();
   void CheckPair(Signal signal);
@@ -380,12 +389,6 @@ struct Resampled {
   bool filled;
 };
 
-struct TimedReading {
-  double t_s;
-  double value;
-  SignalQuality quality;
-};
-
 // `next` is the first reading behind t_s.
 std::optional<Resampled> At(const std::vector<TimedReading>& readings,
                             std::size_t next, double t_s,
@@ -415,14 +418,9 @@ std::optional<Resampled> At(const std::vector<TimedReading>& readings,
   return std::nullopt;
 }
 
-void TableReader::Resample() {
-  const Resampling& how = *options().map.resampling;
-  const double begin_s = rows_.front().t_s + Phase();
-  const double length_s = rows_.back().t_s - begin_s + 0.5 * period_s_;
-  if (length_s / period_s_ > 1e8) {
-    throw ConfigError("--resample " + NumberText(period_s_) +
-                      "s: more than 100 million samples");
-  }
+// The readings of each signal by time.
+std::array<std::vector<TimedReading>, kSignalCount> TableReader::Readings()
+    const {
   std::array<std::vector<TimedReading>, kSignalCount> readings;
   for (const CsvRow& row : rows_) {
     const Sample& sample = row.labelled.sample;
@@ -432,6 +430,37 @@ void TableReader::Resample() {
       }
     }
   }
+  return readings;
+}
+
+void TableReader::NoteResampling(
+    const std::array<std::size_t, kSignalCount>& filled, std::size_t samples) {
+  const Resampling& how = *options().map.resampling;
+  std::string shares;
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    if (filled[i] > 0) {
+      shares += (shares.empty() ? "" : ", ") +
+                std::string(SignalName(static_cast<Signal>(i))) + " " +
+                PercentText(filled[i], samples);
+    }
+  }
+  table_.notes.push_back(
+      "resampled to " + NumberText(period_s_) + " s (" +
+      (how.linear ? "linear" : "hold") + ", at most " +
+      NumberText(how.limit_s) +
+      " s), filled: " + (shares.empty() ? "nothing" : shares) +
+      (shares.empty() ? "" : "; kept out of fits and thresholds"));
+}
+
+void TableReader::Resample() {
+  const Resampling& how = *options().map.resampling;
+  const double begin_s = rows_.front().t_s + Phase();
+  const double length_s = rows_.back().t_s - begin_s + 0.5 * period_s_;
+  if (length_s / period_s_ > 1e8) {
+    throw ConfigError("--resample " + NumberText(period_s_) +
+                      "s: more than 100 million samples");
+  }
+  const auto readings = Readings();
   std::array<std::size_t, kSignalCount> next{};
   std::array<std::size_t, kSignalCount> filled{};
   std::vector<CsvRow> grid;
@@ -487,20 +516,7 @@ void TableReader::Resample() {
                     "--resample " +
                     NumberText(period_s_) + "s:hold:10min");
   }
-  std::string shares;
-  for (std::size_t i = 0; i < kSignalCount; ++i) {
-    if (filled[i] > 0) {
-      shares += (shares.empty() ? "" : ", ") +
-                std::string(SignalName(static_cast<Signal>(i))) + " " +
-                PercentText(filled[i], grid.size());
-    }
-  }
-  table_.notes.push_back(
-      "resampled to " + NumberText(period_s_) + " s (" +
-      (how.linear ? "linear" : "hold") + ", at most " +
-      NumberText(how.limit_s) +
-      " s), filled: " + (shares.empty() ? "nothing" : shares) +
-      (shares.empty() ? "" : "; kept out of fits and thresholds"));
+  NoteResampling(filled, grid.size());
   rows_ = std::move(grid);
 }
 

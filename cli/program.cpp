@@ -133,7 +133,8 @@ std::string CommandLine(int argc, const char* const* argv) {
 }  // namespace
 
 Program::Program(std::string name, std::string description)
-    : app_(std::make_unique<CLI::App>(std::move(description), name)) {
+    : app_(
+          std::make_unique<CLI::App>(std::move(description), std::move(name))) {
   MapError<std::system_error>(kExitData);  // Also those of std::filesystem.
   MapError<DataError>(kExitData);
   MapError<NotFoundError>(kExitNotFound);

@@ -405,7 +405,7 @@ std::string FormatDuration(std::int64_t duration_ns) {
     if (whole < 7200) {
       std::snprintf(text, sizeof text, "%lld min %02lld s", whole / 60,
                     whole % 60);
-    } else if (whole < 2 * 86400) {
+    } else if (whole < 2LL * 86400) {
       std::snprintf(text, sizeof text, "%lld h %02lld min", whole / 3600,
                     whole % 3600 / 60);
     } else {

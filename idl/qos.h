@@ -24,6 +24,24 @@ struct EndpointQos {
 /// topic does not know are kLive.
 template <typename Message>
 EndpointQos QosFor(Profile profile, int valves);
+template <>
+EndpointQos QosFor<ValveSampleMessage>(Profile profile, int valves);
+template <>
+EndpointQos QosFor<DecisionMessage>(Profile profile, int valves);
+template <>
+EndpointQos QosFor<DecisionBatchMessage>(Profile profile, int valves);
+template <>
+EndpointQos QosFor<FaultEvent>(Profile profile, int valves);
+template <>
+EndpointQos QosFor<ModelSetInfoMessage>(Profile profile, int valves);
+template <>
+EndpointQos QosFor<MonitorStatusMessage>(Profile profile, int valves);
+template <>
+EndpointQos QosFor<PairState>(Profile profile, int valves);
+template <>
+EndpointQos QosFor<MonitorShare>(Profile profile, int valves);
+template <>
+EndpointQos QosFor<OperatorAction>(Profile profile, int valves);
 
 /// EndpointQos::name of every topic and profile.
 const std::set<std::string>& EndpointNames();

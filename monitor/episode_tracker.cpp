@@ -151,7 +151,7 @@ void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
 
 void EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
                            EpisodeOutlet& outlet) {
-  open_.emplace();
+  open_ = Open{};
   open_->source_id = verdict.source_id;
   open_->trace_until_ns = transition.stamp_ns + Ns(options_.after_detection_s);
   if (recovered_) {

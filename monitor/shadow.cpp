@@ -145,7 +145,7 @@ void ShadowValve::Compare(const Verdict& active, const ModelSet& models) {
 }
 
 void ShadowValve::Begin(const Verdict& active, const ModelSet& models) {
-  open_.emplace();
+  open_ = Stretch{};
   ShadowDifference& difference = open_->difference;
   difference.valve_id = valve_id_;
   difference.source_id = active.source_id;

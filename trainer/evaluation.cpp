@@ -155,7 +155,7 @@ RunIndices ComputeIndices(const std::vector<Indication>& all,
   return result;
 }
 
-std::vector<Indication> ScoreRun(std::shared_ptr<const ModelSet> models,
+std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
                                  const TrainingRun& run,
                                  const VerdictSink& sink) {
   ValveEngine engine(models);

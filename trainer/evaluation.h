@@ -63,7 +63,7 @@ using VerdictSink = std::function<void(const Sample&, const Verdict&)>;
 /// Runs the monitor's own engine over a stored run. The truth is kept beside
 /// it for the indices and never reaches the engine. DD holds from the stamp of
 /// the detection, which is the first abnormal sample.
-std::vector<Indication> ScoreRun(std::shared_ptr<const ModelSet> models,
+std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
                                  const TrainingRun& run,
                                  const VerdictSink& sink = {});
 

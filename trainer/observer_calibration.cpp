@@ -90,7 +90,7 @@ struct Fold {
 // each, and the rest of it.
 Fold MakeFold(const Condition& normal, int fold) {
   Fold result;
-  const bool whole_stretches = normal.training.size() >= 2 * kFolds;
+  const bool whole_stretches = normal.training.size() / 2 >= kFolds;
   for (std::size_t i = 0; i < normal.training.size(); ++i) {
     std::vector<Sample> whole = WholeStretch(normal, i).samples;
     const std::string& id = normal.training[i].run_id;

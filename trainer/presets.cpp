@@ -56,7 +56,8 @@ std::vector<Regressor> Lags(Signal signal, int longest) {
   return lags;
 }
 
-std::vector<Regressor> Joined(std::vector<std::vector<Regressor>> parts) {
+std::vector<Regressor> Joined(
+    const std::vector<std::vector<Regressor>>& parts) {
   std::vector<Regressor> joined;
   for (const auto& part : parts) {
     joined.insert(joined.end(), part.begin(), part.end());

@@ -68,7 +68,7 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
   const int fits = static_cast<int>(conditions.size() - 1) * channels;
   std::atomic<int> done{0};
   ParallelFor(fits, options.threads, [&](int i) {
-    const auto o = static_cast<std::size_t>(1 + i / channels);
+    const auto o = 1 + static_cast<std::size_t>(i / channels);
     const auto c = static_cast<std::size_t>(i % channels);
     models.observers[o].channels[c] =
         FitObserver(options.channels[c], normal.channels[c], conditions.front(),

@@ -84,7 +84,7 @@ void Console::Hear(const FaultEvent& event) {
 }
 
 std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked) {
-  const std::filesystem::path folder =
+  std::filesystem::path folder =
       asked.empty() ? cli::SharedFile("console") : asked;
   if (!std::filesystem::is_regular_file(folder / "index.html")) {
     const std::string what = folder.string() +

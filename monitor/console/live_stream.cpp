@@ -35,7 +35,7 @@ Message StreamEvent(const std::string& name, const std::string& data) {
 
 std::shared_ptr<LiveStream::Client> LiveStream::Admit(const std::string& valve,
                                                       std::uint64_t next_sample,
-                                                      Message hello) {
+                                                      const Message& hello) {
   const std::lock_guard lock(mutex_);
   if (closed_ || clients_.size() >= options_.max_clients) {
     ++counts_.refused;

@@ -79,7 +79,8 @@ class LiveStream {
   /// @param hello its first message. @returns null if all places are taken or
   ///   the stream is closed.
   std::shared_ptr<Client> Admit(const std::string& valve,
-                                std::uint64_t next_sample, Message hello);
+                                std::uint64_t next_sample,
+                                const Message& hello);
   /// The next message of `client`. Messages that wait when it is ended are
   /// dropped.
   Outcome Next(Client& client, std::chrono::milliseconds timeout,

@@ -559,13 +559,13 @@ HttpServer::Counts HttpServer::counts() const {
   return gate_->counts();
 }
 
-void HttpServer::Add(Pages pages) {
-  for (auto& [path, make] : pages) {
-    gate_->Get(path, [make = std::move(make)](const httplib::Request&,
-                                              httplib::Response& response) {
-      HttpPage page = make();
+void HttpServer::Add(const Pages& pages) {
+  for (const auto& [path, make] : pages) {
+    gate_->Get(path, [make = make](const httplib::Request&,
+                                   httplib::Response& response) {
+      const HttpPage page = make();
       response.status = page.status;
-      response.set_content(std::move(page.body), page.type.c_str());
+      response.set_content(page.body, page.type.c_str());
     });
   }
 }

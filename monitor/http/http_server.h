@@ -84,7 +84,7 @@ class HttpServer {
 
   /// Answers GET by `pages`, which may refer to what outlives this. Before
   /// Start().
-  void Add(Pages pages);
+  void Add(const Pages& pages);
   /// For what pages cannot do. Before Start().
   httplib::Server& routes();
 

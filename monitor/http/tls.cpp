@@ -75,6 +75,7 @@ BIO* SocketBio(int socket) {
   }();
   BIO* const bio = BIO_new(method);
   if (bio != nullptr) {
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): what a BIO holds is a pointer.
     BIO_set_data(bio, reinterpret_cast<void*>(std::intptr_t{socket}));
     BIO_set_init(bio, 1);
   }

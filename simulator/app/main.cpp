@@ -40,17 +40,17 @@ std::vector<cli::VerbExamples> Examples() {
 }  // namespace fdi::simulator
 
 int main(int argc, char** argv) {
-  using namespace fdi;
+  namespace cli = fdi::cli;
   cli::Program program("fdi-simulator",
                        "Control valve with faults: simulates or replays it, "
                        "publishes and records its samples");
   program.AddBusOptions();
-  simulator::AddRunVerb(program);
-  simulator::AddReplayVerb(program);
-  simulator::AddFaultsVerb(program);
-  program.MapError<storage::SqliteError>(cli::kExitData);
-  program.MapError<idl::TransportError>(cli::kExitTransport);
-  program.MapError<simulator::NoReaderError>(cli::kExitTransport);
-  program.AddExamples(simulator::Examples());
+  fdi::simulator::AddRunVerb(program);
+  fdi::simulator::AddReplayVerb(program);
+  fdi::simulator::AddFaultsVerb(program);
+  program.MapError<fdi::storage::SqliteError>(cli::kExitData);
+  program.MapError<fdi::idl::TransportError>(cli::kExitTransport);
+  program.MapError<fdi::simulator::NoReaderError>(cli::kExitTransport);
+  program.AddExamples(fdi::simulator::Examples());
   return program.Run(argc, argv);
 }

@@ -103,7 +103,9 @@ class Looker {
               const Trajectory& answers) const;
   double CostOf(const Hypothesis& hypothesis, double strength,
                 const Trajectory& answers) const;
+  ChannelFit FitWithoutFault() const;
   std::vector<Hypothesis> Hypotheses() const;
+  std::vector<Hypothesis> FitHypotheses(const std::stop_token& stop);
   double StopAsSeen() const;
   void Try(Hypothesis& hypothesis, double strength);
   void TryCourse(Hypothesis& hypothesis, Course course);
@@ -539,7 +541,8 @@ Explanation Looker::Explain(const Hypothesis& h, double scale) const {
   return e;
 }
 
-SecondLook Looker::Run(const std::stop_token& stop) {
+// A healthy valve, whose readings may drift.
+ChannelFit Looker::FitWithoutFault() const {
   const bool has_flow = Measures(Signal::kF);
   // A constant shift of one reading by some per cent: drift.
   constexpr double kDrift = 0.02;
@@ -564,7 +567,11 @@ SecondLook Looker::Run(const std::stop_token& stop) {
   }
   unmoved.cost += Cost(0, 0.0, {detection_, false}, healthy_);
   unmoved.errors += ErrorsOf(healthy_);
+  return unmoved;
+}
 
+// By cost; empty if it was asked to stop.
+std::vector<Hypothesis> Looker::FitHypotheses(const std::stop_token& stop) {
   std::vector<Hypothesis> hypotheses = Hypotheses();
   const double inputs = InputCost(0, 0.0, {detection_, false}, healthy_);
   for (Hypothesis& h : hypotheses) {
@@ -615,7 +622,15 @@ SecondLook Looker::Run(const std::stop_token& stop) {
   std::stable_sort(
       hypotheses.begin(), hypotheses.end(),
       [](const auto& a, const auto& b) { return a.cost < b.cost; });
+  return hypotheses;
+}
 
+SecondLook Looker::Run(const std::stop_token& stop) {
+  const ChannelFit unmoved = FitWithoutFault();
+  const std::vector<Hypothesis> hypotheses = FitHypotheses(stop);
+  if (hypotheses.empty()) {
+    return {};
+  }
   const double readings = Readings();
   const Hypothesis& first = hypotheses.front();
   const bool faulty = first.cost + kPriceOfFault < unmoved.cost;

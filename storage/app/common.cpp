@@ -14,7 +14,7 @@ DataDirectory DataOf(const Context& context) {
 }
 
 DataDirectory WritableDataOf(const Context& context) {
-  const DataDirectory data = DataOf(context);
+  DataDirectory data = DataOf(context);
   EnsureExists(data);
   return data;
 }

@@ -298,7 +298,8 @@ void GuessSignals(std::vector<SniffedColumn>& columns) {
 // Seconds of the time cells; nothing where one is no time.
 class TimeReader {
  public:
-  TimeReader(const cli::ColumnMap& map) : map_(map), clock_(map.zone) {}
+  explicit TimeReader(const cli::ColumnMap& map)
+      : map_(map), clock_(map.zone) {}
   std::optional<double> Read(const std::string& cell) {
     if (const auto number = cli::ParseNumber(cell, map_.decimal)) {
       // Days of a spreadsheet become seconds; the form itself is found out by

@@ -307,7 +307,7 @@ std::vector<std::string> ValvesToMove(ModelStore& models, Database& history,
     }
   }
   std::ranges::sort(valves);
-  valves.erase(std::ranges::unique(valves).begin(), valves.end());
+  valves.erase(std::unique(valves.begin(), valves.end()), valves.end());
   return valves;
 }
 

@@ -61,7 +61,7 @@ std::string StateCondition(EpisodeState state) {
       "coalesce(e.cleared_ns, e.ended_ns) IS NOT NULL";
   constexpr const char* kAcked = " AND e.acked_by IS NOT NULL";
   constexpr const char* kUnacked = " AND e.acked_by IS NULL";
-  const std::string open = " AND e.ended_ns IS NULL";
+  std::string open = " AND e.ended_ns IS NULL";
   switch (state) {
     case EpisodeState::kAny:
       break;

@@ -265,7 +265,7 @@ std::optional<ModelReference> ModelStore::TakeValve(
   }
   const auto theirs = other.FindValve(valve_id);
   const bool of_its_own = theirs && theirs->pattern == valve_id;
-  const auto ours = AssignedModelSet(valve_id);
+  auto ours = AssignedModelSet(valve_id);
   const bool same =
       assigned && ours &&
       other.Summary(*assigned).content_hash == Summary(*ours).content_hash;

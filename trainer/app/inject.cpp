@@ -97,7 +97,7 @@ std::string Store(const InjectedRun& injected, const InjectOptions& options,
   storage::EnsureExists(directory);
   storage::RunRecorder recorder(directory.runs());
   const auto key = recorder.Begin(row);
-  const std::string id = recorder.Id(key);
+  std::string id = recorder.Id(key);
   for (storage::StoredSample stored : injected.run.samples) {
     stored.sample.stamp_ns += shift;
     recorder.Append(key, stored);

@@ -2,6 +2,7 @@
 #include "storage/database/database.h"
 #include "trainer/app/verbs.h"
 
+// NOLINTNEXTLINE(bugprone-exception-escape): of no memory it may end.
 int main(int argc, char** argv) {
   fdi::cli::Program program(
       "fdi-trainer",

@@ -384,9 +384,10 @@ Json SetJson(ModelSet models, bool active, const storage::Lineage& lineage) {
 void AddSummary(const ModelSet& models, const storage::Lineage& lineage,
                 bool active, cli::Report& report) {
   const auto field = [](std::string heading, std::string text) {
-    return cli::Column{.heading = std::move(heading),
-                       .key = "",
-                       .text = [text](const Json&) { return text; }};
+    return cli::Column{
+        .heading = std::move(heading),
+        .key = "",
+        .text = [text = std::move(text)](const Json&) { return text; }};
   };
   report.Fields(
       "", {field("model set", NameOf(models) + (active ? " (active)" : "")),

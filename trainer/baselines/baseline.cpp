@@ -82,7 +82,7 @@ LinearModel FitLinear(std::string name, Signal output,
   return model;
 }
 
-LinearModel FitArx(std::string name, Signal output,
+LinearModel FitArx(const std::string& name, Signal output,
                    const std::vector<Signal>& inputs,
                    std::span<const Stretch> training,
                    std::span<const Stretch> validation) {

@@ -44,7 +44,7 @@ LinearModel FitLinear(std::string name, Signal output,
 
 /// As FitLinear() with all `inputs` at lags 0..n and the output at 1..n: the
 /// order n of 1..6 that errs least on `validation`.
-LinearModel FitArx(std::string name, Signal output,
+LinearModel FitArx(const std::string& name, Signal output,
                    const std::vector<Signal>& inputs,
                    std::span<const Stretch> training,
                    std::span<const Stretch> validation);

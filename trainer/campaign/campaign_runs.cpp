@@ -1,7 +1,8 @@
 #include "trainer/campaign/campaign_runs.h"
 
 #include <algorithm>
-#include <cstring>
+#include <bit>
+#include <cstdint>
 #include <mutex>
 #include <optional>
 
@@ -75,7 +76,7 @@ std::vector<LabelledSample> Simulate(
 
 // Also true of two missing readings, which are NaN and unequal as numbers.
 bool SameBits(double a, double b) {
-  return std::memcmp(&a, &b, sizeof a) == 0;
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }
 
 bool SameSample(const LabelledSample& a, const storage::StoredSample& b) {

@@ -287,7 +287,8 @@ std::string SaidText(const Json& row) {
   if (said.is_null()) {
     return "-";
   }
-  return said == "" ? "unknown" : said.get<std::string>();
+  const auto text = said.get<std::string>();
+  return text.empty() ? "unknown" : text;
 }
 
 // A date, or seconds if the axis of the records is not UTC.

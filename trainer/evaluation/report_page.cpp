@@ -229,7 +229,7 @@ std::string Embedded(const std::string& svg) {
     if (line == "</g>" && kept.back().starts_with("<g fill=")) {
       kept.pop_back();
     } else if (!defines && !line.empty() && !line.starts_with("xmlns:xlink")) {
-      kept.push_back(std::move(line));
+      kept.push_back(line);
     }
     defines = defines && line != "</defs>";
   }

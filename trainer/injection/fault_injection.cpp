@@ -68,14 +68,17 @@ SignalMask UnionOf(const FaultInjection& injection,
 double FlowOf(const simulator::TrimParameters& trim, double closing,
               const simulator::MediumState& medium,
               const FaultEffects& effects) {
-  using namespace simulator;
+  using simulator::EffectivePressureDrop;
+  using simulator::Flow;
   const double bypass = std::clamp(effects.bypass_opening, 0.0, 1.0);
-  return Flow(trim.kv_m3_h, Opening(trim, closing) + effects.opening_offset,
-              EffectivePressureDrop(medium, RecoveryCoefficient(closing)),
+  return Flow(trim.kv_m3_h,
+              simulator::Opening(trim, closing) + effects.opening_offset,
+              EffectivePressureDrop(medium,
+                                    simulator::RecoveryCoefficient(closing)),
               medium.density_kg_m3) +
          Flow(trim.bypass_kv_m3_h, bypass,
-              EffectivePressureDrop(medium,
-                                    BypassRecoveryCoefficient(1.0 - bypass)),
+              EffectivePressureDrop(
+                  medium, simulator::BypassRecoveryCoefficient(1.0 - bypass)),
               medium.density_kg_m3);
 }
 
