@@ -24,6 +24,8 @@ constexpr std::ptrdiff_t kRoutineMeasured = 300;  // of its rows
 constexpr double kMostMisfit = 12.0;
 // Nor does no fault, where no fault gains on it.
 constexpr double kMostHealthy = 4.0;
+// Faults that act alike differ by less than this share of what none is behind.
+constexpr double kAlike = 0.06;
 // Healthy windows have about 1.
 constexpr double kGoodMisfit = 2.0;
 
@@ -56,12 +58,18 @@ constexpr Likeness kLikenesses[] = {
      [](const SecondLook&, const Explanation& e, double nothing) {
        return std::abs(e.strength) < 1.0 && e.distance <= nothing;
      }},
+    // A little sedimentation takes as much of the flow as a leak can, a
+    // twentieth, and moves X by less than the simulation errs.
+    {{2, 5, 0},
+     [](const SecondLook&, const Explanation& e, double nothing) {
+       return e.distance <= kAlike * nothing;
+     }},
     // A stop far open, a torn diaphragm and too little supply differ by gain
     // and supply pressure. Where the best leaves no more than a healthy valve
     // does, it needs no such excuse.
     {{1, 10, 16},
      [](const SecondLook& look, const Explanation& e, double nothing) {
-       return look.misfit > kGoodMisfit && e.distance <= 0.06 * nothing;
+       return look.misfit > kGoodMisfit && e.distance <= kAlike * nothing;
      }}};
 
 void KeepTogether(const SecondLook& look, double nothing,

@@ -215,6 +215,13 @@ TEST(LookAnswerTest, KeepsLeakAndBypassTogetherUnlessTheLeakIsTooLarge) {
   EXPECT_EQ(NamesOf(AnswerOf(look), true), std::vector{18});
 }
 
+TEST(LookAnswerTest, KeepsALeakAndALittleSedimentationTogether) {
+  EXPECT_EQ(NamesOf(AnswerOf(Looked({{2, 0.0}, {5, 40.0}, {0, 900.0}})), true),
+            (std::vector{2, 5}));
+  EXPECT_EQ(NamesOf(AnswerOf(Looked({{2, 0.0}, {5, 90.0}, {0, 900.0}})), true),
+            std::vector{2});
+}
+
 TEST(LookAnswerTest, KeepsStopAndSupplyTogetherWhereTheBestFitsNotWell) {
   const auto named = [](double misfit) {
     return NamesOf(AnswerOf(Looked({{1, 0.0}, {16, 40.0}, {0, 900.0}}, misfit)),
