@@ -25,8 +25,8 @@ std::uint32_t PackQuality(const Sample& sample) {
   return bits;
 }
 
-// A ring of rows of `columns` values, its oldest row at `first`: oldest in
-// front, and `rows` of them.
+// Rotates a ring of rows of `columns` values so that its oldest row, at
+// `first`, comes to the front, and resizes it to `rows`.
 template <typename T>
 void Straighten(std::vector<T>& ring, std::size_t first, std::size_t columns,
                 std::size_t rows) {

@@ -11,7 +11,8 @@ namespace {
 constexpr double kStalePeriods = 3.0;
 constexpr double kSharePerSample = 0.5;
 constexpr double kSharePerSecond = 5.0;
-// Of the period of a valve without a model set, which its samples tell.
+// Bounds of the period of a valve without a model set, measured from its
+// samples.
 constexpr std::int64_t kShortestNs = 1'000'000;
 constexpr std::int64_t kLongestNs = 3'600'000'000'000;
 

@@ -8,7 +8,7 @@
 
 namespace fdi::monitor {
 
-/// Reads the groups of valves that may have a cause in common:
+/// Reads the groups of valves that may share a cause:
 ///
 ///     [[group]]
 ///     name = "air header west"
