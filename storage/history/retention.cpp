@@ -18,15 +18,15 @@ namespace {
 
 constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
 
-/// One kind of item that can be deleted.
+/// One kind of deletable record.
 struct Items {
   const Schema& schema;
-  /// Row id, first stamp and stored bytes of what is not protected; first stamp
-  /// from ?1 on, ended before ?2, the oldest ?3.
+  /// Row id, first stamp and stored bytes of unprotected records with a first
+  /// stamp from ?1 on that ended before ?2; the oldest ?3 of them.
   std::string_view candidates;
   std::string_view erase;
   std::string_view count_protected;
-  int batch;  ///< So many go in one transaction.
+  int batch;  ///< Deletions per transaction.
 };
 
 struct Candidate {
@@ -133,7 +133,7 @@ class Pruner {
   PruneResult result_;
 };
 
-// Counts what is older than `hour` into `result`. @returns its bytes.
+// Adds the hours older than `hour` to `result`. @returns their bytes.
 std::uintmax_t CountHealth(Database& database, const std::string& valve,
                            std::int64_t hour, PruneResult& result) {
   Statement row = database.Prepare(sql::old_health);
