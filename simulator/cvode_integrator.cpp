@@ -72,7 +72,7 @@ int CallRoots(double t, N_Vector x, double* g, void* system) {
   return 0;
 }
 
-// CVODE's words for the error, kept for the exception.
+// Stores CVODE's error message for the exception.
 void Keep(const char* text, void* message) {
   try {
     *static_cast<std::string*>(message) = text;
