@@ -151,6 +151,8 @@ std::map<int, double> Intercepts(const std::vector<Cell>& cells) {
     bin.wtt += cell.weight * t * t;
     bin.wtm += cell.weight * t * cell.mean();
   }
+  // slope = Σ_b S_tm / Σ_b S_tt with S_xy = Σ w x y − Σ w x Σ w y / Σ w within
+  // bin b.
   double spread = 0.0;
   double product = 0.0;
   for (const auto& [index, bin] : bins) {

@@ -174,6 +174,7 @@ void ShadowValve::Extend(const Verdict& active) {
 }
 
 void ShadowValve::Close() {
+  // The last checkpoint has stored an unchanged stretch in full.
   if (open_ && open_->recorded && open_->changed) {
     closed_.push_back(std::move(open_->difference));
   }

@@ -100,6 +100,7 @@ void Trace::Push(const Sample& sample, const Verdict& verdict, int channels,
   std::size_t value = row * layout_.signal_count;
   for (std::size_t s = 0; s < kSignalCount; ++s) {
     if ((layout_.signals >> s & 1U) != 0) {
+      // A missing signal keeps its column, so that all rows have one size.
       values_[value++] = sample.values[s];
     }
   }

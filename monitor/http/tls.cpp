@@ -142,12 +142,15 @@ TlsSession::TlsSession(SSL_CTX* context, int socket)
 }
 
 TlsSession::~TlsSession() {
+  // OpenSSL forbids SSL_shutdown() after a fatal error.
   if (!broken_ && SSL_is_init_finished(ssl_.get()) != 0) {
     SSL_shutdown(ssl_.get());
     ERR_clear_error();
   }
 }
 
+// The error queue is cleared before each call, because SSL_get_error() also
+// sees what earlier calls of the thread left in it.
 ssize_t TlsSession::Receive(char* to, std::size_t size) {
   ERR_clear_error();
   return Result(SSL_read(ssl_.get(), to, static_cast<int>(size)));
