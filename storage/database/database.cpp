@@ -156,6 +156,8 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
     Configure(schema);
     return;
   }
+  // Under the gate, so that two writers that open a new file do not both
+  // create it.
   const GateHolder holder(*gate_, path);
   version_ = CheckIdentity(schema);
   Configure(schema);
@@ -229,6 +231,7 @@ void Database::Configure(const Schema& schema) {
 }
 
 void Database::Migrate(const Schema& schema, int from) {
+  // VACUUM INTO cannot run inside a transaction: the caller holds the gate.
   if (from > 0) {
     migration_backup_ = FreeBackupName(path_, from);
     BackupTo(*migration_backup_);

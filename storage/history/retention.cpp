@@ -110,6 +110,8 @@ class Pruner {
   void DeleteWhile(std::int64_t before_ns, Condition more) {
     std::int64_t from_ns = -kEver;
     while (more()) {
+      // The query is inside the transaction, so that no candidate becomes
+      // protected, e.g. by a label, before it is deleted.
       Transaction transaction(database_);
       const auto batch = Candidates(from_ns, before_ns, items_.batch);
       if (batch.empty()) {
@@ -120,6 +122,7 @@ class Pruner {
         Note(item);
       }
       transaction.Commit();
+      // Earlier rows are deleted or protected.
       from_ns = batch.back().stamp_ns;
       result_.bytes_after = database_.UsedBytes();
       std::this_thread::sleep_for(limits_.pause);

@@ -288,6 +288,7 @@ std::optional<ModelReference> ModelStore::TakeValve(
   if (assigned) {
     entry.model_set = TakeModelSet(other, *assigned);
   }
+  // Baselines and events are copied once, also if the call is repeated.
   const bool has_past =
       !Baselines(valve_id).empty() || !ValveEvents(valve_id).empty();
   Transaction transaction(database_);
