@@ -18,7 +18,7 @@ namespace fdi {
 /// μ_L falling from 1 to 0 between the evidence core and support. Normal
 /// operation competes in the same way with d_0. A fault that no reading since
 /// the detection could have refuted has at most d_f = T/2: it is a candidate,
-/// but not isolated for lack of contrary evidence.
+/// but absence of contrary evidence does not isolate it.
 class FaultBank {
  public:
   explicit FaultBank(std::shared_ptr<const FaultPlan> plan);

@@ -6,8 +6,8 @@
 namespace fdi {
 namespace {
 
-// Strengths considered relative to the trained range: this much weaker or
-// stronger, and less if a single observer shows the effect of strength.
+// Reach beyond the trained strengths, as factors; less with a single observer,
+// which cannot show what strength does.
 constexpr double kReachBelow = 0.5;
 constexpr double kReachAbove = 1.5;
 constexpr double kLoneReachBelow = 0.75;

@@ -68,7 +68,7 @@ class Floor {
   FaultSet findings() const { return findings_; }
   /// Stamp of the first sample of the earliest current finding.
   std::optional<std::int64_t> stamp_ns() const;
-  /// How far a finding exceeds its limit, as a signed share of the span.
+  /// How far a finding is from its model, as a signed share of the span.
   double size(std::size_t finding) const { return tests_[finding].size; }
   /// Fault index of the first finding; the others follow.
   std::size_t first() const { return first_; }

@@ -163,6 +163,8 @@ void ValidateRule(const TsRule& rule, std::size_t n, const Checker& checker) {
 
 }  // namespace
 
+// prediction_kernel.h computes the same in the same order, bit for bit: change
+// both together.
 void Weigh(const TsModel& model, const double* x, FiringRules& firing) {
   std::array<double, kMaxRules> exponents;
   const std::size_t count =
