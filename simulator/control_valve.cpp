@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kGravity = 9.81;            // m/s2.
 constexpr double kGasConstant = 287.0;       // J/(kg K), air.
-constexpr double kLeastSupplyGauge = 120e3;  // Below, the relay is shut.
+constexpr double kLeastSupplyGauge = 120e3;  // Below, the relay gives no air.
 
 }  // namespace
 
@@ -232,6 +232,8 @@ void ValveDynamics::Derivatives(double t, const double* x,
   }
 }
 
+// Positive during the present motion; a zero ends it: a stop, standstill or
+// break-away. A constant 1 disables a root.
 void ValveDynamics::Roots(double t, const double* x, double* g) const noexcept {
   const double friction = BreakAwayForce();
   switch (motion_) {
