@@ -4,7 +4,7 @@
 
 namespace fdi::cli {
 
-/// Pearson's correlation of pairs.
+/// Pearson's correlation coefficient of pairs.
 struct CorrelationSums {
   double n{0.0};
   double x{0.0};

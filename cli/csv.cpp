@@ -15,16 +15,17 @@
 namespace fdi::cli {
 namespace {
 
-/// 100 years: later times do not fit in nanoseconds since `start_ns`.
+/// 100 years: later times would overflow nanoseconds since `start_ns`.
 constexpr double kMaxSeconds = 3.2e9;
 constexpr double kSecondsPerDay = 86400.0;
-/// 1970-01-01 as a spreadsheet counts days.
+/// 1970-01-01 as a spreadsheet day number.
 constexpr double kSerialOf1970 = 25569.0;
 constexpr const char* kSniff =
     "; try: fdi-store runs sniff FILE --map-output tags.toml, then --map "
     "tags.toml";
 
-/// Whether `words`, each between two bars, have `text`; case does not count.
+/// Whether `words`, separated and enclosed by bars, contains `text`, ignoring
+/// case.
 bool IsOneOf(std::string_view text, std::string_view words) {
   std::string lower(text);
   std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
@@ -46,7 +47,7 @@ std::string ColumnNames(Signal signal) {
   return names;
 }
 
-/// The columns of the contract that a run has.
+/// Columns of the CSV contract that a run needs.
 struct Columns {
   std::vector<SignalColumn> signals;
   bool mode{false};
@@ -223,7 +224,7 @@ void CsvReader::Convert(const Conversion& c, Sample& sample) const {
     sample.quality[Index(c.signal)] = SignalQuality::kBad;
     return;
   }
-  // Only if asked for: 0 + 1 * value would lose the sign of −0.
+  // Skipped for the identity: 0 + 1 * value would lose the sign of −0.
   if (c.scale != 1.0 || c.offset != 0.0) {
     value = c.offset + c.scale * *value;
   }
@@ -271,8 +272,8 @@ SignalQuality CsvReader::TaggedQuality() const {
                ? SignalQuality::kGood
                : SignalQuality::kBad;
   }
-  // Numbers are those of OPC DA: 192 good, 64 uncertain. 0 is bad there, but
-  // good with OPC UA.
+  // Numbers are OPC DA quality codes: 192 good, 64 uncertain. 0 is bad there,
+  // but good in OPC UA.
   const auto number = ParseNumber(cell);
   if (number && *number == 0.0) {
     Refuse("column " + Quoted(names_[*quality_column_]) + ": " + Quoted(cell) +
@@ -446,7 +447,7 @@ void CsvReader::CheckHeader() const {
     }
   };
   const ColumnMap& map = options_.map;
-  // Who maps columns says which signals there are; nothing else is demanded.
+  // A map with columns defines the signals; nothing else is required then.
   const unsigned listed = map.columns.empty() ? options_.required : 0U;
   const auto required = static_cast<SignalMask>(listed | MaskOf(Signal::kCv));
   require(time_column_.has_value(), map.time_column.empty()
@@ -537,7 +538,7 @@ FaultTruth CsvReader::Truth() const {
     fault = *parsed;
   }
   if (strength == 0.0) {
-    return {};  // Simulators name the fault before it begins.
+    return {};  // Simulators name a fault before it starts.
   }
   if (fault == 0) {
     Refuse(name + "a strength other than 0 needs a fault");
@@ -600,7 +601,8 @@ void CsvReader::TakeTime(CsvRow& row) {
       time = ScanTime(cell, options_.map.date_order);
     } else if (const double days = Number(*time_column_);
                days > 2.0 && days < 130000.0) {
-      // Excel shows times to the millisecond; beyond is rounding.
+      // Excel shows times to the millisecond; further digits are rounding
+      // errors.
       const auto ms =
           std::llround((days - kSerialOf1970) * kSecondsPerDay * 1e3);
       const std::time_t seconds = (ms - ((ms % 1000) + 1000) % 1000) / 1000;

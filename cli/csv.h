@@ -21,7 +21,7 @@ namespace fdi::cli {
 struct SignalColumn {
   std::string_view name;
   Signal signal;
-  FlowUnit flow_unit;  ///< Of kF alone.
+  FlowUnit flow_unit;  ///< Used for kF only.
 };
 
 inline constexpr std::array<SignalColumn, kSignalCount + 1> kSignalColumns{{
@@ -44,7 +44,7 @@ inline constexpr std::string_view kFaultColumn = "fault";
 inline constexpr std::string_view kFaultNumberColumn = "fault_no";
 inline constexpr std::string_view kStrengthColumn = "fault_strength";
 
-/// Where a signal comes from in a foreign table:
+/// Source of a signal in a foreign table:
 /// value = offset + scale · cell, then 100 − value if it is % of opening.
 struct ColumnMapping {
   std::string column;  ///< Name in the header, or the tag of a long table.
@@ -52,10 +52,10 @@ struct ColumnMapping {
   double scale{1.0};
   double offset{0.0};
   Sense sense{Sense::kClosing};
-  std::string unit{};  ///< Of the cells, as the map says it.
+  std::string unit{};  ///< Of the cells, as written in the map.
 };
 
-/// What the cells of the time column are.
+/// Format of the time column.
 enum class TimeForm {
   kFindOut,
   kElapsed,  ///< Seconds (after scaling) from CsvOptions::start_ns.
@@ -64,33 +64,33 @@ enum class TimeForm {
   kText,     ///< As ScanTime() reads it.
 };
 
-/// A table with one reading in each row.
+/// A table with one reading per row.
 struct LongTable {
   std::string tag{"tag"};
   std::string value{"value"};
-  std::string quality;            ///< Column; empty: none.
-  std::vector<std::string> good;  ///< All else is bad; empty: usual words.
+  std::string quality;            ///< Name of the column; empty: none.
+  std::vector<std::string> good;  ///< Others are bad; empty: usual words.
 };
 
-/// How a signal is brought to a period.
+/// How a signal is resampled to a fixed period.
 struct Resampling {
   double period_s{1.0};
-  bool linear{false};    ///< Else the last reading is held.
-  double limit_s{10.0};  ///< No reading is held, no line drawn for longer.
+  bool linear{false};    ///< Otherwise the last reading is held.
+  double limit_s{10.0};  ///< Limit for holding and interpolation.
 };
 
-/// What `--map tags.toml`, `--zone` and `--resample` say. Signals that are not
-/// named are still found by the names of the CSV contract.
+/// Content of `--map tags.toml`, `--zone` and `--resample`. Signals that are
+/// not mapped are still found by their names in the CSV contract.
 struct ColumnMap {
-  char separator{'\0'};      ///< NUL: found out.
-  char decimal{'\0'};        ///< NUL: found out.
+  char separator{'\0'};      ///< NUL: detected.
+  char decimal{'\0'};        ///< NUL: detected.
   int skip{0};               ///< Lines in front of the header.
   std::string time_column;   ///< Empty: t_s, time, timestamp or datetime.
-  std::string clock_column;  ///< The time of day, if it stands alone.
+  std::string clock_column;  ///< Time of day, if in a column of its own.
   TimeForm time_form{TimeForm::kFindOut};
   double time_scale{1.0};  ///< To seconds.
   DateOrder date_order{DateOrder::kNotSaid};
-  std::string zone;  ///< Of times that do not say it; empty: the machine's.
+  std::string zone;  ///< Of times without an offset; empty: the machine's.
   std::optional<LongTable> long_table;
   std::vector<ColumnMapping> columns;
   std::optional<FlowUnit> flow_unit;  ///< Needed if the flow is mapped.
@@ -99,18 +99,18 @@ struct ColumnMap {
 
 /// Settings of the CSV readers.
 struct CsvOptions {
-  std::string source{"input"};  ///< Name of the file, for messages.
+  std::string source{"input"};  ///< File name for error messages.
   ColumnMap map;
-  /// Columns that must be there; with a map, those of the map instead. Time,
-  /// CV and one of X, F are always needed.
+  /// Required columns; with a map, those of the map instead. Time, CV and one
+  /// of X, F are always required.
   SignalMask required{kBasicSignals};
-  bool split_gaps{false};    ///< A gap starts another run, not an error.
-  double period_s{0.0};      ///< 0: as the file has it.
+  bool split_gaps{false};    ///< A gap starts another run instead of an error.
+  double period_s{0.0};      ///< 0: detected.
   std::int64_t start_ns{0};  ///< UTC of t_s = 0, unless times have a date.
-  LogSink log;               ///< Gets CsvTable::notes, each as `csv_note`.
+  LogSink log;               ///< Receives CsvTable::notes, each as `csv_note`.
 };
 
-/// What the header of a table says.
+/// Information from the header of a table.
 struct CsvHeader {
   SignalMask signals{0};
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
@@ -122,28 +122,29 @@ struct CsvHeader {
 struct CsvTable {
   CsvHeader header;
   std::vector<SampleSeries> runs;
-  bool dated{false};         ///< The times of the file have a date.
-  std::int64_t start_ns{0};  ///< Of t = 0: dated, the first sample.
-  /// What was found out, converted or filled, one sentence each.
+  bool dated{false};         ///< The times in the file have a date.
+  std::int64_t start_ns{0};  ///< Of t = 0; dated: the first sample.
+  /// What was detected, converted or filled in, one sentence each.
   std::vector<std::string> notes;
 };
 
-/// A row taken by CsvReader; of a long table it has one signal.
+/// A row accepted by CsvReader; in a long table it has one signal.
 struct CsvRow {
   LabelledSample labelled;  ///< seq counts from 0; source_id 0, epoch 0.
   double t_s{0.0};          ///< Dated: since the first row.
   std::int64_t line{0};
 };
 
-/// Watches the steps in time of samples that come one by one.
+/// Checks the time steps of samples that arrive one by one.
 class StepCheck {
  public:
-  /// @param period_s 0: the first step.
+  /// @param period_s 0: taken from the first step.
   explicit StepCheck(bool split_gaps, double period_s = 0.0)
       : split_gaps_(split_gaps), period_s_(period_s) {}
 
   /// A step may differ from the period by half of it, or be longer with
-  /// `split_gaps`. @returns what is wrong with the next one; empty: nothing.
+  /// `split_gaps`. @returns what is wrong with the next step; empty if it is
+  /// valid.
   std::string Take(double t_s);
   double period_s() const { return period_s_; }
 
@@ -153,35 +154,35 @@ class StepCheck {
   std::optional<double> last_t_s_;
 };
 
-/// Reads a table line by line, e.g. from a pipe; what belongs to the steps in
-/// time is left to the caller.
+/// Reads a table line by line, e.g. from a pipe; checking the time steps is
+/// left to the caller.
 ///
 /// Header: t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h (or F_t_h), in any
 /// order and case; optional SP_pct,CVI,Ps_kPa,Pz_kPa; optional truth: fault
 /// (f1..f19, t1, p1, p2, normal) or fault_no (0..22) with fault_strength, where
 /// only a non-zero strength marks a fault; optional mode (kValveModeNames; AUTO
-/// if the column is not there). Further columns are ignored. docs/import.md has
+/// if the column is missing). Further columns are ignored. docs/import.md has
 /// the rest: other names, forms of time, separators, long tables.
 ///
-/// A signal whose cell is empty or says that there is no reading (Bad, I/O
-/// Timeout, #N/A, ...) is missing from that sample, with quality BAD.
+/// A signal whose cell is empty or means "no reading" (Bad, I/O Timeout, #N/A,
+/// ...) is missing from that sample, with quality BAD.
 class CsvReader {
  public:
   /// @throws ConfigError if a map has a flow without its unit.
   explicit CsvReader(CsvOptions options);
 
-  /// Takes the next line, without its end. @returns nothing for the header, for
-  /// blank lines, for a tag that is not mapped, and while a quoted cell goes on
-  /// in the next line.
+  /// Processes the next line, without its line break. @returns nothing for the
+  /// header, for blank lines, for an unmapped tag, and while a quoted cell
+  /// continues on the next line.
   /// @throws DataError naming source, line, column, value, what was expected
-  ///   and what to try: missing or double column, cells too few or too many,
+  ///   and what to try: missing or duplicate column, too few or too many cells,
   ///   not a number, not a time, an unknown fault.
   std::optional<CsvRow> TakeLine(std::string_view line);
 
-  /// After the last line. @throws DataError if there was no row.
+  /// Call after the last line. @throws DataError if there was no row.
   void Finish() const;
 
-  /// After the first line.
+  /// Valid after the header line.
   const CsvHeader& header() const { return header_; }
   const CsvOptions& options() const { return options_; }
   bool dated() const {
@@ -210,7 +211,7 @@ class CsvReader {
   const std::string& Cell(std::size_t column) const {
     return record_.cells()[column];
   }
-  /// The value in the unit of the file; nothing if the reading is missing.
+  /// The value in the unit of the file; nothing if there is no reading.
   std::optional<double> Reading(std::size_t column) const;
   double Number(std::size_t column) const;
   void Convert(const Conversion& conversion, Sample& sample) const;
@@ -240,7 +241,7 @@ class CsvReader {
   bool fault_by_number_{false};
   TimeForm time_form_{TimeForm::kFindOut};
   std::optional<std::int64_t> first_ns_;
-  // Of each tag, as a table may be sorted by it; of a wide table the first.
+  // Per tag, because a table may be sorted by tag; a wide table uses the first.
   std::array<std::int64_t, kSignalCount> last_ns_{};
   std::size_t tag_{0};
   std::uint64_t rows_{0};
@@ -248,33 +249,32 @@ class CsvReader {
 };
 
 /// Reads a whole table (UTF-8, see ReadTextFile()). The sample period is the
-/// option's, else the most usual step. Samples that are less than half a period
-/// off its grid are put onto it; ColumnMap::resampling makes a grid of any
-/// table, where what no reading is near to has quality UNCERTAIN.
-/// @throws DataError as CsvReader, or naming the line of a step in time that is
-///   not the sample period; if there are fewer than two rows and the period is
-///   not given; if thousands separators or the sign of decimals cannot be told
-///   apart; if most values of a mapped signal are impossible.
+/// option's, or else the most frequent step. Samples within half a period of
+/// its grid are moved onto it; ColumnMap::resampling makes a grid from any
+/// table, where instants without a nearby reading have quality UNCERTAIN.
+/// @throws DataError as CsvReader, or naming the line of a step that is not the
+///   sample period; if there are fewer than two rows and no period is given; if
+///   the decimal sign is ambiguous; if most values of a mapped signal are
+///   impossible.
 CsvTable ReadCsv(std::string_view text, const CsvOptions& options = {});
 
-/// Reads `path`, `-` for stdin; CsvOptions::source becomes its name.
+/// Reads `path`, or stdin for `-`; CsvOptions::source is set to its name.
 /// @throws as above and as ReadTextFile().
 CsvTable ReadCsvFile(const std::filesystem::path& path,
                      CsvOptions options = {});
 
-/// `map` with the separator and the decimal sign of the table, where it leaves
-/// them open. @throws DataError if thousands separators or the sign of decimals
-///   cannot be told apart.
+/// `map` with the separator and decimal sign of the table, where it does not
+/// set them. @throws DataError if the decimal sign is ambiguous.
 ColumnMap WithSigns(std::string_view text, ColumnMap map,
                     const std::string& source);
 
-/// Whether a cell says that there is no reading: empty, NaN, Bad, #N/A, ...
+/// Whether a cell means "no reading": empty, NaN, Bad, #N/A, ...
 bool IsNoReading(std::string_view cell);
 
-/// Writes the columns of the contract for the signals that occur; mode if it is
-/// not AUTO throughout; fault and fault_strength if truth is known. Numbers
-/// read back as the same bits. t_s counts from `start_ns`. The cell of a signal
-/// that a sample lacks, or of a flow in another unit than the run's, is empty.
+/// Writes the CSV contract's columns for the signals that occur; mode if it is
+/// not AUTO throughout; fault and fault_strength if the truth is known. Numbers
+/// round-trip bit for bit. t_s counts from `start_ns`. The cell of a missing
+/// signal, or of a flow in another unit than the run's, is empty.
 void WriteCsv(std::ostream& output, std::span<const LabelledSample> samples,
               FlowUnit flow_unit, std::int64_t start_ns);
 

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
-// The CR of a CRLF is a blank too.
+// The CR of a CRLF counts as a blank.
 bool IsBlank(char c) {
   return c == ' ' || c == '\t' || c == '\r';
 }
@@ -87,8 +87,8 @@ bool IsUtf8(std::string_view text) {
   return more == 0;
 }
 
-// What a spreadsheet would run as a formula. A number is none, in hexadecimal
-// neither.
+// Whether a spreadsheet would evaluate the cell as a formula. Numbers are not
+// formulas, not even hexadecimal ones.
 bool IsFormula(const std::string& cell) {
   if (cell.size() < 2 || std::string_view("=+-@\t\r").find(cell.front()) ==
                              std::string_view::npos) {
@@ -99,8 +99,8 @@ bool IsFormula(const std::string& cell) {
   return end != cell.c_str() + cell.size();
 }
 
-// A formula has a quote in front, which spreadsheets do not show; so has a text
-// that looks guarded already, so that what is read is what was written.
+// Formulas are written with a leading quote, which spreadsheets hide. Text that
+// already looks like a guarded formula gets one more, so that it round-trips.
 bool IsGuarded(const std::string& cell) {
   const std::size_t quotes = cell.find_first_not_of('\'');
   return quotes != 0 && quotes != std::string::npos &&
@@ -140,12 +140,12 @@ void CsvCells::Take(char c) {
       return;
     case State::kAfter:
       if (c == '"') {
-        cell_ += c;  // It was the first one of two: a quote of the text.
+        cell_ += c;  // The first of two: an escaped quote.
         state_ = State::kQuoted;
       } else if (c == separator_) {
         EndCell();
       } else if (!IsBlank(c)) {
-        cell_ += c;  // "FV"-101, which no writer should write.
+        cell_ += c;  // "FV"-101 is invalid, but harmless.
       }
       return;
     case State::kBefore:
@@ -242,7 +242,7 @@ Digits DigitsOf(std::string_view cell, char& sign) {
     return grouped && exponent == std::string_view::npos ? Digits::kEither
                                                          : Digits::kDecimal;
   }
-  // Dates such as 01.02.2026 are grouped otherwise.
+  // Dates such as 01.02.2026 are not grouped in threes.
   return grouped ? Digits::kThousands : Digits::kNone;
 }
 
@@ -309,7 +309,7 @@ std::string ReadTextFile(const std::filesystem::path& path) {
   if (!is_stdin && std::filesystem::is_directory(path, error)) {
     throw DataError(source + ": is a directory, not a file");
   }
-  // zlib hands through what is not compressed.
+  // zlib passes uncompressed files through.
   const auto close = [](gzFile file) { gzclose(file); };
   const std::unique_ptr<gzFile_s, decltype(close)> file(
       is_stdin ? gzdopen(dup(STDIN_FILENO), "rb") : gzopen(path.c_str(), "rb"),
@@ -347,7 +347,7 @@ void WriteCsvLine(std::ostream& out, const std::vector<std::string>& cells) {
         IsFormula(text) || IsGuarded(text) ? "'" + text : text;
     out << separator;
     separator = ",";
-    // Blanks at the ends are quoted, since readers may drop them.
+    // Blanks at either end are quoted, because readers may drop them.
     const bool quoted =
         cell.find_first_of(",\"\r\n") != std::string::npos ||
         (!cell.empty() && (IsBlank(cell.front()) || IsBlank(cell.back())));

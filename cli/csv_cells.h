@@ -9,26 +9,26 @@
 
 namespace fdi::cli {
 
-/// Splits CSV into cells after RFC 4180, one line of the file at a time, so
-/// that it can come from a pipe:
+/// Splits CSV into cells as in RFC 4180, one line at a time, so that the input
+/// can be a pipe:
 ///
 ///     record = cell *(separator cell) break      break = LF / CRLF
 ///     cell   = *blank (text / DQUOTE *(char / 2DQUOTE) DQUOTE) *blank
 ///
-/// A quoted cell may hold separators, line breaks and doubled quotes. Beyond
-/// the RFC, the separator need not be a comma, blanks around a cell do not
-/// count, and a byte order mark is skipped.
+/// A quoted cell may contain separators, line breaks and doubled quotes. In
+/// addition to the RFC, the separator may be another character, blanks around a
+/// cell are ignored, and a byte order mark is skipped.
 class CsvCells {
  public:
   explicit CsvCells(char separator = ',') : separator_(separator) {}
 
-  /// Takes the next line, without its LF. @returns whether it ends a record;
-  /// if not, a quote is open and the record goes on in the next line.
+  /// Processes the next line, without its LF. @returns whether it ends a
+  /// record; if not, a quote is open and the record continues on the next line.
   bool TakeLine(std::string_view line);
-  /// A quote is still open: at the end of a file, an error.
+  /// A quote is still open, which is an error at the end of a file.
   bool open() const { return state_ == State::kQuoted; }
 
-  /// Of the record that ended last.
+  /// Cells of the last complete record.
   const std::vector<std::string>& cells() const { return cells_; }
   /// Whether that record is a blank line.
   bool blank() const { return cells_.size() == 1 && cells_.front().empty(); }
@@ -50,48 +50,47 @@ class CsvCells {
   std::string cell_;
 };
 
-/// A finite number and nothing else; it may begin with "+".
+/// Parses a finite number and nothing else; a leading "+" is allowed.
 std::optional<double> ParseNumber(std::string_view text, char decimal = '.');
 
-/// The shortest text that reads back as the same double.
+/// The shortest text that round-trips to the same double.
 std::string NumberText(double value);
 
-/// For messages: "text", cut to 60 characters.
+/// For messages: the text in quotes, truncated to 60 characters.
 std::string Quoted(std::string_view text);
 
 /// "a,b"
 std::string Listed(const std::vector<std::string>& names);
 
-/// What a cell says about the sign of decimals.
+/// What a cell tells about the decimal sign.
 enum class Digits {
   kNone,       ///< No sign, or no number.
   kDecimal,    ///< "0.5", "12.34": the sign cannot group thousands.
   kEither,     ///< "1.234"
   kThousands,  ///< "1.234.567", "1.234,5"
 };
-/// @param sign the first one in the cell, unless kNone.
+/// @param sign set to the first one in the cell, unless kNone.
 Digits DigitsOf(std::string_view cell, char& sign);
 
-/// The separator of a table: the one that cuts `header` and `row` into the same
-/// number of cells, as many as possible.
+/// Detects the separator of a table: the one that splits `header` and `row`
+/// into the same number of cells, as many as possible.
 char FindSeparator(std::string_view header, std::string_view row);
 
-/// The whole of a file, `-` for stdin, as UTF-8 with LF: gzip is unpacked,
-/// UTF-16 (with a byte order mark, or told by its zeros) is converted, and what
-/// is neither UTF-8 nor UTF-16 is taken as Latin-1.
-/// @throws NotFoundError if there is no such file; DataError naming it and what
-///   it is instead (folder, spreadsheet, Parquet, damaged gzip, binary).
+/// Reads a whole file, or stdin for `-`, as UTF-8 with LF: gzip is
+/// decompressed, UTF-16 (with a byte order mark, or recognised by its zeros) is
+/// converted, and anything that is neither UTF-8 nor UTF-16 is read as Latin-1.
+/// @throws NotFoundError if there is no such file; DataError naming it and its
+///   actual type (folder, spreadsheet, Parquet, damaged gzip, binary).
 std::string ReadTextFile(const std::filesystem::path& path);
-/// The same of bytes that were read, except for gzip.
+/// The same for bytes in memory, except for gzip.
 std::string ToUtf8(std::string bytes, const std::string& source);
 
-/// Whether two names of columns are equal; case does not count.
+/// Whether two column names are equal, ignoring case.
 bool SameName(std::string_view a, std::string_view b);
 
-/// Writes a record. A text that a spreadsheet would run as a formula (it begins
-/// with = + - @ and is no number) gets a ' in front, which CsvCells takes away
-/// again. A cell is quoted where it must be; the line ends with LF,
-/// as those of all other text files on the system do.
+/// Writes a record. Text that a spreadsheet would evaluate as a formula (it
+/// begins with = + - @ and is not a number) gets a leading ', which CsvCells
+/// removes. Cells are quoted only where necessary; the line ends with LF.
 void WriteCsvLine(std::ostream& out, const std::vector<std::string>& cells);
 
 }  // namespace fdi::cli

@@ -11,15 +11,15 @@
 #include "cli/logging.h"
 #include "diagnosis/error.h"
 
-// Whole tables: what only all rows tell, the signs of the file and its grid of
-// time.
+// Whole tables: properties that only all rows reveal, i.e. the decimal sign and
+// the time grid.
 
 namespace fdi::cli {
 namespace {
 
-/// Steps in time may differ from the period by this share of it.
+/// Tolerance of time steps, as a share of the period.
 constexpr double kStepTolerance = 0.01;
-/// Of the period: less than half, as a row in the middle belongs nowhere.
+/// Share of the period; less than half, since a row in the middle is ambiguous.
 constexpr double kLargestShift = 0.499;
 
 std::string PercentText(std::size_t part, std::size_t whole) {
@@ -48,7 +48,7 @@ SampleSeries EmptyRun(const CsvHeader& header, double period_s) {
   return run;
 }
 
-// The sign of decimals, from all cells of the table.
+// Detects the decimal sign from all cells of the table.
 char FindDecimal(const std::vector<std::string_view>& lines, char separator,
                  const std::string& source) {
   struct Seen {
@@ -113,7 +113,7 @@ char FindDecimal(const std::vector<std::string_view>& lines, char separator,
 ColumnMap WithSigns(std::string_view text, ColumnMap map,
                     const std::string& source) {
   const std::vector<std::string_view> lines = Lines(text);
-  // The header and the first row behind it; both may be blank.
+  // The header and the first row after it; blank lines do not count.
   std::vector<std::string_view> first;
   auto begin = static_cast<std::size_t>(map.skip);
   for (std::size_t i = begin; i < lines.size() && first.size() < 2; ++i) {
@@ -141,7 +141,7 @@ struct TimedReading {
   SignalQuality quality;
 };
 
-// Reads the rows of a whole table and brings them onto a grid of time.
+// Reads the rows of a whole table and aligns them to a time grid.
 class TableReader {
  public:
   TableReader(std::string_view text, const CsvOptions& options)
@@ -173,7 +173,7 @@ class TableReader {
                     reason);
   }
   [[noreturn]] void RefuseStep(std::size_t k) const;
-  // Where the rows lie beside a grid that begins at the first one [s].
+  // Offset of the rows from a grid that begins at the first one [s].
   double Phase() const;
   const CsvOptions& options() const { return reader_.options(); }
   bool MayHaveGaps() const {
@@ -241,7 +241,7 @@ void TableReader::TakeRows() {
   reader_.Finish();
 }
 
-// Rows of one instant become one; a long table may be sorted by tag.
+// Merges rows of the same instant; a long table may be sorted by tag.
 void TableReader::JoinTags() {
   std::ranges::stable_sort(rows_, {}, [](const CsvRow& row) {
     return row.labelled.sample.stamp_ns;
@@ -292,8 +292,8 @@ void TableReader::CheckOrder() const {
   }
 }
 
-// The most usual step in time. Rows that come late or early blur it, so that a
-// round value near to it is taken for jittered rows.
+// The most frequent step. Jitter blurs it, so a nearby round value is
+// preferred.
 void TableReader::FindPeriod() {
   period_s_ = options().map.resampling ? options().map.resampling->period_s
                                        : options().period_s;
@@ -323,7 +323,7 @@ void TableReader::FindPeriod() {
   }
 }
 
-// Whether every step is a period, or a gap where these are allowed.
+// Whether every step is one period, or a gap where gaps are allowed.
 bool TableReader::IsSteady() const {
   for (std::size_t k = 1; k < rows_.size(); ++k) {
     const double off = rows_[k].t_s - rows_[k - 1].t_s - period_s_;
@@ -399,7 +399,7 @@ std::optional<Resampled> At(const std::vector<TimedReading>& readings,
   const auto near = [&](const TimedReading* r) {
     return r != nullptr && std::abs(r->t_s - t_s) <= 0.5 * how.period_s;
   };
-  // A reading near by is taken as it is, as without resampling.
+  // A nearby reading is used unchanged, as without resampling.
   if (near(before) || near(after)) {
     const bool later =
         near(after) && (!near(before) || after->t_s - t_s < t_s - before->t_s);
@@ -418,7 +418,7 @@ std::optional<Resampled> At(const std::vector<TimedReading>& readings,
   return std::nullopt;
 }
 
-// The readings of each signal by time.
+// The readings of each signal, ordered by time.
 std::array<std::vector<TimedReading>, kSignalCount> TableReader::Readings()
     const {
   std::array<std::vector<TimedReading>, kSignalCount> readings;
@@ -497,7 +497,7 @@ void TableReader::Resample() {
     if (!sample.Has(Signal::kCv) ||
         (!sample.Has(Signal::kX) && !sample.Has(Signal::kF))) {
       if (row + 1 < rows_.size() && rows_[row + 1].t_s > t_s + period_s_) {
-        // On behind the gap.
+        // Continue after the gap.
         k = std::max(k, static_cast<std::int64_t>(std::floor(
                             (rows_[row + 1].t_s - begin_s) / period_s_)) -
                             1);
@@ -520,7 +520,7 @@ void TableReader::Resample() {
   rows_ = std::move(grid);
 }
 
-// A signal that is impossible most of the time was converted wrongly.
+// A signal that is impossible most of the time was probably converted wrongly.
 void TableReader::CheckValues() {
   for (std::size_t i = 0; i < kSignalCount; ++i) {
     const auto signal = static_cast<Signal>(i);
@@ -573,8 +573,8 @@ void TableReader::CheckValues() {
   }
 }
 
-// A flow that rises with the closing of the valve, and one against the
-// pressure: a sense, or two columns, exchanged.
+// A flow that falls as the valve opens, or that runs against the pressure,
+// indicates a wrong sense or swapped columns.
 void TableReader::CheckPair(Signal signal) {
   CorrelationSums sums;
   std::size_t count = 0;

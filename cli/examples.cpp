@@ -25,7 +25,7 @@ CLI::App& VerbOf(CLI::App& root, const std::string& verb) {
   return *app;
 }
 
-// The words of a command as a shell sees them; up to a pipe or redirection.
+// Splits a command like a shell does; stops at a pipe or redirection.
 std::vector<std::string> Words(const std::string& command) {
   std::vector<std::string> words;
   std::string word;
@@ -50,20 +50,20 @@ std::vector<std::string> Words(const std::string& command) {
   return words;
 }
 
-// Why the parser of `root` refuses `command`; empty if it does not.
+// Why the parser of `root` rejects `command`; empty if it accepts it.
 std::string Refusal(CLI::App& root, const std::string& command) {
   std::vector<std::string> words = Words(command);
   const auto program = std::find(words.begin(), words.end(), root.get_name());
   if (program == words.end()) {
     return "does not call " + root.get_name();
   }
-  // What stands before the program are settings of the environment.
+  // Words before the program set environment variables.
   words.erase(words.begin(), program + 1);
-  std::reverse(words.begin(), words.end());  // As CLI11 wants them.
+  std::reverse(words.begin(), words.end());  // The order that CLI11 expects.
   try {
     root.parse(words);
   } catch (const CLI::FileError&) {
-    return "";  // --config of a file that is not there.
+    return "";  // --config with a file that does not exist.
   } catch (const CLI::Error& error) {
     return error.what();
   }

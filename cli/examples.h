@@ -9,25 +9,25 @@ class App;
 
 namespace fdi::cli {
 
-/// A command and what it is for.
+/// A command and its purpose.
 struct Example {
   std::string what;     ///< "What happened in the last two hours"
   std::string command;  ///< "fdi-store history list --since 2h"
 };
 
-/// The examples of a verb, group, or (empty) the program.
+/// The examples of a verb, a group or (empty name) the program.
 struct VerbExamples {
   std::string verb;  ///< "history list"
   std::vector<Example> examples;
 };
 
-/// Puts the examples below the help of their verbs; the manual pages have them
-/// from there. @throws std::logic_error for a verb that is not there.
+/// Appends the examples to the help of their verbs, from which the manual pages
+/// are made. @throws std::logic_error for an unknown verb.
 void SetExamples(CLI::App& root, const std::vector<VerbExamples>& examples);
 
-/// What is wrong with the examples of `root`: those that its parser refuses,
-/// and its verbs and groups, itself among them, with fewer than two. Files need
-/// not be there. Runs nothing, but leaves the options of `root` changed.
+/// Checks the examples of `root`: lists those that its parser rejects, and the
+/// verbs and groups, including `root`, that have fewer than two. Files need not
+/// exist. Runs nothing, but leaves the options of `root` modified.
 std::vector<std::string> CheckExamples(
     CLI::App& root, const std::vector<VerbExamples>& examples);
 

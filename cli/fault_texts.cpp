@@ -16,7 +16,7 @@ namespace {
 constexpr std::string_view kFileName = "faults.toml";
 constexpr std::string_view kUnknown = "unknown";
 
-// In the order of the enumerations.
+// Indexed by the enumerations.
 constexpr std::array<std::string_view, 4> kDisciplines{"operator", "instrument",
                                                        "air", "mechanical"};
 constexpr std::array<std::string_view, 4> kNamur{"maintenance required",
@@ -114,7 +114,7 @@ std::string_view SeverityName(Severity severity) {
 }
 
 Severity FaultText::SeverityAt(double strength) const {
-  // An estimate that failed counts as the smallest fault, not as the gravest.
+  // A failed estimate counts as the smallest fault, not as the most severe one.
   const double size = std::isfinite(strength) ? std::abs(strength) : 0.0;
   Severity level = bands.front().level;
   for (const SeverityBand& band : bands) {
@@ -125,8 +125,7 @@ Severity FaultText::SeverityAt(double strength) const {
   return level;
 }
 
-// The whole catalogue must have every key; read as an override, it is then
-// checked for what is too much.
+// Requires every key for every fault; Override() then rejects unknown ones.
 FaultTexts::FaultTexts(const std::filesystem::path& path) {
   TomlReader file(path);
   const auto require = [&file](const std::string& fault) {
@@ -167,7 +166,7 @@ const FaultText& FaultTexts::Of(int fault) const {
 FaultWords FaultTexts::Words(std::string_view answer, double strength) const {
   FaultWords words;
   std::vector<Discipline> disciplines;
-  // "f3|f6": faults that the diagnosis cannot tell apart.
+  // "f3|f6": faults that the diagnosis cannot distinguish.
   while (true) {
     const std::size_t bar = std::min(answer.find('|'), answer.size());
     const FaultText& text = Of(FaultOf(answer.substr(0, bar)).value_or(0));

@@ -13,14 +13,14 @@
 
 namespace fdi::cli {
 
-/// Who goes there.
+/// Who is responsible.
 enum class Discipline : std::uint8_t {
   kOperator,
   kInstrument,
   kAir,
   kMechanical
 };
-/// Status signals of NAMUR NE 107, the gravest last.
+/// Status signals of NAMUR NE 107, the most severe last.
 enum class NamurClass : std::uint8_t {
   kMaintenanceRequired,
   kOutOfSpecification,
@@ -33,16 +33,16 @@ std::string_view DisciplineName(Discipline discipline);  ///< "air", ...
 std::string_view NamurName(NamurClass namur);            ///< "failure", ...
 std::string_view SeverityName(Severity severity);        ///< "critical", ...
 
-/// The severity of a fault from `from` on, |strength| in 0..1.
+/// The severity from |strength| `from` on, in 0..1.
 struct SeverityBand {
   double from{0.0};
   Severity level{Severity::kMedium};
 };
 
-/// What people are told about a fault.
+/// Texts about a fault for operators and planners.
 struct FaultText {
   std::string name;   ///< "Flow transmitter wrong"
-  std::string check;  ///< How to tell it from its look-alikes in the field.
+  std::string check;  ///< How to tell it from similar faults in the field.
   Discipline discipline{Discipline::kInstrument};
   NamurClass namur{NamurClass::kCheckFunction};
   std::vector<SeverityBand> bands;  ///< Ascending, the first from 0.
@@ -50,45 +50,45 @@ struct FaultText {
   Severity SeverityAt(double strength) const;
 };
 
-/// An answer of the diagnosis in people's words; of a group of faults that
-/// cannot be told apart the names joined by " or ", and the gravest of the
-/// rest.
+/// A diagnosis in plain words. For faults that cannot be distinguished, the
+/// names are joined by " or ", and the most severe of the other values are
+/// used.
 struct FaultWords {
   std::string name;
-  std::string check;       ///< Of the fault named first.
-  std::string discipline;  ///< Each once, joined by "|".
+  std::string check;       ///< Of the first fault.
+  std::string discipline;  ///< Distinct ones, joined by "|".
   NamurClass namur{NamurClass::kMaintenanceRequired};
   Severity severity{Severity::kLow};
 };
 
-/// The fault catalogue: a text for every fault and for what is unlike all of
-/// them. A TOML file with a table per fault, [f1]..[p2] and [unknown], with the
-/// keys name, check, discipline, namur and severity; see
+/// The fault catalogue: a text for every fault and for faults unlike any of
+/// them. A TOML file with one table per fault, [f1]..[p2] and [unknown], and
+/// the keys name, check, discipline, namur and severity; see
 /// monitor/catalogue/faults.toml.
 class FaultTexts {
  public:
   /// Reads the whole catalogue from `path`.
-  /// @throws ConfigError at what is missing, unknown or wrong; NotFoundError.
+  /// @throws ConfigError for a missing, unknown or invalid key; NotFoundError.
   explicit FaultTexts(const std::filesystem::path& path);
 
-  /// Replaces the keys that `path` has. Unknown faults and keys are refused.
+  /// Replaces the keys that `path` contains; rejects unknown faults and keys.
   /// @throws as the constructor.
   void Override(const std::filesystem::path& path);
 
-  /// @param fault or finding of the catalogue, 0 stands for unknown.
+  /// @param fault or finding of the catalogue; 0 means unknown.
   const FaultText& Of(int fault) const;
 
-  /// @param answer as in fault_history: "f19", "f3|f6", "unknown", empty or
-  ///   what no catalogue knows (both as unknown).
-  /// @param strength estimated, of either sign.
+  /// @param answer as in fault_history: "f19", "f3|f6", "unknown", or empty;
+  ///   other names count as unknown.
+  /// @param strength estimated; the sign is ignored.
   FaultWords Words(std::string_view answer, double strength) const;
 
  private:
   std::map<int, FaultText> texts_;  // [0]: unknown
 };
 
-/// The catalogue that was installed with the programs, then DATA/faults.toml if
-/// it is there, then --fault-catalogue, each on top of the one before.
+/// The catalogue installed with the programs, overridden by DATA/faults.toml if
+/// it exists, then by --fault-catalogue.
 FaultTexts LoadFaultTexts(const GlobalOptions& options);
 
 /// {"faults": [{"fault", "name", "check", "discipline", "namur", "severity":

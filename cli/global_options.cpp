@@ -23,7 +23,7 @@ namespace {
   throw fdi::ConfigError(text.str());
 }
 
-// CLI11 converts texts, as if they stood on the command line.
+// CLI11 converts values from text, as on the command line.
 std::string TextOf(const toml::node& node, const std::string& key) {
   if (const auto text = node.value_exact<std::string>()) {
     return *text;
@@ -46,8 +46,8 @@ bool IsKey(const CLI::Option& option) {
   return option.get_configurable() && !option.get_lnames().empty();
 }
 
-// Refuses a key that is neither an option nor a verb of `app`. CLI11 would do
-// so too, but without the line and the key that was probably meant.
+// Rejects a key that is neither an option nor a verb of `app`. CLI11 would,
+// too, but without the line and the key that was probably meant.
 void RefuseUnknown(const CLI::App& app, const toml::node& node,
                    const std::string& path, const std::string& key) {
   std::vector<std::string> names;
@@ -103,7 +103,7 @@ void Collect(const CLI::App& app, const toml::table& table,
   }
 }
 
-// The value of an option, with the type that its text has.
+// Inserts an option's value with the type that its text suggests.
 void Insert(toml::table& table, const std::string& key,
             const std::string& text) {
   std::int64_t integer = 0;
@@ -129,12 +129,12 @@ toml::table Effective(CLI::App& app) {
       continue;
     }
     if (option->count() == 0 && !option->get_excludes().empty()) {
-      continue;  // Its default would exclude the others when read back.
+      continue;  // When read back, its default would exclude the others.
     }
     const std::string& key = option->get_lnames().front();
     const bool flag = option->get_expected_max() == 0;
     if (option->count() == 0 && !flag && option->get_expected_min() == 0) {
-      // What the option means without a value stood here until now.
+      // Replaces the value that the option has when given without one.
       option->capture_default_str();
     }
     if (option->count() > 1 && !flag) {
@@ -159,17 +159,17 @@ toml::table Effective(CLI::App& app) {
   return table;
 }
 
-// Lets CLI11 read --config as TOML 1.0 through toml++: a key stands for the
-// option of that name, a table for a verb.
+// Makes CLI11 read --config as TOML 1.0 with toml++: a key is the option of
+// that name, a table is a verb.
 class TomlConfig : public CLI::Config {
  public:
-  // @param root whose options and verbs the file may name; must outlive this.
+  // @param root whose options and verbs the file may contain; outlives this.
   explicit TomlConfig(const CLI::App& root) : root_(root) {}
 
-  // @throws ConfigError naming line and key: TOML that cannot be read, a key
-  //   that is no option, a value that is neither text, number nor flag.
+  // @throws ConfigError naming line and key: invalid TOML, an unknown key, a
+  //   value that is neither text, number nor flag.
   std::vector<CLI::ConfigItem> from_config(std::istream& in) const override;
-  // Unused, since it gets an app that cannot be asked for its defaults; see
+  // Unused, because its app cannot be queried for defaults; see
   // EffectiveToml().
   std::string to_config(const CLI::App*, bool, bool,
                         std::string) const override {
@@ -212,8 +212,8 @@ void AddLogLevel(CLI::App& app, GlobalOptions& options) {
       ->type_name("LEVEL");
 }
 
-// The last of several counts, so that the options of a script can be
-// overridden.
+// If an option is repeated, the last one wins, so that the options of a script
+// can be overridden.
 void LetTheLastCount(CLI::App& app) {
   for (CLI::Option* option : app.get_options()) {
     option->take_last();

@@ -11,14 +11,14 @@ class App;
 
 namespace fdi::cli {
 
-/// The options of a program that stand before or after the verb. Those of the
-/// bus and the fault catalogue are for the programs that use them.
+/// Options that may precede or follow the verb. Bus options and the fault
+/// catalogue apply only to the programs that use them.
 struct GlobalOptions {
   std::filesystem::path data_dir{"./fdi-data"};  ///< --data, env FDI_DATA
   int domain{0};                                 ///< --domain 0..232
   std::string interface { "127.0.0.1" };  ///< --interface ADDR[,ADDR]|all
-  /// --transport udp|shm|default (both). Shared memory starts slower, and a
-  /// peer that was killed is in the way of the next for seconds.
+  /// --transport udp|shm|default (both). Shared memory starts more slowly, and
+  /// a killed peer blocks the next one for seconds.
   std::string transport{"udp"};
   std::string partition;  ///< --partition NAME[,NAME] of samples, or empty
   std::filesystem::path qos_file;     ///< --qos FILE.xml, or empty
@@ -31,7 +31,7 @@ struct GlobalOptions {
   bool utc{false};  ///< Times for people in UTC instead of the local zone.
 };
 
-/// Thrown by --print-config once everything given is known.
+/// Thrown by --print-config once all options have been parsed.
 struct PrintConfigRequest {};
 
 /// Adds --help --version --data --config --print-config --json --utc
@@ -42,8 +42,8 @@ void AddBusOptions(CLI::App& app, GlobalOptions& options);
 /// Adds --fault-catalogue.
 void AddFaultCatalogueOption(CLI::App& app, GlobalOptions& options);
 
-/// What would run, as --config reads it: each option that has a value, of the
-/// program `root` and of the chosen verb.
+/// The effective configuration in the format of --config: every option with a
+/// value, of the program `root` and of the chosen verb.
 std::string EffectiveToml(CLI::App& root);
 
 /// Version of the project and git revision: "0.1.0+438d5bd". Stored with each

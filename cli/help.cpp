@@ -18,12 +18,12 @@ namespace fdi::cli {
 namespace {
 
 constexpr std::size_t kColumn = 30;     // Where the texts begin.
-constexpr std::size_t kTextWidth = 50;  // Both together: 80 columns.
+constexpr std::size_t kTextWidth = 50;  // 80 columns in total.
 constexpr std::size_t kLongestHeading = 26;
 /// The name that PrepareHelp() gives to CLI11's checks for files and folders.
 constexpr const char* kMustExist = "must exist";
 
-// A heading in the left column, its text in the right one.
+// A heading in the left column with its text in the right one.
 std::string Entry(const std::string& heading, const std::string& text) {
   std::string entry = "  " + heading;
   std::size_t width = TextWidth(entry);
@@ -84,7 +84,7 @@ class HelpFormatter : public CLI::Formatter {
   }
 };
 
-// The checks of an option, which CLI11 counts by their index alone.
+// The validators of an option; CLI11 only gives access by index.
 std::vector<CLI::Validator*> ValidatorsOf(CLI::Option& option) {
   std::vector<CLI::Validator*> validators;
   try {
@@ -136,9 +136,9 @@ std::string AcceptedBy(const std::string& description) {
   return "";
 }
 
-// CLI11 shows its checks within the name of the value, "N:INT in [0 - 232]".
-// They are taken out of it, so that a name may hold a colon, and what they
-// accept becomes the name itself or a remark. @returns the remark.
+// CLI11 shows validators within the value's name, "N:INT in [0 - 232]". They
+// are removed from it, so that a name may contain a colon, and what they accept
+// becomes the name itself or a remark. @returns the remark.
 std::string TakeChecks(CLI::Option& option) {
   std::string accepted;
   for (CLI::Validator* check : ValidatorsOf(option)) {
@@ -196,7 +196,7 @@ void Describe(CLI::Option& option) {
   if (remarks.empty()) {
     return;
   }
-  // "Seed (default 1)" goes on within its brackets.
+  // A remark is added inside existing brackets: "Seed (default 1; ...)".
   const bool open = description.ends_with(')');
   option.description((open
                           ? description.substr(0, description.size() - 1) + "; "

@@ -15,15 +15,15 @@ namespace fdi::cli {
 ///     --domain 0..232      DDS domain (default 0)
 ///     --record[=on|off]    Store the samples (without a value: on)
 ///
-/// What an option accepts, its default and what it excludes are taken from the
-/// parser. Call it once, after the last option was added.
+/// Accepted values, defaults and exclusions are taken from the parser. Call
+/// once, after the last option was added.
 void PrepareHelp(CLI::App& root);
 
 /// "a, b, c".
 std::string Joined(const std::vector<std::string>& words,
                    const char* separator = ", ");
 
-/// The files and folders that options name need not exist any more.
+/// Drops the requirement that files and folders named by options exist.
 void AllowMissingFiles(CLI::App& root);
 
 }  // namespace fdi::cli

@@ -6,9 +6,9 @@
 
 namespace fdi::cli {
 
-/// JSON as text; of one line if `indent` is negative. NaN and infinity become
-/// null, bytes that are not UTF-8 the replacement character; the controls that
-/// JSON allows (DEL, C1) are escaped like the others.
+/// JSON as text, on one line if `indent` is negative. NaN and infinity become
+/// null, invalid UTF-8 the replacement character; control characters that JSON
+/// allows (DEL, C1) are escaped, too.
 std::string JsonText(const Json& json, int indent = -1);
 
 }  // namespace fdi::cli

@@ -32,10 +32,10 @@ LogSink MakeStderrSink(LogLevel minimum) {
   logger->set_pattern("%Y-%m-%dT%H:%M:%S.%eZ %l %v",
                       spdlog::pattern_time_type::utc);
   logger->set_level(ToSpdlog(minimum));
-  // Each line at once: the last one before a crash is the one that matters.
+  // Flushed per line: the last line before a crash matters most.
   logger->flush_on(spdlog::level::debug);
   return [logger](LogLevel level, std::string_view line) {
-    const std::string text = Printable(line);  // No text can forge a line.
+    const std::string text = Printable(line);  // Prevents forged lines.
     logger->log(ToSpdlog(level), spdlog::string_view_t(text));
   };
 }

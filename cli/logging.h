@@ -9,7 +9,8 @@
 
 namespace fdi::cli {
 
-/// A sink to stderr: one line each, UTC and level in front. Thread safe.
+/// A sink to stderr: one line each, preceded by UTC time and level. Thread
+/// safe.
 LogSink MakeStderrSink(LogLevel minimum);
 
 /// "event key=value key=\"two words\"": quotes what has blanks or quotes.

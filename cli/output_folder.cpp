@@ -16,8 +16,9 @@ namespace fdi::cli {
 void EnsureFolder(const std::filesystem::path& folder) {
   std::error_code error;
   if (!std::filesystem::is_directory(folder, error)) {
-    // Only the last part is made: a mistyped path should not grow a tree. The
-    // empty part at the end lets "report" and "report/" have the same parent.
+    // Creates only the last component, so that a mistyped path does not create
+    // a tree. The empty component makes "report" and "report/" have the same
+    // parent.
     const std::filesystem::path whole =
         std::filesystem::absolute(folder / "").lexically_normal();
     const std::filesystem::path parent = whole.parent_path().parent_path();
@@ -35,7 +36,7 @@ void EnsureFolder(const std::filesystem::path& folder) {
       throw DataError(folder.string() + " is a file, not a folder");
     }
   }
-  // Before hours of work, not after them.
+  // Checked before hours of work, not after.
   if (access(folder.c_str(), W_OK | X_OK) != 0) {
     throw DataError("cannot write to folder " + folder.string() + ": " +
                     std::strerror(errno));
@@ -48,7 +49,7 @@ void WriteOutput(const std::filesystem::path& path,
     write(std::cout);
     return;
   }
-  // Renamed when it is complete: readers see the old file or the new one.
+  // Atomic: readers see either the old file or the complete new one.
   std::filesystem::path part = path;
   part += ".part";
   std::ofstream file(part, std::ios::binary | std::ios::trunc);

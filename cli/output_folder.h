@@ -7,18 +7,18 @@
 
 namespace fdi::cli {
 
-/// Makes `folder` unless it is there; its parent must be.
-/// @throws DataError naming the parent that is missing, or the folder that
-///   cannot be made or written to.
+/// Creates `folder` unless it exists; its parent must exist.
+/// @throws DataError naming the missing parent, or the folder that cannot be
+///   created or written to.
 void EnsureFolder(const std::filesystem::path& folder);
 
-/// Lets `write` write the file `path`, or stdout for "-". The text goes beside
-/// `path` first, so that a failure leaves no part of it.
+/// Has `write` write the file `path`, or stdout for "-". The file is replaced
+/// atomically, so a failure leaves no partial file.
 /// @throws DataError naming the file.
 void WriteOutput(const std::filesystem::path& path,
                  const std::function<void(std::ostream&)>& write);
 
-/// The same for a text that is there already.
+/// The same for existing text.
 void WriteFile(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace fdi::cli

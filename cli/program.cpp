@@ -26,7 +26,7 @@ namespace fdi::cli {
 namespace {
 
 // Without memory or threads the DDS library throws where nobody can catch, e.g.
-// in destructors: that ends as other failures do, all else by an abort.
+// in destructors: this ends with an error message, other terminations abort.
 [[noreturn]] void EndTerminated() {
   const auto end = [](const char* what) {
     std::fprintf(stderr,
@@ -46,10 +46,10 @@ namespace {
   std::abort();
 }
 
-// What --check-examples throws.
+// Thrown by --check-examples.
 struct ExampleCheckRequest {};
 
-// The verb that was typed, or as far as it was typed.
+// The chosen verb, or group if no verb was given.
 const CLI::App& Chosen(const CLI::App& app) {
   const auto chosen = app.get_subcommands();
   return chosen.empty() ? app : Chosen(*chosen.front());
@@ -63,7 +63,8 @@ std::vector<std::string> VerbNames(const CLI::App& app) {
   return names;
 }
 
-// Of the verb, its group and the program: all may follow the verb.
+// Options of the verb, its group and the program, all of which may follow the
+// verb.
 std::vector<std::string> OptionNames(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* level = &app; level != nullptr;
@@ -77,7 +78,7 @@ std::vector<std::string> OptionNames(const CLI::App& app) {
   return names;
 }
 
-// What was not understood, with the word that was probably meant.
+// The unknown word, with a suggestion.
 std::string Unexpected(const CLI::App& app, const std::string& word) {
   const bool is_option = word.size() > 1 && word.front() == '-';
   const std::vector<std::string> verbs = VerbNames(app);
@@ -94,8 +95,8 @@ std::string Unexpected(const CLI::App& app, const std::string& word) {
   return is_option ? message : message + "; there are " + Joined(names);
 }
 
-// One line for what CLI11 refused. Words that are left over tell more than its
-// own message: where a verb is mistyped, it reports that one is missing.
+// One line for an error of CLI11. Unparsed words are more informative than its
+// own message: if a verb is mistyped, it reports a missing verb.
 std::string Explain(const CLI::App& root, const CLI::ParseError& error) {
   const CLI::App& app = Chosen(root);
   const std::vector<std::string> left = root.remaining(true);
@@ -112,7 +113,7 @@ std::string Explain(const CLI::App& root, const CLI::ParseError& error) {
   return error.what();
 }
 
-// Scripts and logs count on one line per error.
+// Scripts and logs rely on one line per error.
 std::string OneLine(std::string text) {
   while (!text.empty() && text.back() == '\n') {
     text.pop_back();
@@ -135,13 +136,13 @@ std::string CommandLine(int argc, const char* const* argv) {
 Program::Program(std::string name, std::string description)
     : app_(
           std::make_unique<CLI::App>(std::move(description), std::move(name))) {
-  MapError<std::system_error>(kExitData);  // Also those of std::filesystem.
+  MapError<std::system_error>(kExitData);  // And std::filesystem.
   MapError<DataError>(kExitData);
   MapError<NotFoundError>(kExitNotFound);
   MapError<std::invalid_argument>(kExitUsage);
   MapError<fdi::ConfigError>(kExitUsage);
   AddGlobalOptions(*app_, options_);
-  // For the tests: not listed by --help.
+  // For tests; hidden from --help.
   app_->add_flag_callback(
           "--check-examples", [] { throw ExampleCheckRequest(); },
           "Try whether the examples of --help are understood")
@@ -196,12 +197,12 @@ void Program::AddExamples(std::vector<VerbExamples> examples) {
 }
 
 int Program::Run(int argc, const char* const* argv) noexcept {
-  // At a limit of file size a write fails, as on a full disk.
+  // Makes writing beyond the file size limit fail like a full disk.
   std::signal(SIGXFSZ, SIG_IGN);
   std::set_terminate(EndTerminated);
   try {
     const int code = ParseAndRun(argc, argv);
-    // A full disk or a closed pipe shows at the end, if at all.
+    // A full disk or a closed pipe may only show when flushing.
     std::cout.flush();
     if (!std::cout) {
       PrintError("cannot write to standard output");
@@ -243,7 +244,8 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
     throw fdi::ConfigError(Explain(*app_, error) + " (see " + app_->get_name() +
                            " --help)");
   } catch (const fdi::ConfigError& error) {
-    // Of our reader of the file: the options themselves throw CLI::ParseError.
+    // Thrown by our config reader: the options themselves throw
+    // CLI::ParseError.
     throw fdi::ConfigError(in_config() + ": " + error.what());
   }
   return RunVerb(argc, argv);
@@ -288,8 +290,7 @@ int Program::Print(const Report& report) const {
 }
 
 int Program::ExitCodeOf(const std::exception& error) const {
-  // The last added first: a program may map an exception otherwise, and what
-  // derives from a mapped one.
+  // In reverse order: a program may override a mapping, or map a derived type.
   for (auto mapper = mappers_.rbegin(); mapper != mappers_.rend(); ++mapper) {
     if (const auto code = (*mapper)(error)) {
       return *code;

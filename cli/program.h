@@ -23,24 +23,24 @@ namespace fdi::cli {
 enum ExitCode : int {
   kExitOk = 0,
   kExitFailure = 1,
-  kExitUsage = 2,      ///< Usage or configuration: also what CLI11 refuses.
+  kExitUsage = 2,      ///< Usage or configuration, including CLI11's errors.
   kExitData = 3,       ///< Data, database or permission.
   kExitTransport = 4,  ///< DDS.
   kExitNotFound = 5,
 };
 
-/// What a verb gets to work with.
+/// What a verb receives.
 struct Context {
   const GlobalOptions& options;
   LogSink log;               ///< To stderr, lines `event key=value`.
   std::string software;      ///< SoftwareVersion().
-  std::string command_line;  ///< As typed, for the record of a run.
+  std::string command_line;  ///< As typed; recorded with runs.
 };
 
-/// The body of a verb that prints by itself; returns the exit code.
+/// Body of a verb that prints its own output; returns the exit code.
 using PrintAction = std::function<int(const Context&)>;
-/// The body of a verb that returns data; the frame prints them as text or as
-/// the user asks by --json, --csv (AllowCsv()) and --utc.
+/// Body of a verb that returns data, which are printed as text or as requested
+/// by --json, --csv (AllowCsv()) and --utc.
 using ReportAction = std::function<Report(const Context&)>;
 using VerbAction = std::variant<ReportAction, PrintAction>;
 
@@ -70,16 +70,16 @@ class Program {
   Program(const Program&) = delete;
   Program& operator=(const Program&) = delete;
 
-  /// Adds --domain, --interface, --transport and --qos, for a program that
-  /// speaks DDS.
+  /// Adds --domain, --interface, --transport and --qos, for programs that use
+  /// DDS.
   void AddBusOptions();
-  /// Adds --fault-catalogue, for a program that shows LoadFaultTexts().
+  /// Adds --fault-catalogue, for programs that use LoadFaultTexts().
   void AddFaultCatalogueOption();
 
-  /// The parser with its global options, for what the frame does not offer.
+  /// The parser with its global options, for special needs.
   CLI::App& root();
 
-  /// A word that needs one of its verbs after it, e.g. `runs`.
+  /// A group of verbs, e.g. `runs`.
   CLI::App& AddGroup(const std::string& name, const std::string& description);
   /// A verb of the program, or of a group.
   CLI::App& AddVerb(const std::string& name, const std::string& description,
@@ -89,14 +89,14 @@ class Program {
   /// Adds --csv to a verb that returns a Report with a table.
   void AllowCsv(CLI::App& verb, const std::string& description);
 
-  /// Puts examples below the help of verbs, groups (both by path, "history
-  /// list") and, for "", the program; after the verbs were added.
-  /// @throws std::logic_error for a verb that is not there.
+  /// Appends examples to the help of verbs, groups (both named by path,
+  /// "history list") and, for "", the program. Call after adding the verbs.
+  /// @throws std::logic_error for an unknown verb.
   void AddExamples(std::vector<VerbExamples> examples);
 
-  /// Exceptions of type E, and what derives from it, end with `code`. Known
-  /// without: ConfigError and std::invalid_argument 2, DataError and
-  /// filesystem and system errors 3, NotFoundError 5; all others 1.
+  /// Exceptions of type E, or derived from it, end with `code`. Predefined:
+  /// ConfigError and std::invalid_argument 2, DataError, filesystem and system
+  /// errors 3, NotFoundError 5; others 1.
   template <typename E>
   void MapError(int code) {
     mappers_.push_back([code](const std::exception& error) {
@@ -106,7 +106,7 @@ class Program {
     });
   }
 
-  /// Parses, runs the verb, reports an error in one line on stderr. Never
+  /// Parses, runs the verb and reports an error in one line on stderr. Never
   /// throws. @returns the exit code.
   int Run(int argc, const char* const* argv) noexcept;
 
@@ -124,7 +124,7 @@ class Program {
 
   std::unique_ptr<CLI::App> app_;
   GlobalOptions options_;
-  bool csv_{false};  // The flag of whichever verb was chosen.
+  bool csv_{false};  // Of the chosen verb.
   bool help_prepared_{false};
   std::vector<Verb> verbs_;
   std::vector<VerbExamples> examples_;

@@ -13,7 +13,7 @@ namespace fdi::cli {
 namespace {
 
 constexpr int kBarWidth = 30;
-// Often enough to look alive, and cheap beside the work.
+// Frequent enough to look alive, and cheap compared to the work.
 constexpr auto kRedraw = std::chrono::milliseconds(100);
 
 }  // namespace
@@ -44,7 +44,7 @@ void Progress::Update(double fraction, const std::string& note) {
     }
     return;
   }
-  // A log file gets ten lines, not a bar drawn over itself.
+  // In a log file: ten lines instead of a redrawn bar.
   const int step = static_cast<int>(share * 10.0);
   if (step > last_step_) {
     last_step_ = step;
@@ -74,7 +74,8 @@ void Progress::Draw(double fraction, const std::string& note) {
   const int filled = static_cast<int>(fraction * kBarWidth);
   std::string bar(static_cast<std::size_t>(filled), '#');
   bar.resize(kBarWidth, '.');
-  // \r to the start of the line, \033[K clears the rest of a longer note.
+  // \r returns to the start of the line, \033[K erases the rest of a longer
+  // note.
   std::fprintf(stderr, "\r%s [%s] %3.0f %% %s\033[K", title_.c_str(),
                bar.c_str(), fraction * 100.0, note.c_str());
   std::fflush(stderr);

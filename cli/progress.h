@@ -5,8 +5,8 @@
 
 namespace fdi::cli {
 
-/// Progress of a long verb on stderr: a bar on a terminal, else a line for
-/// every tenth of the work. One thread.
+/// Progress of a long verb on stderr: a bar on a terminal, otherwise a line per
+/// tenth of the work. One thread.
 class Progress {
  public:
   explicit Progress(std::string title);
@@ -17,7 +17,7 @@ class Progress {
 
   /// @param fraction of the work done, 0..1. @param note e.g. "f7, channel X".
   void Update(double fraction, const std::string& note = {});
-  /// All done; prints the time taken.
+  /// Shows completion and the time taken.
   void Finish(const std::string& note = {});
 
  private:

@@ -16,8 +16,8 @@
 namespace fdi::cli {
 namespace {
 
-// The value at "a/b" within `json`; null where a member on the way is missing.
-// JSON pointers would do, but they throw where a member is missing.
+// The value at "a/b" within `json`; null where a member on the path is missing.
+// JSON pointers would throw there.
 const Json& ValueAt(const Json& json, std::string_view path) {
   static const Json kNull;
   const Json* value = &json;
@@ -44,7 +44,7 @@ std::string Joined(const Json& list) {
   return text;
 }
 
-// A value as CSV has it: null is an empty cell.
+// A value in CSV form: null is an empty cell.
 std::string Bare(const Json& value) {
   if (value.is_null() ||
       (value.is_number_float() && !std::isfinite(value.get<double>()))) {
@@ -61,8 +61,8 @@ std::string RawText(const Json& row, const Column& column, bool utc) {
     return column.text(row);
   }
   const Json& value = ValueAt(row, column.key);
-  // Documents have times in UTC and SI units throughout; people get them as
-  // they asked.
+  // Documents have UTC times and SI units throughout; text uses the requested
+  // form.
   if (column.format == Format::kTime && value.is_string()) {
     return FormatTime(ParseTime(value.get<std::string>(), true), utc);
   }
@@ -185,7 +185,7 @@ void Report::PrintJson(std::ostream& out) const {
 }
 
 void Report::PrintCsv(std::ostream& out) const {
-  // What Csv() names, else the first of the tables.
+  // The table chosen by Csv(), else the first one.
   const TableView* table = csv_ ? &*csv_ : nullptr;
   for (const View& view : views_) {
     table = table != nullptr ? table : std::get_if<TableView>(&view);

@@ -13,9 +13,9 @@
 
 namespace fdi::cli {
 
-/// How people see a value of a document. JSON and CSV have it bare.
+/// How a value is shown in text. JSON and CSV have the raw value.
 enum class Format {
-  kPlain,     ///< Text as it is, numbers with Column::decimals.
+  kPlain,     ///< Text unchanged, numbers with Column::decimals.
   kTime,      ///< A `*_utc` text as a time in the user's zone.
   kDuration,  ///< A `*_s` number as "3 min 05 s".
   kPercent,   ///< A share of 0..1 as "12.5 %".
@@ -23,36 +23,35 @@ enum class Format {
 
 /// One column of a table, or one line of a list of fields.
 ///
-/// A value that is missing, null or not finite is shown as "-", a flag as yes
-/// or no, a list with commas between its items.
+/// Missing, null or non-finite values are shown as "-", flags as yes or no,
+/// lists separated by commas.
 struct Column {
   std::string heading;  ///< With its unit: "period [s]".
-  /// The member of the row, which is the CSV header as well: "period_s". A
-  /// member of a member is named by its path, "fit/vaf_pct"; its CSV header is
+  /// The member of the row, which is also the CSV header: "period_s". A nested
+  /// member is given by its path, "fit/vaf_pct"; its CSV header is
   /// "fit_vaf_pct".
   std::string key{};
   Format format{Format::kPlain};
   int decimals{2};  ///< Of numbers that are not integers.
-  /// Where a table is wider than the terminal, columns above 0 are left out,
-  /// the highest first.
+  /// If a table is wider than the terminal, columns above 0 are omitted, the
+  /// highest first.
   int spare{0};
-  /// Makes the text for people from the whole row, where one member does not
-  /// suffice.
+  /// Makes the text from the whole row, where one member does not suffice.
   std::function<std::string(const Json& row)> text{};
   std::function<Tone(const Json& row)> tone{};
-  /// Without it, columns with numbers are aligned right and others left.
+  /// Default: columns with numbers are right-aligned, others left-aligned.
   std::optional<Align> align{};
 };
 
 /// How a Report is rendered.
 struct ReportStyle {
   TextStyle text;   ///< Colour and width.
-  bool utc{false};  ///< Times in UTC, not in the local zone.
+  bool utc{false};  ///< Times in UTC instead of the local zone.
 };
 
-/// The result of a verb: one JSON document, and which parts of it people see.
-/// A verb fills `document`; text, JSON and CSV follow from it. Return it from
-/// the action of Program::AddVerb(), which prints it as the user asks:
+/// The result of a verb: a JSON document, and which parts of it the text shows.
+/// A verb fills `document`; text, JSON and CSV follow from it. Returned by the
+/// action of Program::AddVerb(), which prints it in the requested form:
 ///
 ///     Report report;
 ///     report.document["runs"] = RunRows(...);
@@ -72,17 +71,17 @@ class Report {
   /// Shows members of the object at `key` ("" is the document) as aligned
   /// lines "heading:  value".
   Report& Fields(std::string key, std::vector<Column> fields);
-  /// A line, or several, for people alone.
+  /// One or more lines in the text output only.
   Report& Line(std::string text);
-  /// What --csv prints, where that is not the first table: the members `keys`
-  /// of the rows at `key`.
+  /// What --csv prints, if not the first table: the members `keys` of the rows
+  /// at `key`.
   Report& Csv(std::string key, std::vector<std::string> keys);
 
-  /// The parts for people, in the order in which they were added.
+  /// The text output, in the order in which parts were added.
   void PrintText(std::ostream& out, const ReportStyle& style) const;
   /// The document.
   void PrintJson(std::ostream& out) const;
-  /// One table as WriteCsvLine() does: keys as header, values bare.
+  /// One table as WriteCsvLine() writes it: keys as header, raw values.
   /// @throws std::logic_error if there is no table.
   void PrintCsv(std::ostream& out) const;
 

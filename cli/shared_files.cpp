@@ -11,8 +11,8 @@ std::filesystem::path SharedFile(std::string_view name) {
       std::filesystem::read_symlink("/proc/self/exe");
   const std::filesystem::path wanted =
       std::filesystem::path("share") / "fdi" / name;
-  // From the program upwards, so that <prefix>/bin finds <prefix>/share, and a
-  // program in the build tree what the build has put there.
+  // Searches upwards from the program, so that <prefix>/bin finds
+  // <prefix>/share, and a program in the build tree finds the files there.
   std::filesystem::path folder = program.parent_path();
   while (true) {
     std::error_code ignored;

@@ -5,11 +5,11 @@
 
 namespace fdi::cli {
 
-/// A file or folder that was installed with the programs: share/fdi/`name` in
-/// the nearest folder above the running program that has it, so
+/// A file or folder installed with the programs: share/fdi/`name` in the
+/// nearest folder above the running program that has it. So
 /// <prefix>/bin/fdi-store finds <prefix>/share/fdi, and programs in the build
-/// tree find theirs there.
-/// @throws DataError naming where it was looked for.
+/// tree find theirs.
+/// @throws DataError naming where it was searched for.
 std::filesystem::path SharedFile(std::string_view name);
 
 }  // namespace fdi::cli

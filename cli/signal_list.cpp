@@ -22,7 +22,7 @@ SignalMask ParseSignals(const std::vector<std::string>& names,
 
 SignalMask ParseSignals(std::string_view list) {
   std::vector<std::string> names;
-  // The comma at the end: an empty list is one empty name, which is refused.
+  // With the trailing comma an empty list is one empty name, which is rejected.
   std::istringstream text(std::string(list) + ',');
   for (std::string name; std::getline(text, name, ',');) {
     names.push_back(name);

@@ -9,12 +9,12 @@
 
 namespace fdi::cli {
 
-/// The signals called `names`, in any case.
-/// @throws ConfigError naming the first that is none of `accepted`, and these.
+/// Parses signal names, ignoring case.
+/// @throws ConfigError naming the first one not in `accepted`, and these.
 SignalMask ParseSignals(const std::vector<std::string>& names,
                         SignalMask accepted);
 
-/// "CV,X,F", of all signals there are. @throws ConfigError
+/// Parses "CV,X,F"; all signals are accepted. @throws ConfigError
 SignalMask ParseSignals(std::string_view list);
 
 /// "CV,P1"

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::array<int, 3> kSignals = {SIGINT, SIGTERM, SIGHUP};
 
-// A signal handler reaches nothing but globals.
+// A signal handler can only access globals.
 std::atomic<int> g_event{-1};
 std::atomic<bool> g_stop{false};
 std::atomic<bool> g_reload{false};
@@ -25,8 +25,8 @@ std::atomic<bool> g_installed{false};
 std::array<struct sigaction, kSignals.size()> g_previous;
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-// Makes the descriptor readable. A handler may interrupt anything, also what
-// has yet to look at its own errno.
+// Makes the descriptor readable. A handler may interrupt code that has not read
+// its errno yet.
 void Wake() noexcept {
   const int saved_errno = errno;
   const std::uint64_t one = 1;
@@ -38,7 +38,7 @@ extern "C" void FdiOnSignal(int signal) {
   if (signal == SIGHUP) {
     g_reload = true;
   } else if (g_stop.exchange(true)) {
-    _exit(1);  // The orderly stop hangs; exit() is not safe in a handler.
+    _exit(1);  // The orderly stop hangs; exit() is unsafe here.
   }
   Wake();
 }
@@ -56,7 +56,7 @@ StopSignals::StopSignals() {
   }
   g_stop = false;
   g_reload = false;
-  // SA_RESTART: system calls elsewhere go on; whoever waits has the descriptor.
+  // SA_RESTART: other system calls continue; waiters use the descriptor.
   struct sigaction action {};
   action.sa_handler = &FdiOnSignal;
   action.sa_flags = SA_RESTART;
@@ -87,11 +87,11 @@ StopSignals::Event StopSignals::WaitFor(std::chrono::milliseconds timeout) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;
   while (true) {
     if (g_stop) {
-      return Event::kStop;  // The descriptor stays readable for the others.
+      return Event::kStop;  // The descriptor stays readable for others.
     }
     if (g_reload.exchange(false)) {
-      // The reload is taken, so the descriptor must not stay readable, unless
-      // a signal has come between the exchange and the read.
+      // The reload is consumed, so the descriptor must not stay readable,
+      // unless a signal arrived between exchange and read.
       std::uint64_t count = 0;
       [[maybe_unused]] const auto got = read(g_event, &count, sizeof count);
       if (g_stop || g_reload) {
@@ -110,7 +110,7 @@ StopSignals::Event StopSignals::WaitFor(std::chrono::milliseconds timeout) {
       throw std::system_error(errno, std::generic_category(), "poll");
     }
     if (ready > 0 && !g_stop && !g_reload) {
-      std::uint64_t count = 0;  // Another waiter took the reload.
+      std::uint64_t count = 0;  // Another thread consumed the reload.
       [[maybe_unused]] const auto got = read(g_event, &count, sizeof count);
       if (g_stop || g_reload) {
         Wake();

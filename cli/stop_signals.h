@@ -4,27 +4,27 @@
 
 namespace fdi::cli {
 
-/// While it lives, SIGINT and SIGTERM ask for an orderly stop, a second one
-/// ends the process at once (exit code 1), and SIGHUP asks for a reload. One
-/// at a time; the handlers found are put back at the end.
+/// While an object exists, SIGINT and SIGTERM request an orderly stop, a second
+/// one ends the process at once (exit code 1), and SIGHUP requests a reload.
+/// One object at a time; the destructor restores the previous handlers.
 class StopSignals {
  public:
   enum class Event { kTimeout, kReload, kStop };
 
-  /// @throws std::logic_error if another one lives; std::system_error.
+  /// @throws std::logic_error if another object exists; std::system_error.
   StopSignals();
   ~StopSignals();
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;
 
-  /// Cheap; from any thread.
+  /// Cheap; thread safe.
   bool stop_requested() const noexcept;
-  /// As if SIGTERM had come; from any thread.
+  /// Same effect as SIGTERM; thread safe.
   void RequestStop() noexcept;
-  /// Waits for a signal; kStop from the first stop on, kReload once for each
-  /// SIGHUP (those that come close together count once).
+  /// Waits for a signal. Returns kStop from the first stop on, and kReload once
+  /// per SIGHUP (signals in quick succession count once).
   Event WaitFor(std::chrono::milliseconds timeout);
-  /// Becomes readable when a signal comes; for poll().
+  /// Becomes readable when a signal arrives; for poll().
   int descriptor() const noexcept;
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAtmosphereKpa = 101.325;
 
-/// Quantities that share their units.
+/// Kinds of quantity; signals of one kind have the same units.
 enum class Quantity { kPercent, kPressure, kTemperature, kFlow, kNumber };
 
 Quantity QuantityOf(Signal signal) {
@@ -71,7 +71,7 @@ constexpr UnitEntry kSignalUnits[] = {
     {"1", Quantity::kNumber, {1.0, 0.0, kVolume}},
 };
 
-// "bar (g)" is "barg", "m³/h" is "m3/h", "°C" is "degC", "C" too.
+// Normalises a unit: "bar (g)" to "barg", "m³/h" to "m3/h", "°C" to "degC".
 std::string Plain(std::string_view name) {
   std::string plain;
   for (std::size_t i = 0; i < name.size(); ++i) {
@@ -96,7 +96,7 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
               ColumnMapping& mapping) {
   const bool flow = signal == Signal::kF;
   const bool percent = QuantityOf(signal) == Quantity::kPercent;
-  // A flow is measured as volume or as mass, and only the file's author knows.
+  // A flow is measured as volume or mass; only the file's author knows which.
   const std::string name = table.Text("unit").value_or(
       flow                     ? ""
       : signal == Signal::kCvi ? "1"
@@ -126,8 +126,8 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
     scale = (span[1] - span[0]) / (raw[1] - raw[0]);
     offset = span[0] - scale * raw[0];
   }
-  // The user's line comes first, then the unit:
-  // value = u₀ + u₁ (offset + scale · cell).
+  // The linear map of the user is applied first, then the unit: value = u₀ + u₁
+  // (offset + scale · cell).
   mapping.scale = unit->scale * scale;
   mapping.offset = unit->offset + unit->scale * offset;
   mapping.unit = name;
@@ -191,7 +191,7 @@ void ReadTime(TomlReader table, ColumnMap& map) {
   }
 }
 
-// One character of `accepted`; NUL if the key is absent.
+// One of the `accepted` characters; NUL if the key is absent.
 char ReadSign(TomlReader& table, std::string_view key,
               std::string_view accepted) {
   const std::string text = table.Text(key).value_or("");
@@ -226,7 +226,7 @@ std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
   std::string plain = Plain(name);
   const auto find = [&]() -> std::optional<UnitConversion> {
     for (const UnitEntry& unit : kSignalUnits) {
-      // mPa is no MPa.
+      // mPa is not MPa.
       if (unit.quantity == QuantityOf(signal) &&
           (unit.name == plain ||
            (unit.name != "MPa" && SameName(unit.name, plain)))) {

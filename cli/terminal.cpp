@@ -14,7 +14,7 @@ std::string_view Environment(const char* name) {
   return value == nullptr ? "" : value;
 }
 
-// COLUMNS, where it is set, overrules the terminal: as `less` and scripts do.
+// COLUMNS, if set, overrides the terminal, as for `less`.
 std::size_t TerminalColumns() {
   const long asked = std::strtol(Environment("COLUMNS").data(), nullptr, 10);
   if (asked > 0) {

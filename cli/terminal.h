@@ -4,15 +4,15 @@
 
 namespace fdi::cli {
 
-/// How text is to look where it goes.
+/// How to render text for its destination.
 struct TextStyle {
   bool colour{false};
-  std::size_t width{0};  ///< Columns that fit; 0: any number.
+  std::size_t width{0};  ///< Available columns; 0: unlimited.
 };
 
-/// Of standard output: coloured if it is a terminal that is not `dumb` and
-/// NO_COLOR is not set (no-color.org), as wide as the terminal or, if set,
-/// COLUMNS; plain and of any width if it is none.
+/// Style for standard output: coloured if it is a terminal that is not `dumb`
+/// and NO_COLOR is not set (no-color.org), as wide as COLUMNS, if set, or the
+/// terminal; plain and unlimited if it is not a terminal.
 TextStyle StdoutStyle();
 
 }  // namespace fdi::cli

@@ -14,7 +14,7 @@ constexpr const char* kBold = "\x1b[1m";
 constexpr const char* kPlainAgain = "\x1b[0m";
 constexpr std::size_t kGap = 2;  // Blanks between columns.
 
-// The standard library pads by bytes, which is too little after "µ".
+// The standard library pads by bytes, which is too few after "µ".
 std::string Padded(const std::string& text, std::size_t width, Align align) {
   const std::string blanks(width - std::min(width, TextWidth(text)), ' ');
   return align == Align::kRight ? blanks + text : text + blanks;
@@ -67,8 +67,9 @@ std::vector<std::size_t> TextTable::Widths() const {
   return widths;
 }
 
-// The columns that stay, in order: as long as the table is too wide, the most
-// spare one goes, of equal ones the leftmost. Those with 0 stay in any case.
+// The columns that remain, in order: while the table is too wide, the one with
+// the highest `spare` is dropped, of equal ones the leftmost. Columns with 0
+// always remain.
 std::vector<std::size_t> TextTable::Shown(
     const std::vector<std::size_t>& widths, std::size_t width) const {
   std::vector<std::size_t> shown(columns_.size());
@@ -97,7 +98,7 @@ void TextTable::Print(std::ostream& out, const TextStyle& style) const {
   const auto print = [&](const auto& cell_of, const auto& code_of) {
     for (const std::size_t c : shown) {
       const bool last = c == shown.back();
-      // No blanks at the end of a line: they would break it on a terminal.
+      // No trailing blanks: they could wrap on a terminal.
       const bool bare = last && columns_[c].align == Align::kLeft;
       const std::string text =
           Padded(cell_of(c), bare ? 0 : widths[c], columns_[c].align);
@@ -111,7 +112,7 @@ void TextTable::Print(std::ostream& out, const TextStyle& style) const {
     print([&](std::size_t c) { return row.cells[c]; },
           [&](std::size_t c) { return ToneCode(row.tones[c]); });
   }
-  // What is not shown is named, so that nobody takes it for missing.
+  // Names the omitted columns, so that they are not taken for missing data.
   std::string left_out;
   for (std::size_t c = 0; c < columns_.size(); ++c) {
     if (std::find(shown.begin(), shown.end(), c) == shown.end()) {

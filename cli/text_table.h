@@ -11,10 +11,10 @@ namespace fdi::cli {
 
 enum class Align { kLeft, kRight };
 
-/// What a cell says beside its text, which always says it too.
+/// Emphasis of a cell; the text always carries the same information.
 enum class Tone {
   kPlain,
-  kAlarm,    ///< Bold red: wants somebody.
+  kAlarm,    ///< Bold red: needs attention.
   kWarning,  ///< Yellow.
   kQuiet,    ///< Dim.
 };
@@ -28,7 +28,7 @@ class TextTable {
   struct Column {
     std::string heading;  ///< With its unit: "MSE [%^2]".
     Align align{Align::kLeft};
-    /// Where the table is too wide, columns above 0 are left out, the highest
+    /// If the table is too wide, columns above 0 are omitted, the highest
     /// first.
     int spare{0};
   };
@@ -36,11 +36,11 @@ class TextTable {
   explicit TextTable(std::vector<Column> columns);
   /// @throws std::invalid_argument unless there is one cell per column.
   void AddRow(std::vector<std::string> cells);
-  /// Of a cell of the last row. @throws std::invalid_argument if there is none.
+  /// Applies to the last row. @throws std::invalid_argument if there is none.
   void SetTone(std::size_t column, Tone tone);
 
-  /// Plain, or for people: in colour, no wider than fits, with a last line that
-  /// names the columns left out.
+  /// Plain, or styled: in colour and no wider than the style allows, with a
+  /// last line that names the omitted columns.
   void Print(std::ostream& out, const TextStyle& style = {}) const;
   bool empty() const { return rows_.empty(); }
 
@@ -60,7 +60,7 @@ class TextTable {
 /// Code points of UTF-8 text, each taken as one cell of the terminal.
 std::size_t TextWidth(const std::string& text);
 
-/// `value` with `decimals`, "-" where it is not finite.
+/// `value` with `decimals`; "-" if it is not finite.
 std::string FormatNumber(double value, int decimals);
 
 }  // namespace fdi::cli

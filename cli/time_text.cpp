@@ -18,7 +18,7 @@
 namespace fdi::cli {
 namespace {
 
-/// A regular expression recurses with the length of a text.
+/// std::regex recurses with the length of its input.
 constexpr std::size_t kLongestTime = 64;
 
 [[noreturn]] void RefuseTime(std::string_view text) {
@@ -28,7 +28,7 @@ constexpr std::size_t kLongestTime = 64;
                     "or an offset such as +01:00");
 }
 
-// Reads a time from its beginning to its end.
+// A cursor over the text of a time.
 class Scanner {
  public:
   explicit Scanner(std::string_view text) : rest_(text) {}
@@ -42,7 +42,7 @@ class Scanner {
     rest_.remove_prefix(1);
     return true;
   }
-  // Digits only; how many there were is in `count`.
+  // Digits only; sets `count` to the number of digits.
   std::optional<int> Number(std::size_t* count = nullptr) {
     const std::size_t digits =
         std::min(rest_.find_first_not_of("0123456789"), rest_.size());
@@ -90,7 +90,7 @@ std::string Lower(std::string_view text) {
   return lower;
 }
 
-// 1..12 of "Oct", in English as historians write it.
+// 1..12 for "Oct" etc., in English, which historians use.
 std::optional<int> MonthOf(std::string_view word) {
   constexpr std::string_view kMonths = "janfebmaraprmayjunjulaugsepoctnovdec";
   const std::size_t at = kMonths.find(Lower(word));
@@ -174,7 +174,7 @@ bool ScanClock(Scanner& in, CivilTime& time) {
     }
     time.fields.tm_hour = *hour % 12 + (half == "pm" ? 12 : 0);
   }
-  // A leap second has the number 60.
+  // A leap second has number 60.
   return time.fields.tm_hour <= 23 && *minute <= 59 && time.fields.tm_sec <= 60;
 }
 
@@ -228,7 +228,7 @@ bool IsDuration(std::string_view text) {
 }  // namespace
 
 std::string FormatTime(std::int64_t stamp_ns, bool utc) {
-  // 0 or more, also before 1970, where % would give a negative rest.
+  // Non-negative also before 1970, where % gives a negative remainder.
   const std::int64_t fraction =
       ((stamp_ns % kNsPerSecond) + kNsPerSecond) % kNsPerSecond;
   const std::time_t seconds =
@@ -297,7 +297,7 @@ void LocalClock::FindOffsets(const std::tm& fields) {
     std::tm trial = fields;
     trial.tm_isdst = summer;
     mktime(&trial);
-    // Else mktime() has moved it to what the clock did show.
+    // Otherwise mktime() changed it to a time that the clock did show.
     if (trial.tm_isdst == summer && trial.tm_hour == fields.tm_hour &&
         trial.tm_min == fields.tm_min) {
       offsets_s_.push_back(static_cast<int>(trial.tm_gmtoff));
@@ -346,10 +346,10 @@ std::int64_t ParseTime(std::string_view text, bool utc) {
   if (time->offset_s || utc) {
     seconds = timegm(&fields) - time->offset_s.value_or(0);
   } else {
-    fields.tm_isdst = -1;  // mktime() finds out whether it was summer time.
+    fields.tm_isdst = -1;  // mktime() determines daylight saving time.
     seconds = mktime(&fields);
   }
-  constexpr std::time_t kLimit = 9'223'372'000;  // int64 ns end in 2262.
+  constexpr std::time_t kLimit = 9'223'372'000;  // int64 ns overflow in 2262.
   if (seconds < -kLimit || seconds > kLimit) {
     RefuseTime(text);
   }
@@ -373,7 +373,7 @@ std::int64_t ParseDuration(std::string_view text) {
   if (std::regex_match(whole, plain)) {
     seconds = std::strtod(whole.c_str(), nullptr);
   } else {
-    // The parts must follow each other without a gap up to the end.
+    // The parts must be contiguous up to the end.
     std::string rest = whole;
     std::smatch found;
     while (std::regex_search(rest, found, part,

@@ -13,7 +13,7 @@
 
 namespace fdi::cli {
 
-// The file and, per table of it, the keys that were asked for.
+// The file and, for each of its tables, the keys that were read.
 struct TomlReader::Document {
   std::string name;
   toml::table root;
@@ -26,13 +26,13 @@ struct TomlReader::Place {
   const toml::table* table;
   std::string path;  // "fault." or empty.
 
-  // The value of `key`, which is known from now on; nullptr if it is absent.
+  // The value of `key`, which becomes known; nullptr if it is absent.
   const toml::node* Find(std::string_view key) const {
     document.known[table].emplace(key);
     return table->get(key);
   }
 
-  // The value of `key` as a T and nothing else; `expected` says what that is.
+  // The value of `key` as exactly a T; `expected` describes it.
   template <typename T>
   std::optional<T> Value(std::string_view key, const char* expected) const {
     const toml::node* node = Find(key);
@@ -46,7 +46,7 @@ struct TomlReader::Place {
     return value;
   }
 
-  // Calls take(element) for each element of a list, while it returns true.
+  // Calls take(element) for each element of a list while it returns true.
   template <typename F>
   void ForEach(std::string_view key, const std::string& expected,
                const F& take) const {
@@ -60,7 +60,7 @@ struct TomlReader::Place {
     }
   }
 
-  // The table `node` at `key` of this one. Its keys are unknown so far.
+  // The table `node` at `key`; none of its keys is known yet.
   std::unique_ptr<Place> Inner(const toml::node& node,
                                std::string_view key) const {
     document.known[node.as_table()];
@@ -226,8 +226,8 @@ void TomlReader::Refuse(std::string_view key, std::string_view message) const {
 }
 
 void TomlReader::Finish() const {
-  // A key that no getter has asked for is one that nobody knows: mostly it is
-  // mistyped, and ignoring it would run with the default instead.
+  // A key that no getter has read is unknown: usually it is mistyped, and
+  // ignoring it would silently use the default.
   for (const auto& [table, known] : document_->known) {
     for (const auto& [toml_key, node] : *table) {
       const std::string key(toml_key.str());

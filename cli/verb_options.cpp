@@ -27,7 +27,7 @@ std::int64_t TimeWindow::until_ns(const Context& context) const {
                        : ParseTimeOrAgo(until, context.options.utc, NowNs());
 }
 
-// Of the account, not of $USER, which anybody can set.
+// From the account, not from $USER, which anybody can set.
 std::string UserName() {
   const passwd* entry = getpwuid(geteuid());
   return entry != nullptr && entry->pw_name != nullptr ? entry->pw_name

@@ -17,16 +17,16 @@ struct TimeWindow {
   std::string until;
 
   void AddTo(CLI::App& verb);
-  /// The smallest number there is without --since. @throws ConfigError
+  /// The smallest int64 without --since. @throws ConfigError
   std::int64_t since_ns(const Context& context) const;
-  /// The largest number there is without --until. @throws ConfigError
+  /// The largest int64 without --until. @throws ConfigError
   std::int64_t until_ns(const Context& context) const;
 };
 
 /// The user who runs the program: the default of --by.
 std::string UserName();
 
-/// "fdi-store anna@host": where an entry was typed.
+/// "fdi-store anna@host": the origin of an operator action.
 std::string Origin(const std::string& program);
 
 }  // namespace fdi::cli

@@ -60,7 +60,7 @@ bool Coverage::Parked(const Sample& sample) {
   const ValidityRegion& region = models_->validity;
   const double cv = sample[Signal::kCv];
   const bool closed = cv >= 100.0 - kEndOfTravel;
-  // No flow through an open valve is a fault of it if there is pressure.
+  // With pressure across it, an open valve without flow is faulty.
   const bool driven =
       sample.Has(Signal::kP1) && sample.Has(Signal::kP2) &&
       sample[Signal::kP1] - sample[Signal::kP2] >= region.dp.minimum;
@@ -73,7 +73,7 @@ bool Coverage::Parked(const Sample& sample) {
   return at_end_ >= region.rearm_samples;
 }
 
-// What the process does with the valve.
+// Reasons that come from the operation of the process.
 CoverageReasons Coverage::Operation(const Sample& sample) {
   CoverageReasons reasons =
       If(sample.mode != ValveMode::kAuto, CoverageReason::kMode);

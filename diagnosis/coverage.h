@@ -11,53 +11,54 @@
 
 namespace fdi {
 
-/// Accumulators hold over an interruption of at most this: 10 min.
+/// Longest interruption after which accumulators are still valid: 10 min.
 inline constexpr std::int64_t kLongestInterruptionNs = 600'000'000'000;
 
-/// Decides whether a valve is where its model set was trained: it is ARMED or
-/// not, and judged only while it is.
+/// Decides whether a valve operates where its model set was trained. It is
+/// either ARMED, and judged, or not.
 ///
-/// It is disarmed by what the process does with it: another mode than AUTO, a
-/// command beyond the trained range, staying or stepping as never there, or
-/// being parked, at an end of its travel without flow. It is armed again after
-/// `rearm_samples` in a row without all that and with dP, T1, P1 and P2 as in
-/// normal operation: cold feedwater and rising pressure at a start-up are no
-/// broken thermometer. A new stream takes the settling samples only. Once the
-/// valve is armed, dP, T1, P1 and P2 alone never disarm it: they are judged.
-/// Those that were off while an episode was open do not keep it from being
-/// armed again.
+/// The process disarms it: by a mode other than AUTO, by a command outside the
+/// trained range, by a constant or stepping command as never seen in training,
+/// or by parking it, i.e. an end of travel without flow. It is armed again
+/// after `rearm_samples` in a row without any of these and with dP, T1, P1 and
+/// P2 as in normal operation: cold feedwater and rising pressure at a start-up
+/// do not mean a broken transmitter. A new stream only needs the settling
+/// samples. Once the valve is armed, dP, T1, P1 and P2 never disarm it, because
+/// they are judged themselves. Deviations of these during an open episode do
+/// not prevent re-arming.
 ///
-/// What disarms must come before the deviation: a valve that is abnormal, of a
-/// set with a floor, stays armed whatever its command does, for the fault moves
-/// the command; other modes alone disarm it.
+/// Disarming only works before a deviation: with a floor in the model set, an
+/// abnormal valve stays armed whatever its command does, because the fault
+/// moves the command; only other modes disarm it.
 class Coverage {
  public:
   /// `models` must outlive it.
   explicit Coverage(const ModelSet& models);
 
-  /// A new stream: nothing is known.
+  /// Begins a new stream, without any history.
   void Restart();
 
-  /// The observers were initialised at `stamp_ns`: they have to settle.
-  /// @returns true if what was known before still holds: the last sample is at
-  ///   most kLongestInterruptionNs older.
+  /// The observers were initialised at `stamp_ns` and have to settle. @returns
+  /// true if the earlier state is still valid, i.e. the last sample is at most
+  /// kLongestInterruptionNs older.
   bool Settle(std::int64_t stamp_ns);
 
-  /// kLive, kSettling, kInhibited or kUncovered.
-  /// @param found The floor finds something.
-  /// @param pending Some limit was passed at the last sample that was judged.
+  /// @returns kLive, kSettling, kInhibited or kUncovered.
+  /// @param found the floor has a finding.
+  /// @param pending a limit was exceeded at the last judged sample.
   Quality Judge(const Sample& sample, const ObserverBank& bank,
                 bool episode_open, bool found = false, bool pending = false);
 
   /// Why the last sample was not judged.
   CoverageReasons reasons() const { return reasons_; }
-  /// True at the sample that armed the valve.
+  /// True for the sample at which the valve became armed.
   bool armed_now() const { return armed_now_; }
-  /// True if the observers need no more samples to settle.
+  /// True if the observers have settled.
   bool settled() const { return settled_; }
 
   void Save(SnapshotWriter& writer) const;
-  /// @returns false, leaving it undefined, if there is nothing to be read.
+  /// @returns false, leaving the state undefined, if the snapshot is
+  ///   incomplete.
   bool Restore(SnapshotReader& reader);
 
  private:
@@ -65,7 +66,7 @@ class Coverage {
     Signal signal;
     CoverageReason reason;
     SignalRange range;
-    std::optional<int> channel;  // that holds it against its normal band
+    std::optional<int> channel;  // that compares it with its normal band
   };
 
   CoverageReasons Operation(const Sample& sample);
@@ -79,13 +80,13 @@ class Coverage {
   bool armed_{false};
   bool armed_now_{false};
   bool settled_{false};
-  int settling_{0};  // samples that the observers still need
-  int inside_{0};    // samples in a row
-  int needed_{0};    // of them
-  int at_end_{0};    // samples in a row at an end of the travel, no flow
+  int settling_{0};  // samples until the observers have settled
+  int inside_{0};    // consecutive samples inside
+  int needed_{0};    // required value of inside_
+  int at_end_{0};    // consecutive samples at an end of travel, no flow
   std::optional<double> last_cv_;
   double mean_cv_{0.0};
-  int averaged_{0};  // samples in mean_cv_, at most as many as it settles in
+  int averaged_{0};  // samples in mean_cv_, up to kCvMeanSettling
   std::optional<std::int64_t> last_stamp_ns_;
   CoverageReasons excused_{0};
   CoverageReasons reasons_{0};

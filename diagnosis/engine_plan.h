@@ -10,12 +10,12 @@
 
 namespace fdi {
 
-/// A model set made ready for engines: checked, and laid out as they read it.
-/// That takes some milliseconds, once for all valves of the set. Immutable; any
-/// number of threads.
+/// A model set prepared for engines: validated and laid out for evaluation.
+/// This takes some milliseconds, once for all valves of the set. Immutable and
+/// thread safe.
 class EnginePlan {
  public:
-  /// @throws DataError if `models` is not usable (Validate).
+  /// @throws DataError if `models` is invalid (Validate).
   explicit EnginePlan(std::shared_ptr<const ModelSet> models);
 
   const ModelSet& models() const { return *models_; }
@@ -36,9 +36,9 @@ class EnginePlan {
   std::shared_ptr<const FaultPlan> faults_;
 };
 
-/// What engines of one model set share: its plan, and the place where they put
-/// what observers say about a sample. It serves one engine after the other, so
-/// that it stays in the cache: engines that share it belong to one thread.
+/// Shared by the engines of one model set: its plan, and a buffer for the
+/// outputs of the observers for one sample. Engines use the buffer one after
+/// the other, which keeps it in the cache; so they must belong to one thread.
 struct EngineParts {
   /// @throws DataError as EnginePlan.
   explicit EngineParts(std::shared_ptr<const ModelSet> models);
@@ -50,12 +50,13 @@ struct EngineParts {
   InstructionSet instructions{BestInstructionSet()};  ///< Same bits with any.
 };
 
-/// The parts in use, one per model set, for a thread that runs many engines.
+/// Cache of the parts in use, one per model set, for a thread that runs many
+/// engines.
 ///
-/// One thread at a time: that of the engines.
+/// Used by the thread of the engines only.
 class EnginePlans {
  public:
-  /// The parts of this very object, made unless some engine still has them.
+  /// The parts for this object, created unless an engine still uses them.
   /// @throws DataError as EnginePlan.
   EngineParts For(const std::shared_ptr<const ModelSet>& models);
 

@@ -7,7 +7,7 @@
 namespace fdi {
 namespace {
 
-constexpr int kLargestSet = 4;  // that is a name
+constexpr int kLargestSet = 4;  // more faults than this are no diagnosis
 
 int CountOf(double fraction, int samples) {
   return static_cast<int>(std::ceil(fraction * samples - 1e-9));
@@ -60,8 +60,8 @@ FaultSet IsolationWindow::Supported() const {
 namespace {
 
 constexpr double kMeanShare = 0.3;        // of the threshold
-constexpr double kExcitationShare = 0.5;  // of that at the detection
-// Samples of CV that tell how much it varies.
+constexpr double kExcitationShare = 0.5;  // of the deviation at the detection
+// Samples over which the variation of CV is measured.
 constexpr int kFewestCommands = 60;
 constexpr int kMostCommands = 200;
 
@@ -162,7 +162,7 @@ bool ClearingWindow::Cleared() const {
 
 namespace {
 
-// A transmitter that is stuck needs no observer to be told by.
+// A stuck transmitter is certain, so observers are not needed.
 void KnowStuck(FaultSet stuck, Verdict& verdict) {
   verdict.normal_factor = 0.0;
   for (std::size_t i = 0; i < verdict.fault_factors.size(); ++i) {
@@ -265,7 +265,7 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
   Emit(TransitionKind::kDetected, detection_stamp_ns_, verdict);
 }
 
-// The factors of what the floor finds, beside those of the faults.
+// Sets the factors of the floor's findings beside those of the faults.
 void Episode::Tell(const Findings& findings, Verdict& verdict) const {
   const std::size_t first = models_->faults.size() - Floor::kTests;
   for (std::size_t i = 0; floor_names_ != 0 && i < Floor::kTests; ++i) {
@@ -275,7 +275,7 @@ void Episode::Tell(const Findings& findings, Verdict& verdict) const {
   }
 }
 
-// What the floor finds is the name of an episode until a fault is named.
+// The findings of the floor name the episode until a fault is isolated.
 void Episode::NameFloor(Verdict& verdict) {
   const bool named = (verdict.isolated & ~floor_names_) != 0;
   if (isolation_held_ || named || (floor_ & ~verdict.isolated) == 0) {
@@ -323,7 +323,7 @@ void Episode::Isolate(Verdict& verdict) {
     return;
   }
   supported = WithGroups(supported, verdict);
-  // So many say nothing: they are candidates, and the episode is unknown.
+  // A set this large is no diagnosis: its faults remain candidates.
   if (models_->floor && std::popcount(supported) > kLargestSet) {
     supported = floor_;
   }
@@ -339,7 +339,7 @@ void Episode::Isolate(Verdict& verdict) {
     }
     return;
   }
-  // Another set has to hold for a while before it replaces this one.
+  // A different set must persist before it replaces the isolated one.
   contender_run_ = supported == contender_ ? contender_run_ + 1 : 1;
   contender_ = supported;
   if (supported != verdict.isolated &&
@@ -350,11 +350,11 @@ void Episode::Isolate(Verdict& verdict) {
   }
 }
 
-// Nothing that is known explains what goes on if no factor reached T/2 in the
-// last t_k samples, and there were twice as many to find one.
+// The episode is outside all known faults if no factor reached T/2 in the last
+// t_k samples and its age exceeds twice that.
 void Episode::JudgeUnknown(Verdict& verdict) {
   const DecisionParameters& decision = models_->decision;
-  // What is normal again needs no fault.
+  // A valve that looks normal again needs no fault as explanation.
   const bool explained =
       verdict.normal_factor >= decision.isolation_threshold ||
       FactorsFrom(0.5 * decision.isolation_threshold, verdict) != 0;

@@ -17,10 +17,9 @@
 namespace fdi {
 
 /// Counts over the last t_k samples of an open episode which faults had a
-/// factor of at least T. Faults that had it in at least the isolation fraction
-/// of them support a set; those that had it in at least the join fraction join
-/// it, so that noise on the factor of one fault does not leave its neighbour
-/// alone.
+/// factor of at least T. Faults with this in at least the isolation fraction of
+/// the samples support a set; those with at least the join fraction are added
+/// to it, so that noise on one factor does not exclude a neighbouring fault.
 class IsolationWindow {
  public:
   /// @param faults number of faults in the model set.
@@ -29,7 +28,7 @@ class IsolationWindow {
   void Restart();
   void Push(FaultSet above_threshold);
 
-  /// The set that the window supports; empty until t_k samples are in it.
+  /// The supported set; empty until the window is full.
   FaultSet Supported() const;
 
  private:
@@ -39,10 +38,10 @@ class IsolationWindow {
   int filled_{0};
   int next_{0};
   std::vector<FaultSet> ring_;
-  std::vector<int> counts_;  // by bit of a fault
+  std::vector<int> counts_;  // by fault bit
 };
 
-/// The commands of the last samples.
+/// The commands of the most recent samples.
 class CommandHistory {
  public:
   explicit CommandHistory(int length)
@@ -50,9 +49,9 @@ class CommandHistory {
 
   void Push(double cv);
 
-  /// Standard deviation of CV, 0 without samples [%].
+  /// Standard deviation of CV [%]; 0 without samples.
   double deviation() const;
-  /// Largest less smallest CV [%].
+  /// Maximum minus minimum of CV [%].
   double range() const;
 
  private:
@@ -61,25 +60,25 @@ class CommandHistory {
   std::size_t next_{0};
 };
 
-/// Decides when a valve with an open episode is normal again: over the last
-/// t_c samples no residual beyond its threshold, d_0 ≥ T in at least the
-/// isolation fraction of them, and the mean residual within 0.3 thresholds,
-/// so that a fault that hovers below the threshold does not clear.
+/// Decides when a valve with an open episode is normal again: over the last t_c
+/// samples no residual beyond its threshold, d_0 ≥ T in at least the isolation
+/// fraction of them, and every mean residual within 0.3 thresholds, so that a
+/// fault just below the threshold does not clear.
 ///
-/// A valve that stands still is not healthy, it is silent: CV must vary at
-/// least half as much as it did when the fault was detected, or have covered
-/// as wide a range since the last residual beyond a threshold.
+/// A valve that stands still is not proven healthy: CV must vary at least half
+/// as much as at the detection, or have covered as wide a range since the last
+/// residual beyond a threshold.
 class ClearingWindow {
  public:
   explicit ClearingWindow(const ModelSet& models);
 
-  /// Takes the command of every sample that is judged, episode or not.
+  /// Takes the command of every judged sample, with or without an episode.
   void Observe(double cv);
 
-  /// A detection.
+  /// Call at a detection.
   void Restart();
 
-  /// @param residuals of the normal observer, one per channel; NaN abstains.
+  /// @param residuals of the normal observer by channel; NaN abstains.
   void Push(std::span<const double> residuals, double normal_factor,
             bool abnormal);
 
@@ -95,7 +94,7 @@ class ClearingWindow {
 
   const ModelSet* models_;
   CommandHistory commands_;
-  double deviation_then_{0.0};  // of CV at the detection
+  double deviation_then_{0.0};  // standard deviation of CV at the detection
   double range_then_{0.0};
   double lowest_{0.0};  // CV since the last abnormal sample
   double highest_{0.0};
@@ -108,37 +107,37 @@ class ClearingWindow {
   std::array<double, kMaxChannels> sums_{};
 };
 
-/// What was found in one sample.
+/// Findings in one sample.
 struct Findings {
-  std::optional<std::int64_t> detected;  ///< Stamp of a detection.
-  bool abnormal{false};  ///< Something is beyond its threshold right now.
-  FaultSet stuck{0};     ///< Faults of transmitters that are stuck: certain.
-  FaultSet floor{0};     ///< What the floor finds, by size.
-  std::array<double, Floor::kTests> sizes{};  ///< Of its findings, in order.
-  bool settled{true};                         ///< The observers may be asked.
+  std::optional<std::int64_t> detected;  ///< Stamp of a new detection.
+  bool abnormal{false};                  ///< Some limit is exceeded at present.
+  FaultSet stuck{0};  ///< Faults of stuck transmitters: certain.
+  FaultSet floor{0};  ///< Findings of the floor.
+  std::array<double, Floor::kTests> sizes{};  ///< Their sizes.
+  bool settled{true};                         ///< The observers have settled.
 };
 
 /// The episode of a valve from its detection to its end: which faults explain
-/// it, equation (6), and when it is over. State, set and transitions stand in
-/// the verdict that every call is given; its factors must have been scored.
+/// it, equation (6), and when it ends. State, set and transitions are kept in
+/// the verdict passed to every call, whose factors must have been scored.
 class Episode {
  public:
   explicit Episode(std::shared_ptr<const FaultPlan> plan);
 
-  /// Instant factors of the observers.
+  /// Sets the instantaneous factors from the observers.
   void Score(const ObserverBank& bank, Verdict& verdict) const;
 
-  /// A sample that is judged: opens, continues or clears the episode.
+  /// A judged sample: opens, continues or clears the episode.
   void Step(const Sample& sample, const ObserverBank& bank,
             const Findings& findings, Verdict& verdict);
 
-  /// A sample that is not: an open episode waits, with the evidence so far.
+  /// A sample that is not judged: an open episode keeps its evidence.
   void Hold(Verdict& verdict) const;
 
   /// Ends an open episode from outside. @returns its kClosed transition.
   Transition Close(EndReason reason, std::int64_t stamp_ns, Verdict& verdict);
 
-  /// While held, the set of an episode stays empty.
+  /// While held, no fault is isolated.
   void HoldIsolation(bool hold) { isolation_held_ = hold; }
 
  private:
@@ -155,17 +154,17 @@ class Episode {
             EndReason reason = EndReason::kNone) const;
 
   const ModelSet* models_;
-  FaultSet floor_names_;  // of the faults
+  FaultSet floor_names_;  // bits of the findings
   FaultBank faults_;
   IsolationWindow isolation_;
   ClearingWindow clearing_;
   bool isolation_held_{false};
   std::int64_t detection_stamp_ns_{0};
-  FaultSet floor_{0};      // found in this episode
-  bool begun_{false};      // to gather evidence
+  FaultSet floor_{0};      // findings during this episode
+  bool begun_{false};      // gathering of evidence has begun
   int age_{0};             // samples since the detection
-  int without_fault_{0};   // since some factor was T/2
-  FaultSet contender_{0};  // another set than the isolated one
+  int without_fault_{0};   // samples since some factor reached T/2
+  FaultSet contender_{0};  // candidate to replace the isolated set
   int contender_run_{0};
 };
 

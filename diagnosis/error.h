@@ -6,8 +6,8 @@
 
 namespace fdi {
 
-/// What came from outside cannot be used: a file, a row, a stored model.
-/// what() names the source, the place and the accepted range. Exit code 3.
+/// External data cannot be used: a file, a row, a stored model. what() names
+/// the source, the place and the accepted range. Exit code 3.
 class DataError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -26,7 +26,8 @@ class ConfigError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Guards a public entry. @throws std::invalid_argument if `condition` fails.
+/// Checks a precondition. @throws std::invalid_argument if `condition` is
+/// false.
 inline void Require(bool condition, std::string_view message) {
   if (!condition) {
     throw std::invalid_argument(std::string(message));

@@ -12,7 +12,7 @@ namespace fdi {
 /// the last bit between machines with and without fused multiply-add.
 namespace exponential {
 
-/// exp(t) is taken as 0 below this, far above the subnormal numbers.
+/// exp(t) is 0 below this, which is far above the subnormal range.
 inline constexpr double kLowest = -700.0;
 inline constexpr double kLog2E = 1.4426950408889634;
 inline constexpr double kLn2High = 6.93147180369123816490e-01;

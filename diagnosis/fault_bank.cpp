@@ -7,8 +7,8 @@
 namespace fdi {
 namespace {
 
-// What is refuted stays refuted for a while, but not for longer the more often
-// it was: evidence falls behind the best by this many supports at most.
+// A refuted fault stays refuted for a while, but for no longer the more often
+// it was refuted: evidence lags behind the best by at most this many supports.
 constexpr double kMemoryOfContradiction = 4.0;
 
 }  // namespace

@@ -16,26 +16,26 @@ namespace fdi {
 ///     d_f = min( max(γ_observers, γ_tracker), μ_L(L_best − L_f) ),
 ///
 /// μ_L falling from 1 to 0 between the evidence core and support. Normal
-/// operation competes alike with d_0. A fault that no reading since the
-/// detection could have refuted has d_f = T/2 at most: it is a candidate, and
-/// not named for want of evidence.
+/// operation competes in the same way with d_0. A fault that no reading since
+/// the detection could have refuted has at most d_f = T/2: it is a candidate,
+/// but absence of contrary evidence does not isolate it.
 class FaultBank {
  public:
   explicit FaultBank(std::shared_ptr<const FaultPlan> plan);
-  /// With a plan of its own. `models` must be valid and outlive the bank.
+  /// Makes its own plan. `models` must be valid and outlive the bank.
   explicit FaultBank(const ModelSet& models);
 
-  /// Instant factors of all observers and faults from the residuals in `bank`.
+  /// Instantaneous factors of all observers and faults from `bank`'s residuals.
   void Score(const ObserverBank& bank, Verdict& verdict) const;
 
-  /// A detection: evidence and strengths begin anew.
+  /// Resets evidence and strengths at a detection.
   void Restart();
 
-  /// Follows strengths and evidence with the residuals of one more sample of
-  /// an open episode.
+  /// Updates strengths and evidence with the residuals of one more sample of an
+  /// open episode.
   void Follow(const ObserverBank& bank);
 
-  /// Lets the evidence so far act on the factors scored by Score().
+  /// Applies the evidence so far to the factors set by Score().
   void Compete(Verdict& verdict) const;
 
  private:

@@ -101,7 +101,7 @@ std::string DidYouMeanFault(std::string_view name,
                             std::vector<std::string> others) {
   const std::string lower = Lower(name);
   if (NumberAfter(lower, "f") || NumberAfter(lower, "paper")) {
-    return "";  // Well written, but there is no such number.
+    return "";  // Well-formed, but there is no such number.
   }
   for (const int fault : kFaultsAndFindings) {
     others.push_back(FaultName(fault));

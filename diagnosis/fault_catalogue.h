@@ -12,16 +12,16 @@
 namespace fdi {
 
 struct FaultFacts {
-  std::string_view name;         ///< "f1"; "t1", "p1", "p2" of transmitters.
+  std::string_view name;         ///< "f1"; "t1", "p1", "p2" for transmitters.
   std::string_view description;  ///< "valve clogging".
   std::string_view paper_name;   ///< "F1".."F5", or empty.
   bool is_signed;                ///< Strength in [-1, 1], else in [0, 1].
-  /// The signal whose transmitter is at fault.
+  /// The signal of the faulty transmitter.
   std::optional<Signal> transmitter{};
 };
 
-/// All faults. The number of one is its place, from 1 on. Models, databases and
-/// messages hold these numbers: a new one comes last.
+/// All faults, numbered by position from 1 on. Models, databases and messages
+/// contain these numbers, so new faults are appended.
 inline constexpr FaultFacts kFaultCatalogue[] = {
     {"f1", "valve clogging", "F1", false},
     {"f2", "plug or seat sedimentation", "", false},
@@ -47,8 +47,9 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
     {"p2", "outlet pressure transmitter fault", "", true, Signal::kP2},
 };
 
-/// What the floor finds (diagnosis/floor.h): readings that cannot be, whatever
-/// the cause. Their numbers begin at kFirstFinding, so that faults can join.
+/// Findings of the floor (diagnosis/floor.h): implausible readings, whatever
+/// the cause. Their numbers begin at kFirstFinding, to leave room for more
+/// faults.
 inline constexpr FaultFacts kFindingCatalogue[] = {
     {"travel_deviation", "rod does not follow the command", "", true},
     {"shut_flow", "flow with the valve shut", "", false},
@@ -59,9 +60,9 @@ inline constexpr FaultFacts kFindingCatalogue[] = {
 
 /// The actuator faults of the DAMADICS benchmark are 1..kFaultCount.
 inline constexpr int kFaultCount = 19;
-/// All faults, which the simulator knows, are 1..kLastFault.
+/// All faults, also known to the simulator, are 1..kLastFault.
 inline constexpr int kLastFault = static_cast<int>(std::size(kFaultCatalogue));
-/// What the floor finds is kFirstFinding..kLastFinding.
+/// The findings of the floor are kFirstFinding..kLastFinding.
 inline constexpr int kFirstFinding = 201;
 inline constexpr int kLastFinding =
     kFirstFinding + static_cast<int>(std::size(kFindingCatalogue)) - 1;
@@ -103,24 +104,24 @@ bool Contains(const std::vector<int>& faults, int fault);
 /// The names of all faults, for messages and help: "f1..f19, t1, p1, p2".
 extern const std::string kFaultNames;
 
-/// @throws std::invalid_argument if `fault` is neither fault nor finding.
+/// @throws std::invalid_argument if `fault` is neither a fault nor a finding.
 const FaultFacts& FaultFactsOf(int fault);
 
 /// "f19", "t1"; "normal" for 0; "unknown" for anything else.
 std::string FaultName(int fault);
 
-/// The fault called `name`, in any case: one of kFaultNames, or paper1..paper5
+/// Parses a fault name, ignoring case: one of kFaultNames, or paper1..paper5
 /// for the five faults of [Mendonça et al., 2009] (f1 f3 f6 f7 f19).
 std::optional<int> ParseFault(std::string_view name);
 
-/// As ParseFault(), and what the floor finds.
+/// As ParseFault(), also accepting findings of the floor.
 std::optional<int> ParseFinding(std::string_view name);
 
-/// The signal whose transmitter is at fault, if it is such a fault.
+/// The signal of the faulty transmitter, for transmitter faults.
 std::optional<Signal> TransmitterOf(int fault);
 
-/// For messages: " (did you mean 'f19'?)", or "" if `name` is not nearly the
-/// name of a fault or one of `others`.
+/// For messages: " (did you mean 'f19'?)", or "" if `name` is not close to the
+/// name of a fault or to one of `others`.
 std::string DidYouMeanFault(std::string_view name,
                             std::vector<std::string> others = {});
 

@@ -6,8 +6,8 @@
 namespace fdi {
 namespace {
 
-// A fault may be this much weaker or stronger than those trained, and this
-// much if there is but one observer to tell what strength does.
+// Reach beyond the trained strengths, as factors; less with a single observer,
+// which cannot show what strength does.
 constexpr double kReachBelow = 0.5;
 constexpr double kReachAbove = 1.5;
 constexpr double kLoneReachBelow = 0.75;
@@ -54,7 +54,7 @@ void AddNode(const ObserverPlan& plan, std::size_t index, StrengthPath& path) {
   }
 }
 
-// κ between the last node but one and the last.
+// Appends κ for the segment that ends at the last node.
 void AddErrors(const ModelSet& models, StrengthPath& path) {
   const Observer& high = models.observers[path.nodes.back().observer];
   const std::size_t before = path.nodes[path.nodes.size() - 2].observer;

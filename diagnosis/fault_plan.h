@@ -9,20 +9,20 @@
 
 namespace fdi {
 
-/// Strengths tried at the start of an episode, evenly over the reach.
+/// Number of strengths tried at the start of an episode, evenly spaced.
 inline constexpr int kStrengthCells = 33;
 
-/// A place between two nodes of a StrengthPath.
+/// A position between two nodes of a StrengthPath.
 struct PathPlace {
-  std::size_t segment{0};  ///< Between node `segment` and the next.
-  std::size_t nearest{0};  ///< Node.
-  double high_share{0.0};  ///< Of the stronger node, in [0, 1].
-  double from_low{0.0};    ///< Strength less that of the weaker node.
+  std::size_t segment{0};  ///< Between nodes `segment` and `segment` + 1.
+  std::size_t nearest{0};  ///< Index of the nearer node.
+  double high_share{0.0};  ///< Weight of the stronger node, in [0, 1].
+  double from_low{0.0};    ///< Strength minus that of the weaker node.
   double from_nearest{0.0};
 };
 
-/// The observers of one fault in one direction by rising |strength|, the normal
-/// one before them at 0: what a StrengthTracker moves along.
+/// The observers of one fault in one direction by increasing |strength|,
+/// preceded by the normal one at 0: the path that a StrengthTracker follows.
 struct StrengthPath {
   struct Node {
     std::size_t observer;
@@ -40,7 +40,7 @@ struct StrengthPath {
 
   std::size_t fault_index{0};
   double sign{1.0};
-  double lowest{0.0};  ///< Reach of |s|.
+  double lowest{0.0};  ///< Range of |s|.
   double highest{0.0};
   std::vector<Node> nodes;
   std::vector<Point> points;                   ///< By node and channel.
@@ -49,7 +49,7 @@ struct StrengthPath {
   std::array<PathPlace, kStrengthCells> places{};
 };
 
-/// What FaultBank needs of a model set: made once, shared by all valves.
+/// FaultBank's data derived from a model set; shared by all valves.
 class FaultPlan {
  public:
   explicit FaultPlan(std::shared_ptr<const ObserverPlan> observers);
@@ -58,13 +58,13 @@ class FaultPlan {
   const ModelSet& models() const { return observers_->models(); }
   /// One per fault and direction.
   const std::vector<StrengthPath>& paths() const { return paths_; }
-  /// Fault index of an observer, of any but the normal one.
+  /// Fault index of an observer other than the normal one.
   std::size_t fault_index(std::size_t observer) const {
     return fault_indices_[observer];
   }
-  /// τ_c: the median correlation time of the residuals of a channel over the
-  /// observers, times the channels of the same output: they share its noise,
-  /// and what one of them says the others repeat [samples].
+  /// τ_c: the median correlation time of a channel's residuals over the
+  /// observers, times the number of channels with the same output: these share
+  /// its noise and repeat each other's evidence [samples].
   double channel_time(std::size_t channel) const {
     return channel_times_[channel];
   }
@@ -79,7 +79,7 @@ class FaultPlan {
   std::vector<StrengthPath> paths_;
 };
 
-/// The path of `observers`, indices of one fault and direction by rising
+/// The path of `observers`: indices of one fault and direction by increasing
 /// |strength|, at least one.
 StrengthPath MakeStrengthPath(const ObserverPlan& plan,
                               const std::vector<std::size_t>& observers);

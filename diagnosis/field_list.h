@@ -1,13 +1,13 @@
 #pragma once
 
-/// One list of the fields of a record, for everything that treats them alike:
+/// Applies a macro to each field of a single list:
 ///
 ///     FDI_FOR_EACH(MACRO, sd, correlation)    is    MACRO(sd)
 ///     MACRO(correlation)
 ///
-/// The preprocessor expands no macro within itself. FDI_FOR_EACH_STEP therefore
-/// leaves the name of its next step unexpanded, and FDI_EXPAND reads the result
-/// again, 64 times: so many fields fit.
+/// The preprocessor does not expand a macro within itself. FDI_FOR_EACH_STEP
+/// therefore leaves the name of its next step unexpanded, and FDI_EXPAND
+/// rescans the result 64 times, which limits the number of fields.
 #define FDI_FOR_EACH(MACRO, ...) \
   __VA_OPT__(FDI_EXPAND(FDI_FOR_EACH_STEP(MACRO, __VA_ARGS__)))
 #define FDI_FOR_EACH_STEP(MACRO, FIRST, ...) \

@@ -11,9 +11,9 @@ namespace {
 
 constexpr double kShut = 98.0;       // of CV and X [%]
 constexpr double kStop = 2.0;        // from an end of the travel [%]
-constexpr int kBreakaway = 5;        // samples that a rod may rest
-constexpr int kStuckSamples = 10;    // of the position; twice as many of F
-constexpr double kFlowBorder = 0.9;  // of the largest flow: no saturation
+constexpr int kBreakaway = 5;        // samples that a rod may stay at rest
+constexpr int kStuckSamples = 10;    // for the position; twice as many for F
+constexpr double kFlowBorder = 0.9;  // of the largest flow: not saturated
 
 }  // namespace
 
@@ -106,7 +106,8 @@ void Floor::Count(int finding, bool beyond, double size, int needed,
   test.found = test.length >= needed;
 }
 
-// A reading that repeats while what it should follow goes further than `most`.
+// Finds a reading that repeats while its expected value moves by more than
+// `most`.
 void Floor::Watch(int finding, double reading, Expectations expected,
                   double most, bool counts, const Sample& sample,
                   Repeat& repeat) {
@@ -131,14 +132,15 @@ void Floor::Watch(int finding, double reading, Expectations expected,
 void Floor::PushTravel(const Sample& sample) {
   const double x = sample[Signal::kX];
   const double deviation = rod_->Beyond(x);
-  // The sides count apart: noise that is beyond both limits in turn is neither.
+  // Each side counts separately: noise beyond both limits in turn is no
+  // finding.
   Test& test = tests_[0];
   if (test.length > 0 && std::signbit(test.size) != std::signbit(deviation)) {
     test.length = 0;
   }
   Count(kTravelDeviation, std::abs(deviation) > limits_->deviation,
         0.01 * deviation, limits_->deviation_samples, sample.stamp_ns);
-  // Neither stop moves, whatever the command does beyond it.
+  // At a stop the rod does not move, whatever the command.
   const auto within = [](double at) {
     return std::clamp(at, kStop, 100.0 - kStop);
   };

@@ -9,13 +9,13 @@
 
 namespace fdi {
 
-/// Where the rod is a sample later, under `command` [%].
+/// Rod position one sample later, for a constant `command` [%].
 double Follow(const FloorLimits::Rod& rod, double x, double command);
 
-/// The positions that the rod of a healthy valve may have: those of the
-/// quickest and the slowest answer, x ← x + min(s |u − x|, v) sign(u − x), and
-/// all between. Before it leaves a stop, and at the start, the slowest waits:
-/// a chamber has to be filled or emptied first.
+/// The range of positions that the rod of a healthy valve may have, between
+/// those of the quickest and the slowest response, x ← x + min(s |u − x|, v)
+/// sign(u − x). Before leaving a stop, and at the start, the slowest waits
+/// because a chamber has to be filled or vented first.
 class RodBand {
  public:
   /// `limits` must outlive it.
@@ -26,7 +26,7 @@ class RodBand {
 
   double quick() const { return quick_; }
   double slow() const { return slow_; }
-  /// By how much `x` is outside [%], positive above.
+  /// Distance of `x` from the range [%], positive above.
   double Beyond(double x) const;
 
  private:
@@ -34,56 +34,56 @@ class RodBand {
   std::array<double, kMaxLag> commands_{};
   double quick_{0.0};
   double slow_{0.0};
-  int wait_{0};  // samples that the slow rod still rests
+  int wait_{0};  // samples for which the slow rod stays at rest
   bool resting_{true};
 };
 
 /// F(X, P1 − P2) of the floor; `dp` may be negative.
 double FlowAt(const FloorLimits& floor, double x, double dp);
 
-/// The limits that never sleep (FloorLimits): they hold in AUTO at every
-/// command, within the trained region and outside, from the first sample on.
+/// Wide limits that always apply in AUTO (FloorLimits): at every command,
+/// inside and outside the trained region, from the first sample on.
 ///
-///     travel_deviation  X is none of the positions that the rod may have
+///     travel_deviation  X is outside the range that the rod may have
 ///     shut_flow         F > m F_high although CV and X are shut
 ///     excess_flow       F > c F(X − deviation/2, P1 − P2) + m F_high
 ///     x_stuck           X repeats, to the bit, while the rod should travel
 ///     f_stuck           F likewise, while F(X, P1 − P2) changes
 ///
-/// They tell that something is wrong, not what: names of their own, until a
-/// fault is named.
+/// They show that something is wrong, but not what: they name an episode until
+/// a fault is isolated.
 class Floor {
  public:
   /// `models` must outlive it.
   explicit Floor(const ModelSet& models);
 
-  /// Nothing is known: the rod is where the next reading says.
+  /// Clears all state: the rod is assumed where the next reading is.
   void Restart();
 
-  /// Takes every accepted sample. Other modes than AUTO restart it; UNCERTAIN
+  /// Takes every accepted sample. Modes other than AUTO restart it; UNCERTAIN
   /// readings are not tested.
   void Push(const Sample& sample);
 
-  /// What is found right now; never anything without a floor.
+  /// The current findings; always empty without a floor.
   FaultSet findings() const { return findings_; }
-  /// Stamp of the first sample of the earliest of its runs.
+  /// Stamp of the first sample of the earliest current finding.
   std::optional<std::int64_t> stamp_ns() const;
-  /// By how much a finding is beyond its model, in shares of the span, signed.
+  /// How far a finding is from its model, as a signed share of the span.
   double size(std::size_t finding) const { return tests_[finding].size; }
-  /// Fault index of its first finding; the others follow.
+  /// Fault index of the first finding; the others follow.
   std::size_t first() const { return first_; }
   static constexpr std::size_t kTests = 5;
 
  private:
-  struct Test {  // a run of samples beyond a limit
+  struct Test {  // consecutive samples beyond a limit
     int length{0};
     std::int64_t since_ns{0};
     double size{0.0};
     bool found{false};
   };
-  /// Two accounts of what a reading should follow.
+  /// Two estimates of the expected value of a reading.
   using Expectations = std::array<double, 2>;
-  struct Repeat {  // a run of samples with one reading
+  struct Repeat {  // consecutive samples with the same reading
     double reading{0.0};
     std::int64_t since_ns{0};
     int length{0};

@@ -49,10 +49,11 @@ SourceOrder::Placement SourceOrder::Place(const Sample& sample) {
         sample.seq == last_seq_ ? Intake::kRepeat : Intake::kLate;
     return placement;
   }
-  // Consecutive samples that keep another distance come from a publisher with
-  // another period; a distance that a lost sample explains is a gap.
+  // Consecutive samples with a different, constant interval come from a
+  // publisher with another period; an interval explained by lost samples is a
+  // gap.
   if (has_stamp_) {
-    // Two of them may lie 400 years apart: in nanoseconds that is too much.
+    // Stamps up to 400 years apart would overflow in nanoseconds.
     const std::int64_t interval =
         std::clamp(sample.stamp_ns - last_stamp_ns_, -kFarNs, kFarNs);
     const bool consecutive = sample.seq == last_seq_ + 1;

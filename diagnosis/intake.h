@@ -10,9 +10,9 @@
 
 namespace fdi {
 
-/// Keeps the order of one valve's samples: per source by seq, between sources
-/// the newest wins, and their distance in time by the sample period. A stamp
-/// that steps back under a seq that goes on is a gap, and the sample accepted.
+/// Orders one valve's samples: within a source by seq, between sources the
+/// newest wins, and their intervals are checked against the sample period. If
+/// the stamp steps back while seq continues, the sample is accepted as a gap.
 class SourceOrder {
  public:
   explicit SourceOrder(double sample_period_s);
@@ -20,7 +20,7 @@ class SourceOrder {
   struct Placement {
     Intake intake{Intake::kAccepted};
     bool new_source{false};
-    bool gap{false};  ///< Not one period after the last accepted sample.
+    bool gap{false};  ///< Not one period after the last accepted one.
   };
 
   Placement Place(const Sample& sample);
@@ -30,7 +30,7 @@ class SourceOrder {
  private:
   bool Superseded(std::uint64_t source_id) const;
 
-  static constexpr int kRemembered = 8;  // sources that spoke before
+  static constexpr int kRemembered = 8;  // number of earlier sources remembered
   static constexpr int kPeriodStrikes = 3;
 
   std::int64_t period_ns_;
@@ -39,17 +39,16 @@ class SourceOrder {
   std::int64_t last_stamp_ns_{0};
   bool has_source_{false};
   bool has_stamp_{false};
-  int off_period_{0};  // intervals in a row that were not one period
-  std::int64_t off_interval_ns_{0};  // Their distance.
+  int off_period_{0};  // consecutive intervals that were not one period
+  std::int64_t off_interval_ns_{0};  // Length of the last one.
   std::array<std::uint64_t, kRemembered> superseded_{};
   int superseded_count_{0};
 };
 
-/// Finds transmitters of T1, P1 and P2 that repeat one reading, to the bit, for
-/// longer than they ever did in normal operation (StuckLimits). No observer
-/// sees that: the reading is a normal one. What is UNCERTAIN is no reading.
-/// Signals whose transmitter fault is not among those of the model set are not
-/// watched.
+/// Detects transmitters of T1, P1 and P2 that repeat one reading, to the bit,
+/// for longer than ever in normal operation (StuckLimits). Observers cannot see
+/// that, because the reading itself is normal. UNCERTAIN readings are ignored.
+/// Signals whose transmitter fault is not in the model set are not watched.
 class StuckReadings {
  public:
   /// `models` must outlive it.
@@ -57,12 +56,12 @@ class StuckReadings {
 
   void Restart();
 
-  /// Takes every sample that reaches the observers.
+  /// Takes every sample that is passed to the observers.
   void Push(const Sample& sample);
 
-  /// The faults of the transmitters that are stuck now.
+  /// Transmitter faults of the signals that are stuck at present.
   FaultSet faults() const { return faults_; }
-  /// Stamp of the first sample beyond a limit, while one is stuck.
+  /// Stamp of the first sample beyond the limit, while one is stuck.
   std::optional<std::int64_t> stamp_ns() const;
 
  private:

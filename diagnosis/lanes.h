@@ -1,6 +1,6 @@
 #pragma once
 
-// No vector is passed to a function that is not inlined.
+// Vectors are never passed to functions that are not inlined.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 #include <cstddef>
@@ -13,11 +13,12 @@
 
 #define FDI_INLINE [[gnu::always_inline]] inline
 
-/// Arithmetic on a Quad, always inlined: compiled for whatever instructions the
-/// function has that uses it. Every lane has the bits of the scalar operation.
+/// Arithmetic on a Quad. Always inlined, so that it is compiled for the
+/// instruction set of the calling function. Every lane has the same bits as the
+/// scalar operation.
 namespace fdi::lanes {
 
-/// In one register, as AVX2 has it.
+/// In one AVX2 register.
 using Wide = double __attribute__((vector_size(32)));
 using WideMask = decltype(Wide{} < Wide{});
 

@@ -7,8 +7,8 @@ namespace fdi {
 
 enum class LogLevel { kDebug, kInfo, kWarning, kError };
 
-/// Where adapters send their lines, each `event key=value ...`. Called from any
-/// thread. Programs own the logger behind it; an empty sink drops the line.
+/// Receives the log lines of adapters, each `event key=value ...`. Called from
+/// any thread. Programs own the logger behind it; an empty sink drops lines.
 using LogSink = std::function<void(LogLevel, std::string_view)>;
 
 }  // namespace fdi

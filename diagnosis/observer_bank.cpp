@@ -49,7 +49,7 @@ void ObserverBank::Initialise(const Sample& sample) {
   }
 }
 
-// As the fits do (BuildRegression), over the last hundred readings or so.
+// Same rule as in fitting (BuildRegression), over about the last 100 readings.
 bool ObserverBank::IsMeasured(std::size_t channel) {
   if (state_.active[channel] == 0) {
     return false;

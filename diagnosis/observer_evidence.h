@@ -8,26 +8,25 @@
 
 namespace fdi {
 
-/// The evidence for one explanation, L = Σ_c L_c, gathered by channel so that
-/// each forgets for itself: a channel at its transmitter's limit, or without
-/// measured signals, says next to nothing, and what it said before is held
-/// until it speaks again,
+/// The evidence for one explanation, L = Σ_c L_c, with separate memory per
+/// channel: a channel at its transmitter's limit, or without measured signals,
+/// has little information, and its evidence is held until it has more,
 ///
 ///     L_c ← λ L_c + gain,   λ = 1 meanwhile.
 ///
 /// Here for every observer at the strength that it was trained for, with the
-/// gain −½ (r²/S + ln S)/τ_c of its residual r of variance S.
+/// gain −½ (r²/S + ln S)/τ_c for its residual r of variance S.
 class ObserverEvidence {
  public:
   explicit ObserverEvidence(std::shared_ptr<const FaultPlan> plan);
 
   void Clear();
 
-  /// Takes the residuals of one sample.
+  /// Adds the residuals of one sample.
   void Gather(const ObserverBank& bank);
 
-  /// Lifts every sum to `least` if it is below, in the channel that speaks most
-  /// against.
+  /// Raises every sum to at least `least`, in the channel with the strongest
+  /// contrary evidence.
   void RaiseTo(double least);
 
   double total(std::size_t observer) const { return totals_[observer]; }

@@ -41,6 +41,8 @@ FDI_INLINE void Score(const ObserverPlan& plan, const ObserverState& state,
     const Lanes extrapolation = Load<Lanes>(outputs.extrapolations[b]);
     Lanes certain = residual;
     if (Any(extrapolation != All<Lanes>(0.0))) {
+      // The error e of extrapolation widens the membership:
+      // r / sqrt(1 + (e / sd)²).
       const Lanes uncertain =
           kExtrapolationError * extrapolation / Load<Lanes>(block.sd);
       certain = residual / lanes::ByLane(1.0 + uncertain * uncertain,

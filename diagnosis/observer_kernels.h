@@ -10,7 +10,7 @@
 
 namespace fdi {
 
-/// What observers say about one sample, in blocks as in the plan.
+/// Outputs of the observers for one sample, in the blocks of the plan.
 struct ObserverOutputs {
   explicit ObserverOutputs(const ObserverPlan& plan);
 
@@ -21,7 +21,7 @@ struct ObserverOutputs {
   std::vector<Quad> extrapolations;
 };
 
-/// What the observers of one valve remember, and where they put what they say.
+/// State of one valve's observers, and the buffer for their outputs.
 struct ObserverState {
   ObserverState(const ObserverPlan& plan,
                 std::shared_ptr<ObserverOutputs> place);
@@ -30,7 +30,7 @@ struct ObserverState {
     return static_cast<std::size_t>((head + depth - lag) % depth);
   }
 
-  int depth;  ///< Of the rings.
+  int depth;  ///< Length of the rings.
   int head{0};
   std::vector<std::array<double, kSignalCount>> measured;  ///< A ring.
   std::vector<SignalMask> uncertain;                       ///< A ring.
@@ -39,21 +39,21 @@ struct ObserverState {
   std::shared_ptr<ObserverOutputs> outputs;
 };
 
-/// The instructions that the kernels below are compiled for. The bits of the
-/// results are the same with all of them.
+/// The instruction set of the kernels below. The results have the same bits
+/// with all of them.
 enum class InstructionSet { kPortable, kAvx2 };
 
-/// The best one that this processor has.
+/// The best one that this processor supports.
 InstructionSet BestInstructionSet();
 
-/// How evidence is gathered on one channel; see ObserverEvidence.
+/// Parameters of evidence on one channel; see ObserverEvidence.
 struct GainTerms {
   double memory;       ///< λ
   double time;         ///< τ_c [samples].
-  bool counts_spread;  ///< False where the reading has no density.
+  bool counts_spread;  ///< False where the reading has no density (saturated).
 };
 
-/// Outliers r²/S count up to this in evidence.
+/// Upper bound of r²/S in evidence, against outliers.
 inline constexpr double kMostSurprise = 25.0;
 
 /// Loops over observers, four at a time.
@@ -62,13 +62,13 @@ struct ObserverKernels {
   /// newest row of measurements.
   void (*predict)(const ObserverPlan& plan, ObserverState& state);
 
-  /// μ of the residuals of blocks [first, last), less what extrapolation may
-  /// have put there; kAbstains where the residual is NaN. memberships[0] is
-  /// that of the first block.
+  /// μ of the residuals of blocks [first, last), after subtracting possible
+  /// extrapolation errors; kAbstains where the residual is NaN. memberships[0]
+  /// belongs to the first block.
   void (*score)(const ObserverPlan& plan, const ObserverState& state,
                 std::size_t first, std::size_t last, double* memberships);
 
-  /// L_c ← λ L_c − ½ (r²/S + ln S)/τ_c for all observers of a channel; without
+  /// L_c ← λ L_c − ½ (r²/S + ln S)/τ_c for all observers of a channel, without
   /// the gain where the residual is NaN.
   /// @param parts L_c, by block of the plan.
   void (*gather)(const ObserverPlan& plan, const ObserverState& state,

@@ -11,12 +11,12 @@ namespace fdi {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-// So many observers with the same antecedents are worth weighing rules once.
+// Minimum number of observers for which sharing rule weights pays off.
 constexpr std::size_t kFewestShared = 8;
 
-// A rule in each lane; none where there are fewer.
+// One rule per lane; null where there are fewer.
 using LaneRules = std::array<const TsRule*, kLanes>;
-// A model likewise.
+// One model per lane; likewise.
 using LaneModels = std::array<const TsModel*, kLanes>;
 
 Quad ByLane(const std::function<double(std::size_t)>& number) {
@@ -52,7 +52,7 @@ void AddSets(const LaneRules& rules, std::size_t regressors,
   premise.set_count = group.sets.size() - premise.first_set;
 }
 
-// Entries beyond those of a rule are 0 and add nothing.
+// Padding entries are 0 and have no effect.
 void AddNearness(const LaneRules& rules, ObserverGroup& group,
                  QuadPremise& premise) {
   premise.first_nearness = group.nearness.size();
@@ -96,7 +96,7 @@ void AddConsequent(const LaneRules& rules, ObserverGroup& group) {
   }
 }
 
-// Rule r of each model, where it has so many.
+// Rule r of each model; null where there are fewer.
 LaneRules RulesAt(const LaneModels& models, std::size_t r) {
   LaneRules rules{};
   for (std::size_t i = 0; i < kLanes; ++i) {
@@ -117,7 +117,7 @@ void AddRange(const LaneModels& models, ObserverGroup& group) {
   }
 }
 
-// The rules of `model`, four by four, serve all observers of the group.
+// The rules of `model`, in blocks of four, for all observers of the group.
 void AddSharedPremises(const TsModel& model, ObserverGroup& group) {
   for (std::size_t r = 0; r < model.rules.size(); r += kLanes) {
     LaneRules rules{};
@@ -158,7 +158,7 @@ bool SameRegressors(const TsModel& a, const TsModel& b) {
   return a.regressors == b.regressors && a.parallel == b.parallel;
 }
 
-// Those that are `alike` go together, in the order of the first of each.
+// Groups items that are `alike`, in order of first occurrence.
 template <typename Alike>
 std::vector<std::vector<std::size_t>> Sorted(
     const std::vector<std::size_t>& observers, const Alike& alike) {
@@ -200,7 +200,7 @@ ObserverPlan::ObserverPlan(const ModelSet& models)
   first_blocks_.push_back(blocks_.size());
 }
 
-// Groups of differences come last: they need the normal prediction.
+// Difference groups come last, because they need the normal prediction.
 void ObserverPlan::AddChannel(std::size_t channel) {
   const auto model = [&](std::size_t o) -> const TsModel& {
     return At(o, channel).model;

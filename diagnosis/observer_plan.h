@@ -9,8 +9,8 @@
 
 namespace fdi {
 
-/// Numbers of four observers, or of four rules, side by side: what one vector
-/// instruction takes.
+/// Numbers of four observers, or of four rules, side by side, for one vector
+/// instruction.
 struct alignas(32) Quad {
   std::array<double, 4> lane{};
 };
@@ -24,27 +24,27 @@ struct QuadSet {
   Quad right_width;
 };
 
-/// Where the exponents of four lanes come from. Sets that are 1 everywhere in
-/// all of them are left out.
+/// The inputs to the exponents of four lanes. Sets that are 1 everywhere in all
+/// lanes are omitted.
 struct QuadPremise {
   Quad start;  ///< 0; −∞ in a lane without a rule.
-  Quad least;  ///< Lower bound of the sum.
+  Quad least;  ///< Lower bound of the exponent.
   std::size_t first_set{0};
   std::size_t set_count{0};
   std::size_t first_nearness{0};  ///< v, then the rows of L.
   std::size_t nearness_rows{0};
 };
 
-/// A regressor as it is read.
+/// Where a regressor is read from.
 struct RegressorSource {
-  bool own{false};  ///< Of the model's own predictions, not the readings.
+  bool own{false};  ///< From the model's predictions, not the readings.
   std::size_t signal{0};
   int lag{0};
 };
 
-/// Observers of one channel with the same regressors. They are evaluated four
-/// at a time; with the same antecedents, too, their rules are weighed once,
-/// four rules at a time.
+/// Observers of one channel with the same regressors, evaluated four at a time.
+/// If they also have the same antecedents, their rules are weighted once for
+/// all, four rules at a time.
 struct ObserverGroup {
   std::size_t channel{0};
   bool difference{false};
@@ -53,7 +53,7 @@ struct ObserverGroup {
   std::size_t first_block{0};
   std::size_t blocks{0};
   bool runs_on_itself{false};
-  std::size_t own_block{0};  ///< First of the own past, if it runs on itself.
+  std::size_t own_block{0};  ///< First of its own past, if it runs on itself.
   /// Rules of each block of observers; the same in all if shared.
   std::vector<std::size_t> rules;
   std::vector<std::size_t> first_premise;     ///< By block; 0 if shared.
@@ -68,7 +68,7 @@ struct ObserverGroup {
   std::vector<Quad> maximum;
 };
 
-/// Numbers of four observers of one channel that stand side by side in a block.
+/// Parameters of four observers of one channel, side by side in a block.
 struct ObserverBlock {
   Quad output_min;
   Quad output_max;
@@ -84,9 +84,9 @@ struct ObserverBlock {
   Quad log_variance;
 };
 
-/// What ObserverBank needs of a model set, in the order in which it is read:
-/// made once, shared by all valves. Every observer and channel has a slot; the
-/// slots of a group stand side by side in blocks of four.
+/// ObserverBank's data derived from a model set, in order of access; shared by
+/// all valves. Every observer and channel has a slot; the slots of a group are
+/// contiguous in blocks of four.
 class ObserverPlan {
  public:
   /// `models` must be valid and outlive the plan.
@@ -98,14 +98,14 @@ class ObserverPlan {
   /// Longest lag + 1.
   int depth() const { return depth_; }
   std::size_t own_blocks() const { return own_blocks_; }
-  /// First block of channel c; of one beyond the last, the number of blocks.
+  /// First block of channel c; for c one past the last, the number of blocks.
   std::size_t first_block(std::size_t c) const { return first_blocks_[c]; }
   std::size_t slot(std::size_t observer, std::size_t channel) const {
     return slots_[observer * channels_ + channel];
   }
-  /// True if the slots of channel c are in the order of the observers.
+  /// True if the slots of channel c have the same order as the observers.
   bool in_order(std::size_t c) const { return in_order_[c] != 0; }
-  /// What some observer needs for channel c, its output included.
+  /// The signals needed for channel c, including its output.
   SignalMask signals(std::size_t c) const { return signals_[c]; }
 
  private:

@@ -12,7 +12,7 @@
 
 namespace fdi::lanes {
 
-// A rule of less than 4e-18 of the strongest adds nothing to a double.
+// A rule below 4e-18 of the strongest does not change a double sum.
 inline constexpr double kFiringExponent = -40.0;
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -64,7 +64,7 @@ struct Prediction {
     return Max(Load<Lanes>(premise.least), exponent);
   }
 
-  // exp(t) of the rules that fire, 0 of the others.
+  // exp(t) for the rules that fire, 0 for the others.
   FDI_INLINE static Lanes Weight(const Lanes& exponent, const Lanes& largest) {
     const Lanes t = exponent - largest;
     const auto fires = t > All<Lanes>(kFiringExponent);
@@ -114,7 +114,7 @@ struct Prediction {
                  Load<Lanes>(limits.output_max));
   }
 
-  // The rules of a shared premise that fire.
+  // The firing rules of a shared premise.
   struct Firing {
     std::size_t count{0};
     std::array<std::size_t, kMaxRules> rules;
@@ -153,7 +153,7 @@ struct Prediction {
     }
   }
 
-  // ŷ of four observers from the weights of the premise that they share.
+  // ŷ of four observers from the weights of their shared premise.
   FDI_INLINE static Lanes Blend(const ObserverGroup& group, std::size_t block,
                                 const ObserverBlock& limits,
                                 const Firing& firing, const Regressors& x) {
@@ -168,12 +168,12 @@ struct Prediction {
                  Load<Lanes>(limits.output_max));
   }
 
-  // What the predictions of a group have in common.
+  // Shared by the predictions of a group.
   struct Common {
     const ObserverPlan& plan;
     double reading;
-    double base;                // Normal prediction under a difference, or 0.
-    double base_extrapolation;  // Of that.
+    double base;                // Normal prediction below a difference, or 0.
+    double base_extrapolation;  // Extrapolation of `base`.
   };
 
   static Common CommonOf(const ObserverPlan& plan, const ObserverState& state,
@@ -188,8 +188,8 @@ struct Prediction {
             of_normal(state.outputs->extrapolations)};
   }
 
-  // Keeps what four observers say: their own part of the prediction, and that
-  // with all regressors within the trained range.
+  // Stores the outputs of four observers: their own part of the prediction, and
+  // the same with all regressors clamped to the trained range.
   FDI_INLINE static void Keep(const Common& common, const Lanes& own,
                               const Lanes& inside, std::size_t block,
                               ObserverState& state) {
@@ -219,7 +219,7 @@ struct Prediction {
     return All<Lanes>(state.measured[row][source.signal]);
   }
 
-  // Values of `x` kept within the trained range; true if some were not.
+  // Clamps `x` to the trained range; returns whether any value changed.
   FDI_INLINE static bool Beyond(const Quad* minimum, const Quad* maximum,
                                 std::size_t count, const Regressors& x,
                                 Regressors& inside) {

@@ -7,9 +7,9 @@
 
 namespace fdi {
 
-/// Bytes of `text` from `place` on that are one letter of a terminal: 1 to 4 of
-/// UTF-8. 0 for a control character (C0, DEL, C1, which move the cursor or
-/// command the terminal) and for what is not UTF-8.
+/// Length of the printable UTF-8 character of `text` at `place`, 1 to 4 bytes.
+/// 0 for a control character (C0, DEL, C1, which control the terminal) and for
+/// invalid UTF-8.
 inline std::size_t LetterSize(std::string_view text, std::size_t place) {
   const auto byte = [&](std::size_t i) {
     return place + i < text.size()
@@ -45,9 +45,9 @@ inline bool IsPrintable(std::string_view text) {
   return true;
 }
 
-/// The one rule for texts from outside that reach a terminal or a log: a byte
-/// that is no part of a letter is written as \xNN.
-/// @param kept control characters that stay as they are, e.g. "\n".
+/// Sanitises external text for a terminal or a log: bytes that are not part of
+/// a printable character are written as \xNN.
+/// @param kept control characters that are kept, e.g. "\n".
 inline std::string Printable(std::string_view text,
                              std::string_view kept = "") {
   std::string result;
@@ -66,8 +66,8 @@ inline std::string Printable(std::string_view text,
   return result;
 }
 
-/// A value of a log line, `key=VALUE`, by the same rule: in quotes if a script
-/// that splits at blanks would not see where it ends.
+/// The value of a log field, `key=VALUE`, sanitised in the same way, and quoted
+/// if a script that splits at blanks would misread it.
 inline std::string LogValue(std::string_view value) {
   if (!value.empty() && value.find_first_of(" \"=") == std::string_view::npos) {
     return Printable(value);

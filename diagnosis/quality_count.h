@@ -11,8 +11,8 @@ namespace fdi {
 inline constexpr std::size_t kQualityCount =
     static_cast<std::size_t>(Quality::kUnassigned) + 1;
 
-/// Samples by quality: the time that a valve was judged, and why it was not.
-/// Times the sample period, seconds.
+/// Samples by quality; times the sample period, this is the time for which a
+/// valve was judged or not, and why.
 class QualityCount {
  public:
   void Add(Quality quality, std::uint64_t samples = 1) {
@@ -31,7 +31,8 @@ class QualityCount {
   std::array<std::uint64_t, kQualityCount> samples_{};
 };
 
-/// Whether `verdict` counts: repeated, late and superseded samples do not.
+/// Whether `verdict` counts as time: repeated, late and superseded samples do
+/// not.
 inline bool CountsAsTime(const Verdict& verdict) {
   return !OutOfOrder(verdict.intake);
 }

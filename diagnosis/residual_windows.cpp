@@ -7,7 +7,7 @@ namespace fdi {
 namespace {
 
 constexpr double kLeastVariance = 1e-24;
-constexpr double kMostActivity = 4.0;  // times that of the training
+constexpr double kMostActivity = 4.0;  // as a multiple of that in training
 
 }  // namespace
 

@@ -8,14 +8,14 @@
 
 namespace fdi {
 
-/// Mean and energy of residuals over windows of exponential memory. With the
-/// n-th value, gain g = max(1/n, 1/N), so that a window grows until its length
-/// N is reached,
+/// Mean and energy of residuals over windows with exponential memory. For the
+/// n-th value the gain is g = max(1/n, 1/N), so that a window grows until it
+/// reaches its length N,
 ///
 ///     v ← (1 − g) (v + g (r − m)²),   m ← m + g (r − m);
 ///
-/// the energy is ½ log v. Small and slow faults show there long before single
-/// residuals pass a threshold.
+/// the energy is ½ log v. Small and slow faults show here long before single
+/// residuals exceed a threshold.
 class ResidualWindow {
  public:
   explicit ResidualWindow(int length) : length_(length) {}
@@ -28,7 +28,7 @@ class ResidualWindow {
   double log_rms() const;
 
   void Save(SnapshotWriter& writer) const;
-  /// @returns false if there is no window of this length to be read.
+  /// @returns false if the snapshot has no window of this length.
   bool Restore(SnapshotReader& reader);
 
  private:
@@ -38,30 +38,30 @@ class ResidualWindow {
   double variance_{0.0};
 };
 
-/// The limit on the energy of a window while `command`, the window of CV over
-/// the same samples, is as active as it is; see WindowLimits. The activity
-/// counts up to four times that of the training.
+/// The limit on the energy of a window, given the activity of `command`, the
+/// window of CV over the same samples; see WindowLimits. The activity is capped
+/// at four times that of training.
 double UpperLogRms(const WindowLimits& limits, const ResidualWindow& command);
 
-/// True if the limits hold for a window: it is full, and the mean of CV over it
-/// is one that they were fitted to. Without CV they always hold.
+/// Whether the limits apply to a window: it is full, and its mean of CV is in
+/// the range that they were fitted to. Without CV they always apply.
 bool Applies(const WindowLimits& limits, const ResidualWindow& window,
              const ResidualWindow& command);
 
-/// True if limits that apply are passed.
+/// Whether limits that apply are exceeded.
 bool IsBeyond(const WindowLimits& limits, const ResidualWindow& window,
               const ResidualWindow& command);
 
-/// The windows of all channels of a model set, each with that of CV over the
-/// same samples.
+/// The windows of all channels of a model set, each with the window of CV over
+/// the same samples.
 class ResidualWindows {
  public:
   explicit ResidualWindows(const ModelSet& models);
 
   void Restart();
 
-  /// @param residuals of the normal observer, one per channel; NaN abstains.
-  /// @param cv NaN without the signal: no limit is raised.
+  /// @param residuals of the normal observer by channel; NaN abstains.
+  /// @param cv NaN without the signal: limits are not raised.
   void Push(std::span<const double> residuals, double cv);
 
   void Save(SnapshotWriter& writer) const;

@@ -12,8 +12,8 @@ struct SignalFacts {
   SignalRange range;
 };
 
-// Ranges: twice the usual transmitter span of a feedwater valve, so that a
-// saturated reading passes and a broken one does not.
+// Ranges are twice the usual transmitter span of a feedwater valve, so that a
+// saturated reading passes but a broken one does not.
 constexpr std::array<SignalFacts, kSignalCount> kFacts{{
     {"CV", "%", {-10.0, 110.0}},
     {"P1", "kPa", {-100.0, 8000.0}},

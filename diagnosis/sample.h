@@ -39,7 +39,7 @@ constexpr SignalMask MaskOf(Signal signal) {
 /// CV, P1, P2, T1, X and F: the basic measurements of the benchmark.
 inline constexpr SignalMask kBasicSignals = 0x3F;
 
-/// What a transmitter can read: values beyond it never reach an observer.
+/// Plausible readings of a transmitter: others never reach an observer.
 struct SignalRange {
   double minimum;
   double maximum;
@@ -53,7 +53,7 @@ struct SignalRange {
 std::string_view SignalName(Signal signal);
 /// "%", "kPa", "degC"; for kF the unit of the flow, see FlowUnitName().
 std::string_view SignalUnit(Signal signal);
-/// The signal called `name`, in any case.
+/// Parses a signal name, ignoring case.
 std::optional<Signal> ParseSignal(std::string_view name);
 /// The physically possible readings of `signal`, for both flow units.
 SignalRange PlausibleRange(Signal signal);
@@ -70,7 +70,7 @@ enum class ValveMode : std::uint8_t {
 
 /// "AUTO", "MANUAL", "INHIBITED", "OUT_OF_SERVICE" or "CALIBRATING".
 std::string_view ValveModeName(ValveMode mode);
-/// The mode called `name`, in any case.
+/// Parses a mode, ignoring case.
 std::optional<ValveMode> ParseValveMode(std::string_view name);
 /// All names, for messages and help.
 inline constexpr std::string_view kValveModeNames =
@@ -96,8 +96,8 @@ struct Sample {
 
   double operator[](Signal signal) const { return values[Index(signal)]; }
   bool Has(Signal signal) const { return (present & MaskOf(signal)) != 0; }
-  /// The signals whose values are guesses, such as those drawn between two
-  /// readings: quality UNCERTAIN.
+  /// The signals whose values are estimates, such as interpolated readings:
+  /// quality UNCERTAIN.
   SignalMask uncertain() const {
     SignalMask mask = 0;
     for (std::size_t i = 0; i < kSignalCount; ++i) {
@@ -113,13 +113,13 @@ struct Sample {
   }
 };
 
-/// The truth beside a simulated or labelled sample; never seen by an engine.
+/// The truth of a simulated or labelled sample; never seen by an engine.
 struct FaultTruth {
   int fault{0};          ///< 1..22, 0 = none acting.
-  double strength{0.0};  ///< Signed; 0 while the fault does not act.
+  double strength{0.0};  ///< Signed; 0 while the fault is inactive.
 };
 
-/// A sample and its truth, where it is known.
+/// A sample with its truth, if known.
 struct LabelledSample {
   Sample sample;
   std::optional<FaultTruth> truth;

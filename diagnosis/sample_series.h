@@ -6,7 +6,7 @@
 
 namespace fdi {
 
-/// Which way a position or command counts; here all are in % of closing.
+/// Direction of a position or command; internally all are in % of closing.
 enum class Sense { kClosing, kOpening };
 
 /// Consecutive samples, one sample period apart.

@@ -34,12 +34,12 @@ class SnapshotWriter {
   std::vector<std::byte> bytes_;
 };
 
-/// Reads them back in the same order; never beyond the end.
+/// Reads the numbers back in the same order, with bounds checks.
 class SnapshotReader {
  public:
   explicit SnapshotReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
 
-  /// @returns false if fewer bytes are left.
+  /// @returns false if too few bytes are left.
   template <SnapshotNumber... T>
   bool Get(T&... values) {
     return (Take(&values, sizeof values) && ...);

@@ -6,17 +6,17 @@
 namespace fdi {
 namespace {
 
-constexpr int kSearchSamples = 40;  // for so many samples strengths are tried
+constexpr int kSearchSamples = 40;  // initial samples with a grid search
 // A fault rarely develops faster than to full strength in 10 minutes.
 constexpr double kRateDeviation = 1.0 / 1500.0;
-// What a fault does to a channel counts from this share of the deviation on.
+// An effect on a channel counts from this share of the deviation on.
 constexpr double kLeastEffect = 0.25;
 
 double Lane(const std::vector<Quad>& quads, std::size_t slot) {
   return quads[slot / kLanes].lane[slot % kLanes];
 }
 
-// Of a residual under its own condition, and of what is extrapolated.
+// Variance of a residual under its own condition, including extrapolation.
 double Variance(const ObserverBank& bank, const StrengthPath::Point& point) {
   const double extrapolated =
       kExtrapolationError *
@@ -80,7 +80,7 @@ double StrengthTracker::Sum(const double* parts) const {
   return total;
 }
 
-// −½ (ν²/S + ln S)/τ of one channel.
+// The evidence −½ (ν²/S + ln S)/τ of one channel.
 double StrengthTracker::Gain(const ObserverBank& bank, std::size_t channel,
                              double residual, double variance) const {
   const double distance =
@@ -137,9 +137,10 @@ void StrengthTracker::Step(const ObserverBank& bank) {
   UpdateFactor(bank);
 }
 
-// True if a reading tells this fault from normal operation: some observer of it
-// predicts another one, unless the limit of the transmitter hides both. A
-// reading at the limit that normal operation does not explain is a test passed.
+// True if a reading can distinguish this fault from normal operation: one of
+// its observers makes a different prediction, unless the transmitter's limit
+// hides both. A reading at the limit that normal operation does not explain
+// counts as a test passed.
 bool StrengthTracker::CouldBeRefuted(const ObserverBank& bank) const {
   for (std::size_t c = 0; c < channels_; ++c) {
     const int channel = static_cast<int>(c);
@@ -159,8 +160,8 @@ bool StrengthTracker::CouldBeRefuted(const ObserverBank& bank) const {
   return false;
 }
 
-// Most evidence over a grid of constant strengths: the filter is only locally
-// right, and a fault without effect at small strengths has no slope there.
+// The best of a grid of constant strengths: the filter is only valid locally,
+// and a fault without effect at small strengths has no slope there.
 void StrengthTracker::Search(const ObserverBank& bank) {
   for (std::size_t c = 0; c < channels_; ++c) {
     if (bank.active(static_cast<int>(c))) {
@@ -203,7 +204,7 @@ void StrengthTracker::SearchChannel(const ObserverBank& bank,
 
 void StrengthTracker::Follow(const ObserverBank& bank) {
   const double memory = plan_->memory();
-  // Prediction: s ← s + ṡ; the old information fades by λ.
+  // Prediction step: s ← s + ṡ; old information fades by λ.
   strength_ += rate_;
   var_strength_ = (var_strength_ + 2.0 * covariance_ + var_rate_) / memory;
   covariance_ = (covariance_ + var_rate_) / memory;
@@ -238,7 +239,8 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
   }
 }
 
-// Correction of the filter by one channel; outliers pull with a bounded force.
+// Correction step of the filter for one channel; outliers have bounded
+// influence.
 void StrengthTracker::Correct(const Prediction& prediction, double strength,
                               double spread) {
   const double residual = prediction.residual;
@@ -256,8 +258,8 @@ void StrengthTracker::Correct(const Prediction& prediction, double strength,
   var_strength_ -= gain_s * slope * var_strength_;
 }
 
-// A strength that the residuals say nothing of stays within [0, 1] all the
-// same.
+// Bounds a strength on which the residuals have no information to [0, 1] in
+// standard deviation.
 void StrengthTracker::KeepBounded() {
   var_strength_ = std::clamp(var_strength_, 0.0, 1.0);
   var_rate_ = std::max(var_rate_, 0.0);

@@ -9,7 +9,7 @@
 
 namespace fdi {
 
-/// Follows how strong one fault would have to be, in one direction, to explain
+/// Tracks how strong one fault would have to be, in one direction, to explain
 /// the samples since a detection, and how well it then explains them.
 ///
 /// Between the observers of the fault, at strengths s_1 < s_2 < ..., and the
@@ -17,44 +17,45 @@ namespace fdi {
 ///
 ///     ŷ(s) = ŷ_j + (ŷ_{j+1} − ŷ_j) (s − s_j) / (s_{j+1} − s_j),
 ///
-/// with a variance that grows with what interpolation errs by there. s is
-/// followed with its rate by a Kalman filter of fading memory over all active
-/// channels, so that a developing fault is met at every strength, not at the
-/// trained ones only. The innovations ν of variance S give the evidence
+/// with a variance that includes the interpolation error. A Kalman filter with
+/// fading memory tracks s and its rate over all active channels, so that a
+/// developing fault matches at every strength, not only at the trained ones.
+/// The innovations ν of variance S give the evidence
 ///
 ///     L ← λ L − ½ Σ_c (ν²/S + ln S) / τ_c,
 ///
-/// τ_c (FaultPlan) the same for all faults: log-likelihoods of faults differ
-/// long before single residuals do. A reading at the transmitter's limit has no
-/// density: it costs ν²/S of a prediction below the limit, and nothing of one
-/// beyond; what the channel said before is held. Each observer gathers evidence
-/// of its own strength alike (ObserverEvidence); the fault has that of the
-/// best, so that no interpolation can spoil a strength that was trained.
+/// with τ_c (FaultPlan) common to all faults: log-likelihoods differ long
+/// before single residuals do. A reading at the transmitter's limit has no
+/// density: it costs ν²/S if the prediction is below the limit, and nothing if
+/// it is beyond; earlier evidence of the channel is held. Each observer gathers
+/// evidence for its own strength in the same way (ObserverEvidence); the fault
+/// has that of the best, so that interpolation cannot degrade a trained
+/// strength.
 class StrengthTracker {
  public:
   /// `plan` and `path` must outlive the tracker.
   StrengthTracker(const FaultPlan& plan, const StrengthPath& path);
 
-  /// Begins anew at a detection.
+  /// Restarts at a detection.
   void Restart();
 
-  /// Takes the residuals of one sample.
+  /// Adds the residuals of one sample.
   void Step(const ObserverBank& bank);
 
-  /// Lifts the evidence to `least` if it is below.
+  /// Raises the evidence to at least `least`.
   void RaiseEvidence(double least);
 
-  /// Of the best explanation, followed or trained.
+  /// For the best explanation, tracked or trained.
   double strength(const ObserverEvidence& trained) const;
   double evidence(const ObserverEvidence& trained) const;
 
   /// True once a reading since the detection could have refuted the fault: on a
   /// channel where it differs from normal operation and the transmitter's limit
-  /// does not hide both. A fault that is not yet refutable is not named.
+  /// does not hide both. A fault that is not yet refutable is not isolated.
   bool refutable() const { return refutable_; }
 
   /// Smallest membership over the active channels of the residual at the
-  /// followed strength.
+  /// tracked strength.
   double factor() const { return factor_; }
 
   const StrengthPath& path() const { return *path_; }

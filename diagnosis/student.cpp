@@ -6,8 +6,8 @@
 
 namespace fdi {
 
-// By bisection of the distribution, F(t) = 1 − I_x(ν/2, 1/2)/2 integrated
-// numerically: Simpson's rule over θ of t = sqrt(ν) tan θ.
+// Bisection of the distribution, F(t) = 1 − I_x(ν/2, 1/2)/2, integrated
+// numerically by Simpson's rule over θ, t = sqrt(ν) tan θ.
 double StudentQuantile(double p, double freedom) {
   Require(p > 0.0 && p < 1.0 && freedom >= 1.0,
           "Student's t needs 0 < p < 1 and at least one degree of freedom");

@@ -6,7 +6,8 @@
 namespace fdi {
 namespace {
 
-// Optimal string alignment distance: insert, delete, change, swap neighbours.
+// Optimal string alignment distance: insertions, deletions, substitutions and
+// transpositions of neighbours.
 std::size_t Distance(const std::string& a, const std::string& b) {
   std::vector<std::vector<std::size_t>> d(
       a.size() + 1, std::vector<std::size_t>(b.size() + 1));

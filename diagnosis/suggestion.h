@@ -7,7 +7,7 @@
 namespace fdi {
 
 /// The candidate that `word` was probably meant to be: at most a third of its
-/// letters (one at least) changed, added, left out or swapped with a neighbour.
+/// letters (at least one) changed, added, omitted or transposed.
 std::optional<std::string> Suggest(const std::string& word,
                                    const std::vector<std::string>& candidates);
 

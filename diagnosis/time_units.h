@@ -4,7 +4,7 @@
 
 namespace fdi {
 
-// Of stamps and spans, which are integers.
+// For integer stamps and durations.
 inline constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 inline constexpr std::int64_t kNsPerMinute = 60 * kNsPerSecond;
 inline constexpr std::int64_t kNsPerHour = 60 * kNsPerMinute;

@@ -16,7 +16,7 @@ namespace {
 
 // A rule fires if its exponent is above log(1e-8).
 constexpr double kCoveredExponent = -18.420680743952367;
-// A rule of less than 4e-18 of the strongest adds nothing to a double.
+// A rule below 4e-18 of the strongest does not change a double sum.
 constexpr double kFiringExponent = -40.0;
 
 // log μ(x) of one set; an infinite width gives 0 on its side.
@@ -49,7 +49,7 @@ double Exponent(const TsRule& rule, const double* x) {
   for (std::size_t j = 0; j < rule.antecedents.size(); ++j) {
     exponent += LogMembership(rule.antecedents[j], x[j]);
   }
-  // In this order a distance beyond all numbers is the farthest, too.
+  // In this order infinite and NaN distances also count as the farthest.
   return std::max(kFarthestExponent, exponent);
 }
 
@@ -72,7 +72,7 @@ bool SamePremise(const TsRule& a, const TsRule& b) {
          a.center == b.center && a.metric == b.metric;
 }
 
-// Throws the DataErrors of Validate() with the place in front.
+// Throws the DataErrors of Validate(), prefixed with the place.
 class Checker {
  public:
   explicit Checker(std::string where) : where_(std::move(where)) {}
@@ -163,6 +163,8 @@ void ValidateRule(const TsRule& rule, std::size_t n, const Checker& checker) {
 
 }  // namespace
 
+// prediction_kernel.h computes the same in the same order, bit for bit: change
+// both together.
 void Weigh(const TsModel& model, const double* x, FiringRules& firing) {
   std::array<double, kMaxRules> exponents;
   const std::size_t count =

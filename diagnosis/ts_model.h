@@ -8,7 +8,7 @@
 
 namespace fdi {
 
-/// Keeps the difference of two exponents a number however far x is.
+/// Keeps differences of exponents finite however far x is.
 inline constexpr double kFarthestExponent = -1e300;
 
 inline constexpr int kMaxLag = 16;
@@ -39,9 +39,10 @@ struct Regressor {
 
 /// R_i: if x_1 is A_i1 and ... and x is near v_i then y_i = a_iᵀx + b_i.
 ///
-/// The sets are the projections of a cluster on each regressor. Its distance
-/// in the product space tells the rule apart where clusters lie oblique: a rule
-/// with a center has sets that are 1 everywhere, other rules have no center.
+/// The sets are the projections of a cluster on each regressor. For oblique
+/// clusters, the distance in the product space distinguishes the rules instead:
+/// a rule with a center has sets that are 1 everywhere; other rules have no
+/// center.
 struct TsRule {
   std::vector<FuzzySet> antecedents;  ///< One per regressor.
   std::vector<double> slopes;         ///< a_i, one per regressor.
@@ -59,29 +60,30 @@ struct TsRule {
 ///     β_i = Π_j μ_Aij(x_j) · exp(−½ ‖L_i (x − v_i)‖²).
 ///
 /// In a parallel model a regressor on the output itself (lag ≥ 1) reads the
-/// model's own past predictions, otherwise the measured past.
+/// model's own past predictions instead of the measured past.
 struct TsModel {
   Signal output{Signal::kX};
   bool parallel{true};
   std::vector<Regressor> regressors;
   std::vector<double> regressor_min;  ///< Range of the training data, one
   std::vector<double> regressor_max;  ///< per regressor.
-  double output_min{0.0};             ///< Predictions are kept within
+  double output_min{0.0};             ///< Predictions are clamped to
   double output_max{0.0};             ///< [output_min, output_max].
-  /// A reading from here on is at the upper limit of its transmitter, and the
-  /// true value may be any beyond; infinite where none was met.
+  /// Readings from here on are at the upper limit of the transmitter, and the
+  /// true value may be any beyond; infinite if none occurred.
   double saturation{std::numeric_limits<double>::infinity()};
   std::vector<TsRule> rules;
 };
 
 struct TsPrediction {
   double value{0.0};
-  bool covered{true};  ///< False where every β_i < 1e-8: nearest rule.
+  bool covered{true};  ///< False if every β_i < 1e-8: the nearest rule is used.
 };
 
-/// ŷ for the regressor values `x` (as many as model.regressors). The exponents
-/// of a rule are summed first, one exp per rule; the largest is taken out, so
-/// that far from all rules the nearest one answers. Does not allocate.
+/// ŷ for the regressor values `x` (model.regressors.size() of them). The
+/// exponents of a rule are summed first, for one exp per rule; the largest is
+/// factored out, so that far from all rules the nearest one determines ŷ. Does
+/// not allocate.
 TsPrediction Evaluate(const TsModel& model, const double* x);
 
 /// The weights β_i / Σ β_i of the rules that fire at one x.
@@ -92,18 +94,18 @@ struct FiringRules {
   std::array<double, kMaxRules> weights;  ///< Sum to 1.
 };
 
-/// Finds the rules that weigh at least 4e-18 of the strongest.
+/// Finds the rules with a weight of at least 4e-18 of the strongest.
 void Weigh(const TsModel& model, const double* x, FiringRules& firing);
 
 /// ŷ of `model` from the weights of a model with the same antecedents.
 double Blend(const TsModel& model, const double* x, const FiringRules& firing);
 
-/// True if the models have regressors, their ranges and antecedents in common,
-/// so that one Weigh() serves both.
+/// True if the models have the same regressors, ranges and antecedents, so that
+/// one Weigh() serves both.
 bool SharesAntecedents(const TsModel& a, const TsModel& b);
 
 /// r = y − min(ŷ, saturation); NaN if reading and prediction are both at the
-/// limit of the transmitter, where they say nothing about each other.
+/// transmitter's limit, where they cannot be compared.
 double Residual(double saturation, double reading, double prediction);
 double Residual(const TsModel& model, double reading, double prediction);
 

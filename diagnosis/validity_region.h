@@ -13,25 +13,25 @@ inline constexpr SignalRange kUnbounded{
 
 /// Gain of the running mean of CV that ValidityRegion::cv_mean bounds.
 inline constexpr double kCvMeanGain = 0.1;
-/// Samples until that mean counts.
+/// Samples until that mean is valid.
 inline constexpr int kCvMeanSettling = 30;
 
-/// Where the observers of a model set were trained, margins included; see
-/// Coverage for what becomes of a valve outside.
+/// The region in which the observers of a model set were trained, margins
+/// included; see Coverage for valves outside.
 struct ValidityRegion {
   SignalRange cv{0.0, 100.0};  ///< Commands [%].
-  /// Its running mean over about 10 samples [%]: models with a past were not
-  /// fitted to a command that stays where it was for moments only.
+  /// Running mean of CV over about 10 samples [%]: dynamic models were not
+  /// fitted where the command stayed only for moments.
   SignalRange cv_mean{kUnbounded};
   double cv_step{200.0};  ///< Largest change of CV from sample to sample [%].
   SignalRange dp{kUnbounded};  ///< P1 − P2 in normal operation [kPa].
-  SignalRange t1{kUnbounded};  ///< T1 likewise [°C]; the thresholds of a
-                               ///< channel T1, if there is one, hold instead.
-  SignalRange p1{kUnbounded};  ///< P1 alike [kPa].
-  SignalRange p2{kUnbounded};  ///< P2 alike [kPa].
-  double flow_cutoff{0.0};     ///< A flow below is none [unit of the flow].
-  int rearm_samples{60};       ///< Inside before a valve that was outside, or
-                               ///< in another mode than AUTO, is judged again.
+  SignalRange t1{kUnbounded};  ///< T1 in normal operation [°C]; superseded by
+                               ///< the thresholds of a channel T1, if any.
+  SignalRange p1{kUnbounded};  ///< P1 in normal operation [kPa].
+  SignalRange p2{kUnbounded};  ///< P2 in normal operation [kPa].
+  double flow_cutoff{0.0};     ///< Less is no flow [unit of the flow].
+  int rearm_samples{60};       ///< Samples inside before a valve that was
+                               ///< outside, or not in AUTO, is judged.
 };
 
 }  // namespace fdi

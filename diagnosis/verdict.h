@@ -10,31 +10,31 @@
 
 namespace fdi {
 
-/// What became of a received sample. Only kAccepted reaches the observers.
+/// Outcome of a received sample. Only kAccepted reaches the observers.
 enum class Intake : std::uint8_t {
   kAccepted,
   kRepeat,      ///< seq seen before from this source.
   kLate,        ///< seq before the newest one of this source.
-  kSuperseded,  ///< A newer source speaks for this valve.
+  kSuperseded,  ///< A newer source has replaced this one.
   kBadQuality,  ///< A required signal has quality BAD.
   kNotFinite,   ///< A required signal is NaN or infinite.
-  kRange,       ///< A required signal is beyond what a transmitter can read.
+  kRange,       ///< A required signal is implausible.
   kUnit,        ///< Flow in another unit than the model set's.
-  kPeriod,      ///< Stamps are not the model set's sample period apart.
+  kPeriod,      ///< Interval is not the model set's period.
 };
 inline constexpr int kIntakeCount = 9;
 
-/// True if the sample left the engine as it was: repeated, late, or of a source
-/// that a newer one superseded.
+/// True if the sample did not affect the engine: repeated, late, or from a
+/// superseded source.
 constexpr bool OutOfOrder(Intake intake) {
   return intake == Intake::kRepeat || intake == Intake::kLate ||
          intake == Intake::kSuperseded;
 }
 
-/// Beside the state: may the diagnosis be relied upon?
+/// Whether the diagnosis can be relied upon, independent of the state.
 enum class Quality : std::uint8_t {
   kLive,
-  kStale,  ///< No sample for 3 periods; a label of the adapter's clock.
+  kStale,  ///< No sample for 3 periods; set by the monitor's clock.
   kBadInput,
   kSettling,
   kInhibited,
@@ -47,13 +47,13 @@ enum class Quality : std::uint8_t {
 enum class CoverageReason : std::uint8_t {
   kMode,     ///< Another mode than AUTO.
   kCv,       ///< CV beyond the trained range.
-  kCvStep,   ///< CV steps as never in training.
-  kParked,   ///< At an end of its travel, without flow.
-  kDp,       ///< P1 − P2 unlike normal operation.
-  kT1,       ///< T1 likewise.
-  kP1,       ///< P1 alike.
-  kP2,       ///< P2 alike.
-  kWaiting,  ///< Inside, not yet for long enough.
+  kCvStep,   ///< CV stepped as never in training.
+  kParked,   ///< At an end of travel, without flow.
+  kDp,       ///< P1 − P2 outside normal operation.
+  kT1,       ///< T1 outside normal operation.
+  kP1,       ///< P1 outside normal operation.
+  kP2,       ///< P2 outside normal operation.
+  kWaiting,  ///< Inside, but not for long enough yet.
 };
 inline constexpr int kCoverageReasonCount = 9;
 
@@ -64,11 +64,11 @@ constexpr CoverageReasons BitOf(CoverageReason reason) {
   return static_cast<CoverageReasons>(1U << static_cast<unsigned>(reason));
 }
 
-/// What is known of an episode that no fault has been named for.
+/// What is known about an episode without an isolated fault.
 enum class Unknown : std::uint8_t {
-  kNone,          ///< No episode, or one with a set.
+  kNone,          ///< No episode, or a fault is isolated.
   kTooEarly,      ///< Known faults may still explain it.
-  kOutsideKnown,  ///< None does: no factor reached T/2 in the last t_k samples.
+  kOutsideKnown,  ///< None: no factor reached T/2 in the last t_k samples.
 };
 
 enum class State : std::uint8_t { kNormal, kDetected, kIsolated };
@@ -91,28 +91,28 @@ enum class EndReason : std::uint8_t {
   kUnknown,
 };
 
-/// What gave an episode the name that it has.
+/// What named the fault of an episode.
 enum class Layer : std::uint8_t {
   kObservers,  ///< The engine: observers and limits.
-  kPhysics,    ///< A simulation of the valve: the second look.
+  kPhysics,    ///< A simulation of the valve (second look).
 };
 
-/// A step in the life of an episode.
+/// A transition of an episode.
 struct Transition {
   TransitionKind kind{TransitionKind::kDetected};
   std::int64_t stamp_ns{0};
   /// Key of the episode: stamp of the first abnormal sample of its detection.
   std::int64_t detection_stamp_ns{0};
   FaultSet faults{0};    ///< The isolated set, empty until isolated.
-  double factor{0.0};    ///< Largest factor of the set, or of any fault.
+  double factor{0.0};    ///< Largest of the set, or else of any fault.
   double strength{0.0};  ///< Estimated, of the fault with that factor, or the
-                         ///< likeliest by the physics; 0 until isolated.
+                         ///< likeliest one by physics; 0 until isolated.
   EndReason reason{EndReason::kNone};  ///< Of kClosed.
   Unknown unknown{Unknown::kNone};     ///< As in the verdict at that time.
-  Layer layer{Layer::kObservers};      ///< Whose answer `faults` is.
+  Layer layer{Layer::kObservers};      ///< What named `faults`.
 };
 
-/// Everything the engine says about one sample.
+/// The engine's result for one sample.
 struct Verdict {
   std::int64_t stamp_ns{0};
   std::uint64_t source_id{0};
@@ -124,7 +124,7 @@ struct Verdict {
   State state{State::kNormal};
   Unknown unknown{Unknown::kNone};
   bool detected{false};    ///< An episode is open.
-  double confidence{0.0};  ///< Share of the channels that could vote.
+  double confidence{0.0};  ///< Share of the channels that voted.
   /// r = y − ŷ of the normal observer per channel; NaN where it abstains.
   std::array<double, kMaxChannels> residuals{};
   double normal_factor{0.0};                             ///< d_0
@@ -150,8 +150,8 @@ std::string_view TransitionName(TransitionKind kind);  ///< "DETECTED", ...
 std::string_view EndReasonName(EndReason reason);      ///< "cleared", ...
 std::string_view LayerName(Layer layer);               ///< "observers", ...
 
-/// 64-bit FNV-1a over valve, source and detection stamp: recording the same
-/// episode twice meets the same id.
+/// 64-bit FNV-1a over valve, source and detection stamp: recording an episode
+/// twice yields the same id.
 std::uint64_t EpisodeId(std::string_view valve_id, std::uint64_t source_id,
                         std::int64_t detection_stamp_ns);
 

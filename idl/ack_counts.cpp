@@ -3,7 +3,7 @@
 namespace fdi::idl {
 namespace {
 
-// Acknowledgements that overtake each other are not that far apart.
+// Reordered acknowledgements are closer together than this.
 constexpr std::uint32_t kOvertaken = 64;
 constexpr std::size_t kMostAcknowledgements = 16'384;
 

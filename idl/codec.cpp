@@ -11,15 +11,15 @@
 #include "diagnosis/field_list.h"
 #include "diagnosis/printable.h"
 
-// How a record becomes a message of fdi_v1.idl and back:
+// Maps records to messages of fdi_v1.idl and back:
 //
 //     KeyFields(transfer, record, wire)   the members that are its key
 //     Fields(transfer, record, wire)      all others
 //
 // each name every field once. A Transfer<true> copies the fields to the wire
 // and throws at the first that does not fit; a Transfer<false> copies them from
-// the wire, where anything may stand, and remembers that one did not fit. What
-// fits is the same either way.
+// the wire, where any value may occur, and remembers whether one did not fit.
+// Both apply the same checks.
 namespace fdi::idl {
 namespace {
 
@@ -27,8 +27,8 @@ static_assert(kMaxChannels == 16 && kMaxFaults == 64 && kMaxObservers == 128 &&
                   kSignalCount == 10 && kLastFinding <= 255,
               "fdi_v1.idl cannot grow");
 
-// LastOf(enumerator) is the last one of its enumeration. Enumerators stand in
-// the same order on both sides, and the last ones prove it.
+// LastOf(enumerator) is the last one of its enumeration. Enumerators have the
+// same order on both sides, which the last ones prove.
 #define FDI_LAST(OURS, WIRE)                                                 \
   static_assert(static_cast<unsigned>(OURS) == static_cast<unsigned>(WIRE)); \
   constexpr std::int64_t LastOf(decltype(OURS)) {                            \
@@ -51,7 +51,8 @@ template <bool kEncodes>
 class Transfer {
  public:
   // A field whose range follows from its type: enumerators, counts (int to
-  // unsigned long), texts up to the bound of the IDL; all others as they are.
+  // unsigned long), texts up to the bound of the IDL; all other types are
+  // copied.
   template <typename Ours, typename Wire>
   void operator()(const char* field, Ours& ours, Wire&& wire) {
     using Plain = std::remove_const_t<Ours>;
@@ -70,7 +71,7 @@ class Transfer {
     }
   }
 
-  // An integer or enumerator in low..high. A foreign enumerator arrives as any
+  // An integer or enumerator in low..high. A foreign enumerator may be any
   // 32-bit pattern.
   template <typename Ours, typename Wire>
   void Ranged(const char* field, Ours& ours, Wire&& wire, std::int64_t low,
@@ -92,7 +93,7 @@ class Transfer {
     }
   }
 
-  // The number of a fault, or of what the floor finds.
+  // The number of a fault or of a finding of the floor.
   template <typename Ours, typename Wire>
   void Fault(const char* field, Ours& ours, Wire&& wire) {
     const int fault = kEncodes ? ours : static_cast<int>(wire);
@@ -105,7 +106,7 @@ class Transfer {
     }
   }
 
-  // The name of an instance: not empty, without control characters.
+  // The key text of an instance: not empty, no control characters.
   template <typename Ours, typename Wire>
   void Id(const char* field, Ours& ours, Wire& wire) {
     static_assert(Wire::max_size == kMaxIdLength);
@@ -142,7 +143,7 @@ class Transfer {
     }
   }
 
-  // The first `count` values of an array of ours; the others become 0.
+  // The first `count` values of an array; the others become 0.
   template <typename Values, typename Count, typename Wire>
   void Array(const char* field, Values& values, Count& count, Wire&& wire) {
     const std::size_t used =
@@ -205,7 +206,7 @@ class Transfer {
   bool all_fit_{true};
 };
 
-// Either a T to be read or one to be written.
+// A T, const or not.
 template <typename Given, typename T>
 concept Is = std::same_as<std::remove_const_t<Given>, T>;
 
@@ -303,7 +304,7 @@ void Fields(auto& t, Is<ObserverInfo> auto& m, auto& w) {
   FDI_FIELD(strength)
 }
 
-// A group of faults that cannot be told apart.
+// A group of indistinguishable faults.
 void Fields(auto& t, Is<std::vector<int>> auto& m, auto& w) {
   t.List("groups.faults", m, w.faults(), kMaxFaults);
 }
@@ -321,7 +322,7 @@ void Fields(auto& t, Is<ModelSetInfoMessage> auto& m, auto& w) {
   t.List("groups", m.groups, w.groups(), kMaxGroups);
 }
 
-// A counter: its name and its total.
+// A counter: name and total.
 void Fields(auto& t, Is<std::pair<std::string, std::uint64_t>> auto& m,
             auto& w) {
   t("counters.name", m.first, w.name());

@@ -18,7 +18,7 @@
 #include "fdi_v1PubSubTypes.hpp"
 #endif
 
-/// Inside idl/ only: plain messages to generated types and back.
+/// Inside idl/ only: converts plain messages to generated types and back.
 namespace fdi::idl {
 
 /// The name of a topic and its types on the wire.
@@ -43,22 +43,23 @@ FDI_TOPIC(OperatorAction, OperatorAction)
 FDI_TOPIC(MonitorShare, MonitorShare)
 #undef FDI_TOPIC
 
-/// Conversion of the messages of one topic; the fields are listed in codec.cpp,
-/// once for both directions.
+/// Converts the messages of one topic; codec.cpp lists the fields once for both
+/// directions.
 template <typename Message>
 struct Codec : TopicOf<Message> {
   using Wire = typename TopicOf<Message>::Wire;
 
-  /// @throws DataError naming the field that does not fit, and what would.
+  /// @throws DataError naming the field that does not fit and what would.
   static void Encode(const Message& message, Wire& wire);
-  /// The members that are the key only. @throws as Encode().
+  /// Encodes the key members only. @throws as Encode().
   static void EncodeKey(const Message& message, Wire& wire);
-  /// @returns false for what no publisher of ours sends (an enumerator, a size,
-  ///   a fault out of range); `message` is unspecified then.
+  /// @returns false for values that none of our publishers sends (an
+  ///   enumerator, a size or a fault out of range); `message` is unspecified
+  ///   then.
   static bool Decode(const Wire& wire, Message& message);
 };
 
-/// References to the members of `message` that are its key.
+/// References to the key members of `message`.
 template <typename Message>
 auto KeyOf(Message& message) {
   if constexpr (requires { message.monitor; }) {
@@ -74,20 +75,21 @@ template <typename... T>
 std::tuple<std::remove_const_t<T>...> CopyOf(const std::tuple<T&...>& members) {
   return members;
 }
-/// The same members by value.
+/// The same by value.
 template <typename Message>
 using Key = decltype(CopyOf(KeyOf(std::declval<Message&>())));
 
-/// A generated type that survives foreign bytes and several endpoints.
+/// A generated type that is safe with malformed data and several endpoints.
 ///
-/// What cannot be deserialized, for whatever reason, is refused and counted,
-/// once: the library deserializes a message into an object of its own first,
-/// for its key, and then into that of the reader.
+/// A message that cannot be deserialized, for whatever reason, is refused and
+/// counted once: the library deserializes it first into an object of its own,
+/// for the key, and then into the reader's.
 ///
-/// Generated types compute keys in a buffer that all endpoints of the type
-/// share, from which two threads got each other's keys; hence the lock. Between
-/// a text and a number of a key are bytes that nobody writes, so that the sum
-/// over it hung on the key before; hence a buffer of its own for such a key.
+/// Generated types compute keys in a buffer shared by all endpoints of the
+/// type, so two threads could get each other's keys; hence the lock. Between a
+/// text and a number in a key there are padding bytes that are never written,
+/// so the hash depended on the previous key; hence a fresh buffer for such
+/// keys.
 template <typename Generated>
 class CheckedType : public Generated {
  public:
@@ -129,11 +131,11 @@ class CheckedType : public Generated {
     const std::lock_guard lock(key_mutex_);
     return Generated::compute_key(data, handle, force_md5);
   }
-  // Of a message without a hash of its key. One without a handle belongs to no
-  // instance, and Fast DDS 3.1.2 then follows an iterator at its end
-  // (update_instance_nts). What has no key has a handle of its own here, and is
-  // refused when it is taken. The end of an instance is its key alone, and so
-  // cannot be read as a whole.
+  // For a message without a key hash. Without a handle it would belong to no
+  // instance, and Fast DDS 3.1.2 then dereferences an end iterator
+  // (update_instance_nts). A message whose key cannot be read therefore gets a
+  // handle of its own here and is refused when it is taken. A dispose contains
+  // only the key and cannot be read as a whole message.
   bool compute_key(rtps::SerializedPayload_t& payload,
                    rtps::InstanceHandle_t& handle, bool force_md5) override {
     typename Generated::type message;
@@ -161,7 +163,7 @@ class CheckedType : public Generated {
     try {
       return Generated::deserialize(payload, data);
     } catch (const std::exception&) {
-      return false;  // E.g. bad_alloc of an absurd length.
+      return false;  // E.g. bad_alloc for an absurd length.
     }
   }
 #if FDI_FAST_DDS == 2
@@ -170,10 +172,10 @@ class CheckedType : public Generated {
     return true;
   }
 #else
-  // Fast CDR 2 takes the end of the bytes between any two members for the end
-  // of the message; the others keep what they held before. So a message has to
-  // be as long as what was read from it. The calculated size may be some bytes
-  // too large, for it aligns the elements of an empty list.
+  // Fast CDR 2 accepts the end of the bytes between any two members as the end
+  // of the message; the remaining members keep their old values. So a message
+  // must be as long as what was read from it. The calculated size may be a few
+  // bytes too large, because it aligns the elements of an empty list.
   bool IsWhole(const rtps::SerializedPayload_t& payload, const void* data) {
     constexpr rtps::octet kFirstOfXcdr2 = 6;  // Of the encapsulations.
     const auto form = payload.data[1] < kFirstOfXcdr2
@@ -197,7 +199,7 @@ class CheckedType : public Generated {
       refused_.fetch_add(1, std::memory_order_relaxed);
       return false;
     }
-    // For its key: that of this message, if it got so far, not of the last.
+    // For the key: use this message as far as it can be read, not the last one.
     *static_cast<typename Generated::type*>(data) = {};
     static_cast<void>(IsRead(payload, data));
     return false;

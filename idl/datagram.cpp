@@ -1,9 +1,9 @@
-// A message is a header and submessages:
+// An RTPS message is a header and submessages:
 //
 //     message    = "RTPS" version(2) vendor(2) prefix(12) {submessage}
 //     submessage = kind(1) flags(1) length(2) body(length) {pad to 4}
 //
-// Bit 0 of the flags: numbers are little endian. Length 0 means up to the end
+// Bit 0 of the flags: numbers are little endian. Length 0 means until the end
 // of the message, except for PAD and INFO_TS.
 #include "idl/datagram.h"
 
@@ -35,15 +35,15 @@ constexpr std::uint8_t kInvalidateFlag = 0x02;  // INFO_TS without a time.
 constexpr std::uint16_t kSentinel = 1;          // Ends a parameter list.
 constexpr std::uint16_t kKeyHash = 0x70;
 
-// A writer of 20 000 a second is here after 20 months. The library aborts at
-// the end of the range, and when it meets a writer counts up to where it
-// stands.
+// A writer of 20 000 messages a second gets here after 20 months. The library
+// aborts at the end of the range, and iterates up to a new writer's current
+// number.
 constexpr std::int64_t kSequenceLimit = std::int64_t{1} << 40;
-// The library allocates what a fragment says that its sample has. Ours have
-// some kB at most.
+// The library allocates the sample size that a fragment claims. Our samples
+// have a few kB.
 constexpr std::int64_t kMostSampleBytes = 65'536;
 
-// Bytes that a body has at least; -1: no such kind.
+// Minimum size of a body; -1 for an unknown kind.
 int LeastBody(std::uint8_t kind, std::uint8_t flags) {
   switch (kind) {
     case kPad:
@@ -69,13 +69,13 @@ int LeastBody(std::uint8_t kind, std::uint8_t flags) {
       return 20;
     case kDataFrag:
       return 32;
-    default:  // Of DDS Security: SEC_BODY to SRTPS_POSTFIX.
+    default:  // DDS Security: SEC_BODY to SRTPS_POSTFIX.
       return kind >= 0x30 && kind <= 0x34 ? 0 : -1;
   }
 }
 
-// A body and the order of its bytes. Whoever reads knows that it is long
-// enough.
+// A body and its byte order. Readers do not check bounds: callers must know
+// that it is long enough.
 struct Body {
   Bytes bytes;
   bool little_endian;
@@ -91,15 +91,15 @@ struct Body {
     const std::int64_t b = U16(at + 2);
     return little_endian ? a | b << 16 : a << 16 | b;
   }
-  // Of 64 bit, the high half first; -1: none that a writer has.
+  // 64 bits, high half first; -1 if no writer can have reached it.
   std::int64_t Sequence(std::size_t at) const {
     const std::int64_t high = U32(at);
     return high < kSequenceLimit >> 32 ? high << 32 | U32(at + 4) : -1;
   }
 };
 
-// Whether the parameters of a data submessage, from `at` on, are inside it.
-// Calls see(id) for each.
+// Whether the parameter list of a data submessage, which begins at `at`, lies
+// inside it. Calls see(id) for each parameter.
 template <typename See>
 bool ReadParameters(const Body& body, std::size_t at, See see) {
   for (bool ended = false; !ended;) {
@@ -114,7 +114,7 @@ bool ReadParameters(const Body& body, std::size_t at, See see) {
   return at <= body.bytes.size();
 }
 
-// Where the parameters begin: counted from behind the offset itself.
+// Position of the parameters; the offset counts from behind itself.
 std::size_t ParametersOf(const Body& body) {
   return 4U + body.U16(2);
 }
@@ -126,7 +126,7 @@ bool DataIsSound(const Body& body, std::uint8_t flags, std::size_t fixed) {
           ReadParameters(body, at, [](std::uint16_t) {}));
 }
 
-// Of sound data.
+// Whether valid data is a dispose with nothing but a serialized key.
 bool IsBareKey(const Body& body, std::uint8_t flags) {
   constexpr std::uint8_t kEndOfInstance = kKeyFlag | kInlineQosFlag;
   if ((flags & (kEndOfInstance | kDataFlag)) != kEndOfInstance ||
@@ -145,8 +145,8 @@ bool ContentIsSound(std::uint8_t kind, std::uint8_t flags, const Body& body) {
     case kData:
       return DataIsSound(body, flags, 20);
     case kDataFrag:
-      // Messages of ours need none; the library aborts when it gets the same
-      // one whole and in fragments.
+      // Our messages need no fragments, and the library aborts on one that it
+      // gets both whole and in fragments.
       return IsOfDiscovery(body.bytes[11]) && DataIsSound(body, flags, 32) &&
              body.U32(20) > 0 && body.U16(24) > 0 && body.U16(26) > 0 &&
              body.U32(28) <= kMostSampleBytes;
@@ -164,7 +164,7 @@ bool ContentIsSound(std::uint8_t kind, std::uint8_t flags, const Body& body) {
   }
 }
 
-// Who speaks, as long as no INFO_SRC says otherwise.
+// The sender: that of the header until an INFO_SRC changes it.
 class Speaker {
  public:
   explicit Speaker(Bytes message) { SetPrefix(message.subspan(8)); }
@@ -183,7 +183,8 @@ class Speaker {
   WriterGuid guid_{};
 };
 
-// Whether a sound submessage says nothing that its writer cannot have written.
+// Whether a valid submessage contains only numbers that its writer can have
+// reached.
 bool KeepsPace(std::uint8_t kind, const Body& body, Speaker& speaker,
                WriterPace& pace, WriterPace::Clock::time_point now) {
   switch (kind) {
@@ -209,7 +210,7 @@ bool KeepsPace(std::uint8_t kind, const Body& body, Speaker& speaker,
   }
 }
 
-// Of a sound acknowledgement, whose body is at `begin` of the datagram:
+// Processes a valid acknowledgement, whose body is at `begin` of the datagram:
 // reader(4) writer(4) base(8) bits(4) bitmap count(4).
 void TakeCount(const Body& body, std::size_t begin, Speaker& speaker,
                AckCounts& acks, CheckedDatagram& checked) {
@@ -252,7 +253,7 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
     return {DatagramVerdict::kHeader, 0};
   }
   Speaker speaker(datagram);
-  std::size_t sound = kHeaderBytes;  // Up to here, all is handed over.
+  std::size_t sound = kHeaderBytes;  // Everything up to here is passed on.
   CheckedDatagram checked;
   for (std::size_t at = sound; at < size;) {
     if (size - at < kSubmessageHeaderBytes) {
@@ -265,8 +266,8 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
     const std::size_t stated = header.U16(2);
     const bool to_end = stated == 0 && kind != kPad && kind != kInfoTs;
     const std::size_t length = to_end ? size - begin : stated;
-    // Fast DDS 2.9.1 fills a datagram and adds its statistics, four bytes more
-    // than the receiver takes.
+    // When a datagram is full, the statistics that Fast DDS 2.9.1 appends
+    // exceed what the receiver accepts by four bytes.
     if (length > size - begin && kind < kFirstOfVendors) {
       return {DatagramVerdict::kLength, 0};
     }
@@ -274,7 +275,7 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
         begin + std::min((length + 3) & ~std::size_t{3}, size - begin);
     if (kind < kFirstOfVendors) {
       const int least = LeastBody(kind, flags);
-      if (least < 0 || at != sound) {  // Behind a vendor's own.
+      if (least < 0 || at != sound) {  // Follows a vendor submessage.
         return {DatagramVerdict::kKind, 0};
       }
       if (length < static_cast<std::size_t>(least)) {

@@ -15,17 +15,17 @@
 
 namespace fdi::idl {
 
-/// Which QoS of the topic; both ends of a topic should agree.
+/// The QoS profile of a topic; both ends should agree.
 enum class Profile {
-  kLive,        ///< Of system.md: keeps the newest, never waits for a reader.
+  kLive,        ///< KEEP_LAST: keeps the newest, never waits for a reader.
   kLossless,    ///< KEEP_ALL: a slow reader slows the writer down.
   kBestEffort,  ///< ValveSample only: no retransmission.
 };
 
 struct PublisherOptions {
   Profile profile{Profile::kLive};
-  int valves{0};  ///< How many this publisher speaks for; 0: max_valves.
-  /// Where it writes; "" is the usual partition, and none means that one.
+  int valves{0};  ///< Number of valves it publishes; 0: max_valves.
+  /// Partitions to write to; "" is the default one, as is an empty list.
   std::vector<std::string> partitions{};
 };
 
@@ -37,16 +37,16 @@ enum class WriteResult {
 
 struct PublisherStatus {
   std::uint64_t written{0};
-  std::uint64_t retries{0};       ///< Times a full history made Write() wait.
+  std::uint64_t retries{0};       ///< Times Write() waited for a full history.
   std::uint64_t refused{0};       ///< Writes answered with kTooManyValves.
-  std::uint64_t incompatible{0};  ///< Readers with a QoS that cannot be met.
-  int matched{0};                 ///< Readers now.
+  std::uint64_t incompatible{0};  ///< Readers with incompatible QoS.
+  int matched{0};                 ///< Readers at present.
 };
 
-/// Writes one topic. Thread safe. What is on the way when it is destroyed is
-/// lost: call WaitForAcknowledged() first.
+/// Writes one topic. Thread safe. Destroying it loses unacknowledged messages:
+/// call WaitForAcknowledged() first.
 ///
-/// Message is one of the nine of wire.h; there are no others.
+/// Message is one of the nine of wire.h; no others are instantiated.
 template <typename Message>
 class Publisher {
  public:
@@ -57,27 +57,27 @@ class Publisher {
   Publisher(const Publisher&) = delete;
   Publisher& operator=(const Publisher&) = delete;
 
-  /// Sends `message`. With kLossless it waits until there is room, a stop is
-  /// requested or `timeout` has passed; otherwise it does not wait.
-  /// @throws DataError naming what in `message` is too long or out of range.
+  /// Sends `message`. With kLossless it blocks until there is room, a stop is
+  /// requested or `timeout` has passed; otherwise it does not block.
+  /// @throws DataError naming the field that is too long or out of range.
   WriteResult Write(
       const Message& message, std::stop_token stop = {},
       std::chrono::milliseconds timeout = std::chrono::milliseconds::max());
 
-  /// Ends the stream of the instance of `message` (for a valve: no samples will
-  /// follow). Only the key of `message` counts. Nothing if never written.
+  /// Disposes the instance of `message` (for a valve: no more samples will
+  /// follow). Only the key of `message` is used. Ignored if never written.
   void Dispose(const Message& message);
 
-  /// @returns whether at least `count` readers are matched in time.
+  /// @returns whether at least `count` readers were matched in time.
   bool WaitForReaders(int count, std::chrono::milliseconds timeout) const;
-  /// @returns whether all matched readers have all that was written in time.
+  /// @returns whether all matched readers acknowledged everything in time.
   bool WaitForAcknowledged(std::chrono::milliseconds timeout);
   PublisherStatus status() const;
-  /// PublisherStatus::matched, at the cost of one load.
+  /// PublisherStatus::matched, at the cost of one atomic load.
   int matched() const;
-  /// Readers that came since the start, gone or not.
+  /// Readers matched since the start, including those that have left.
   int came() const;
-  /// Readers that come from now on are not given what was written before.
+  /// Later readers do not get what was written before.
   void Forget();
 
  private:
@@ -85,50 +85,51 @@ class Publisher {
   std::unique_ptr<Impl> impl_;
 };
 
-/// What DDS says about a received message.
+/// Metadata of a received message.
 struct Reception {
   std::int64_t sent_ns{0};          ///< UTC at the writer.
   std::int64_t received_ns{0};      ///< UTC here.
-  std::uint64_t writer_id{0};       ///< Differs between writers of one domain.
-  std::uint64_t participant_id{0};  ///< The same for all of one participant.
+  std::uint64_t writer_id{0};       ///< Identifies the writer.
+  std::uint64_t participant_id{0};  ///< Identifies the participant.
 };
 
-/// What became of the messages. Nothing is lost in silence.
+/// Outcome of the messages. None is lost silently.
 struct SubscriberStatus {
   std::uint64_t received{0};  ///< Messages handed out.
   std::uint64_t ended{0};     ///< Ended instances handed out.
-  /// Written since this subscriber exists, and will never come: overwritten by
-  /// a live writer, or dropped on the way.
+  /// Written since this subscriber exists and lost for good: overwritten by a
+  /// live writer, or dropped on the way.
   std::uint64_t lost{0};
-  std::uint64_t undecodable{0};  ///< What we never send, and unknown ends.
-  /// Messages of valves beyond max_valves: lost, and how many valves (exact
-  /// up to 65536).
+  std::uint64_t undecodable{0};  ///< Foreign data and unknown disposes.
+  /// Lost messages of valves beyond max_valves, and the number of these valves
+  /// (exact up to 65536).
   std::uint64_t rejected_instances{0};
   std::uint64_t refused_valves{0};
-  /// Full: sent again by a reliable KEEP_ALL writer, so back-pressure rather
-  /// than loss; what a live writer overwrites meanwhile is counted as lost.
+  /// Rejected while full: a reliable KEEP_ALL writer resends them, so this is
+  /// back-pressure, not loss; what a live writer overwrites meanwhile counts as
+  /// lost.
   std::uint64_t rejected_samples{0};
-  std::uint64_t incompatible{0};  ///< Writers that offer less than is asked.
-  std::uint64_t waiting{0};       ///< Messages that Take() is behind with.
-  int matched{0};                 ///< Writers now.
-  int alive{0};                   ///< Of these, writers that show life.
+  std::uint64_t incompatible{0};  ///< Writers with incompatible QoS.
+  std::uint64_t waiting{0};       ///< Messages queued for Take().
+  int matched{0};                 ///< Writers at present.
+  int alive{0};                   ///< Of these, writers that are alive.
 };
 
-/// Where messages are that Take() is behind with, once 16 MB wait for it.
+/// Where the backlog of Take() is held once 16 MB are queued.
 enum class Overflow {
-  /// In the history of the library, which it searches from the front with every
-  /// message that comes: slow beyond some thousand.
+  /// In the history of the library, which is scanned from the front for every
+  /// message: slow beyond some thousand.
   kLibrary,
-  /// On the way: nothing is received until there is room, and lossless writers
-  /// wait. For a participant with this endpoint alone: no other one of it
-  /// receives meanwhile, acknowledgements included.
+  /// On the wire: the participant stops receiving until there is room, and
+  /// lossless writers wait. For a participant with this endpoint only, because
+  /// its other endpoints receive nothing meanwhile, acknowledgements included.
   kOnTheWay,
 };
 
 template <typename Message>
 struct Handlers {
   std::function<void(const Message&, const Reception&)> on_message;
-  /// The publisher ended this instance. Only the key of the message is set.
+  /// The publisher disposed this instance. Only the key of the message is set.
   std::function<void(const Message&, const Reception&)> on_ended;
 };
 
@@ -144,15 +145,15 @@ inline Handlers<DecisionBatchMessage> EachVector(
           {}};
 }
 
-/// Reads one topic. The messages of one valve from one writer come in the order
-/// of writing; those of different valves as they arrive, or valve by valve
-/// where many have waited. One thread takes; status() and Interrupt() are
+/// Reads one topic. Messages of one valve from one writer are delivered in the
+/// order of writing; those of different valves as they arrive, or valve by
+/// valve after a backlog. One thread calls Take(); status() and Interrupt() are
 /// thread safe.
 template <typename Message>
 class Subscriber {
  public:
-  /// @param partitions where to read, patterns as of fnmatch(); none: the
-  ///   usual one.
+  /// @param partitions to read, patterns as in fnmatch(); none: the default
+  ///   one.
   /// @throws TransportError if the library refuses the endpoint.
   explicit Subscriber(Participant& participant,
                       Profile profile = Profile::kLive,
@@ -162,18 +163,19 @@ class Subscriber {
   Subscriber(const Subscriber&) = delete;
   Subscriber& operator=(const Subscriber&) = delete;
 
-  /// Hands out what has arrived, at most `limit`; if nothing has, waits up to
-  /// `timeout` first. What is not taken waits here, up to 16 MB; from then on
-  /// the writers wait (lossless) or overwrite (live).
-  /// @returns how many messages and ends were handed out.
-  /// @throws what a handler throws; the next message comes with the next call.
+  /// Delivers what has arrived, at most `limit` messages; if nothing has, waits
+  /// up to `timeout` first. Messages that are not taken are queued, up to 16
+  /// MB; beyond it writers wait (lossless) or overwrite (live). @returns the
+  /// number of messages and disposes delivered.
+  /// @throws what a handler throws; the next call continues with the next
+  ///   message.
   int Take(const Handlers<Message>& handlers, std::chrono::milliseconds timeout,
            int limit = std::numeric_limits<int>::max());
 
-  /// Makes a Take() that waits, or the next one, return at once.
+  /// Makes the current Take(), or else the next one, return at once.
   void Interrupt();
 
-  /// @returns whether at least `count` writers are matched in time.
+  /// @returns whether at least `count` writers were matched in time.
   bool WaitForWriters(int count, std::chrono::milliseconds timeout) const;
   SubscriberStatus status() const;
 

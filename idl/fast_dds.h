@@ -21,10 +21,9 @@
 #include <fastrtps/types/TypesBase.h>
 #endif
 
-/// Inside idl/ only: one name for what Fast DDS 2.9 (Debian 12) and 3.1 (Debian
-/// 13) call differently. What they do differently stands where it is done,
-/// under
-/// `#if FDI_FAST_DDS == 2`.
+/// Inside idl/ only: common names for what Fast DDS 2.9 (Debian 12) and 3.1
+/// (Debian 13) call differently. Differences in behaviour are handled where
+/// they occur, under `#if FDI_FAST_DDS == 2`.
 namespace fdi::idl {
 
 namespace dds = eprosima::fastdds::dds;

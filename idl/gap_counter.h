@@ -7,16 +7,16 @@
 
 namespace fdi::idl {
 
-/// Counts what writers wrote and a reader never got, from the numbers that
-/// every writer gives its messages 1, 2, 3, ... The library's own count leaves
-/// out what a writer overwrote before sending.
+/// Counts messages that were written and never received, from the sequence
+/// numbers that every writer assigns: 1, 2, 3, ... The library's own count
+/// omits what a writer overwrote before sending.
 ///
-/// What was written before `joined_ns` is no loss: a late joiner gets a part.
+/// Messages from before `joined_ns` do not count: a late joiner gets only some.
 class GapCounter {
  public:
   explicit GapCounter(std::int64_t joined_ns) : joined_ns_(joined_ns) {}
 
-  /// A message, in any order, once each.
+  /// Counts a message; any order, once each.
   void Count(std::uint64_t writer_id, std::uint64_t number,
              std::int64_t sent_ns) {
     if (sent_ns < joined_ns_) {
@@ -33,8 +33,8 @@ class GapCounter {
     missing_ += writer.Missing() - before;
   }
 
-  /// How many lie between those counted, of all writers. Exact once all that
-  /// has been received has been counted.
+  /// Missing numbers between the counted ones, over all writers. Exact once
+  /// everything received has been counted.
   std::uint64_t missing() const { return missing_; }
 
  private:

@@ -19,14 +19,14 @@ using eprosima::fastdds::dds::Log;
 using Clock = std::chrono::steady_clock;
 constexpr auto kQuietTime = std::chrono::seconds(10);
 
-// The library has one log for the process; so have we.
+// Process-wide, like the library's log.
 struct Registry {
   std::mutex mutex;
   bool installed{false};
   std::vector<const LogSink*> sinks;
 };
 
-// Never destroyed: the log thread of the library outlives our statics.
+// Never destroyed: the library's log thread outlives our statics.
 Registry& TheRegistry() {
   static Registry& registry = *new Registry;
   return registry;
@@ -38,7 +38,7 @@ LogLevel LevelOf(Log::Kind kind) {
                                       : LogLevel::kDebug;
 }
 
-// Called by the one log thread of the library.
+// Called by the library's log thread.
 class Throttle : public eprosima::fastdds::dds::LogConsumer {
  public:
   void Consume(const Log::Entry& entry) override {

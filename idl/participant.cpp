@@ -39,14 +39,15 @@ using transport::UDPv6TransportDescriptor;
 constexpr int kMaxDomain = 232;
 constexpr int kMaxValvesLimit = 100000;
 constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
-// More than the 208 kB that the kernel keeps for a host which does not answer
-// (net.ipv4.neigh.default.unres_qlen_bytes), or sending to all others waits for
-// up to 3 s until that host is given up. Capped by net.core.wmem_max, of which
-// the kernel takes the double: its default suffices.
+// Larger than the 208 kB that the kernel queues for a host which does not
+// answer (net.ipv4.neigh.default.unres_qlen_bytes); otherwise sending to all
+// hosts blocks for up to 3 s until that host is given up. Capped by
+// net.core.wmem_max, of which the kernel takes twice the value: its default
+// suffices.
 constexpr std::uint32_t kSendBufferBytes = 4U << 20U;
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
-// Remote endpoints of each topic, and participants without a key.
+// Bounds remote endpoints per topic, and participants without a key.
 constexpr std::size_t kRemembered = 64;
 
 std::vector<std::string> Addresses(const std::string& interfaces) {
@@ -103,7 +104,7 @@ void ValidateInterfaces(const std::string& interfaces) {
   }
 }
 
-// One participant in a process sees another as a process would.
+// Participants in one process communicate as separate processes would.
 void SetUpLibraryOnce() {
   static const bool done = [] {
     auto* const factory = dds::DomainParticipantFactory::get_instance();
@@ -124,7 +125,7 @@ void SetUpLibraryOnce() {
   static_cast<void>(done);
 }
 
-// What a transport of the library receives, without what would harm it.
+// Passes on what a library transport receives, without harmful datagrams.
 class CheckedTransport : public transport::ChainingTransport {
  public:
   CheckedTransport(
@@ -155,8 +156,8 @@ class CheckedTransport : public transport::ChainingTransport {
                const rtps::Locator_t& local,
                const rtps::Locator_t& remote) override {
 #if FDI_FAST_DDS != 2 && defined FASTDDS_STATISTICS
-    // Over shared memory Fast DDS 3.1 leaves out the submessage of statistics
-    // at the end but not its room, which has what the memory held before.
+    // Over shared memory Fast DDS 3.1 omits the statistics submessage at the
+    // end but not its space, which contains stale memory.
     constexpr std::uint32_t kStatisticsBytes = 60;
     if (remote.kind == LOCATOR_KIND_SHM) {
       bytes -= std::min(bytes, kStatisticsBytes);
@@ -179,7 +180,7 @@ class CheckedTransport : public transport::ChainingTransport {
   }
 
  private:
-  // For the base, which makes a transport of `lower`.
+  // For the base class, which creates a transport from `lower`.
   struct Chain : transport::ChainingTransportDescriptor {
     using ChainingTransportDescriptor::ChainingTransportDescriptor;
     transport::TransportInterface* create_transport() const override {
@@ -190,7 +191,7 @@ class CheckedTransport : public transport::ChainingTransport {
   std::shared_ptr<DatagramLog> log_;
 };
 
-// Still a descriptor of its kind: the library looks for shared memory by type.
+// Keeps its descriptor type, by which the library looks for shared memory.
 template <typename Descriptor>
 struct Checked : Descriptor {
   Checked(const Descriptor& lower, std::shared_ptr<DatagramLog> datagrams)
@@ -233,7 +234,7 @@ void SetTransports(const DdsOptions& options, dds::DomainParticipantQos& qos) {
   }
 }
 
-// Also those of a QoS file; TCP stays as it is.
+// Wraps the transports, also those of a QoS file; TCP is left as it is.
 void CheckTransports(const std::shared_ptr<DatagramLog>& log,
                      dds::TransportConfigQos& qos) {
   if (std::exchange(qos.use_builtin_transports, false)) {
@@ -251,7 +252,7 @@ void CheckTransports(const std::shared_ptr<DatagramLog>& log,
   }
 }
 
-// The plugins of DDS Security 1.1 with the files of one key.
+// Configures the plugins of DDS Security 1.1 with the files of one key.
 void Secure(const std::filesystem::path& folder, const LogSink& log,
             dds::DomainParticipantQos& qos) {
   const std::int64_t now = NowNs();
@@ -435,8 +436,8 @@ void Participant::Impl::Remember(const RemoteKey& key, PolicyTexts texts) {
   }
 }
 
-// One line is enough: strangers may come by the thousand. Fast DDS 3.1.2
-// refuses each again and again.
+// Logs only the first, because thousands may come and Fast DDS 3.1.2 refuses
+// each of them repeatedly.
 void Participant::Impl::onParticipantAuthentication(
     dds::DomainParticipant* /*participant*/,
     rtps::ParticipantAuthenticationInfo&& info) {

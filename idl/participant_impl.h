@@ -22,7 +22,7 @@
 #include "idl/profile_file.h"
 #include "idl/qos.h"
 
-/// Inside idl/ only: what the endpoints of a participant share.
+/// Inside idl/ only: shared by the endpoints of a participant.
 namespace fdi::idl {
 
 /// @throws TransportError naming `operation` unless `code` is RETCODE_OK.
@@ -37,23 +37,22 @@ Handle* NotNull(Handle* handle, const std::string& operation) {
   return handle;
 }
 
-/// UTC
+/// Current UTC time.
 inline std::int64_t NowNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::system_clock::now().time_since_epoch())
       .count();
 }
 
-/// `timeout` from now; a timeout without end is one of a year, so that nothing
-/// overflows.
+/// `timeout` from now; limited to a year to avoid overflow.
 inline std::chrono::steady_clock::time_point DeadlineIn(
     std::chrono::milliseconds timeout) {
   const std::chrono::milliseconds longest = std::chrono::hours(24 * 365);
   return std::chrono::steady_clock::now() + std::min(timeout, longest);
 }
 
-/// How many remote endpoints are matched: set by a callback, waited for by
-/// other threads.
+/// Number of matched remote endpoints: set by a callback, awaited by other
+/// threads.
 class Matched {
  public:
   void Set(int count) {
@@ -78,9 +77,9 @@ class Matched {
   std::atomic<int> count_{0};
 };
 
-/// While it lives, what the DDS library logs goes to `sink`, at most one line
-/// per place in the library and 10 s; with several alive, to the newest. The
-/// library never writes to stdout once one has existed.
+/// While an object exists, the DDS library's log goes to its `sink`, at most
+/// one line per source location in 10 s; with several objects, to the newest.
+/// Once one has existed, the library never writes to stdout.
 class LibraryLog {
  public:
   explicit LibraryLog(LogSink sink);
@@ -92,13 +91,13 @@ class LibraryLog {
   LogSink sink_;
 };
 
-/// What a participant remembers of its datagrams: how many by verdict, and how
-/// far the writers are. Thread safe.
+/// A participant's state of received datagrams: counts by verdict, and
+/// positions of the writers. Thread safe.
 class DatagramLog {
  public:
   explicit DatagramLog(LogSink log) : log_(std::move(log)) {}
 
-  /// @param sender for the log.
+  /// @param sender shown in the log.
   void Count(DatagramVerdict verdict, std::size_t bytes,
              const rtps::Locator_t& sender);
   DatagramCounts counts() const;
@@ -112,7 +111,7 @@ class DatagramLog {
   std::array<std::atomic<std::uint64_t>, kDatagramVerdictCount> counts_{};
 };
 
-/// What Participant is outside of idl/, with the library's handle in it.
+/// The implementation of Participant, with the library's handle.
 class Participant::Impl : private dds::DomainParticipantListener {
  public:
   Impl(const DdsOptions& options, LogSink log, const std::string& name);
@@ -120,12 +119,12 @@ class Participant::Impl : private dds::DomainParticipantListener {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  /// The topic called `topic`, made with its type at first use; lives as long
-  /// as the participant.
+  /// The topic called `topic`, created with its type at first use; lives as
+  /// long as the participant.
   dds::Topic* TopicOf(const std::string& topic, const dds::TypeSupport& type);
 
   /// Logs that policy `id` of a remote endpoint on `topic` is incompatible with
-  /// ours, with both sides.
+  /// ours, showing both sides.
   void ReportIncompatible(const std::string& topic, bool remote_is_writer,
                           dds::QosPolicyId_t id, const PolicyTexts& ours);
 
@@ -161,13 +160,13 @@ class Participant::Impl : private dds::DomainParticipantListener {
   DdsOptions options_;
   LogSink log_;
   LibraryLog library_log_;
-  std::shared_ptr<DatagramLog> datagrams_;  // The transports have it, too.
+  std::shared_ptr<DatagramLog> datagrams_;  // Shared with the transports.
   ProfileFile profiles_;
   std::atomic<std::uint64_t> refused_{0};
   std::mutex remotes_mutex_;
   std::map<RemoteKey, std::deque<PolicyTexts>> remotes_;  // Newest first.
   std::deque<rtps::GUID_t> refused_guids_;                // Newest first.
-  std::mutex topics_mutex_;  // Apart, for it is held in calls of the library.
+  std::mutex topics_mutex_;  // Separate: held during library calls.
   std::map<std::string, dds::Topic*> topics_;
   dds::DomainParticipant* handle_{nullptr};
 };

@@ -23,7 +23,7 @@ void ForEachChild(const tinyxml2::XMLElement& parent, Visit visit) {
   }
 }
 
-// The policies under <qos> and <topic>, and what stands beside these.
+// The policies under <qos>, <topic> and <rtps>, and the elements beside these.
 std::set<std::string> PoliciesOf(const tinyxml2::XMLElement& endpoint) {
   std::set<std::string> policies;
   ForEachChild(endpoint, [&](const tinyxml2::XMLElement& element) {
@@ -39,8 +39,8 @@ std::set<std::string> PoliciesOf(const tinyxml2::XMLElement& endpoint) {
   return policies;
 }
 
-// Calls visit(element, policy) for the policies that a profile of an endpoint
-// may state: the name in XML and how to reach it in the QoS.
+// Calls visit(element, policy) for the policies that an endpoint profile may
+// override: XML name and accessor.
 template <typename Visit>
 void ForEachPolicy(Visit visit) {
   visit(
@@ -69,7 +69,7 @@ void ForEachPolicy(Visit visit) {
       [](auto& q) -> auto& { return q.endpoint().multicast_locator_list; });
 }
 
-// Of writers alone, or found elsewhere in a writer than in a reader.
+// Only in writers, or placed differently in writers than in readers.
 constexpr const char* kPublishMode = "publishMode";
 constexpr const char* kTimes = "times";
 
@@ -79,7 +79,7 @@ bool CanOverride(const std::string& element) {
   return known;
 }
 
-// What both kinds of endpoint have.
+// Copies the policies common to both kinds of endpoint.
 template <typename Qos>
 void CopyStated(const std::set<std::string>& stated, const Qos& from, Qos& to) {
   ForEachPolicy([&](const char* name, auto policy) {
@@ -89,8 +89,8 @@ void CopyStated(const std::set<std::string>& stated, const Qos& from, Qos& to) {
   });
 }
 
-// @throws ConfigError unless a profile of this name may state `elements`; the
-// names are those of the topics with `suffix`.
+// @throws ConfigError unless a profile `name` may override `elements`; valid
+//   names are those of the topics with `suffix`.
 void CheckProfile(const std::string& path, const std::string& name,
                   const std::set<std::string>& elements,
                   const std::string& suffix) {
@@ -118,8 +118,8 @@ void CheckProfile(const std::string& path, const std::string& name,
   }
 }
 
-// The library keeps profiles by name for the life of the process and refuses
-// the same file twice.
+// The library keeps profiles by name for the lifetime of the process and
+// refuses to load a file twice.
 void LoadOnce(const std::string& path) {
   static std::mutex mutex;
   static std::string loaded;

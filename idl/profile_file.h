@@ -14,20 +14,20 @@
 namespace fdi::idl {
 
 /// The QoS file of --qos. A profile overrides exactly the policies that it
-/// states; all others stay as in qos.cpp, so that a file about reliability does
-/// not bring back the library's limit of ten valves.
+/// states; the others stay as in qos.cpp, so that a file about reliability does
+/// not reset the library's limit of ten valves.
 ///
 /// Element names are those of Fast DDS XML: "reliability", "historyQos", ...
 class ProfileFile {
  public:
   ProfileFile() = default;
 
-  /// Reads `path` and hands it to the library, once per process.
+  /// Reads `path` and loads it into the library, once per process.
   /// @throws ConfigError naming the file, and the profile or element, if it is
-  ///   missing, not XML, or states what cannot be overridden.
+  ///   missing, invalid, or states a policy that cannot be overridden.
   explicit ProfileFile(const std::string& path);
 
-  /// `qos` with what the profile `name` states in its place, if there is one.
+  /// `qos` with the policies that the profile `name` states, if there is one.
   /// @throws TransportError
   dds::DataWriterQos Override(const std::string& name, dds::DataWriterQos qos,
                               const dds::Publisher& publisher) const;

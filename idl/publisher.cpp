@@ -18,8 +18,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A full history often answers at once instead of blocking; this keeps the
-// retries from taking the processor that the reader needs.
+// A full history often returns at once instead of blocking; the back-off keeps
+// retries from starving the reader.
 constexpr auto kBackOff = std::chrono::microseconds(100);
 constexpr auto kDisposeTimeout = std::chrono::seconds(5);
 
@@ -69,8 +69,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
 
   ~Impl() override {
     writer->set_listener(nullptr);
-    // Deleting a writer frees its changes while its heartbeat may still walk
-    // through them, for ever if a dead reader has not acknowledged them.
+    // Deleting a writer frees its changes while its heartbeat may still iterate
+    // over them, forever if a dead reader has not acknowledged them.
     std::size_t removed = 0;
     writer->clear_history(&removed);
     publisher->delete_datawriter(writer);
@@ -79,8 +79,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  // The instance of the message that stands in `wire`; nullptr beyond the
-  // limit.
+  // The instance of `message`, which is already encoded in `wire`; nullptr
+  // beyond the limit.
   const dds::InstanceHandle_t* InstanceOf(const Message& message) {
     auto found = instances.find(KeyOf(message));
     if (found != instances.end()) {
@@ -93,7 +93,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
     return &instances.emplace(KeyOf(message), handle).first->second;
   }
 
-  // Calls `send` until the history has room. @returns whether it had in time.
+  // Retries `send` until the history has room. @returns false on timeout or
+  // stop.
   template <typename Send>
   bool Retry(Send send, const char* operation, const std::stop_token& stop,
              Clock::time_point deadline) {

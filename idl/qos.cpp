@@ -5,32 +5,32 @@
 namespace fdi::idl {
 namespace {
 
-// Unacknowledged samples that a lossless writer may have on the way: enough to
-// hide a round trip. The library scans its free list at every release, so that
-// larger histories cost throughput (fewer than 5000 measured best).
+// Unacknowledged samples of a lossless writer: enough to hide a round trip. The
+// library scans its free list at every release, so larger histories cost
+// throughput (below 5000 measured best).
 constexpr int kSamplesInFlight = 4096;
-// Samples of all valves that wait in the library once the queue of the
-// Subscriber is full; beyond it writers are made to wait. The limit is per
-// valve, and the library counts what is missing on the way towards it: 16 per
-// valve halved the rate of 2000 valves.
+// Samples of all valves that are held in the library once the queue of the
+// Subscriber is full; beyond it writers have to wait. The limit is per valve,
+// and the library counts messages missing on the way towards it: 16 per valve
+// halved the rate of 2000 valves.
 constexpr int kReaderBacklog = 131072;
-// Samples in a datagram. Fast DDS 3.1 holds their memory until it is sent, also
-// of those that a newer one has replaced: without room beside the history,
-// writing too fast fails with OUT_OF_RESOURCES. Allocated when needed.
+// Samples in a datagram. Fast DDS 3.1 holds their memory until it is sent,
+// including samples that a newer one has replaced: without spare room beside
+// the history, fast writing fails with OUT_OF_RESOURCES. Allocated on demand.
 constexpr int kSamplesInDatagram = 1024;
-// Samples of all valves that a live writer keeps, in case one got lost.
+// Samples of all valves that a live writer keeps for retransmission.
 constexpr int kLiveHistory = 32768;
-constexpr int kBatchesInFlight = 64;  // Of at most 48 kB.
+constexpr int kBatchesInFlight = 64;  // Up to 48 kB each.
 constexpr int kActionsInFlight = 64;
 constexpr int kModelSets = 256;
 constexpr int kMonitors = 64;
 
-// Fast DDS 2.9.1 deadlocks if a VOLATILE writer removes a reader, e.g. one that
-// died, while it is sending: what that reader had not acknowledged is removed,
+// Fast DDS 2.9.1 deadlocks if a VOLATILE writer removes a reader, e.g. a dead
+// one, while it is sending: it removes what that reader had not acknowledged,
 // which waits for the sending thread, which waits for the removal (upstream
-// pull requests 3468 and 5432). A TRANSIENT_LOCAL writer removes nothing then:
-// it keeps what was acknowledged until it needs the room. Readers that ask for
-// VOLATILE get nothing old from either.
+// pull requests 3468 and 5432). A TRANSIENT_LOCAL writer does not remove
+// anything then: it keeps acknowledged samples until it needs the room.
+// VOLATILE readers get no old samples from either.
 #if FDI_FAST_DDS == 2
 constexpr auto kWriterDurability = dds::TRANSIENT_LOCAL_DURABILITY_QOS;
 #else
@@ -49,9 +49,9 @@ Duration& HeartbeatPeriod(dds::DataWriterQos& writer) {
 #endif
 }
 
-// Limits for `instances` keys. An endpoint is refused unless max_samples is at
-// least the product. `allocated` sizes the lists of unacknowledged samples,
-// which otherwise grow one by one; payloads are never allocated ahead.
+// Limits for `instances` keys. The library refuses an endpoint if max_samples
+// is below the product. `allocated` sizes the lists of unacknowledged samples,
+// which otherwise grow one by one; payloads are never preallocated.
 void SetLimits(dds::ResourceLimitsQosPolicy& limits, int instances,
                int per_instance, int allocated) {
   limits.max_instances = instances;
@@ -60,8 +60,8 @@ void SetLimits(dds::ResourceLimitsQosPolicy& limits, int instances,
   limits.allocated_samples = std::min(limits.max_samples, allocated);
 }
 
-// What all topics share: reliable, volatile, sent by the library's thread (3
-// times the rate of sending in write()), a full history noticed within 50 ms
+// Common to all topics: reliable, volatile, sent by the library's thread (3
+// times the rate of sending in write()), a full history detected within 50 ms
 // instead of 3 s.
 EndpointQos Common(const std::string& name) {
   EndpointQos qos;
@@ -79,8 +79,8 @@ EndpointQos Common(const std::string& name) {
   reader.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
   reader.durability().kind = dds::VOLATILE_DURABILITY_QOS;
   reader.data_sharing().off();
-  // The dynamic modes refuse the end of an instance, which has no payload, and
-  // with it all that the writer sends later.
+  // The dynamic modes reject a dispose, which has no payload, and with it
+  // everything that the writer sends later.
   reader.endpoint().history_memory_policy =
       rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   return qos;
@@ -111,7 +111,7 @@ void ReaderKeepsAll(EndpointQos& qos, int instances) {
   SetLimits(qos.reader.resource_limits(), instances, per_instance, 256);
 }
 
-// A writer with one instance and its readers, lossless.
+// Lossless, for writers with one instance.
 void KeepInFlight(EndpointQos& qos, int messages) {
   qos.writer.history().kind = dds::KEEP_ALL_HISTORY_QOS;
   SetLimits(qos.writer.resource_limits(), 1, messages, 1);
@@ -125,7 +125,7 @@ void TransientLocal(EndpointQos& qos) {
   qos.reader.durability().kind = dds::TRANSIENT_LOCAL_DURABILITY_QOS;
 }
 
-// The policies as words, for the log.
+// Policies as text, for the log.
 std::string Text(const Duration& duration) {
   if (duration == kForever) {
     return "infinite";
@@ -173,7 +173,7 @@ PolicyTexts Texts(const dds::ReliabilityQosPolicy& reliability,
       {dds::OWNERSHIP_QOS_POLICY_ID, shared ? "SHARED" : "EXCLUSIVE"}};
 }
 
-// Our endpoints have functions for what remote ones have as members.
+// Our QoS has accessor functions where discovered QoS has members.
 PolicyTexts TextsOfOurs(const auto& qos) {
   return Texts(qos.reliability(), qos.durability(), qos.deadline(),
                qos.liveliness(), qos.ownership());
@@ -214,8 +214,8 @@ EndpointQos QosFor<DecisionMessage>(Profile /*profile*/, int valves) {
   return qos;
 }
 
-// With TRANSIENT_LOCAL and KEEP_ALL the library would hold, and search, what
-// was acknowledged long ago.
+// With TRANSIENT_LOCAL and KEEP_ALL the library would hold, and scan, samples
+// that were acknowledged long ago.
 template <>
 EndpointQos QosFor<DecisionBatchMessage>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_decision_batch");
@@ -241,7 +241,7 @@ EndpointQos QosFor<ModelSetInfoMessage>(Profile /*profile*/, int /*valves*/) {
 }
 
 // Dead or hung monitors are noticed after 5 s. MANUAL_BY_TOPIC, because with
-// the other kinds any other participant keeps the dead alive (Fast-DDS#4373).
+// the other kinds any other participant keeps a dead one alive (Fast-DDS#4373).
 template <>
 EndpointQos QosFor<MonitorStatusMessage>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_monitor_status");
@@ -255,7 +255,7 @@ EndpointQos QosFor<MonitorStatusMessage>(Profile /*profile*/, int /*valves*/) {
   return qos;
 }
 
-// The newest word is all that counts.
+// Only the newest state matters.
 template <>
 EndpointQos QosFor<PairState>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_pair_state");

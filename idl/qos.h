@@ -11,7 +11,7 @@
 #include "idl/endpoint.h"
 #include "idl/fast_dds.h"
 
-/// Inside idl/ only: the QoS of every topic, with the reasons beside it.
+/// Inside idl/ only: the QoS of every topic; qos.cpp gives the reasons.
 namespace fdi::idl {
 
 struct EndpointQos {
@@ -20,8 +20,8 @@ struct EndpointQos {
   dds::DataReaderQos reader{};
 };
 
-/// The QoS of the topic of Message for up to `valves` valves. Profiles that a
-/// topic does not know are kLive.
+/// The QoS of the topic of Message for up to `valves` valves. A profile that
+/// the topic does not have means kLive.
 template <typename Message>
 EndpointQos QosFor(Profile profile, int valves);
 template <>
@@ -46,7 +46,7 @@ EndpointQos QosFor<OperatorAction>(Profile profile, int valves);
 /// EndpointQos::name of every topic and profile.
 const std::set<std::string>& EndpointNames();
 
-/// The policies that two endpoints must agree on, in words, by policy id.
+/// Text of the policies on which two endpoints must agree, by policy id.
 using PolicyTexts = std::map<dds::QosPolicyId_t, std::string>;
 
 PolicyTexts Describe(const dds::DataWriterQos& qos);

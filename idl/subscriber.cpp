@@ -24,9 +24,9 @@ namespace {
 
 constexpr std::size_t kRefusedLimit = 65536;
 
-// Messages that wait for Take(), so many as fit into 8 MB; another 8 MB may be
-// taken and not yet handed out. They wait here and not in the library, which
-// searches its history at every release.
+// Messages queued for Take(): as many as fit into 8 MB; another 8 MB may have
+// been taken from the queue and not handed out yet. They are queued here and
+// not in the library, which scans its history at every release.
 template <typename Message>
 constexpr std::size_t QueueCapacity() {
   std::size_t bytes = sizeof(Message);
@@ -36,20 +36,20 @@ constexpr std::size_t QueueCapacity() {
   return std::clamp<std::size_t>((8U << 20U) / bytes, 16, 32768);
 }
 
-constexpr std::chrono::hours kLongestWait{1};  // The clock must not overflow.
+constexpr std::chrono::hours kLongestWait{1};  // Avoids overflow of the clock.
 constexpr std::chrono::milliseconds kLongestFarewell{500};
 
 struct HandleHash {
   std::size_t operator()(const dds::InstanceHandle_t& handle) const {
-    std::size_t hash = 0;  // The handle is an MD5 sum: any part will do.
+    std::size_t hash = 0;  // An MD5 sum: any part will do.
     std::memcpy(&hash, static_cast<const rtps::octet*>(handle.value),
                 sizeof hash);
     return hash;
   }
 };
 
-// 64-bit FNV-1a over the first bytes of the writer's GUID: 12 of the
-// participant, 4 of the entity.
+// 64-bit FNV-1a over the first bytes of the writer's GUID: 12 for the
+// participant, 16 with the entity.
 std::uint64_t HashOf(const dds::InstanceHandle_t& writer, std::size_t bytes) {
   std::uint64_t hash = 14695981039346656037U;
   for (std::size_t i = 0; i < bytes; ++i) {
@@ -81,7 +81,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
         bus.TopicOf(Traits::kTopic, dds::TypeSupport(new Type()));
     type = bus->find_type(topic->get_type_name());
     const EndpointQos ours = QosFor<Message>(profile, bus.options().max_valves);
-    // The reader is enabled once `reader` is set: callbacks use it.
+    // Enabled only after `reader` is set, because callbacks use it.
     dds::SubscriberQos subscriber_qos;
     subscriber_qos.entity_factory().autoenable_created_entities = false;
     for (const std::string& partition : partitions) {
@@ -102,7 +102,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   ~Impl() override {
     queue.Close();
     reader->set_listener(nullptr);
-    if (!holds_receipt) {  // Otherwise nothing is refused.
+    if (!holds_receipt) {  // Otherwise nothing was rejected.
       LetWritersFinish();
     }
     subscriber->delete_datareader(reader);
@@ -120,12 +120,12 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
            << dds::StatusMask::liveliness_changed();
   }
 
-  // A writer that removes a reader drops what this reader has not acknowledged,
-  // and in Fast DDS 2.9.1 deadlocks if its sending thread is sending just then,
-  // as it is while it repeats what had no room here (matched_reader_remove
+  // A writer that removes a reader drops what the reader has not acknowledged.
+  // In Fast DDS 2.9.1 it then deadlocks if its thread is sending at that
+  // moment, as when it retransmits what had no room here (matched_reader_remove
   // against the flow controller, upstream pull request 3468). Hence a reader
-  // that is behind takes and acknowledges all before it leaves, within
-  // kLongestFarewell. A writer that writes on without a pause is not helped.
+  // with a backlog takes and acknowledges everything before it leaves, within
+  // kLongestFarewell. This does not help against a writer that never pauses.
   void LetWritersFinish() {
     const Duration two_heartbeats{0, 100'000'000};
     const auto end = std::chrono::steady_clock::now() + kLongestFarewell;
@@ -140,7 +140,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     }
   }
 
-  // Of the thread that takes. Waits for the first message only.
+  // Called by the taking thread. Waits for the first message only.
   int HandOut(const Handlers<Message>& handlers,
               std::chrono::milliseconds timeout, int limit) {
     int handed = 0;
@@ -169,10 +169,10 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     return handed;
   }
 
-  // Moves from the library to `queue` while there is room. Called by the
-  // thread that receives, which holds locks of the library and so must not
-  // wait for the thread that takes but with holds_receipt, and by the thread
-  // that made room: who comes second leaves the work to the first.
+  // Moves messages from the library to `queue` while there is room. Called by
+  // the receiving thread, which holds locks of the library and may wait for the
+  // taking thread only with holds_receipt, and by the taking thread after it
+  // made room. If both call it, the second one leaves the work to the first.
   void Drain(bool waits) noexcept {
     pending.store(true);
     while (pending.load()) {
@@ -218,15 +218,15 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     }
     if (!item.ended && !keys.contains(info.instance_handle)) {
       if (keys.size() >= max_keys) {
-        keys.clear();  // Ids that come and go for ever must not fill memory.
+        keys.clear();  // Bounds the memory if ids keep changing.
       }
       keys.emplace(info.instance_handle, CopyOf(KeyOf(item.message)));
     }
-    queue.TryPush(std::move(item));  // There is room, or it is the end.
+    queue.TryPush(std::move(item));  // There is room, or it is closed.
   }
 
-  // Sets the key of the instance that has ended. An end carries the handle of
-  // its instance only, an MD5 sum of the key: `keys` has what it stands for.
+  // Sets the key of the disposed instance. A dispose carries only the instance
+  // handle, an MD5 sum of the key, which `keys` maps back.
   bool FindKey(const dds::InstanceHandle_t& handle, Message& message) {
     const auto found = keys.find(handle);
     if (found == keys.end()) {
@@ -300,15 +300,15 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   bool has_lease{false};
   Matched matched;
   BoundedQueue<Item> queue{QueueCapacity<Message>()};
-  std::vector<Item> batch;  // Taken from it, and handed out up to `next`.
+  std::vector<Item> batch;  // Taken from `queue`; handed out up to `next`.
   std::size_t next{0};
   std::atomic<bool> pending{false};
-  std::atomic<std::uint64_t> received{0};  // Handed out, as is `ended`.
+  std::atomic<std::uint64_t> received{0};  // Handed out; likewise `ended`.
   std::atomic<std::uint64_t> ended{0};
 
   mutable std::mutex status_mutex;  // Guards what follows.
-  SubscriberStatus counted;         // lost: as the library counts,
-  std::uint64_t missing{0};         // as `gaps` does.
+  SubscriberStatus counted;         // Its `lost` is the library's count,
+  std::uint64_t missing{0};         // this is that of `gaps`.
   std::set<dds::InstanceHandle_t> refused_valves;
 
   std::mutex drain_mutex;  // Guards what follows.
@@ -354,7 +354,7 @@ SubscriberStatus Subscriber<Message>::status() const {
   status.received = impl.received.load(std::memory_order_relaxed);
   status.ended = impl.ended.load(std::memory_order_relaxed);
   status.undecodable += refused_bytes;
-  // Messages refused for a reason of their own are missing, too.
+  // Messages rejected for other reasons are missing as well.
   const std::uint64_t explained = status.rejected_instances + refused_bytes;
   status.lost =
       std::max(impl.missing - std::min(impl.missing, explained), status.lost);

@@ -14,11 +14,11 @@
 #include "diagnosis/sample.h"
 #include "diagnosis/verdict.h"
 
-/// What goes over the wire, as plain structs: one per topic `fdi/v1/...`.
-/// Doubles arrive bit for bit as they were sent, NaN included.
+/// The messages on the wire as plain structs, one per topic `fdi/v1/...`.
+/// Doubles are transmitted bit for bit, including NaN.
 namespace fdi::idl {
 
-/// Lengths in bytes; a longer text is refused, never cut.
+/// Lengths in bytes; a longer text is rejected, never truncated.
 inline constexpr std::size_t kMaxIdLength = 64;  ///< Valve, set, observer, ...
 inline constexpr std::size_t kMaxNameLength = 32;  ///< Channel, counter.
 inline constexpr std::size_t kMaxTextLength = 255;
@@ -26,7 +26,7 @@ inline constexpr std::size_t kMaxGroups = 64;
 inline constexpr std::size_t kMaxCounters = 64;
 inline constexpr std::size_t kMaxBatch = 128;
 
-/// Stamps of samples, 1900 to 2100: the time between any two has no overflow.
+/// Range of sample stamps, 1900 to 2100: differences cannot overflow.
 inline constexpr std::int64_t kMinStampNs = -2'208'988'800'000'000'000;
 inline constexpr std::int64_t kMaxStampNs = 4'102'444'800'000'000'000;
 
@@ -37,8 +37,8 @@ struct ValveSampleMessage {
 };
 
 /// Topic fdi/v1/DecisionVector, key valve_id. Of the arrays in `verdict` only
-/// the first channel_count, fault_count and observer_count entries travel;
-/// transitions do not: they are FaultEvents.
+/// the first channel_count, fault_count and observer_count entries are sent;
+/// transitions are not: they are FaultEvents.
 struct DecisionMessage {
   std::string valve_id;
   std::uint64_t model_hash{0};  ///< ModelSet::content_hash; 0 if unassigned.
@@ -101,7 +101,7 @@ struct MonitorStatusMessage {
 /// @throws DataError unless `id` has 1..64 bytes and no NUL.
 void ValidateId(std::string_view id);
 
-/// The sizes of `models` beside the verdict. @throws as ValidateId().
+/// Adds the array sizes of `models` to a verdict. @throws as ValidateId().
 DecisionMessage MakeDecision(std::string valve_id, const ModelSet& models,
                              const Verdict& verdict);
 

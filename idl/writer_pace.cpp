@@ -11,11 +11,11 @@ using std::chrono::duration_cast;
 using std::chrono::seconds;
 
 constexpr std::int64_t kBurst = std::int64_t{1} << 20;  // 2 ms of counting.
-// Well above what a writer can send, and what one sends for longer.
+// Well above what a writer can send, briefly or for longer.
 constexpr std::int64_t kPerSecond = 1'000'000;
 constexpr std::int64_t kPerSecondOfSilence = 100'000;
 constexpr seconds kSilence{10};
-// A number that was left out stays in a set of the library, 48 bytes each.
+// The library keeps each skipped number in a set, at 48 bytes.
 constexpr std::int64_t kCostOfLeftOut = 64;
 constexpr std::size_t kMostRecent = 32'768;
 
@@ -44,8 +44,8 @@ WriterPace::State& WriterPace::Find(const WriterGuid& writer,
   if (recent_.size() == kMostRecent) {
     older_ = std::exchange(recent_, {});
   }
-  // Writers of discovery start at 1 with their participant; others may have
-  // written for months.
+  // Discovery writers start at 1 with their participant; others may have been
+  // writing for months.
   State state{IsOfDiscovery(writer.back()) ? 0 : number, kBurst, now};
   if (const auto found = older_.find(writer); found != older_.end()) {
     state = found->second;

@@ -16,8 +16,8 @@ std::int64_t DayOf(std::int64_t stamp_ns) {
   return stamp_ns / kNsPerDay - (stamp_ns % kNsPerDay < 0 ? 1 : 0);
 }
 
-// Puts each record of `newer` on top of the one in `older` with its key, by
-// `combine`; behind the others if there is none or `combine` says false.
+// Combines each record of `newer` with the record of `older` that has the same
+// key; appends it if there is none or `combine` returns false.
 template <typename T, typename KeyOf, typename Combine>
 void Merge(std::vector<T>& older, std::vector<T> newer, KeyOf key_of,
            Combine combine) {

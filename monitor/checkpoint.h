@@ -12,22 +12,24 @@
 
 namespace fdi::monitor {
 
-/// `newer` on top of `older`: time and health add up, accumulators and
-/// stretches that grew are replaced. Of each at most 100 000 records.
+/// Merges `newer` into `older`: time and health add up, accumulators and
+/// stretches that grew are replaced. Keeps at most 100 000 records of each
+/// kind.
 Checkpoint Merged(Checkpoint older, Checkpoint newer);
 
-/// `newer` behind `older`; of the same stretch the newer one stands. What is
-/// beyond 100 000, as while the disk is full, is left out: these are notes, no
-/// evidence.
+/// Appends `newer` to `older`; of two records of the same stretch the newer one
+/// is kept. Records beyond 100 000, which occur while the disk is full, are
+/// dropped: they are not evidence.
 std::vector<ShadowDifference> Merged(std::vector<ShadowDifference> older,
                                      std::vector<ShadowDifference> newer);
 
-/// The most days or hours that a valve keeps until they are taken.
+/// The most days or hours that a valve accumulates between checkpoints.
 inline constexpr std::size_t kMostBookRows = 256;
 
-/// The row of a book that a sample is added to: the one that `is` its own, else
-/// the last one if it `may_open` none or there are too many.
-/// @returns null if a row is to be begun.
+/// The row of a book to which a sample is added: the one for which `is` holds,
+/// else the last one if no row may be opened (`may_open` is false, or there are
+/// too many).
+/// @returns null if a new row is to be appended.
 template <typename Row, typename Is>
 Row* FindRow(std::vector<Row>& rows, Is is, bool may_open) {
   const auto own = std::find_if(rows.rbegin(), rows.rend(), is);
@@ -38,10 +40,10 @@ Row* FindRow(std::vector<Row>& rows, Is is, bool may_open) {
   return rows.empty() || open ? nullptr : &rows.back();
 }
 
-/// The time of one valve by quality and day, until it is taken.
+/// Time of one valve by quality and day, accumulated until the next checkpoint.
 class CoverageBook {
  public:
-  /// @param accepted false: a sample whose stamp does not begin a day.
+  /// @param accepted if false, the sample's stamp does not open a new day.
   void Add(std::int64_t stamp_ns, Quality quality, std::uint64_t samples = 1,
            bool accepted = true);
   std::size_t rows() const { return days_.size(); }
@@ -54,7 +56,7 @@ class CoverageBook {
     std::int64_t day;
     QualityCount samples;
   };
-  std::vector<Day> days_;  // Mostly one.
+  std::vector<Day> days_;  // Usually one.
 };
 
 }  // namespace fdi::monitor

@@ -11,7 +11,7 @@ struct CounterInfo {
   std::string_view name;
   std::string_view family;
   std::string_view help;
-  std::string_view reason{};  // Of an exclusion.
+  std::string_view reason{};  // Reason label of an exclusion.
 };
 
 constexpr std::string_view kExcluded = "fdi_samples_excluded_total";
@@ -78,7 +78,7 @@ std::string Lower(std::string_view text) {
   return lower;
 }
 
-// Of a label's value: \ " and line feed are escaped.
+// Escapes \ " and line feed in a label's value.
 void AppendEscaped(std::string_view value, std::string& text) {
   for (const char c : value) {
     switch (c) {
@@ -154,7 +154,7 @@ void Exposition::Value(std::uint64_t value, Label label) {
 }
 
 void Exposition::Value(double value, Label label) {
-  std::array<char, 32> digits{};  // Of a double 24 suffice.
+  std::array<char, 32> digits{};  // A double needs 24.
   const auto end =
       std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
   Line(std::string_view(digits.data(), end), label);

@@ -12,8 +12,8 @@
 
 namespace fdi::monitor {
 
-/// What a monitor counts from its start on. The table in counters.cpp says in
-/// words what each of them is.
+/// What a monitor counts since its start. The table in counters.cpp describes
+/// each counter.
 enum class Counter : std::uint8_t {
   kReceived,
   kDiagnosed,
@@ -48,12 +48,11 @@ enum class Counter : std::uint8_t {
 inline constexpr std::size_t kCounterCount =
     static_cast<std::size_t>(Counter::kCount_);
 
-/// A number that a monitor tells: on the bus by its name, on the page of
-/// metrics as a value of a family. Values of one family stand side by side and
-/// differ in a label.
+/// A reported number: on the bus by its name, on the metrics page as a value of
+/// a family. Values of one family are adjacent and differ in a label.
 struct Measure {
   enum class Type : std::uint8_t { kCounter, kGauge };
-  std::string name;         ///< "received"; empty: not told on the bus.
+  std::string name;         ///< "received"; empty: not published on the bus.
   std::string_view family;  ///< "fdi_waiting"; empty: not on the page.
   Type type{Type::kCounter};
   std::string_view help;
@@ -62,8 +61,8 @@ struct Measure {
   std::uint64_t value{0};
 };
 
-/// Totals: by Counter; of samples by Intake; of samples, or of sample periods
-/// without any (STALE), by Quality. Thread safe.
+/// Totals: by Counter; samples by Intake; samples, or sample periods without
+/// one (STALE), by Quality. Thread safe.
 class Counters {
  public:
   template <typename What>
@@ -75,9 +74,9 @@ class Counters {
     return totals_[Place(what)].load(std::memory_order_relaxed);
   }
 
-  /// All totals, as of now: of the counters, of the samples by verdict of the
-  /// intake ("accepted", "range", ...), of the sample periods by quality
-  /// ("samples_live", ...).
+  /// All current totals: counters, samples by verdict of the intake
+  /// ("accepted", "range", ...), sample periods by quality ("samples_live",
+  /// ...).
   std::vector<Measure> Measures() const;
 
  private:
@@ -96,9 +95,9 @@ class Counters {
       totals_{};
 };
 
-/// A page of metrics in the text format of Prometheus, version 0.0.4: for each
-/// family `# HELP`, `# TYPE`, then its values. Names of counters end in _total
-/// and carry the unit, e.g. fdi_database_wal_bytes.
+/// A metrics page in the Prometheus text format, version 0.0.4: for each family
+/// `# HELP`, `# TYPE`, then its values. Names of counters end in _total and
+/// carry the unit, e.g. fdi_database_wal_bytes.
 class Exposition {
  public:
   using Type = Measure::Type;
@@ -108,14 +107,14 @@ class Exposition {
     std::string_view value;
   };
 
-  /// Begins a family. Each name once.
+  /// Begins a family. Call once per name.
   void Family(std::string_view name, Type type, std::string_view help);
 
-  /// A value of the family begun last, with at most one label.
+  /// A value of the current family, with at most one label.
   void Value(double value, Label label = {});
   void Value(std::uint64_t value, Label label = {});
 
-  /// Measures with a family, those of one family in a row.
+  /// Adds measures that have a family; those of one family must be adjacent.
   void Add(const std::vector<Measure>& measures);
 
   const std::string& text() const { return text_; }

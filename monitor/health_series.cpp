@@ -14,7 +14,7 @@
 namespace fdi::monitor {
 namespace {
 
-constexpr double kLeastLiveHours = 1.0;  // of a day that counts
+constexpr double kLeastLiveHours = 1.0;  // A day needs this many.
 constexpr double kCoveredShare = 0.2;
 
 using Kind = HealthLimit::Kind;
@@ -67,7 +67,7 @@ std::int64_t DayOf(const HealthHour& hour) {
   return hour.hour / 24 - (hour.hour % 24 < 0 ? 1 : 0);
 }
 
-// A mean within a day: of all, or of one bin of CV.
+// A daily mean: of all samples, or of one bin of CV.
 struct Cell {
   std::int64_t day{0};
   int bin{0};
@@ -135,7 +135,7 @@ void AddStrengths(const HealthHour& hour, int fault, Cells& cells) {
   }
 }
 
-// a_b of m_db = a_b + slope t, weighted by samples.
+// The a_b of m_db = a_b + slope t, weighted by samples.
 std::map<int, double> Intercepts(const std::vector<Cell>& cells) {
   struct Bin {
     double w{0.0}, wt{0.0}, wm{0.0}, wtt{0.0}, wtm{0.0};
@@ -151,6 +151,8 @@ std::map<int, double> Intercepts(const std::vector<Cell>& cells) {
     bin.wtt += cell.weight * t * t;
     bin.wtm += cell.weight * t * cell.mean();
   }
+  // slope = Σ_b S_tm / Σ_b S_tt with S_xy = Σ w x y − Σ w x Σ w y / Σ w within
+  // bin b.
   double spread = 0.0;
   double product = 0.0;
   for (const auto& [index, bin] : bins) {
@@ -191,7 +193,7 @@ std::vector<DailyValue> Adjusted(const std::vector<Cell>& cells) {
   return days;
 }
 
-// Per day that was seen.
+// Totals of the days with samples.
 std::vector<DailyValue> Totals(std::span<const HealthHour> hours, Kind kind) {
   std::map<std::int64_t, double> days;
   for (const HealthHour& hour : hours) {
@@ -207,7 +209,7 @@ std::vector<DailyValue> Totals(std::span<const HealthHour> hours, Kind kind) {
   return values;
 }
 
-// Of the last epoch and, unless `any_models`, of the last model set.
+// Hours of the last epoch and, unless `any_models`, of the last model set.
 std::vector<HealthHour> Comparable(std::span<const HealthHour> hours,
                                    bool any_models) {
   std::vector<HealthHour> comparable;
@@ -302,7 +304,7 @@ HealthForecast Forecast(const HealthSeries& series, const HealthLimit& limit) {
   return forecast;
 }
 
-// How limits and forecasts are written.
+// Text form of limits and forecasts.
 
 HealthLimit ParseHealthLimit(std::string_view text) {
   const std::size_t sign = text.find('=');

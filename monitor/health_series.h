@@ -12,13 +12,13 @@
 
 namespace fdi::monitor {
 
-/// What is followed over months, and how far it may go.
+/// A quantity followed over months, and its limit.
 struct HealthLimit {
   enum class Kind : std::uint8_t {
     kResidual,   ///< Mean residual of a signal [its unit].
-    kDeviation,  ///< Likewise, of what the normal model expects [%].
+    kDeviation,  ///< The same, relative to what the normal model expects [%].
     kStrength,   ///< Mean estimated strength of a fault [-].
-    kTravel,     ///< Strokes, of 100 % of travel each.
+    kTravel,     ///< Full strokes, of 100 % of travel.
     kReversals,
   };
   Kind kind{Kind::kResidual};
@@ -31,38 +31,38 @@ struct HealthLimit {
   }
 };
 
-/// "F=-10%", "X=3", "f19=0.5", "travel=100000", "reversals=1e6"; names in any
-/// case. @throws ConfigError naming `text` and what is accepted.
+/// Parses "F=-10%", "X=3", "f19=0.5", "travel=100000", "reversals=1e6"; names
+/// in any case. @throws ConfigError naming `text` and what is accepted.
 HealthLimit ParseHealthLimit(std::string_view text);
-/// The same backwards.
+/// The inverse of ParseHealthLimit().
 std::string HealthLimitText(const HealthLimit& limit);
 /// "m3/h", "%", "", "strokes"
 std::string HealthUnit(const HealthLimit& limit, FlowUnit flow_unit);
 
-/// What the hours say about one quantity.
+/// What the hours of health say about one quantity.
 struct HealthSeries {
-  std::vector<DailyValue> days;  ///< Days since 1970-01-01 that were judged.
+  std::vector<DailyValue> days;  ///< Judged days, since 1970-01-01.
   double seen_hours{0.0};
   double live_hours{0.0};
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
 };
 
-/// Daily values of hours in order of time, of the epoch that came last, and,
-/// but for travel and reversals, of the model set that came last: what another
-/// valve or another model said does not compare. A day needs one LIVE hour.
+/// Daily values of chronological hours from the last epoch and, except for
+/// travel and reversals, from the last model set: what another valve or another
+/// model reported is not comparable. A day needs one LIVE hour.
 ///
-/// Residuals depend on where the valve works. With m_db the mean of day d in
-/// bin b, m_db = a_b + slope t is fitted over all bins with one slope, and the
-/// value of a day is the mean of m_db − a_b, plus the mean of a_b: a change of
-/// operation is no drift.
+/// Residuals depend on the operating point of the valve. With m_db the mean of
+/// day d in bin b, m_db = a_b + slope t is fitted over all bins with one common
+/// slope; the value of a day is the mean of m_db − a_b, plus the mean of a_b.
+/// So a change of operation does not look like drift.
 HealthSeries SeriesOf(std::span<const HealthHour> hours,
                       const HealthLimit& limit);
 
-/// How long until a limit is met.
+/// When a limit will be reached.
 struct HealthForecast {
   enum class Answer : std::uint8_t {
-    kTime,     ///< `time` holds.
-    kReached,  ///< It is at or beyond the limit now.
+    kTime,     ///< `time` is set.
+    kReached,  ///< At or beyond the limit now.
     kAway,     ///< A significant trend, but not towards the limit.
     kNoTrend,  ///< No significant trend (two-sided test at 5 %).
     kOutside,  ///< Mostly outside what was trained: less than one LIVE hour
@@ -70,9 +70,9 @@ struct HealthForecast {
     kTooFew,   ///< Fewer than kTrendDays days.
   };
   Answer answer{Answer::kTooFew};
-  int days{0};                  ///< Days it rests on,
-  double first_day{0.0};        ///< from
-  double last_day{0.0};         ///< to.
+  int days{0};                  ///< Number of days used,
+  double first_day{0.0};        ///< the first
+  double last_day{0.0};         ///< and the last of them.
   std::optional<double> now;    ///< Level on the last day, or the total.
   std::optional<double> slope;  ///< [1/day]
   std::optional<TimeToLimit> time;

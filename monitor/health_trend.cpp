@@ -14,8 +14,8 @@ constexpr double kHuber = 1.345;
 constexpr double kNormalMad = 0.674489750196082;  // MAD of a unit normal
 constexpr double kMaxCorrelation = 0.9;
 constexpr int kIterations = 50;
-constexpr double kNinety = 0.95;        // one-sided, of a 90 % interval
-constexpr double kFivePercent = 0.975;  // one-sided, of a two-sided test
+constexpr double kNinety = 0.95;        // quantile of a 90 % interval
+constexpr double kFivePercent = 0.975;  // quantile of a two-sided 5 % test
 
 double Median(std::vector<double> values) {
   const auto middle =
@@ -27,7 +27,7 @@ double Median(std::vector<double> values) {
   return 0.5 * (*middle + *std::max_element(values.begin(), middle));
 }
 
-// Scale of residuals about 0.
+// Robust scale of residuals about 0.
 double Scale(const std::vector<double>& residuals) {
   std::vector<double> sizes;
   for (const double r : residuals) {
@@ -36,7 +36,7 @@ double Scale(const std::vector<double>& residuals) {
   return Median(std::move(sizes)) / kNormalMad;
 }
 
-// Line, or level if `slope` is to stay 0, by weighted least squares.
+// Weighted least squares for a line, or for a level if not `with_slope`.
 void Solve(std::span<const DailyValue> values,
            const std::vector<double>& weights, bool with_slope,
            TrendLine& line) {
@@ -84,7 +84,7 @@ double Correlation(std::span<const DailyValue> values,
   return std::clamp(corrected, 0.0, kMaxCorrelation);
 }
 
-// Variances from Huber's ψ of the residuals.
+// Sets the variances, from Huber's ψ of the residuals.
 void Judge(std::span<const DailyValue> values, double scale, int parameters,
            TrendLine& line) {
   const auto n = static_cast<double>(values.size());
@@ -165,7 +165,7 @@ std::optional<TimeToLimit> ToLimit(const TrendLine& line, double limit,
   const double gap = limit - line.At(from);
   const double start = limit - line.At(line.first_day);
   if (gap * line.slope <= 0.0) {
-    // Met between the first day and `from`, or moving away.
+    // The limit was passed before `from`, or the line leads away from it.
     return start * line.slope > 0.0 ? std::optional(TimeToLimit{})
                                     : std::nullopt;
   }

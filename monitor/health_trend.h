@@ -5,24 +5,24 @@
 
 namespace fdi::monitor {
 
-/// A value of one day.
+/// The value of one day.
 struct DailyValue {
-  double day{0.0};  ///< Since any fixed day.
+  double day{0.0};  ///< Since an arbitrary origin.
   double value{0.0};
 };
 
 /// A straight line through daily values, y(t) = level + slope (t − middle),
 /// with the variances of both, which are independent.
 ///
-/// It is a Huber M-estimate (k = 1.345, scale by the median absolute
-/// deviation): a few odd days do not turn it. Days are not independent: with ρ
-/// the correlation of residuals of neighbouring days, corrected for the bias
-/// that fitting a line brings, n days tell as much as
+/// It is a Huber M-estimate (k = 1.345, scale from the median absolute
+/// deviation), so a few outlying days do not tilt it. Days are not independent:
+/// with ρ the correlation of the residuals of neighbouring days, corrected for
+/// the bias caused by fitting the line, n days are worth
 ///
 ///     n_e = n (1 − ρ) / (1 + ρ)
 ///
-/// independent ones. Variances are larger by n / n_e, and quantiles are those
-/// of Student's t with n_e − 2 degrees of freedom.
+/// independent ones. Variances grow by n / n_e, and quantiles are those of
+/// Student's t with n_e − 2 degrees of freedom.
 struct TrendLine {
   double middle{0.0};  ///< Mean of the days.
   double level{0.0};   ///< [unit]
@@ -36,31 +36,31 @@ struct TrendLine {
   double last_day{0.0};
 
   double At(double day) const { return level + slope * (day - middle); }
-  /// Two-sided test of the slope at 5 %.
+  /// Two-sided test of the slope at the 5 % level.
   bool significant() const;
 };
 
-/// The least days that a line is drawn through.
+/// Minimum number of days for a fit.
 inline constexpr int kTrendDays = 8;
 
-/// Nothing if there are fewer than kTrendDays values, or all of one day.
+/// Nothing if there are fewer than kTrendDays values, or all are of one day.
 std::optional<TrendLine> FitTrend(std::span<const DailyValue> values);
 
-/// When a line meets a limit, in days after `from`; at least 0.
+/// When a line reaches a limit, in days after `from`; at least 0.
 struct TimeToLimit {
   double days{0.0};
-  double lower{0.0};  ///< Of a 90 % interval, by Fieller's theorem.
+  double lower{0.0};  ///< Ends of a 90 % interval, by Fieller's theorem.
   double upper{0.0};
 };
 
 /// Nothing if the slope is not significant, or leads away from the limit.
-/// Zero where the limit is passed at `from`.
+/// Zero if the limit has been passed by `from`.
 std::optional<TimeToLimit> ToLimit(const TrendLine& line, double limit,
                                    double from);
 
-/// When a sum that grows by `values` a day on average has grown by
-/// `remaining`, with a 90 % interval as above; `upper` may be infinite.
-/// Nothing if it does not grow, or there are fewer than kTrendDays values.
+/// When a total that grows by `values` a day on average has grown by
+/// `remaining`, with a 90 % interval as above; `upper` may be infinite. Nothing
+/// if it does not grow, or with fewer than kTrendDays values.
 std::optional<TimeToLimit> ToTotal(std::span<const DailyValue> values,
                                    double remaining);
 

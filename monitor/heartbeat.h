@@ -8,8 +8,8 @@
 
 namespace fdi::monitor {
 
-/// A thread's sign of life: it beats whenever it has got on with its work, and
-/// at least each second while there is none.
+/// A thread's sign of life: it beats whenever it makes progress, and at least
+/// once a second while it is idle.
 ///
 /// Thread safe.
 class Pulse {
@@ -27,7 +27,7 @@ class Pulse {
   std::atomic<Clock::duration> last_{Clock::now().time_since_epoch()};
 };
 
-/// The threads that must get on for the monitor to be of use. The pulses
+/// The threads that must make progress for the monitor to be useful. The pulses
 /// outlive this.
 class Heartbeat {
  public:
@@ -57,19 +57,19 @@ class Heartbeat {
   std::vector<Member> members_;
 };
 
-/// When to notify a service manager that all is well: once in each interval,
-/// and only if every thread got on since the last time.
+/// Decides when to notify a service manager that all is well: once per
+/// interval, and only if every thread made progress since the last
+/// notification.
 class Watchdog {
  public:
   using TimePoint = Heartbeat::TimePoint;
   using Interval = std::chrono::microseconds;
 
-  /// @param interval between two notifications; half of what the manager
-  ///   allows.
+  /// @param interval half of the timeout that the manager allows.
   Watchdog(const Heartbeat& heartbeat, Interval interval, TimePoint now)
       : heartbeat_(heartbeat), interval_(interval), notified_(now) {}
 
-  /// @returns whether to notify now; then it is taken as done.
+  /// @returns whether to notify now, which is then taken as done.
   bool Due(TimePoint now) {
     if (now < next() || !heartbeat_.StalledSince(notified_).empty()) {
       return false;
@@ -78,7 +78,7 @@ class Watchdog {
     return true;
   }
 
-  /// When to ask again.
+  /// When to call Due() next.
   TimePoint next() const { return notified_ + interval_; }
 
  private:

@@ -11,13 +11,12 @@
 namespace fdi::monitor {
 namespace {
 
-// Bounds how long a commit takes, and so how long later events wait for it.
+// Bounds the time of a commit, and so how long later events wait for it.
 constexpr std::size_t kRecordsPerCommit = 1'000;
 
-// Few and large transactions: the newest chunk of a trace is packed anew in
-// each of them.
+// Few large transactions, because each one repacks the newest chunk of a trace.
 constexpr std::size_t kPointsPerCommit = 5'000;
-// So many open episodes grow at once: half a millisecond each.
+// Number of open episodes extended per commit; each takes half a millisecond.
 constexpr int kTracesPerCommit = 100;
 
 constexpr std::chrono::milliseconds kLastDelivery{300};
@@ -37,7 +36,7 @@ Journal::~Journal() {
   try {
     Stop();
   } catch (...) {
-    // Whoever wants to know calls Stop().
+    // The error is reported only to those who call Stop() themselves.
   }
 }
 
@@ -57,8 +56,8 @@ void Journal::Stop() {
     stop_by_ = Clock::now() + options_.stop_limit;
     work_.notify_one();
   }
-  // The publisher ends after the writer, which may still commit what it waits
-  // for; then what it published last is marked by this thread.
+  // The publisher ends after the writer, whose last commits it awaits; then
+  // this thread marks what was published last.
   FirstError errors;
   errors.Try([this] { writer_.Join(); });
   {
@@ -188,7 +187,8 @@ void Journal::Write() {
       }
       last_attempt = stopping_;
     }
-    // While the history fails, a commit that succeeds tells that it answers.
+    // While the history is degraded, a successful commit shows that it has
+    // recovered.
     const bool served = (!degraded_ || CommitBuffered()) && WriteWaiting();
     if (!served) {
       FailWaitingEvents();
@@ -198,15 +198,15 @@ void Journal::Write() {
     const std::lock_guard lock(mutex_);
     const bool idle =
         records_.empty() && traces_.empty() && checkpoint_.empty();
-    // An attempt that failed before Stop() was called is not the last one: the
-    // history may answer again.
+    // An attempt that failed before Stop() is not the last one: the history may
+    // have recovered since.
     if ((stopping_ && idle) || (last_attempt && !served)) {
       return;
     }
   }
 }
 
-// Commits what waits, the evidence in its turn.
+// Commits what is queued, events before evidence.
 // @returns false once the history fails.
 bool Journal::WriteWaiting() {
   while (true) {
@@ -252,8 +252,8 @@ bool Journal::WriteRecords() {
   }
 }
 
-// Events, resumptions and looks in one commit; gaps and marks are buffered once
-// that succeeded, so that a repetition buffers nothing twice.
+// Commits events, resumptions and looks together; gaps and marks are buffered
+// only after that succeeded, so that a retry does not buffer them twice.
 bool Journal::WriteBatch(const std::vector<const Record*>& batch) {
   const bool any = std::ranges::any_of(batch, [](const Record* record) {
     return std::holds_alternative<PendingEvent>(*record) ||
@@ -292,7 +292,7 @@ bool Journal::WriteBatch(const std::vector<const Record*>& batch) {
          });
 }
 
-// One that fails is merged with the next.
+// A checkpoint that fails is merged into the next one.
 bool Journal::WriteCheckpoint() {
   Checkpoint checkpoint;
   {
@@ -308,8 +308,9 @@ bool Journal::WriteCheckpoint() {
   return false;
 }
 
-// Buffers evidence and commits it at once, so that no event waits for it. Once
-// one does wait it is stored with what is buffered by then.
+// Buffers evidence and commits it immediately, so that no event waits for it.
+// An event that arrives meanwhile is committed with the evidence buffered so
+// far.
 bool Journal::WriteTraces() {
   last_commit_ = Clock::now();
   std::size_t points = 0;
@@ -366,7 +367,8 @@ bool Journal::Attempt(const std::function<void()>& call) {
   }
 }
 
-// No event that waits behind a failed one needs to wait for its deadline.
+// After one event has failed, those queued behind it need not wait for their
+// deadlines.
 void Journal::FailWaitingEvents() {
   const std::lock_guard lock(mutex_);
   for (const Record& record : records_) {
@@ -409,8 +411,8 @@ void Journal::PublishAll() {
   }
 }
 
-// Marks as sent what was published before `limit`, if all is acknowledged, and
-// what is too much.
+// Marks events published before `limit` as sent if all are acknowledged, and
+// the oldest ones beyond max_undelivered in any case.
 void Journal::MarkDelivered(Clock::time_point limit,
                             std::chrono::milliseconds patience) {
   const auto due = [&] {

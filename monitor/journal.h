@@ -23,39 +23,39 @@ namespace fdi::monitor {
 
 /// Settings of Journal.
 struct JournalOptions {
-  std::chrono::milliseconds patience{200};  ///< Of the bus for the disk.
+  std::chrono::milliseconds patience{200};  ///< Maximum wait for a commit.
   std::chrono::milliseconds commit_period{1000};
   std::chrono::milliseconds retry_period{1000};
-  std::chrono::milliseconds stop_limit{1000};  ///< Of evidence at the end.
-  std::size_t max_records{100'000};         ///< Events, gaps and marks waiting.
-  std::size_t max_trace_points{2'000'000};  ///< Evidence waiting.
-  /// Whether all subscribers there are have, in time, what was published.
+  std::chrono::milliseconds stop_limit{1000};  ///< For evidence at shutdown.
+  std::size_t max_records{100'000};         ///< Queued events, gaps and marks.
+  std::size_t max_trace_points{2'000'000};  ///< Queued evidence.
+  /// Whether all current subscribers acknowledge, within the timeout, what was
+  /// published.
   std::function<bool(std::chrono::milliseconds)> acknowledged{
       [](std::chrono::milliseconds) { return true; }};
-  /// What was published is kept to be sent again for so long, as subscribers
-  /// may still be about to find us, and until it is acknowledged.
+  /// Minimum time for which a published event may be sent again, because new
+  /// subscribers may still be discovering us; it also has to be acknowledged.
   std::chrono::milliseconds delivery_time{10'000};
   std::size_t max_undelivered{
-      10'000};  ///< Beyond it the oldest counts as sent.
+      10'000};  ///< Beyond it the oldest is marked as sent.
 };
 
-/// Takes fault events to the history and to the bus, in this order, and
-/// evidence, gaps and checkpoints to the history. Never blocks the diagnosis.
+/// Passes fault events to the history and then to the bus, and evidence, gaps
+/// and checkpoints to the history. Never blocks the diagnosis.
 ///
 /// A published event is marked as sent once subscribers have acknowledged it;
-/// what is not marked is sent again by the next session.
+/// unmarked events are republished by the next session.
 ///
-/// Two threads, because a commit may take as long as it likes: the history
-/// thread commits, events before evidence, those that wait together at once;
-/// the publisher publishes the events in their order, each as soon as it is
-/// committed, or once committing failed, or 200 ms after it came, then as not
-/// persisted.
+/// Two threads, because the duration of a commit is unbounded: the history
+/// thread commits in batches, events before evidence; the publisher publishes
+/// the events in order, each as soon as it is committed, or as not persisted if
+/// the commit failed or took longer than 200 ms.
 ///
-/// If the history fails, all is kept and tried again each second; what no
-/// longer fits is counted as lost, and the time becomes a data gap once the
-/// history answers again.
+/// If the history fails, everything is kept and retried every second; what
+/// exceeds the queues is counted as lost, and the outage becomes a data gap
+/// once the history has recovered.
 ///
-/// Built idle. Thread safe, but for Start() and Stop().
+/// Built idle. Thread safe except for Start() and Stop().
 class Journal : public EpisodeOutlet {
  public:
   Journal(HistorySink& history, EventSink& bus, const MonitorContext& context,
@@ -69,24 +69,24 @@ class Journal : public EpisodeOutlet {
   void Look(EpisodeLook look) override;
   void Gap(DataGap gap) override;
   void Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) override;
-  /// `event` was published before Start(): it is marked as sent in its turn.
+  /// `event` was published before Start(): marks it as sent once that is due.
   void Published(const FaultEvent& event);
-  /// Commits `checkpoint`, merged with one that still waits.
+  /// Commits `checkpoint`, merged with one that is still waiting.
   void Commit(Checkpoint checkpoint);
 
   void Start();
-  /// Commits and publishes what is there and ends the threads; nothing if they
-  /// were not started. @throws what a thread ended with.
+  /// Commits and publishes what is queued and ends the threads; does nothing if
+  /// they were not started. @throws what a thread ended with.
   void Stop();
 
   /// A thread ended with an exception.
   bool failed() const { return writer_.failed() || publisher_.failed(); }
-  /// The history fails at present.
+  /// The history is failing at present.
   bool degraded() const { return degraded_; }
-  /// Of the history thread.
+  /// Beaten by the history thread.
   const Pulse& pulse() const { return pulse_; }
 
-  /// What waits for the history.
+  /// What is queued for the history.
   struct Backlog {
     std::size_t records{0};
     std::size_t trace_points{0};
@@ -115,11 +115,11 @@ class Journal : public EpisodeOutlet {
   using Record =
       std::variant<PendingEvent, Resumption, EpisodeLook, DataGap, Sent>;
 
-  // Of callers. Those called Locked hold mutex_.
+  // Used by callers. Functions named Locked require mutex_.
   bool AddLocked(Record record);
   void SettleLocked(Pending& pending, bool committed);
 
-  // Of the history thread.
+  // Used by the history thread.
   void Write();
   bool WriteWaiting();
   bool WriteRecords();
@@ -132,7 +132,7 @@ class Journal : public EpisodeOutlet {
   void FailWaitingEvents();
   void Recovered();
 
-  // Of the publisher.
+  // Used by the publisher.
   void PublishAll();
   void Publish(const PendingEvent& pending, bool persisted);
   void MarkDelivered(Clock::time_point limit,
@@ -146,8 +146,8 @@ class Journal : public EpisodeOutlet {
   JournalOptions options_;
   Pulse pulse_;
   std::atomic<bool> degraded_{false};
-  std::int64_t degraded_since_ns_{0};  // Of the history thread,
-  Clock::time_point last_commit_;      // as well.
+  std::int64_t degraded_since_ns_{0};  // Used by the history
+  Clock::time_point last_commit_;      // thread only.
 
   mutable std::mutex mutex_;                // Guards what follows.
   std::condition_variable work_;            // For the history thread,

@@ -29,9 +29,9 @@ bool PairElection::Heard(const PairState& word, TimePoint now) {
   return true;
 }
 
-// A leader that receives nothing while we do says that it gets on, and yet has
-// nothing to publish. Samples often come in bursts, so that ours come somewhat
-// before or after its own: half of the patience is no sign.
+// A leader that receives nothing while we do is alive and yet has nothing to
+// publish. Samples often come in bursts, so ours may arrive somewhat before or
+// after the leader's: only a lag of more than half the patience counts.
 bool PairElection::Sound(const Other& other, TimePoint now) const {
   const bool deaf = other.deaf_since && now - *other.deaf_since > patience_;
   return !other.word.leaving && now - other.heard <= patience_ && !deaf;

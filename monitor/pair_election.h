@@ -10,18 +10,21 @@
 
 namespace fdi::monitor {
 
-/// Which monitor of a pair leads, as one of them sees it. It decides from what
-/// the others say and from its own progress; it has neither a clock nor a bus.
+/// Decides which monitor of a pair leads, as one of them sees it, from the
+/// messages of the others and its own progress; it has neither a clock nor a
+/// bus.
 ///
-/// - Who leads goes on until it leaves, hangs or is deaf: a change is a risk,
-///   so nobody takes over from a sound leader, whatever its rank.
-/// - Without a leader, the best takes over: the one that judges most valves,
-///   then the lower rank, then the lower instance. Others wait longer, each by
-///   one more `patience`, in case the best does not.
-/// - Of two leaders, as after a link was cut, the better one goes on.
-/// - Who did not get on for `patience`, or whose lease has run out, does not
-///   trust what it knew: it stands by and listens first. So a leader that was
-///   stopped publishes nothing before it has heard whether it still leads.
+/// - A leader stays leader until it leaves, hangs or is deaf: a change is a
+///   risk, so nobody takes over from a sound leader, whatever its rank.
+/// - Without a leader, the best monitor takes over: the one that judges most
+///   valves, then the lower rank, then the lower instance. Each of the others
+///   waits one `patience` longer, in case the best does not.
+/// - Of two leaders, for example after a network partition, the better one
+///   stays.
+/// - A monitor that made no progress for `patience`, or whose lease has run
+///   out, discards what it knew: it stands by and listens first. So a leader
+///   that was suspended publishes nothing before it has heard whether it still
+///   leads.
 ///
 /// One thread.
 class PairElection {
@@ -29,43 +32,43 @@ class PairElection {
   using TimePoint = std::chrono::steady_clock::time_point;
   using Duration = std::chrono::steady_clock::duration;
 
-  /// @param self of which name, pair, rank and instance count.
+  /// @param self of which monitor, pair, rank and instance are used.
   /// @param patience how long a leader may be silent.
   /// @param listening how long a monitor listens at its start.
   PairElection(PairState self, Duration patience, Duration listening,
                TimePoint now);
 
-  /// Takes what a monitor said. @returns false if it does not count, as it is
-  /// of another pair, or our own.
+  /// Takes a message of a monitor. @returns false if it is ignored because it
+  /// belongs to another pair or is our own.
   bool Heard(const PairState& word, TimePoint now);
 
-  /// The diagnosis has got on. To be called several times within `patience`.
-  /// @param received samples so far. @param judged valves now.
+  /// Reports progress of the diagnosis. Call several times within `patience`.
+  /// @param received samples so far. @param judged valves at present.
   void Step(std::uint64_t received, int judged, TimePoint now);
 
-  /// The lease on leading has run out: another may lead by now. It stands by
-  /// and listens first.
+  /// The lease has run out, so another monitor may lead by now: stands by and
+  /// listens first.
   void Lapse(TimePoint now);
 
-  /// Says that it leaves, if another one is there to take over.
+  /// Announces that this monitor leaves, if another one can take over.
   void Leave(TimePoint now);
 
   bool leads() const { return self_.leads; }
-  /// The own word, as of the last call.
+  /// The own state, as of the last call.
   const PairState& self() const { return self_; }
   /// The monitor that leads; empty if none is known.
   const std::string& leader() const { return leader_; }
-  /// Others that are there.
+  /// Number of other monitors that are alive.
   int others() const { return others_; }
-  /// One of them has the same rank; empty if none.
+  /// Another monitor with the same rank; empty if there is none.
   const std::string& twin() const { return twin_; }
 
  private:
   struct Other {
     PairState word;
-    TimePoint heard;     // The word,
-    TimePoint received;  // one with more samples.
-    // We received samples a good while after it last did, since then.
+    TimePoint heard;     // When the last message came,
+    TimePoint received;  // and the last with new samples.
+    // Since when we have been receiving samples that it has not.
     std::optional<TimePoint> deaf_since;
   };
 

@@ -17,7 +17,7 @@ constexpr std::size_t kRememberedRefusals = 65536;
 constexpr std::chrono::milliseconds kTendPeriod{250};
 constexpr std::uint64_t kBeatSamples = 64;
 
-// In the order of Intake.
+// Indexed by Intake.
 constexpr std::array<LogId, kIntakeCount> kRejectionIds{
     LogId::kMissingSignal /* accepted, and yet not judged */,
     LogId::kRepeat,
@@ -70,7 +70,7 @@ Pipeline::~Pipeline() {
   try {
     Stop();
   } catch (...) {
-    // Whoever wants to know calls Stop().
+    // The error is reported only to those who call Stop() themselves.
   }
 }
 
@@ -102,7 +102,7 @@ void Pipeline::Start(const std::vector<OpenEpisode>& open,
   }
 }
 
-// A valve has one open episode; the older one of two cannot go on.
+// A valve has at most one open episode; the older of two is closed.
 void Pipeline::Recover(const std::vector<OpenEpisode>& episodes) {
   for (const OpenEpisode& episode : episodes) {
     const auto [known, fresh] = recovered_.emplace(episode.valve_id, episode);
@@ -137,7 +137,7 @@ void Pipeline::Stop() {
   if (looks_) {
     errors.Try([this] { looks_->Stop(); });
   }
-  // The recorder first: it may report a gap.
+  // The recorder stops before the journal, because it may report a gap.
   if (recorder_) {
     errors.Try([this] { recorder_->Stop(); });
   }
@@ -145,7 +145,7 @@ void Pipeline::Stop() {
   errors.Rethrow();
 }
 
-// @returns null for a valve that is not served, which is counted.
+// @returns null for a valve that is not admitted, which is counted.
 Pipeline::Valve* Pipeline::Admit(std::string_view valve_id) {
   const auto known = by_id_.find(valve_id);
   if (known != by_id_.end()) {
@@ -171,7 +171,7 @@ Pipeline::Valve* Pipeline::Admit(std::string_view valve_id) {
   return Refuse(valve_id, valves_.size() < places ? "reserved" : "max_valves");
 }
 
-// The valve keeps its place, or gets one when it comes.
+// The valve keeps its slot, or is guaranteed one when its first sample comes.
 void Pipeline::Reserve(const std::string& valve_id) {
   if (const auto found = by_id_.find(valve_id); found != by_id_.end()) {
     found->second->known = true;
@@ -180,13 +180,13 @@ void Pipeline::Reserve(const std::string& valve_id) {
   }
 }
 
-// Strangers whose episode is open stay.
+// Only unknown valves without an open episode can be evicted.
 bool Pipeline::MayGiveUp(const Valve& valve) const {
   return !valve.known && !valve.monitor.episode_open();
 }
 
-// @returns whether a stranger gave its place up: a silent one or, for a known
-// valve, the one that has been silent longest.
+// Evicts an unknown valve that is silent or, in favour of a known valve, the
+// one that has been silent longest. @returns whether a slot was freed.
 bool Pipeline::FreePlace(bool for_known) {
   const TimePoint now = last_tended_;
   while (!idle_.empty()) {
@@ -236,7 +236,7 @@ void Pipeline::GiveUp(Valve& valve) {
                 [&valve](const auto& each) { return each.get() == &valve; });
 }
 
-// Of refused ids only a bounded set of hashes is kept.
+// Only a bounded set of hashes is kept of refused ids.
 Pipeline::Valve* Pipeline::Refuse(std::string_view valve_id,
                                   const char* reason) {
   if (refused_.size() < kRememberedRefusals) {
@@ -277,7 +277,7 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
   return *valves_.emplace_back(std::move(valve));
 }
 
-// @returns false if the model set of the valve cannot be had.
+// @returns false if the model set of the valve cannot be loaded.
 bool Pipeline::Resolve(const std::string& valve_id,
                        std::optional<EngineParts>& parts) {
   parts.reset();
@@ -323,7 +323,7 @@ void Pipeline::Offer(std::string_view valve_id, const Sample& sample,
   const ValveOutcome outcome =
       valve->monitor.Step(sample, writer, received, journal_);
   if (valve->shadow != nullptr) {
-    // Both without second looks, which the candidate does not get.
+    // Compares without second looks, which the candidate does not get.
     const ValveOutcome observed{valve->monitor.observed(), outcome.models,
                                 outcome.model_swapped, outcome.isolation_held,
                                 outcome.missing};
@@ -344,7 +344,7 @@ void Pipeline::Offer(std::string_view valve_id, const Sample& sample,
 }
 
 void Pipeline::OfferEnd(std::string_view valve_id, std::uint64_t writer) {
-  // The end of a stream that was never seen takes no stranger's place.
+  // The end of a stream that was never seen evicts no valve.
   const bool expected =
       by_id_.contains(valve_id) || reserved_.contains(valve_id);
   Valve* const valve = expected ? Admit(valve_id) : nullptr;
@@ -409,8 +409,9 @@ void Pipeline::Count(const Valve& valve, const Sample& sample,
   if (CountsAsTime(verdict)) {
     counters_.Add(verdict.quality);
   }
-  // The engine accepts a sample that lacks signals; the channels that need them
-  // abstain. Without any channel left nothing is judged, which has a reason.
+  // The engine accepts a sample with missing signals; the channels that need
+  // them abstain. Without any channel left nothing is judged, which needs a
+  // reason.
   const bool unjudged =
       verdict.quality == Quality::kBadInput && outcome.missing != 0;
   if (verdict.intake == Intake::kAccepted && !unjudged) {
@@ -467,7 +468,7 @@ void Pipeline::Tend(TimePoint now) {
 
 void Pipeline::TendSilent(TimePoint now) {
   idle_.clear();
-  Checkpoint full;  // Of valves whose rows become many before the next one.
+  Checkpoint full;  // Of valves that are running out of rows.
   for (const std::unique_ptr<Valve>& valve : valves_) {
     ValveMonitor& monitor = valve->monitor;
     if (monitor.book_rows() >= kMostBookRows / 2) {
@@ -532,7 +533,7 @@ void Pipeline::TakeCensus() {
 void Pipeline::PublishLast() {
   for (const std::unique_ptr<Valve>& valve : valves_) {
     const ValveMonitor& monitor = valve->monitor;
-    // No stamp: a model set was adopted since.
+    // A zero stamp: a model set was adopted after the last sample.
     if (monitor.seen() && CountsAsTime(monitor.verdict()) &&
         monitor.verdict().stamp_ns != 0) {
       decisions_.PublishLast(monitor.id(), monitor.models(), monitor.verdict());
@@ -568,11 +569,11 @@ void Pipeline::AdoptNextResolver() {
     Reserve(id);
   }
   std::uint64_t swapped = 0;
-  std::vector<EngineParts> alive;  // A plan is made once, adopted or not.
+  std::vector<EngineParts> alive;  // Keeps each plan alive, adopted or not.
   for (const std::unique_ptr<Valve>& valve : valves_) {
     ValveMonitor& monitor = valve->monitor;
     std::optional<EngineParts> parts;
-    // A valve whose new set cannot be had goes on with the one it has.
+    // A valve whose new set cannot be loaded keeps its old one.
     if (Resolve(monitor.id(), parts) && monitor.Adopt(parts, journal_)) {
       ++swapped;
     }

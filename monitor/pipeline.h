@@ -27,33 +27,33 @@ namespace fdi::monitor {
 /// Settings of Pipeline.
 struct PipelineOptions {
   int max_valves{2000};
-  /// A stranger that is silent for so long gives its place up when another
-  /// valve needs it: one that no model set is assigned to by its id, and that
-  /// the last session did not have. At once if its publisher ended the stream.
+  /// An unknown valve, one without a model set assigned by id and without an
+  /// episode left by the last session, may be evicted in favour of another
+  /// valve after this silence, or at once after its publisher ended the stream.
   std::chrono::milliseconds place_timeout{60'000};
   std::string valve_glob{"*"};
   TraceOptions trace;
   std::chrono::milliseconds stale_timeout{3'600'000};  ///< Ends an episode.
-  /// A valve that stays silent for so long after the start gives up the
-  /// episode that the last session left open.
+  /// An episode left open by the last session is closed if its valve stays
+  /// silent for this long after the start.
   std::chrono::milliseconds recovery_window{60'000};
   std::chrono::milliseconds checkpoint_period{60'000};
   JournalOptions journal;
   RecorderOptions recorder;
-  ShadowOptions shadow;    ///< Without a candidate: none runs.
-  bool second_look{true};  ///< By physics, where the model set has them.
+  ShadowOptions shadow;    ///< Without a candidate: disabled.
+  bool second_look{true};  ///< By simulation, for model sets with physics.
 };
 
-/// Where the results go; all outlive the pipeline.
+/// Receivers of the results; all outlive the pipeline.
 struct PipelineSinks {
   DecisionSink& decisions;
   EventSink& events;
   HistorySink& history;
   SampleSink* samples{nullptr};  ///< Null: samples are not recorded.
-  LiveSink* live{nullptr};       ///< Null: nobody looks.
+  LiveSink* live{nullptr};       ///< Null: no live view.
 };
 
-/// How the valves are now.
+/// The current state of the valves.
 struct ValveCensus {
   std::uint64_t valves{0};
   std::uint64_t unassigned{0};
@@ -65,17 +65,17 @@ struct ValveCensus {
 };
 
 /// From samples to decisions, events and records. The thread that takes samples
-/// from the bus, the diagnosis thread, diagnoses them, too: what it is behind
-/// with waits at the subscriber, which then stops receiving, so nothing is
-/// dropped and no thread only moves samples.
+/// from the bus, the diagnosis thread, also diagnoses them: its backlog stays
+/// at the subscriber, which then stops receiving, so nothing is dropped and no
+/// thread is needed to move samples.
 ///
 ///     diagnosis thread: Offer() -> engine -> decision vectors
 ///                                    |-> Journal: history thread, publisher
 ///                                    |-> Recorder: recorder thread
 ///                                    \-> LookWorker, which answers later
 ///
-/// Built idle; Start() starts the threads of these. All calls come from the
-/// diagnosis thread, Start() and Stop() while there is none, except where
+/// Built idle; Start() starts the threads of these parts. All calls come from
+/// the diagnosis thread, Start() and Stop() while it does not run, except where
 /// noted.
 class Pipeline {
  public:
@@ -89,53 +89,56 @@ class Pipeline {
   Pipeline& operator=(const Pipeline&) = delete;
 
   /// @param open episodes that the last session left open.
-  /// @param accumulators of valves, as of the last session's last checkpoint.
-  /// @param shadow_accumulators the same of the candidate.
+  /// @param accumulators of the valves, from the last checkpoint.
+  /// @param shadow_accumulators the same for the candidate.
   void Start(const std::vector<OpenEpisode>& open,
              std::vector<Accumulator> accumulators = {},
              std::vector<Accumulator> shadow_accumulators = {});
 
-  /// `event`, of an earlier session, was published. Before Start().
+  /// Reports that `event`, of an earlier session, was published. Before
+  /// Start().
   void Published(const FaultEvent& event) { journal_.Published(event); }
 
-  /// A sample that was received. @param writer who sent it.
+  /// Processes a received sample. @param writer its DDS writer.
   void Offer(std::string_view valve_id, const Sample& sample,
              std::uint64_t writer,
              TimePoint received = std::chrono::steady_clock::now());
   /// Another monitor of the same valves raised an event that this one did not:
-  /// it is recorded, and an episode that is open there goes on here.
+  /// records it and, if its episode is open, continues that here.
   void Adopt(FaultEvent event);
-  /// Nothing is judged of this valve yet, or not again.
+  /// True while nothing of this valve is judged, at first or after a restart.
   bool IsSettling(const std::string& valve_id) const;
-  /// The publisher ended the stream of the valve.
+  /// The writer ended the stream of the valve.
   void OfferEnd(std::string_view valve_id, std::uint64_t writer);
 
-  /// Does what is due beside samples: silent valves, checkpoints, newcomers on
-  /// the bus, another assignment. To be called ten times a second or so, by a
-  /// busy thread as well. @param now all samples received before were offered.
+  /// Periodic work: silent valves, checkpoints, new subscribers, changed
+  /// assignments. Call about ten times a second, even under load. @param now
+  /// all samples received earlier have been offered.
   void Tend(TimePoint now = std::chrono::steady_clock::now());
-  /// Sends the decision vectors that the sink kept back, as Tend() does.
+  /// Sends the decision vectors that the sink has buffered, as Tend() does.
   void FlushDecisions();
 
-  /// Asks `resolver` for the models of all valves from the next Tend() on:
-  /// between two samples, none is lost or diagnosed twice. Thread safe.
+  /// Has all valves use `resolver` from the next Tend() on: the change falls
+  /// between two samples, of which none is lost or diagnosed twice. Thread
+  /// safe.
   void Reassign(std::shared_ptr<const ModelResolver> resolver);
 
-  /// Stores and publishes what is there, then ends the threads; nothing if they
-  /// were not started. Episodes stay open: the next session goes on with them.
+  /// Stores and publishes what is queued, then ends the threads; does nothing
+  /// if they were not started. Episodes stay open for the next session to
+  /// continue.
   /// @throws what a thread ended with.
   void Stop();
 
-  /// What follows is thread safe.
+  /// The functions below are thread safe.
 
-  /// A thread died of an exception, which Stop() throws.
+  /// A thread ended with an exception, which Stop() throws.
   bool failed() const {
     return journal_.failed() || (recorder_ && recorder_->failed()) ||
            (looks_ && looks_->failed());
   }
   ValveCensus census() const;                    ///< As of the last Tend().
   std::vector<std::string> valve_names() const;  ///< Of all valves seen.
-  /// Of the candidate; null if none runs.
+  /// Counts of the candidate; null without one.
   const ShadowCounts* shadow_counts() const {
     return shadow_ ? &shadow_->counts() : nullptr;
   }
@@ -152,7 +155,7 @@ class Pipeline {
   struct Valve {
     ValveMonitor monitor;
     ShadowValve* shadow;  // Null: not compared.
-    bool known;           // Keeps its place.
+    bool known;           // Never evicted.
   };
   struct Hash {
     using is_transparent = void;
@@ -193,15 +196,15 @@ class Pipeline {
   std::unique_ptr<LookWorker> looks_;  // Null: no second looks.
   EnginePlans plans_;
 
-  std::vector<std::unique_ptr<Valve>> valves_;  // In the order of first sight.
+  std::vector<std::unique_ptr<Valve>> valves_;  // In order of first samples.
   std::unordered_map<std::string, Valve*, Hash, std::equal_to<>> by_id_;
-  // Known valves that have no place yet; strangers leave that many free.
+  // Known valves without a slot yet; unknown ones leave that many slots free.
   std::unordered_set<std::string, Hash, std::equal_to<>> reserved_;
-  std::vector<Valve*> idle_;  // Silent strangers, as of the last Tend().
+  std::vector<Valve*> idle_;  // Silent unknown valves, as of the last Tend().
   std::unordered_set<std::size_t> refused_;  // Hashes of ids.
   std::unordered_map<std::string, OpenEpisode> recovered_;
   std::unordered_map<std::string, Accumulator> accumulators_;
-  std::optional<TimePoint> recovery_deadline_;  // While there is something to.
+  std::optional<TimePoint> recovery_deadline_;  // Empty: none is left.
 
   bool started_{false};
   Pulse pulse_;

@@ -24,7 +24,7 @@ Recorder::~Recorder() {
   try {
     Stop();
   } catch (...) {
-    // Whoever wants to know calls Stop().
+    // The error is reported only to those who call Stop() themselves.
   }
 }
 
@@ -34,7 +34,7 @@ void Recorder::Start() {
     try {
       Run();
     } catch (...) {
-      queue_.Close();  // Nobody waits for room any more.
+      queue_.Close();  // Unblocks Record().
       throw;
     }
   });
@@ -92,7 +92,7 @@ void Recorder::Take(const ReceivedSample& sample) {
 void Recorder::Commit() {
   last_commit_ = std::chrono::steady_clock::now();
   if (degraded_ && pending_ == 0) {
-    return;  // To commit nothing would not tell whether the disk answers.
+    return;  // An empty commit would not show whether the disk works again.
   }
   try {
     sink_.Commit();
@@ -132,7 +132,7 @@ void Recorder::CountDropped(std::uint64_t samples) {
   missing_more_ = true;
 }
 
-// One gap for drops that go on, once none was added since the last commit.
+// Drops in successive commit periods become one gap, reported once they cease.
 void Recorder::ReportMissing() {
   std::optional<DataGap> gap;
   {

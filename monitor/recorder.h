@@ -18,17 +18,17 @@ namespace fdi::monitor {
 
 /// Settings of Recorder.
 struct RecorderOptions {
-  bool lossless{false};  ///< Full: Record() waits instead of dropping.
+  bool lossless{false};  ///< Record() blocks while the queue is full.
   std::size_t queue_samples{16'384};
-  /// So that less than 1 s is lost with the process, whatever a commit takes.
+  /// Keeps the loss in a crash below 1 s, including the time of a commit.
   std::chrono::milliseconds commit_period{750};
-  std::uint64_t commit_samples{100'000};  ///< Commit earlier with so many.
-  std::uint64_t max_pending{200'000};     ///< Kept while commits fail.
+  std::uint64_t commit_samples{100'000};  ///< Commit earlier after so many.
+  std::uint64_t max_pending{200'000};     ///< Bound while commits fail.
 };
 
-/// Stores samples as runs by a thread of its own. What is not stored is
-/// counted; while commits fail samples are kept up to a limit and then dropped,
-/// so that diagnosis goes on. The time in which samples were dropped becomes a
+/// Stores samples as runs in a thread of its own. Samples that are not stored
+/// are counted; while commits fail, samples are kept up to a limit and then
+/// dropped, so that the diagnosis continues. The time of the drops becomes a
 /// data gap of all valves, "record_dropped", once a commit succeeds again.
 ///
 /// Built idle.
@@ -41,20 +41,20 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// One thread.
+  /// Called by one thread.
   void Record(ReceivedSample sample);
 
   void Start();
-  /// Stores what is there, ends the runs and the thread; nothing if it was not
-  /// started. @throws what the thread ended with.
+  /// Stores what is queued and ends the runs and the thread; does nothing if it
+  /// was not started. @throws what the thread ended with.
   void Stop();
 
   /// The thread ended with an exception.
   bool failed() const { return worker_.failed(); }
   bool degraded() const { return degraded_; }
-  /// Of the recorder thread.
+  /// Beaten by the recorder thread.
   const Pulse& pulse() const { return pulse_; }
-  /// Samples that wait for it.
+  /// Number of queued samples.
   std::size_t waiting() const { return queue_.size(); }
 
  private:
@@ -80,7 +80,7 @@ class Recorder {
 
   std::mutex missing_mutex_;        // Guards what follows.
   std::optional<DataGap> missing_;  // Not yet reported.
-  bool missing_more_{false};        // Since the last commit.
+  bool missing_more_{false};        // Dropped since the last commit.
 
   Worker worker_;
 };

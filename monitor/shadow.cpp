@@ -13,7 +13,7 @@ namespace {
 constexpr std::array<std::string_view, kShadowFitCount> kFitNames = {
     "compared", "unassigned", "same_set", "signals", "unit", "period"};
 
-// Bit n stands for fault number n, whatever the set calls it.
+// Bit n stands for fault number n, independent of the bit's place in the set.
 std::uint64_t NumbersOf(const ModelSet& models, FaultSet faults) {
   std::uint64_t numbers = 0;
   for (std::size_t bit = 0; faults != 0; ++bit, faults >>= 1U) {
@@ -174,6 +174,7 @@ void ShadowValve::Extend(const Verdict& active) {
 }
 
 void ShadowValve::Close() {
+  // The last checkpoint has stored an unchanged stretch in full.
   if (open_ && open_->recorded && open_->changed) {
     closed_.push_back(std::move(open_->difference));
   }

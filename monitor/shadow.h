@@ -17,51 +17,51 @@
 
 namespace fdi::monitor {
 
-/// Whether the candidate can be compared on a valve.
+/// Whether the candidate can be compared with the active set of a valve.
 enum class ShadowFit : std::uint8_t {
   kCompared,
   kNoActive,  ///< No model set is assigned to the valve.
   kSameSet,   ///< The candidate is the active set there.
-  kSignals,   ///< A signal that the candidate reads is not delivered.
-  kUnit,      ///< Its flow is in the other unit.
+  kSignals,   ///< The candidate needs a signal that is missing.
+  kUnit,      ///< The candidate expects the other flow unit.
   kPeriod,    ///< The active set is for another sample period.
 };
 inline constexpr std::size_t kShadowFitCount = 6;
 std::string_view ShadowFitName(ShadowFit fit);  ///< "compared", "signals", ...
 
-/// What became of a sample that both sets were given.
+/// Result of a sample that both sets were given.
 enum class ShadowOutcome : std::uint8_t {
   kAgreed,
   kDiffered,
-  kNotJudged,  ///< By one of both: not LIVE.
+  kNotJudged,  ///< By either set: not LIVE.
 };
 inline constexpr std::size_t kShadowOutcomeCount = 3;
 
 /// Bounds on what is recorded.
 struct ShadowLimits {
-  int min_samples{5};    ///< Shorter stretches are only counted.
-  int max_per_hour{60};  ///< Stretches of one valve in an hour of time.
+  int min_samples{5};    ///< Shorter stretches are counted, not stored.
+  int max_per_hour{60};  ///< Stored stretches of one valve per hour.
   std::int64_t silence_ns{3'600'000'000'000};  ///< Ends the open episode.
 };
 
 /// Settings of ShadowBank.
 struct ShadowOptions {
-  std::shared_ptr<const ModelSet> candidate;  ///< Null: none runs.
+  std::shared_ptr<const ModelSet> candidate;  ///< Null: disabled.
   std::string valve_glob{"*"};
   ShadowLimits limits;
 };
 
-/// Totals since the start; valves stand for now. Thread safe.
+/// Totals since the start; `valves` is the current number. Thread safe.
 struct ShadowCounts {
   std::array<std::atomic<std::uint64_t>, kShadowOutcomeCount> samples{};
   std::array<std::atomic<std::int64_t>, kShadowFitCount> valves{};
-  std::atomic<std::uint64_t> recorded{0};  ///< Stretches to be stored.
-  std::atomic<std::uint64_t> left_out{0};  ///< Stretches beyond the bound.
+  std::atomic<std::uint64_t> recorded{0};  ///< Stretches stored.
+  std::atomic<std::uint64_t> left_out{0};  ///< Stretches beyond max_per_hour.
 };
 
-/// The candidate on one valve: its engine beside the active one, on the same
-/// samples, and the stretches in which the answers differ. Pure but for what it
-/// counts. One thread, that of `parts`.
+/// The candidate on one valve: its engine runs beside the active one on the
+/// same samples, and the stretches in which the answers differ are kept. No
+/// side effects except on the counts. One thread, that of `parts`.
 class ShadowValve {
  public:
   /// @param counts outlives this.
@@ -71,16 +71,17 @@ class ShadowValve {
   /// As ValveMonitor::Resume().
   void Resume(Accumulator accumulator) { saved_ = std::move(accumulator); }
 
-  /// Takes a sample and what the active set answered.
-  /// @returns what became of it, nothing if the candidate does not fit or the
-  ///   sample is out of order.
+  /// Processes a sample and the answer of the active set.
+  /// @returns the result; nothing if the candidate does not fit or the sample
+  ///   is out of order.
   std::optional<ShadowOutcome> Step(const Sample& sample,
                                     const ValveOutcome& active);
 
   /// The publisher ended the stream.
   void EndStream();
 
-  /// Appends stretches that changed since the last call; open ones as they are.
+  /// Appends the stretches that changed since the last call, including open
+  /// ones.
   void TakeCheckpoint(Checkpoint& checkpoint);
 
   const std::string& valve_id() const { return valve_id_; }
@@ -90,9 +91,9 @@ class ShadowValve {
   // A stretch that has not ended.
   struct Stretch {
     ShadowDifference difference;
-    std::uint64_t active_faults{0};  // By fault number.
+    std::uint64_t active_faults{0};  // Bit n: fault number n.
     std::uint64_t candidate_faults{0};
-    bool counted{false};   // Long enough; recorded or left out.
+    bool counted{false};   // Reached min_samples.
     bool recorded{false};  // To be stored.
     bool changed{false};   // Since the last checkpoint.
   };
@@ -109,7 +110,7 @@ class ShadowValve {
   const ModelSet* candidate_;
   ShadowLimits limits_;
   ShadowCounts& counts_;
-  std::optional<ValveEngine> engine_;  // Once there is something to compare.
+  std::optional<ValveEngine> engine_;  // Created by the first comparison.
   std::optional<Accumulator> saved_;
   ShadowFit fit_{ShadowFit::kNoActive};
   std::int64_t stamp_ns_{0};
@@ -121,26 +122,26 @@ class ShadowValve {
   int in_hour_{0};
 };
 
-/// A candidate model set beside the active ones, on all valves that it fits:
-/// its decisions are compared and go nowhere. Costs one engine per valve.
+/// Runs a candidate model set beside the active ones on all valves that it
+/// fits: its decisions are only compared. Costs one engine per valve.
 ///
-/// The diagnosis thread, except where noted.
+/// Used by the diagnosis thread, except where noted.
 class ShadowBank {
  public:
   /// @throws DataError if the candidate is not usable.
   ShadowBank(ShadowOptions options, ThrottledLog& log);
 
-  /// The accumulators as of the last checkpoint; those of another candidate
-  /// count for nothing. Before the first Add().
+  /// Restores the accumulators of the last checkpoint; those of another
+  /// candidate are ignored. Before the first Add().
   void Restore(std::vector<Accumulator> accumulators);
 
-  /// A valve that is seen for the first time. @returns null if the candidate
-  ///   is not to run on it.
+  /// Adds a valve at its first sample. @returns null if the candidate does not
+  /// run on it.
   ShadowValve* Add(const std::string& valve_id);
   /// `valve` is not used any more.
   void Remove(const ShadowValve* valve);
 
-  /// Gives a sample to the candidate and reports why it does not fit.
+  /// Passes a sample to the candidate, and logs why it does not fit.
   void Step(ShadowValve& valve, const Sample& sample,
             const ValveOutcome& active);
 

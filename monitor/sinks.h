@@ -14,15 +14,15 @@
 #include "diagnosis/records/trace_point.h"
 #include "diagnosis/verdict.h"
 
-/// What the monitor needs from outside; the program wires it to DDS and SQLite.
-/// Each sink is called by one thread only, which its comment names.
+/// The interfaces that the monitor needs; the program implements them with DDS
+/// and SQLite. Each sink is called by a single thread, which its comment names.
 namespace fdi::monitor {
 
 class Counters;
 class ThrottledLog;
 struct EpisodeTrace;
 
-/// What all parts of a monitor share.
+/// Shared by all parts of a monitor.
 struct MonitorContext {
   Counters& counters;
   ThrottledLog& log;
@@ -34,17 +34,18 @@ inline std::string NameOf(const ModelSet& models) {
   return models.name + "@" + std::to_string(models.version);
 }
 
-/// Says which model set a valve is diagnosed with. Diagnosis thread.
+/// Tells which model set a valve is diagnosed with. Diagnosis thread.
 class ModelResolver {
  public:
   virtual ~ModelResolver() = default;
   /// Null if none is assigned.
-  /// @throws std::exception if it cannot be had: the valve goes without.
+  /// @throws std::exception if it cannot be loaded: the valve has no model
+  ///   then.
   virtual std::shared_ptr<const ModelSet> ModelsFor(
       std::string_view valve_id) const = 0;
-  /// The valves that a model set is assigned to by their id, not by a glob.
+  /// The valves with a model set assigned by id rather than by a glob.
   virtual std::vector<std::string> AssignedValves() const { return {}; }
-  /// Its faults are detected and not named: the baseline is provisional.
+  /// True while the baseline is provisional: faults are detected but not named.
   virtual bool IsolationHeld(std::string_view /*valve_id*/) const {
     return false;
   }
@@ -54,20 +55,19 @@ class ModelResolver {
 class DecisionSink {
  public:
   virtual ~DecisionSink() = default;
-  /// May keep it back until Flush().
+  /// May buffer the vector until Flush().
   /// @param models null for a valve without a model set.
   /// @returns false if it was not sent.
   virtual bool Publish(const std::string& valve_id, const ModelSet* models,
                        const Verdict& verdict) = 0;
-  /// Sends what was kept back; to be called whenever no sample waits.
-  /// @returns how many vectors were kept back since the last call and could not
-  ///   be sent.
+  /// Sends the buffered vectors; call whenever no sample is waiting. @returns
+  /// how many vectors buffered since the last call could not be sent.
   virtual std::uint64_t Flush() { return 0; }
 
-  /// True once somebody listens where nobody did: PublishLast() is due for
-  /// every valve. Nothing is sent to newcomers before.
+  /// True once the first subscribers arrive: PublishLast() is due for every
+  /// valve, and nothing is sent to them before.
   virtual bool WantsLast() { return false; }
-  /// A vector that Publish() took while nobody listened.
+  /// Publishes a vector that Publish() accepted without subscribers.
   virtual void PublishLast(const std::string& /*valve_id*/,
                            const ModelSet* /*models*/,
                            const Verdict& /*verdict*/) {}
@@ -81,32 +81,31 @@ class EventSink {
   virtual bool Publish(const FaultEvent& event, bool persisted) = 0;
 };
 
-/// Stores episodes. History thread of the journal. Every call may fail with a
-/// std::exception, can be repeated then, and doing it twice is a no-op except
-/// where noted.
+/// Stores episodes. History thread of the journal. Every call may throw a
+/// std::exception and can then be retried; calls are idempotent except where
+/// noted.
 class HistorySink {
  public:
   virtual ~HistorySink() = default;
   /// Makes the calls of Record(), Resume() and StoreLook() in `batch` one
-  /// commit: all of it is on the disk on return or, if it fails, nothing.
+  /// commit: on return everything is on the disk; on failure, nothing.
   virtual void CommitBatch(const std::function<void()>& batch) = 0;
   /// Within CommitBatch().
   virtual void Record(const FaultEvent& event) = 0;
-  /// An episode left open by an earlier session goes on. Within CommitBatch().
+  /// Continues an episode that an earlier session left open. In CommitBatch().
   virtual void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) = 0;
   /// Replaces the earlier look at the episode. Within CommitBatch().
   virtual void StoreLook(const EpisodeLook& look) = 0;
-  /// Buffers. Evidence of an episode that is not there is dropped.
+  /// Buffers. Evidence of an unknown episode is dropped.
   virtual void AddTrace(const EpisodeTrace& trace) = 0;
   /// Buffers.
   virtual void AddGap(const DataGap& gap) = 0;
-  /// On the disk on return, as a whole or, if it fails, not at all. Twice
-  /// counts twice.
+  /// Durable on return; all or nothing. Not idempotent: twice counts twice.
   virtual void CommitCheckpoint(const Checkpoint& checkpoint) = 0;
-  /// The event is on the bus. Buffers.
+  /// Marks the event as published. Buffers.
   virtual void MarkSent(const FaultEvent& event) = 0;
-  /// Stores what is buffered, and a sign of life; called each second. After a
-  /// call that failed it writes in any case, so that success tells something.
+  /// Commits what is buffered, and a sign of life; called every second. After a
+  /// failure it writes in any case, so that its success proves recovery.
   virtual void Commit() = 0;
 };
 
@@ -116,45 +115,46 @@ class SampleSink {
   virtual ~SampleSink() = default;
   /// Buffers.
   virtual void Append(const ReceivedSample& sample) = 0;
-  /// Stores what is buffered. @throws std::exception; then it still is.
+  /// Commits what is buffered. @throws std::exception; the buffer is kept.
   virtual void Commit() = 0;
-  /// Forgets what is buffered. @returns how many samples that were.
+  /// Discards the buffer. @returns the number of samples in it.
   virtual std::uint64_t DropPending() = 0;
-  /// Ends all runs and stores what is buffered.
+  /// Ends all runs and commits what is buffered.
   virtual void Close() = 0;
-  /// How many samples are stored by now.
+  /// Number of samples stored so far.
   virtual std::uint64_t recorded() const = 0;
 };
 
-/// What became of one sample.
+/// The result for one sample.
 struct ValveOutcome {
-  const Verdict& verdict;  ///< Stands until the next call.
+  const Verdict& verdict;  ///< Valid until the next call.
   const ModelSet* models;  ///< Null while the valve is UNASSIGNED.
-  bool model_swapped;      ///< Another model set answers from here on.
+  bool model_swapped;      ///< This is the first sample with another model set.
   bool isolation_held;     ///< See ModelResolver::IsolationHeld().
-  /// Signals that the model set reads and the sample lacks. Their channels
-  /// abstain; without any channel left the quality is BAD_INPUT.
+  /// Signals that the model set needs and the sample lacks. Their channels
+  /// abstain; if no channel is left, the quality is BAD_INPUT.
   SignalMask missing{0};
 };
 
-/// Why nothing comes from a valve.
+/// Why a valve sends nothing.
 enum class Silence : std::uint8_t {
   kNone,
   kStale,    ///< No sample for three periods.
   kEnded,    ///< Its publisher ended the stream.
-  kMonitor,  ///< Its monitor is silent; the page of a plant alone says so.
+  kMonitor,  ///< Its monitor is silent; only on the plant page.
 };
 
-/// Shows people how the valves are. Diagnosis thread, which must not wait.
+/// Shows the valves to operators. Called by the diagnosis thread; must not
+/// block.
 class LiveSink {
  public:
   virtual ~LiveSink() = default;
-  /// A sample in its order and what became of it.
+  /// A sample in order, and its result.
   virtual void Show(const std::string& valve_id, const Sample& sample,
                     const ValveOutcome& outcome) = 0;
-  /// The valve fell silent; its next sample ends that.
+  /// The valve fell silent, until its next sample.
   virtual void ShowSilence(const std::string& valve_id, Silence silence) = 0;
-  /// The valve has given its place up: it is not shown any more.
+  /// The valve was evicted and is not shown any more.
   virtual void Forget(const std::string& /*valve_id*/) {}
 };
 

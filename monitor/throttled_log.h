@@ -13,7 +13,7 @@
 
 namespace fdi::monitor {
 
-/// What a monitor reports again and again: the numbers are the log ids of
+/// Repeating log events of a monitor: the numbers are the log ids in
 /// docs/errors.md, M101 and so on.
 enum class LogId : std::uint8_t {
   kBadQuality = 101,     ///< sample_rejected reason=bad_quality
@@ -43,7 +43,7 @@ enum class LogId : std::uint8_t {
   kStalled = 151,        ///< threads_stalled
   kPairTwin = 152,       ///< pair_rank_taken
   kOperatorSync = 153,   ///< operator_action_waits, operator_action_refused
-  kContested = 154,      ///< valves_contested: of two monitors, no pair
+  kContested = 154,      ///< valves_contested, outside a pair
   kLookDropped = 161,    ///< second_look_dropped
   kLookFailed = 162,     ///< second_look_failed
 };
@@ -51,18 +51,18 @@ enum class LogId : std::uint8_t {
 /// "event id=M101 FIELDS"
 std::string LogLine(LogId id, std::string_view event, std::string_view fields);
 
-/// How many lines of one kind are shown.
+/// Bound on the lines of one kind.
 struct LogLimitOptions {
   int lines{100};  ///< In each interval.
   std::chrono::milliseconds interval{10'000};
 };
 
-/// Counts lines by kind and says which to show. Thread safe.
+/// Counts lines by kind and decides which to show. Thread safe.
 class LogLimit {
  public:
   explicit LogLimit(const LogLimitOptions& options) : options_(options) {}
 
-  /// @param not_shown how many of the kind were not since the last shown one.
+  /// @param not_shown set to the number suppressed since the last shown line.
   /// @returns whether the line is to be shown.
   bool Admit(std::string_view kind, std::uint64_t& not_shown);
 
@@ -78,8 +78,8 @@ class LogLimit {
   std::map<std::string, Window, std::less<>> windows_;
 };
 
-/// Writes lines of the ids above, of each id the first at once and then at most
-/// one per interval, with the number of those left out (`not_shown=N`).
+/// Writes lines with the ids above; of each id the first immediately and then
+/// at most one per interval, with the number suppressed (`not_shown=N`).
 ///
 /// Thread safe.
 class ThrottledLog {
@@ -94,7 +94,7 @@ class ThrottledLog {
               const std::function<std::string()>& fields,
               LogLevel level = LogLevel::kWarning);
 
-  /// A line as it is, unthrottled.
+  /// Writes a line unchanged and unthrottled.
   void Line(LogLevel level, std::string_view line) const;
 
  private:
@@ -102,9 +102,9 @@ class ThrottledLog {
   LogLimit limit_;
 };
 
-/// A sink before `sink` that holds back what is beyond the limit of its event,
-/// the first word of a line, whoever writes it; the next line of the event that
-/// is shown says how many were not. Thread safe.
+/// Wraps `sink` and suppresses lines beyond the limit of their event, which is
+/// the first word; the next line of the event that is shown carries the number
+/// suppressed. Thread safe.
 LogSink LimitLog(LogSink sink, const LogLimitOptions& options = {});
 
 }  // namespace fdi::monitor

@@ -25,8 +25,8 @@ std::uint32_t PackQuality(const Sample& sample) {
   return bits;
 }
 
-// A ring of rows of `columns` values, its oldest row at `first`: oldest in
-// front, and `rows` of them.
+// Rotates a ring of rows of `columns` values so that its oldest row, at
+// `first`, comes to the front, and resizes it to `rows`.
 template <typename T>
 void Straighten(std::vector<T>& ring, std::size_t first, std::size_t columns,
                 std::size_t rows) {
@@ -100,6 +100,7 @@ void Trace::Push(const Sample& sample, const Verdict& verdict, int channels,
   std::size_t value = row * layout_.signal_count;
   for (std::size_t s = 0; s < kSignalCount; ++s) {
     if ((layout_.signals >> s & 1U) != 0) {
+      // A missing signal keeps its column, so that all rows have one size.
       values_[value++] = sample.values[s];
     }
   }

@@ -13,29 +13,29 @@ namespace fdi::monitor {
 
 /// Past instants of one valve, packed: 100 bytes each for six signals, two
 /// channels and five faults, so 180 kB for half an hour at 1 Hz. Holds at most
-/// `capacity` of them, none older than `span_ns` before the newest; memory
-/// grows with what is in it.
+/// `capacity` instants, none older than `span_ns` before the newest; memory
+/// grows with the content.
 class Trace {
  public:
-  /// @param keeps_isolated a change of the isolated set begins it anew;
-  ///   otherwise its points do not tell the set.
+  /// @param keeps_isolated restart at a change of the isolated set; otherwise
+  ///   points do not contain the set.
   Trace(std::size_t capacity, std::int64_t span_ns, bool keeps_isolated = true)
       : capacity_(capacity),
         span_ns_(span_ns),
         keeps_isolated_(keeps_isolated) {}
 
-  /// Appends an instant. Where Continues() is false the trace begins anew.
+  /// Appends an instant. The trace restarts where Continues() is false.
   void Push(const Sample& sample, const Verdict& verdict, int channels,
             int faults);
 
-  /// Whether source, signals, model sizes and isolated set are as before.
+  /// Whether source, signals, model sizes and isolated set are unchanged.
   bool Continues(const Sample& sample, const Verdict& verdict, int channels,
                  int faults) const;
 
   /// The newest `count` instants, oldest first.
   std::vector<TracePoint> Unpack(std::size_t count = SIZE_MAX) const;
 
-  /// Hands over what is in it and is empty afterwards.
+  /// Moves the content out and leaves the trace empty.
   Trace Take();
 
   std::size_t size() const { return size_; }
@@ -53,7 +53,7 @@ class Trace {
     ValveMode mode;
     bool initialised;
   };
-  // What all instants of a trace share.
+  // Properties shared by all instants of a trace.
   struct Layout {
     std::uint64_t source_id{0};
     std::uint32_t epoch{0};
@@ -88,7 +88,7 @@ class Trace {
 struct EpisodeTrace {
   std::uint64_t episode_id{0};
   Trace trace;
-  bool complete{false};  ///< Nothing follows.
+  bool complete{false};  ///< No more will follow.
 };
 
 }  // namespace fdi::monitor

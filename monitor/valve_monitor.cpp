@@ -11,7 +11,8 @@ namespace {
 constexpr double kStalePeriods = 3.0;
 constexpr double kSharePerSample = 0.5;
 constexpr double kSharePerSecond = 5.0;
-// Of the period of a valve without a model set, which its samples tell.
+// Bounds of the period of a valve without a model set, measured from its
+// samples.
 constexpr std::int64_t kShortestNs = 1'000'000;
 constexpr std::int64_t kLongestNs = 3'600'000'000'000;
 
@@ -78,6 +79,7 @@ bool ValveMonitor::WithinShare(const Sample& sample, TimePoint received) {
 }
 
 void ValveMonitor::Place(const Sample& sample) {
+  // Before the update: BeginsAnew() compares with the previous sample.
   share_ -= BeginsAnew(sample) ? 1.0 : 0.0;
   source_id_ = sample.source_id;
   stamp_ns_ = sample.stamp_ns;
@@ -218,6 +220,7 @@ std::uint64_t ValveMonitor::CountStale(TimePoint now) {
   }
   const std::chrono::duration<double> counted(periods * period_s());
   stale_counted_ += std::chrono::duration_cast<TimePoint::duration>(counted);
+  // Silence is measured by arrival, and dated by extending the last stamp.
   const std::chrono::nanoseconds since = stale_counted_ - received_;
   const auto samples = static_cast<std::uint64_t>(periods);
   coverage_.Add(stamp_ns_ + since.count(), Quality::kStale, samples);

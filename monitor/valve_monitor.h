@@ -23,79 +23,78 @@ class ValveMonitor {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  /// @param parts of the model set; nothing: none assigned.
-  /// @param looks takes second looks if the model set has physics, and outlives
-  ///   this; null: none are taken.
+  /// @param parts of the model set; nothing: none is assigned.
+  /// @param looks performs second looks if the model set has physics, and
+  ///   outlives this; null: none.
   ValveMonitor(const std::string& id, const std::optional<EngineParts>& parts,
                const TraceOptions& options, LookWorker* looks = nullptr);
 
-  /// Before the first Step().
+  /// Call before the first Step().
   void Recover(const OpenEpisode& episode);
 
   /// See EpisodeTracker::Adopt().
   void Adopt(const FaultEvent& event) { tracker_.Adopt(event); }
 
-  /// The accumulators as of the last checkpoint of an earlier session; they
-  /// count if the first sample is of the same source. Before the first Step().
+  /// The accumulators from the last checkpoint of an earlier session; used if
+  /// the first sample comes from the same source. Before the first Step().
   void Resume(Accumulator accumulator) { saved_ = std::move(accumulator); }
 
   /// See ModelResolver::IsolationHeld().
   void HoldIsolation(bool hold);
 
-  /// Adds the time and health since the last call and, of a valve that is not
+  /// Adds the time and health since the last call and, unless the valve is
   /// silent, the accumulators.
   void TakeCheckpoint(Checkpoint& checkpoint);
 
-  /// Whether `sample` is within the share of the diagnosis that the valve has.
-  /// A sample that makes it begin anew, as a gap, another source or another
-  /// epoch do, costs many times as much as others, and leaves rows in the
-  /// history. So at most 200 of them in a row are served, then five a second
-  /// and one for two other samples; the rest is to be refused.
+  /// Rate limit. A sample that restarts the engine (a gap, another source or
+  /// another epoch) costs many times as much as others and adds rows to the
+  /// history. So 200 of them in a row are accepted, then five a second plus one
+  /// for every two other samples. @returns false if `sample` is to be rejected.
   bool WithinShare(const Sample& sample, TimePoint received);
 
-  /// @param writer who sent it; see EndStream().
+  /// @param writer its DDS writer; see EndStream().
   ValveOutcome Step(const Sample& sample, std::uint64_t writer,
                     TimePoint received, EpisodeOutlet& outlet);
 
-  /// The publisher ended the stream. Nothing if another one speaks by now.
+  /// The writer ended the stream. Ignored if another writer has taken over.
   /// @returns whether the stream ended.
   bool EndStream(std::uint64_t writer, EpisodeOutlet& outlet);
 
-  /// Continues with another model set, or none, from the next sample on.
-  /// @returns whether it is another one.
+  /// Switches to another model set, or none, from the next sample on. @returns
+  /// whether it differs from the current one.
   bool Adopt(const std::optional<EngineParts>& parts, EpisodeOutlet& outlet);
 
   /// Labels the valve STALE if it was silent for three periods.
   /// @returns whether it became so by this call.
   bool CheckStale(TimePoint now);
 
-  /// Periods in which a STALE valve was silent since the last call; they are
-  /// time of the valve.
+  /// Periods of silence of a STALE valve since the last call; they count as
+  /// time.
   std::uint64_t CountStale(TimePoint now);
 
   /// Closes an open episode after a long silence.
   void CheckTimeout(TimePoint now, std::chrono::milliseconds timeout,
                     EpisodeOutlet& outlet);
 
-  /// Closes what was to be resumed if the valve is silent.
+  /// Closes an episode that was to be resumed if the valve is silent.
   void GiveUpRecovery(std::int64_t now_ns, EpisodeOutlet& outlet);
 
   void Flush(EpisodeOutlet& outlet) { tracker_.Flush(outlet); }
 
-  /// Rows of time and health that wait for TakeCheckpoint().
+  /// Rows of time and health since the last TakeCheckpoint().
   std::size_t book_rows() const { return coverage_.rows() + health_.rows(); }
-  /// How long nothing came; for ever once the stream has ended.
+  /// Time since the last sample; infinite once the stream has ended.
   TimePoint::duration Silence(TimePoint now) const {
     return ended_ ? TimePoint::duration::max() : now - received_;
   }
 
   const std::string& id() const { return id_; }
   const ModelSet* models() const { return models_.get(); }
-  /// A sample came.
+  /// A sample has been received.
   bool seen() const { return seen_; }
-  /// The last one.
+  /// The verdict on the last sample.
   const Verdict& verdict() const { return answer_ ? *answer_ : observed(); }
-  /// The same without second looks.
+  /// The same before any second look.
   const Verdict& observed() const {
     return engine_ ? engine_->verdict() : unassigned_;
   }
@@ -120,7 +119,7 @@ class ValveMonitor {
   SignalMask required_{0};  // By models_.
   std::optional<ValveEngine> engine_;
   LookWorker* looks_;
-  std::unique_ptr<EpisodeNames> names_;  // Null: the engine's count.
+  std::unique_ptr<EpisodeNames> names_;  // Null: no second looks.
   const Verdict* answer_{nullptr};       // On the last sample.
   EpisodeTracker tracker_;
   Verdict unassigned_;
@@ -131,16 +130,16 @@ class ValveMonitor {
   std::int64_t stamp_ns_{0};
   bool isolation_held_{false};
   std::int64_t unassigned_interval_ns_{1'000'000'000};
-  double share_{kFullShare};  // Beginnings that are left,
-  TimePoint share_at_;        // as of then.
-  std::uint32_t epoch_{0};    // Of the last sample in its order.
+  double share_{kFullShare};  // Restarts left
+  TimePoint share_at_;        // as of this time.
+  std::uint32_t epoch_{0};    // Of the last sample in order.
   bool swapped_{false};
   bool seen_{false};
   bool stale_{false};
   bool ended_{false};
   std::uint64_t writer_{0};
   TimePoint received_;
-  TimePoint stale_counted_;  // Silence up to here is counted.
+  TimePoint stale_counted_;  // Silence is counted up to here.
 };
 
 }  // namespace fdi::monitor

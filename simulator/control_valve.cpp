@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kGravity = 9.81;            // m/s2.
 constexpr double kGasConstant = 287.0;       // J/(kg K), air.
-constexpr double kLeastSupplyGauge = 120e3;  // Below, the relay gives nothing.
+constexpr double kLeastSupplyGauge = 120e3;  // Below, the relay gives no air.
 
 }  // namespace
 
@@ -146,7 +146,8 @@ double ValveDynamics::NetForce(const ProcessInputs& inputs,
          OpeningForce(inputs, x[kActuatorState]);
 }
 
-// de/dt for the derivative action; the rod moves only while the play is taken.
+// de/dt for the derivative action; the rod moves only when the play is taken
+// up.
 double ValveDynamics::ErrorRate(const double* x) const {
   const double tau = parameters_.positioner.filter_time_s;
   const double rod = Rod(x[kActuatorState]);
@@ -174,7 +175,8 @@ double ValveDynamics::Signal(const double* x) const {
   return std::clamp(signal, -1.0, 1.0);
 }
 
-// Air through the relay into the chamber at the transducer's output `drive`.
+// Air flow through the relay into the chamber for the transducer output
+// `drive`.
 double ValveDynamics::RelayFlow(double chamber_pa, double drive) const {
   const PositionerParameters& p = parameters_.positioner;
   const double ambient = parameters_.actuator.ambient_pressure_pa;
@@ -230,6 +232,8 @@ void ValveDynamics::Derivatives(double t, const double* x,
   }
 }
 
+// Positive during the present motion; a zero ends it: a stop, standstill or
+// break-away. A constant 1 disables a root.
 void ValveDynamics::Roots(double t, const double* x, double* g) const noexcept {
   const double friction = BreakAwayForce();
   switch (motion_) {
@@ -277,15 +281,15 @@ double FlowM3PerHour(const TrimParameters& trim, const FaultEffects& effects,
 
 namespace {
 
-// Within this of a stop and moving towards it: at the stop [stroke].
+// At a stop: this close and moving towards it [stroke].
 constexpr double kStopReach = 1e-7;
 
 CvodeOptions OptionsFor(const ValveDynamics& dynamics, double scale) {
   CvodeOptions options;
   options.relative_tolerance = 6e-7 * scale;
-  // Position, velocity, charge, lags, integral. A tight velocity doubles the
-  // steps and changes nothing: it is slaved to the forces. The charge is not:
-  // inside the play nothing brings its error back.
+  // Position, velocity, charge, lags, integral. A tight tolerance of velocity
+  // doubles the steps without effect, because it is slaved to the forces. The
+  // charge needs one: inside the play nothing corrects its error.
   options.absolute_tolerances = {6e-6, 0.03, 6e-6, 2e-5, 2e-5, 4e-5};
   options.absolute_tolerances.resize(dynamics.state_count());
   for (double& tolerance : options.absolute_tolerances) {
@@ -314,9 +318,9 @@ class ControlValve::Impl {
 
   ValveDynamics dynamics_;
   CvodeIntegrator integrator_;
-  double time_s_{0.0};            // Of the present Advance().
+  double time_s_{0.0};            // Time within the present Advance().
   bool continues_{false};         // The solver's history is valid.
-  double until_sampling_s_{0.0};  // Of a sampled positioner.
+  double until_sampling_s_{0.0};  // For a sampled positioner.
 
  private:
   void Integrate(double t_stop);
@@ -324,7 +328,7 @@ class ControlValve::Impl {
   double RestingPosition(double wanted, double& gauge_pa) const;
 };
 
-// The actuator position nearest to `wanted` that a chamber pressure between
+// The actuator position closest to `wanted` that a chamber pressure between
 // ambient and supply can hold, and that gauge pressure.
 double ControlValve::Impl::RestingPosition(double wanted,
                                            double& gauge_pa) const {
@@ -349,12 +353,12 @@ double ControlValve::Impl::RestingPosition(double wanted,
 void ControlValve::Impl::Settle(const ProcessInputs& inputs) {
   dynamics_.SetInputs(inputs, inputs, 1.0);
   const PositionerParameters& p = dynamics_.parameters().positioner;
-  // The dead zone's table passes 0 here.
+  // The transducer's table with dead zone is 0 at this signal.
   const double rest_signal = p.transducer_dead_zone ? -0.04 : 0.0;
   const double command = std::clamp(inputs.command, 0.0, 1.0);
   const double angle = std::clamp(command - rest_signal / p.gain, 0.0, 1.0);
   double gauge_pa = 0.0;
-  // The opening force depends on the rod, hence on the play: align first.
+  // The opening force depends on the rod, and so on the play: align first.
   double z = LeverPosition(angle);
   for (int i = 0; i < 3; ++i) {
     dynamics_.Align(z);
@@ -373,7 +377,7 @@ void ControlValve::Impl::Settle(const ProcessInputs& inputs) {
   SelectMotion();
 }
 
-// Held while friction or a stop carries the net force, else moving with it.
+// Held while friction or a stop balances the net force, else moving with it.
 void ControlValve::Impl::SelectMotion() {
   const std::span<double> state = x();
   const double friction = dynamics_.BreakAwayForce();
@@ -399,8 +403,8 @@ void ControlValve::Impl::SelectMotion() {
   }
 }
 
-// Handles stops, standstill and break-away. True if the integration has to
-// restart: after every root, and after a motion that ended between roots.
+// Handles stops, standstill and break-away. @returns true if the integration
+// must restart: after every root, and after a motion that ended between roots.
 bool ControlValve::Impl::AfterStep(StepResult result) {
   const std::span<double> state = x();
   double& z = state[kActuatorState];

@@ -11,23 +11,23 @@
 
 namespace fdi::simulator {
 
-/// Places of the states, each scaled to order 1.
+/// Indices of the states, each scaled to order 1.
 enum ValveStateIndex : std::size_t {
   kActuatorState,   ///< z, actuator position [stroke].
   kVelocityState,   ///< dz/dt [stroke/s].
   kChargeState,     ///< n: air mass = (1 + n) P0 V0 / (R T).
-  kFirstLagState,   ///< Command behind one lag.
-  kSecondLagState,  ///< Command behind two lags.
+  kFirstLagState,   ///< Command after one lag.
+  kSecondLagState,  ///< Command after two lags.
   kIntegralState,   ///< (1/TI) int e dt; only if TI is finite.
 };
 
-/// How the moving mass moves. Without Coulomb friction it is free or held at a
+/// State of motion. Without Coulomb friction the mass is free or held at a
 /// stop; with it, rising, falling or held.
 enum class Motion { kFree, kRising, kFalling, kHeld };
 
-/// Right-hand side of equations (13)-(17) for one motion, constant fault
-/// effects, and inputs that are smooth in time, or a held command with
-/// pressures that are linear in time.
+/// Right-hand side of equations (13)-(17) for one state of motion and constant
+/// fault effects. Inputs are either smooth in time, or a held command with
+/// pressures linear in time.
 ///
 ///   z' = v
 ///   v' = (N - F_f sign(v) - b v) / m
@@ -36,8 +36,8 @@ enum class Motion { kFree, kRising, kFalling, kHeld };
 ///   N = m g - K (x + x0) + (Pc - P0) A - (P1m - P2) A0 / Km
 ///   mdot by the air relay with if = transducer(clamp((17))), minus leaks
 ///
-/// The actuator's position drives spring and play; the rod's, behind the play
-/// and the stops, the chamber's volume (15), the plug and the feedback.
+/// Spring and play act on the actuator's position; the chamber volume (15), the
+/// plug and the feedback follow the rod, behind the play and the stops.
 class ValveDynamics final : public OdeSystem {
  public:
   explicit ValveDynamics(const ValveParameters& parameters);
@@ -49,54 +49,54 @@ class ValveDynamics final : public OdeSystem {
   /// Command of `from`; pressures from `from` at t = 0 to `to` at `duration_s`.
   void SetInputs(const ProcessInputs& from, const ProcessInputs& to,
                  double duration_s);
-  /// Inputs that are smooth functions of time, until SetInputs(); the vapour
-  /// pressure is that at `time_s`.
+  /// Inputs as smooth functions of time, until SetInputs(); the vapour pressure
+  /// is that at `time_s`.
   void FollowInputs(const InputFunction& inputs, double time_s);
   void SetCommandNoise(double noise) { command_noise_ = noise; }
   void set_motion(Motion motion) { motion_ = motion; }
   Motion motion() const { return motion_; }
-  /// Holds the positioner's output, or lets it follow (17) again.
+  /// Holds the positioner's output, or releases it to (17).
   void HoldSignal(std::optional<double> signal) { held_signal_ = signal; }
 
   void Derivatives(double t, const double* x,
                    double* dx) const noexcept override;
   void Roots(double t, const double* x, double* g) const noexcept override;
 
-  /// Inputs as the faults make them.
+  /// The inputs after applying the fault effects.
   ProcessInputs Effective(const ProcessInputs& inputs) const;
 
   /// Backlash width / stroke.
   double PlayWidth() const;
-  /// Ends of the actuator's travel; the rod's are 0 and its limit.
+  /// Ends of the actuator's travel; those of the rod are 0 and its limit.
   double LowStop() const { return parameters_.actuator.lowest_travel; }
   double HighStop() const { return parameters_.actuator.highest_travel; }
-  /// Rod behind the play for an actuator position z.
+  /// Rod position behind the play for an actuator position z.
   double Rod(double z) const;
-  /// Rod and feedback follow the state of an accepted step.
+  /// Updates rod and feedback after an accepted step.
   void Commit(const double* x);
-  /// Puts rod and feedback without play at z.
+  /// Sets rod and feedback to z, without play.
   void Align(double z);
 
-  /// N above [N].
+  /// N of the equations above [N].
   double NetForce(double t, const double* x) const;
-  /// Friction at rest, a little above F_f: with the two equal, creeping would
-  /// switch between motion and rest without end [N].
+  /// Friction at rest, slightly above F_f: if both were equal, creeping would
+  /// alternate between motion and rest forever [N].
   double BreakAwayForce() const;
-  /// Force of spring, weight and flow, towards opening, at actuator position z
+  /// Force of spring, weight and flow towards opening, at actuator position z
   /// and time t [N].
   double OpeningForce(double t, double z) const;
   double Feedback(double rod) const;
-  /// if of (17) in [-1, 1], before the transducer.
+  /// if of (17) in [-1, 1], the input of the transducer.
   double Signal(const double* x) const;
   double ChamberPressureOf(const double* x) const;
-  /// Charge that gives `pressure_pa` at actuator position z.
+  /// Charge that results in `pressure_pa` at actuator position z.
   double ChargeFor(double pressure_pa, double z) const;
   double SupplyPressure() const { return supply_pa_; }
 
   const ValveParameters& parameters() const { return parameters_; }
 
  private:
-  // Command and pressures at time t, as the faults make them.
+  // Command and pressures at time t, with fault effects.
   ProcessInputs InputsAt(double t) const;
   double OpeningForce(const ProcessInputs& inputs, double z) const;
   double NetForce(const ProcessInputs& inputs, const double* x) const;
@@ -113,7 +113,7 @@ class ValveDynamics final : public OdeSystem {
   double rod_limit_{1.0};
   double rod_{0.0};
   double feedback_{0.0};
-  InputFunction inputs_;  // Empty while the command is held.
+  InputFunction inputs_;  // Empty if the command is held.
   double command_{0.0};
   double command_noise_{0.0};
   double inlet_pa_{0.0};
@@ -123,13 +123,13 @@ class ValveDynamics final : public OdeSystem {
   double vapour_pa_{0.0};
 };
 
-/// Flow through trim and bypass [m3/h] with the rod at `rod`, under inputs as
-/// the faults make them.
+/// Flow through trim and bypass [m3/h] with the rod at `rod`; `effective` has
+/// the fault effects applied.
 double FlowM3PerHour(const TrimParameters& trim, const FaultEffects& effects,
                      const ProcessInputs& effective, double rod,
                      double bypass_opening);
 
-/// Where the valve stands. Fractions of the stroke; 0 open, 1 closed.
+/// Mechanical state. Fractions of the stroke; 0 open, 1 closed.
 struct ValveState {
   double rod;                  ///< Position y of rod and plug, behind the play.
   double actuator;             ///< Position z of the actuator, before the play.
@@ -147,48 +147,47 @@ struct ValveState {
 /// of the chamber (air mass beyond ambient over P0 V0 / (R T)), the two filter
 /// lags, and the integral of the error if TI is finite. The rod follows the
 /// actuator through a backlash; its position is committed after each accepted
-/// step, so that the right-hand side stays smooth inside a step. Motion is
+/// step, so that the right-hand side is smooth within a step. The motion is
 /// free, or with Coulomb friction rising, falling or held; at a stop it is
-/// held. Root functions find stops, standstill and break-away, where the
+/// held. Root functions detect stops, standstill and break-away, where the
 /// integration restarts.
 class ControlValve final {
  public:
-  /// @param tolerance_scale Multiplies CVODE's tolerances, > 0.
+  /// @param tolerance_scale factor on CVODE's tolerances, > 0.
   ControlValve(const ValveParameters& parameters, double tolerance_scale);
   ~ControlValve();
 
-  /// Puts the valve at rest under `inputs`: no air flow, forces in balance.
+  /// Brings the valve to rest under `inputs`: no air flow, forces in balance.
   void Settle(const ProcessInputs& inputs);
   /// Open, vented and at rest, the filter at 0.
   void ColdStart();
 
-  /// Takes new fault effects; moves the rod where a stop or play moved.
+  /// Sets new fault effects; moves the rod if a stop or the play changed.
   void SetEffects(const FaultEffects& effects);
 
   /// Noise on the command of the following Advance(), fraction of closing.
   void SetCommandNoise(double noise);
 
-  /// Integrates over `duration_s`: the command of `from` is held, pressures and
-  /// temperature-dependent vapour pressure are those of `from` at the start,
-  /// and the pressures run linearly to those of `to`.
+  /// Integrates over `duration_s`: the command of `from` is held, the pressures
+  /// run linearly from those of `from` to those of `to`, and the vapour
+  /// pressure is that of `from`.
   /// @throws CvodeError
   void Advance(double duration_s, const ProcessInputs& from,
                const ProcessInputs& to);
 
   /// Integrates from `from_s` to `to_s` under inputs that are smooth functions
-  /// of time. The solver goes on with its history from the last call, which
-  /// ended at `from_s`, unless the fault effects changed in between.
+  /// of time. The solver keeps its history from the last call, which ended at
+  /// `from_s`, unless the fault effects changed in between.
   /// @throws CvodeError
   void AdvanceSmoothly(double from_s, double to_s, const InputFunction& inputs);
 
   ValveState state() const;
 
-  /// Net force on the moving mass but friction and damping [N], towards
-  /// closing, equation (14), under the inputs last advanced to.
+  /// Net force on the moving mass without friction and damping [N], towards
+  /// closing, equation (14), under the last inputs of Advance().
   double NetForce() const;
 
-  /// Flow through trim and bypass [m3/h], and pressures as the faults make
-  /// them.
+  /// Flow through trim and bypass [m3/h], with fault effects.
   double FlowM3PerHour(const ProcessInputs& inputs,
                        double bypass_opening) const;
   ProcessInputs Effective(const ProcessInputs& inputs) const;

@@ -72,7 +72,7 @@ int CallRoots(double t, N_Vector x, double* g, void* system) {
   return 0;
 }
 
-// CVODE's words for the error, kept for the exception.
+// Stores CVODE's error message for the exception.
 void Keep(const char* text, void* message) {
   try {
     *static_cast<std::string*>(message) = text;
@@ -151,6 +151,7 @@ class CvodeIntegrator::Impl {
 
   StepResult StepTowards(double t_stop) {
     void* const m = memory_.get();
+    // CVODE drops the stop time once it is reached, so it is set every time.
     Check(CVodeSetStopTime(m, t_stop), "CVodeSetStopTime");
     const int code = CVode(m, t_stop, state_.get(), &time_, CV_ONE_STEP);
     if (code < 0) {

@@ -9,7 +9,7 @@
 
 namespace fdi::simulator {
 
-/// CVODE failed: what() names the operation, code() is its return value.
+/// A failed CVODE call: what() names the operation, code() is its return value.
 class CvodeError : public std::runtime_error {
  public:
   CvodeError(const std::string& operation, int code);
@@ -37,8 +37,8 @@ struct CvodeOptions {
 
 enum class StepResult { kStep, kRoot, kStopTime };
 
-/// Stiff integration by CVODE's variable-order BDF with a dense Jacobian by
-/// difference quotients, one accepted step at a time.
+/// Stiff integration by CVODE's variable-order BDF with a dense
+/// difference-quotient Jacobian, one accepted step at a time.
 class CvodeIntegrator {
  public:
   /// `system` must outlive this object.
@@ -47,15 +47,15 @@ class CvodeIntegrator {
   CvodeIntegrator(CvodeIntegrator&&) noexcept;
   CvodeIntegrator& operator=(CvodeIntegrator&&) noexcept;
 
-  /// Starts afresh at (t, state()), without the history of earlier steps: to be
-  /// called after every jump of the state or of the right-hand side.
+  /// Restarts at (t, state()) without the history of earlier steps; required
+  /// after every jump of the state or of the right-hand side.
   void Restart(double t);
 
-  /// One accepted step towards `t_stop`, never beyond.
+  /// Takes one accepted step towards `t_stop`, never beyond it.
   StepResult StepTowards(double t_stop);
 
   double time() const;
-  /// The state at time(); may be changed before Restart().
+  /// The state at time(); may be modified before Restart().
   std::span<double> state();
   std::span<const double> state() const;
   std::int64_t step_count() const;

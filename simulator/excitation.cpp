@@ -79,8 +79,8 @@ class Recorded final : public Excitation {
   Recorded(RecordedExcitation config, double period_s)
       : config_(std::move(config)), period_s_(period_s) {}
 
-  // Beyond the last row it is held: the pressures of the last period need one
-  // more.
+  // Held beyond the last row, because the pressures of the last period need one
+  // more row.
   ProcessInputs Next(const FlowOfPressures&) override {
     const std::size_t last = config_.rows.size() - 1;
     return FromRow(config_.rows[std::min(row_++, last)]);
@@ -91,7 +91,7 @@ class Recorded final : public Excitation {
   }
 
  private:
-  // Linear between the rows.
+  // Interpolates linearly between the rows.
   ProcessInputs At(double row) const {
     const auto last = static_cast<double>(config_.rows.size() - 1);
     const double at = std::clamp(row, 0.0, last);

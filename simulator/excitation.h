@@ -13,7 +13,7 @@
 
 namespace fdi::simulator {
 
-/// What acts on the valve from outside at one instant, in SI units.
+/// External inputs of the valve at one instant, in SI units.
 struct ProcessInputs {
   double command{0.0};  ///< CV as a fraction of closing, 0..1.
   double inlet_pressure_pa{0.0};
@@ -43,8 +43,8 @@ struct Disturbance {
 void RequireDisturbance(const std::string& field,
                         const Disturbance& disturbance);
 
-/// Work about one operating point in open loop, with an optional slow sine on
-/// the command, so that faults that look alike at a fixed position separate.
+/// Operation about one operating point in open loop, with an optional slow sine
+/// on the command, to separate faults that look alike at a fixed position.
 struct OperatingPointExcitation {
   double cv_pct{71.67};
   Disturbance cv_noise_pct{0.5, 0.95};
@@ -74,9 +74,9 @@ struct LevelLoopExcitation {
   double initial_cv_pct{59.9};
   double proportional_gain{5.0};  ///< % of CV per % of level.
   double integral_time_s{120.0};
-  double inlet_opening{1.0};   ///< V1, hand valve before, in (0, 1].
-  double outlet_opening{1.0};  ///< V2, hand valve behind, in (0, 1].
-  double bypass_opening{0.0};  ///< V3, hand valve beside, in [0, 1].
+  double inlet_opening{1.0};   ///< V1, upstream hand valve, in (0, 1].
+  double outlet_opening{1.0};  ///< V2, downstream hand valve, in (0, 1].
+  double bypass_opening{0.0};  ///< V3, bypass hand valve, in [0, 1].
 };
 
 /// A recorded excitation, one row per sample.
@@ -90,15 +90,15 @@ using ExcitationConfig = std::variant<OperatingPointExcitation, SineExcitation,
 /// "operating-point", "sine", "level-loop" or "csv".
 std::string_view ExcitationName(const ExcitationConfig& config);
 
-/// The default excitation called `name` (csv: without rows).
+/// The default excitation `name` (csv: without rows).
 /// @throws ConfigError naming the accepted names.
 ExcitationConfig DefaultExcitation(std::string_view name);
 
 /// @throws ConfigError naming field, value and range.
 void Validate(const ExcitationConfig& config);
 
-/// Flow through the valve and its bypass [m3/h] for the pressures before and
-/// behind the valve [Pa], at its present opening.
+/// Flow through the valve and its bypass [m3/h], as a function of the pressures
+/// upstream and downstream [Pa], at the present opening.
 using FlowOfPressures = std::function<double(double, double)>;
 
 /// Process inputs at a time since the first sample [s].
@@ -110,29 +110,29 @@ class Excitation {
   virtual ~Excitation() = default;
 
   /// True if the inputs do not depend on the valve. They are then known one
-  /// period ahead, and the pressures run linearly from sample to sample. A
-  /// closed loop's pressures, found at a sample, are reached, and read, one
+  /// period ahead, and the pressures run linearly from sample to sample. In a
+  /// closed loop, the pressures computed at a sample are reached, and read, one
   /// period later.
   virtual bool is_open_loop() const { return true; }
 
-  /// Inputs under which a closed loop starts; its first Next() follows.
+  /// Inputs at which a closed loop starts; its first Next() follows.
   virtual ProcessInputs Rest() const { return {}; }
 
-  /// Hand valve V3 beside the valve, 0..1.
+  /// Opening of the bypass hand valve V3, 0..1.
   virtual double bypass_opening() const { return 0.0; }
 
-  /// The inputs as smooth functions of time; empty if they are not.
+  /// The inputs as smooth functions of time; empty if not available.
   virtual InputFunction AsFunction() const { return {}; }
 
   /// While held, a closed loop neither controls nor advances: its pressures
-  /// follow the flow, and its command means nothing.
+  /// follow the flow, and its command is ignored.
   virtual void Hold(bool /*held*/) {}
 
   /// Inputs of the next sample. `flow` is only used by closed loops.
   virtual ProcessInputs Next(const FlowOfPressures& flow) = 0;
 };
 
-/// @param seed Same seed, same inputs, bit for bit.
+/// @param seed same seed, same inputs, bit for bit.
 std::unique_ptr<Excitation> MakeExcitation(const ExcitationConfig& config,
                                            double period_s, std::uint64_t seed);
 

@@ -29,7 +29,7 @@ double ReadNumber(std::string_view text, std::string_view part,
   return value;
 }
 
-// Cuts `rest` at the next `separator`; the part before it.
+// Splits `rest` at the next `separator`; returns the part before it.
 std::string_view CutAt(std::string_view& rest, char separator) {
   const std::size_t at = rest.find(separator);
   const std::string_view part = rest.substr(0, at);
@@ -84,7 +84,7 @@ void ReadOption(std::string_view text, std::string_view option,
   }
 }
 
-// The shortest text that reads back as `value`.
+// The shortest text that round-trips to `value`.
 std::string Shortest(double value) {
   std::array<char, 32> buffer{};
   const auto [end, error] =

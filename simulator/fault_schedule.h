@@ -20,8 +20,8 @@ struct FaultSchedule {
   double initial_strength{0.0};
   double final_strength{1.0};
   double end_s{std::numeric_limits<double>::infinity()};  ///< > start_s.
-  /// The reading stays what it was at the first sample from start_s on; of t1,
-  /// p1, p2 only. No effect on the process, no development; strength 1.
+  /// From start_s on, the reading stays at the first sample's value; t1, p1, p2
+  /// only. No effect on the process, no development; strength 1.
   bool flatline{false};
 };
 
@@ -31,26 +31,25 @@ inline constexpr std::string_view kFaultForms =
     "FAULT:incipient@START+DURATION[:from=S0][:strength=S][:until=T] or "
     "t1|p1|p2:flatline@START[:until=T]";
 
-/// Reads "f19:abrupt@50:strength=0.75" or
+/// Parses "f19:abrupt@50:strength=0.75",
 /// "f1:incipient@500+1200:from=0.25:strength=0.6:until=3000" or
-/// "t1:flatline@50"; times in s.
-/// strength is 1 and from is 0 where they are not given.
+/// "t1:flatline@50"; times in s. By default strength is 1 and from is 0.
 /// @throws ConfigError naming the text, the reason and kFaultForms.
 FaultSchedule ParseFaultSchedule(std::string_view text);
 
-/// The text that ParseFaultSchedule() reads back as `schedule`.
+/// The text from which ParseFaultSchedule() restores `schedule`.
 std::string ToText(const FaultSchedule& schedule);
 
 /// @throws ConfigError naming field, value and range.
 void Validate(const FaultSchedule& schedule);
 
-/// Strength at `time_s`; 0 while the fault does not act.
+/// Strength at `time_s`; 0 while the fault is inactive.
 double StrengthAt(const FaultSchedule& schedule, double time_s);
 
-/// The first schedule that acts at `time_s`, else {0, 0}.
+/// The first schedule active at `time_s`, else {0, 0}.
 FaultTruth TruthAt(const std::vector<FaultSchedule>& schedules, double time_s);
 
-/// All that act at `time_s`, combined; flatlines have no effect of this kind.
+/// All active at `time_s`, combined; flatlines have no such effects.
 FaultEffects EffectsAt(const std::vector<FaultSchedule>& schedules,
                        double time_s);
 

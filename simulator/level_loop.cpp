@@ -21,7 +21,7 @@ constexpr double kLevelMassKg = 27.4;        // Per % of level.
 constexpr double kDrumEnergy = 735.0;        // J/Pa.
 constexpr double kSuperheaterHeat = 1.04e6;  // J/K.
 constexpr double kSteamTemperatureC = 398.8;
-constexpr double kSuperheaterShare = 0.178;  // Of the firing.
+constexpr double kSuperheaterShare = 0.178;  // Of the firing power.
 constexpr double kFiringGain = 60.0;         // W/Pa.
 constexpr double kFiringIntegralS = 300.0;
 constexpr double kHandValveKv = 250.0;  // V1 and V2, open [m3/h].
@@ -39,7 +39,7 @@ double TonsPerHour(double flow_m3_h) {
   return flow_m3_h * FeedDensity() / 1000.0;
 }
 
-// Pressure that a throttled hand valve takes beyond the open one [Pa].
+// Additional pressure loss of a throttled hand valve [Pa].
 double HandValveLoss(double flow_m3_h, double opening) {
   const double open = flow_m3_h / kHandValveKv;
   return 1e5 * FeedDensity() / 1000.0 * open * open *
@@ -80,7 +80,7 @@ double LevelLoop::OutletPressure(double flow_m3_h) const {
          HandValveLoss(flow_m3_h, config_.outlet_opening);
 }
 
-// Euler in steps of at most 0.1 s: the fastest pole lies at a minute.
+// Euler steps of at most 0.1 s: the fastest time constant is about a minute.
 void LevelLoop::AdvanceBoiler() {
   const int steps = static_cast<int>(std::ceil(period_s_ / 0.1));
   const double h = period_s_ / steps;
@@ -108,7 +108,7 @@ void LevelLoop::AdvanceBoiler() {
   }
 }
 
-// CV [%] by PI with the integral held at the ends of CV; more CV, less water.
+// PI controller for CV [%], with anti-windup; more CV means less water.
 double LevelLoop::LevelController(double level_pct) {
   const double error = level_pct - config_.level_set_point_pct;
   integral_pct_ +=
@@ -128,7 +128,7 @@ ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {
   pump_offset_pa_ = 1e3 * pump_.Next();
   const double reading = boiler_.level_pct + level_noise_.Next();
   const double cv_pct = held_ ? integral_pct_ : LevelController(reading);
-  // The more flows, the less pressure is left to drive it: bisection.
+  // More flow leaves less driving pressure, so bisection finds the balance.
   double low = 0.0;
   double high = 1000.0;
   for (int i = 0; i < 40; ++i) {

@@ -7,18 +7,19 @@
 
 namespace fdi::simulator {
 
-/// The boiler as the valve sees it.
+/// State of the boiler that the valve feeds.
 struct BoilerState {
   double level_pct;  ///< Of the drum.
   double drum_pressure_pa;
   double steam_flow_kg_s;
-  double steam_temperature_c;  ///< Behind the superheater.
+  double steam_temperature_c;  ///< After the superheater.
   double feed_flow_kg_s;
   double firing_w;
 };
 
-/// Feedwater loop about the Lublin boiler's working point: the valve feeds a
-/// drum whose level a PI controller holds through CV; steam demand disturbs.
+/// Feedwater loop about the operating point of the Lublin boiler: the valve
+/// feeds a drum whose level a PI controller maintains through CV; steam demand
+/// is the disturbance.
 ///
 ///   27.4 dL/dt   = Wf - Ws - Wb                         (kg/s, L in %)
 ///   735  dP/dt   = Q - Wf (hl - hf) - Ws (hg - hl)      (J/Pa)
@@ -27,9 +28,9 @@ struct BoilerState {
 ///   P1 = 3557 kPa - 3 (F - 17.3) - loss of V1 + pump noise   (F in t/h)
 ///   P2 = P + 178 kPa + 0.13 F^2 + loss of V2
 ///
-/// F and the two pressures solve each other at every sample. Values fitted to
-/// means, deviations and correlations of the plant record; enthalpies of
-/// saturated water and steam at 2.4 MPa, feed at 100.7 degC.
+/// F and the two pressures are solved together at every sample. Values are
+/// fitted to means, deviations and correlations of the plant record; enthalpies
+/// are those of saturated water and steam at 2.4 MPa, feed at 100.7 degC.
 class LevelLoop final : public Excitation {
  public:
   LevelLoop(const LevelLoopExcitation& config, double period_s,

@@ -5,7 +5,7 @@
 namespace fdi::simulator {
 namespace {
 
-// The finalizer of SplitMix64: spreads neighbouring seeds and streams.
+// The finalizer of SplitMix64: decorrelates neighbouring seeds and streams.
 std::uint64_t Mix(std::uint64_t z) {
   z += 0x9E3779B97F4A7C15ULL;
   z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;

@@ -7,12 +7,11 @@
 
 namespace fdi::simulator {
 
-/// Standard normal numbers, the same for the same seed on every standard
-/// library (std::normal_distribution is not): mt19937_64 and the polar method
-/// of Marsaglia.
+/// Standard normal numbers that are reproducible with every standard library
+/// (std::normal_distribution is not): mt19937_64 and Marsaglia's polar method.
 class NormalSource {
  public:
-  /// @param stream Independent streams of one seed.
+  /// @param stream selects one of the independent streams of a seed.
   NormalSource(std::uint64_t seed, std::uint64_t stream);
   double operator()();
 
@@ -24,11 +23,11 @@ class NormalSource {
   double spare_{0.0};
 };
 
-/// A Disturbance as it runs; starts in its stationary distribution.
+/// A realisation of a Disturbance; starts in its stationary distribution.
 class DisturbanceProcess {
  public:
   DisturbanceProcess(const Disturbance& disturbance, NormalSource source);
-  /// The next value; the first call gives sample 0.
+  /// The next value; the first call is sample 0.
   double Next();
 
  private:

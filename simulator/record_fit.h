@@ -8,12 +8,13 @@
 
 namespace fdi::simulator {
 
-/// One instant of a plant record: what drove the valve and how it answered.
+/// One instant of a plant record: inputs and response of the valve.
 struct RecordRow {
   InputRow input;
   double x_pct;
   double flow;  ///< In the flow unit of the parameter set.
-  /// False for what was filled in: it drives the valve, and fits nothing.
+  /// False for filled-in values, which drive the valve but do not count in
+  /// fits.
   bool x_measured{true};
   bool flow_measured{true};
 };
@@ -21,20 +22,20 @@ struct RecordRow {
 /// How the inputs of a record act between its rows.
 struct RecordDrive {
   double period_s{1.0};  ///< Of the rows, > 0.
-  /// The command is linear from row to row instead of held.
+  /// The command is interpolated between rows instead of held.
   bool interpolated_command{false};
-  /// Rows from the stamp of a command to its action: negative where the valve
-  /// answers before the stamp, as to a command that is stamped when the period
-  /// is over.
+  /// Rows from the stamp of a command to its effect; negative if the valve
+  /// responds before the stamp, as for commands stamped at the end of their
+  /// period.
   int command_delay{0};
 };
 
-/// The command that acts from row k on: that of row k - delay, or of the
-/// nearest row that there is.
+/// The command acting from row k on: that of row k - delay, or of the nearest
+/// existing row.
 double DelayedCommand(const std::vector<RecordRow>& record, std::size_t k,
                       int delay);
 
-/// What the simulated valve answers to one row.
+/// Response of the simulated valve in one row.
 struct RecordAnswer {
   double x_pct;
   double flow;
@@ -48,10 +49,10 @@ struct RecordFit {
   double flow_bias{0.0};
 };
 
-/// Answers of a fault-free valve to the inputs of rows [first, last): noise and
-/// resolution off, in equilibrium with the first of them.
-/// @param tolerance_scale On the integrator's tolerances, > 0: 10 takes half
-///   the time of 1 and errs by 0.02 % of X.
+/// Response of a fault-free valve to the inputs of rows [first, last), without
+/// noise and resolution, starting in equilibrium with the first row.
+/// @param tolerance_scale factor on the integrator's tolerances, > 0: 10 takes
+///   half the time of 1, with errors of 0.02 % of X.
 /// @throws ConfigError if `parameters`, `drive` or a row is not valid.
 /// @throws std::invalid_argument unless first < last <= record.size().
 std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
@@ -60,8 +61,8 @@ std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
                                          const RecordDrive& drive = {},
                                          double tolerance_scale = 10.0);
 
-/// What the flow transmitter reads of a valve with its rod at `x_pct`, without
-/// noise; pressures and temperature of `input` act as they are.
+/// Reading of the flow transmitter with the rod at `x_pct`, without noise;
+/// pressures and temperature of `input` are used unchanged.
 double FlowReading(const ValveParameters& parameters,
                    const FaultEffects& effects, const InputRow& input,
                    double x_pct);

@@ -5,8 +5,7 @@
 namespace fdi::simulator {
 
 /// @throws ConfigError "`field` is `value`: expected `low` <= `field` <=
-/// `high`"
-///   unless value is in [low, high].
+///   `high`" unless value is in [low, high].
 void RequireRange(std::string_view field, double value, double low,
                   double high);
 

@@ -22,8 +22,8 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// Standard deviation of a normal distribution with that median deviation. A
-// residual of 0 is that of a row that fits nothing.
+// Standard deviation of a normal distribution with the same median absolute
+// deviation. Residuals of 0 are skipped: they mark rows that do not count.
 double RobustScale(const VectorXd& residuals) {
   std::vector<double> sizes;
   for (const double r : residuals) {
@@ -34,7 +34,7 @@ double RobustScale(const VectorXd& residuals) {
   return sizes.empty() ? 0.0 : 1.4826 * Median(std::move(sizes));
 }
 
-// Share of independent rows in a series with that lag-1 correlation.
+// Share of independent rows in a series with this lag-1 correlation.
 double IndependentShare(const VectorXd& r) {
   const double power = r.squaredNorm();
   if (r.size() < 2 || power == 0.0) {
@@ -120,7 +120,7 @@ double Minimiser::Loss(const MatrixXd& r, const VectorXd& point) const {
          0.5 * off.squaredNorm();
 }
 
-// Information, scores and gradient of the data at the present point.
+// Computes information, scores and gradient of the data at the present point.
 void Minimiser::Linearise() {
   const Index p = fit_.point.size();
   std::vector<VectorXd> points;
@@ -157,7 +157,7 @@ void Minimiser::Linearise() {
   }
 }
 
-// Entries at a bound that the gradient presses against stay where they are.
+// Entries at a bound stay there if the gradient points outwards.
 VectorXd Minimiser::Step(double damping) const {
   const VectorXd precision = PriorPrecision();
   MatrixXd h = share_ * fit_.information;
@@ -178,7 +178,7 @@ VectorXd Minimiser::Step(double damping) const {
   return -h.ldlt().solve(g);
 }
 
-// One accepted step; false where none lowers the loss by enough.
+// Takes one step; @returns false if none lowers the loss by enough.
 bool Minimiser::Improve() {
   constexpr int kTrials = 5;
   constexpr double kDampingFactor = 8.0;

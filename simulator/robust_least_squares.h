@@ -7,12 +7,12 @@
 
 namespace fdi::simulator {
 
-/// Residuals at several points: one matrix (instants x channels) per point.
-/// Points of one call do not depend on each other.
+/// Residuals at several points: one matrix (instants x channels) per point. The
+/// points of one call are independent.
 using ResidualFunction = std::function<std::vector<Eigen::MatrixXd>(
     const std::vector<Eigen::VectorXd>& points)>;
 
-/// Where a point may lie, and what is believed of it before; p entries each.
+/// Bounds and prior of a point; p entries each.
 struct PointBounds {
   Eigen::VectorXd lower;
   Eigen::VectorXd upper;
@@ -24,12 +24,12 @@ struct RobustFitOptions {
   int max_iterations{10};
   double difference_step{0.02};  ///< Of the numeric Jacobian.
   double huber{1.345};           ///< Corner of the loss, in scales.
-  double tolerance{2e-3};        ///< Relative fall of the loss that ends it.
-  Eigen::VectorXd least_scale;   ///< Per channel: noise of the transmitter.
-  Eigen::Index block_rows{60};   ///< Of the blocks that estimate `scatter`.
+  double tolerance{2e-3};        ///< Relative decrease of the loss to stop.
+  Eigen::VectorXd least_scale;   ///< Per channel: transmitter noise.
+  Eigen::Index block_rows{60};   ///< Block length for estimating `scatter`.
 };
 
-/// Outcome of a fit; see StandardDeviations().
+/// Result of a fit; see StandardDeviations().
 struct RobustFit {
   Eigen::VectorXd point;
   Eigen::VectorXd scale;        ///< Per channel.
@@ -48,18 +48,17 @@ double MeanHuberLoss(const Eigen::MatrixXd& residuals,
 ///
 /// by Levenberg-Marquardt with Huber's loss rho. The scale s_j of channel j is
 /// the residuals' median absolute deviation, at least `least_scale`; c <= 1
-/// discounts rows whose residuals resemble their neighbours'. Both are found
-/// anew in each iteration.
+/// discounts correlated residuals. Both are re-estimated in each iteration.
 ///
-/// @param start p entries, moved into the bounds.
+/// @param start p entries, clamped to the bounds.
 RobustFit FitRobustly(const ResidualFunction& residuals,
                       const Eigen::VectorXd& start, const PointBounds& bounds,
                       const RobustFitOptions& options);
 
-/// How far the data leave each of the `kept` entries of the point open, the
-/// others known: the larger of the root of H^-1 and of the sandwich
-/// H^-1 (scatter + P) H^-1 with H = information + P, P the prior's. The
-/// sandwich holds for residuals that are neither white nor independent.
+/// Uncertainty of each of the `kept` entries of the point, given the others:
+/// the larger of the root of H^-1 and that of the sandwich H^-1 (scatter + P)
+/// H^-1, where H = information + P and P is the prior's precision. The sandwich
+/// is valid for residuals that are neither white nor independent.
 Eigen::VectorXd StandardDeviations(const RobustFit& fit,
                                    const PointBounds& bounds,
                                    const std::vector<Eigen::Index>& kept);

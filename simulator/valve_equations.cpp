@@ -44,8 +44,8 @@ namespace {
 
 constexpr double kRegularPa = 1e3;
 
-// sqrt(d), odd and with a finite slope at 0: a cubic inside +-epsilon that
-// meets value and slope of the root at its ends.
+// sqrt(d), odd and with a finite slope at 0: inside +-epsilon a cubic that
+// matches value and slope of the root at its ends.
 double SignedRoot(double d, double epsilon) {
   const double q = d / epsilon;
   if (std::abs(q) >= 1.0) {
@@ -54,7 +54,7 @@ double SignedRoot(double d, double epsilon) {
   return std::sqrt(epsilon) * q * (1.25 - 0.25 * q * q);
 }
 
-// Linear interpolation in a table, held at its ends.
+// Linear interpolation in a table, constant beyond its ends.
 template <std::size_t N>
 double Interpolate(const std::array<double, N>& x,
                    const std::array<double, N>& y, double at) {

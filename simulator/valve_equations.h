@@ -14,13 +14,13 @@ namespace fdi::simulator {
 ///   properties of ordinary water substance", J. Phys. Chem. Ref. Data 22.
 double WaterDensity(double temperature_c);
 
-/// Density with which the valve's flow is computed [kg/m3]: WaterDensity() up
-/// to 110 degC, held beyond. The benchmark's model does so: its evaporation
-/// fault leaves the liquid's density alone.
+/// Density used for the valve's flow [kg/m3]: WaterDensity() up to 110 degC,
+/// constant above, as in the benchmark's model, whose evaporation fault does
+/// not change the liquid's density.
 double LiquidDensity(double temperature_c);
 
-/// Brings the flow of one sample after another to a unit, by LiquidDensity() at
-/// T1: the last one known, 20 degC before.
+/// Converts the flow of successive samples to a unit, with LiquidDensity() at
+/// the last known T1, initially 20 degC.
 class FlowConversion {
  public:
   explicit FlowConversion(FlowUnit to) : to_(to) {}
@@ -55,8 +55,8 @@ struct MediumState {
 MediumState MediumAt(double inlet_pressure_pa, double outlet_pressure_pa,
                      double temperature_c);
 
-/// Pressure drop that drives the flow: P1m - P2, at most
-/// max(0, Km (P1m - rc Pv)) (choking).
+/// Pressure drop that drives the flow: P1m - P2, at most max(0, Km (P1m - rc
+/// Pv)) (choking).
 double EffectivePressureDrop(const MediumState& medium, double recovery);
 
 /// (12) F = 100 Kv f sqrt(dP / rho) [m3/h], Kv in m3/h, dP in MPa; negative
@@ -65,7 +65,8 @@ double Flow(double kv_m3_h, double opening, double pressure_drop_pa,
             double density_kg_m3);
 
 /// Force of the flow on the plug, towards opening: (P1m - P2) A0 / Km, with the
-/// unlimited drop. The paper prints Km (Pus - Pds) A0; this is the benchmark's.
+/// unlimited drop. The paper prints Km (Pus - Pds) A0; this is the benchmark's
+/// form.
 double FlowForce(double pressure_drop_pa, double plug_area_m2, double recovery);
 
 /// (15) Absolute pressure in the chamber Pc = (P0 V0 + R T m) / (V0 + A x),
@@ -73,21 +74,21 @@ double FlowForce(double pressure_drop_pa, double plug_area_m2, double recovery);
 double ChamberPressure(const ActuatorParameters& actuator, double charge,
                        double position_m);
 
-/// (16) Air flow [kg/s] between two pressures per unit of |if| and Cv:
-/// 4.13e-6 sqrt((Pa1 - Pa2) Pa2) while Pa2 >= Pa1/2, else 2.065e-6 Pa1 (the
-/// printed 2.06e-6 would leave a jump); backwards if Pa1 < Pa2.
+/// (16) Air flow [kg/s] between two pressures per unit of |if| and Cv: 4.13e-6
+/// sqrt((Pa1 - Pa2) Pa2) while Pa2 >= Pa1/2, else 2.065e-6 Pa1 (the printed
+/// 2.06e-6 would cause a jump); reversed if Pa1 < Pa2.
 double AirFlow(double from_pa, double to_pa);
 
 /// Square-root law of the benchmark's air relay: sqrt(Pa1 - Pa2) [sqrt(Pa)],
 /// odd, regularised below 1 kPa.
 double OrificeAirFlow(double from_pa, double to_pa);
 
-/// Static table of the electro-pneumatic transducer, dead zone about 0.
+/// Static table of the electro-pneumatic transducer, with a dead zone about 0.
 double TransducerOutput(double signal);
 
-/// The lever between rod and positioner: X = 0.5 + sin(60 deg (a - 0.5)), a the
-/// angle as a fraction of its travel. LeverAngle() is its inverse and is held
-/// at the ends of the travel.
+/// The lever between rod and positioner: X = 0.5 + sin(60 deg (a - 0.5)), with
+/// the angle a as a fraction of its travel. LeverAngle() is its inverse,
+/// clamped at the ends of the travel.
 double LeverPosition(double angle);
 double LeverAngle(double closing);
 

@@ -63,12 +63,12 @@ namespace {
 
 using Answers = std::vector<std::vector<RecordAnswer>>;  // By segment.
 
-// Tolerances of the integrator: a difference of simulations at points 2 % apart
-// needs finer ones than a simulation that is compared with a record.
+// Integrator tolerances: differences between simulations of points 2 % apart
+// need finer ones than a comparison with a record.
 constexpr double kFine = 1.0;
 constexpr double kCoarse = 10.0;
 
-// Simulates on `threads` threads.
+// Simulates all candidates on all segments with `threads` threads.
 std::vector<Answers> Simulate(const std::vector<ValveCandidate>& candidates,
                               const std::vector<RecordSegment>& segments,
                               double tolerance_scale, int threads) {
@@ -96,8 +96,8 @@ std::vector<Answers> Simulate(const std::vector<ValveCandidate>& candidates,
 }
 
 // Differences simulation - record: one row per instant, columns X [%] and, if
-// `has_flow`, F by `parameters`; the first `settle_rows` of every segment are
-// left out.
+// `has_flow`, F computed with `parameters`; the first `settle_rows` of every
+// segment are omitted.
 MatrixXd Residuals(const ValveParameters& parameters, const Answers& motion,
                    const std::vector<RecordSegment>& segments,
                    std::size_t settle_rows, bool has_flow) {
@@ -123,7 +123,7 @@ MatrixXd Residuals(const ValveParameters& parameters, const Answers& motion,
   return result;
 }
 
-// `factor` to both sides of the nominal value, inside [least, most].
+// A factor of `factor` either side of the nominal value, within [least, most].
 ValveUnknown Unknown(const char* name, double& (*in)(ValveParameters&),
                      ValveParameters nominal, double factor, double least,
                      double most) {
@@ -137,7 +137,7 @@ ValveUnknown Unknown(const char* name, double& (*in)(ValveParameters&),
           false};
 }
 
-// Sums of a weighted straight line y = a - n x.
+// Sums for the weighted straight line y = a - n x.
 struct LineSums {
   double w{0.0};
   double x{0.0};
@@ -156,7 +156,7 @@ struct LineSums {
   }
 };
 
-// Flow over 100 sqrt(dP / rho), i.e. Kv f(X) [m3/h]; 0 where it says nothing.
+// Flow over 100 sqrt(dP / rho), i.e. Kv f(X) [m3/h]; 0 if not usable.
 double EffectiveKv(const RecordRow& row, const InstrumentParameters& i) {
   const double margin = 0.01 * (i.flow.high - i.flow.low);
   if (row.flow < i.flow.low + margin || row.flow > i.flow.high - margin) {
@@ -307,7 +307,7 @@ constexpr double kHuber = 1.345;   // Corner of the loss.
 constexpr double kAtBound = 1e-3;  // Of a search, in the logarithm.
 constexpr int kMostIterations = 10;
 
-// The noise of a transmitter; one without noise still reads in steps.
+// The transmitter's noise, or at least its resolution.
 double LeastScale(const Transmitter& transmitter) {
   return std::max(transmitter.noise_sd,
                   1e-5 * (transmitter.high - transmitter.low));
@@ -319,7 +319,7 @@ std::vector<Index> AllOf(const std::vector<ValveUnknown>& unknowns) {
   return all;
 }
 
-// Kv and exponent do not move the rod.
+// Kv and exponent do not affect the rod.
 VectorXd WithoutTrim(const std::vector<ValveUnknown>& unknowns,
                      VectorXd point) {
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
@@ -355,7 +355,7 @@ void RequireUsable(const std::vector<HealthyRecord>& records,
   }
 }
 
-// One choice of air relay and drive, and what may be fitted in it.
+// One choice of air relay and drive, with its fitted unknowns.
 struct Hypothesis {
   ValveCandidate base;  // With the nominal values of all unknowns.
   std::vector<ValveUnknown> unknowns;
@@ -428,8 +428,8 @@ Hypothesis Identification::Start(const ValveParameters& variant,
   return h;
 }
 
-// First how and when the command acts, then the relay. Of what fits alike the
-// first is kept: the nominal relay, the command held and without delay.
+// Chooses first how and when the command acts, then the relay. Of equally good
+// fits the first is kept: the nominal relay, a held command without delay.
 Hypothesis Identification::BestStart() const {
   std::vector<Hypothesis> drives;
   for (const int delay : {0, -1, 1, 2}) {
@@ -449,8 +449,8 @@ Hypothesis Identification::BestStart() const {
 RobustFit Identification::Fit(const Hypothesis& hypothesis,
                               const std::vector<RecordSegment>& segments,
                               int iterations, double tolerance_scale) const {
-  // Points that differ in the trim alone share a simulation; the last point
-  // that came alone is where the fit is.
+  // Points that differ only in the trim share a simulation; the last single
+  // point is the present one of the fit.
   std::vector<VectorXd> simulated;
   std::vector<Answers> motions;
   const auto residuals = [&](const std::vector<VectorXd>& points) {
@@ -495,7 +495,7 @@ RobustFit Identification::Fit(const Hypothesis& hypothesis,
                      options);
 }
 
-// A short fit of each to the liveliest segment, judged by X on all of them.
+// Fits each briefly to the liveliest segment, and compares X on all of them.
 Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
   constexpr int kIterations = 4;
   std::vector<ValveCandidate> candidates;
@@ -512,7 +512,7 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
         Residuals(candidates[i].parameters, motions[i], segments_,
                   static_cast<std::size_t>(options_.settle_rows), false)
             .norm();
-    // A lag of the valve looks like a part of a sample of delay.
+    // A lag of the valve resembles a delay of part of a sample.
     const bool same_delay = hypotheses[i].base.drive.command_delay ==
                             hypotheses[best].base.drive.command_delay;
     if (loss < (same_delay ? 0.99 : 0.9) * least) {
@@ -523,8 +523,8 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
   return hypotheses[best];
 }
 
-// Fits; puts what the records leave open back to nominal, the last of the list
-// first, and fits the others again.
+// Fits; resets parameters that the records do not determine to nominal, the
+// last of the list first, and fits the others again.
 void Identification::KeepIdentified(
     Hypothesis& hypothesis, std::vector<FittedParameter>& rejected) const {
   for (bool changed = true; changed && !hypothesis.unknowns.empty();) {
@@ -548,9 +548,10 @@ void Identification::KeepIdentified(
   }
 }
 
-// Tries each stated parameter beside those that are kept. One that goes to a
-// bound of its search stands for something else that the model leaves out, and
-// whether it pays then hangs on the last digit of the readings.
+// Tries each stated parameter in addition to those kept. One that reaches a
+// bound of its search compensates for something missing in the model, and
+// whether it lowers the loss enough then depends on the last digit of the
+// readings.
 void Identification::AddStated(Hypothesis& hypothesis,
                                std::vector<FittedParameter>& rejected) const {
   for (const ValveUnknown& unknown :
@@ -589,7 +590,7 @@ std::vector<RecordFit> Identification::Compare(
       whole.push_back({&record.rows, 0, record.rows.size()});
     }
   }
-  // Rows that were filled in have a difference of 0.
+  // Filled-in rows have a difference of 0.
   const auto count = [&](Index j) {
     double measured = 0.0;
     for (const RecordSegment& segment : whole) {

@@ -30,7 +30,7 @@ ValveParameters LublinActuator3Refit() {
 ValveParameters PaperOperatingPoint() {
   ValveParameters valve;
   valve.name = "paper-operating-point";
-  // The data sheet's supply: evaporation then opens the valve all the way.
+  // The data sheet's supply: with it, evaporation opens the valve fully.
   valve.actuator.supply_pressure_gauge_pa = 240e3;
   valve.trim.characteristic = FlowCharacteristic::kLinear;
   valve.trim.kv_m3_h = 63.0;

@@ -24,14 +24,14 @@ struct ActuatorParameters {
   double supply_pressure_gauge_pa{600e3};  ///< Above ambient.
   double plug_area_m2{1.9635e-3};          ///< A0, 50 mm plug.
   double play_fraction{0.01};              ///< Backlash width / stroke.
-  /// Travel of the actuator before the play / stroke: it goes on where a stop
-  /// holds the rod.
+  /// Travel of the actuator / stroke, before the play: it continues where a
+  /// stop holds the rod.
   double lowest_travel{-0.05};
   double highest_travel{1.25};
   double coulomb_friction_n{0.0};  ///< F_f of (13), 0 = none.
 };
 
-/// Law of the air flow between two pressures.
+/// Law of air flow between two pressures.
 enum class AirRelay {
   kCompressible,  ///< (16), with a Cv each for filling and venting.
   kOrifice        ///< mdot = c if sqrt(Pa1 - Pa2), the DAMADICS benchmark's.
@@ -80,13 +80,13 @@ struct InstrumentParameters {
   Transmitter temperature{0.0, 200.0, 0.282};
   Transmitter position{0.0, 100.0, 0.141};
   Transmitter flow{0.0, 40.0, 0.0564};
-  /// Noise of the command on its way to the positioner, drawn once a sample and
-  /// held, hence 17 times smaller than that of a fast white noise [%].
+  /// Noise of the command on its way to the positioner, drawn once per sample
+  /// and held, hence 17 times smaller than fast white noise [%].
   double positioner_noise_sd_pct{0.0083};
   int resolution_bits{16};  ///< Of the span.
 };
 
-/// One valve. The named sets below are what users choose from.
+/// One valve. Users choose from the named sets below.
 struct ValveParameters {
   std::string name{"lublin-actuator-3"};
   ActuatorParameters actuator{};
@@ -99,9 +99,9 @@ struct ValveParameters {
 /// - lublin-actuator-3: data sheet and benchmark values of actuator 3 of the
 ///   Lublin sugar factory (feedwater of the 4th boiler), flow in t/h, with the
 ///   benchmark's air relay in place of (16).
-/// - lublin-actuator-3-refit: the same refitted to 40 minutes of the plant's
+/// - lublin-actuator-3-refit: the same, refitted to 40 minutes of the plant
 ///   record: (16) with a Cv each for filling and venting (without the dead
-///   zone's table), filter time, Kv and exponent; all else as above.
+///   zone's table), filter time, Kv and exponent; otherwise as above.
 /// - paper-operating-point: linear trim in m3/h that gives the flow, position
 ///   and noise floor of [Mendonca et al., 2009], tables 3 and 4.
 std::vector<std::string> ParameterSetNames();

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kForever = 1e10;
 
-// Value at `time_s`, which is within the points.
+// Value at `time_s`, which must lie within the points.
 double Interpolate(const std::vector<double>& t_s,
                    const std::vector<double>& values, double time_s) {
   const auto right = std::upper_bound(t_s.begin(), t_s.end(), time_s);
@@ -33,7 +33,8 @@ double Interpolate(const std::vector<double>& t_s,
 
 class Profile {
  public:
-  // Each profile has three streams of noise, beyond those of the excitations.
+  // Each profile has three noise streams, numbered above those of the
+  // excitations.
   Profile(InputProfile config, std::uint64_t seed, std::uint64_t index)
       : config_(std::move(config)),
         cv_(config_.cv_noise_pct, NormalSource(seed, 100 + 3 * index)),
@@ -89,7 +90,8 @@ class Profiled final : public Excitation {
   bool is_open_loop() const override { return base_->is_open_loop(); }
   double bypass_opening() const override { return base_->bypass_opening(); }
 
-  // Without noise of its own: that belongs to the samples.
+  // Uses copies of the profiles, because their noise streams belong to the
+  // samples.
   ProcessInputs Rest() const override {
     ProcessInputs inputs = base_->Rest();
     std::vector<Profile> at_start = profiles_;
@@ -188,7 +190,7 @@ std::unique_ptr<Excitation> WithProfiles(
 namespace {
 
 constexpr double kNsPerS = 1e9;
-// Fault onsets closer than this to a sample belong to it [s].
+// Fault onsets this close to a sample are moved to it [s].
 constexpr double kLeastSegmentS = 1e-6;
 
 std::uint64_t SampleCount(const ValveSimulationConfig& config) {
@@ -309,8 +311,8 @@ void ValveSimulation::Impl::Start() {
   }
 }
 
-// One Advance() per stretch of constant faults, with the command of the last
-// sample and pressures on the line from those reached to those of `target`.
+// One Advance() per interval of constant faults, with the last command and
+// pressures on the line from the reached ones to those of `target`.
 void ValveSimulation::Impl::AdvanceAcrossFaults(double from_s, double to_s,
                                                 const ProcessInputs& target) {
   ProcessInputs here = inputs_;
@@ -356,7 +358,7 @@ void ValveSimulation::Impl::AdvanceTo(std::uint64_t k) {
   inputs_ = open_loop ? target : NextInputs();
 }
 
-// `step` is a fault of the transmitter, as a fraction of its span.
+// `step` is a transmitter fault, as a share of its span.
 double ValveSimulation::Impl::Read(const Transmitter& transmitter, double value,
                                    double step) {
   value = std::clamp(value, transmitter.low, transmitter.high);
@@ -376,7 +378,7 @@ double ValveSimulation::Impl::Read(const Transmitter& transmitter, double value,
   return value;
 }
 
-// A flatline starts with the first reading from its start on.
+// A flatline holds the first reading after its start.
 void ValveSimulation::Impl::HoldFlatlines(double time_s, Sample& sample) {
   for (std::size_t i = 0; i < config_.faults.size(); ++i) {
     const FaultSchedule& fault = config_.faults[i];

@@ -11,19 +11,19 @@
 
 namespace fdi::simulator {
 
-/// Process inputs that follow straight lines through points in time, beginning
-/// with t_s.front() and ending with t_s.back(); equal times make a step. Before
-/// and behind, and for inputs without points, the excitation goes on.
+/// Process inputs that follow polylines in time, from t_s.front() to
+/// t_s.back(); equal times make a step. Outside this interval, and for inputs
+/// without points, the excitation applies.
 ///
 /// While CV is profiled, a closed loop is held: it neither controls nor
-/// advances, and goes on from where it stood; its pressures follow the flow.
+/// advances, and resumes from its state; its pressures follow the flow.
 struct InputProfile {
   std::vector<double> t_s{};     ///< Since the first sample, >= 0, ascending.
   std::vector<double> cv_pct{};  ///< Each as long as t_s, or empty.
   std::vector<double> p1_kpa{};
   std::vector<double> p2_kpa{};
   std::vector<double> t1_degc{};
-  /// On profiled inputs. Where CV is profiled at 0 or 100 it is exactly that.
+  /// On profiled inputs. A CV profiled at 0 or 100 gets no noise.
   Disturbance cv_noise_pct{};
   Disturbance p1_noise_kpa{};
   Disturbance p2_noise_kpa{};
@@ -31,7 +31,7 @@ struct InputProfile {
   friend bool operator==(const InputProfile&, const InputProfile&) = default;
 };
 
-/// The samples from from_s (included) to until_s carry `mode`.
+/// Samples from from_s (inclusive) to until_s (exclusive) have `mode`.
 struct ModeStretch {
   double from_s{0.0};   ///< Since the first sample, >= 0.
   double until_s{0.0};  ///< > from_s.
@@ -44,11 +44,11 @@ struct ModeStretch {
 void Validate(const InputProfile& profile);
 void Validate(const ModeStretch& stretch);
 
-/// The first stretch that has `time_s`, else `otherwise`.
+/// The mode of the first stretch that contains `time_s`, else `otherwise`.
 ValveMode ModeAt(const std::vector<ModeStretch>& stretches, double time_s,
                  ValveMode otherwise);
 
-/// `base` with `profiles` laid over it; where they overlap, the later one wins.
+/// `base` overlaid with `profiles`; where these overlap, the later one wins.
 /// @throws ConfigError if a profile is not valid.
 std::unique_ptr<Excitation> WithProfiles(
     std::unique_ptr<Excitation> base, const std::vector<InputProfile>& profiles,
@@ -58,9 +58,9 @@ std::unique_ptr<Excitation> WithProfiles(
 struct ValveSimulationConfig {
   ValveParameters parameters{};
   ExcitationConfig excitation{OperatingPointExcitation{}};
-  std::vector<InputProfile> inputs{};  ///< Laid over the excitation.
-  /// The first that has a sample's time wins, else the recorded excitation's
-  /// mode, else AUTO.
+  std::vector<InputProfile> inputs{};  ///< Override the excitation.
+  /// The first one that contains a sample's time applies, else the recorded
+  /// excitation's mode, else AUTO.
   std::vector<ModeStretch> modes{};
   std::vector<FaultSchedule> faults{};
   std::uint64_t seed{1};       ///< Same seed, same run, bit for bit.
@@ -70,18 +70,18 @@ struct ValveSimulationConfig {
   std::uint64_t source_id{0};  ///< Copied into every sample.
   bool noise{true};            ///< Sensor and positioner noise.
   bool resolution{true};       ///< Converter resolution of the transmitters.
-  bool cold_start{false};      ///< From X = 0 and vented, not in equilibrium.
-  /// The inputs act as functions of time instead of a command held, and
-  /// pressures linear, from sample to sample: the sine as it is, a recorded
-  /// excitation linear between its samples. Not under profiles.
+  bool cold_start{false};      ///< Start at X = 0, vented, not in equilibrium.
+  /// Inputs act as functions of time instead of a held command and linear
+  /// pressures between samples: the sine itself, or a recorded excitation
+  /// interpolated between its samples. Not available with profiles.
   bool continuous_inputs{false};
-  double tolerance_scale{1.0};  ///< On the integrator's tolerances.
+  double tolerance_scale{1.0};  ///< Factor on the integrator's tolerances.
 };
 
 /// @throws ConfigError naming field, value and range.
 void Validate(const ValveSimulationConfig& config);
 
-/// What the integrator did so far.
+/// The integrator's work so far.
 struct SimulationStatistics {
   std::int64_t solver_steps{0};
   std::int64_t derivative_calls{0};
@@ -89,9 +89,9 @@ struct SimulationStatistics {
 };
 
 /// Streams the samples of one run: valve, positioner and process are integrated
-/// from sample to sample, faults act by their schedules, and the transmitters
-/// read CV, P1, P2, T1, X and F. stamp = start_ns + k period, seq = k, k from
-/// 0.
+/// from sample to sample, faults act according to their schedules, and the
+/// transmitters read CV, P1, P2, T1, X and F. stamp = start_ns + k period, seq
+/// = k, k from 0.
 ///
 /// Uses no clock and no global state; one object per thread.
 class ValveSimulation {
@@ -102,12 +102,12 @@ class ValveSimulation {
   ValveSimulation(ValveSimulation&&) noexcept;
   ValveSimulation& operator=(ValveSimulation&&) noexcept;
 
-  /// Number of samples of the run. A recorded excitation may end it early.
+  /// Number of samples of the run; a recorded excitation may shorten it.
   std::uint64_t sample_count() const;
   /// True once sample_count() samples were taken.
   bool finished() const;
 
-  /// The next sample, with its truth (fault 0 where none acts).
+  /// The next sample, with its truth (fault 0 if none is active).
   /// @throws std::logic_error if finished().
   /// @throws CvodeError if the integration fails.
   LabelledSample Step();

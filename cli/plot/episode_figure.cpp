@@ -18,7 +18,7 @@ namespace {
 using storage::Episode;
 using storage::HistoryEntry;
 
-// Faults with a line of their own colour; others are grey.
+// The first faults get colours of their own; the others are grey.
 constexpr std::array<const char*, 5> kFaultInks = {
     ink::kVermilion, ink::kBlue, ink::kGreen, ink::kOrange, ink::kSky};
 
@@ -52,7 +52,7 @@ std::vector<double> Residuals(const std::vector<TracePoint>& trace,
   });
 }
 
-// ŷ = y − r of the normal observer for the channel that watches `signal`.
+// ŷ = y − r of the normal observer of the channel with output `signal`.
 std::vector<double> Estimates(const EpisodeEvidence& evidence,
                               const std::vector<TracePoint>& trace,
                               Signal signal) {
@@ -70,7 +70,7 @@ std::vector<double> Estimates(const EpisodeEvidence& evidence,
   return estimates;
 }
 
-// What the engine accepted, by time of sampling.
+// Samples that the engine accepted, ordered by sampling time.
 std::vector<TracePoint> Accepted(const EpisodeEvidence& evidence) {
   std::vector<TracePoint> accepted;
   std::copy_if(evidence.trace.begin(), evidence.trace.end(),
@@ -91,7 +91,7 @@ std::vector<double> TimesOf(const EpisodeEvidence& evidence,
   });
 }
 
-// A reading as the simulation with the fault that explains it best has it.
+// Adds a reading as simulated with the fault that explains it best.
 void AddSimulated(const EpisodeEvidence& evidence,
                   const std::vector<TracePoint>& trace,
                   const std::vector<double> EpisodeLook::*column,
@@ -138,8 +138,8 @@ Panel TravelPanel(const EpisodeEvidence& evidence,
   return panel;
 }
 
-// Of the output that a channel watches. Channels are named after it, with the
-// signals that they read where there is more than one: "F", "F(CV)".
+// Unit of a channel's output. Channels are named after it, followed by the
+// signals that they read if there are several channels: "F", "F(CV)".
 std::string_view UnitOf(const EpisodeEvidence& evidence, std::size_t channel) {
   const std::string& name = evidence.episode.channels[channel];
   const auto signal = evidence.models
@@ -169,20 +169,20 @@ Panel ResidualPanel(const EpisodeEvidence& evidence,
   return panel;
 }
 
-// One window of a channel over the trace, as Detection sees it.
+// One window of a channel over the trace, as Detection computes it.
 struct WindowTrace {
   std::size_t channel{0};
   const WindowLimits* limits{nullptr};
   std::vector<double> mean;
   std::vector<double> deviation;
-  std::vector<double> upper_deviation;  // The limit follows what CV does.
+  std::vector<double> upper_deviation;  // It depends on the motion of CV.
   std::vector<bool> mean_beyond;
   std::vector<bool> deviation_beyond;
 };
 
-// The windows of all channels, computed again from the trace, which has no
-// windows of its own. Only LIVE samples count. The trace begins half an hour
-// before the detection, so that windows of up to 200 samples are full by then.
+// Recomputes the windows of all channels, because the trace does not contain
+// them. Only LIVE samples count. The trace begins half an hour before the
+// detection, so windows of up to 200 samples are full by then.
 std::vector<WindowTrace> ComputeWindows(const ModelSet& models,
                                         const std::vector<TracePoint>& trace) {
   std::vector<WindowTrace> traces;
@@ -220,7 +220,7 @@ std::vector<WindowTrace> ComputeWindows(const ModelSet& models,
   return traces;
 }
 
-// The windows whose limits were passed by the n_d samples that make a
+// The windows whose limits were exceeded by the n_d samples that made the
 // detection, with their limits. None if single residuals made it.
 std::vector<Panel> WindowPanels(const EpisodeEvidence& evidence,
                                 const std::vector<TracePoint>& trace) {
@@ -264,7 +264,7 @@ std::vector<Panel> WindowPanels(const EpisodeEvidence& evidence,
   return panels;
 }
 
-// The faults that were isolated come first, then by their greatest factor.
+// Isolated faults first, then by largest factor.
 std::vector<std::size_t> ByWeight(const Episode& episode,
                                   const std::vector<std::vector<double>>& d) {
   const auto greatest = [&](std::size_t f) {
@@ -294,8 +294,8 @@ Panel FactorPanel(const EpisodeEvidence& evidence,
     panel.limits = {{evidence.models->decision.isolation_threshold,
                      "threshold T", ink::kPurple}};
   }
-  // Decisions come after the detection: before it, a fault that looks normal
-  // has a factor near 1, too.
+  // Factors are shown from the detection on: before it, a fault that looks
+  // normal also has a factor near 1.
   std::vector<std::vector<double>> factors;
   for (std::size_t f = 0; f < episode.faults.size(); ++f) {
     factors.push_back(Values(trace, [f](const TracePoint& instant) {
@@ -305,7 +305,7 @@ Panel FactorPanel(const EpisodeEvidence& evidence,
     }));
   }
   const auto order = ByWeight(episode, factors);
-  for (std::size_t i = order.size(); i-- > 0;) {  // The gravest on top.
+  for (std::size_t i = order.size(); i-- > 0;) {  // The most important on top.
     const std::size_t f = order[i];
     const bool isolated = (episode.fault_bits >> f & 1U) != 0;
     const bool coloured = i < kFaultInks.size();
@@ -322,7 +322,7 @@ Panel FactorPanel(const EpisodeEvidence& evidence,
   return panel;
 }
 
-// Colour and word of a mark; no word for what is no mark.
+// Text and colour of a mark; empty text for events without one.
 std::pair<std::string, const char*> MarkOf(const HistoryEntry& event) {
   if (event.kind == "ISOLATED" || event.kind == "REISOLATED") {
     return {(event.kind == "ISOLATED" ? "isolated " : "now ") +
@@ -361,7 +361,7 @@ std::vector<Mark> Marks(const EpisodeEvidence& evidence) {
   return marks;
 }
 
-// Stretches in which the engine did not decide, and gaps of the record.
+// Periods in which the engine did not decide, and gaps in the record.
 std::vector<Band> Bands(const EpisodeEvidence& evidence,
                         const std::vector<TracePoint>& trace) {
   const std::int64_t origin_ns = evidence.episode.detected_ns;
@@ -423,8 +423,8 @@ EpisodeEvidence LoadEvidence(storage::History& history, std::string_view id,
           models.channels.size() == episode.channels.size()) {
         evidence.models = std::move(models);
       }
-    } catch (const NotFoundError&) {  // It may have been made elsewhere,
-    } catch (const DataError&) {      // or be of an older format.
+    } catch (const NotFoundError&) {  // It may be from elsewhere,
+    } catch (const DataError&) {      // or in an older format.
     }
   }
   return evidence;

@@ -21,8 +21,8 @@ constexpr double kBottom = 96.0;
 constexpr double kLeft = 110.0;
 constexpr double kLetter = 8.5;  // mean width
 
-// Tags of gnuplot's labels and arrows, so that those of one panel can be taken
-// away before the next one is drawn.
+// Tags of gnuplot's labels and arrows, by which those of one panel are removed
+// before the next one is drawn.
 constexpr int kFirstNameTag = 100;
 constexpr int kFirstStemTag = 1000;
 
@@ -44,7 +44,7 @@ bool HasNumber(const std::vector<double>& values) {
 }
 
 // gnuplot refuses to plot a series without any number; such series, and panels
-// in which nothing else is left, are taken out.
+// with nothing else, are removed.
 Figure Drawable(Figure figure) {
   for (Panel& panel : figure.panels) {
     std::erase_if(panel.series,
@@ -56,7 +56,7 @@ Figure Drawable(Figure figure) {
   return figure;
 }
 
-// The horizontal range: the one asked for, else that of everything drawn.
+// The horizontal range: as requested, else that of everything drawn.
 Range RangeOf(const Figure& figure) {
   if (figure.x_range) {
     return *figure.x_range;
@@ -90,9 +90,9 @@ class PointWriter {
         unit_(unit),
         out_(out) {}
 
-  // Groups of equal size are reduced to their extremes, in the order in which
-  // these came. A group with a break or a missing value is written in full, so
-  // that the break stays where it is.
+  // Reduces groups of equal size to their extremes, in their original order. A
+  // group with a break or a missing value is written in full, so that the break
+  // stays in place.
   void Write(std::size_t groups) {
     const std::size_t count = std::min(x_.size(), y_.size());
     const std::size_t step = std::max<std::size_t>(1, count / groups);
@@ -143,8 +143,8 @@ class PointWriter {
 };
 
 // Writes one script: terminal, data blocks, then a multiplot with one plot per
-// panel. Positions are in pixels from the top left corner; gnuplot wants shares
-// of the picture from the bottom left.
+// panel. Positions are pixels from the top left; gnuplot needs fractions of the
+// picture from the bottom left.
 class ScriptWriter {
  public:
   ScriptWriter(const Figure& figure, Format format)
@@ -195,9 +195,9 @@ class ScriptWriter {
     return format_ == Format::kPng ? png : svg;
   }
 
-  // A name stands right of its mark's stem, and the stem reaches up to its
-  // name. From right to left, each name goes above all names whose stems would
-  // cross it otherwise.
+  // A name is placed to the right of its mark's stem, which reaches up to it.
+  // From right to left, each name is placed above all names that its stem would
+  // cross.
   void PlaceMarks() {
     marks_ = figure_.marks;
     std::erase_if(marks_, [this](const Mark& mark) {
@@ -270,7 +270,7 @@ class ScriptWriter {
     }
   }
 
-  // The names of the marks above the first panel, and their stems up to them.
+  // The names of the marks above the first panel, with their stems.
   void Names() {
     for (std::size_t m = 0; m < marks_.size(); ++m) {
       const double bottom =
@@ -315,7 +315,7 @@ class ScriptWriter {
       out_ << "unset label\nunset object\nunset for [i=" << kFirstStemTag << ':'
            << kFirstStemTag + static_cast<int>(marks_.size()) << "] arrow i\n";
     }
-    // What befell all panels is named in the first one only.
+    // Bands through all panels are labelled only in the first one.
     Shade(figure_.bands, p == 0);
     Shade(panel.bands, true);
     out_ << "set tmargin at screen " << ScreenY(top)
@@ -367,7 +367,7 @@ class ScriptWriter {
              << series.colour << "' " << TitleOf(series.title);
     }
     if (panel.series.empty()) {
-      next() << "NaN notitle";  // The axes alone.
+      next() << "NaN notitle";  // Axes only.
     }
     for (const std::string& note : panel.notes) {
       next() << "keyentry " << TitleOf(note);
@@ -399,8 +399,8 @@ class ScriptWriter {
   Format format_;
   Range range_;
   TimeUnit unit_;
-  std::vector<Mark> marks_;        // Those in range, by x.
-  std::vector<std::size_t> rows_;  // Of the names of marks_, from below.
+  std::vector<Mark> marks_;        // Marks in range, ordered by x.
+  std::vector<std::size_t> rows_;  // Rows of their names, from below.
   std::size_t mark_rows_{1};
   std::ostringstream out_;
 };

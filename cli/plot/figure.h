@@ -14,8 +14,9 @@
 /// PNG or SVG. A caller fills a Figure and calls DrawFigure().
 namespace fdi::plot {
 
-// Colours that the colour-blind can tell, after Okabe & Ito (2008), "Color
-// Universal Design". Lines that are compared also differ in width or dashes.
+// Colours that are distinguishable with colour blindness, after Okabe & Ito
+// (2008), "Color Universal Design". Lines to be compared also differ in width
+// or dashes.
 namespace ink {
 inline constexpr const char* kBlack = "#000000";
 inline constexpr const char* kGrey = "#8c8c8c";
@@ -28,7 +29,7 @@ inline constexpr const char* kSky = "#56b4e9";
 inline constexpr const char* kPurple = "#cc79a7";
 }  // namespace ink
 
-/// A value of a series that is not there: a gap in its line.
+/// A missing value of a series: a gap in its line.
 inline constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 enum class Dash { kSolid = 1, kDashed = 2, kDotted = 3, kDashDot = 4 };
@@ -36,12 +37,12 @@ enum class Dash { kSolid = 1, kDashed = 2, kDotted = 3, kDashDot = 4 };
 /// How the points of a series are drawn.
 enum class Shape {
   kLine,
-  kSteps,   ///< Each value holds up to the next abscissa.
+  kSteps,   ///< Each value holds until the next abscissa.
   kPoints,  ///< Dots, not joined.
-  kBars,    ///< Bars from 0, as wide as the abscissae are apart.
+  kBars,    ///< Bars from 0 that fill the space between abscissae.
 };
 
-/// From `from` up to `to` on an axis.
+/// The interval from `from` to `to` on an axis.
 struct Range {
   double from{0.0};
   double to{1.0};
@@ -65,11 +66,11 @@ struct Limit {
   std::string colour{ink::kPurple};
 };
 
-/// A shaded stretch of the horizontal axis.
+/// A shaded interval of the horizontal axis.
 struct Band {
   double from{0.0};
   double to{0.0};
-  std::string text;  ///< Left out where there is no room for it.
+  std::string text;  ///< Omitted if there is no room.
   std::string colour{"#dcdcdc"};
 };
 
@@ -80,13 +81,13 @@ struct Mark {
   std::string colour{ink::kBlack};
 };
 
-/// One pair of axes. A panel with bands alone is a strip without values.
+/// One pair of axes. A panel with only bands is a strip without values.
 struct Panel {
-  std::string label;  ///< Of the vertical axis, with its unit: "flow F [m3/h]".
+  std::string label;  ///< Of the vertical axis, with unit: "flow F [m3/h]".
   std::vector<Series> series{};
   std::vector<Limit> limits{};
-  std::optional<Range> range{};      ///< Of the values; without: what is drawn.
-  std::vector<Band> bands{};         ///< Of this panel alone.
+  std::optional<Range> range{};      ///< Of the values; empty: automatic.
+  std::vector<Band> bands{};         ///< In this panel only.
   std::vector<std::string> notes{};  ///< Lines of text below the legend.
   double height{200.0};              ///< [px]
 };
@@ -97,32 +98,31 @@ struct Figure {
   std::string subtitle{};
   std::string footnote{};
   std::string x_label{};
-  /// The abscissae are seconds: the axis is labelled in s, min, h or d,
-  /// whichever suits, and its label gets that unit.
+  /// The abscissae are seconds: the axis is scaled to s, min, h or d as
+  /// suitable, and the unit is added to its label.
   bool is_time{false};
-  double gap{1e300};        ///< A longer step between abscissae breaks lines.
+  double gap{1e300};        ///< Longer steps between abscissae break lines.
   std::vector<double> x{};  ///< Ascending.
-  std::optional<Range> x_range{};  ///< Without: from the first to the last x.
+  std::optional<Range> x_range{};  ///< Empty: from the first to the last x.
   std::vector<Panel> panels{};
   std::vector<Mark> marks{};
   std::vector<Band> bands{};   ///< Through all panels.
   double width{1400.0};        ///< [px]
   double legend_width{250.0};  ///< Right of the panels [px].
-  /// Of more points the least and the greatest of as many groups are drawn, so
-  /// that no peak is lost and a picture has a bounded size.
+  /// If there are more points, only the extremes of this many groups are drawn,
+  /// so that no peak is lost and the picture's size is bounded.
   std::size_t groups{1600};
 };
 
-/// Colour `index` of a series among others, round and round; black and grey
-/// are not among them.
+/// Colour for series number `index`, repeating; never black or grey.
 const char* SeriesColour(std::size_t index);
 
 enum class Format { kPng, kSvg };
 
-/// Of a file by its ending, which is .png or .svg. @throws ConfigError
+/// Format by file extension, .png or .svg. @throws ConfigError
 Format FormatOf(const std::filesystem::path& file);
 
-/// The script that makes gnuplot draw `figure` to `output`.
+/// The script with which gnuplot draws `figure` to `output`.
 /// @throws DataError if there is nothing to draw.
 std::string GnuplotScript(const Figure& figure, Format format,
                           const std::filesystem::path& output);
@@ -133,9 +133,9 @@ std::string GnuplotScript(const Figure& figure, Format format,
 std::string DrawFigure(const Figure& figure, Format format,
                        const GnuplotLimits& limits = {});
 
-/// Draws to the file `output`, whose ending gives the format. The file is
-/// there only if all of it could be drawn.
-/// @throws as above; ConfigError for another ending; DataError if the file
+/// Draws to the file `output`, whose extension gives the format. The file is
+/// created only if drawing succeeds.
+/// @throws as above; ConfigError for another extension; DataError if the file
 ///   cannot be written.
 void DrawFigure(const Figure& figure, const std::filesystem::path& output);
 

@@ -27,7 +27,7 @@ namespace {
 class ScratchFolder {
  public:
   ScratchFolder() {
-    // mkdtemp() puts letters of its own in place of the last six.
+    // mkdtemp() replaces the last six characters.
     std::string name =
         (std::filesystem::temp_directory_path() / "fdi-plot-XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) {
@@ -48,8 +48,8 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-// In a process group of its own, which can be killed as a whole, and without
-// the files and sockets of this process.
+// Spawns gnuplot in its own process group, so that it can be killed as a whole,
+// and without the files and sockets of this process.
 pid_t Spawn(const std::filesystem::path& script) {
   std::string name = "gnuplot";
   std::string argument = script.string();
@@ -133,10 +133,10 @@ std::string RunGnuplot(
   return {std::istreambuf_iterator<char>(picture), {}};
 }
 
-// In single quotes a quote is written twice, but gnuplot 5.4 does not accept
-// such a pair at the beginning of a string. In double quotes gnuplot runs what
-// stands between backquotes as a command, which are therefore written as octal
-// numbers. It reads any digits that follow as part of such a number.
+// In single quotes a quote is doubled, but gnuplot 5.4 rejects such a pair at
+// the beginning of a string. In double quotes gnuplot executes backquoted text
+// as a command, so backquotes are written as octal escapes. gnuplot reads
+// digits that follow as part of the escape, so they are escaped as well.
 std::string GnuplotText(std::string_view text) {
   std::string result = "\"";
   bool after_number = false;

@@ -78,7 +78,7 @@ double TimeOf(const StoredRun& run, const StoredSample& stored) {
          1e-9;
 }
 
-// Stretches with one fault; of a growing one the strength it reached.
+// Intervals with one fault; for a growing fault, the strength that it reached.
 std::vector<Band> TruthBands(const StoredRun& run,
                              const std::vector<StoredSample>& samples) {
   std::vector<Band> bands;

@@ -5,10 +5,10 @@
 
 namespace fdi::plot {
 
-/// The signals of a run, or a stretch of it, over the time from its start: CV
-/// and X; flow; pressures; further signals, as far as the run has them. The
-/// truth is shaded; marks stand where observers were initialised and where
-/// another model set took over; refused samples are counted in the footnote.
+/// The signals of a run, or of a part of it, over the time from its start: CV
+/// and X; flow; pressures; other signals that it has. The truth is shaded;
+/// marks show where observers were initialised and where the model set changed;
+/// the footnote counts rejected samples.
 Figure RunFigure(const storage::StoredRun& run);
 
 }  // namespace fdi::plot

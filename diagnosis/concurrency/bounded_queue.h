@@ -9,12 +9,11 @@
 
 namespace fdi {
 
-/// First in, first out, between threads; at most `capacity` items wait. The
-/// taker gets all that is there at once, so that both sides touch the lock
-/// rarely.
+/// A bounded FIFO between threads. The consumer takes the whole backlog at
+/// once, so that both sides rarely contend for the lock.
 ///
-/// Who fills a queue from a place that must not wait asks HasRoom() before each
-/// item, and is to be told once Reopened() is true.
+/// A producer that must not block calls HasRoom() before each item, and is
+/// resumed once Reopened() is true.
 ///
 /// Thread safe.
 template <typename T>
@@ -27,21 +26,21 @@ class BoundedQueue {
     return items_.size() < capacity_;
   }
 
-  /// @returns false if the queue is or gets closed.
+  /// @returns false if the queue is closed, before or while waiting.
   bool WaitForRoom() {
     std::unique_lock lock(mutex_);
     return WaitForRoom(lock);
   }
 
-  /// Waits for room. @returns false, without the item, if the queue is or gets
-  /// closed.
+  /// Waits for room. @returns false, dropping the item, if the queue is closed,
+  /// before or while waiting.
   template <typename U>
   bool Push(U&& item) {
     std::unique_lock lock(mutex_);
     return WaitForRoom(lock) && Append(std::forward<U>(item));
   }
 
-  /// @returns false, without the item, if the queue is full or closed.
+  /// @returns false, dropping the item, if the queue is full or closed.
   template <typename U>
   bool TryPush(U&& item) {
     const std::lock_guard lock(mutex_);
@@ -50,8 +49,8 @@ class BoundedQueue {
   }
 
   /// Replaces `batch` by all items, oldest first, after waiting up to `timeout`
-  /// for the first; empty if none came or Interrupt() was called.
-  /// @returns false once the queue is closed and all was taken.
+  /// for the first; empty after a timeout or Interrupt().
+  /// @returns false once the queue is closed and drained.
   bool PopAll(std::vector<T>& batch, std::chrono::milliseconds timeout) {
     batch.clear();
     std::unique_lock lock(mutex_);
@@ -73,14 +72,14 @@ class BoundedQueue {
     return std::exchange(reopened_, false);
   }
 
-  /// Makes a PopAll() that waits, or the next one, return at once.
+  /// Makes the current PopAll(), or else the next one, return at once.
   void Interrupt() {
     const std::lock_guard lock(mutex_);
     interrupted_ = true;
     arrival_.notify_one();
   }
 
-  /// No further items; what is in can still be taken.
+  /// Rejects further items; those in the queue can still be taken.
   void Close() {
     const std::lock_guard lock(mutex_);
     closed_ = true;
@@ -102,7 +101,7 @@ class BoundedQueue {
   template <typename U>
   bool Append(U&& item) {
     items_.push_back(std::forward<U>(item));
-    if (items_.size() == 1) {  // The taker takes all: it sleeps on none only.
+    if (items_.size() == 1) {  // A consumer only sleeps on an empty queue.
       arrival_.notify_one();
     }
     return true;

@@ -10,8 +10,8 @@
 
 namespace fdi {
 
-/// A thread that keeps the exception that it ended with. Built idle; whoever
-/// owns it asks its body to return, by means of their own, before Join().
+/// A thread that stores the exception that ended it. Built idle; its owner must
+/// make the body return before calling Join().
 class Worker {
  public:
   Worker() = default;
@@ -39,7 +39,7 @@ class Worker {
   /// Started and not yet joined.
   bool started() const { return thread_.joinable(); }
 
-  /// The body threw. Any thread.
+  /// The body threw. Thread safe.
   bool failed() const { return failed_; }
 
   /// @returns whether the body has returned, or was never started.
@@ -48,7 +48,7 @@ class Worker {
            result_.wait_for(timeout) == std::future_status::ready;
   }
 
-  /// Waits until the body has returned. @throws once what it threw.
+  /// Waits for the body to return. @throws what it threw, once.
   void Join() {
     if (thread_.joinable()) {
       thread_.join();
@@ -64,8 +64,8 @@ class Worker {
   std::thread thread_;
 };
 
-/// Runs steps that must all be tried, such as those of an orderly end, and
-/// keeps the exception of the first that fails.
+/// Runs steps that must all be attempted, such as those of a shutdown, and
+/// stores the first exception.
 class FirstError {
  public:
   template <typename Step>

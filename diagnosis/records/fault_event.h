@@ -25,29 +25,28 @@ std::vector<FaultCandidate> CandidatesOf(const ModelSet& models,
                                          const Verdict& verdict,
                                          FaultSet isolated);
 
-/// A step in the life of an episode: what the history stores and what the topic
-/// FaultEvent carries.
+/// A transition of an episode, as stored in the history and published on the
+/// topic FaultEvent.
 struct FaultEvent {
   std::string valve_id;
   std::uint64_t source_id{0};
   std::uint64_t seq{0};  ///< Of the sample at the transition.
   std::uint64_t episode_id{0};
   Transition transition;
-  /// The faults that may explain the episode, largest factor first. At the end
-  /// of an episode that got no name: those that could explain it last; none if
-  /// it is outside all known faults.
+  /// The faults that may explain the episode, largest factor first. When an
+  /// unnamed episode ends: its last candidates; none if it is outside all known
+  /// faults.
   std::vector<FaultCandidate> candidates;
   std::string model_set;  ///< NAME, without the version.
   int model_version{0};
   std::uint64_t model_hash{0};
   bool persisted{false};  ///< Committed to the history before it was published.
-  /// The model set that made the transition; null if an earlier session did.
-  /// Neither stored nor sent.
+  /// The model set that made the transition; null if an earlier session made
+  /// it. Neither stored nor sent.
   std::shared_ptr<const ModelSet> models{};
 };
 
-/// The members of FaultEvent that are stored and sent as they are, for
-/// everything that treats all of them alike.
+/// The members of FaultEvent that are stored and sent unchanged, as an X-macro.
 #define FDI_FAULT_EVENT_FIELDS(FIELD) \
   FIELD(valve_id)                     \
   FIELD(source_id)                    \
@@ -61,17 +60,17 @@ struct OpenEpisode {
   std::uint64_t source_id{0};
   std::uint64_t episode_id{0};
   std::int64_t detection_stamp_ns{0};
-  std::int64_t last_stamp_ns{0};  ///< The last instant known of the valve.
-  FaultSet faults{0};             ///< The set that was isolated last, if any.
+  std::int64_t last_stamp_ns{0};           ///< Stamp of the last known instant.
+  FaultSet faults{0};                      ///< The last isolated set, if any.
   std::vector<FaultCandidate> candidates;  ///< Its members.
   bool isolated{false};
-  Layer layer{Layer::kObservers};  ///< That named them.
+  Layer layer{Layer::kObservers};  ///< What named them.
   std::string model_set;
   int model_version{0};
   std::uint64_t model_hash{0};
 };
 
-/// The episode as `event` left it, which did not close it.
+/// The episode after `event`, which must not close it.
 OpenEpisode OpenEpisodeOf(const FaultEvent& event);
 
 }  // namespace fdi

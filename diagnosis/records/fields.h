@@ -7,7 +7,7 @@
 
 namespace fdi {
 
-/// The field `Inner` of the record that is the field `Outer` of another one.
+/// Accesses the member `Inner` of the member `Outer` of a record.
 template <auto Outer, auto Inner>
 struct Nested {
   template <typename Record>
@@ -16,8 +16,8 @@ struct Nested {
   }
 };
 
-/// A field of a record, with the name by which SQL, JSON and the wire know it.
-/// `member` is a pointer to a member, or Nested.
+/// A field of a record with its name in SQL, JSON and on the wire. `member` is
+/// a pointer to member, or Nested.
 template <typename Member>
 struct Field {
   std::string_view name;
@@ -29,14 +29,14 @@ struct Field {
   }
 };
 template <typename Member>
-Field(const char*, Member) -> Field<Member>;  // clang 14 needs it.
+Field(const char*, Member) -> Field<Member>;  // For clang 14.
 template <typename Member>
 constexpr Field<Member> FieldOf(std::string_view name, Member member) {
   return {name, member};
 }
 
-/// The fields of a flat record in the order in which they are stored: a tuple
-/// of Field, specialised beside the record. It is the only list of them.
+/// The fields of a flat record in storage order: a tuple of Field, specialised
+/// beside the record. There is no other list of them.
 template <typename Record>
 inline constexpr std::tuple<> kFieldsOf{};
 
@@ -50,9 +50,9 @@ void ForEachField(Record& record, Visit&& visit) {
 
 }  // namespace fdi
 
-/// FDI_FIELDS(fdi::DataGap, valve_id, from_ns, to_ns, reason), outside all
-/// namespaces, makes kFieldsOf<DataGap> of members of these names, 64 at most.
-/// The macros below apply a macro to every argument after the first.
+/// FDI_FIELDS(fdi::DataGap, valve_id, from_ns, to_ns, reason), used outside all
+/// namespaces, defines kFieldsOf<DataGap> with members of these names, 64 at
+/// most. The macros below apply a macro to every argument after the first.
 #define FDI_FIELDS(Record, ...)                  \
   template <>                                    \
   inline constexpr auto fdi::kFieldsOf<Record> = \

@@ -4,12 +4,11 @@
 
 namespace fdi {
 
-/// Which valves a monitor of a plant takes: what the topic MonitorShare
-/// carries. Of two monitors that are not a pair, at most one should take a
-/// valve.
+/// Which valves a monitor takes, as published on the topic MonitorShare. Of
+/// monitors that do not form a pair, at most one should take a valve.
 struct MonitorShare {
   std::string monitor;     ///< Unique name of the process, e.g. host:pid.
-  std::string pair;        ///< Of --pair; empty: nobody stands in for it.
+  std::string pair;        ///< As in --pair; empty: not in a pair.
   std::string valves;      ///< Glob of ids.
   std::string partitions;  ///< Where it takes samples, as in --partition.
 };

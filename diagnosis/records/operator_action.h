@@ -7,20 +7,20 @@ namespace fdi {
 
 enum class OperatorActionKind : std::uint8_t { kAck, kLabel, kShelve };
 
-/// What an operator did on one monitor of a pair, for the history of the other
-/// one: what the topic OperatorAction carries.
+/// An operator action on one monitor of a pair, for the history of the other,
+/// as published on the topic OperatorAction.
 struct OperatorAction {
-  std::string monitor;  ///< That brings it.
+  std::string monitor;  ///< The monitor that forwards it.
   OperatorActionKind kind{OperatorActionKind::kAck};
-  std::uint64_t episode_id{0};  ///< Of kAck and kLabel,
-  std::string valve_id;         ///< of kShelve.
-  std::string value;  ///< The label; of kShelve the fault, empty for any.
+  std::uint64_t episode_id{0};  ///< For kAck and kLabel,
+  std::string valve_id;         ///< for kShelve.
+  std::string value;  ///< The label; for kShelve the fault, empty for any.
   std::int64_t stamp_ns{0};
   std::string who;
   std::string comment;
   std::string origin;
-  std::int64_t until_ns{0};  ///< Of kShelve, as what follows.
-  std::int64_t ended_ns{0};  ///< Taken off the shelf before its time; or 0.
+  std::int64_t until_ns{0};  ///< For kShelve, like the rest.
+  std::int64_t ended_ns{0};  ///< End, if unshelved early; else 0.
   std::string ended_by;
   std::string ended_origin;
 };

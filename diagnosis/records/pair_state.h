@@ -5,17 +5,16 @@
 
 namespace fdi {
 
-/// What one of the monitors that stand in for each other says of itself: what
-/// the topic PairState carries.
+/// State of one monitor of a pair, as published on the topic PairState.
 struct PairState {
   std::string monitor;        ///< Unique name of the process, e.g. host:pid.
   std::string pair;           ///< The same for both.
   int rank{1};                ///< The lower one is preferred.
   std::uint64_t instance{0};  ///< Random, new at each start.
   bool leads{false};          ///< It publishes.
-  bool leaving{false};        ///< Its last word.
+  bool leaving{false};        ///< Its last message before it stops.
   int judged{0};              ///< Valves that are not silent and have settled.
-  std::uint64_t received{0};  ///< Samples, since its start.
+  std::uint64_t received{0};  ///< Samples since its start.
 };
 
 }  // namespace fdi

@@ -5,12 +5,12 @@
 
 namespace fdi {
 
-/// What is between the commas of `text`; nothing in an empty one.
+/// Splits a comma-separated list; empty for empty text.
 std::vector<std::string> PartitionNames(const std::string& text);
 
-/// The same, of what --partition takes: at most 8 of 1 to 30 letters, digits
-/// and -_./
-/// @param patterns of fnmatch() are accepted, too: with *?[]!
+/// The same for the argument of --partition: at most 8 names of 1 to 30
+/// letters, digits and -_./
+/// @param patterns also accept fnmatch() patterns with *?[]!
 /// @throws ConfigError naming what is accepted.
 std::vector<std::string> ParsePartitions(const std::string& text,
                                          bool patterns);

@@ -10,10 +10,10 @@
 #include "diagnosis/records/fields.h"
 #include "diagnosis/verdict.h"
 
-/// What a monitor records beside episodes and samples.
+/// Records of a monitor other than episodes and samples.
 namespace fdi {
 
-/// A time in which a valve, or every valve if `valve_id` is empty, was not
+/// A period in which a valve, or every valve if `valve_id` is empty, was not
 /// diagnosed or not recorded.
 struct DataGap {
   std::string valve_id;
@@ -29,8 +29,7 @@ struct CoverageDay {
   QualityCount samples;
 };
 
-/// The slow accumulators of a valve's engine, as ValveEngine::Save() packs
-/// them.
+/// The slow accumulators of a valve's engine, as packed by ValveEngine::Save().
 struct Accumulator {
   std::string valve_id;
   std::uint64_t source_id{0};
@@ -38,7 +37,7 @@ struct Accumulator {
   std::int64_t stamp_ns{0};  ///< Of the last sample.
   std::vector<std::byte> bytes;
 };
-/// The answer of one model set about a valve.
+/// The diagnosis of a valve by one model set.
 struct ShadowAnswer {
   State state{State::kNormal};
   std::string fault;  ///< Names joined by |; empty unless isolated.
@@ -46,9 +45,8 @@ struct ShadowAnswer {
   bool operator==(const ShadowAnswer&) const = default;
 };
 
-/// A stretch in which the candidate model set and the active one answered
-/// differently, each the same throughout. Its key is valve, source, start and
-/// candidate.
+/// A period in which the candidate and the active model set had constant,
+/// different answers. The key is valve, source, start and candidate.
 struct ShadowDifference {
   std::string valve_id;
   std::uint64_t source_id{0};
@@ -82,12 +80,12 @@ inline constexpr auto kFieldsOf<ShadowDifference> = std::tuple{
     Field{"candidate_fault",
           Nested<&ShadowDifference::candidate, &ShadowAnswer::fault>{}}};
 
-/// What a monitor stores of all valves each minute.
+/// What a monitor stores for all valves every minute.
 struct Checkpoint {
-  std::vector<CoverageDay> coverage;             ///< Since the one before.
+  std::vector<CoverageDay> coverage;             ///< Since the last one.
   std::vector<Accumulator> accumulators;         ///< Of the live valves.
-  std::vector<HealthHour> health;                ///< Since the one before.
-  std::vector<ShadowDifference> shadow;          ///< New or longer since then.
+  std::vector<HealthHour> health;                ///< Since the last one.
+  std::vector<ShadowDifference> shadow;          ///< New or extended since.
   std::vector<Accumulator> shadow_accumulators;  ///< Of the candidate.
 
   bool empty() const {

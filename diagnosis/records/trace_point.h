@@ -9,17 +9,17 @@
 
 namespace fdi {
 
-/// A sample as it was received, with what became of it.
+/// A sample as received, with the outcome of its intake.
 struct ReceivedSample {
   std::string valve_id;
   Sample sample;
   Intake intake{Intake::kAccepted};
   bool initialised{false};    ///< The observers were initialised here.
-  bool model_swapped{false};  ///< Another model set judged from here on.
-  bool ended{false};          ///< No sample: the stream of the valve ended.
+  bool model_swapped{false};  ///< First sample judged by another model set.
+  bool ended{false};          ///< Not a sample: the stream of the valve ended.
 };
 
-/// One instant of an episode's evidence: what was read and what was decided.
+/// One instant of an episode's evidence: readings and verdict.
 struct TracePoint {
   Sample sample;  ///< As received, bit for bit.
   Intake intake{Intake::kAccepted};

@@ -34,7 +34,7 @@ constexpr int kMaxDays = 36500;
 constexpr std::int64_t kDay = 86400;
 constexpr std::size_t kMaxName = 64;
 constexpr std::size_t kMaxFile = 1U << 20U;
-// Of the other hosts, whose clocks may be behind.
+// For hosts whose clocks are slow.
 constexpr std::int64_t kClockMargin = kDay;
 
 constexpr const char* kCaCertificate = "ca.pem";
@@ -61,7 +61,7 @@ const std::vector<RoleRow>& Roles() {
        {"fdi/v1/DecisionVector", "fdi/v1/DecisionBatch", "fdi/v1/FaultEvent",
         "fdi/v1/ModelSetInfo", "fdi/v1/MonitorStatus", "fdi/v1/PairState",
         "fdi/v1/OperatorAction", "fdi/v1/MonitorShare"},
-       // Beside samples, what other monitors say to it.
+       // Besides samples, the topics of other monitors.
        {"fdi/v1/ValveSample", "fdi/v1/DecisionVector", "fdi/v1/FaultEvent",
         "fdi/v1/PairState", "fdi/v1/OperatorAction", "fdi/v1/MonitorShare"}},
       {Role::kReader, "reader", {}, {"fdi/v1/*"}}};
@@ -84,7 +84,7 @@ using StoreContext =
     std::unique_ptr<X509_STORE_CTX, Freer<X509_STORE_CTX_free>>;
 using Extension = std::unique_ptr<X509_EXTENSION, Freer<X509_EXTENSION_free>>;
 
-// What OpenSSL says about the call that failed last.
+// OpenSSL's reason for the last failed call.
 std::string Reason() {
   const char* reason = ERR_reason_error_string(ERR_peek_last_error());
   ERR_clear_error();
@@ -126,7 +126,7 @@ std::string Read(const fs::path& file) {
   return text;
 }
 
-// Never open to others, not even for a moment.
+// Creates the file with its final mode, so it is never open to others.
 void Write(const fs::path& file, std::string_view text, mode_t mode) {
   const int handle =
       open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
@@ -217,7 +217,7 @@ std::string UtcText(std::int64_t seconds) {
   return text.data();
 }
 
-// The clock of the making, not of the samples.
+// Time of creation; unrelated to sample stamps.
 std::int64_t NowSeconds() {
   return std::time(nullptr);
 }
@@ -233,7 +233,7 @@ void AddExtension(X509* certificate, X509* issuer, int kind,
           "extension");
 }
 
-// Signed by `issuer`; by itself if there is none.
+// Signed by `issuer`; self-signed if that is null.
 Certificate MakeCertificate(EVP_PKEY* key, const std::string& name,
                             std::int64_t until, X509* issuer,
                             EVP_PKEY* issuer_key) {
@@ -297,7 +297,7 @@ PrivateKey NewKey() {
   return key;
 }
 
-// S/MIME with the text in clear, as the library reads it.
+// S/MIME with clear text, the form that the library reads.
 std::string Sign(const std::string& document, X509* signer, EVP_PKEY* key) {
   constexpr int kFlags = PKCS7_DETACHED | PKCS7_TEXT;
   const Bio in = MemoryOf(document);
@@ -314,12 +314,13 @@ Store StoreOf(X509* authority) {
   Store store(X509_STORE_new());
   Require(store != nullptr && X509_STORE_add_cert(store.get(), authority) == 1,
           "store");
-  // Times are looked at apart, for a message of their own.
+  // Validity periods are checked separately, with an error message of their
+  // own.
   X509_STORE_set_flags(store.get(), X509_V_FLAG_NO_CHECK_TIME);
   return store;
 }
 
-// The document in clear.
+// Verifies the signature. @returns the document.
 std::string ReadSigned(const fs::path& file, X509* authority) {
   const std::string text = Read(file);
   const Bio in = MemoryOf(text);
@@ -366,8 +367,8 @@ constexpr std::string_view kHead =
     "xsi:noNamespaceSchemaLocation=\"http://www.omg.org/spec/DDS-Security/"
     "20170801/";
 
-// The name of the grant is that of the role. Times have a margin: what counts
-// is the certificate.
+// The grant is named after the role. Its validity has a margin: the certificate
+// is what counts.
 std::string PermissionsXml(const std::string& name, Role role,
                            const std::string& partitions, std::int64_t until) {
   const auto row = std::ranges::find(Roles(), role, &RoleRow::role);
@@ -397,8 +398,8 @@ std::string PermissionsXml(const std::string& name, Role role,
          "</dds>\n";
 }
 
-// Protection of submessages rather than of whole datagrams: each writer has a
-// key that only readers with the right to its topic are given.
+// Protects submessages rather than whole datagrams: each writer has a key that
+// is given only to readers with the right to its topic.
 std::string GovernanceXml() {
   return std::string(kHead) + R"(omg_shared_ca_governance.xsd">
   <domain_access_rules>
@@ -426,7 +427,7 @@ std::string GovernanceXml() {
 )";
 }
 
-// The text between `before` and `after`, or nothing.
+// The text between `before` and `after`; empty if there is none.
 std::string Between(const std::string& text, const std::string& before,
                     const std::string& after) {
   const std::size_t begin = text.find(before);
@@ -461,7 +462,7 @@ std::string GatewayPartitions(const std::string& permissions) {
   return names;
 }
 
-// CheckKey(), but for the times.
+// CheckKey() without validity periods.
 KeyInfo Examine(const fs::path& folder) {
   const Certificate authority = ReadCertificate(folder / kCaCertificate);
   const Certificate certificate = ReadCertificate(folder / kCertificate);
@@ -538,7 +539,7 @@ void MakeAuthority(const fs::path& folder, int days) {
   const Certificate certificate =
       MakeCertificate(key.get(), "fdi authority", NowSeconds() + days * kDay,
                       nullptr, key.get());
-  // The certificate last: without it there is no authority.
+  // The certificate is written last: without it there is no authority.
   fs::remove(folder / kGovernance);
   Write(folder / kGovernance,
         Sign(GovernanceXml(), certificate.get(), key.get()), 0644);

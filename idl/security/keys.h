@@ -7,18 +7,19 @@
 #include <string_view>
 #include <vector>
 
-/// The keys of DDS Security 1.1 for the topics of fdi, made with OpenSSL.
+/// Keys of DDS Security 1.1 for the topics of fdi, made with OpenSSL.
 ///
-/// A folder of keys holds the authority (ca.pem, ca.key, governance.p7s) and
-/// one folder for each program or host, which is all that its programs need:
-/// ca.pem, governance.p7s, cert.pem, key.pem and permissions.p7s. ca.key makes
-/// further keys and belongs on no host that runs a monitor.
+/// A key folder contains the authority (ca.pem, ca.key, governance.p7s) and one
+/// folder per program or host with everything that its programs need: ca.pem,
+/// governance.p7s, cert.pem, key.pem and permissions.p7s. ca.key signs further
+/// keys and must not be on a host that runs a monitor.
 ///
-/// The governance encrypts samples, discovery and liveliness, and lets nobody
-/// in without a key. Keys are ECDSA on P-256, documents S/MIME with SHA-256.
+/// The governance encrypts samples, discovery and liveliness, and refuses
+/// participants without a key. Keys are ECDSA on P-256, documents S/MIME with
+/// SHA-256.
 namespace fdi::idl {
 
-/// What the holder of a key may do on the bus.
+/// Permissions of a key's holder on the bus.
 enum class Role {
   kGateway,  ///< Publish samples of valves.
   kMonitor,  ///< Read samples; publish vectors, events, sets and status.
@@ -29,43 +30,43 @@ inline constexpr const char* kRoleNames = "gateway, monitor or reader";
 const char* RoleName(Role role);
 std::optional<Role> ParseRole(std::string_view name);
 
-/// Programs and lists warn so long before a key expires.
+/// How long before its expiry programs and lists warn about a key.
 inline constexpr int kDaysOfWarning = 30;
 
 struct KeyInfo {
-  std::string name;  ///< Common name of the certificate, name of the folder.
+  std::string name;  ///< Common name of the certificate and name of the folder.
   Role role{Role::kReader};
   /// Where a gateway may publish samples, as in --partition; empty: anywhere.
   std::string partitions{};
   std::int64_t from_ns{0};   ///< UTC
-  std::int64_t until_ns{0};  ///< UTC; the authority's, if that is earlier.
+  std::int64_t until_ns{0};  ///< UTC; the earlier end of key and authority.
 };
 
-/// Makes the authority in `folder`, which is made, too.
-/// @param days 1..36500: how long it is valid.
-/// @throws ConfigError if there is one, or `days` is out of range.
+/// Creates the authority in `folder`, which is created as well.
+/// @param days 1..36500: period of validity.
+/// @throws ConfigError if an authority exists, or `days` is out of range.
 /// @throws DataError if a file cannot be written.
 void MakeAuthority(const std::filesystem::path& folder, int days);
 
-/// Makes the key `name` in `folder`/`name`; with `replace` in place of the one
-/// that is there, whole or not at all.
-/// @param name 1..64 letters, digits, '.', '_', '-'; no '.' in front.
+/// Creates the key `name` in `folder`/`name`; with `replace`, atomically in
+/// place of the existing one.
+/// @param name 1..64 letters, digits, '.', '_', '-'; not beginning with '.'.
 /// @param partitions of a gateway, see KeyInfo.
-/// @param days 1..36500; it ends with the authority at the latest.
-/// @throws ConfigError if there is no authority, the key is there (without
-///   `replace`: is not there), or the name, `partitions` or `days` is not
-///   accepted.
+/// @param days 1..36500; limited by the authority's period.
+/// @throws ConfigError if there is no authority, the key exists (with
+///   `replace`: does not exist), or the name, `partitions` or `days` is
+///   invalid.
 /// @throws DataError if a file cannot be read or written.
 KeyInfo MakeKey(const std::filesystem::path& folder, const std::string& name,
                 Role role, int days, bool replace,
                 const std::string& partitions = {});
 
-/// The keys in `folder`, by name. @throws as CheckKey(), without its times.
+/// The keys in `folder`, by name. @throws as CheckKey(), regardless of periods.
 std::vector<KeyInfo> ListKeys(const std::filesystem::path& folder);
 
-/// Examines the five files of one key at `now_ns` (UTC).
-/// @throws ConfigError naming the file, what is wrong and what to do: missing,
-///   open to others, expired, not signed by the authority, changed by hand, of
+/// Checks the five files of one key at `now_ns` (UTC).
+/// @throws ConfigError naming the file, the defect and the remedy: missing,
+///   open to others, expired, not signed by the authority, modified, or of
 ///   another key.
 KeyInfo CheckKey(const std::filesystem::path& folder, std::int64_t now_ns);
 

@@ -11,10 +11,11 @@
 namespace fdi::monitor {
 namespace {
 
-// A datagram of UDP has 64 kB at most, of which keys take some.
+// A UDP datagram holds at most 64 kB, part of which goes to the security
+// header.
 constexpr std::size_t kMostBatchBytes = 48'000;
 
-// At most, in CDR.
+// Upper bound of the CDR size of one vector.
 std::size_t BytesOf(const idl::DecisionMessage& message) {
   constexpr std::size_t kFixed = 128;
   const int values =
@@ -94,7 +95,7 @@ void BusDecisionSink::AddToBatch(const idl::DecisionMessage& message) {
 }
 
 void BusDecisionSink::SendBatch() {
-  // Each write into a full history takes 50 ms, also after a stop.
+  // A write into a full history blocks for 50 ms, even after a stop.
   if (stop_.stop_requested() ||
       batches_->Write(batch_, stop_) != idl::WriteResult::kSent) {
     unsent_ += batch_.vectors.size();

@@ -13,16 +13,15 @@
 
 namespace fdi::monitor {
 
-/// Decision vectors over DDS. What nobody listens to is not sent; who comes
-/// gets the last vector of every valve first. The stream of batches, if asked
-/// for, is a second one, which has every vector: a slow subscriber of it makes
-/// Publish() and Flush() wait, until `stop` is requested.
+/// Publishes decision vectors over DDS. While there is no subscriber nothing is
+/// sent; a new subscriber first gets the last vector of every valve. The
+/// optional batch stream carries every vector: a slow subscriber of it blocks
+/// Publish() and Flush() until `stop` is requested.
 class BusDecisionSink : public DecisionSink {
  public:
-  /// @param batches_of the monitor as subscribers of batches see it; empty: no
-  ///   batches.
-  /// @param partitions where subscribers read, and a monitor that stands in
-  ///   for us; none: the usual one.
+  /// @param batches_of monitor name in the batches; empty: no batches.
+  /// @param partitions where subscribers and a standby monitor read; empty: the
+  ///   default partition.
   BusDecisionSink(idl::Participant& participant, const std::string& batches_of,
                   std::stop_token stop,
                   const std::vector<std::string>& partitions = {});
@@ -34,19 +33,19 @@ class BusDecisionSink : public DecisionSink {
   void PublishLast(const std::string& valve_id, const ModelSet* models,
                    const Verdict& verdict) override;
 
-  /// What Publish() sends.
+  /// Fills the message that Publish() sends.
   static void Fill(const std::string& valve_id, const ModelSet* models,
                    const Verdict& verdict, idl::DecisionMessage& message);
-  /// As Publish().
+  /// Publishes a message that Fill() has prepared.
   bool Send(const idl::DecisionMessage& message);
-  /// Who comes from now on gets nothing that was sent before.
+  /// Drops the last-value cache: later subscribers get nothing sent before.
   void Forget() { live_.Forget(); }
-  /// Subscribers so far; see idl::Publisher.
+  /// Subscribers matched so far; see idl::Publisher.
   int came() const { return live_.came(); }
 
-  /// Waits until all readers have what was published.
+  /// Waits until all subscribers have acknowledged what was published.
   bool WaitForAcknowledged(std::chrono::milliseconds timeout);
-  /// Of both streams; `written` without batches.
+  /// Combined status of both streams; `written` excludes batches.
   idl::PublisherStatus status() const;
 
  private:
@@ -60,20 +59,21 @@ class BusDecisionSink : public DecisionSink {
   std::stop_token stop_;
   idl::DecisionBatchMessage batch_;
   std::size_t batch_bytes_{0};
-  std::uint64_t unsent_{0};  // Of batches, since the last Flush().
+  std::uint64_t unsent_{0};  // Vectors in batches since the last Flush().
   idl::DecisionMessage message_;
-  bool unheard_{false};  // Vectors of some valve were not sent.
+  bool unheard_{false};  // Vectors were dropped for lack of subscribers.
 };
 
-/// Fault events over DDS; each is a line of the log as well.
+/// Publishes fault events over DDS, and logs one line for each.
 class BusEventSink : public EventSink {
  public:
-  /// @param partitions as of BusDecisionSink.
+  /// @param partitions as in BusDecisionSink.
   BusEventSink(idl::Participant& participant, LogSink log,
                const std::vector<std::string>& partitions = {});
 
   bool Publish(const FaultEvent& event, bool persisted) override;
-  /// For subscribers that came after `event` was published by another one.
+  /// Republishes `event`, first published by another monitor, for new
+  /// subscribers.
   void Repeat(const FaultEvent& event) { publisher_.Write(event); }
   int came() const { return publisher_.came(); }
 

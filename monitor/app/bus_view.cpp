@@ -7,8 +7,8 @@
 namespace fdi::monitor {
 namespace {
 
-// A position looks like the name of nothing: a fault set may be {f1, f19}, so
-// that "d2" would be read as the factor of f2.
+// The placeholder must not look like a name: a fault set may be {f1, f19}, so
+// "d2" would be read as the factor of f2.
 std::string Position(std::size_t index) {
   return "#" + std::to_string(index + 1);
 }

@@ -15,7 +15,7 @@ namespace fdi::monitor {
 /// Which decision vectors a program wants.
 enum class Vectors : std::uint8_t {
   kNone,
-  kLive,  ///< Of each valve the newest; some are overwritten under load.
+  kLive,  ///< The newest of each valve; under load some are overwritten.
   kAll,   ///< Of monitors with --lossless-decisions.
 };
 
@@ -27,16 +27,16 @@ struct BusOptions {
   Vectors vectors{Vectors::kLive};
 };
 
-/// All that monitors publish, for programs that show it.
+/// Everything that monitors publish, for programs that display it.
 class BusView {
  public:
   /// @throws TransportError
   BusView(const BusOptions& options, const cli::Context& context, LogSink log);
 
-  /// Calls `on_message` with each message that has come and its Reception,
-  /// model sets first because they explain decision vectors, and `on_ended`
-  /// with the id of each valve whose monitor ended it. Waits a moment if there
-  /// is nothing.
+  /// Calls `on_message` with each received message and its Reception, model
+  /// sets first because they explain the decision vectors, and `on_ended` with
+  /// the id of each valve whose monitor disposed of it. Blocks briefly if
+  /// nothing has arrived.
   template <typename OnMessage, typename OnEnded>
   void Take(OnMessage on_message, OnEnded on_ended) {
     constexpr std::chrono::milliseconds kNow{0};
@@ -60,7 +60,7 @@ class BusView {
     }
   }
 
-  /// Messages that were published and did not arrive.
+  /// Messages that were published but lost on the way.
   std::uint64_t lost() const;
 
  private:
@@ -75,13 +75,13 @@ class BusView {
   std::optional<idl::Subscriber<idl::DecisionBatchMessage>> batches_;
 };
 
-/// What the arrays of decision vectors mean, learnt from ModelSetInfo.
+/// The meaning of the arrays in decision vectors, learnt from ModelSetInfo.
 class ModelNames {
  public:
   void Learn(const idl::ModelSetInfoMessage& info);
-  /// Null if it has not come yet.
+  /// Null if the ModelSetInfo has not arrived yet.
   const idl::ModelSetInfoMessage* Find(std::uint64_t hash) const;
-  /// Whether the factors of `message` have names, or are none.
+  /// Whether the factors of `message` can be named, or there are none.
   bool Explains(const idl::DecisionMessage& message) const;
 
   /// {"X": r, ...} by channel; null where it abstains. Without ModelSetInfo the

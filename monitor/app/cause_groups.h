@@ -8,14 +8,14 @@
 
 namespace fdi::monitor {
 
-/// Reads the groups of valves that may have a cause in common:
+/// Reads the groups of valves that may share a cause:
 ///
 ///     [[group]]
 ///     name = "air header west"
 ///     valves = ["FV-1*", "LV-207"]   # ids or globs
 ///     faults = ["f16", "f17"]        # any of them; these by default
-///     min_valves = 3                 # so many valves, 2 or more,
-///     within_s = 300                 # within so many seconds
+///     min_valves = 3                 # at least this many valves (2..),
+///     within_s = 300                 # within this many seconds
 ///
 /// @throws ConfigError naming file, line and key; NotFoundError.
 std::vector<storage::CauseGroup> ReadCauseGroups(

@@ -22,7 +22,7 @@ struct Arguments {
   bool remove{false};
 };
 
-// From the terminal, without echo, or a line of what is not one.
+// Reads from a terminal without echo, or else one line of standard input.
 std::string AskPassword(const char* prompt) {
   if (isatty(STDIN_FILENO) != 0) {
     const char* const text = getpass(prompt);

@@ -26,7 +26,7 @@ struct PlantConsoleOptions {
   BusOptions bus{.program = "fdi-monitor console"};
 };
 
-// OK if there are monitors and all of them are well.
+// OK if there is at least one monitor and all of them are healthy.
 console::MonitorFacts FactsOf(const std::vector<console::MonitorLine>& lines) {
   const bool well =
       !lines.empty() && std::ranges::all_of(lines, [](const auto& line) {
@@ -40,7 +40,7 @@ int RunConsole(PlantConsoleOptions options, const cli::Context& context) {
   const LogSink log = LimitLog(context.log);
   const cli::StopSignals signals;
   const std::int64_t started_ns = cli::NowNs();
-  std::optional<PlantFeed> feed;  // Outlives the threads of the console.
+  std::optional<PlantFeed> feed;  // Outlives the console's threads.
   console::Console console(options.console, context.options, log);
   feed.emplace(console.live());
   BusView bus(options.bus, context, log);

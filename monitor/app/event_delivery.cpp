@@ -1,4 +1,4 @@
-// The two ways in which an event leaves the monitor: a program of the user's, a
+// The two ways in which an event leaves the monitor: a user's program, and a
 // POST to a web server.
 #include <algorithm>
 #include <cerrno>
@@ -46,7 +46,8 @@ std::string Reason(const char* operation, int code) {
   return std::string(operation) + ": " + std::strerror(code);
 }
 
-// A file in memory: a program that does not read it blocks nobody.
+// An in-memory file, not a pipe: a program that never reads its input cannot
+// block us.
 int MakeInput(std::string_view text) {
   const int fd = memfd_create("fdi-event", MFD_CLOEXEC);
   if (fd >= 0 && (write(fd, text.data(), text.size()) !=
@@ -58,7 +59,7 @@ int MakeInput(std::string_view text) {
   return fd;
 }
 
-// @returns the status of the child once it has ended.
+// @returns the exit status of the child; waits for it to exit.
 int Reap(pid_t pid) {
   int status = 0;
   while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
@@ -66,14 +67,14 @@ int Reap(pid_t pid) {
   return status;
 }
 
-// The whole process group.
+// Kills the whole process group.
 void Kill(pid_t pid) {
   kill(-pid, SIGKILL);
   Reap(pid);
 }
 
-// What the child is to have: `input` as standard input, our standard error as
-// output, no other file, all signals as usual, a process group of its own.
+// Attributes of the child: `input` as standard input, our standard error as its
+// output, no other open file, default signals, its own process group.
 class SpawnPlan {
  public:
   explicit SpawnPlan(int input) {
@@ -156,7 +157,7 @@ class ProgramDelivery : public EventDelivery {
     // The header of glibc 2.36 declares pidfd_open() for C alone.
     const File process(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
     if (process.get() < 0) {
-      // Without it nobody would notice its end before the limit.
+      // Without it the end of the process would go unnoticed until the timeout.
       const int code = errno;
       Kill(pid);
       return Reason("pidfd_open", code);
@@ -192,8 +193,8 @@ constexpr std::string_view kScheme = "http://";
                     "http://HOST[:PORT][/PATH]");
 }
 
-// Words are separated by blanks; within '...' or "..." a blank is part of the
-// word. Nothing else means anything, and nothing escapes.
+// Words are separated by blanks; within '...' or "..." a blank belongs to the
+// word. There are no other special characters and no escapes.
 std::vector<std::string> SplitWords(const std::string& text) {
   std::vector<std::string> words;
   bool in_word = false;
@@ -265,7 +266,7 @@ class UrlDelivery : public EventDelivery {
   std::chrono::milliseconds limit_;
   std::mutex mutex_;
   bool stopped_{false};
-  httplib::Client* client_{nullptr};  // Under way.
+  httplib::Client* client_{nullptr};  // The request in progress, or null.
 };
 
 }  // namespace

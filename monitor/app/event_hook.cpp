@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::chrono::milliseconds kTick{100};
 
-// "f3|f6" by the candidates of the event, which know their numbers.
+// "f3|f6". Without a model set the names come from the candidates, which hold
+// fault numbers.
 std::string FaultsOf(const FaultEvent& event) {
   if (event.models != nullptr && event.transition.faults != 0) {
     return FaultSetName(*event.models, event.transition.faults);
@@ -41,8 +42,8 @@ cli::Json EventJson(const FaultEvent& event, bool persisted,
                     const cli::FaultTexts& texts) {
   const Transition& t = event.transition;
   const std::string fault = FaultsOf(event);
-  // The catalogue says "unlike any known fault" of what has no fault, which is
-  // wrong while known faults may still explain it.
+  // For an event without a fault the catalogue says "unlike any known fault",
+  // which is wrong while known faults may still explain it.
   const bool named = !fault.empty() || t.unknown == Unknown::kOutsideKnown;
   const cli::FaultWords words = texts.Words(fault, t.strength);
   const bool closed = t.kind == TransitionKind::kClosed;
@@ -77,7 +78,7 @@ EventHook::~EventHook() {
   try {
     Stop(std::chrono::milliseconds(0));
   } catch (...) {
-    // Whoever wants to know calls Stop().
+    // The error is reported only to those who call Stop() themselves.
   }
 }
 

@@ -20,22 +20,22 @@
 
 namespace fdi::monitor {
 
-/// Hands one text to the world outside.
+/// Delivers one text to an external receiver.
 class EventDelivery {
  public:
   virtual ~EventDelivery() = default;
-  /// Waits until it was taken, or for the time limit. One thread.
-  /// @returns why it was not taken, or nothing.
+  /// Waits until the text was accepted, or the timeout. Called by one thread.
+  /// @returns why it was not accepted, or nothing on success.
   virtual std::optional<std::string> Deliver(const std::string& json) = 0;
-  /// Ends what is under way, and all that comes, at once. Thread safe.
+  /// Aborts the delivery in progress and all later ones. Thread safe.
   virtual void Interrupt() = 0;
 };
 
-/// Runs a program with the text as its standard input; status 0 is success.
-/// No shell: `words` are the program, sought in PATH, and its arguments. It has
-/// no other file of ours open, its output goes to our standard error, and it is
-/// killed with all its children that stay in its process group after `limit`.
-/// @throws std::system_error if the kernel has no file for us.
+/// Runs a program with the text as its standard input; exit status 0 is
+/// success. There is no shell: `words` are the program, looked up in PATH, and
+/// its arguments. It inherits no other open file, writes to our standard error,
+/// and is killed after `limit` together with the children in its process group.
+/// @throws std::system_error if no event file descriptor can be created.
 std::unique_ptr<EventDelivery> DeliverToProgram(
     std::vector<std::string> words, std::chrono::milliseconds limit);
 
@@ -45,15 +45,16 @@ std::unique_ptr<EventDelivery> DeliverToProgram(
 std::unique_ptr<EventDelivery> DeliverToUrl(const std::string& url,
                                             std::chrono::milliseconds limit);
 
-/// One of the two: what begins with http:// is a URL, else a command whose
-/// words are separated by blanks, with quotes around those that have some.
+/// Chooses between the two: a target that begins with http:// is a URL, any
+/// other a command whose words are separated by blanks; words that contain
+/// blanks are quoted.
 /// @throws ConfigError naming what is accepted.
 std::unique_ptr<EventDelivery> MakeEventDelivery(
     const std::string& target, std::chrono::milliseconds limit);
 
 /// Settings of EventHook.
 struct EventHookOptions {
-  int per_minute{60};  ///< Deliveries; so many at once.
+  int per_minute{60};  ///< Rate and burst size of deliveries.
   std::size_t max_waiting{256};
   std::function<std::chrono::steady_clock::time_point()> now{
       std::chrono::steady_clock::now};
@@ -61,21 +62,20 @@ struct EventHookOptions {
 
 /// {"kind", "valve_id", "episode_id", "stamp_utc", "fault", "name", "severity",
 /// "discipline", "namur", "check", "factor", "strength", "reason", "model_set",
-/// "persisted"}; null where there is none. What has no fault yet has neither
-/// name nor check: that it is unlike all known faults is said once that is
-/// known.
+/// "persisted"}; missing values are null. Without a fault, name and check are
+/// null too, until the event is known to lie outside all known faults.
 cli::Json EventJson(const FaultEvent& event, bool persisted,
                     const cli::FaultTexts& texts);
 
 /// Notifies a program or a web server of every fault event that goes to the
-/// bus, each at most once and in their order, by a thread of its own: neither
-/// diagnosis nor bus wait.
+/// bus, each at most once and in order, from a thread of its own: neither the
+/// diagnosis nor the bus waits.
 ///
-/// Not more than `per_minute`: what comes beyond is left out but for the
-/// newest, which is delivered once the rate allows it. What is delivered
-/// carries "left_out", how many were not since the one before.
+/// The rate is limited to `per_minute`. Of the events beyond it only the newest
+/// is kept, and delivered once the rate allows it. Each delivery carries
+/// "left_out", the number of events dropped since the previous one.
 ///
-/// Built idle. Thread safe, but for Start() and Stop().
+/// Built idle. Thread safe except for Start() and Stop().
 class EventHook {
  public:
   struct Counts {
@@ -90,12 +90,12 @@ class EventHook {
   EventHook(const EventHook&) = delete;
   EventHook& operator=(const EventHook&) = delete;
 
-  /// Takes `event`, an object, for delivery. Never waits.
+  /// Queues `event`, a JSON object, for delivery. Never blocks.
   void Notify(cli::Json event);
 
   void Start();
-  /// Lets what is under way and what waits go on for at most `patience`; then
-  /// ends the thread. Nothing if it was not started.
+  /// Allows `patience` for the deliveries in progress and in the queue, then
+  /// ends the thread. Does nothing if it was not started.
   void Stop(std::chrono::milliseconds patience);
 
   Counts counts() const;
@@ -125,7 +125,7 @@ class EventHook {
   Worker worker_;
 };
 
-/// In front of `bus`: a hook is notified of what went there.
+/// Decorates `bus`: the hook is notified of every event that went to it.
 class OutwardEvents : public EventSink {
  public:
   OutwardEvents(EventSink& bus, std::unique_ptr<EventDelivery> delivery,

@@ -68,7 +68,7 @@ void HistoryStore::WatchCauses(
   PublishCauses();
 }
 
-// Within the transaction that records the event.
+// Called within the transaction that records the event.
 void HistoryStore::LookForCauses(const FaultEvent& event) {
   if (!causes_) {
     return;

@@ -15,33 +15,33 @@
 
 namespace fdi::monitor {
 
-/// history.db as the monitor's history. What the file can never take (an
-/// episode that is not there) is reported and left out; all else may fail and
-/// is tried again by the caller.
+/// history.db as the history of the monitor. Records that the file can never
+/// accept (their episode does not exist) are reported and skipped; any other
+/// operation may fail and is retried by the caller.
 class HistoryStore : public HistorySink {
  public:
   using Clock = std::function<std::int64_t()>;  ///< UTC now [ns]
 
-  /// Opens the file and begins a session; if the last one died, its outage
-  /// becomes a gap of all valves.
+  /// Opens the file and begins a session. If the previous session crashed, its
+  /// outage is recorded as a gap of all valves.
   /// @throws DataError, storage::SqliteError
   HistoryStore(const std::filesystem::path& path, const std::string& software,
                const std::string& config, Clock utc_now_ns, LogSink log);
 
-  /// Episodes that earlier sessions left open. Before anything is recorded.
+  /// Episodes that earlier sessions left open. Call before recording anything.
   std::vector<OpenEpisode> OpenEpisodes();
   /// The accumulators as of the last checkpoint.
   std::vector<Accumulator> Accumulators() { return writer_.Accumulators(); }
-  /// The same of the candidate of --shadow.
+  /// The same for the --shadow candidate.
   std::vector<Accumulator> ShadowAccumulators() {
     return writer_.ShadowAccumulators();
   }
-  /// Events that an earlier session committed but perhaps did not send. What
-  /// cannot be read of them is reported, and left out.
+  /// Events that an earlier session committed but may not have sent. Unreadable
+  /// ones are reported and skipped.
   std::vector<FaultEvent> UnsentEvents();
 
-  /// Looks for common causes among what is recorded from now on. `told` is
-  /// called once a change is on the disk, by the history thread.
+  /// Looks for common causes in what is recorded from now on. `told` is called
+  /// by the history thread after each change has been committed.
   void WatchCauses(std::vector<storage::CauseGroup> groups,
                    std::function<void(const storage::CauseChange&)> told);
 
@@ -57,7 +57,7 @@ class HistoryStore : public HistorySink {
   void MarkSent(const FaultEvent& event) override { writer_.MarkSent(event); }
   void Commit() override { writer_.Commit(utc_now_ns_()); }
 
-  /// An orderly end.
+  /// Ends the session cleanly.
   void EndSession() { writer_.EndSession(utc_now_ns_(), true); }
 
  private:
@@ -71,7 +71,7 @@ class HistoryStore : public HistorySink {
   LogSink log_;
   std::optional<storage::CommonCauseBook> causes_;
   std::function<void(const storage::CauseChange&)> cause_told_;
-  std::vector<storage::CauseChange> cause_changes_;  // Of this batch.
+  std::vector<storage::CauseChange> cause_changes_;  // Of the current batch.
 };
 
 }  // namespace fdi::monitor

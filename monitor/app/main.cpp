@@ -8,7 +8,7 @@
 
 namespace {
 
-// For --help and the manual pages.
+// Shown by --help and in the manual pages.
 std::vector<fdi::cli::VerbExamples> Examples() {
   return {
       {"",

@@ -13,11 +13,12 @@
 
 namespace fdi::monitor {
 
-/// Which model set each valve is diagnosed with, as models.db says now: the one
-/// that is assigned to the valve, else the default one, else none.
+/// The model set that each valve is diagnosed with, as of the current
+/// models.db: the one assigned to the valve, else the default one, else none.
 ///
-/// The default is what `--model-set` names; without it the active set, if there
-/// is exactly one and no valve is assigned any.
+/// The default is the set named by `--model-set`. Without that option it is the
+/// active set, provided that there is exactly one and no valve has an
+/// assignment.
 ///
 /// Thread safe.
 class ModelAssignment : public ModelResolver {
@@ -25,8 +26,8 @@ class ModelAssignment : public ModelResolver {
   /// Called once for each model set, before it is used.
   using Announce = std::function<void(const ModelSet&)>;
 
-  /// Makes or migrates models.db if need be, and loads all sets that are
-  /// assigned or the default one, so that a damaged one is found at once.
+  /// Creates or migrates models.db if necessary and loads the default set and
+  /// all assigned ones, so that a damaged one is found at once.
   /// @throws NotFoundError, DataError, storage::SqliteError
   ModelAssignment(const std::filesystem::path& path,
                   const std::optional<storage::ModelReference>& wanted,
@@ -37,16 +38,16 @@ class ModelAssignment : public ModelResolver {
 
   std::vector<std::string> AssignedValves() const override;
 
-  /// While the baseline of the valve is provisional.
+  /// True while the baseline of the valve is provisional.
   bool IsolationHeld(std::string_view valve_id) const override;
 
-  /// How many sets are in use or were, one at least unless none is assigned.
+  /// Number of sets in use now or earlier; at least 1 unless none is assigned.
   std::size_t loaded() const;
 
-  /// Of the default set: "NAME@VERSION", or "none".
+  /// Name of the default set: "NAME@VERSION", or "none".
   std::string DefaultName() const;
 
-  /// How many valves had a set assigned when this was made.
+  /// Number of valves that had a set assigned at construction.
   std::size_t assigned() const { return assigned_; }
 
  private:
@@ -63,7 +64,7 @@ class ModelAssignment : public ModelResolver {
   std::vector<std::string> assigned_valves_;
 };
 
-/// Makes models.db, or migrates it, if need be. Then it can be read.
+/// Creates or migrates models.db if necessary, so that it can be read.
 void PrepareModels(const std::filesystem::path& path);
 
 }  // namespace fdi::monitor

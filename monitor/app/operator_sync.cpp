@@ -45,7 +45,7 @@ void OperatorSync::Start() {
       try {
         Adopt();
         Bring();
-      } catch (const std::exception& error) {  // It is tried again.
+      } catch (const std::exception& error) {  // Retried in the next period.
         const std::string reason = error.what();
         log_.Report(LogId::kOperatorSync, "operator_action_waits",
                     [&reason] { return "reason=" + LogValue(reason); });
@@ -73,13 +73,13 @@ void OperatorSync::Bring() {
       if (out_.Write(unsent_.front(), {}, kPeriod) != idl::WriteResult::kSent) {
         return;
       }
-    } catch (const DataError& error) {  // Too long for the wire.
+    } catch (const DataError& error) {  // Does not fit the wire type.
       ReportRefusal(error);
     }
   }
 }
 
-// What came back from there is known, which ends the round.
+// The history already has an action that comes back to us, which ends the loop.
 void OperatorSync::Adopt() {
   const auto now = std::chrono::steady_clock::now();
   for (std::size_t waiting = received_.size(); waiting > 0; --waiting) {
@@ -93,7 +93,7 @@ void OperatorSync::Adopt() {
       }
     } catch (const NotFoundError&) {
       keep = now - received.since < kEpisodeMayCome;
-    } catch (const ConfigError& error) {  // Not what our programs accept.
+    } catch (const ConfigError& error) {  // Not a valid action.
       ReportRefusal(error);
     }
     if (keep) {

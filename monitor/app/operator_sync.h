@@ -16,10 +16,11 @@
 
 namespace fdi::monitor {
 
-/// Brings what operators do on one monitor of a pair into the history of the
-/// other one: acknowledgements, labels, shelves, by whatever program they were
-/// made. Who was away gets those of the last 30 days when it comes; those of
-/// episodes that it does not have are left out. A thread of its own.
+/// Copies operator actions (acknowledgements, labels, shelves) made on one
+/// monitor of a pair, by whatever program, into the history of the other. A
+/// monitor that was away gets those of the last 30 days when it returns;
+/// actions on episodes that it does not have are skipped. Runs a thread of its
+/// own.
 class OperatorSync {
  public:
   /// @throws idl::TransportError; DataError, storage::SqliteError
@@ -48,7 +49,7 @@ class OperatorSync {
   idl::Subscriber<OperatorAction> in_;
   int came_{0};
   std::deque<OperatorAction> unsent_;
-  std::deque<Received> received_;  // Whose episode may still be adopted.
+  std::deque<Received> received_;  // Its episode may still be adopted.
   std::jthread thread_;
 };
 

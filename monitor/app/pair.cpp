@@ -1,28 +1,29 @@
 // Who publishes what, and when.
 //
-// Vectors. A valve's vectors have an order (source, seq). What the leader
-// publishes covers ours up to the same place; the rest is held for some
-// seconds, and published by who takes over. So no vector is missing, and none
-// is there twice unless both led.
+// Vectors. The vectors of a valve are ordered by (source, seq). What the leader
+// publishes covers ours up to the same position; the standby holds its own for
+// some seconds and publishes them at a takeover. So no vector is missing, and
+// none is sent twice unless both monitors led.
 //
 // Events. They are recorded before they come here (the outbox of the history
-// has them until they are marked as sent), and are the same on both sides: ids
-// are hashes of valve, source and stamp of detection. What was not heard goes
-// out at the take-over. What the leader raised and we did not, as we were away
-// or were settling, is adopted after a while: recorded, and its episode goes on
-// here under the same id.
+// keeps them until they are marked as sent), and are the same on both sides:
+// ids are hashes of valve, source and stamp of detection. Events not heard from
+// the leader are published at the takeover. An event that the leader raised and
+// we did not, because we were away or settling, is adopted after a while: it is
+// recorded, and its episode continues here under the same id.
 //
-// A leader that is killed may have reached us and nobody else. So what it said
-// last is published once more, unless it had said goodbye.
+// A leader that is killed may have reached us and nobody else. Its last
+// messages are therefore published once more, unless it said that it was
+// leaving.
 //
-// Subscribers that come late are given the last vectors and events of each
-// valve by DDS, but only those of a writer that lives. So the first one that
-// comes after a take-over makes us send what the former leader had published;
-// who was there before drops repeats by (source, seq) or by (episode,
-// transition, stamp), as after a restart.
+// DDS gives late subscribers the last vectors and events of each valve, but
+// only those of writers that are alive. So the first new subscriber after a
+// takeover makes us send what the former leader had published; earlier
+// subscribers drop duplicates by (source, seq) or by (episode, transition,
+// stamp), as after a restart.
 //
-// Leading is a lease: it ends by itself if the diagnosis does not get on for as
-// long as the others wait. A process that was stopped and goes on therefore
+// Leadership is a lease: it expires if the diagnosis makes no progress for as
+// long as the others wait. A process that was suspended and resumes therefore
 // publishes nothing before it has heard who leads by now.
 #include "monitor/app/pair.h"
 
@@ -45,15 +46,15 @@ constexpr milliseconds kElectionPeriod{10};
 constexpr milliseconds kWordPeriod{50};
 constexpr milliseconds kListening{1500};  // Discovery takes some 100 ms.
 constexpr milliseconds kHoldVectors{3000};
-// A writer that lives has sent by then what it wrote, to all that read it.
+// By then a live writer has delivered its messages to all its readers.
 constexpr milliseconds kUnderWay{200};
 constexpr std::size_t kMostVectors = 20'000;  // 46 MB
 constexpr std::size_t kMostEvents = 10'000;
 constexpr std::size_t kMostPlaces = 200'000;
-// Later than that one of the two has judged differently.
+// If no counterpart has arrived by then, the two monitors judged differently.
 constexpr milliseconds kAdoptAfter{2000};
 constexpr milliseconds kHeardWithin{60'000};
-constexpr std::size_t kEventsPerValve = 16;  // As the writer keeps for DDS.
+constexpr std::size_t kEventsPerValve = 16;  // The writer's DDS history depth.
 
 bool Same(const FaultEvent& a, const FaultEvent& b) {
   return a.episode_id == b.episode_id &&
@@ -152,7 +153,8 @@ bool Pair::WantsLast() {
   return decisions_.WantsLast() || lacks;
 }
 
-// By the publisher of the journal, but at the start.
+// Called by the journal's publisher thread, and at the start by the main
+// thread.
 bool Pair::Publish(const FaultEvent& event, bool persisted) {
   const std::lock_guard lock(mutex_);
   FaultEvent own = event;
@@ -182,7 +184,7 @@ bool Pair::IsPublishedLocked(const FaultEvent& event) const {
          });
 }
 
-// @returns false if it is on the bus already.
+// @returns false if the event is on the bus already.
 bool Pair::RememberLocked(const FaultEvent& event) {
   if (IsPublishedLocked(event)) {
     return false;
@@ -239,8 +241,8 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
   heard_events_.Take(
       {[&](const FaultEvent& event, const auto&) { Hear(event, now); }, {}},
       kNow);
-  // It is counted from our last word, as the others count: that was before the
-  // last step.
+  // The lease counts from our last message, as the other monitors count, which
+  // was sent before the last step.
   if (led_ && now >= lease_until_.load()) {
     election_.Lapse(now);
   }
@@ -259,12 +261,12 @@ void Pair::Leave() {
   election_.Leave(now);
   Follow(now);
   if (led_) {
-    lease_until_ = TimePoint::max();  // Nobody else publishes what is left.
+    lease_until_ = TimePoint::max();  // Nobody else publishes the rest.
   }
   own_word_.WaitForAcknowledged(milliseconds(100));
 }
 
-// Does what the election decided.
+// Carries out the decision of the election.
 void Pair::Follow(TimePoint now) {
   const bool leads = election_.leads();
   const bool changed = leads != led_;
@@ -316,8 +318,9 @@ void Pair::Follow(TimePoint now) {
   status_.takeovers += changed && leads ? 1 : 0;
 }
 
-// Of a take-over, or of a moment in which the lease had run out. One vector of
-// a valve at a time, as the writer keeps but one until it is sent.
+// Publishes what was held before a takeover, or while the lease had expired:
+// one vector per valve and call, because the writer keeps only the last one
+// until it is sent.
 void Pair::PublishHeld() {
   std::unordered_set<std::string> sent;
   const bool all = held_vectors_.size() > kMostVectors / 2;
@@ -337,7 +340,8 @@ void Pair::PublishHeld() {
   }
 }
 
-// What the leader has published meanwhile, and what it never will.
+// Drops vectors that the leader has published or never will, and closed
+// episodes' events that are too old.
 void Pair::DropHeard(TimePoint now) {
   while (!held_vectors_.empty() && !led_) {
     const HeldVector& first = held_vectors_.front();
@@ -362,7 +366,8 @@ void Pair::DropHeard(TimePoint now) {
   });
 }
 
-// Of a valve that has not settled nothing of our own is to be waited for.
+// An event of a valve that is settling is adopted at once: this monitor will
+// not raise its own.
 void Pair::Adopt(TimePoint now, Pipeline& pipeline) {
   std::vector<FaultEvent> due;
   {
@@ -381,7 +386,7 @@ void Pair::Adopt(TimePoint now, Pipeline& pipeline) {
   }
 }
 
-// Those that were heard at that time or later.
+// Republishes the events heard at `since` or later.
 void Pair::RepeatEvents(TimePoint since) {
   const std::lock_guard lock(mutex_);
   for (const auto& [valve_id, events] : published_) {

@@ -18,7 +18,7 @@
 
 namespace fdi::monitor {
 
-/// Settings of a monitor that has another one to stand in for it.
+/// Settings of a monitor in a redundant pair.
 struct PairOptions {
   std::string name;        ///< The same for both; letters, digits, - and _.
   int rank{0};             ///< 1..9; the lower one is preferred.
@@ -28,22 +28,22 @@ struct PairOptions {
 /// @throws ConfigError naming the option and what is accepted.
 void Validate(const PairOptions& options);
 
-/// Where this monitor of a pair publishes: in the usual partition, and in one
-/// where the other monitor hears it and it does not hear itself.
+/// The partitions in which this monitor of a pair publishes: the default one,
+/// and one that only the other monitor reads.
 std::vector<std::string> PartitionsOf(const PairOptions& options);
-/// Where the other one does, as a pattern.
+/// The partitions of the other monitors, as a pattern.
 std::vector<std::string> PartitionOfOthers(const PairOptions& options);
 
-/// One of two monitors that stand in for each other. Both diagnose and record
-/// everything; what they would publish goes through here, and the one that does
-/// not lead holds it until it has heard the same from the leader. Who takes
-/// over publishes what was not heard.
+/// One monitor of a redundant pair. Both diagnose and record everything and
+/// publish through this class; the standby holds its messages until it has
+/// heard the same from the leader, and publishes the unheard ones when it takes
+/// over.
 ///
-/// The thread of the diagnosis calls Tick(), and nothing else says that this
-/// monitor is alive.
+/// Tick() is called by the diagnosis thread and is the only sign of life that
+/// the other monitor gets.
 class Pair : public DecisionSink, public EventSink {
  public:
-  /// @param events where events go while we lead; `bus` is behind it.
+  /// @param events sink of events while we lead; it forwards to `bus`.
   /// @throws idl::TransportError
   Pair(idl::Participant& participant, const PairOptions& options,
        const std::string& monitor, BusDecisionSink& decisions,
@@ -59,13 +59,13 @@ class Pair : public DecisionSink, public EventSink {
   }
   bool Publish(const FaultEvent& event, bool persisted) override;
 
-  /// Hears the others, decides who leads, and says so. Several times within
-  /// the patience, by the thread of the diagnosis.
+  /// Receives the states of the others, decides who leads and publishes our
+  /// own. Called by the diagnosis thread, several times per patience interval.
   void Tick(std::uint64_t received, Pipeline& pipeline);
-  /// Says that it leaves, if somebody is there to take over; before the end.
+  /// Hands leadership over if another monitor is there; call before the end.
   void Leave();
 
-  /// How it is; thread safe.
+  /// Thread safe.
   struct Status {
     std::string name;
     int rank{0};
@@ -75,14 +75,14 @@ class Pair : public DecisionSink, public EventSink {
     std::uint64_t takeovers{0};  ///< Times it began to lead.
   };
   Status status() const;
-  /// Every event was heard from the leader, or is so old that it never will be.
+  /// True if every event was heard from the leader or is too old to be heard.
   /// Thread safe.
   bool HeardAllEvents() const;
 
  private:
   using Clock = std::chrono::steady_clock;
   using TimePoint = Clock::time_point;
-  struct Place {  // In the stream of a valve.
+  struct Place {  // Position in the stream of a valve.
     std::uint64_t source_id{0};
     std::uint64_t seq{0};
   };
@@ -117,30 +117,31 @@ class Pair : public DecisionSink, public EventSink {
   idl::Subscriber<PairState> words_;
   idl::Subscriber<idl::DecisionMessage> heard_vectors_;
   idl::Subscriber<FaultEvent> heard_events_;
-  // Until then we lead for sure: nobody takes over before.
+  // Until then we certainly lead: no other monitor takes over earlier.
   std::atomic<TimePoint> lease_until_{TimePoint{}};
 
-  // Of the diagnosis thread.
+  // Used by the diagnosis thread only.
   PairElection election_;
   TimePoint ticked_;
   TimePoint said_;
   bool led_{false};
   std::string followed_;
-  // What was heard before has reached subscribers, too: its leader lived on.
+  // Messages heard earlier have reached all subscribers: their leader was alive
+  // until then.
   TimePoint arrived_;
   std::unordered_map<std::string, Place> covered_;  // Heard, by valve.
-  std::deque<HeldVector> held_vectors_;             // In the order of coming.
-  // A subscriber that comes lacks what the former leader published: how many
-  // had come when we took over; -1: it lacks nothing.
+  std::deque<HeldVector> held_vectors_;             // In order of arrival.
+  // Number of subscribers at the takeover: a later one lacks what the former
+  // leader published. -1: nothing is lacking.
   int vectors_lacked_{-1};
   int events_lacked_{-1};
 
-  mutable std::mutex mutex_;  // Guards what follows.
+  mutable std::mutex mutex_;  // Guards the members below.
   Status status_;
   // The last events of each valve that are on the bus.
   std::map<std::string, std::deque<HeldEvent>> published_;
-  std::deque<HeldEvent> held_events_;  // Ours that were not heard,
-  std::deque<HeldEvent> foreign_;      // heard ones that are not ours yet.
+  std::deque<HeldEvent> held_events_;  // Ours, not heard from the leader yet.
+  std::deque<HeldEvent> foreign_;      // Heard, not raised by us yet.
 };
 
 }  // namespace fdi::monitor

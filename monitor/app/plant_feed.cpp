@@ -10,7 +10,7 @@ constexpr std::chrono::seconds kLeastPatience{3};
 constexpr std::chrono::seconds kForgotten{60};
 constexpr double kSilentPeriods = 3.0;
 
-// "leader", "standby"; of a monitor that stands alone nothing.
+// "leader" or "standby"; empty for a monitor that is not in a pair.
 std::string PairOf(const idl::MonitorStatusMessage& status) {
   const auto leads =
       std::ranges::find(status.counters, "pair_leader",
@@ -35,7 +35,8 @@ std::shared_ptr<const console::ModelFacts> PlantFeed::Add(
   models.decision.detection_samples = info.detection_samples;
   models.sample_period_s = info.sample_period_s;
   models.flow_unit = info.flow_unit;
-  // Several monitors may have it: one object, so that trends go on.
+  // Several monitors may use the same set; sharing one object keeps trends
+  // continuous.
   auto& facts = models_[info.model_hash];
   if (!facts) {
     facts = console::FactsOf(models);
@@ -64,7 +65,7 @@ void PlantFeed::Add(const idl::DecisionMessage& message,
       valve.source_id == verdict.source_id && verdict.seq <= valve.seq;
   valve.participant = reception.participant_id;
   if (repeated || OutOfOrder(verdict.intake)) {
-    return;  // As who takes over from the leader of a pair repeats some.
+    return;  // A new leader of a pair repeats some vectors.
   }
   const auto models = models_.find(message.model_hash);
   const auto facts = models == models_.end() ? nullptr : models->second;

@@ -13,10 +13,11 @@
 
 namespace fdi::monitor {
 
-/// Shows on a board what the monitors of a plant say, and which of them are
-/// silent. A valve belongs to the monitor whose vector of it came last; of a
-/// pair that is who leads. A monitor is known by its participant, which both
-/// its vectors and its status come from. One thread, but for monitors().
+/// Feeds a board with what the monitors of a plant publish, and tells which of
+/// them are silent. A valve belongs to the monitor that published its last
+/// vector, in a pair the leader. A monitor is identified by its DDS
+/// participant, which sends both its vectors and its status. One thread, except
+/// for monitors().
 class PlantFeed {
  public:
   using Clock = std::chrono::steady_clock;
@@ -25,7 +26,7 @@ class PlantFeed {
 
   explicit PlantFeed(console::LiveBoard& board) : board_(board) {}
 
-  /// What the arrays of vectors with its hash mean.
+  /// Learns what the arrays mean in vectors with the hash of `info`.
   std::shared_ptr<const console::ModelFacts> Add(
       const idl::ModelSetInfoMessage& info);
   void Add(const idl::DecisionMessage& message, const idl::Reception& reception,
@@ -33,12 +34,12 @@ class PlantFeed {
   void Add(const idl::MonitorStatusMessage& status,
            const idl::Reception& reception, Clock::time_point now);
 
-  /// Marks valves that are silent: for three periods of theirs and at least
-  /// 3 s, or because their monitor is. Forgets monitors that were silent for a
-  /// minute and have no valve. Several times a second.
+  /// Marks as silent the valves that sent nothing for three of their periods
+  /// and at least 3 s, or whose monitor is silent. Forgets monitors without
+  /// valves after a minute of silence. Call several times a second.
   void Tend(Clock::time_point now);
 
-  /// By name; thread safe.
+  /// Ordered by name; thread safe.
   std::vector<console::MonitorLine> monitors() const;
 
  private:
@@ -62,7 +63,7 @@ class PlantFeed {
   console::LiveBoard& board_;
   std::map<std::uint64_t, std::shared_ptr<const console::ModelFacts>> models_;
   std::map<std::string, Valve> valves_;
-  mutable std::mutex mutex_;                   // Guards what follows.
+  mutable std::mutex mutex_;                   // Guards the members below.
   std::map<std::uint64_t, Monitor> monitors_;  // By participant.
 };
 

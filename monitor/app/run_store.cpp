@@ -18,8 +18,8 @@ storage::StoredSample ToStored(const ReceivedSample& received) {
   return stored;
 }
 
-// Of two samples of a source, lost ones between them counted; 1 s if their
-// order does not tell.
+// Sample period derived from two samples of a source, allowing for lost ones
+// between them; 1 s if they are out of order.
 double PeriodBetween(const Sample& first, const Sample& second) {
   if (second.seq <= first.seq || second.stamp_ns <= first.stamp_ns) {
     return 1.0;

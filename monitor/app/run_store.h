@@ -13,9 +13,9 @@
 
 namespace fdi::monitor {
 
-/// runs.db as the monitor's recorder: runs for each source of a valve, whose
-/// sample period is what its first two samples are apart. A run that is a day
-/// long is followed by the next one, so that retention can take it.
+/// runs.db as the recorder of the monitor: one run per source of a valve, whose
+/// sample period is derived from its first two samples. A run is closed after a
+/// day and a new one begun, so that retention can delete it.
 class RunStore : public SampleSink {
  public:
   /// @throws DataError, storage::SqliteError
@@ -32,8 +32,8 @@ class RunStore : public SampleSink {
   struct Stream {
     std::uint64_t source_id{0};
     std::optional<Key> run;
-    storage::StoredSample first;  // waits for the second while there is no run
-    std::int64_t start_ns{0};     // of that run
+    storage::StoredSample first;  // Held until the second one starts a run.
+    std::int64_t start_ns{0};     // Start of `run`.
     double period_s{1.0};
   };
   using Streams = std::vector<Stream>;  // of one valve, the newest at the end

@@ -33,7 +33,7 @@ struct RunArguments {
   ServiceOptions service;
 };
 
-// A flag that may have a value; TOML knows it as true and false, too.
+// A flag with an optional value; TOML may give it as true or false.
 std::string ParseRecord(const std::string& word) {
   if (word == "true" || word == "on") {
     return "on";
@@ -48,7 +48,7 @@ std::string ParseRecord(const std::string& word) {
   return word;
 }
 
-// As --record; what is an address is checked where it is used.
+// As for --record; an address is validated where it is used.
 std::function<std::string(std::string)> AddressOr(const std::string& usual) {
   return [usual](const std::string& word) {
     if (word == "true" || word == "on") {

@@ -1,13 +1,13 @@
-// The service from its start to its end. Orders that matter:
+// The service from start to end. Orders that matter:
 //
-// Start: what an earlier session left unsent is sent before the journal's
-// threads use the same connection; samples are taken last, once everything
-// that looks at them is ready. They wait at the subscriber meanwhile.
+// Start: what an earlier session left unsent is published before the journal's
+// threads use the same connection. The subscription is served last, once all
+// consumers are ready; until then samples queue at the subscriber.
 //
-// Stop: first nobody new is let in (HTTP), then the diagnosis takes what was
-// received, then journal and recorder store and publish it, then the hook gets
-// a second for its deliveries, then the session ends in the history, then the
-// last status goes out. Each step is tried, whatever became of those before.
+// Stop: HTTP stops accepting requests, the diagnosis drains the subscriber,
+// journal and recorder store and publish the results, the hook gets a second
+// for its deliveries, the session is closed in the history, and the last status
+// is published. Each step is attempted even if an earlier one failed.
 #include "monitor/app/service.h"
 
 #include <algorithm>
@@ -30,8 +30,8 @@ using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
 
 constexpr milliseconds kTakeTimeout{100};
-constexpr int kTakeLimit = 4096;  // Under full load Take() has no other end.
-// A pair has to hear of us more often.
+constexpr int kTakeLimit = 4096;  // Bounds a call of Take() under full load.
+// A pair must exchange states more often.
 constexpr milliseconds kPairTakeTimeout{20};
 constexpr int kPairTakeLimit = 256;
 constexpr milliseconds kTickPeriod{1000};
@@ -88,8 +88,8 @@ std::filesystem::path LockOf(const storage::DataDirectory& data) {
   return path += ".lock";
 }
 
-// The reader never gives the place of a valve back while its publisher lives,
-// so it takes more than the pipeline, which does.
+// The reader never frees the slot of a valve while its publisher is alive, so
+// it needs more slots than the pipeline, which does free them.
 int IntakeValves(int max_valves) {
   constexpr int kStrangers = 60'000;
   constexpr int kMost = 100'000;  // See idl::DdsOptions.
@@ -107,7 +107,7 @@ std::string PairText(const Pair& pair) {
   return status.leads ? "leader" : "standby, " + leader + " leads";
 }
 
-// To the service manager (systemd, Type=notify), if there is one that listens.
+// Notifies the service manager (systemd, Type=notify), if there is one.
 void Notify(const std::string& state) {
   sd_notify(0, state.c_str());
 }
@@ -193,7 +193,7 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
 
 Service::~Service() = default;
 
-// The bus, and who else is told.
+// The bus, preceded by console and event hook where they are enabled.
 EventSink& Service::EventsOut() {
   return outward_ ? static_cast<EventSink&>(*outward_) : events_;
 }
@@ -213,7 +213,7 @@ PipelineOptions Service::WithDelivery(PipelineOptions options) {
   return options;
 }
 
-// Any thread that resolves models.
+// Called by any thread that resolves models.
 void Service::AnnounceModels(const ModelSet& models) {
   models_topic_.Write(idl::Describe(models));
   context_.log(LogLevel::kInfo, "models_loaded model_set=" + NameOf(models));
@@ -252,7 +252,7 @@ void Service::Start() {
   }
 }
 
-// What an earlier session committed but perhaps did not send.
+// Publishes what an earlier session committed but may not have sent.
 void Service::ResendEvents() {
   for (const FaultEvent& event : history_.UnsentEvents()) {
     if (pair_ ? pair_->Publish(event, true) : events_.Publish(event, true)) {
@@ -301,9 +301,9 @@ void Service::ServeProbes() {
 }
 
 // The diagnosis thread: takes samples from the bus and diagnoses them. The
-// thread that receives has decoded them already, so that a thread between the
-// two would only move them. What this one is behind with waits at the
-// subscriber, which stops receiving when 16 MB wait.
+// receive thread has decoded them already, so an intermediate thread would only
+// move them. The backlog stays at the subscriber, which stops receiving once it
+// holds 16 MB.
 void Service::Diagnose() {
   TimePoint
       received{};  // The last sample; when it came, not when it was taken.
@@ -322,7 +322,7 @@ void Service::Diagnose() {
       }};
   const int limit = pair_ ? kPairTakeLimit : kTakeLimit;
   const auto take = [&](milliseconds timeout) {
-    // Anew each time: the UTC clock may have been set.
+    // Recomputed each time, because the UTC clock may have been set.
     utc_to_steady_ns =
         Clock::now().time_since_epoch() / std::chrono::nanoseconds(1) -
         cli::NowNs();
@@ -339,14 +339,15 @@ void Service::Diagnose() {
   if (pair_) {
     pair_->Leave();
   }
-  // What is there already; publishers that go on do not keep us.
+  // Drains what has arrived already; publishers that continue to send do not
+  // delay the shutdown beyond drain_until_.
   while (Clock::now() < drain_until_.load() && take(milliseconds(0)) > 0) {
   }
   pipeline_.FlushDecisions();
 }
 
 void Service::Serve(cli::StopSignals& signals) {
-  // Not through the log: scripts wait for this line at every log level.
+  // Not written through the log: scripts wait for this line at every log level.
   const std::string ready =
       "monitor_ready model_set=" + assignment_->DefaultName() +
       " assigned=" + std::to_string(assignment_->assigned()) +
@@ -386,7 +387,7 @@ void Service::Serve(cli::StopSignals& signals) {
   }
 }
 
-// @returns when to look again, `next_tick` at the latest.
+// @returns when to be called again, `next_tick` at the latest.
 Service::TimePoint Service::FeedWatchdog(TimePoint next_tick) {
   if (!watchdog_) {
     return next_tick;
@@ -420,14 +421,14 @@ void Service::Tick() {
   }
 }
 
-// Somebody asked for it, or changed the models: the answer is not throttled.
+// A reload was requested, or the models changed: its outcome is not throttled.
 void Service::Reload(const char* cause) {
   context_.log(LogLevel::kInfo, std::string("models_reload cause=") + cause);
   try {
     auto next = std::make_shared<const ModelAssignment>(
         data_.models(), options_.model_set,
         [this](const ModelSet& models) { AnnounceModels(models); });
-    // Loads here what the diagnosis would otherwise wait for.
+    // Loads the sets here, so that the diagnosis thread need not.
     for (const std::string& valve : pipeline_.valve_names()) {
       next->ModelsFor(valve);
     }
@@ -542,8 +543,8 @@ void Service::Stop() {
   status_topic_.WaitForAcknowledged(kAcknowledgeLimit);
   context_.log(LogLevel::kInfo, StatusLine(StatusOf(Facts())));
   context_.log(LogLevel::kInfo, "monitor_stopped");
-  // Last, as a client may keep them for a second. Their threads look at all the
-  // rest, so they must not outlive this call.
+  // Last, because clients may keep the server's threads busy for a second.
+  // These threads use everything above, so they must end within this call.
   http_.reset();
   if (console_) {
     errors.Try([this] { console_->Close(); });
@@ -556,7 +557,7 @@ void Service::StopDiagnosis() {
   drain_until_ = Clock::now() + kDrainLimit;
   stopping_ = true;
   samples_.Interrupt();
-  // A subscriber that does not read must not keep the service from ending.
+  // A subscriber that does not read must not prevent the shutdown.
   if (!diagnosis_.WaitFor(kSubscriberPatience)) {
     publication_stop_.request_stop();
   }

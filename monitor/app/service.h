@@ -46,16 +46,16 @@ struct ServiceOptions {
   double stale_timeout_s{3600.0};
   double trace_before_s{1800.0};
   double status_period_s{60.0};     ///< Of the status line in the log.
-  std::optional<PairOptions> pair;  ///< Another monitor stands in for us.
+  std::optional<PairOptions> pair;  ///< This monitor has a standby.
   /// Runs beside the active sets; without a version the newest one.
   std::optional<storage::ModelReference> shadow;
   std::string shadow_valves{"*"};
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
   std::vector<std::string> http_names;  ///< See HostAllowed().
-  /// Groups of valves with causes in common; empty: DATA/groups.toml, if any.
+  /// Groups of valves with common causes; empty: DATA/groups.toml if it exists.
   std::filesystem::path groups;
-  /// Notify a program or a web server of events; empty: nobody.
+  /// Notify a program or a web server of events; empty: disabled.
   std::string on_event;
   int on_event_per_minute{60};
   double on_event_timeout_s{10.0};
@@ -64,11 +64,11 @@ struct ServiceOptions {
 };
 
 /// The monitor as a service: DDS on one side, the databases on the other, the
-/// pipeline between them. The thread of Run() looks after the rest: signals,
-/// status, watchdog, new models. Lives for one run.
+/// pipeline between them. The thread of Run() handles signals, status, watchdog
+/// and new models. Runs once.
 class Service {
  public:
-  /// Opens everything and starts nothing: no thread of ours runs yet.
+  /// Opens all resources and starts none of its threads.
   /// @throws ConfigError, DataError, NotFoundError, idl::TransportError,
   ///   storage::SqliteError
   Service(const ServiceOptions& options, const cli::Context& context);
@@ -76,8 +76,8 @@ class Service {
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
 
-  /// Serves until a signal asks to stop or a thread fails, then stores and
-  /// publishes what was received and ends all threads, whatever happens.
+  /// Serves until a signal requests a stop or a thread fails, then stores and
+  /// publishes what was received and ends all threads in any case.
   /// @returns the exit code. @throws the first error.
   int Run(cli::StopSignals& signals);
 
@@ -112,14 +112,14 @@ class Service {
 
   ServiceOptions options_;
   const cli::Context& context_;
-  std::unique_ptr<HttpServer> http_;           // Null: not served.
-  std::unique_ptr<console::Console> console_;  // Null: not served.
+  std::unique_ptr<HttpServer> http_;           // Null: no probes.
+  std::unique_ptr<console::Console> console_;  // Null: no console.
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
-  // Read before a session begins: an error in them leaves no trace.
+  // Read before a session begins, so that an error in them leaves no trace.
   PipelineOptions pipeline_options_;
   std::vector<storage::CauseGroup> cause_groups_;
-  std::unique_ptr<EventDelivery> delivery_;  // Null: nobody outside is told.
+  std::unique_ptr<EventDelivery> delivery_;  // Null: no event hook.
   idl::Participant participant_;
   idl::Participant intake_participant_;  // See idl::Overflow.
   idl::Publisher<idl::ModelSetInfoMessage> models_topic_;
@@ -131,18 +131,18 @@ class Service {
   std::stop_source publication_stop_;  // Ends waits for slow subscribers.
   BusDecisionSink decisions_;
   BusEventSink events_;
-  std::unique_ptr<OutwardEvents> outward_;  // Null: nobody is told.
+  std::unique_ptr<OutwardEvents> outward_;  // Null: no console, no event hook.
   idl::Publisher<idl::MonitorStatusMessage> status_topic_;
   idl::Subscriber<idl::ValveSampleMessage> samples_;
   Counters counters_;
   ThrottledLog log_;
-  std::unique_ptr<Pair> pair_;               // Null: nobody stands in for us.
-  std::unique_ptr<OperatorSync> operators_;  // With pair_.
+  std::unique_ptr<Pair> pair_;               // Null: not in a pair.
+  std::unique_ptr<OperatorSync> operators_;  // Set together with pair_.
   ShareWatch shares_;
   Pipeline pipeline_;
-  Pulse service_pulse_;  // Of the thread of Run().
+  Pulse service_pulse_;  // Beaten by the thread of Run().
   Heartbeat heartbeat_;
-  std::optional<Watchdog> watchdog_;  // If a manager asks for it.
+  std::optional<Watchdog> watchdog_;  // Only if a service manager asks for it.
   std::string notified_status_;
   std::int64_t started_ns_;
   std::uint64_t reported_loss_{0};

@@ -14,12 +14,12 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// It says so once a second.
+// A monitor announces its share once a second.
 constexpr milliseconds kGoneAfter{3500};
 constexpr std::size_t kMostMonitors = 64;
 
-// Whether a publisher may be in both. Of two patterns that is known only if one
-// matches the other as text.
+// Whether a publisher can be in both partitions. For two patterns this is known
+// only if one matches the other as text.
 bool Overlap(const std::string& a, const std::string& b) {
   if (a == b) {
     return true;

@@ -13,21 +13,22 @@
 
 namespace fdi::monitor {
 
-/// Valves that another monitor takes, too, without being of our pair.
+/// Valves that are also taken by a monitor outside our pair.
 struct ContestedValves {
   std::size_t count{0};
   std::string example;  ///< Id of the first.
-  std::string monitor;  ///< That takes it, too.
+  std::string monitor;  ///< Another monitor that takes it.
 };
 
-/// Those of `valves` that a monitor of `others` takes, too.
-/// @param own a monitor of the same pair, and itself, contest nothing.
+/// Those of `valves` that a monitor of `others` takes as well.
+/// @param own its pair partner and the monitor itself are ignored.
 ContestedValves FindContested(const MonitorShare& own,
                               const std::vector<MonitorShare>& others,
                               const std::vector<std::string>& valves);
 
-/// Says which share of the plant this monitor takes, hears those of others, and
-/// reports valves that two of them take. One thread, if nothing else is said.
+/// Announces which share of the plant this monitor takes, receives the shares
+/// of the others, and reports valves that two of them take. One thread unless
+/// noted.
 class ShareWatch {
  public:
   /// @throws ConfigError if the glob does not fit the wire;
@@ -35,10 +36,10 @@ class ShareWatch {
   ShareWatch(idl::Participant& participant, MonitorShare own,
              ThrottledLog& log);
 
-  /// About once a second. @param valves that this monitor has seen; asked for
-  /// only where another one takes samples, too.
+  /// Call about once a second. @param valves returns the valves seen so far;
+  /// called only if another monitor's share may overlap.
   void Tick(const std::function<std::vector<std::string>()>& valves);
-  /// As of the last Tick(). Any thread.
+  /// As of the last Tick(). Thread safe.
   ContestedValves contested() const {
     const std::lock_guard lock(mutex_);
     return contested_;

@@ -25,8 +25,8 @@ double Seconds(const timeval& time) {
          static_cast<double>(time.tv_usec) * 1e-6;
 }
 
-// User and system time of this process; 0 where the kernel does not say, as
-// below.
+// User and system time of this process; 0 where the kernel does not tell, as in
+// the functions below.
 double CpuSeconds() {
   rusage usage{};
   return getrusage(RUSAGE_SELF, &usage) == 0
@@ -160,7 +160,7 @@ HttpPage ReadinessPage(const Readiness& readiness) {
                                     {"publishers", readiness.publishers}});
 }
 
-// What came from the network, and who.
+// What was refused on the network, and from how many participants.
 void AddWhatWasRefused(const StatusFacts& facts,
                        std::vector<Measure>& measures) {
   constexpr Type kCounter = Type::kCounter;
@@ -307,7 +307,7 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
     status.text += (status.text.empty() ? "stalled: " : "; stalled: ") +
                    Joined(facts.stalled);
   }
-  // Names of other monitors and of valves may be long.
+  // The names of other monitors and of valves may be long.
   if (status.text.size() > idl::kMaxTextLength) {
     status.text.resize(idl::kMaxTextLength);
   }

@@ -84,7 +84,7 @@ Json LargestOf(const Json& factors) {
   return largest;
 }
 
-// "leader host:1 "; of a monitor without a pair nothing.
+// "leader host:1 "; empty for a monitor that is not in a pair.
 std::string PairText(const idl::MonitorStatusMessage& status) {
   const auto leads =
       std::ranges::find(status.counters, "pair_leader",
@@ -95,7 +95,7 @@ std::string PairText(const idl::MonitorStatusMessage& status) {
                    " ";
 }
 
-// Lines that are no rows: title, blank, heading, "too narrow", blank, keys.
+// Lines other than rows: title, blank, heading, "too narrow", blank, keys.
 constexpr std::size_t kOtherLines = 6;
 
 std::string Title(const TopBoard& board, const TopView& view,
@@ -231,7 +231,7 @@ Json TopBoard::RowOf(const Heard& heard, Clock::time_point now) const {
 cli::Report TopBoard::Valves(TopSort sort, const std::string& filter,
                              Clock::time_point now) const {
   const std::string lower = Lower(filter);
-  // What decides first stands first; what does not count for `sort` is equal.
+  // Sort keys in order of precedence; those that `sort` ignores are equal.
   using Order = std::tuple<int, std::int64_t, double, std::string>;
   std::vector<std::pair<Order, Json>> rows;
   for (const auto& [valve_id, heard] : decisions_) {
@@ -330,7 +330,7 @@ std::string Clipped(const std::string& line, std::size_t width) {
       escape = c != 'm';
       continue;
     }
-    if ((c & '\xC0') != '\x80') {  // Not the rest of a letter in UTF-8.
+    if ((c & '\xC0') != '\x80') {  // Not a UTF-8 continuation byte.
       fits = cells < width;
       cells += fits ? 1 : 0;
     }

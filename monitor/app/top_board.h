@@ -19,12 +19,12 @@ enum class TopSort { kWorst, kValve, kFactor, kSince };
 std::string_view TopSortName(TopSort sort);  ///< "worst first", ...
 TopSort NextSort(TopSort sort);
 
-/// The newest word of the monitors on every valve: what `top` shows.
+/// The latest state of every valve as published by monitors: what `top` shows.
 class TopBoard {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// @param silence how long a valve may be without a vector.
+  /// @param silence after which a valve without vectors is marked silent.
   TopBoard(cli::FaultTexts texts, std::chrono::milliseconds silence)
       : texts_(std::move(texts)), silence_(silence) {}
 
@@ -32,24 +32,24 @@ class TopBoard {
   void Add(const idl::DecisionMessage& message, Clock::time_point now);
   void Add(const FaultEvent& message, Clock::time_point now);
   void Add(const idl::MonitorStatusMessage& message, Clock::time_point now);
-  /// The monitor ended this valve.
+  /// The monitor disposed of this valve.
   void Remove(const std::string& valve_id);
 
   /// {"monitor", "valves": [{"valve_id", "state", "quality", "silent", "fault",
   /// "name", "factor", "strength", "normal_factor", "factors", "residuals",
   /// "since_utc", "abnormal_s", "stamp_utc", "model_set"}]}, and its table.
-  /// `state` is NOT_JUDGED where the quality is a reason not to judge; `factor`
-  /// the largest of the isolated set, or of any fault; `strength` null until a
-  /// fault is isolated; `factors` the three that fit best; `since_utc` and
-  /// `abnormal_s` belong to the open episode.
-  /// @param filter part of valve id, faults, state, quality or model set, in
-  ///   any case; empty: all.
+  /// `state` is NOT_JUDGED where the quality rules out a verdict; `factor` is
+  /// the largest of the isolated set, or of any fault; `strength` is null until
+  /// a fault is isolated; `factors` are the three that fit best; `since_utc`
+  /// and `abnormal_s` belong to the open episode.
+  /// @param filter substring of valve id, faults, state, quality or model set,
+  ///   ignoring case; empty: all.
   cli::Report Valves(TopSort sort, const std::string& filter,
                      Clock::time_point now) const;
 
   std::size_t valves() const { return decisions_.size(); }
-  /// "OK", "DEGRADED: why", of a pair "leader host:1 OK, standby host:2 OK";
-  /// empty if no monitor has spoken lately.
+  /// "OK", "DEGRADED: why", for a pair "leader host:1 OK, standby host:2 OK";
+  /// empty if no status has arrived recently.
   std::string Health(Clock::time_point now) const;
 
  private:
@@ -69,7 +69,7 @@ class TopBoard {
       monitors_;
 };
 
-/// What the user of `top` looks at.
+/// The state of the view in `top`.
 struct TopView {
   TopSort sort{TopSort::kWorst};
   std::string filter;
@@ -80,12 +80,12 @@ struct TopView {
   bool utc{false};
 };
 
-/// A whole screen: `height` lines, none wider than style.width.
+/// Renders a whole screen: `height` lines, none wider than style.width.
 std::string TopScreen(const TopBoard& board, TopView& view,
                       const cli::TextStyle& style, std::size_t height,
                       TopBoard::Clock::time_point now);
 
-/// `line` without what is beyond `width` cells; escape codes take none.
+/// `line` truncated to `width` cells; escape codes take no cells.
 std::string Clipped(const std::string& line, std::size_t width);
 
 }  // namespace fdi::monitor

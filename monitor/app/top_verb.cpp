@@ -27,9 +27,9 @@ using Clock = TopBoard::Clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kRefresh{1000};
-constexpr milliseconds kQuiet{1000};  // With --once: no new valve for so long.
+constexpr milliseconds kQuiet{1000};  // With --once: after the last new valve.
 constexpr milliseconds kSilence{10'000};
-constexpr std::size_t kPageKeys = 2;  // A page is a half of the screen.
+constexpr std::size_t kPageKeys = 2;  // A page is half a screen.
 
 struct TopOptions {
   BusOptions bus{.program = "fdi-monitor top"};
@@ -38,7 +38,7 @@ struct TopOptions {
   std::string filter;
 };
 
-// Escape codes of ECMA-48 and xterm, which every terminal of today knows.
+// Escape codes of ECMA-48 and xterm, which all current terminals understand.
 constexpr std::string_view kEnter = "\x1b[?1049h\x1b[?25l";  // Other screen,
 constexpr std::string_view kLeave = "\x1b[0m\x1b[?25h\x1b[?1049l";  // no cursor
 constexpr std::string_view kHome = "\x1b[H";
@@ -46,9 +46,9 @@ constexpr std::string_view kNextLine = "\x1b[0m\x1b[K\r\n";
 constexpr std::string_view kEndOfScreen = "\x1b[0m\x1b[K\x1b[J";
 constexpr int kRestOfCodeMs = 20;
 
-/// A terminal as a program has it that draws whole screens: keys come at once
-/// and unseen, the cursor is hidden, and what was on the screen comes back at
-/// the end. Ctrl-C stays the signal that it is.
+/// A terminal in full-screen mode: keys arrive at once and without echo, the
+/// cursor is hidden, and the previous screen content is restored at the end.
+/// Ctrl-C still sends SIGINT.
 class Terminal {
  public:
   /// @throws std::system_error if standard input or output is no terminal.
@@ -60,7 +60,7 @@ class Terminal {
     keys.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
     keys.c_cc[VMIN] = 1;
     keys.c_cc[VTIME] = 0;
-    keys.c_cc[VSUSP] = _POSIX_VDISABLE;  // It would leave the screen as it is.
+    keys.c_cc[VSUSP] = _POSIX_VDISABLE;  // ^Z would leave the screen as it is.
     tcsetattr(STDIN_FILENO, TCSAFLUSH, &keys);
     Write(kEnter);
   }
@@ -78,7 +78,7 @@ class Terminal {
     return known ? size : winsize{24, 80, 0, 0};
   }
 
-  /// Replaces what is on the screen; lines are separated by newlines.
+  /// Replaces the screen content; lines are separated by newlines.
   void Draw(std::string_view screen) const {
     std::string text(kHome);
     for (const char c : screen) {
@@ -87,8 +87,8 @@ class Terminal {
     Write(text.append(kEndOfScreen));
   }
 
-  /// The next key, if one was pressed, as terminals send it: "q", "\r", or ESC
-  /// alone or with its code, "\x1b[A"; "\x04" at the end of the input.
+  /// The next key pressed, if any, as terminals send it: "q", "\r", ESC alone
+  /// or with its code, "\x1b[A"; "\x04" at end of input.
   std::optional<std::string> ReadKey() const {
     if (!Readable(0)) {
       return std::nullopt;
@@ -114,7 +114,7 @@ class Terminal {
     while (!text.empty()) {
       const ssize_t count = write(STDOUT_FILENO, text.data(), text.size());
       if (count < 0 && errno != EINTR) {
-        return;  // The terminal is gone; its input says so.
+        return;  // The terminal is gone, which the next read reports.
       }
       text.remove_prefix(count > 0 ? static_cast<std::size_t>(count) : 0);
     }
@@ -136,7 +136,7 @@ class Terminal {
   termios before_{};
 };
 
-/// What keys do to the view. @returns false to quit.
+/// Applies a key to the view. @returns false to quit.
 bool OnKey(const std::string& key, std::size_t height, TopView& view) {
   const bool character = key.size() == 1 && key[0] >= ' ' && key[0] <= '~';
   if (key == "\x04") {
@@ -189,7 +189,7 @@ void Take(BusView& bus, TopBoard& board) {
            [&board](const std::string& valve_id) { board.Remove(valve_id); });
 }
 
-/// Waits until all is there that monitors have said; prints it.
+/// Waits until the monitors' valves have all been heard, and prints them.
 int Once(const TopOptions& options, const cli::Context& context, BusView& bus,
          TopBoard& board) {
   const cli::StopSignals signals;
@@ -251,7 +251,7 @@ int Live(const TopOptions& options, const cli::Context& context, BusView& bus,
 }
 
 int RunTop(const TopOptions& options, const cli::Context& context) {
-  // Lines of the log would spoil the screen.
+  // Log lines would garble the screen.
   const bool live = !options.once && !context.options.json;
   TopBoard board(cli::LoadFaultTexts(context.options), kSilence);
   BusView bus(options.bus, context, live ? LogSink() : context.log);

@@ -9,7 +9,7 @@ class Program;
 
 namespace fdi::monitor {
 
-/// Where on the bus a program is, as its options say.
+/// DDS settings from the options of a program.
 inline idl::DdsOptions DdsOptionsOf(const cli::GlobalOptions& options,
                                     int max_valves) {
   idl::DdsOptions dds;

@@ -21,7 +21,7 @@ Json Utc(std::int64_t stamp_ns) {
   return cli::FormatTime(stamp_ns, true);
 }
 
-// Why there is no name: the faults that it may yet be, or that none is known.
+// Why there is no name: the candidates, or that no known fault fits.
 std::string WhyUnknown(const FaultEvent& message) {
   if (message.transition.faults != 0) {
     return "";

@@ -10,23 +10,23 @@
 
 namespace fdi::monitor {
 
-/// A message of the bus: one JSON object, and one line for people.
+/// A message from the bus as one JSON object and as one line of text.
 struct WatchRecord {
   cli::Json object;
   std::string line;
 };
 
-/// Turns messages into records. Decision vectors are arrays; ModelSetInfo says
-/// what they mean, and may come after the first of them, as it is another
-/// topic. Vectors without an explanation wait for it, in their order, at most
-/// kPatience; after that factors and residuals go by position: "#2".
+/// Turns messages into records. Decision vectors are arrays, whose meaning
+/// ModelSetInfo gives. It is a topic of its own and may arrive after the first
+/// vectors, so these wait for it, in order, for at most kPatience; after that,
+/// factors and residuals are named by position: "#2".
 class WatchRecords {
  public:
   using Clock = std::chrono::steady_clock;
   using Sink = std::function<void(const WatchRecord&)>;
   static constexpr std::chrono::seconds kPatience{2};
 
-  /// @param utc times of lines in UTC, not in the local zone.
+  /// @param utc show times in UTC instead of the local zone.
   WatchRecords(bool utc, const Sink& sink)
       : utc_(utc), sink_([sink](WatchRecord record) {
           record.line = Printable(record.line);
@@ -38,7 +38,7 @@ class WatchRecords {
   void Add(const idl::MonitorStatusMessage& message, Clock::time_point now);
   void Add(const idl::ModelSetInfoMessage& message, Clock::time_point now);
 
-  /// Hands out the vectors that wait, as far as they are due.
+  /// Emits the waiting vectors that are due.
   void Flush(Clock::time_point now);
 
  private:

@@ -17,7 +17,7 @@ namespace {
 constexpr double kAttempts = 5.0;
 constexpr std::size_t kMaxOrigins = 256;
 
-// Does nothing if the file is there.
+// Does nothing if the file exists.
 void MakeTokenFile(const std::filesystem::path& path) {
   const int file =
       open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
@@ -68,7 +68,7 @@ void FailureLimit::Add(const std::string& origin, Clock::time_point now) {
   AllowanceOf(origin, now).attempts -= 1.0;
 }
 
-// Once there are too many, all others share one.
+// Once the table is full, all further origins share one allowance.
 FailureLimit::Allowance& FailureLimit::AllowanceOf(const std::string& origin,
                                                    Clock::time_point now) {
   const auto refilled = [now](const Allowance& allowance) {

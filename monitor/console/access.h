@@ -15,7 +15,8 @@ namespace fdi::console {
 
 inline constexpr std::size_t kMinTokenLength = 16;
 
-/// A token: its file, made with a random one and mode 0600 if it is not there.
+/// Loads a token from its file, which is created with mode 0600 and a random
+/// token if it does not exist.
 /// @returns the first line. @throws ConfigError if that is shorter than 16
 ///   characters or has blanks, or if others than the owner, root and the group
 ///   can read the file or others than the owner and root can change it;
@@ -29,38 +30,38 @@ enum class Permission : std::uint8_t {
   kTooMany
 };
 
-/// Slows guesses down: from an address that failed five times in a row one
-/// attempt per second is looked at. In bounded memory; not thread safe.
+/// Slows down guessing: after five failures in a row an address gets one
+/// attempt per second. Bounded memory; not thread safe.
 class FailureLimit {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Whether to look at an attempt from there.
+  /// Whether an attempt from `origin` is to be checked.
   bool Allows(const std::string& origin, Clock::time_point now);
-  /// It was looked at, and failed.
+  /// Records that a checked attempt failed.
   void Add(const std::string& origin, Clock::time_point now);
   void Forget(const std::string& origin) { failing_.erase(origin); }
 
  private:
-  // Attempts that are left, which grow by one per second.
+  // Remaining attempts, refilled at one per second.
   struct Allowance {
     double attempts;
     Clock::time_point stamp;
   };
   Allowance& AllowanceOf(const std::string& origin, Clock::time_point now);
 
-  std::map<std::string, Allowance> failing_;  // By origin, a bounded number.
+  std::map<std::string, Allowance> failing_;  // By origin; bounded.
 };
 
-/// Decides who may change something. What FailureLimit does not allow is not
-/// looked at, the right token or not. Failures are counted and logged with
-/// where they came from. Thread safe.
+/// Decides who may change something. An attempt that FailureLimit refuses is
+/// not checked, even if its token is right. Failures are counted and logged
+/// with their origin. Thread safe.
 class TokenGuard {
  public:
   using Clock = FailureLimit::Clock;
   struct Counts {
     std::uint64_t wrong{0};
-    std::uint64_t unread{0};  ///< Refused with kTooMany.
+    std::uint64_t unread{0};  ///< Refused with kTooMany, unchecked.
   };
 
   /// @param token empty: the console is read-only.

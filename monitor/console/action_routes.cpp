@@ -1,4 +1,4 @@
-// What people do to alarms, on record with who, why and from where.
+// Operator actions on alarms, recorded with who, why and from where.
 #include <httplib.h>
 
 #include "diagnosis/error.h"
@@ -24,14 +24,14 @@ std::string TextOf(const Json& body, const char* key) {
   return found->get<std::string>();
 }
 
-// `body` has the name of the user if there is one.
+// With users, `body` already holds the name of the logged-in one.
 storage::OperatorNote NoteOf(const Json& body, const httplib::Request& request,
                              const Api& api) {
   return {TextOf(body, "who"), TextOf(body, "comment"),
           "console " + request.remote_addr, api.sources.utc_now_ns()};
 }
 
-// The alarm as it is now.
+// The current state of the alarm.
 Json AlarmRow(const Api& api, const std::string& id) {
   const auto reader = api.History();
   return AlarmJson(
@@ -79,12 +79,12 @@ Json EndShelf(const Api& api, const httplib::Request& request,
     return ShelfJson(storage::HistoryEditor(api.sources.history)
                          .EndShelf(std::stoll(request.matches[1]),
                                    NoteOf(body, request, api)));
-  } catch (const DataError& error) {  // It is over already.
+  } catch (const DataError& error) {  // It has ended already.
     throw ConfigError(error.what());
   }
 }
 
-// What it was done to, for the log.
+// The object of the action, for the log.
 std::string SubjectOf(const httplib::Request& request, const Json& result) {
   const auto valve = result.find("valve");
   std::string subject = "valve=";
@@ -122,7 +122,7 @@ void Perform(const Api& api, const Action& action,
   const bool named =
       body.is_object() && body.contains("who") && body["who"].is_string();
   std::string who = named ? body["who"].get<std::string>() : "";
-  // First of all: who may not act does not learn what is wrong with the body.
+  // Checked first: a client without permission learns nothing about the body.
   if (!api.access.MayAct(request, response, action.role, who)) {
     return;
   }

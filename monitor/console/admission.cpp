@@ -14,20 +14,20 @@ constexpr const char* kApi = "/api/";
 constexpr const char* kLogIn = "/api/v1/login";
 constexpr std::size_t kShownPath = 200;
 
-// A text of anybody's as one word of a log line.
+// Quotes untrusted text as one word of a log line.
 std::string Quoted(const std::string& text) {
   return Json(text).dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
-// "10.0.0.1" for "::ffff:10.0.0.1", as a socket for both versions has it.
+// "10.0.0.1" for "::ffff:10.0.0.1", the form used by dual-stack sockets.
 std::string_view PlainAddress(std::string_view address) {
   constexpr std::string_view kMapped = "::ffff:";
   return address.starts_with(kMapped) ? address.substr(kMapped.size())
                                       : address;
 }
 
-// Whether a page of this server sent it: browsers say with each POST which
-// page did, and no page can change that.
+// Whether a page of this server sent the request: browsers state the origin of
+// each POST, and scripts cannot forge it.
 bool OfOurPage(const httplib::Request& request) {
   const std::string origin = request.get_header_value("Origin");
   const std::string host = request.get_header_value("Host");
@@ -184,7 +184,7 @@ void Admission::LogIn(const httplib::Request& request,
       break;
   }
   logins_->LogOut(SessionOf(request));
-  // Over https as the browser sees it, which may end at a proxy.
+  // Whether the browser uses https, which may end at a proxy.
   const bool secure =
       request.get_header_value("Origin").starts_with("https://");
   response.set_header("Set-Cookie", cookie_ + "=" + session +
@@ -228,7 +228,7 @@ bool Admission::MayAct(const httplib::Request& request,
              "this console is read-only: start the monitor with "
              "--console-write FILE or --console-users FILE");
       return false;
-    case Permission::kWrongToken:  // The guard has logged it.
+    case Permission::kWrongToken:  // Already logged by the guard.
       response.set_header("WWW-Authenticate", "Bearer");
       SendError(response, 401,
                 "Authorization: expected Bearer and the token of the file "

@@ -24,17 +24,17 @@ namespace fdi::console {
 
 /// Settings of Admission.
 struct AdmissionOptions {
-  /// Holds the token of who may act on alarms; none: read-only.
+  /// File of the token that permits actions on alarms; none: read-only.
   std::optional<std::filesystem::path> token_file;
-  /// Instead of the token: who may do what, see LoadUsers().
+  /// File of users and roles, used instead of the token; see LoadUsers().
   std::optional<std::filesystem::path> users_file;
-  /// The header by which a proxy at this address says which of those users
-  /// asks; empty: none does.
+  /// Header in which the proxy at proxy_address names the user of a request;
+  /// empty: no proxy.
   std::string proxy_header;
   std::string proxy_address;
 };
 
-/// What was refused by reason and done by action since the start.
+/// Refusals by reason and actions by kind, since the start.
 struct AdmissionCounts {
   TokenGuard::Counts tokens;
   std::map<std::string_view, std::uint64_t> refused;
@@ -42,43 +42,44 @@ struct AdmissionCounts {
   std::optional<std::size_t> sessions;  ///< With users.
 };
 
-/// Decides what may be asked for and done, by whom. Without users, everybody
-/// may read, and the token acts. With users, one has to log in for all but the
-/// files of the page. Every action and every refusal is one line in the log, of
-/// refusals at most 10 for each reason in 10 s. Thread safe.
+/// Decides who may read and who may act. Without users, everybody may read and
+/// the token permits actions. With users, everything except the files of the
+/// page requires a login. Each action and each refusal is logged in one line;
+/// refusals are limited to 10 per reason in 10 s. Thread safe.
 class Admission {
  public:
-  /// @throws ConfigError, DataError: what the files are not.
+  /// @throws ConfigError, DataError if a file is invalid.
   Admission(const AdmissionOptions& options, LogSink log);
 
-  /// Before every route, and those to log in and out. Before the server's
-  /// start; `cookie`: its name.
+  /// Installs a check before every route, and the login and logout routes. Call
+  /// before the server starts. @param cookie name of the session cookie.
   void AddTo(httplib::Server& server, const std::string& cookie);
 
-  /// Who sent the request; nothing without users, or without a login.
+  /// The sender of the request; nothing without users or without a login.
   std::optional<Visitor> WhoSent(const httplib::Request& request);
-  /// For an answer that goes on: whether its visitor is still admitted, by
-  /// any thread.
+  /// For streaming responses: a function that tells whether the visitor is
+  /// still admitted; callable from any thread.
   std::function<bool()> StillAdmits(const httplib::Request& request);
-  /// Whether the visitor of the request may do anything.
+  /// Whether the visitor may perform any action at all.
   bool MayWrite(const httplib::Request& request);
-  /// Whether it comes with a session, which can be ended.
+  /// Whether the request carries a session, which can be logged out.
   bool HasSession(const httplib::Request& request) const;
-  /// Whether that may be done, by `who`, as the request says (may be empty).
-  /// If not, it is answered. @param who becomes the name of the visitor.
+  /// Whether `who`, as named in the request (may be empty), may perform the
+  /// action; if not, an error response is sent. @param who is set to the
+  /// visitor's name.
   bool MayAct(const httplib::Request& request, httplib::Response& response,
               Role needed, std::string& who);
-  /// Puts an action on record. @param subject "episode=...".
+  /// Records an action in log and counters. @param subject "episode=...".
   void Acted(const httplib::Request& request, const char* action,
              const std::string& who, const std::string& subject);
 
-  /// Whether somebody can act at all.
+  /// Whether anybody can act at all.
   bool writable() const { return logins_ || token_.writable(); }
   /// "token", "users" or "off".
   const char* mode() const;
   AdmissionCounts counts() const;
 
-  /// Reads the users anew. @throws as the constructor; the old ones stay.
+  /// Reloads the users. @throws as the constructor; then the old ones stay.
   void Reload();
 
  private:

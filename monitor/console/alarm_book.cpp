@@ -64,7 +64,7 @@ std::vector<Json> AlarmBook::Refresh(std::int64_t now_ns) {
 
 std::vector<Json> AlarmBook::Read(storage::History& history,
                                   std::int64_t now_ns) {
-  // A shelf that runs out changes alarms without a commit.
+  // Shelves expire without a commit, so the version alone is not enough.
   const std::string version = history.Version();
   if (version_ == version && now_ns < earliest_shelf_end_ns_) {
     return {};

@@ -16,7 +16,8 @@ namespace {
 constexpr std::int64_t kNsPerMs = 1'000'000;
 constexpr std::int64_t kLastMs = 9'000'000'000'000;  // year 2255
 
-// For the middle of a sentence: "flow transmitter ..." but "CV ...".
+// Lower-cases a name for the middle of a sentence: "flow transmitter ...", but
+// "CV ...".
 std::string PlainName(const cli::FaultTexts& texts, std::string_view fault) {
   std::string name = texts.Words(fault, 0.0).name;
   if (name.size() > 1 &&

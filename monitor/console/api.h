@@ -26,7 +26,7 @@ struct Response;
 
 namespace fdi::console {
 
-/// How the monitor is.
+/// State of the monitor.
 struct MonitorFacts {
   std::string_view health;  ///< "OK", "DEGRADED"
   std::vector<std::pair<std::string, std::uint64_t>> counters;
@@ -34,19 +34,19 @@ struct MonitorFacts {
   std::string pair{};  ///< "leader", "standby, host:1 leads"; empty: none.
 };
 
-/// A monitor whose valves the page of a plant shows.
+/// A monitor whose valves the plant page shows.
 struct MonitorLine {
   std::string name;  ///< "host:pid", as in MonitorStatus.
   std::string software;
-  std::string health;       ///< "OK", ...; empty: it has said nothing yet.
+  std::string health;       ///< "OK", ...; empty: no status has arrived yet.
   std::string text;         ///< Why it is not OK.
-  std::string pair;         ///< "leader", "standby"; empty: it stands alone.
-  std::uint64_t valves{0};  ///< That it judged last.
+  std::string pair;         ///< "leader", "standby"; empty: not in a pair.
+  std::uint64_t valves{0};  ///< Valves for which its vectors came last.
   std::int64_t heard_ns{0};
   bool silent{false};
 };
 
-/// What the console needs of the monitor; called by any thread.
+/// What the console needs from the monitor; called by any thread.
 struct ConsoleSources {
   std::filesystem::path history;
   std::filesystem::path models;
@@ -54,14 +54,14 @@ struct ConsoleSources {
   std::int64_t started_ns{0};
   std::function<MonitorFacts()> facts;
   std::function<std::int64_t()> utc_now_ns;
-  /// Of the page of a plant, which shows several monitors and has no database
-  /// of its own: `history` and `models` do not count.
+  /// For the plant page, which shows several monitors and has no database of
+  /// its own; `history` and `models` are then ignored.
   OpenHistory plant_history{};
   std::function<std::vector<MonitorLine>()> monitors{};
 };
 
-/// The last work list that was asked for. Reading months of all valves takes a
-/// while, so it is valid for a minute.
+/// The last work list that was requested. Reading months of all valves takes a
+/// while, so it stays valid for a minute.
 struct WorkListCache {
   std::mutex mutex;
   std::string query;
@@ -69,7 +69,7 @@ struct WorkListCache {
   std::vector<planner::WorkRow> rows;
 };
 
-/// What answers are made of; all that it refers to outlives the server.
+/// What responses are made from; everything referenced outlives the server.
 struct Api {
   ConsoleSources sources;
   LiveBoard& board;
@@ -82,20 +82,20 @@ struct Api {
   std::string instance;  ///< Differs after a restart.
   std::stop_token stopping{};
 
-  /// @throws storage::PlantError at once while the plant's history is away.
+  /// @throws storage::PlantError immediately while the plant history is away.
   std::unique_ptr<storage::History> History() const;
-  /// Explain(), with the faults called as the catalogue does.
+  /// Explain(), with the fault names of the catalogue.
   Json Words(const ModelFacts* facts, const TracePoint* point) const;
 };
 
-/// A file for the user to save.
+/// A file to download.
 struct File {
   std::string type;
   std::string name;
   std::string body;
 };
 
-/// What answers GET of paths that match a regular expression: JSON or a file.
+/// A GET handler for paths that match a regular expression: JSON or a file.
 struct Route {
   const char* path;
   Json (*json)(const Api&, const httplib::Request&);
@@ -109,35 +109,35 @@ std::span<const Route> HistoryRoutes();
 /// /api/v1/worklist, worklist.csv, valves/ID/health.
 std::span<const Route> PlannerRoutes();
 
-/// An exception becomes {"error"} with 400 for ConfigError and
-/// std::invalid_argument, 404 for NotFoundError, 503 for a history that is
-/// busy or away, else 500.
+/// Exceptions become {"error"} with 400 for ConfigError and
+/// std::invalid_argument, 404 for NotFoundError, 503 for a history that is busy
+/// or away, otherwise 500.
 void AddRoutes(httplib::Server& server, const Api& api,
                std::span<const Route> routes);
 /// /api/v1/stream
 void AddStreamRoute(httplib::Server& server, const Api& api);
-/// POST: changes to the history, for those whom Admission lets act.
+/// POST routes that change the history, where Admission permits it.
 void AddActionRoutes(httplib::Server& server, const Api& api);
 
-/// Of a plant: {"monitors": [{"monitor", "host", "software", "health", "text",
+/// For a plant: {"monitors": [{"monitor", "host", "software", "health", "text",
 /// "pair", "valves", "heard_ms", "silent"}], "history_away": {"since_ms",
-/// "reason"}, or null}. Else null.
+/// "reason"} or null}. Otherwise null.
 Json PlantJson(const Api& api);
 
 void SendJson(httplib::Response& response, const Json& json);
 void SendError(httplib::Response& response, int status,
                const std::string& what);
-/// Runs `send`; exceptions are answered as those of AddRoutes().
+/// Runs `send`; exceptions are answered as in AddRoutes().
 void Guarded(httplib::Response& response, const std::function<void()>& send);
 
-/// The parameter of the query, or nothing if it is not there or empty.
+/// The query parameter; nothing if it is missing or empty.
 std::optional<std::string> Parameter(const httplib::Request& request,
                                      const char* name);
 /// @throws ConfigError naming the parameter and the range.
 std::int64_t IntegerParameter(const httplib::Request& request, const char* name,
                               std::int64_t otherwise, std::int64_t minimum,
                               std::int64_t maximum);
-/// ms since 1970 as ns. @throws ConfigError
+/// Milliseconds since 1970, converted to ns. @throws ConfigError
 std::int64_t TimeParameter(const httplib::Request& request, const char* name,
                            std::int64_t otherwise_ns);
 

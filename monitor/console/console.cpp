@@ -25,12 +25,13 @@ std::string NewInstance() {
   return text;
 }
 
-// A stream takes a thread for itself; one more says that all are taken.
-// Pictures are drawn by a program that takes a whole processor for a second.
+// Each stream occupies a thread; one more tells further clients that all are
+// taken. Pictures are drawn by a program that uses a whole processor for a
+// second.
 std::vector<monitor::HttpLane> Lanes() {
   return {{StreamOptions{}.max_clients + 1, 16,
            [](std::string_view path) { return path == "/api/v1/stream"; }},
-          {1, 8,  // A password's hash takes a processor for 20 ms.
+          {1, 8,  // Hashing a password takes 20 ms of a processor.
            [](std::string_view path) { return path == "/api/v1/login"; }},
           {1, 2,
            [](std::string_view path) {
@@ -54,7 +55,7 @@ monitor::HttpServerOptions ServerOptions(const ConsoleOptions& options) {
 
 }  // namespace
 
-// Shows events that went to the bus.
+// Shows the events that went to the bus.
 class Console::Events : public monitor::EventSink {
  public:
   Events(monitor::EventSink& bus, Console& console)
@@ -130,7 +131,7 @@ void Console::Start(ConsoleSources sources) {
   SetRulesOfEveryAnswer();
   RenewTls();
   httplib::Server& routes = server_->routes();
-  // Cookies know no port, and a host may have two consoles.
+  // Cookies ignore the port, and a host may run two consoles.
   access_.AddTo(routes, "fdi_" + std::to_string(server_->address().port));
   for (const auto group : {LiveRoutes(), HistoryRoutes(), PlannerRoutes()}) {
     AddRoutes(routes, *api_, group);
@@ -194,7 +195,7 @@ void Console::Stop() {
 }
 
 void Console::Close() {
-  // HTTP threads that write to a stream wait for its end, so that comes first.
+  // HTTP threads that serve a stream wait for its end, so streams end first.
   Stop();
   server_.reset();
   stream_.Stop();

@@ -18,54 +18,55 @@ namespace fdi::console {
 /// Settings of Console.
 struct ConsoleOptions {
   monitor::HttpAddress address;
-  /// Of the page; empty: those installed with the program.
+  /// Folder of the page; empty: the one installed with the program.
   std::filesystem::path files;
   std::vector<std::string> names;  ///< See monitor::HostAllowed().
   AdmissionOptions admission;
   std::optional<monitor::TlsFiles> tls;
 };
 
-/// Folder with index.html. @throws ConfigError naming `asked`, or DataError if
-///   nothing was asked for and none is installed.
+/// The folder with index.html. @throws ConfigError naming `asked`, or DataError
+/// if nothing was asked for and nothing is installed.
 std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked);
 
-/// The live page of a monitor and its API (docs/console.md): it shows what the
-/// pipeline passes to live(), reads the history, and lets those act whom
-/// Admission lets. Or that of a plant: it shows what was heard on the bus. It
-/// has threads of its own; neither diagnosis nor bus waits for any of them.
+/// The live page of a monitor and its API (docs/console.md): shows what the
+/// pipeline passes to live(), reads the history, and performs the actions that
+/// Admission permits. Alternatively the page of a plant, which shows what was
+/// heard on the bus. Has threads of its own, for none of which diagnosis or bus
+/// ever wait.
 class Console {
  public:
-  /// Binds the address and finds its files; nothing is answered yet.
+  /// Binds the address and finds the page's files; nothing is served yet.
   /// @throws ConfigError, DataError, NotFoundError, std::runtime_error
   Console(const ConsoleOptions& options, const cli::GlobalOptions& global,
           LogSink log);
-  /// As Close().
+  /// Calls Close().
   ~Console();
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
 
-  /// For the pipeline, or for who hears the monitors of a plant.
+  /// Fed by the pipeline, or from the bus for a plant.
   LiveBoard& live() { return board_; }
-  /// For the pipeline, in front of `bus`: an event is shown once it is on the
-  /// bus, by which time it is in the history, unless that failed.
+  /// Event sink for the pipeline, in front of `bus`: an event is shown once it
+  /// is on the bus, by which time it is in the history unless that failed.
   monitor::EventSink& Before(monitor::EventSink& bus);
 
-  /// Of a plant: a model set, or an event, that was heard; after Start().
+  /// For a plant: a model set or an event from the bus; call after Start().
   void Hear(std::shared_ptr<const ModelFacts> models) {
     models_->Learn(std::move(models));
   }
   void Hear(const FaultEvent& event);
 
-  /// Answers from now on. Once, with a history, before the pipeline starts.
-  /// What throws in here leaves no thread behind. The history of a plant may be
-  /// away.
+  /// Starts serving. Call once and, with a history, before the pipeline starts.
+  /// If it throws, no thread is left behind. The history of a plant may be
+  /// unavailable.
   void Start(ConsoleSources sources);
-  /// Reads the certificate and the users anew. What is wrong with them is
-  /// logged, and the old ones stay.
+  /// Reloads the certificate and the users. Errors are logged, and the old ones
+  /// stay in use.
   void Reload();
-  /// Ends all streams and takes no further connections. Does not wait.
+  /// Ends all streams and stops accepting connections. Does not block.
   void Stop();
-  /// Stops and waits for all threads: from here on `sources` are not called.
+  /// Stops, and waits for all threads: `sources` are not called any more.
   void Close();
 
   StreamCounts streams() const { return stream_.counts(); }

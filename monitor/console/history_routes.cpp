@@ -1,5 +1,5 @@
-// What the history tells: alarms, episodes with their evidence, figures,
-// shelves.
+// Routes that read the history: alarms, episodes with their evidence,
+// statistics, shelves.
 #include <algorithm>
 #include <iterator>
 #include <limits>
@@ -24,7 +24,8 @@ constexpr std::int64_t kPageLimit = 1000;
 
 Json Alarms(const Api& api, const httplib::Request& /*request*/) {
   const std::int64_t now_ns = api.sources.utc_now_ns();
-  // Of a plant whose history is away, what came over the bus has to do.
+  // While the history of a plant is unavailable, alarms heard on the bus are
+  // used.
   std::vector<storage::Alarm> alarms = api.alarms.Heard();
   if (!api.sources.plant_history || !api.alarms.away()) {
     std::ranges::move(api.History()->AlarmList(now_ns, kMostAlarms),
@@ -46,8 +47,8 @@ storage::EpisodeFilter FilterOf(const Api& api,
   return filter;
 }
 
-// The newest first. A page goes on below the oldest row of the one before it,
-// which the page asks for as before_ms.
+// Newest first. The next page continues below the oldest row of the previous
+// one, given as before_ms.
 Json History(const Api& api, const httplib::Request& request) {
   storage::EpisodeFilter filter = FilterOf(api, request);
   const std::int64_t limit =
@@ -135,7 +136,7 @@ Json Shelves(const Api& api, const httplib::Request& /*request*/) {
   return {{"shelf", std::move(list)}};
 }
 
-// Of what people did, a value and who; of transitions, what was decided.
+// Operator actions have a value and who; transitions have what was decided.
 Json EventJson(const storage::HistoryEntry& event) {
   const bool by_hand = !event.who.empty();
   return {{"kind", event.kind},
@@ -182,8 +183,8 @@ Json GapsOf(storage::History& history, const storage::Episode& episode,
   return gaps;
 }
 
-// Where the episode is best understood: at its isolation, else the last
-// instant that was abnormal.
+// The most informative instant of the episode: at its isolation, else the last
+// abnormal one.
 const TracePoint* Telling(const storage::Episode& episode,
                           const std::vector<TracePoint>& points) {
   const TracePoint* telling = nullptr;
@@ -197,7 +198,7 @@ const TracePoint* Telling(const storage::Episode& episode,
   return telling;
 }
 
-// What a second look says; its simulation becomes columns of the trace.
+// Result of a second look; its simulation becomes columns of the trace.
 Json LookJson(const std::optional<EpisodeLook>& look,
               const std::vector<TracePoint>& points, Json& trace) {
   if (!look) {
@@ -287,8 +288,8 @@ Json CsvRow(const TracePoint& point, SignalMask signals,
   return row;
 }
 
-// The evidence as CSV: readings under the column names that the programs
-// import, then residuals r_CHANNEL, d0 and d_FAULT.
+// The evidence as CSV: readings in the columns that the programs import, then
+// residuals r_CHANNEL, d0 and d_FAULT.
 File EpisodeCsv(const Api& api, const httplib::Request& request) {
   const std::string id = request.matches[1];
   const auto reader = api.History();

@@ -10,12 +10,12 @@
 #include "monitor/console/live_board.h"
 #include "storage/history/alarm.h"
 
-/// What the console answers, as JSON; the keys are those of docs/console.md.
+/// JSON of the console's responses; the keys are those of docs/console.md.
 namespace fdi::console {
 
 using cli::Json;
 
-/// Compact; bytes that are not UTF-8 become the replacement character.
+/// Compact; invalid UTF-8 becomes the replacement character.
 std::string Dump(const Json& json);
 
 /// ns to ms since 1970.
@@ -23,11 +23,11 @@ Json Ms(std::int64_t stamp_ns);
 Json Ms(const std::optional<std::int64_t>& stamp_ns);
 /// Rounded to `decimals`; null if it is not finite.
 Json Rounded(double value, int decimals);
-/// Null for a text that is empty or missing.
+/// Null if the text is empty or missing.
 Json TextOrNull(const std::string& text);
 Json TextOrNull(const std::optional<std::string>& text);
 
-/// What the alarms say of a valve.
+/// Alarm state of a valve.
 struct ValveAlarm {
   std::optional<std::int64_t> since_ns;
   std::string episode;  ///< Empty: none is open.
@@ -37,14 +37,14 @@ struct ValveAlarm {
   bool operator==(const ValveAlarm&) const = default;
 };
 
-/// @param newest_only with "v", the newest point of the sparkline, instead of
-///   "spark".
+/// @param newest_only include "v", the newest point of the sparkline, instead
+///   of "spark".
 Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
               bool newest_only = false);
 
 Json ModelFactsJson(const ModelFacts& models);
 
-/// One instant of a valve, for the stream.
+/// One instant of a valve, as sent on the stream.
 Json SampleJson(const std::string& valve_id, const TracePoint& point);
 /// Many instants as columns.
 /// @param models null: no residuals, thresholds or factors.
@@ -57,8 +57,8 @@ Json AlarmsJson(const std::vector<storage::Alarm>& alarms,
                 const cli::FaultTexts& texts);
 Json ShelfJson(const storage::Shelf& shelf);
 
-/// The alarm that `event` is about, from the event alone: it is not, or not
-/// yet, in the history.
+/// The alarm that `event` belongs to, made from the event alone because it is
+/// not, or not yet, in the history.
 storage::Alarm AlarmOf(const FaultEvent& event);
 
 }  // namespace fdi::console

@@ -1,4 +1,4 @@
-// How the monitor and its valves are now, and the stream of what changes.
+// Current state of the monitor and its valves, and the stream of changes.
 #include <algorithm>
 #include <set>
 
@@ -77,7 +77,7 @@ Json Valves(const Api& api, const httplib::Request& /*request*/) {
           {"valves", std::move(tiles)}};
 }
 
-// Gaps of the valve and of the whole monitor, as the history has them.
+// Gaps of the valve and of the whole monitor, from the history.
 void AddStoredGaps(const Api& api, const std::string& valve_id,
                    std::int64_t since_ns, Json& gaps) {
   const auto reader = api.History();
@@ -109,7 +109,7 @@ Json Trend(const Api& api, const httplib::Request& request) {
   for (const DataGap& gap : trend->gaps) {
     json["gaps"].push_back(GapJson(gap));
   }
-  if (!api.sources.plant_history) {  // A page asks for words each 2 s.
+  if (!api.sources.plant_history) {  // Polled every 2 s by a plant page.
     AddStoredGaps(api, valve_id, since_ns, json["gaps"]);
   }
   json["marks"] = Json::array();
@@ -140,8 +140,8 @@ void Stream(const Api& api, const httplib::Request& request,
     SendError(response, 400, "valve: expected an id of 1..64 bytes");
     return;
   }
-  // The samples begin here: a trend that the page asks for after it was
-  // greeted overlaps with them, and nothing is missed between the two.
+  // The samples begin here: a trend that the page requests after the hello
+  // overlaps with them, so nothing is missed in between.
   const auto trend = api.board.Trend(valve, 0);
   const auto client = api.stream.Admit(
       valve, trend ? trend->next : 0,

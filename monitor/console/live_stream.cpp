@@ -11,9 +11,9 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kTick{250};
 constexpr milliseconds kTilePeriod{1000};
-// Latency of what other programs do to the history.
+// Latency of changes that other programs make to the history.
 constexpr milliseconds kAlarmPeriod{2000};
-// Between attempts to read a history that is away.
+// Longest pause between attempts to read an unavailable history.
 constexpr milliseconds kLongestPause{60'000};
 constexpr std::size_t kUnstoredLimit = 1000;
 
@@ -21,7 +21,7 @@ constexpr std::size_t kUnstoredLimit = 1000;
 
 struct LiveStream::Client {
   std::string valve;
-  std::uint64_t next_sample{0};  // The feeding thread alone uses it.
+  std::uint64_t next_sample{0};  // Used by the feeding thread only.
   std::deque<Message> queue;
   std::size_t bytes{0};
   bool ended{false};
@@ -53,7 +53,7 @@ void LiveStream::Release(const std::shared_ptr<Client>& client) {
   std::erase(clients_, client);
 }
 
-// With the mutex locked. One message may be larger than what may wait.
+// Call with the mutex locked. A single message may exceed max_bytes.
 void LiveStream::Push(Client& client, const Message& message) {
   if (client.ended) {
     return;
@@ -105,7 +105,7 @@ StreamCounts LiveStream::counts() const {
 void LiveStream::Start(FeedParts parts) {
   parts_ = std::make_unique<FeedParts>(std::move(parts));
   if (!parts_->plant) {
-    parts_->alarms.Refresh(parts_->utc_now_ns());  // The alarms of before.
+    parts_->alarms.Refresh(parts_->utc_now_ns());  // The initial alarms.
   }
   thread_ = std::thread([this] { Run(); });
   alarms_thread_ = std::thread([this] { FollowAlarms(); });
@@ -163,7 +163,7 @@ void LiveStream::Run() {
   }
 }
 
-// A history that is busy or away is asked again after 2, 4, 8, ... s. Each
+// A history that is busy or unavailable is retried after 2, 4, 8, ... s. Each
 // reason is logged once.
 void LiveStream::FollowAlarms() {
   milliseconds pause{0};
@@ -235,7 +235,7 @@ void LiveStream::SendSamples() {
   for (const auto& client : clients) {
     const auto trend = parts_->board.Since(client->valve, client->next_sample);
     if (!trend) {
-      continue;  // It wants none, or that valve was not seen yet.
+      continue;  // No valve is wanted, or it has not been seen yet.
     }
     client->next_sample = trend->next;
     Json samples = Json::array();

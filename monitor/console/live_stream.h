@@ -19,43 +19,43 @@
 
 namespace fdi::console {
 
-/// A server-sent event: "event: NAME\ndata: DATA\n\n". `data` has no line ends,
-/// as compact JSON has none.
+/// A server-sent event: "event: NAME\ndata: DATA\n\n". `data` has no line
+/// breaks; compact JSON has none.
 using Message = std::shared_ptr<const std::string>;
 Message StreamEvent(const std::string& name, const std::string& data);
 
 /// Settings of LiveStream.
 struct StreamOptions {
   std::size_t max_clients{16};
-  std::size_t max_bytes{4 << 20};  ///< That wait for one client.
+  std::size_t max_bytes{4 << 20};  ///< Bound of the queue of one client.
 };
 
-/// What became of the clients.
+/// Clients since the start, by outcome.
 struct StreamCounts {
-  std::uint64_t clients{0};  ///< Now.
+  std::uint64_t clients{0};  ///< At present.
   std::uint64_t admitted{0};
-  std::uint64_t refused{0};  ///< All places were taken.
+  std::uint64_t refused{0};  ///< max_clients was reached.
   std::uint64_t dropped{0};  ///< Too slow.
 };
 
-/// What the stream reads; all of it outlives the stream's thread.
+/// What the stream reads; everything outlives its threads.
 struct FeedParts {
   LiveBoard& board;
   AlarmBook& alarms;
   const cli::FaultTexts& texts;
   std::function<std::int64_t()> utc_now_ns;
   LogSink log;
-  /// Of a plant, whose history may be away: PlantJson(), sent each second.
+  /// For a plant, whose history may be away: PlantJson(), sent every second.
   std::function<Json()> plant{};
 };
 
-/// The pages that listen, and two threads that send them what changes: tiles
-/// each second and samples of the valves that they show four times a second;
-/// alarms at once, by a thread of their own, because the history may be slow or
-/// away. Between these and the HTTP thread that writes to a page's socket is a
-/// bounded queue; a client whose queue is full is dropped, so that nothing ever
-/// waits for a client. While there is no client only the alarms are followed.
-/// Thread safe.
+/// The pages that are connected, and two threads that push changes to them:
+/// tiles every second and samples of the valves on display four times a second;
+/// alarms immediately, from a thread of their own because the history may be
+/// slow or unavailable. A bounded queue separates these from the HTTP thread
+/// that writes to a page's socket; a client whose queue is full is dropped, so
+/// nothing ever waits for a client. Without clients only the alarms are
+/// followed. Thread safe.
 class LiveStream {
  public:
   enum class Outcome : std::uint8_t { kMessage, kTimeout, kEnded };
@@ -66,32 +66,32 @@ class LiveStream {
   LiveStream(const LiveStream&) = delete;
   LiveStream& operator=(const LiveStream&) = delete;
 
-  /// Starts the threads; changes from now on are sent. Once.
-  /// @throws storage::SqliteError, DataError, but for a plant.
+  /// Starts the threads, which push changes from now on. Call once.
+  /// @throws storage::SqliteError, DataError; never for a plant.
   void Start(FeedParts parts);
-  /// Ends all clients and admits none. Does not wait.
+  /// Ends all clients and admits no more. Does not block.
   void Close();
   /// Closes, and waits for the threads.
   void Stop();
 
-  /// @param valve whose samples the client wants, from `next_sample` of
-  ///   LiveBoard::Since() on; empty: of none.
-  /// @param hello its first message. @returns null if all places are taken or
-  ///   the stream is closed.
+  /// @param valve whose samples are pushed, starting at `next_sample` of
+  ///   LiveBoard::Since(); empty: none.
+  /// @param hello first message. @returns null if max_clients is reached or the
+  ///   stream is closed.
   std::shared_ptr<Client> Admit(const std::string& valve,
                                 std::uint64_t next_sample,
                                 const Message& hello);
-  /// The next message of `client`. Messages that wait when it is ended are
-  /// dropped.
+  /// The next message of `client`. Queued messages are dropped when the client
+  /// is ended.
   Outcome Next(Client& client, std::chrono::milliseconds timeout,
                Message& message);
   void Release(const std::shared_ptr<Client>& client);
   void Broadcast(const Message& message);
   StreamCounts counts() const;
 
-  /// The history changed: its alarms are sent at once.
+  /// Reports a change of the history: its alarms are pushed immediately.
   void Wake();
-  /// An event that is not in the history.
+  /// Adds an event that is not in the history.
   void AddUnstored(const FaultEvent& event);
 
  private:
@@ -109,7 +109,7 @@ class LiveStream {
   std::map<std::string, std::pair<std::uint64_t, ValveAlarm>> sent_;
   std::chrono::steady_clock::time_point next_tiles_;
 
-  mutable std::mutex mutex_;  // Guards all below, and what is in clients.
+  mutable std::mutex mutex_;  // Guards what follows and all Client fields.
   std::condition_variable changed_;
   std::vector<std::shared_ptr<Client>> clients_;
   StreamCounts counts_;

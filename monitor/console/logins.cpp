@@ -31,7 +31,7 @@ Logins::Outcome Logins::LogIn(const std::string& name,
   }
   const bool fits = PasswordFits(password, hash) && hash != nobody_;
   const std::lock_guard lock(mutex_);
-  const auto user = users_.find(name);  // May have changed meanwhile.
+  const auto user = users_.find(name);  // May have changed during the hash.
   if (!fits || user == users_.end() || user->second.hash != hash) {
     failures_.Add(origin, now);
     return Outcome::kWrong;

@@ -13,15 +13,15 @@
 
 namespace fdi::console {
 
-/// Who asks for something.
+/// The authenticated sender of a request.
 struct Visitor {
   std::string name;
   Role role{Role::kView};
 };
 
-/// Who is logged in. A session ends when its user logs out or does nothing for
-/// 30 minutes, when the user's password changes or the user is removed, and
-/// when 64 others were used later. Thread safe.
+/// The users who are logged in. A session ends when its user logs out or is
+/// idle for 30 minutes, when the password changes or the user is removed, and
+/// when 64 others have been used more recently. Thread safe.
 class Logins {
  public:
   using Clock = FailureLimit::Clock;
@@ -29,20 +29,20 @@ class Logins {
 
   explicit Logins(Users users);
 
-  /// Takes the time that a password's hash takes, for an unknown name, too.
-  /// @param origin the address: see FailureLimit.
-  /// @param session is set if admitted: what the client has to show.
+  /// Takes the time of hashing a password even if the name is unknown.
+  /// @param origin client address: see FailureLimit.
+  /// @param session set on success: the secret that the client presents.
   Outcome LogIn(const std::string& name, const std::string& password,
                 const std::string& origin, std::string& session,
                 Clock::time_point now = Clock::now());
   void LogOut(std::string_view session);
-  /// The user of the session, which is used by that.
+  /// The user of the session; resets its idle time.
   std::optional<Visitor> OfSession(std::string_view session,
                                    Clock::time_point now = Clock::now());
-  /// The user of that name, whom somebody else has examined.
+  /// The user of that name, authenticated by a proxy.
   std::optional<Visitor> OfName(std::string_view name) const;
 
-  /// From now on these; the sessions of the others end.
+  /// Replaces the users; sessions of changed or removed ones end.
   void Take(Users users);
   std::size_t sessions() const;
 
@@ -50,11 +50,11 @@ class Logins {
   struct Session {
     std::string secret;
     std::string name;
-    std::string hash;  // That the password fitted.
+    std::string hash;  // The hash that the password matched.
     Clock::time_point used;
   };
 
-  const std::string nobody_;  // A hash that takes as long as the others.
+  const std::string nobody_;  // Dummy hash for unknown names; equally slow.
   mutable std::mutex mutex_;
   Users users_;
   std::vector<Session> sessions_;

@@ -44,7 +44,7 @@ constexpr std::array<std::string_view, kSignalCount> kPlainNames{
     "set point",      "positioner output", "chamber pressure",
     "supply pressure"};
 
-// r relative to the threshold on its side; above 1 it is beyond it.
+// Residual relative to the threshold of its sign; abnormal above 1.
 double Excess(const ModelFacts::Channel& channel, double residual) {
   const double threshold = residual < 0.0 ? channel.low : channel.high;
   return threshold != 0.0 ? residual / threshold : 0.0;
@@ -58,7 +58,7 @@ std::optional<std::size_t> FarthestBeyond(const ModelFacts& models,
       std::min(models.channels.size(), point.residuals.size());
   for (std::size_t c = 0; c < count; ++c) {
     const double excess = Excess(models.channels[c], point.residuals[c]);
-    if (excess > most) {  // Never of NaN.
+    if (excess > most) {  // False for NaN.
       most = excess;
       farthest = c;
     }
@@ -122,7 +122,7 @@ std::shared_ptr<const ModelFacts> StoredModels::For(
     }
   } catch (const NotFoundError&) {
   }
-  // A set of the same name and version in another models.db differs by hash.
+  // The same name and version in another models.db has another hash.
   if (!facts || facts->hash != episode.model_hash) {
     return FactsOf(episode);
   }

@@ -16,7 +16,7 @@
 
 namespace fdi::console {
 
-/// What people need to know of a model set to read its results.
+/// What a reader needs to know of a model set to interpret its results.
 struct ModelFacts {
   struct Channel {
     std::string name;  ///< "X", "F", ...
@@ -38,18 +38,18 @@ struct ModelFacts {
 
 std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models);
 
-/// The facts of model sets that found the episodes of the history, of models.db
-/// or heard on the bus. Thread safe; caches 32 of them.
+/// The facts of the model sets behind the episodes in the history, from
+/// models.db or from the bus. Thread safe; caches 32 sets.
 class StoredModels {
  public:
   /// @param models empty: there is no models.db.
   explicit StoredModels(std::filesystem::path models)
       : path_(std::move(models)) {}
 
-  /// Of the set that made the episode. If that set is gone, what the episode
-  /// itself tells: names, without thresholds (NaN).
+  /// Facts of the set that produced the episode. If that set no longer exists,
+  /// the names recorded in the episode, without thresholds (NaN).
   std::shared_ptr<const ModelFacts> For(const storage::Episode& episode);
-  /// What models.db need not be asked for.
+  /// Adds a set that then need not be loaded from models.db.
   void Learn(std::shared_ptr<const ModelFacts> facts);
 
  private:
@@ -60,21 +60,21 @@ class StoredModels {
   std::map<std::string, std::shared_ptr<const ModelFacts>> known_;
 };
 
-/// "NORMAL", "DETECTED", "ISOLATED", or "NOT_JUDGED" where the engine would say
-/// NORMAL of a sample that it did not judge. The quality is the reason.
+/// "NORMAL", "DETECTED", "ISOLATED", or "NOT_JUDGED" where the engine reports
+/// NORMAL for a sample that it did not judge because of its quality.
 std::string_view ShownState(State state, Quality quality);
 
-/// Plain name of what the diagnosis calls "f19".
+/// Returns the plain name of a fault such as "f19".
 using FaultNamer = std::function<std::string(std::string_view)>;
 
-/// What the observers say about an instant, for people:
+/// Explains in words what the observers say about an instant:
 ///
 ///     "flow 12 m3/h above what the normal model expects; fits: flow
 ///      transmitter wrong, plug eroded"
 ///
-/// The channel is the one whose normal residual is farthest beyond its
-/// threshold, relative to it; faults fit whose factor is at least T/2, the best
-/// first. Without a channel beyond its threshold the text says so.
+/// The channel shown has the normal residual farthest beyond its threshold,
+/// relative to it; the faults listed have a factor of at least T/2, best first.
+/// If no channel is beyond its threshold, the text says so.
 std::string Explain(const ModelFacts& models, const TracePoint& point,
                     const FaultNamer& name);
 

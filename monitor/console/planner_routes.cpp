@@ -1,4 +1,4 @@
-// What a maintenance planner asks for: the work list, months of a valve.
+// Routes for maintenance planners: the work list, and months of a valve.
 #include <map>
 #include <sstream>
 
@@ -60,7 +60,7 @@ File WorkListCsv(const Api& api, const httplib::Request& request) {
   return {"text/csv; charset=utf-8", "worklist.csv", csv.str()};
 }
 
-// One array per quantity, as charts take them; all of the same length.
+// One array per quantity, as charts need them; all have the same length.
 Json ColumnsJson(const std::vector<HealthHour>& hours) {
   Json columns;
   for (const char* key :
@@ -68,8 +68,8 @@ Json ColumnsJson(const std::vector<HealthHour>& hours) {
         "travel_strokes", "reversals", "epoch"}) {
     columns[key] = Json::array();
   }
-  // Where an hour lacks a channel, as before a model set was changed, its
-  // columns have nulls.
+  // If an hour lacks a channel, for example because the model set was
+  // different, its columns have nulls.
   std::map<std::string, Json> channels;
   const auto fill = [&channels](std::size_t size) {
     for (auto& [signal, channel] : channels) {

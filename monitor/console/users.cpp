@@ -73,7 +73,8 @@ std::pair<std::string, User> ParseLine(const std::string& line) {
       ": cannot be written: " + std::generic_category().message(errno));
 }
 
-// Whole or not at all; like the file that was there, else for us alone.
+// Replaces the file atomically, keeping owner, group and mode; a new file is
+// readable by us alone.
 void Replace(const std::filesystem::path& path, std::string_view text) {
   std::string part = path.string() + ".XXXXXX";
   const int file = mkostemp(part.data(), O_CLOEXEC);
@@ -141,7 +142,7 @@ void StoreUser(const std::filesystem::path& path, const std::string& name,
   }
   std::istringstream old;
   if (std::filesystem::exists(path)) {
-    LoadUsers(path);  // What is wrong with it is said before it is changed.
+    LoadUsers(path);  // Reports errors before anything is changed.
     old.str(monitor::ReadPrivateFile(path, kOption));
   }
   std::string fresh;

@@ -10,7 +10,7 @@
 
 namespace fdi::console {
 
-/// What a user may do; each includes those before it.
+/// Permissions of a user; each role includes the ones before it.
 enum class Role : std::uint8_t {
   kView,         ///< Read everything.
   kAcknowledge,  ///< Acknowledge, shelve, take off the shelf.
@@ -23,7 +23,7 @@ std::optional<Role> ParseRole(std::string_view name);
 
 struct User {
   Role role{Role::kView};
-  /// By crypt(3); "*": no password fits, a proxy has to know the user.
+  /// From crypt(3); "*": no password matches, so a proxy must authenticate.
   std::string hash{"*"};
 };
 
@@ -36,11 +36,11 @@ using Users = std::map<std::string, User, std::less<>>;
 ///   others can read the file; DataError if it cannot be read.
 Users LoadUsers(const std::filesystem::path& path);
 
-/// Adds the line of a user, replaces it, or with nothing removes it. The file
-/// is there whole at any time, with mode 0600 if it is made; its other lines,
-/// its owner and group stay.
-/// @throws ConfigError if the name cannot be one, or as LoadUsers();
-///   NotFoundError if there is nobody to remove; DataError.
+/// Adds or replaces the line of a user, or removes it if `user` is empty. The
+/// file is replaced atomically, and created with mode 0600; its other lines,
+/// owner and group are kept.
+/// @throws ConfigError if the name is invalid, or as LoadUsers(); NotFoundError
+///   if there is no such user to remove; DataError.
 void StoreUser(const std::filesystem::path& path, const std::string& name,
                const std::optional<User>& user);
 
@@ -49,13 +49,13 @@ void StoreUser(const std::filesystem::path& path, const std::string& name,
 ///   or control characters.
 std::string HashPassword(const std::string& password);
 
-/// Takes tens of milliseconds whether it fits or not.
+/// Takes tens of milliseconds in either case.
 bool PasswordFits(const std::string& password, const std::string& hash);
 
-/// Takes the same time wherever the texts differ.
+/// Constant time: independent of where the texts differ.
 bool SameSecret(std::string_view given, std::string_view secret);
 
-/// 48 hexadecimal digits that nobody can guess.
+/// 48 random hexadecimal digits.
 std::string RandomToken();
 
 }  // namespace fdi::console

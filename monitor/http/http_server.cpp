@@ -32,18 +32,18 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-// Descriptors are few: the usual limit of a process is 1024.
+// Descriptors are scarce: the usual limit of a process is 1024.
 constexpr std::size_t kMaxClients = 128;
-constexpr std::size_t kMaxAccepted = 64;        // Not yet among those.
+constexpr std::size_t kMaxAccepted = 64;        // Not yet among the clients.
 constexpr milliseconds kRequestPatience{2000};  // For a whole request.
 constexpr milliseconds kRefusalPatience{500};   // For reading a refusal.
-// A client may keep a thread waiting for so long at a time and in all, and
-// longer for long answers.
+// Limits on how long a client may block a thread, at a time and in total; the
+// total grows with the length of the answer.
 constexpr milliseconds kPausePatience{2000};
 constexpr milliseconds kAnswerPatience{5000};
 constexpr std::size_t kSlowestBytesPerMs = 1000;
 constexpr milliseconds kStopPatience{500};
-// The library's backlog of 5 lets a burst of clients wait for seconds.
+// The library's backlog of 5 makes clients of a burst wait for seconds.
 constexpr int kBacklog = 256;
 
 constexpr Refusal kForeignHost{
@@ -57,7 +57,8 @@ constexpr Refusal kPlainHttp{400, "Bad Request", "this port speaks https alone",
 constexpr Refusal kBusy{503, "Service Unavailable",
                         "too many such requests wait already", "busy"};
 
-// Runs the library's jobs where they come from: they only pass a socket on.
+// Runs the library's jobs in the accepting thread: they only hand over a
+// socket.
 class Inline : public httplib::TaskQueue {
  public:
   // void in the library's version 0.11 (Debian 12), bool in 0.18 (Debian 13).
@@ -69,8 +70,7 @@ class Inline : public httplib::TaskQueue {
   void shutdown() override {}
 };
 
-// A connected socket that does not block, with TLS or without; closed with the
-// object.
+// A connected non-blocking socket, with or without TLS; closed on destruction.
 class Socket {
  public:
   Socket(int handle, const TlsContext* tls) : handle_(handle) {
@@ -81,7 +81,7 @@ class Socket {
     }
   }
   ~Socket() {
-    tls_.reset();  // Says farewell.
+    tls_.reset();  // Sends close_notify.
     if (handle_ >= 0) {
       close(handle_);
     }
@@ -98,7 +98,7 @@ class Socket {
   short events() const { return tls_ ? tls_->events() : short{POLLIN}; }
   bool pending() const { return tls_ && tls_->pending(); }
 
-  // As recv() and send(); see TlsSession for what errno says.
+  // Like recv() and send(); TlsSession describes the values of errno.
   ssize_t Receive(char* to, std::size_t size) const {
     return tls_ ? tls_->Receive(to, size) : recv(handle_, to, size, 0);
   }
@@ -113,7 +113,7 @@ class Socket {
   std::unique_ptr<TlsSession> tls_;
 };
 
-// A client whose request is not whole yet, or that was refused and still sends.
+// A client whose request is incomplete, or that was refused and still sends.
 struct Client {
   Socket socket;
   Clock::time_point deadline;
@@ -122,8 +122,8 @@ struct Client {
   bool refused{false};
 };
 
-// What the library reads and where it writes to. It waits for a client that
-// does not read, but in all no longer than an answer of that length may take.
+// The stream that the library reads from and writes to. It waits for a slow
+// reader, but in total no longer than an answer of that length may take.
 class AnswerStream : public httplib::Stream {
  public:
   AnswerStream(const Client& client, const std::atomic<bool>& ended)
@@ -186,11 +186,11 @@ class AnswerStream : public httplib::Stream {
   std::size_t place_{0};
   std::size_t written_{0};
   Clock::duration waited_{0};
-  Clock::duration paused_{0};  // Since the last byte that was taken.
+  Clock::duration paused_{0};  // Since the last byte was accepted.
   bool writable_{true};
 };
 
-// The library's own options let two servers share a port in silence.
+// The library's own options let two servers share a port silently.
 void SetListenerOptions(int socket) {
   const int yes = 1;
   setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
@@ -240,7 +240,7 @@ std::string ToString(const HttpAddress& address) {
   return text.append(std::to_string(address.port));
 }
 
-// Routes of the library behind a thread that reads all requests.
+// The library's routes behind one thread that reads all requests.
 class HttpServer::Gate : public httplib::Server {
  public:
   explicit Gate(const HttpServerOptions& options) : options_(options) {
@@ -303,7 +303,7 @@ class HttpServer::Gate : public httplib::Server {
     std::deque<Client> waiting;  // Guarded by mutex_.
   };
 
-  // Called by the thread that accepts.
+  // Called by the accepting thread.
   bool process_and_close_socket(socket_t socket) override {
     std::unique_lock lock(mutex_);
     Client client{Socket(socket, tls_.get()), Clock::now() + kRequestPatience};
@@ -362,7 +362,7 @@ class HttpServer::Gate : public httplib::Server {
     changed_.notify_all();
   }
 
-  // @returns whether the client remains one that is listened to.
+  // @returns false if the client is to be dropped from the list.
   bool Serve(Client& client, bool readable) {
     if (readable && !Read(client)) {
       return false;
@@ -402,7 +402,7 @@ class HttpServer::Gate : public httplib::Server {
     return true;
   }
 
-  // @returns as Serve().
+  // Handles a client that closed or failed. @returns as Serve().
   bool Left(Client& client, int error) {
     if (client.refused) {
       return false;
@@ -435,8 +435,8 @@ class HttpServer::Gate : public httplib::Server {
     return Refuse(client, kBusy);
   }
 
-  // Goes on reading for a while: a socket that is closed with bytes unread
-  // takes the answer back.
+  // Sends the refusal and keeps reading for a while: closing a socket with
+  // unread bytes resets the connection, which discards the answer.
   bool Refuse(Client& client, const Refusal& refusal) {
     Count(refusal.kind);
     const std::string body =
@@ -481,8 +481,8 @@ class HttpServer::Gate : public httplib::Server {
     }
   }
 
-  // What version 0.11 asks the stream for, 0.18 wants to be told. A template,
-  // so that only one of the calls has to compile.
+  // Version 0.18 of the library takes as an argument what 0.11 asks of the
+  // stream. A template, so that only the matching call has to compile.
   void Process(auto& stream) {
     bool closed = true;
     if constexpr (requires {
@@ -499,7 +499,7 @@ class HttpServer::Gate : public httplib::Server {
 
   const HttpServerOptions options_;
   std::array<int, 2> wake_{};
-  std::list<Client> clients_;  // Of the listening thread alone, oldest first.
+  std::list<Client> clients_;  // Listening thread only, oldest first.
   std::list<Lane> lanes_;
   std::vector<std::thread> threads_;
   std::atomic<bool> ended_{false};
@@ -573,7 +573,7 @@ void HttpServer::Add(const Pages& pages) {
 void HttpServer::Start() {
   gate_->Start();
   thread_ = std::thread([this] { gate_->listen_after_bind(); });
-  while (!gate_->is_running()) {  // stop() before that would be forgotten.
+  while (!gate_->is_running()) {  // An earlier stop() would be lost.
     std::this_thread::yield();
   }
 }

@@ -18,14 +18,14 @@ class Server;
 
 namespace fdi::monitor {
 
-/// Where a server listens.
+/// Address on which a server listens.
 struct HttpAddress {
   std::string host;
-  int port{0};  ///< 0: any that is free.
+  int port{0};  ///< 0: any free port.
 };
 
-/// "PORT" (of 127.0.0.1), "HOST:PORT" or "[IPv6]:PORT".
-/// @param option that it is the value of, for the message.
+/// Parses "PORT" (on 127.0.0.1), "HOST:PORT" or "[IPv6]:PORT".
+/// @param option to name in the error message.
 /// @throws ConfigError naming option, text and what is accepted.
 HttpAddress ParseHttpAddress(const std::string& text,
                              const std::string& option);
@@ -39,8 +39,8 @@ struct HttpPage {
   std::string body;
 };
 
-/// Threads that answer the requests which `takes` says yes to, and how many may
-/// wait for them; one more is answered 503 with Retry-After.
+/// A pool of threads for the requests that `takes` accepts, with a bounded
+/// queue; a request that finds it full is answered 503 with Retry-After.
 struct HttpLane {
   std::size_t threads{2};
   std::size_t waiting{32};
@@ -50,56 +50,55 @@ struct HttpLane {
 /// Settings of HttpServer.
 struct HttpServerOptions {
   HttpAddress address;
-  std::string option{"--http"};      ///< That asked for it, for messages.
-  std::vector<HttpLane> lanes{{}};   ///< The first that takes it answers.
+  std::string option{"--http"};      ///< Named in error messages.
+  std::vector<HttpLane> lanes{{}};   ///< The first lane that takes a request.
   std::size_t max_body{0};           ///< Of a request [bytes].
   std::vector<std::string> names{};  ///< See HostAllowed().
   std::optional<TlsFiles> tls{};     ///< Nothing: plain HTTP.
   std::string user_header{};         ///< See ParseRequestHead().
 };
 
-/// Answers HTTP by threads of its own. A request is read whole, in bounded
-/// memory and time, before any of them sees it, so that no client holds a
-/// thread by sending slowly. A client that reads slowly is cut off. At most 128
-/// clients are listened to at once; the next one takes the place of the one
-/// that has been silent longest.
+/// An HTTP server with threads of its own. A request is read completely, in
+/// bounded memory and time, before a worker thread sees it, so no client can
+/// occupy a worker by sending slowly; a client that reads slowly is cut off. At
+/// most 128 clients are open at once; a further one replaces the oldest.
 class HttpServer {
  public:
-  /// From path to what makes the page, called by any of the threads.
+  /// Maps paths to functions that make the page, called by any worker thread.
   using Pages = std::map<std::string, std::function<HttpPage()>>;
-  /// Clients by what became of them since the start: "answered", "failed",
-  /// "malformed", "too_large", "encoded", "host", "slow", "busy", "left" or
-  /// "tls": no handshake that we understand.
+  /// Clients since the start, by outcome: "answered", "failed", "malformed",
+  /// "too_large", "encoded", "host", "slow", "busy", "left", or "tls" for a
+  /// failed handshake.
   using Counts = std::map<std::string_view, std::uint64_t>;
 
-  /// Binds the address; nothing is answered yet. A second server on the same
+  /// Binds the address; nothing is served yet. A second server on the same
   /// address is an error.
   /// @throws std::runtime_error naming the address and the reason; ConfigError
   ///   as TlsContext.
   explicit HttpServer(const HttpServerOptions& options);
-  /// Answers what it is at, which may take a second, and no more.
+  /// Finishes the answers in progress, which may take a second.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  /// Answers GET by `pages`, which may refer to what outlives this. Before
-  /// Start().
+  /// Serves GET from `pages`, which may refer only to objects that outlive
+  /// this. Call before Start().
   void Add(const Pages& pages);
-  /// For what pages cannot do. Before Start().
+  /// The library's server, for what pages cannot do. Use before Start().
   httplib::Server& routes();
 
-  /// Answers from now on. Once.
+  /// Starts serving. Call once.
   void Start();
 
-  /// Takes no further connections. Does not wait.
+  /// Stops accepting connections. Does not block.
   void Stop();
 
-  /// Takes the files of the certificate as they are now, for clients that come
-  /// from now on. @returns days until it ends; nothing without TLS.
+  /// Reloads the certificate files for future clients. @returns days until the
+  /// certificate expires; nothing without TLS.
   /// @throws ConfigError as TlsContext; the old one stays.
   std::optional<int> RenewTls();
 
-  /// With the port that was found, if any was asked for.
+  /// With the actual port if 0 was requested.
   const HttpAddress& address() const { return address_; }
   bool has_tls() const { return has_tls_; }
 

@@ -54,8 +54,8 @@ bool IsPlain(std::string_view text) {
   });
 }
 
-// %XX as bytes; nothing if a % is followed by anything else, of which the
-// library would know one more form.
+// Decodes %XX; nothing if a % is followed by anything else, because the library
+// accepts another form besides.
 std::optional<std::string> Decoded(std::string_view text) {
   std::string result;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -90,8 +90,8 @@ std::string Encoded(std::string_view path) {
   return result;
 }
 
-// "GET /path?query HTTP/1.1"; the path is passed on in one form, so that the
-// routes see the path that chose the lane.
+// Parses "GET /path?query HTTP/1.1". The path is normalised, so that the routes
+// see the same path that chose the lane.
 std::optional<Refusal> TakeRequestLine(std::string_view line,
                                        RequestHead& head) {
   const std::size_t first = line.find(' ');
@@ -133,7 +133,7 @@ std::optional<Refusal> TakeLength(std::string_view value, std::size_t max_body,
   return head.body_size > max_body ? std::optional(kBody) : std::nullopt;
 }
 
-// Headers that no page reads are dropped.
+// Drops the headers that no page reads.
 std::optional<Refusal> TakeHeader(std::string_view line, std::size_t max_body,
                                   std::string_view user_header,
                                   RequestHead& head) {
@@ -178,12 +178,12 @@ std::optional<Refusal> TakeHeader(std::string_view line, std::size_t max_body,
     pass("Origin", value);
   } else if (name == "accept-encoding" &&
              Lower(value).find("gzip") != std::string::npos) {
-    pass("Accept-Encoding", "gzip");  // Brotli takes seconds of a processor.
+    pass("Accept-Encoding", "gzip");  // Brotli would take seconds of CPU time.
   }
   return std::nullopt;
 }
 
-// "host", "host:port", "[v6]", "[v6]:port" without port and brackets.
+// Strips port and brackets from "host", "host:port", "[v6]", "[v6]:port".
 std::string_view WithoutPort(std::string_view host) {
   if (host.starts_with("[")) {
     const std::size_t end = host.find(']');

@@ -8,21 +8,21 @@
 
 namespace fdi::monitor {
 
-/// The first bytes of an HTTP request, checked before the library sees them:
-/// version 0.11 of it stores lines, headers and bodies of any length, takes
-/// bodies apart that are compressed, and repeats a file for each range that is
-/// asked for. Therefore it is given only the headers that our pages read.
+/// The head of an HTTP request, checked before the library sees it: version
+/// 0.11 stores lines, headers and bodies of any length, decompresses bodies,
+/// and repeats a file for each requested range. It is therefore given only the
+/// headers that our pages read.
 struct RequestHead {
-  std::string text;     ///< Request line and headers as the library gets them.
+  std::string text;     ///< Request line and headers for the library.
   std::string path;     ///< Decoded, without query.
   std::string host;     ///< Header Host.
-  std::string user;     ///< The header that names a user, see there.
-  std::size_t size{0};  ///< Of the head as it came [bytes].
+  std::string user;     ///< Value of `user_header`, see ParseRequestHead().
+  std::size_t size{0};  ///< Size of the head as received [bytes].
   std::size_t body_size{0};  ///< Content-Length [bytes].
 };
 
-/// Why a request is not answered by a page: a status of HTTP, the words that
-/// the client reads, and the word that counts it.
+/// Why a request is refused: HTTP status and its title, the reason for the
+/// client, and the counter's name.
 struct Refusal {
   int status;
   const char* title;
@@ -34,25 +34,25 @@ inline constexpr std::size_t kMaxTarget = 4096;                  ///< [bytes]
 inline constexpr std::size_t kMaxHead = std::size_t{16} * 1024;  ///< [bytes]
 inline constexpr std::size_t kMaxHeaders = 100;
 
-/// Reads the head at the beginning of `bytes`.
-/// @param head is set once it is whole.
-/// @param max_body of a body [bytes].
-/// @param user_header by which a proxy says who asks; it may be there once.
-/// @returns why it is refused; nothing if it is good so far.
+/// Parses the head at the beginning of `bytes`.
+/// @param head set once the head is complete.
+/// @param max_body limit of Content-Length [bytes].
+/// @param user_header by which a proxy names the user; allowed only once.
+/// @returns why the request is refused; nothing if it is valid so far.
 std::optional<Refusal> ParseRequestHead(std::string_view bytes,
                                         std::size_t max_body,
                                         std::optional<RequestHead>& head,
                                         std::string_view user_header = {});
 
-/// A loopback address, or the name for it.
+/// Whether `host` is a loopback address or "localhost".
 bool IsLoopback(std::string_view host);
 
-/// Whether a page may ask us by this Host header. A name that leads to our
-/// address may be anybody's (DNS rebinding), so that a server answers to its
-/// own names alone, on any port, as tunnels end on others: bound to a loopback
-/// address, localhost and loopback addresses; bound to another, also every
-/// address, as an address is nobody's name, and the name of the machine.
-/// @param names further ones, as --allow-host has them.
+/// Whether to answer a request with this Host header. Any name can be made to
+/// resolve to our address (DNS rebinding), so a server answers only to its own
+/// names, on any port because tunnels may change it. Bound to a loopback
+/// address: localhost and loopback addresses. Bound to another address: also
+/// every IP address, since these cannot be rebound, and the machine's name.
+/// @param names additional ones, from --allow-host.
 bool HostAllowed(std::string_view host_header, std::string_view bound_host,
                  std::span<const std::string> names = {});
 

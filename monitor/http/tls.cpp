@@ -21,7 +21,7 @@
 namespace fdi::monitor {
 namespace {
 
-// What OpenSSL says about the call that failed, first cause first.
+// OpenSSL's reason for the call that failed, the first cause first.
 std::string Reason() {
   const unsigned long error = ERR_peek_error();
   const char* reason = ERR_SYSTEM_ERROR(error)
@@ -36,8 +36,8 @@ std::string Reason() {
   throw ConfigError(std::string(option) + " " + file.string() + ": " + what);
 }
 
-// The library's own socket writes with write(), which kills a process whose
-// client has gone (SIGPIPE).
+// OpenSSL's socket BIO uses write(), which raises SIGPIPE if the client has
+// gone.
 int WriteSocket(BIO* bio, const char* from, int size) {
   BIO_clear_retry_flags(bio);
   const ssize_t count =
@@ -115,7 +115,7 @@ void TakeKey(SSL_CTX* context, const TlsFiles& files) {
   }
 }
 
-// @returns days until it ends.
+// @returns days until the certificate expires.
 int CheckValidity(const X509* certificate, const std::filesystem::path& file) {
   int days = 0;
   int seconds = 0;
@@ -142,19 +142,22 @@ TlsSession::TlsSession(SSL_CTX* context, int socket)
 }
 
 TlsSession::~TlsSession() {
+  // OpenSSL forbids SSL_shutdown() after a fatal error.
   if (!broken_ && SSL_is_init_finished(ssl_.get()) != 0) {
     SSL_shutdown(ssl_.get());
     ERR_clear_error();
   }
 }
 
+// The error queue is cleared before each call, because SSL_get_error() also
+// sees what earlier calls of the thread left in it.
 ssize_t TlsSession::Receive(char* to, std::size_t size) {
   ERR_clear_error();
   return Result(SSL_read(ssl_.get(), to, static_cast<int>(size)));
 }
 
 ssize_t TlsSession::Send(const char* from, std::size_t size) {
-  if (size == 0) {  // An error for SSL_write().
+  if (size == 0) {  // SSL_write() would fail.
     return 0;
   }
   ERR_clear_error();
@@ -187,7 +190,7 @@ ssize_t TlsSession::Result(int returned) {
                   ? EPROTONOSUPPORT
                   : EPROTO;
       break;
-    default:  // The client has gone.
+    default:  // The connection is lost.
       errno = ECONNRESET;
   }
   broken_ = true;
@@ -207,8 +210,8 @@ TlsContext::TlsContext(const TlsFiles& files)
   SSL_CTX_set_mode(context, SSL_MODE_ENABLE_PARTIAL_WRITE |
                                 SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER |
                                 SSL_MODE_RELEASE_BUFFERS);
-  // One record for each call, so that no client keeps the thread that listens
-  // to all of them with records that carry no data.
+  // One record per call, so that a client cannot occupy the listening thread
+  // with records that carry no data.
   SSL_CTX_clear_mode(context, SSL_MODE_AUTO_RETRY);
   SSL_CTX_set_session_cache_mode(context, SSL_SESS_CACHE_OFF);  // Tickets do.
   if (SSL_CTX_use_certificate_chain_file(context, files.certificate.c_str()) !=

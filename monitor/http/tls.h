@@ -11,31 +11,31 @@ struct ssl_st;
 
 namespace fdi::monitor {
 
-/// A certificate for TLS, both PEM.
+/// Certificate and key for TLS, both PEM.
 struct TlsFiles {
-  std::filesystem::path certificate;  ///< The server's first, then its issuers.
+  std::filesystem::path certificate;  ///< The server's, then its issuers'.
   std::filesystem::path key;  ///< Without passphrase; empty: in `certificate`.
   bool operator==(const TlsFiles&) const = default;
 };
 
-/// The server's end of TLS on a connected socket that does not block. The
-/// handshake is part of the first Receive(). Used by one thread at a time.
+/// The server side of TLS on a connected non-blocking socket. The first
+/// Receive() performs the handshake. Used by one thread at a time.
 class TlsSession {
  public:
   TlsSession(ssl_ctx_st* context, int socket);
-  /// Tells the client that nothing follows, if it can be told at once.
+  /// Sends close_notify if that is possible without blocking.
   ~TlsSession();
   TlsSession(const TlsSession&) = delete;
   TlsSession& operator=(const TlsSession&) = delete;
 
-  /// As recv() and send(): -1 with errno EAGAIN if the socket has to get ready
-  /// for `events()` first, EPROTONOSUPPORT if the client speaks plain HTTP,
-  /// EPROTO for all that is no TLS that we speak.
+  /// Like recv() and send(): -1 with errno EAGAIN if poll() has to wait for
+  /// `events()` first, EPROTONOSUPPORT if the client speaks plain HTTP, EPROTO
+  /// for a failed handshake or protocol error.
   ssize_t Receive(char* to, std::size_t size);
   ssize_t Send(const char* from, std::size_t size);
-  /// What poll() should wait for.
+  /// The events that poll() should wait for.
   short events() const { return events_; }
-  /// Bytes that have come and that poll() knows nothing of.
+  /// Whether bytes are buffered that poll() does not report.
   bool pending() const;
 
  private:
@@ -54,9 +54,9 @@ class TlsContext {
   ///   read, that needs a passphrase or that is of another certificate.
   explicit TlsContext(const TlsFiles& files);
 
-  /// For a client that was accepted.
+  /// Begins a session on an accepted socket.
   std::unique_ptr<TlsSession> Accept(int socket) const;
-  /// Of the certificate, rounded down.
+  /// Days until the certificate expires, rounded down.
   int days_left() const { return days_left_; }
 
  private:

@@ -20,7 +20,7 @@ Json Hours(std::int64_t ms) {
 }
 
 // The sums are integers in units of `quantum`, so that parts of an hour add up
-// exactly over restarts; only here they become figures in the channel's unit.
+// exactly across restarts; only here they are converted to the channel's unit.
 Json MeanOf(const ResidualSums& sums, double quantum) {
   return SixDigits(static_cast<double>(sums.residual) /
                    static_cast<double>(sums.samples) * quantum);
@@ -48,8 +48,9 @@ Json ChannelJson(const HealthHour& hour, std::size_t c) {
                     {"mean", MeanOf(sums, quantum)},
                     {"rms", RmsOf(sums, quantum)}});
   }
-  // Measured output less residual is what the normal model expected. Its sum
-  // may be 0, as may the samples: 0/0 is not finite, and so null.
+  // The measured output minus the residual is what the normal model expected.
+  // Its sum and the number of samples may be 0: 0/0 is not finite and becomes
+  // null.
   const auto residual = static_cast<double>(all.residual);
   const double expected = static_cast<double>(all.output) - residual;
   return {

@@ -9,14 +9,14 @@
 
 namespace fdi::planner {
 
-/// What the months say about one limit.
+/// The forecast for one limit.
 struct LimitTrend {
   monitor::HealthLimit limit;
   monitor::HealthForecast forecast;
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
 };
 
-/// −10 % and +10 % of the flow that the normal model expects.
+/// Limits of −10 % and +10 % of the flow that the normal model expects.
 std::vector<monitor::HealthLimit> DefaultLimits();
 
 /// Parses each of `texts`; without any, DefaultLimits(). @throws ConfigError
@@ -41,7 +41,7 @@ cli::Json TrendsJson(std::span<const LimitTrend> trends);
 /// history also have "host" and "monitor".
 cli::Json HealthHoursJson(std::span<const HealthHour> hours);
 
-/// The hours of each day as one, with all model sets and epochs apart.
+/// Merges the hours of each day, separately for each model set and epoch.
 std::vector<HealthHour> DaysOf(std::span<const HealthHour> hours);
 
 /// `value` with six significant digits; null if it is not finite.

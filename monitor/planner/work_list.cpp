@@ -88,7 +88,7 @@ std::string TrendText(const LimitTrend& trend) {
          ForecastText(trend.forecast);
 }
 
-// A reason of either kind.
+// A reason of either kind, with its weight.
 struct WeightedText {
   double weight;
   std::string text;
@@ -116,13 +116,13 @@ double ScoreOf(const ValveWork& work, const WorkOptions& options) {
   return most + kOtherReasons * (sum - most);
 }
 
-// What an episode was: as its label says, or its answer.
+// The fault of an episode according to its label, or else its diagnosis.
 std::string FaultOf(const Episode& episode) {
   const std::string label = episode.label.value_or("");
   return ParseFault(label) ? label : episode.fault.value_or("unknown");
 }
 
-// Labels on one answer in the plant.
+// How often labels in the plant confirmed or contradicted one diagnosis.
 struct Record {
   int right{0};
   int wrong{0};
@@ -143,7 +143,7 @@ std::map<std::string, Record> RecordsOf(const std::vector<Episode>& episodes) {
   return records;
 }
 
-// Episodes come in order of detection: the newest one has the last word.
+// Episodes come in order of detection, so the newest one decides.
 void AddEpisode(const Episode& episode, const cli::FaultTexts& texts,
                 std::vector<FaultReason>& reasons) {
   const std::string fault = FaultOf(episode);
@@ -176,7 +176,7 @@ std::vector<Episode> EpisodesOf(storage::History& history,
   for (Episode& episode : history.List(filter)) {
     episodes.push_back(std::move(episode));
   }
-  // In the plant's history both of a pair have an episode.
+  // The plant history has each episode of a pair twice.
   std::set<std::string> seen;
   std::erase_if(episodes, [&seen](const Episode& episode) {
     return !seen.insert(episode.episode_id).second;

@@ -13,35 +13,36 @@
 
 namespace fdi::planner {
 
-/// Why somebody should look at a valve: an answer of the diagnosis, with all
-/// its episodes in the time looked at.
+/// A reason to inspect a valve: one diagnosed fault, with all its episodes in
+/// the period.
 struct FaultReason {
-  std::string fault;  ///< As in fault_history, or what a label says.
+  std::string fault;  ///< As in fault_history, or from a label.
   cli::FaultWords words;
-  double strength{0.0};   ///< Estimated, of the newest episode.
-  double factor{0.0};     ///< Its peak factor.
+  double strength{0.0};   ///< Estimated, in the newest episode.
+  double factor{0.0};     ///< Peak factor of that episode.
   int episodes{0};        ///< Without those labelled false.
-  bool confirmed{false};  ///< A label says so.
-  /// Of labels on this answer in the plant: (right + 1) / (right + wrong + 1).
+  bool confirmed{false};  ///< By a label.
+  /// From labels on this diagnosis in the plant: (right + 1) / (right + wrong +
+  /// 1).
   double trust{1.0};
-  std::string episode_id;       ///< The newest.
-  std::int64_t detected_ns{0};  ///< Of it.
+  std::string episode_id;       ///< Of the newest episode.
+  std::int64_t detected_ns{0};  ///< Of that episode.
   std::optional<std::int64_t> ended_ns;
-  /// Of the newest evidence. The clock of this machine may be behind it.
+  /// Time of the newest evidence, which may be ahead of this machine's clock.
   std::int64_t last_ns{0};
 };
 
-/// What is known of one valve.
+/// Everything known of one valve.
 struct ValveWork {
   std::string valve_id;
   std::vector<FaultReason> faults;
   std::vector<LimitTrend> trends;
-  /// Since the equipment was replaced or repaired last (its epoch).
+  /// Since the equipment was last replaced or repaired (its epoch).
   double travel_strokes{0.0};
   double service_hours{0.0};
-  double live_share{1.0};  ///< Of that time, the part that could be judged.
-  std::optional<std::int64_t> last_ns;  ///< The newest hour of it.
-  /// Where the newest of it is from; in the plant's history alone.
+  double live_share{1.0};  ///< Share of that time that could be judged.
+  std::optional<std::int64_t> last_ns;  ///< Its newest hour.
+  /// Where that hour comes from; only in the plant history.
   std::string host;
   std::string monitor;
 };
@@ -50,28 +51,28 @@ struct ValveWork {
 struct WorkRow {
   int rank{0};
   double score{0.0};
-  ValveWork work;   ///< Its reasons by weight, the weightiest first.
+  ValveWork work;   ///< Its reasons by decreasing weight.
   std::string why;  ///< The reasons in words, in the same order.
 };
 
 /// Settings of RankWork().
 struct WorkOptions {
   std::int64_t now_ns{0};
-  double horizon_days{180.0};   ///< Trends that need longer do not count.
-  double half_life_days{30.0};  ///< Of an episode that has ended.
+  double horizon_days{180.0};   ///< Trends beyond it do not count.
+  double half_life_days{30.0};  ///< After the end of an episode.
 };
 
-/// The valves with a reason, the most urgent first. A reason weighs
+/// The valves with a reason, the most urgent first. A reason has the weight
 ///
 ///     S · C · U · R
 ///
-/// S severity by the catalogue at the estimated strength: low 1, medium 2,
-/// high 4, critical 8; a limit counts as high. C confidence: 1 where a label
-/// confirms it, else peak factor times the trust that labels on this answer
-/// have earned. U urgency: 1 while the episode lasts or the limit is reached;
-/// after its end it halves in half_life_days; a limit in t days has
-/// 1 − t/horizon_days. R repetition: 1 + 0.1 per further episode, at most 2.
-/// A valve has its weightiest reason and a quarter of the others.
+/// S severity in the catalogue at the estimated strength: low 1, medium 2, high
+/// 4, critical 8; a limit counts as high. C confidence: 1 if a label confirms
+/// the fault, else peak factor times the trust earned by labels on this
+/// diagnosis. U urgency: 1 while the episode lasts or the limit is reached; it
+/// halves every half_life_days after the end; a limit in t days has 1 −
+/// t/horizon_days. R repetition: 1 + 0.1 per further episode, at most 2. The
+/// score of a valve is its largest weight plus a quarter of the others.
 std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
                               const WorkOptions& options);
 
@@ -79,7 +80,7 @@ std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
 double WeightOf(const FaultReason& reason, const WorkOptions& options);
 double WeightOf(const LimitTrend& trend, const WorkOptions& options);
 
-/// The reasons in words, the weightiest first.
+/// The reasons in words, in order of decreasing weight.
 std::string WhyText(const ValveWork& work, const WorkOptions& options);
 
 /// Settings of ReadWorkList().
@@ -87,13 +88,13 @@ struct WorkQuery {
   std::string valve_glob{"*"};
   std::int64_t since_ns{0};  ///< Episodes from then on, and open ones.
   std::vector<monitor::HealthLimit> limits;
-  std::string discipline;  ///< Only reasons of it; empty: any.
+  std::string discipline;  ///< Reasons of this one only; empty: any.
   std::size_t top{0};      ///< 0: all.
-  WorkOptions options;     ///< now_ns is needed.
+  WorkOptions options;     ///< now_ns must be set.
 };
 
-/// What the history knows of the plant, ranked; see RankWork(). Trends are
-/// those of the hours of health from since_ns on.
+/// Ranks what the history knows of the plant; see RankWork(). Trends use the
+/// hours of health from since_ns on.
 /// @throws ConfigError for an unknown discipline, naming the accepted ones.
 std::vector<WorkRow> ReadWorkList(storage::History& history,
                                   const cli::FaultTexts& texts,

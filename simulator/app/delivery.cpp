@@ -22,16 +22,16 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-// At full speed, memory is the limit and not the clock.
+// At full speed samples are committed by number rather than by time.
 constexpr std::int64_t kMostPending = 50'000;
-constexpr milliseconds kCommitPeriod(750);  // Loses less than 1 s.
+constexpr milliseconds kCommitPeriod(750);  // Bounds the loss to less than 1 s.
 
 std::filesystem::path Prepared(const storage::DataDirectory& directory) {
   storage::EnsureExists(directory);
   return directory.runs();
 }
 
-// Holds samples back until they are due.
+// Delays samples until they are due.
 class Pacer {
  public:
   Pacer(double speed, cli::StopSignals& signals)
@@ -65,7 +65,7 @@ class Pacer {
   steady_clock::time_point start_;
 };
 
-// Until the feed ends or a stop is requested.
+// Delivers samples until the feed ends or a stop is requested.
 void DeliverAll(Feed& feed, const FeedSinks& sinks, Pacer pacer,
                 std::vector<FedValve>& valves) {
   while (const auto next = feed.Next()) {
@@ -231,7 +231,7 @@ cli::Report Deliver(Feed& feed, const FeedSinks& sinks, double speed,
   try {
     DeliverAll(feed, sinks, Pacer(speed, signals), valves);
   } catch (...) {
-    // The readers still get what came before, and the end of the streams.
+    // The readers still get the earlier samples, and the end of the streams.
     if (publisher != nullptr) {
       publisher->Finish();
     }

@@ -20,7 +20,7 @@
 #include "storage/runs/run_recorder.h"
 #include "storage/runs/runs.h"
 
-/// How samples leave the program, which `run` and `replay` have in common.
+/// Delivery of samples, shared by `run` and `replay`.
 namespace fdi::simulator {
 
 struct DeliveryOptions {
@@ -35,42 +35,42 @@ void AddDeliveryOptions(CLI::App& verb, DeliveryOptions& options);
 /// options.start, or now to the millisecond. @throws ConfigError
 std::int64_t StartOf(const DeliveryOptions& options);
 
-/// Reads "1", "0.5", "60" (times real time) or "max" (infinity: as fast as the
-/// samples are taken). @throws ConfigError naming these.
+/// Parses "1", "0.5", "60" (times real time) or "max" (infinity: as fast as the
+/// readers accept samples). @throws ConfigError naming these.
 double ParseSpeed(std::string_view text);
 
-/// At infinite speed, the reader paces the writer and there must be one.
+/// At infinite speed a reader is required, and paces the writer.
 SamplePublisherOptions PublisherOptionsOf(const DeliveryOptions& options,
                                           double speed);
 
-/// @throws ConfigError unless `valve_id` may name a valve.
+/// @throws ConfigError unless `valve_id` is valid.
 void RequireValveId(const std::string& valve_id);
 
-/// A random number that no other publisher has.
+/// A random number, unique among publishers.
 std::uint64_t NewSourceId();
 
-/// A sample and the index of its valve.
+/// A sample with the index of its valve.
 struct FedSample {
   std::size_t valve{0};
   LabelledSample labelled;
 };
 
-/// Yields samples in the order in which they shall leave.
+/// Yields samples in the order of delivery.
 class Feed {
  public:
   virtual ~Feed() = default;
-  /// Nothing at the end, or if a stop was requested while it waited.
+  /// Nothing at the end, or if a stop was requested while waiting.
   virtual std::optional<FedSample> Next() = 0;
 };
 
-/// Records the samples of some valves as runs, committed each second.
+/// Records the samples of some valves as runs, committed every second.
 class RunSink {
  public:
-  /// Makes the data directory if need be.
+  /// Creates the data directory if necessary.
   /// @throws DataError, SqliteError as RunRecorder.
   explicit RunSink(const storage::DataDirectory& directory);
 
-  /// The runs of valve 0, 1, 2, ... @returns the id of the run.
+  /// Begins the run of valve 0, 1, 2, ... @returns the id of the run.
   std::string Begin(const storage::NewRun& run);
   void Append(std::size_t valve, const LabelledSample& sample);
   void Close() { recorder_.Close(); }
@@ -96,29 +96,29 @@ class CsvSink {
   std::vector<LabelledSample> samples_;
 };
 
-/// Where the samples of a feed go; what is null is left out.
+/// Destinations of a feed; null ones are skipped.
 struct FeedSinks {
   std::unique_ptr<SamplePublisher> publisher;
   std::unique_ptr<RunSink> runs;
   std::unique_ptr<CsvSink> csv;
 };
 
-/// What is delivered for one valve.
+/// The delivery of one valve.
 struct FedValve {
   std::string valve_id;
   std::uint64_t source_id{0};
   std::optional<std::uint64_t> seed{};
-  std::string run_id{};  ///< Of the recorded run; may be empty.
+  std::string run_id{};  ///< Of the recorded run, if any.
   std::uint64_t samples{0};
   std::int64_t first_stamp_ns{0};
   std::int64_t last_stamp_ns{0};
 };
 
-/// Takes all samples of `feed` to the sinks, each when it is due, and closes
-/// these. One of stamp s is due (s - s0) / speed after the first one; a gap in
-/// the stamps is a pause.
-/// @returns what was delivered. Its exit code is kExitTransport if readers lack
-///   samples of a lossless delivery that was not interrupted.
+/// Passes all samples of `feed` to the sinks, each when it is due, and closes
+/// these. A sample with stamp s is due (s - s0) / speed after the first one; a
+/// gap in the stamps is a pause.
+/// @returns a summary. Its exit code is kExitTransport if readers miss samples
+///   of a lossless delivery that was not interrupted.
 cli::Report Deliver(Feed& feed, const FeedSinks& sinks, double speed,
                     cli::StopSignals& signals, std::vector<FedValve> valves);
 

@@ -39,10 +39,10 @@ constexpr EffectField kFields[] = {
     {"P1 reading, share of span, +", &FaultEffects::inlet_reading_step},
     {"P2 reading, share of span, +", &FaultEffects::outlet_reading_step},
 };
-// An effect without a text here would be missing from the list of faults.
+// An effect without a text would be missing from the list of faults.
 static_assert(sizeof(FaultEffects) == std::size(kFields) * sizeof(double));
 
-// What differs from the healthy valve: "Kv x 0.8, opening + 0.1".
+// Differences from the healthy valve: "Kv x 0.8, opening + 0.1".
 std::string EffectText(int fault, double strength) {
   const FaultEffects healthy;
   FaultEffects faulty;

@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kMaxSeconds = 3.2e9;  // Nanoseconds must fit.
+constexpr double kMaxSeconds = 3.2e9;  // Longer would overflow nanoseconds.
 
 const cli::SignalColumn* FindColumn(std::string_view key) {
   for (const cli::SignalColumn& column : cli::kSignalColumns) {

@@ -14,7 +14,7 @@ namespace fdi::simulator {
 
 struct JsonRow {
   Sample sample;              ///< stamp_ns from t_s; seq counts from 0.
-  std::optional<double> t_s;  ///< Not given: to be stamped by the clock.
+  std::optional<double> t_s;  ///< Missing: stamped on arrival.
 };
 
 /// Reads samples as JSON lines, one object a line, with the names of the CSV
@@ -23,13 +23,13 @@ struct JsonRow {
 ///     {"t_s": 0, "CV_pct": 70.1, "X_pct": 71.0, "F_t_h": 12.5, "mode": "AUTO"}
 ///
 /// A signal that is null or missing is not present in that sample; CV and one
-/// of X, F must be. t_s is in all lines or in none; no mode means AUTO. Further
-/// keys are ignored.
+/// of X, F are required. t_s must be in all lines or in none; a missing mode
+/// means AUTO. Other keys are ignored.
 class JsonLineReader {
  public:
-  /// @param source For messages.
-  /// @param split_gaps Accepts gaps in time.
-  /// @param period_s 0: the first step.
+  /// @param source name for error messages.
+  /// @param split_gaps accept gaps in time.
+  /// @param period_s 0: taken from the first step.
   JsonLineReader(std::string source, bool split_gaps, double period_s)
       : source_(std::move(source)), steps_(split_gaps, period_s) {}
 
@@ -37,7 +37,7 @@ class JsonLineReader {
   /// @throws DataError naming source, line, key and reason.
   std::optional<JsonRow> TakeLine(std::string_view line);
 
-  /// Keys of the first object that mean nothing here.
+  /// Unknown keys of the first object.
   const std::vector<std::string>& ignored_keys() const { return ignored_keys_; }
 
  private:

@@ -7,7 +7,7 @@
 namespace fdi::simulator {
 namespace {
 
-// For --help and the manual pages.
+// Shown by --help and in the manual pages.
 std::vector<cli::VerbExamples> Examples() {
   return {
       {"",

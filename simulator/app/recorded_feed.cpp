@@ -127,10 +127,10 @@ std::optional<std::string> StreamFeed::NextLine() {
   if (buffer_.empty() || signals_.stop_requested()) {
     return std::nullopt;
   }
-  return std::exchange(buffer_, {});  // The last one may lack its end.
+  return std::exchange(buffer_, {});  // The last line may lack its end.
 }
 
-// Waits for bytes. @returns false if a stop was requested.
+// Waits for input. @returns false if a stop was requested.
 bool StreamFeed::Fill() {
   std::array<pollfd, 2> entries{
       {{descriptor_, POLLIN, 0}, {signals_.descriptor(), POLLIN, 0}}};
@@ -140,7 +140,7 @@ bool StreamFeed::Fill() {
       continue;
     }
     if (entries[0].revents == 0) {
-      signals_.WaitFor(std::chrono::milliseconds(0));  // A reload: ignored.
+      signals_.WaitFor(std::chrono::milliseconds(0));  // Ignores a reload.
       continue;
     }
     std::array<char, 65536> bytes;

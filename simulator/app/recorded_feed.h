@@ -13,24 +13,24 @@
 #include "simulator/app/json_line_reader.h"
 #include "simulator/valve_equations.h"
 
-/// Samples that were taken before, or elsewhere: the feeds of `replay`.
+/// Samples recorded earlier or elsewhere: the feeds of `replay`.
 namespace fdi::simulator {
 
-/// How replayed samples are stamped: the first one at start() and the others
-/// as far behind it as they were; or as they are.
+/// How replayed samples are stamped: shifted so that the first one is at
+/// start(), or unchanged (`keep`).
 struct Restamping {
   bool keep{false};
-  std::function<std::int64_t()> start{};  ///< Asked once, at the first sample.
+  std::function<std::int64_t()> start{};  ///< Called at the first sample.
   std::uint64_t source_id{0};             ///< Of all samples.
 };
 
-/// Applies a Restamping to one sample after another.
+/// Applies a Restamping to successive samples.
 class Restamper {
  public:
   explicit Restamper(Restamping restamping)
       : restamping_(std::move(restamping)) {}
   void Apply(Sample& sample);
-  /// Stamps by the arrival now_ns, on the grid of `period_ns` from the first.
+  /// Stamps by the arrival time now_ns, rounded to a grid of `period_ns`.
   void StampByClock(std::int64_t now_ns, std::int64_t period_ns,
                     Sample& sample);
 
@@ -40,11 +40,11 @@ class Restamper {
   std::optional<std::int64_t> last_stamp_ns_;
 };
 
-/// Logs `flow_converted` unless the units are the same.
+/// Logs `flow_converted` unless the units are equal.
 void ReportConversion(const LogSink& log, const std::string& run, FlowUnit from,
                       FlowUnit to);
 
-/// Samples that are all known: a stored run or a file.
+/// Samples that are known in advance: a stored run or a file.
 class StoredFeed final : public Feed {
  public:
   StoredFeed(std::vector<LabelledSample> samples, Restamping restamping)
@@ -61,20 +61,20 @@ class StoredFeed final : public Feed {
 struct StreamOptions {
   cli::ColumnMap map;
   bool split_gaps{false};
-  /// 0: the first step; of JSON lines without t_s, 1 s.
+  /// 0: the first step, or 1 s for JSON lines without t_s.
   double period_s{0.0};
-  /// To which a flow is converted; nothing: as it comes.
+  /// Unit to which flow is converted; nothing: unchanged.
   std::optional<FlowUnit> flow_unit{};
 };
 
-/// Samples that come line by line from a pipe, as CSV or as JSON (told by the
-/// first line). A signal ends the wait for the next line.
+/// Samples from a pipe, line by line, as CSV or JSON (detected from the first
+/// line). A signal interrupts waiting for the next line.
 class StreamFeed final : public Feed {
  public:
   StreamFeed(int descriptor, cli::StopSignals& signals,
              const StreamOptions& options, Restamping restamping, LogSink log);
-  /// @throws DataError naming the line, as CsvReader and JsonLineReader, or if
-  ///   a line has more than 1 MiB.
+  /// @throws DataError naming the line, as CsvReader and JsonLineReader, or for
+  ///   a line longer than 1 MiB.
   /// @throws std::system_error if reading fails.
   std::optional<FedSample> Next() override;
 
@@ -91,7 +91,7 @@ class StreamFeed final : public Feed {
   Restamper restamper_;
   LogSink log_;
   std::string buffer_;
-  std::size_t begin_{0};  // Of what was not handed out.
+  std::size_t begin_{0};  // Start of the unread part.
   bool ended_{false};
   cli::CsvReader csv_;
   cli::StepCheck steps_;

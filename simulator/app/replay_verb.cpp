@@ -32,7 +32,7 @@ struct ReplayOptions {
   DeliveryOptions delivery;
 };
 
-// What is replayed, and for which valve.
+// The samples to replay, and their valve.
 struct Recording {
   std::string valve_id;
   std::vector<LabelledSample> samples;
@@ -54,7 +54,7 @@ Recording LoadRun(const ReplayOptions& options, const cli::Context& context) {
   return recording;
 }
 
-// The flow unit of the model set that the valve has here, if it has one.
+// The flow unit of the valve's model set in the data directory, if any.
 std::optional<FlowUnit> UnitOf(const std::string& valve,
                                const cli::Context& context) {
   const storage::DataDirectory data{context.options.data_dir};
@@ -103,10 +103,10 @@ void Check(const ReplayOptions& options) {
   if (options.csv.empty() && options.table.given()) {
     throw ConfigError("--map, --zone and --resample are of --csv");
   }
-  StartOf(options.delivery);  // A bad one is refused before all else.
+  StartOf(options.delivery);  // An invalid one is rejected first.
 }
 
-// The feed; sets `valve_id` if the options leave it open.
+// Opens the feed; sets `valve_id` if the options do not.
 std::unique_ptr<Feed> OpenFeed(const ReplayOptions& options,
                                const Restamping& restamping,
                                const cli::Context& context,
@@ -139,7 +139,7 @@ cli::Report Replay(ReplayOptions options, const cli::Context& context) {
   SamplePublisherOptions publishing =
       PublisherOptionsOf(options.delivery, speed);
   if (at_once) {
-    // A gateway goes on without a reader; one that is there paces it.
+    // A gateway continues without readers; an existing one paces it.
     publishing.needs_reader = options.delivery.wait_reader_s > 0.0;
   }
   Restamping restamping;

@@ -35,7 +35,7 @@ struct RunOptions {
   DeliveryOptions delivery;
 };
 
-// The scenario file, then the options, then --set.
+// Applies the scenario file, then the options, then --set.
 Scenario BaseScenario(const RunOptions& options) {
   Scenario scenario;
   ValveSimulationConfig& config = scenario.config;
@@ -100,7 +100,7 @@ std::vector<Scenario> Scenarios(const RunOptions& options) {
   return scenarios;
 }
 
-// Steps all valves in turn, so that their samples leave by time.
+// Steps all valves in turn, so that samples are delivered in order of time.
 class SimulationFeed final : public Feed {
  public:
   SimulationFeed(const std::vector<Scenario>& scenarios,
@@ -158,8 +158,8 @@ cli::Report Run(const RunOptions& options, const cli::Context& context) {
     ids.push_back(scenario.valve_id);
   }
 
-  // The files are opened before the wait for a reader, so that what cannot be
-  // written is refused at once; the runs begin behind it.
+  // The files are opened before waiting for a reader, so that errors show at
+  // once; the runs begin afterwards.
   FeedSinks sinks;
   if (!options.export_file.empty()) {
     sinks.csv = std::make_unique<CsvSink>(options.export_file);
@@ -181,7 +181,7 @@ cli::Report Run(const RunOptions& options, const cli::Context& context) {
   return Deliver(feed, sinks, speed, signals, std::move(valves));
 }
 
-// A number of any size, or a time as "10m".
+// A plain number, or a duration such as "10m".
 double SecondsOf(const std::string& text) {
   double seconds = 0.0;
   const char* end = text.data() + text.size();

@@ -15,9 +15,9 @@ using std::chrono::steady_clock;
 
 constexpr double kNeededWaitS = 30.0;
 constexpr double kCourtesyWaitS = 2.0;
-// How often a wait looks up for signals and for readers that left.
+// Interval at which waits check for signals and for readers that have left.
 constexpr milliseconds kLook(100);
-constexpr int kStalled = 50;  // looks until a stall is worth a line
+constexpr int kStalled = 50;  // checks before a stall is logged
 constexpr milliseconds kStopGrace(700);
 constexpr milliseconds kLiveAcknowledge(2000);
 constexpr milliseconds kLosslessAcknowledge(60'000);

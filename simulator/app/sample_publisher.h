@@ -16,7 +16,7 @@
 
 namespace fdi::simulator {
 
-/// Nobody listens. Exit code 4.
+/// There is no reader. Exit code 4.
 class NoReaderError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -25,12 +25,13 @@ class NoReaderError : public std::runtime_error {
 /// Settings of SamplePublisher.
 struct SamplePublisherOptions {
   bool lossless{false};          ///< The reader paces the writer.
-  bool needs_reader{false};      ///< Without one, nothing leaves.
+  bool needs_reader{false};      ///< Publish only while there is one.
   std::optional<double> wait_s;  ///< For a reader; see AwaitReader().
-  bool keep_alive{false};        ///< Do not end the streams.
+  bool keep_alive{false};        ///< Do not dispose the instances.
 };
 
-/// Publishes the samples of some valves and ends their streams. One thread.
+/// Publishes the samples of some valves and disposes them at the end. One
+/// thread.
 class SamplePublisher {
  public:
   /// @throws ConfigError, TransportError as idl::Participant.
@@ -38,25 +39,25 @@ class SamplePublisher {
                   std::vector<std::string> valve_ids,
                   const cli::Context& context, cli::StopSignals& signals);
 
-  /// Waits until a reader is there: for wait_s or 30 s if one is needed, else
-  /// for wait_s or 2 s, so that one which is up gets the first sample.
-  /// @throws NoReaderError naming domain and interface if one is needed.
+  /// Waits for a reader: for wait_s or 30 s if one is required, else for wait_s
+  /// or 2 s, so that a running reader gets the first sample.
+  /// @throws NoReaderError naming domain and interface if one is required.
   void AwaitReader();
 
-  /// Lossless: waits until there is room. Where a reader is needed and none is
-  /// left: waits for another.
-  /// @returns false if a stop was requested before the sample left.
+  /// If lossless, blocks until there is room. If a reader is required and none
+  /// is left, waits for another.
+  /// @returns false if a stop was requested before the sample was sent.
   /// @throws NoReaderError, TransportError
   bool Publish(std::size_t valve, const Sample& sample);
 
-  /// Waits until the readers have it all, ends the streams (unless keep_alive),
-  /// waits again; for 60 s lossless, else for 2 s. After a stop it waits a
-  /// moment only, and leaves streams open whose readers are behind.
-  /// @returns whether the readers have it all.
+  /// Waits for acknowledgement, disposes the instances (unless keep_alive) and
+  /// waits again; up to 60 s if lossless, else 2 s. After a stop it waits only
+  /// briefly, and does not dispose instances with readers that are behind.
+  /// @returns whether the readers have acknowledged everything.
   bool Finish();
 
   bool lossless() const { return options_.lossless; }
-  /// How many there are now.
+  /// Current number of readers.
   int readers() const { return writer_.status().matched; }
 
  private:
@@ -71,7 +72,7 @@ class SamplePublisher {
   idl::ValveSampleMessage message_;
 };
 
-/// The DDS settings of the command line, for `valves` valves.
+/// DDS settings from the command line, for `valves` valves.
 /// @throws ConfigError
 idl::DdsOptions DdsOptionsOf(const cli::GlobalOptions& options,
                              std::size_t valves);

@@ -14,9 +14,9 @@
 #include "diagnosis/error.h"
 #include "diagnosis/field_list.h"
 
-// A scenario as TOML. The keys of a table are the names of the members of its
-// struct, listed once for the reader and the writer; the unit of a field is the
-// end of its name, its range is in the Validate() of its struct.
+// A scenario as TOML. The keys of a table are the member names of its struct,
+// listed once for reader and writer; the unit of a field is the suffix of its
+// name, its range is in the Validate() of its struct.
 namespace fdi::simulator {
 namespace {
 
@@ -25,8 +25,8 @@ using std::filesystem::path;
 
 constexpr double kForever = 1e10;
 
-// VisitFields(value, visit) calls visit(name, field) for each field; a struct
-// within has a list of its own.
+// VisitFields(value, visit) calls visit(name, field) for each field; nested
+// structs have lists of their own.
 #define FDI_VISIT(FIELD) visit(#FIELD, value.FIELD);
 #define FDI_FIELDS(STRUCT, ...)                      \
   template <typename Visitor>                        \
@@ -72,7 +72,7 @@ path Resolve(const path& folder, const path& file) {
   return file.is_absolute() ? file : folder / file;
 }
 
-// Sets each field that its table names; the keys get known either way.
+// Sets the fields that the table contains; all keys become known.
 class FieldReader {
  public:
   explicit FieldReader(TomlReader& table) : table_(table) {}
@@ -125,7 +125,7 @@ class FieldReader {
   TomlReader& table_;
 };
 
-// The shortest text that reads back as `value`.
+// The shortest text that round-trips to `value`.
 template <typename Number>
 std::string Shortest(Number value) {
   std::array<char, 32> buffer{};
@@ -134,7 +134,7 @@ std::string Shortest(Number value) {
   return {buffer.data(), end};
 }
 
-// "[a, b, c]" of the texts that `text_of` makes of `items`.
+// "[a, b, c]", made by `text_of` from `items`.
 template <typename Items, typename TextOf>
 std::string List(const Items& items, TextOf text_of) {
   std::string list;
@@ -146,7 +146,7 @@ std::string List(const Items& items, TextOf text_of) {
 
 using Lines = std::vector<std::pair<std::string, std::string>>;
 
-// Appends "PREFIXfield" and its value for all fields, inner structs included.
+// Appends "PREFIXfield" and its value for all fields, nested structs included.
 class FieldWriter {
  public:
   FieldWriter(std::string prefix, Lines& lines)
@@ -200,7 +200,7 @@ void AppendDifferences(const std::string& prefix, Struct value, Struct defaults,
   }
 }
 
-// Runs `read`; a ConfigError without a place is given that of `key`.
+// Runs `read`; a ConfigError from it is reported at the place of `key`.
 template <typename Read>
 void AtKey(const TomlReader& table, std::string_view key, Read&& read) {
   try {
@@ -230,7 +230,7 @@ void ReadParameters(TomlReader& table, const path& folder,
   AtKey(table, kKey, [&] { Validate(parameters); });
 }
 
-// Takes CV, P1, P2 and T1 of a CSV as excitation, and its period and length.
+// Uses CV, P1, P2 and T1 of a CSV as excitation, with its period and length.
 void LoadExcitation(const path& folder, const std::string& file,
                     Scenario& scenario) {
   cli::CsvOptions options;
@@ -334,7 +334,7 @@ void ReadNumbers(TomlReader& table, ValveSimulationConfig& config) {
   }
 }
 
-// As TOML if it is that, else as text.
+// Parses the value as TOML if possible, else as text.
 TomlReader ReaderOf(const std::string& setting, std::string_view key,
                     std::string_view value) {
   const std::string source = "setting '" + setting + "'";
@@ -369,7 +369,7 @@ void AppendExcitation(const Scenario& scenario, Lines& result) {
       excitation);
 }
 
-// An inline table: {t_s = [0, 10], ...}.
+// As an inline table: {t_s = [0, 10], ...}.
 std::string InputText(const InputProfile& input) {
   Lines lines;
   AppendDifferences("", input, InputProfile{}, lines);

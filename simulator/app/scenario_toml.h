@@ -9,17 +9,17 @@
 
 namespace fdi::simulator {
 
-/// The defaults of ValveSimulationConfig for lublin-actuator-3.
+/// Defaults for the parameter set lublin-actuator-3.
 ValveSimulationConfig DefaultConfig();
 
-/// One simulated valve, as a TOML table describes it.
+/// One simulated valve, as described by a TOML table.
 struct Scenario {
   std::string valve_id{"VALVE-0001"};
-  ValveSimulationConfig config{DefaultConfig()};  ///< start_ns 0: not given.
-  std::string excitation_file;  ///< Of a csv excitation, as it was given.
+  ValveSimulationConfig config{DefaultConfig()};  ///< start_ns 0: not set.
+  std::string excitation_file;  ///< Of a csv excitation, as given.
 };
 
-/// Lays what `table` says over `scenario`; what it does not say stays. Keys:
+/// Applies `table` to `scenario`; what it does not mention is unchanged. Keys:
 ///
 ///     valve = "LC51_03"
 ///     parameters = "lublin-actuator-3"   # or a name of ParameterSetNames(),
@@ -57,40 +57,40 @@ struct Scenario {
 ///     name = "mine"
 ///     trim.kv_m3_h = 72.7
 ///
-/// A parameter file has the keys of [parameters]. Choosing a csv excitation
-/// sets period and, unless the table has duration_s, duration to the file's.
+/// A parameter file has the keys of [parameters]. A csv excitation sets the
+/// period and, unless the table has duration_s, the duration.
 ///
-/// @param folder Where relative file names start.
+/// @param folder base of relative file names.
 /// @throws ConfigError naming file, line, key, value and what is accepted. The
-///   caller's Finish() of the whole document refuses unknown keys.
+///   caller's Finish() of the whole document rejects unknown keys.
 /// @throws DataError if a csv excitation cannot be read.
 void ApplyScenario(cli::TomlReader& table, const std::filesystem::path& folder,
                    Scenario& scenario);
 
-/// Lays a whole file over `scenario`. @throws as ApplyScenario(), and
-/// ConfigError on an unknown key.
+/// Applies a whole file to `scenario`. @throws as ApplyScenario(), and
+/// ConfigError for an unknown key.
 void ApplyScenarioFile(const std::filesystem::path& path, Scenario& scenario);
 
-/// The named set, or what "FILE.toml" makes of it; `folder` as above.
+/// The named set, or the one in "FILE.toml"; `folder` as above.
 /// @throws ConfigError naming the accepted names.
 ValveParameters FindParameters(const std::string& name,
                                const std::filesystem::path& folder = {});
 
-/// Takes the excitation called `name`: operating-point, sine, level-loop or
-/// csv:FILE. @throws ConfigError naming these; DataError.
+/// Selects an excitation: operating-point, sine, level-loop or csv:FILE.
+/// @throws ConfigError naming these; DataError.
 void ChooseExcitation(const std::string& name,
                       const std::filesystem::path& folder, Scenario& scenario);
 
-/// Lays one `key=value` over `scenario`, e.g. "excitation.amplitude_pct=5" or
+/// Applies one `key=value` to `scenario`, e.g. "excitation.amplitude_pct=5" or
 /// "excitation=level-loop" (text needs no quotes). @throws as above.
 void ApplySetting(std::string_view setting, Scenario& scenario);
 
-/// The canonical text: TOML from which ApplyScenario() restores `scenario`. Of
-/// excitation and parameters it has what differs from the defaults of that name
-/// (which the software version pins). Numbers read back as the same bits.
+/// The canonical text: TOML from which ApplyScenario() restores `scenario`. For
+/// excitation and parameters it contains the differences from the defaults of
+/// that name (which the software version pins). Numbers round-trip bit for bit.
 std::string ScenarioText(const Scenario& scenario);
 
-/// Text in TOML's quotes.
+/// Text as a quoted TOML string.
 std::string QuoteToml(std::string_view text);
 
 }  // namespace fdi::simulator

@@ -1,5 +1,5 @@
-// fdi-store history: what people do about episodes (ack, label) and alarms that
-// are out of the way for a while (shelve, unshelve, shelf).
+// fdi-store history: operator actions on episodes (ack, label) and on alarms
+// (shelve, unshelve, shelf).
 #include <set>
 
 #include "diagnosis/error.h"
@@ -21,8 +21,8 @@ struct AckOptions {
   NoteOptions note;
 };
 
-// The episodes that are meant: those named, or all that the filter finds and
-// nobody has acknowledged.
+// The selected episodes: those named, or all unacknowledged ones that pass the
+// filter.
 std::vector<Episode> Chosen(const AckOptions& options, HistoryReader& reader,
                             const Context& context) {
   if (options.all != options.ids.empty()) {
@@ -45,7 +45,7 @@ std::vector<Episode> Chosen(const AckOptions& options, HistoryReader& reader,
 
 Report Acknowledge(const AckOptions& options, const Context& context) {
   const auto path = DataOf(context).history();
-  // The reader comes first, as an editor would make a file that is not there.
+  // The reader is opened first, because an editor would create a missing file.
   HistoryReader reader(path);
   // All ids are looked up before the first episode is acknowledged.
   auto episodes = Chosen(options, reader, context);
@@ -125,7 +125,7 @@ struct ShelveOptions {
   NoteOptions note;
 };
 
-// A valve that was never seen may be a slip of the pen.
+// Warns about a valve that was never seen, which may be a typing error.
 void WarnIfUnknown(const std::string& valve, HistoryReader& reader,
                    const Context& context) {
   std::set<std::string> known;

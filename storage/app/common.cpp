@@ -1,4 +1,4 @@
-// What the verbs have in common: options, values of documents, texts.
+// Shared by the verbs: options, JSON values, texts.
 #include <sstream>
 
 #include "diagnosis/error.h"
@@ -103,9 +103,9 @@ Json NumberJson(const std::optional<double>& number) {
   return number && std::isfinite(*number) ? Json(*number) : Json();
 }
 
-// Rounding is all that varies in an output that stood still: its variance is
-// some 1e-28 of what the residual has. Of an output that varies, a model would
-// have to miss by 3000 times its deviation to get here.
+// The VAF of an output that stood still is rounding noise: its variance is some
+// 1e-28 of that of the residual. For an output that varies, a model would have
+// to be off by 3000 standard deviations to get here.
 bool VafSaysSomething(double vaf) {
   return vaf > -1e9;
 }
@@ -181,7 +181,7 @@ void AddTextTable(Report& report, const cli::TextTable& table) {
   std::ostringstream text;
   table.Print(text);
   std::string lines = text.str();
-  lines.pop_back();  // Line() ends the last one.
+  lines.pop_back();  // Line() adds the last newline.
   report.Line(std::move(lines));
 }
 

@@ -1,4 +1,5 @@
-// fdi-store history: what many episodes tell together (stats, causes, shadow).
+// fdi-store history: aggregate figures over many episodes (stats, causes,
+// shadow).
 #include <algorithm>
 #include <set>
 
@@ -23,7 +24,7 @@ std::string SecondsText(double seconds) {
                              1'000'000'000);
 }
 
-// The rows of `map`, by episodes, the most first; of equals by name.
+// The rows of `map`, most episodes first, ties by name.
 template <typename Row>
 std::vector<std::pair<std::string, Row>> MostFirst(
     const std::map<std::string, Row>& map) {
@@ -175,7 +176,7 @@ Json CauseJson(const CommonCause& cause) {
           {"members", Rows(cause.members, member)}};
 }
 
-// Each value of a member once, in order.
+// The distinct values of a key of the members, sorted.
 std::set<std::string> Distinct(const Json& cause, const char* key) {
   std::set<std::string> values;
   for (const Json& member : cause["members"]) {
@@ -214,8 +215,8 @@ struct ShadowOptions {
   cli::TimeWindow window;
 };
 
-// The answers of the two sets stand in members of their own, "active" and
-// "candidate"; a path names them in columns: "active/model_set".
+// The answers of the two sets are objects, "active" and "candidate"; columns
+// refer to their members by a path: "active/model_set".
 Json DifferenceJson(const ShadowDifference& d) {
   return {{"valve_id", d.valve_id},
           {"source_id", Hex(d.source_id)},

@@ -32,14 +32,14 @@ Tone ToneOf(AlarmState state) {
   return Tone::kPlain;
 }
 
-// "20 s", or "-" while it has not happened.
+// "20 s", or "-" if it has not happened yet.
 std::string After(std::int64_t from_ns, std::optional<std::int64_t> to_ns) {
   return to_ns ? cli::FormatDuration(*to_ns - from_ns) : "-";
 }
 
-// What people see of an episode beside the columns of fault_history.
+// What the text output shows beside the columns of fault_history.
 struct EpisodeText {
-  AlarmState state;  // Shelved, or its own.
+  AlarmState state;  // Shelved, or else the episode's.
   std::string fault_name;
   std::string isolated_after;
   std::string lasted;
@@ -59,7 +59,7 @@ EpisodeTexts TextsOf(const std::vector<Alarm>& alarms, const Context& context) {
   return texts;
 }
 
-// Of an episode, or of one in the plant's history.
+// Rows of the plant history also have host and monitor.
 Json ListedJson(const Episode& e) {
   Json row = EpisodeJson(e);
   if (!e.monitor.empty()) {
@@ -118,7 +118,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   return report.Table("episodes", columns, "no episode matches");
 }
 
-// Transitions have faults and a factor, what people did has a who.
+// Transitions have faults and a factor; operator actions have a who.
 Json HistoryEntryJson(const HistoryEntry& event) {
   const bool by_hand = !event.who.empty();
   return {{"kind", event.kind},
@@ -288,7 +288,7 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
   return report;
 }
 
-// Reads back as the same bits; "nan".
+// Round-trips bit for bit; "nan" for NaN.
 std::string CsvNumber(double value) {
   if (std::isnan(value)) {
     return "nan";
@@ -296,7 +296,7 @@ std::string CsvNumber(double value) {
   return cli::NumberText(value);
 }
 
-// Heading of a signal, as in the CSV contract.
+// CSV heading of a signal, as in the import format.
 std::string Heading(Signal signal, FlowUnit flow_unit) {
   const std::string name(SignalName(signal));
   if (signal == Signal::kF) {
@@ -306,8 +306,8 @@ std::string Heading(Signal signal, FlowUnit flow_unit) {
   return name + (unit == "%" ? "_pct" : unit.empty() ? "" : "_" + unit);
 }
 
-// A row per instant: time, verdict, the signals that the valve has, residuals
-// by channel, decision factors. What is missing is nan.
+// One row per instant: time, verdict, the signals of the valve, residuals by
+// channel, decision factors. Missing values are nan.
 void WriteTrace(const Episode& episode, const std::vector<TracePoint>& trace,
                 std::ostream& out) {
   SignalMask present = 0;

@@ -1,4 +1,4 @@
-// fdi-store keys init, add, renew, list: the keys of a bus that is locked.
+// fdi-store keys init, add, renew, list: the keys of a secured bus.
 #include "idl/security/keys.h"
 
 #include "diagnosis/error.h"
@@ -19,7 +19,7 @@ struct KeyOptions {
   int days{kKeyDays};
 };
 
-// "days_left" is of now.
+// "days_left" counts from now.
 Json KeyJson(const idl::KeyInfo& key) {
   return {{"name", key.name},
           {"role", idl::RoleName(key.role)},

@@ -1,7 +1,7 @@
 #include "storage/app/verbs.h"
 #include "storage/database/database.h"
 
-// NOLINTNEXTLINE(bugprone-exception-escape): of no memory it may end.
+// NOLINTNEXTLINE(bugprone-exception-escape): only std::bad_alloc.
 int main(int argc, char** argv) {
   fdi::cli::Program program(
       "fdi-store",

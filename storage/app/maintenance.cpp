@@ -16,7 +16,7 @@ struct File {
   const char* name;
   std::filesystem::path path;
   const Schema* schema;
-  /// What `doctor` counts.
+  /// Figures that `doctor` reports: name and query.
   std::vector<std::pair<const char*, const char*>> counts;
 };
 
@@ -96,7 +96,7 @@ std::string VerdictText(const Json& finding) {
                                           : "not there";
 }
 
-// Of files that are there; in kB if `divisor` is 1000.
+// Only for files that exist; in kB if `divisor` is 1000.
 cli::Column NumberColumn(std::string heading, const char* key, int divisor) {
   return TextColumn(
       std::move(heading),
@@ -195,7 +195,7 @@ struct PruneOptions {
   bool dry_run{false};
 };
 
-// One row per kind of record for which there is a limit.
+// One row per kind of record that has a limit.
 Json PruneAll(const PruneOptions& options, const DataDirectory& data) {
   struct Task {
     const AgeAndSize& asked;

@@ -105,7 +105,7 @@ std::string DecisionText(const DecisionParameters& d) {
          std::to_string(d.clearing_samples) + " samples";
 }
 
-// A line of the table of observers is one channel of one observer.
+// One row per channel of each observer.
 void AddObservers(const ModelSet& models, Report& report) {
   using cli::Align;
   cli::TextTable table({{"observer"},

@@ -1,5 +1,4 @@
-// fdi-store faults, health show|trend, worklist: what a maintenance planner
-// asks.
+// fdi-store faults, health show|trend, worklist: for maintenance planners.
 #include <algorithm>
 #include <string>
 
@@ -90,8 +89,8 @@ std::string ChannelsText(const Json& hour) {
   return text.empty() ? "-" : text;
 }
 
-// The CSV has a line per hour and channel, and so is another table than that
-// for people, whose line is an hour. An hour without channels has a line, too.
+// The CSV has a row per hour and channel, unlike the text table, whose row is
+// an hour. An hour without channels gets a row, too.
 Report CsvOf(const Json& hours, bool of_plant) {
   Report report;
   Json& rows = report.document["hours"] = Json::array();

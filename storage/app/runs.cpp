@@ -25,7 +25,7 @@ Json LabelJson(const RunLabel& label) {
           {"to_s", NumberJson(label.to_s)}};
 }
 
-// One run as every verb of the group prints it.
+// A run as all verbs of the group show it.
 Json RunJson(const RunInfo& info) {
   const NewRun& run = info.run;
   Json intake = Json::object();
@@ -72,7 +72,7 @@ std::optional<RunOrigin> OriginOf(const std::string& name) {
                     "'; there are simulated, imported, recorded");
 }
 
-// "f19 0.50", "f7 0.20, ..." of the last of several labels, "stored", "-".
+// "f19 0.50"; "f7 0.20, ..." for the last of several labels; "stored"; "-".
 std::string TruthText(const Json& run) {
   const Json& labels = run["labels"];
   if (labels.empty()) {
@@ -196,7 +196,7 @@ Report ImportRuns(const RunImportOptions& options, const Context& context) {
   run.source_id = RandomSource();
   run.start_ns = table.start_ns;
   run.origin = RunOrigin::kImported;
-  // How the original became the run stands in the run's record.
+  // The run records how it was made from the original file.
   run.scenario = options.file;
   for (const std::string& note : table.notes) {
     run.scenario += '\n' + note;
@@ -215,7 +215,7 @@ Report ImportRuns(const RunImportOptions& options, const Context& context) {
     report.Line("run " + id + ": " + std::to_string(stored.back().samples) +
                 " samples of " + options.valve);
   }
-  // The keys of the first run stand at the top, as there is but one as a rule.
+  // The first run's keys go to the top level, as there is usually only one run.
   report.document = RunJson(stored.front());
   report.document["samples"] = samples;
   report.document["ignored_columns"] = table.header.ignored_columns;

@@ -1,4 +1,4 @@
-// fdi-store ship: brings the history to the plant's, in PostgreSQL.
+// fdi-store ship: copies the history to the plant history in PostgreSQL.
 #include <algorithm>
 #include <chrono>
 #include <set>
@@ -64,8 +64,8 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
                       "nothing was new");
 }
 
-// Each reason once, until it works again; pauses double up to five minutes.
-// There is nothing to tidy up at a signal: a kill loses nothing.
+// Reports each reason once until shipping works again; pauses double up to five
+// minutes. No cleanup is needed on a signal: a kill loses nothing.
 [[noreturn]] void ShipForEver(const ShipOptions& options,
                               const Context& context) {
   const std::chrono::nanoseconds every(cli::ParseDuration(options.every));

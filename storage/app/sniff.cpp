@@ -1,4 +1,4 @@
-// fdi-store runs sniff: what a file of a plant holds, and a tag map for it.
+// fdi-store runs sniff: analyses an exported file and proposes a tag map.
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -22,12 +22,12 @@ struct SniffedColumn {
   std::vector<double> values;
   std::size_t cells{0};
   std::size_t missing{0};
-  std::size_t words{0};  // Neither numbers nor known words for no reading.
+  std::size_t words{0};  // Neither numbers nor known words for "no reading".
   std::set<std::string> texts{};
   std::optional<Signal> signal{};
   std::string unit{};
   bool opening{false};
-  std::string guessed{};  // Why, and what is not certain.
+  std::string guessed{};  // Reasons, and what is uncertain.
 
   double Median() const {
     std::vector<double> sorted = values;
@@ -44,7 +44,7 @@ struct Sniffed {
   cli::ColumnMap map;
   std::size_t rows{0};
   std::vector<double> times_s;
-  std::string date{};  // Of [time]
+  std::string date{};  // The column of [time].
   bool dated{false};
   std::string time_guess{};
   std::vector<SniffedColumn> columns;
@@ -84,7 +84,8 @@ double MedianStep(const std::vector<double>& times_s) {
   return *middle;
 }
 
-// "bar g" of "PT101 [bar g]" or "P1 (bar g)", "t/h" of "F_t_h"; or nothing.
+// The unit in a name: "bar g" of "PT101 [bar g]" or "P1 (bar g)", "t/h" of
+// "F_t_h"; else empty.
 std::string UnitInName(Signal signal, std::string_view name) {
   const std::size_t open = name.find_first_of("[(");
   const std::size_t close = name.find_last_of("])");
@@ -109,8 +110,8 @@ std::string UnitInName(Signal signal, std::string_view name) {
   return {};
 }
 
-// What a tag may be, by its letters after ISA 5.1 and by usual words. Both
-// pressures are P1 until they are told apart by size.
+// Guesses the signal from ISA 5.1 tag letters and common words. Both pressures
+// are P1 until their sizes tell them apart.
 std::optional<Signal> SignalOfName(const std::string& name) {
   std::string plain = Lower(name.substr(0, name.find_first_of("[(")));
   while (!plain.empty() && plain.back() == ' ') {
@@ -149,7 +150,7 @@ std::optional<Signal> SignalOfName(const std::string& name) {
   if (Has(plain, {"flow", "durchfl", "menge"})) {
     return Signal::kF;
   }
-  // The letters in front of the loop number: of "20.FIC101" FIC.
+  // The letters in front of the loop number: FIC in "20.FIC101".
   const std::size_t digit = plain.find_last_of("0123456789");
   std::size_t end = digit == std::string::npos ? plain.size() : digit;
   while (end > 0 && !std::isalpha(static_cast<unsigned char>(plain[end - 1]))) {
@@ -206,7 +207,7 @@ void GuessUnit(SniffedColumn& column) {
   column.guessed += "unit by size; ";
 }
 
-// Of b with a as it was 0, 1 or 2 periods before, the strongest.
+// Correlation of b with a delayed by 0, 1 or 2 periods, the strongest.
 double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
   std::map<double, double> at;
   for (std::size_t k = 0; k < a.values.size(); ++k) {
@@ -217,7 +218,7 @@ double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
     cli::CorrelationSums sums;
     for (std::size_t k = static_cast<std::size_t>(lag); k < b.values.size();
          ++k) {
-      // Of a compressed table, the last reading holds.
+      // In a compressed table, the last reading remains valid.
       const auto after =
           at.upper_bound(b.times_s[k - static_cast<std::size_t>(lag)]);
       if (after != at.begin()) {
@@ -230,7 +231,7 @@ double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
   return strongest;
 }
 
-// The signals by name, one column each, then units and senses.
+// Signals by name, at most one column each; then units and senses.
 void GuessSignals(std::vector<SniffedColumn>& columns) {
   for (SniffedColumn& column : columns) {
     if (column.values.empty() || column.words > column.values.size()) {
@@ -247,8 +248,8 @@ void GuessSignals(std::vector<SniffedColumn>& columns) {
     }
     return found;
   };
-  // What flows from 1 to 2 loses pressure. A P2 that says so in its name, as in
-  // the contract, keeps it.
+  // The pressure falls in the direction of flow. A column named P2, as in the
+  // import format, stays P2.
   std::vector<SniffedColumn*> pressures = of(Signal::kP1);
   if (pressures.size() == 2 && of(Signal::kP2).empty()) {
     SniffedColumn* low = pressures[0]->Median() < pressures[1]->Median()
@@ -270,8 +271,8 @@ void GuessSignals(std::vector<SniffedColumn>& columns) {
       GuessUnit(*found.front());
     }
   }
-  // The flow rises with the opening, and follows the rod more closely than the
-  // command.
+  // The flow rises with the opening, and follows the rod more closely than it
+  // follows the command.
   const auto flow = of(Signal::kF);
   const auto cv = of(Signal::kCv);
   std::vector<SniffedColumn*> moving = of(Signal::kX);
@@ -295,15 +296,15 @@ void GuessSignals(std::vector<SniffedColumn>& columns) {
   }
 }
 
-// Seconds of the time cells; nothing where one is no time.
+// Seconds of a time cell; nothing if it cannot be read as a time.
 class TimeReader {
  public:
   explicit TimeReader(const cli::ColumnMap& map)
       : map_(map), clock_(map.zone) {}
   std::optional<double> Read(const std::string& cell) {
     if (const auto number = cli::ParseNumber(cell, map_.decimal)) {
-      // Days of a spreadsheet become seconds; the form itself is found out by
-      // the reader.
+      // Spreadsheet day numbers become seconds; the importer detects the format
+      // itself.
       const bool serial =
           *number > 3e4 && *number < 7e4 && *number != std::floor(*number);
       dated_ = dated_ || serial;
@@ -345,7 +346,7 @@ std::vector<Cells> CellsOf(const std::string& text, const cli::ColumnMap& map) {
   return rows;
 }
 
-// d/m/y or m/d/y, where a number above 12 tells.
+// Tells d/m/y from m/d/y, where a number above 12 decides it.
 cli::DateOrder OrderOf(const std::vector<Cells>& rows, std::size_t column) {
   bool day_first = true;
   bool month_first = true;
@@ -386,7 +387,7 @@ std::optional<std::size_t> FindTime(const std::vector<Cells>& rows,
         found.time_guess = "day before month; ";
       }
     }
-    // A date whose time of day stands in the next column.
+    // A date with the time of day in the next column.
     if (slashed && cell.size() <= 11 && c + 1 < header.size() &&
         rows[1].size() > c + 1 &&
         cli::ScanTime(cell + ' ' + rows[1][c + 1], found.map.date_order)) {
@@ -414,7 +415,7 @@ void AddCell(const std::string& cell, double t_s, char decimal,
   }
 }
 
-// A table with a column of few names beside one of values is long.
+// A table is long if one column has few distinct names beside one of values.
 void FindTags(const std::vector<Cells>& rows, const std::vector<double>& times,
               Sniffed& found) {
   std::vector<SniffedColumn>& columns = found.columns;
@@ -468,7 +469,7 @@ double Rounded(double period_s) {
   return period_s;
 }
 
-// Period, jitter and gaps, and what --resample would help.
+// Period, jitter and gaps, and whether --resample would help.
 void JudgeTiming(Sniffed& found) {
   std::vector<double> times = found.times_s;
   std::ranges::sort(times);
@@ -538,7 +539,7 @@ Sniffed Sniff(const std::string& text, const std::string& source,
   }
   for (std::size_t r = 1; r < rows.size(); ++r) {
     if (rows[r].size() != header.size()) {
-      continue;  // The reader names it.
+      continue;  // The importer reports it.
     }
     std::string cell = rows[r][*time];
     cell += split ? ' ' + rows[r][*time + 1] : "";
@@ -571,7 +572,7 @@ std::string TomlText(const std::string& text) {
   return quoted + '"';
 }
 
-// The tag map to edit; what was guessed says so.
+// The tag map to edit, with guesses marked as such.
 std::string MapText(const Sniffed& found, const std::string& file) {
   std::string text = "# Of " + file +
                      ", by fdi-store runs sniff. Check what is guessed.\n"

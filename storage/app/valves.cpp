@@ -21,8 +21,8 @@ Json SetJson(const std::optional<ModelReference>& reference) {
   return reference ? Json(ToString(*reference)) : Json();
 }
 
-// An entry stands for the valves whose ids match its pattern, so that it has no
-// valve_id of its own.
+// An entry applies to all valves whose ids match its pattern, so it has no
+// valve_id.
 Json EntryJson(const ValveEntry& entry) {
   return {{"valve", entry.pattern},
           {"type", entry.type},
@@ -79,7 +79,7 @@ Json BaselineJson(const BaselineRecord& record) {
 }
 
 // As found and as left: a column for the newest baseline of each epoch, a row
-// for every figure that one of them has.
+// for every figure in any of them.
 void AddComparison(const std::vector<BaselineRecord>& records, Report& report) {
   std::vector<BaselineRecord> newest;
   for (const BaselineRecord& record : records) {
@@ -92,7 +92,7 @@ void AddComparison(const std::vector<BaselineRecord>& records, Report& report) {
   if (newest.empty()) {
     return;
   }
-  std::vector<std::string> names;  // In the order in which they come.
+  std::vector<std::string> names;  // In order of first occurrence.
   std::vector<std::map<std::string, double>> figures(newest.size());
   std::vector<cli::TextTable::Column> columns = {{"baseline"}};
   for (std::size_t i = 0; i < newest.size(); ++i) {
@@ -133,7 +133,7 @@ void AddComparison(const std::vector<BaselineRecord>& records, Report& report) {
   AddTextTable(report, table);
 }
 
-// Time by quality; nothing if no monitor has run here.
+// Time by quality; empty if no monitor has run here.
 std::vector<CoverageTime> CoverageOf(const std::string& valve_id,
                                      const Context& context) {
   const auto path = DataOf(context).history();
@@ -145,7 +145,7 @@ std::vector<CoverageTime> CoverageOf(const std::string& valve_id,
   return HistoryReader(path).Coverage(filter);
 }
 
-// `fields` come first: what counts for the valve whose entry it is.
+// `fields` come first: they apply to the valve whose entry it is.
 void AddEntry(ModelStore& store, const ValveEntry& entry,
               std::vector<cli::Column> fields, Report& report) {
   fields.insert(
@@ -173,7 +173,7 @@ void AddEntry(ModelStore& store, const ValveEntry& entry,
   AddComparison(baselines, report);
 }
 
-// What counts for one valve: the entry that matches it and the set it gets.
+// What applies to one valve: the entry that matches it and its model set.
 Report ShowValve(const std::string& valve_id, const Context& context) {
   ModelStore store(DataOf(context).models());
   const auto entry = store.FindValve(valve_id);
@@ -201,7 +201,7 @@ Report ShowValve(const std::string& valve_id, const Context& context) {
   return report;
 }
 
-// The entry as it is after a change.
+// Reports the entry after a change.
 Report Changed(const ValveEntry& entry) {
   Report report;
   report.document = EntryJson(entry);
@@ -234,7 +234,7 @@ Report AddValves(const AddOptions& options, const Context& context) {
   ModelStore store = WritableModels(context);
   if (!options.model_set.empty()) {
     entry.model_set = ParseModelReference(options.model_set);
-    store.Summary(*entry.model_set);  // It must exist.
+    store.Summary(*entry.model_set);  // Throws if it does not exist.
   }
   store.PutValve(entry);
   return Changed(entry);
@@ -268,7 +268,7 @@ struct EventOptions {
   std::string who{cli::UserName()};
 };
 
-// A replaced, repacked or recalibrated valve is another valve to its models.
+// To the models, a replaced, repacked or recalibrated valve is a different one.
 Report Event(const EventOptions& options, const Context& context) {
   ValveEvent event;
   event.kind = ParseValveEventKind(options.kind);
@@ -296,7 +296,7 @@ ExclusiveLock LockOf(const DataDirectory& data) {
   return {path += ".lock", "recording faults; stop it to move valves"};
 }
 
-// Ids in models.db and history.db, of those that the glob matches.
+// Ids in models.db and history.db that match the glob.
 std::vector<std::string> ValvesToMove(ModelStore& models, Database& history,
                                       const std::string& glob) {
   std::vector<std::string> valves = ValvesInProgress(history, glob);
@@ -311,7 +311,8 @@ std::vector<std::string> ValvesToMove(ModelStore& models, Database& history,
   return valves;
 }
 
-// First all is copied, then all is deleted: what is interrupted is done anew.
+// Everything is copied before anything is deleted, so an interrupted move can
+// be repeated.
 Report Move(const MoveOptions& options, const Context& context) {
   const DataDirectory from = DataOf(context);
   const DataDirectory to{options.target};

@@ -22,8 +22,8 @@
 #include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
 
-/// The verbs of fdi-store, one file per noun. A verb reads what it needs, fills
-/// the document of a Report, and declares which of its members people see.
+/// The verbs of fdi-store, one file per noun. A verb reads its data, fills the
+/// document of a Report, and declares which members the text output shows.
 namespace fdi::storage {
 
 class ModelStore;
@@ -39,7 +39,7 @@ void AddModelsVerbs(cli::Program& program);
 void AddValvesVerbs(cli::Program& program);
 void AddTypesVerbs(cli::Program& program);
 void AddHistoryVerbs(cli::Program& program);  ///< list, show, export, plot
-// To the group `history`, which must be there.
+// Added to the group `history`, which must exist.
 void AddHistoryFigures(cli::Program& program, CLI::App& group);
 void AddAlarmVerbs(cli::Program& program, CLI::App& group);
 void AddPlannerVerbs(cli::Program& program);  ///< faults, health, worklist
@@ -47,14 +47,14 @@ void AddMaintenanceVerbs(cli::Program& program);
 void AddKeysVerbs(cli::Program& program);
 void AddShipVerb(cli::Program& program);
 
-/// For --help and the manual pages.
+/// Examples for --help and the manual pages.
 std::vector<cli::VerbExamples> Examples();
 
-/// Of a verb without options.
+/// For verbs without options.
 struct NoOptions {};
 
 /// Adds a verb to a group or, with program.root(), to the program. The action
-/// gets the Options that the caller ties to the options of the command line:
+/// receives the Options that the caller binds to command-line options:
 ///
 ///     auto [verb, options] = AddVerb(program, group, "list", "...", List);
 ///     verb.add_option("--valve", options.valve, "Glob over valve ids");
@@ -73,14 +73,14 @@ std::pair<CLI::App&, Options&> AddVerb(cli::Program& program, CLI::App& group,
   return {verb, *options};
 }
 
-/// --data.
+/// The data directory of --data.
 DataDirectory DataOf(const Context& context);
-/// --data, made if it is not there; for verbs that write.
+/// The same, created if it does not exist; for verbs that write.
 DataDirectory WritableDataOf(const Context& context);
-/// The models in it, to change.
+/// Its model store, opened for changes.
 ModelStore WritableModels(const Context& context);
 
-/// The options that narrow a list of episodes.
+/// Options that filter a list of episodes.
 struct EpisodeOptions {
   std::string valve{"*"};
   std::string fault;
@@ -93,7 +93,7 @@ struct EpisodeOptions {
   EpisodeFilter Filter(const Context& context) const;
 };
 
-/// --from, --monitor: another history than that of --data.
+/// --from, --monitor: selects a history other than that of --data.
 struct PlantOptions {
   std::string url;
   std::string monitor;
@@ -102,7 +102,7 @@ struct PlantOptions {
   void AddTo(CLI::App& verb);
 };
 
-/// Which episodes, and of which history.
+/// Which episodes of which history.
 struct HistoryOptions {
   EpisodeOptions filter;
   PlantOptions plant;
@@ -117,13 +117,13 @@ struct HistoryOptions {
 std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
                                      const Context& context);
 
-/// The options of what people do: --by, --comment.
+/// Options of operator actions: --by, --comment.
 struct NoteOptions {
   std::string who{cli::UserName()};
   std::string comment;
 
   void AddTo(CLI::App& verb);
-  /// From this program, now.
+  /// A note from this program, stamped now.
   OperatorNote Note() const;
 };
 
@@ -134,17 +134,17 @@ void AddOutput(CLI::App& verb, std::string& output);
 /// --limit.
 void AddLimit(CLI::App& verb, std::int64_t& limit);
 
-// Values of documents: null where there is none.
+// JSON values; null where there is none.
 Json TimeJson(const std::optional<std::int64_t>& stamp_ns);  ///< RFC 3339, UTC
 Json TextJson(const std::optional<std::string>& text);  ///< Null if empty, too.
 Json NumberJson(const std::optional<double>& number);   ///< Null if not finite.
-/// The variance accounted for, 100 (1 - var(residual) / var(output)) %, says
-/// nothing of an output that stood still in the validation data.
+/// False if the variance accounted for, 100 (1 - var(residual) / var(output))
+/// %, is meaningless because the output stood still in the validation data.
 bool VafSaysSomething(double vaf);
-Json VafJson(double vaf);              ///< Null where it says nothing.
+Json VafJson(double vaf);              ///< Null if it is meaningless.
 std::string Hex(std::uint64_t value);  ///< 16 digits
 
-/// An array of what `row_of` makes of each item.
+/// An array with row_of(item) for each item.
 template <typename Items, typename RowOf>
 Json Rows(const Items& items, RowOf row_of) {
   Json rows = Json::array();
@@ -161,15 +161,15 @@ Json ShelfJson(const Shelf& shelf);
 
 /// {"V1": {"LIVE": 12.5, ...}, ...}: hours by valve and quality.
 Json HoursJson(const std::vector<CoverageTime>& coverage);
-/// The same as a table for people; nothing if there are none.
+/// The same as a text table; adds nothing if it is empty.
 void AddHours(Report& report, const std::vector<CoverageTime>& coverage);
-/// A table for people alone, whose rows are not rows of the document.
+/// A table in the text output only, whose rows are not in the document.
 void AddTextTable(Report& report, const cli::TextTable& table);
 
-/// As the user wants times, "-" if there is none.
+/// In the user's time format; "-" if there is none.
 std::string TimeText(const std::optional<std::int64_t>& stamp_ns,
                      const Context& context);
-/// A column, or field, whose text for people is not a member of the document.
+/// A column, or field, whose text is not a member of the document.
 cli::Column TextColumn(std::string heading,
                        std::function<std::string(const Json& row)> text,
                        int spare = 0, cli::Align align = cli::Align::kLeft);

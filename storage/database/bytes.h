@@ -42,10 +42,10 @@ class ByteWriter {
   std::vector<std::byte> bytes_;
 };
 
-/// Reads back what ByteWriter wrote; never beyond the end.
+/// Reads back what ByteWriter wrote, with bounds checks.
 class ByteReader {
  public:
-  /// @param where the bytes come from, for messages; must outlive the reader.
+  /// @param where the bytes come from, for error messages; outlives the reader.
   ByteReader(std::span<const std::byte> bytes, std::string_view where)
       : bytes_(bytes), where_(where) {}
 
@@ -81,7 +81,7 @@ class ByteReader {
     return taken;
   }
 
-  /// @throws DataError if there are bytes left.
+  /// @throws DataError if bytes remain.
   void ExpectEnd() const {
     if (!bytes_.empty()) {
       Refuse(std::to_string(bytes_.size()) + " bytes too many");

@@ -14,13 +14,13 @@ struct DataDirectory {
   std::filesystem::path history() const { return path / "history.db"; }
 };
 
-/// Sizes of a database and of its write-ahead log [byte], 0 where there is
-/// none; from any thread, beside those that use it. A log grows without end
-/// while a reader keeps its transaction open.
+/// Sizes of a database and of its write-ahead log [byte], 0 if the file is
+/// missing. Thread safe, and safe beside open connections. The log grows
+/// without bound while a reader keeps its transaction open.
 std::uintmax_t FileBytes(const std::filesystem::path& database);
 std::uintmax_t WalBytes(const std::filesystem::path& database);
 
-/// Makes the folder if it is not there; for programs that write.
+/// Creates the folder if it does not exist; for programs that write.
 /// @throws DataError naming the path and the reason.
 void EnsureExists(const DataDirectory& directory);
 

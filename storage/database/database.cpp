@@ -36,7 +36,7 @@ auto SqliteCall(std::string_view operation, Call&& call) {
   throw DataError("database " + path.string() + ": " + reason);
 }
 
-/// Names the reason that SQLite would hide behind "unable to open".
+/// Reports the reason that SQLite would hide behind "unable to open".
 void CheckReachable(const std::filesystem::path& path, Access access) {
   std::error_code error;
   const auto folder = path.has_parent_path() ? path.parent_path() : ".";
@@ -70,7 +70,7 @@ std::unique_ptr<SQLite::Database> Connect(const std::filesystem::path& path,
   }
 }
 
-/// The first name like `<file>.v1.backup` that is free.
+/// The first unused name like `<file>.v1.backup`.
 std::filesystem::path FreeBackupName(const std::filesystem::path& path,
                                      int version) {
   const std::string stem = path.string() + ".v" + std::to_string(version);
@@ -81,7 +81,7 @@ std::filesystem::path FreeBackupName(const std::filesystem::path& path,
   return name;
 }
 
-// SQLiteCpp keeps the handle of a statement to itself: find it by its text.
+// SQLiteCpp does not expose its statement handle, so it is found by its text.
 bool Writes(sqlite3* connection, const std::string& sql) {
   for (sqlite3_stmt* s = sqlite3_next_stmt(connection, nullptr); s != nullptr;
        s = sqlite3_next_stmt(connection, s)) {
@@ -156,6 +156,8 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
     Configure(schema);
     return;
   }
+  // Under the gate, so that two writers that open a new file do not both
+  // create it.
   const GateHolder holder(*gate_, path);
   version_ = CheckIdentity(schema);
   Configure(schema);
@@ -222,13 +224,14 @@ void Database::Configure(const Schema& schema) {
   if (access_ == Access::kOccasionalWriter) {
     Execute("PRAGMA wal_autocheckpoint = 0");
   } else {
-    // What a busy recorder touches in a few commits [KiB, pages of 4 KiB].
+    // The pages that a busy recorder touches in a few commits [KiB].
     Execute("PRAGMA cache_size = -32768");
     Execute("PRAGMA wal_autocheckpoint = 4000");
   }
 }
 
 void Database::Migrate(const Schema& schema, int from) {
+  // VACUUM INTO cannot run inside a transaction: the caller holds the gate.
   if (from > 0) {
     migration_backup_ = FreeBackupName(path_, from);
     BackupTo(*migration_backup_);
@@ -284,7 +287,7 @@ bool Database::Checkpoint() {
   }
   const GateHolder holder(*gate_, path_);
   sqlite3* handle = connection_->getHandle();
-  sqlite3_busy_timeout(handle, 0);  // A reader may stay for hours.
+  sqlite3_busy_timeout(handle, 0);  // A reader may last for hours.
   const int code = sqlite3_wal_checkpoint_v2(
       handle, nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
   sqlite3_busy_timeout(handle, static_cast<int>(kWritePatience.count()));
@@ -317,7 +320,7 @@ void Database::BackupTo(const std::filesystem::path& target) {
     throw DataError("database " + path_.string() + ": backup " +
                     target.string() + " exists already");
   }
-  // A copy is a write to SQLite: lift the lock of a reader for it.
+  // VACUUM INTO counts as a write: a reader's query_only is lifted for it.
   const bool reader = access_ == Access::kReader;
   try {
     if (reader) {
@@ -397,7 +400,8 @@ void Statement::Run() {
 }
 
 void Statement::Reset() {
-  // The result of a reset repeats the error of the step before: not an error.
+  // reset() repeats the error of the preceding step(), which is not an error
+  // here.
   statement_->tryReset();
 }
 
@@ -523,7 +527,7 @@ Snapshot::~Snapshot() {
   try {
     database_.Prepare("COMMIT").Run();
   } catch (const std::exception&) {
-    // A read transaction that cannot end ends with its connection.
+    // If COMMIT fails, the read transaction ends with its connection.
   }
 }
 

@@ -23,8 +23,8 @@ namespace fdi::storage {
 
 class WriteGate;
 
-/// How an enumeration stands in a text column, e.g. FlowUnit as "m3/h".
-/// Specialised by who stores it, with
+/// Text form of an enumeration in a column, e.g. FlowUnit as "m3/h".
+/// Specialised by the code that stores it, with
 ///
 ///     static constexpr auto name = FlowUnitName;    // of a value
 ///     static constexpr auto last = FlowUnit::kTPerHour;
@@ -33,19 +33,19 @@ class WriteGate;
 template <typename Enum>
 struct EnumText {};
 
-/// @throws DataError saying that the file has a name unknown to this program.
+/// @throws DataError: the file holds a name unknown to this program.
 [[noreturn]] void RefuseName(std::string_view name);
 
-/// ns UTC.
+/// Current UTC time [ns].
 std::int64_t UtcNow();
 
-/// Lists of names stand in one column, joined by |: "a|b" is {"a", "b"}, and
-/// "" is {}.
+/// Lists of names are stored in one column, joined by |: "a|b" is {"a", "b"},
+/// and "" is {}.
 std::vector<std::string> SplitNames(std::string_view joined);
 std::string JoinNames(const std::vector<std::string>& names);
 
-/// A failed call of SQLite while a database is in use. (What is wrong with a
-/// file when it is opened is a DataError.)
+/// A failed SQLite call on an open database. (Errors in opening a file are
+/// DataErrors.)
 class SqliteError : public std::runtime_error {
  public:
   SqliteError(int code, const std::string& message);
@@ -60,40 +60,40 @@ class SqliteError : public std::runtime_error {
   int code_;
 };
 
-/// How a connection uses its file. SQLite before 3.51.3 may corrupt a WAL file
-/// if two connections write or checkpoint at the same moment. So every writing
-/// transaction passes a gate, a lock on `<file>.gate`, and only a kWriter
-/// checkpoints, inside the gate. (The last connection of a file folds the log
-/// in when it closes, as SQLite does under its own exclusive lock.)
+/// How a connection uses its file. SQLite before 3.51.3 may corrupt a WAL
+/// database if two connections write or checkpoint at the same moment. So every
+/// write transaction holds a lock on `<file>.gate`, and only a kWriter
+/// checkpoints, while holding it. (The last connection to close checkpoints,
+/// too, under SQLite's own exclusive lock.)
 enum class Access {
-  kWriter,  ///< The service that records; creates, migrates, checkpoints.
-  kOccasionalWriter,  ///< A command that writes once; creates and migrates.
-  kReader,  ///< Read only; the file must exist in the current version.
+  kWriter,  ///< The recording service; creates, migrates, checkpoints.
+  kOccasionalWriter,  ///< A one-shot command; creates and migrates.
+  kReader,            ///< Read-only; the file must have the current version.
 };
 
 enum class Synchronous {
-  kNormal,  ///< Power loss may take the last commits; never corrupts.
-  kFull,    ///< A commit is on the disk when it returns.
+  kNormal,  ///< Power loss may lose the last commits; never corrupts.
+  kFull,    ///< A commit is durable when it returns.
 };
 
-/// What a database file must be. Tables are STRICT.
+/// Identity and version of a database file. Tables are STRICT.
 struct Schema {
-  std::string_view kind;           ///< For messages: "run", "model", "history".
+  std::string_view kind;           ///< In messages: "run", "model", "history".
   std::int32_t application_id{0};  ///< Marks the file as this kind.
   Synchronous synchronous{Synchronous::kFull};
   /// migrations[v] is the SQL script from version v to v + 1; their number is
-  /// the current version. Never edit one that was released: append.
+  /// the current version. Never edit a released one: append.
   std::vector<std::string_view> migrations;
-  /// Queries of Check() beside those of SQLite: one finding per row, as text.
+  /// Additional queries of Check(): one finding per row, as text.
   std::vector<std::string_view> checks{};
 };
 
 class Database;
 
-/// What SQLite holds in a column of a row.
+/// Storage class of a column in a row.
 enum class ColumnType { kInteger, kReal, kText, kBlob, kNull };
 
-/// A prepared statement. Columns and parameters are typed at the call; columns
+/// A prepared statement. Columns and parameters are typed by the call; columns
 /// count from 0. Must not outlive its Database.
 class Statement {
  public:
@@ -102,9 +102,9 @@ class Statement {
   Statement(Statement&&) noexcept;
   Statement& operator=(Statement&&) noexcept;
 
-  /// Resets, then binds all parameters in order. Takes integers, enums, bool,
+  /// Resets, then binds all parameters in order. Accepts integers, enums, bool,
   /// double (NaN becomes NULL), text, std::span<const std::byte>, nullopt and
-  /// optionals of these. uint64 is stored as the int64 of the same bits.
+  /// optionals of these. uint64 is stored as the int64 with the same bits.
   template <typename... Args>
   Statement& Bind(const Args&... args) {
     Reset();
@@ -113,10 +113,10 @@ class Statement {
     return *this;
   }
 
-  /// Advances. @returns true if there is a row.
-  /// @throws std::logic_error if it writes outside a Transaction.
+  /// Steps. @returns true if there is a row.
+  /// @throws std::logic_error for a write outside a Transaction.
   bool Step();
-  /// Runs to the end and resets; for what returns no rows.
+  /// Runs to completion and resets; for statements without result rows.
   void Run();
   void Reset();
 
@@ -135,9 +135,9 @@ class Statement {
   std::optional<double> OptionalDouble(int column) const;
   std::optional<std::string> OptionalText(int column) const;
 
-  /// Copies the columns from `first` on into `fields`, by their types. NULL is
-  /// an empty text, 0, or nothing in an optional.
-  /// @throws DataError for the name of an enumeration that has no such value.
+  /// Reads columns from `first` on into `fields`, by their types. NULL becomes
+  /// an empty text, 0, or an empty optional.
+  /// @throws DataError for an unknown enumeration name.
   template <typename... Fields>
   void Read(int first, Fields&... fields) const {
     (Get(first++, fields), ...);
@@ -210,15 +210,15 @@ class Statement {
   bool writes_{false};
 };
 
-/// One connection to one of the three databases. One thread at a time: it may
-/// be handed over, e.g. to a thread that is started later, but two threads that
-/// use it at once corrupt its statements.
-/// Set on every connection: foreign_keys, trusted_schema OFF, busy_timeout 5 s,
-/// WAL, journal_size_limit 64 MiB, synchronous as the schema says.
+/// One connection to one of the three databases. Not thread safe: it may be
+/// handed over, e.g. to a thread started later, but concurrent use by two
+/// threads corrupts its statements.
+/// Settings of every connection: foreign_keys, trusted_schema OFF, busy_timeout
+/// 5 s, WAL, journal_size_limit 64 MiB, synchronous from the schema.
 class Database {
  public:
-  /// Opens `path`; writers create it (not its folder) and migrate it forward
-  /// in one transaction, after a copy of an older file was left beside it.
+  /// Opens `path`. Writers create it (not its folder) and migrate it forward in
+  /// one transaction, after saving a copy of an older file beside it.
   /// @throws DataError naming file and reason: folder missing, no permission,
   ///   not a database, another application_id, a newer version (naming both),
   ///   or, for a reader, an older version.
@@ -230,10 +230,10 @@ class Database {
   Database& operator=(const Database&) = delete;
 
   Statement Prepare(std::string_view sql) { return {*this, sql}; }
-  /// The statement of this text, prepared at its first use; for those that are
-  /// run again and again. One user at a time, who runs it to its end.
+  /// The statement with this text, prepared at first use; for repeated queries.
+  /// One user at a time, who runs it to completion.
   Statement& Cached(std::string_view sql);
-  /// Runs one statement that returns nothing. Writes need a Transaction.
+  /// Runs one statement without result rows. Writes need a Transaction.
   template <typename... Args>
   void Run(std::string_view sql, const Args&... args) {
     Prepare(sql).Bind(args...).Run();
@@ -250,17 +250,16 @@ class Database {
   std::int64_t LastInsertRowid() const;
   /// Rows changed by the last INSERT, UPDATE or DELETE.
   int Changes() const;
-  /// Differs from the last call's value if another connection committed since.
+  /// Changes whenever another connection has committed since the last call.
   std::int64_t DataVersion();
 
-  /// Folds the log into the file and truncates it. Readers may prevent that:
-  /// @returns false then, without waiting for them. For a kWriter;
-  /// @throws std::logic_error otherwise.
+  /// Copies the WAL into the file and truncates it. Does not wait for readers
+  /// that prevent this: @returns false then. @throws std::logic_error unless
+  /// this is a kWriter.
   bool Checkpoint();
   std::uintmax_t WalBytes() const;
   std::uintmax_t FileBytes() const;
-  /// Of the file, the pages that hold something: those that are free are used
-  /// again before it grows.
+  /// Bytes of the pages in use; free pages are reused before the file grows.
   std::uintmax_t UsedBytes();
 
   /// A consistent copy (VACUUM INTO). @throws DataError if `target` exists.
@@ -273,7 +272,7 @@ class Database {
   Access access() const { return access_; }
   bool InTransaction() const;
   int version() const { return version_; }
-  /// The copy that was made before a migration, if there was one.
+  /// The copy made before a migration, if any.
   const std::optional<std::filesystem::path>& migration_backup() const {
     return migration_backup_;
   }
@@ -298,11 +297,11 @@ class Database {
   std::map<std::string, Statement, std::less<>> cached_;
 };
 
-/// A writing transaction: waits for the gate (up to 5 s), BEGIN IMMEDIATE,
+/// A write transaction: waits for the gate (up to 5 s), then BEGIN IMMEDIATE;
 /// rolls back unless committed.
 class Transaction {
  public:
-  /// @throws SqliteError (IsBusy) if another connection keeps writing.
+  /// @throws SqliteError (IsBusy) if another connection keeps the gate or lock.
   explicit Transaction(Database& database);
   ~Transaction();
   Transaction(const Transaction&) = delete;
@@ -315,8 +314,8 @@ class Transaction {
   bool open_{true};
 };
 
-/// A read transaction: all queries in its scope see one state of the file.
-/// Keep it short: it stops checkpoints.
+/// A read transaction: all queries in its scope see one state of the file. Keep
+/// it short, because it blocks checkpoints.
 class Snapshot {
  public:
   explicit Snapshot(Database& database);

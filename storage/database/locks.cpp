@@ -45,7 +45,8 @@ ExclusiveLock::ExclusiveLock(const std::filesystem::path& path,
     throw DataError("process " + owner + " is already " + std::string(purpose) +
                     " here: it holds " + path.string());
   }
-  // The pid serves the message alone: not being able to write it is harmless.
+  // The pid is only used in the error message, so failing to write it is
+  // harmless.
   const std::string pid = std::to_string(getpid());
   if (ftruncate(file_, 0) == 0) {
     [[maybe_unused]] const ssize_t written =
@@ -81,7 +82,7 @@ WriteGate::~WriteGate() {
 }
 
 bool WriteGate::Enter(std::chrono::milliseconds patience) {
-  // flock has no timeout, and a stopped process may hold the gate for ever.
+  // flock has no timeout, and a suspended process may hold the gate forever.
   const auto deadline = std::chrono::steady_clock::now() + patience;
   while (flock(file_, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK && errno != EINTR) {

@@ -6,14 +6,15 @@
 
 namespace fdi::storage {
 
-/// Holds a lock file for as long as it lives, e.g. `history.db.lock` for the
-/// one monitor that records there. The kernel frees it if the process dies, so
-/// a file that was left behind does not block. The file holds the owner's pid.
+/// Holds a lock file for its lifetime, e.g. `history.db.lock` for the one
+/// monitor that records there. The kernel releases the lock if the process
+/// dies, so a file left behind does not block. The file contains the owner's
+/// pid.
 class ExclusiveLock {
  public:
-  /// @param purpose what the holder does, for the message: "recording faults".
-  /// @throws DataError naming the file, `purpose` and the pid of the holder if
-  ///   another one holds it; naming path and reason if it cannot be opened.
+  /// @param purpose what the holder does, for messages: "recording faults".
+  /// @throws DataError naming the file, `purpose` and the holder's pid if the
+  ///   lock is taken; naming path and reason if the file cannot be opened.
   ExclusiveLock(const std::filesystem::path& path, std::string_view purpose);
   ~ExclusiveLock();
   ExclusiveLock(ExclusiveLock&& other) noexcept;
@@ -25,12 +26,12 @@ class ExclusiveLock {
   int file_{-1};
 };
 
-/// How long a connection waits for others that write.
+/// How long a connection waits for other writers.
 inline constexpr std::chrono::milliseconds kWritePatience{5000};
 
 /// Lets one connection at a time write or checkpoint a database, across
-/// processes: a lock on `<database>.gate`. (Not on the database itself: to
-/// close a second descriptor of it would drop the locks of SQLite.)
+/// processes, by a lock on `<database>.gate`. (Not on the database itself:
+/// closing a second descriptor of it would drop SQLite's locks.)
 class WriteGate {
  public:
   /// @throws DataError naming the file and the reason.
@@ -39,7 +40,7 @@ class WriteGate {
   WriteGate(const WriteGate&) = delete;
   WriteGate& operator=(const WriteGate&) = delete;
 
-  /// @returns false if it stayed locked for `patience`.
+  /// @returns false if the gate stayed locked for `patience`.
   bool Enter(std::chrono::milliseconds patience);
   void Leave() noexcept;
 
@@ -47,7 +48,7 @@ class WriteGate {
   int file_{-1};
 };
 
-/// Is in the gate for its life.
+/// Holds the gate for its lifetime.
 class GateHolder {
  public:
   /// @throws SqliteError (IsBusy) after kWritePatience, naming `database`.

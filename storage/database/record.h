@@ -9,7 +9,8 @@
 #include "diagnosis/sample.h"
 #include "storage/database/database.h"
 
-// Rows of flat records, driven by the one list of their fields, kFieldsOf.
+// SQL and binding of flat records, driven by their single field list,
+// kFieldsOf.
 namespace fdi::storage {
 
 template <>
@@ -30,7 +31,7 @@ std::string ColumnsOf() {
   return columns;
 }
 
-/// "SELECT a, b " and what follows, from FROM on.
+/// "SELECT a, b " followed by `from`, which begins with FROM.
 template <typename Record>
 std::string SelectSql(std::string_view from) {
   return std::string("SELECT ")
@@ -39,9 +40,9 @@ std::string SelectSql(std::string_view from) {
       .append(from);
 }
 
-/// "INSERT INTO table (a, b) VALUES (?, ?) " and what follows, such as an
-/// ON CONFLICT clause. An empty text of `nullable`, names of columns each
-/// between blanks, becomes NULL.
+/// "INSERT INTO table (a, b) VALUES (?, ?) " followed by `rest`, such as an ON
+/// CONFLICT clause. `nullable` lists columns, each between blanks, for which an
+/// empty text becomes NULL.
 template <typename Record>
 std::string InsertSql(std::string_view table, std::string_view rest = "",
                       std::string_view nullable = "") {
@@ -72,7 +73,7 @@ Statement& BindRecord(Statement& statement, const Record& record) {
       kFieldsOf<Record>);
 }
 
-/// The record in the current row, whose columns from `first` on are
+/// Reads a record from the current row, whose columns from `first` on are
 /// ColumnsOf<Record>().
 template <typename Record>
 Record ReadRecord(const Statement& row, int first = 0) {
@@ -82,7 +83,7 @@ Record ReadRecord(const Statement& row, int first = 0) {
   return record;
 }
 
-/// The records in all rows that are left.
+/// The records of all remaining rows.
 template <typename Record>
 std::vector<Record> ReadRecords(Statement& rows) {
   std::vector<Record> records;

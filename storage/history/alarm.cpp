@@ -14,7 +14,7 @@ std::int64_t Nanoseconds(double seconds) {
   return static_cast<std::int64_t>(seconds * 1e9);
 }
 
-// What falls into the time [from, to).
+// The part of an episode within [from, to).
 struct Stretch {
   std::int64_t from_ns;
   std::int64_t to_ns;
@@ -48,14 +48,14 @@ void AddLabel(const AlarmSpan& span, AlarmStatistics& statistics) {
                             : statistics.labelled_true);
 }
 
-// Episodes of one valve, detected at `stamps`, that came in a row of at least
-// `criteria.chattering_episodes` within the window.
+// Number of episodes of one valve, detected at `stamps`, that belong to a
+// series of at least `criteria.chattering_episodes` within the window.
 std::int64_t Chattering(const std::vector<std::int64_t>& stamps,
                         const AlarmCriteria& criteria) {
   const auto row = static_cast<std::size_t>(criteria.chattering_episodes);
   const std::int64_t window_ns = Nanoseconds(criteria.chattering_window_s);
   std::int64_t count = 0;
-  std::size_t counted = 0;  // Those before are counted.
+  std::size_t counted = 0;  // Those before are counted already.
   for (std::size_t last = row - 1; row > 0 && last < stamps.size(); ++last) {
     const std::size_t first = last + 1 - row;
     if (stamps[last] - stamps[first] <= window_ns) {
@@ -67,7 +67,7 @@ std::int64_t Chattering(const std::vector<std::int64_t>& stamps,
   return count;
 }
 
-// The most stamps, which are in order, in any window.
+// The largest number of the sorted stamps in any window.
 std::int64_t MostWithin(const std::vector<std::int64_t>& stamps,
                         std::int64_t window_ns) {
   std::size_t most = 0;

@@ -13,72 +13,73 @@
 
 namespace fdi::storage {
 
-/// An alarm that somebody does not want to be told of until a time.
+/// An alarm that an operator has suppressed until a given time.
 struct Shelf {
   std::int64_t shelf_id{0};
   std::string valve_id;
-  std::optional<std::string> fault;  ///< As in fault_history; none: any.
+  std::optional<std::string> fault;  ///< As in fault_history; nothing: any.
   std::int64_t from_ns{0};
   std::int64_t until_ns{0};
   std::string who;
   std::string comment;
   std::string origin;  ///< "fdi-store anna@host", "console 127.0.0.1", ...
-  /// Set if it was ended before its time, by whom and from where.
+  /// Set if it was ended early: when, by whom and from where.
   std::optional<std::int64_t> ended_ns;
   std::string ended_by;
   std::string ended_origin;
 };
 
-/// By beginning: those in force at a time, or all there ever were.
+/// Ordered by beginning: those in force at a time, or all.
 std::vector<Shelf> ReadShelves(Database& database,
                                std::optional<std::int64_t> in_force_at_ns = {});
 
-/// [from, until), unless it was ended before.
+/// [from, until), or less if it was ended early.
 bool InForce(const Shelf& shelf, std::int64_t now_ns);
 
-/// `shelf` is for this valve and this answer. A shelved fault covers episodes
-/// with just this answer: not those that are not isolated, nor another set.
+/// Whether `shelf` applies to this valve and diagnosis. A shelved fault covers
+/// only episodes with exactly this diagnosis: not those that are not isolated,
+/// nor those with another fault set.
 bool Covers(const Shelf& shelf, const Episode& episode);
 
 /// States of an alarm in ANSI/ISA-18.2-2016 (IEC 62682), alarm state
 /// transition diagram. An episode is the alarm; its condition has returned to
 /// normal once it was cleared or has ended for another reason.
 enum class AlarmState {
-  kUnacked,          ///< In alarm, nobody has acknowledged it.
-  kAcked,            ///< In alarm, acknowledged.
-  kReturnedUnacked,  ///< Returned to normal before anybody acknowledged it.
+  kUnacked,          ///< Active, not acknowledged.
+  kAcked,            ///< Active, acknowledged.
+  kReturnedUnacked,  ///< Returned to normal, not acknowledged.
   kNormal,           ///< Returned to normal and acknowledged.
-  kShelved,          ///< Out of the way for a limited time.
+  kShelved,          ///< Suppressed for a limited time.
 };
 
 /// "UNACK", "ACKED", "RTN_UNACK", "NORMAL", "SHELVED".
 std::string_view AlarmStateName(AlarmState state);
 
-/// Shelving hides any other state, which comes back when it ends.
+/// Shelving hides any other state, which reappears when the shelf ends.
 AlarmState AlarmStateOf(bool active, bool acknowledged, bool shelved = false);
 AlarmState AlarmStateOf(const Episode& episode, bool shelved = false);
 
-/// An episode as an operator sees it.
+/// An episode as operators see it.
 struct Alarm {
   Episode episode;
-  AlarmState state{AlarmState::kUnacked};  ///< Without its shelf.
-  /// In force now; of several the one that lasts longest.
+  AlarmState state{AlarmState::kUnacked};  ///< Regardless of the shelf.
+  /// The shelf in force now; of several, the one that lasts longest.
   std::optional<Shelf> shelf;
 };
 
-/// `episodes` in their order, with those of `shelves` that are in force.
+/// `episodes` in their order, with the matching `shelves` that are in force.
 std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,
                             const std::vector<Shelf>& shelves,
                             std::int64_t now_ns);
 
 /// Settings of ComputeAlarmStatistics().
 ///
-/// ANSI/ISA-18.2-2016 (clause on monitoring and assessment) and EEMUA 191
-/// (3rd edition, alarm system metrics) count an alarm as chattering that comes
-/// three times or more within a minute, and as stale (a long-standing one)
-/// what stays for more than 24 hours. An episode needs minutes to be isolated
-/// and to clear on evidence, so that none could come thrice a minute: the
-/// window is half an hour.
+/// ANSI/ISA-18.2-2016 (clause on monitoring and assessment) and EEMUA 191 (3rd
+/// edition, alarm system metrics) call an alarm chattering if it occurs three
+/// times or more within a minute, and stale (here: standing) if it stays for
+/// more than 24 hours. An episode needs minutes of evidence to be isolated and
+/// to clear, so none could occur three times a minute: the window is half an
+/// hour.
 struct AlarmCriteria {
   int chattering_episodes{3};
   double chattering_window_s{1800.0};
@@ -86,14 +87,14 @@ struct AlarmCriteria {
   double flood_window_s{600.0};  ///< Alarm rates are counted per 10 minutes.
 };
 
-/// What of an episode counts.
+/// What the statistics need of an episode.
 struct AlarmSpan {
   std::string valve_id;
   std::string fault;  ///< As in the view; "" while not isolated.
   std::int64_t detected_ns{0};
   std::optional<std::int64_t> ended_ns;
   std::optional<std::string> label;
-  std::optional<std::int64_t> last_ns;  ///< While open: of the newest evidence.
+  std::optional<std::int64_t> last_ns;  ///< Newest evidence, while open.
 };
 
 struct DayAlarms {
@@ -106,34 +107,34 @@ struct ValveAlarms {
   std::int64_t episodes{0};
   std::int64_t open{0};
   double alarm_s{0.0};
-  std::int64_t chattering{0};  ///< Episodes that came in such a row.
-  std::int64_t standing{0};    ///< Episodes that lasted, or last, too long.
+  std::int64_t chattering{0};  ///< Episodes in a chattering series.
+  std::int64_t standing{0};    ///< Episodes that lasted longer than standing_s.
   std::int64_t last_detected_ns{0};
 };
 
 struct FaultAlarms {
   std::int64_t episodes{0};
-  std::int64_t right{0};  ///< Labelled true, or as this very answer.
+  std::int64_t right{0};  ///< Labelled true, or with the diagnosed fault.
   std::int64_t wrong{0};  ///< Labelled false, or as another fault.
 };
 
-/// How good the alarms of a time were. An episode is counted if it was
-/// detected within the time; time in alarm is that of all episodes, as far as
-/// it falls into the time.
+/// Quality of the alarms in a period. An episode is counted if it was detected
+/// within the period; time in alarm is that part of every episode that lies
+/// within the period.
 struct AlarmStatistics {
   std::vector<DayAlarms> days;  ///< Days with an alarm, in order.
   std::map<std::string, ValveAlarms> valves;
   std::map<std::string, FaultAlarms> faults;  ///< "": not isolated.
   std::int64_t labelled_true{0};              ///< Label true, or a fault.
-  std::int64_t labelled_false{0};             ///< No fault was there.
+  std::int64_t labelled_false{0};             ///< Labelled as no fault.
   std::int64_t unlabelled{0};
   std::int64_t most_in_flood_window{0};  ///< Plant-wide.
 };
 
-/// @param spans by detection. Those that end before `since_ns` or begin at
-///   `until_ns` or later do not count.
-/// @param now_ns to which open episodes last; to their newest evidence where
-///   stamps are ahead of the clock.
+/// @param spans ordered by detection. Those that end before `since_ns` or begin
+///   at `until_ns` or later are ignored.
+/// @param now_ns end of open episodes; their newest evidence where that is
+///   later because its stamps are ahead of the clock.
 AlarmStatistics ComputeAlarmStatistics(const std::vector<AlarmSpan>& spans,
                                        std::int64_t since_ns,
                                        std::int64_t until_ns,

@@ -18,7 +18,7 @@ namespace sql = history_sql;
 namespace {
 
 constexpr std::array<std::string_view, 3> kChanges{"OPENED", "GROWN", "ENDED"};
-// An episode may be detected long before the fault of a group is isolated.
+// An episode may be detected long before it isolates a fault of the group.
 constexpr std::int64_t kLongestIsolationNs = 86'400'000'000'000;
 
 bool GlobMatches(const std::string& glob, std::string_view text) {
@@ -42,8 +42,8 @@ CommonCause ReadCause(Database& database, const std::string& cause_id) {
   return cause;
 }
 
-// Of `members`, by isolation, the largest number within `within_ns` of each
-// other that has `episode_id`.
+// The subset of `members`, which are ordered by isolation, that contains
+// `episode_id`, spans at most `within_ns` and has the most valves.
 std::vector<CauseMember> Crowd(const std::vector<CauseMember>& members,
                                std::int64_t within_ns,
                                const std::string& episode_id) {
@@ -150,7 +150,7 @@ std::optional<CauseChange> CommonCauseBook::Open(const CauseGroup& group,
   database_.Run(sql::insert_cause, cause_id, group.name,
                 crowd.back().isolated_ns);
   if (database_.Changes() == 0) {
-    return std::nullopt;  // It was there, and has ended.
+    return std::nullopt;  // It exists and has ended.
   }
   for (const CauseMember& member : crowd) {
     Insert(cause_id, member);
@@ -159,8 +159,8 @@ std::optional<CauseChange> CommonCauseBook::Open(const CauseGroup& group,
                      ReadCause(database_, cause_id)};
 }
 
-// Episodes of the group that hold one of its faults since a time within
-// from..to, by that time; none that belongs to a cause already.
+// Episodes of the group that hold one of its faults, first isolated within
+// from..to, and belong to no cause of the group yet; ordered by isolation.
 std::vector<CauseMember> CommonCauseBook::Candidates(const CauseGroup& group,
                                                      std::int64_t from_ns,
                                                      std::int64_t to_ns) {

@@ -12,7 +12,7 @@
 
 namespace fdi::storage {
 
-/// Valves that something in common can bring down: an air header, a line.
+/// Valves that may fail from a common cause: an air header, a line.
 struct CauseGroup {
   std::string name;
   std::vector<std::string> valve_globs;
@@ -23,54 +23,54 @@ struct CauseGroup {
   bool Has(std::string_view valve_id) const;
 };
 
-/// An episode that has a cause in common with others.
+/// An episode that shares a cause with others.
 struct CauseMember {
   std::string episode_id;
   std::string valve_id;
-  std::string fault;            ///< What was isolated when it joined.
-  std::int64_t isolated_ns{0};  ///< Since when its fault of the group holds.
+  std::string fault;            ///< The isolated set when it joined.
+  std::int64_t isolated_ns{0};  ///< Isolation of its fault of the group.
   std::optional<std::int64_t> ended_ns;
 
   bool operator==(const CauseMember&) const = default;
 };
 
-/// The parent of the episodes of several valves of one group.
+/// The common cause of episodes of several valves of one group.
 struct CommonCause {
   std::string cause_id;  ///< 16 hex digits
   std::string group;
-  std::int64_t opened_ns{0};  ///< Isolation of the member that made it one.
-  std::optional<std::int64_t> ended_ns;  ///< None while a member is open.
-  std::vector<CauseMember> members;      ///< By isolation.
+  std::int64_t opened_ns{0};  ///< Isolation of the member that completed it.
+  std::optional<std::int64_t> ended_ns;  ///< Empty while a member is open.
+  std::vector<CauseMember> members;      ///< Ordered by isolation.
 };
 
 struct CauseChange {
   enum class Kind : std::uint8_t { kOpened, kGrown, kEnded };
   Kind kind{Kind::kOpened};
-  CommonCause cause;  ///< As it is now.
+  CommonCause cause;  ///< State after the change.
 };
 
 /// "OPENED", "GROWN", "ENDED"
 std::string_view CauseChangeName(CauseChange::Kind kind);
 
-/// Finds common causes as episodes are recorded. Once at least min_valves
+/// Detects common causes while episodes are recorded. Once at least min_valves
 /// valves of a group isolate one of its faults within within_ns of each other,
-/// a cause opens with all of them; while it is open, every further such valve
-/// of the group joins; it ends when all its episodes have ended.
+/// a cause opens with all of them; while it is open, further such valves of the
+/// group join; it ends when all its episodes have ended.
 ///
-/// All that it knows stands in the database: a restart changes nothing, and
-/// telling it twice is a no-op. Each call within a transaction.
+/// All state is in the database, so a restart changes nothing; calls are
+/// idempotent. Each call must be within a transaction.
 class CommonCauseBook {
  public:
   /// @throws std::invalid_argument for min_valves < 2 or within_ns ≤ 0.
   CommonCauseBook(Database& database, std::vector<CauseGroup> groups);
 
-  /// The episode isolated another set at `stamp_ns`.
+  /// The episode isolated another fault set at `stamp_ns`.
   std::vector<CauseChange> Isolated(const std::string& episode_id,
                                     const std::string& valve_id,
                                     std::int64_t stamp_ns);
   /// The episode has ended.
   std::vector<CauseChange> Ended(const std::string& episode_id);
-  /// Ends causes whose episodes ended while nobody looked.
+  /// Ends causes whose episodes have ended in the meantime.
   std::vector<CauseChange> EndFinished();
 
  private:
@@ -95,10 +95,10 @@ struct CauseFilter {
   bool open_only{false};
   std::int64_t since_ns{std::numeric_limits<std::int64_t>::min()};
   std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
-  std::int64_t limit{0};  ///< The newest so many; 0: all.
+  std::int64_t limit{0};  ///< Only the newest ones; 0: all.
 };
 
-/// By opening.
+/// Ordered by opening.
 std::vector<CommonCause> ReadCommonCauses(Database& database,
                                           const CauseFilter& filter = {});
 

@@ -12,12 +12,12 @@
 
 namespace fdi::storage {
 
-/// "00c0ffee12345678": how an episode id is stored and shown.
+/// Text form of an episode id: "00c0ffee12345678".
 std::string EpisodeIdText(std::uint64_t episode_id);
 /// The inverse; nothing unless the text is 16 lower-case hex digits.
 std::optional<std::uint64_t> ParseEpisodeId(std::string_view text);
 
-/// A line of an episode's history: a transition, or what a person noted.
+/// An entry in an episode's history: a transition or an operator action.
 struct HistoryEntry {
   std::int64_t event_id{0};
   std::string kind;  ///< TransitionName(), or RESUMED, ACK, LABEL.
@@ -28,11 +28,11 @@ struct HistoryEntry {
   double factor{0.0};
   double strength{0.0};
   std::string reason;
-  std::string layer;  ///< LayerName() of what names a fault.
+  std::string layer;  ///< LayerName() of what named the fault.
   std::string value;  ///< Of LABEL.
   std::string who;
   std::string comment;
-  std::string origin;  ///< From where a person did it.
+  std::string origin;  ///< Where an operator action came from.
   std::uint64_t episode_id{0};
 };
 
@@ -50,7 +50,7 @@ struct Episode {
   std::optional<std::string> label;
   std::optional<std::string> acked_by;
 
-  std::string host;  ///< Of the monitor; in the plant's history alone.
+  std::string host;  ///< Of the monitor; plant history only.
   std::string monitor;
   std::uint64_t id{0};
   std::uint64_t source_id{0};
@@ -72,11 +72,11 @@ struct Episode {
   std::vector<std::string> faults;    ///< Of the trace, by index.
 };
 
-/// One life of a monitor.
+/// One run of the monitor process.
 struct MonitorSession {
   std::int64_t session_id{0};
   std::int64_t start_ns{0};
-  std::int64_t alive_ns{0};  ///< Last sign of life.
+  std::int64_t alive_ns{0};  ///< Last heartbeat.
   std::optional<std::int64_t> stop_ns;
   bool clean{false};
   std::string software;
@@ -98,32 +98,32 @@ enum class EpisodeState {
   kAlarmShelved,
 };
 
-/// "any", "open", ... "UNACK", ..., in any case. @throws ConfigError naming the
-/// accepted names.
+/// Parses "any", "open", ... "UNACK", ..., ignoring case. @throws ConfigError
+/// naming the accepted names.
 EpisodeState ParseEpisodeState(std::string_view name);
 
 /// Settings of HistoryReader::List().
 struct EpisodeFilter {
-  std::string valve_glob{"*"};  ///< As in a shell: * ? [...].
+  std::string valve_glob{"*"};  ///< Shell pattern: * ? [...].
   std::string fault;            ///< Name, "unknown", or empty: any.
   std::int64_t since_ns{std::numeric_limits<std::int64_t>::min()};
   std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
   EpisodeState state{EpisodeState::kAny};
-  std::int64_t limit{0};   ///< The newest so many; 0: all.
-  std::int64_t now_ns{0};  ///< At which kAlarmShelved holds.
+  std::int64_t limit{0};   ///< Only the newest ones; 0: all.
+  std::int64_t now_ns{0};  ///< Time at which kAlarmShelved is evaluated.
 };
 
-/// The words of ParseEpisodeState().
+/// The names that ParseEpisodeState() accepts.
 std::vector<std::string> EpisodeStateNames();
 
-/// Episodes of one valve with one answer.
+/// Episodes of one valve with one diagnosis.
 struct EpisodeStatistics {
   std::string valve_id;
   std::string fault;  ///< As in the view; "" while not isolated.
   std::int64_t episodes{0};
   std::int64_t open{0};
   std::int64_t unacked{0};
-  std::int64_t labelled_true{0};           ///< Label true, or of the answer.
+  std::int64_t labelled_true{0};           ///< Label true, or that fault.
   std::int64_t labelled_false{0};          ///< Label false, or another fault.
   std::optional<double> mean_isolation_s;  ///< From detection.
   std::optional<double> mean_duration_s;   ///< Of the ended ones.
@@ -131,7 +131,7 @@ struct EpisodeStatistics {
   std::int64_t last_detected_ns{0};
 };
 
-/// Time of one valve with one quality, over the days of a filter.
+/// Time that one valve spent in one quality, over the days of a filter.
 struct CoverageTime {
   std::string valve_id;
   std::string quality;  ///< QualityName().

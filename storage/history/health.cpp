@@ -21,14 +21,14 @@ namespace sql = history_sql;
 //   bin      = for each channel: samples [residual square output]
 //   strength = fault samples strength
 //
-// All numbers without a type are LEB128 with the sign folded in; the three sums
-// of a channel are left out if it has no samples.
+// Numbers without a type are zigzag-coded LEB128; the three sums of a channel
+// are omitted if it has no samples.
 namespace {
 
 constexpr std::uint8_t kFormat = 1;
 constexpr std::uint8_t kTonnes = 0x80;  // beside the format: flow in t/h
 
-// LEB128, negative numbers folded in between: 0, -1, 1, -2, ...
+// LEB128 with zigzag coding: 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
 void PutNumber(ByteWriter& out, std::int64_t value) {
   auto rest = (static_cast<std::uint64_t>(value) << 1) ^
               static_cast<std::uint64_t>(value >> 63);
@@ -98,7 +98,7 @@ void GetBins(ByteReader& in, HealthHour& hour) {
   }
 }
 
-// The numbers of every hour, in the order in which they are stored.
+// Visits the fixed numbers of an hour in storage order.
 template <typename Hour, typename Visit>
 void ForEachNumber(Hour& hour, Visit visit) {
   visit(hour.seen_ms);
@@ -117,8 +117,8 @@ HealthHour Unpacked(const Statement& row, int column, HealthHour hour) {
   return hour;
 }
 
-// What was stored by a program of other channels under the same hash cannot be
-// added to: the newer part stands.
+// An hour that was stored with other channels under the same hash cannot be
+// added to: the newer part replaces it.
 HealthHour Sum(const HealthHour& stored, const HealthHour& part) {
   if (stored.channels != part.channels) {
     return part;

@@ -12,15 +12,15 @@
 
 namespace fdi::storage {
 
-/// The sums of an hour as bytes; health.cpp has the layout. Its key and live_ms
-/// are columns of their own.
+/// The sums of an hour as bytes; health.cpp has the format. Its key and live_ms
+/// are separate columns.
 std::vector<std::byte> PackHealth(const HealthHour& hour);
 
-/// Fills `hour`, which has its key, with what PackHealth() gave.
+/// Decodes bytes from PackHealth() into `hour`, whose key is already set.
 /// @throws DataError if the bytes are damaged or of a later format.
 void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour);
 
-/// Adds `hours` to those that are stored. Within a transaction.
+/// Adds `hours` to the stored ones. Call within a transaction.
 void StoreHealth(Database& database, std::span<const HealthHour> hours);
 
 /// Settings of ReadHealth().
@@ -30,14 +30,14 @@ struct HealthFilter {
   std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
 };
 
-/// The first hour that begins at `stamp_ns` or later.
+/// The first hour that begins at or after `stamp_ns`.
 std::int64_t HourFrom(std::int64_t stamp_ns);
 
-/// The hours of one valve that begin in the window, by time.
+/// The hours of one valve that begin in the window, ordered by time.
 std::vector<HealthHour> ReadHealth(Database& database,
                                    const HealthFilter& filter);
 
-/// Valves that have any, by id; `glob` as in a shell.
+/// Ids of valves that have stored hours, sorted; `glob` is a shell pattern.
 std::vector<std::string> HealthValves(Database& database,
                                       const std::string& glob);
 

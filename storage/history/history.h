@@ -16,62 +16,61 @@
 
 namespace fdi::storage {
 
-/// Reads what happened: to the valves of one monitor (HistoryReader), or of a
-/// plant (PlantReader), whose rows have their host and monitor. One thread at a
-/// time.
+/// Read access to the history of one monitor (HistoryReader), or of a plant
+/// (PlantReader), whose rows also have host and monitor. One thread at a time.
 class History {
  public:
   virtual ~History() = default;
 
-  /// By detection.
+  /// Ordered by detection.
   virtual std::vector<Episode> List(const EpisodeFilter& filter) = 0;
 
-  /// `id` may be a unique beginning, or `last`.
-  /// @throws NotFoundError if no episode, or more than one, begins like that.
+  /// `id` may be a unique prefix, or `last`.
+  /// @throws NotFoundError if no episode, or more than one, matches.
   virtual Episode Show(std::string_view id) = 0;
 
-  /// Of one episode, in order of recording.
+  /// Entries of one episode, in order of recording.
   virtual std::vector<HistoryEntry> Events(std::uint64_t episode_id) = 0;
 
-  /// Nothing if no second look at the episode had an answer.
+  /// The result of the second look at the episode; nothing if there is none.
   /// @throws DataError
   virtual std::optional<EpisodeLook> Look(std::uint64_t episode_id) = 0;
 
   /// In order of arrival. @throws DataError if stored bytes are damaged.
   virtual std::vector<TracePoint> Trace(std::uint64_t episode_id) = 0;
 
-  /// By valve and fault, of the episodes that List() would give.
+  /// By valve and fault, over the episodes that List() would return.
   virtual std::vector<EpisodeStatistics> Statistics(
       const EpisodeFilter& filter) = 0;
 
-  /// Gaps that touch the filter's time, of its valves and of all valves.
+  /// Gaps that overlap the filter's time, of its valves and of all valves.
   virtual std::vector<DataGap> Gaps(const EpisodeFilter& filter) = 0;
 
-  /// Time by valve and quality; the filter's fault and state do not count.
+  /// Time by valve and quality; the filter's fault and state are ignored.
   virtual std::vector<CoverageTime> Coverage(const EpisodeFilter& filter) = 0;
 
-  /// Open episodes, and ended ones that nobody has acknowledged, newest first:
-  /// `limit` of them, open ones before others. Shelved ones are among them.
+  /// Open episodes and ended unacknowledged ones, newest first, including
+  /// shelved ones; at most `limit`, of which open ones take precedence.
   virtual std::vector<Alarm> AlarmList(std::int64_t now_ns,
                                        std::int64_t limit) = 0;
 
-  /// ComputeAlarmStatistics() of the filter's valves, fault and time.
+  /// ComputeAlarmStatistics() for the filter's valves, fault and time.
   virtual AlarmStatistics AlarmFigures(const EpisodeFilter& filter,
                                        std::int64_t now_ns) = 0;
 
-  /// By beginning: those in force at a time, or all there ever were.
+  /// Ordered by beginning: those in force at a time, or all.
   virtual std::vector<Shelf> Shelves(
       std::optional<std::int64_t> in_force_at_ns) = 0;
 
-  /// The hours of one valve that begin in the window, by time.
+  /// The hours of one valve that begin in the window, ordered by time.
   virtual std::vector<HealthHour> Health(const HealthFilter& filter) = 0;
-  /// Valves that have any, by id; `glob` as in a shell.
+  /// Ids of valves that have stored hours, sorted; `glob` is a shell pattern.
   virtual std::vector<std::string> HealthValves(const std::string& glob) = 0;
 
-  /// Differs once something was stored since the last call of this reader.
+  /// Changes whenever something was stored since the last call on this object.
   virtual std::string Version() = 0;
 
-  /// `episodes` with what is shelved now.
+  /// `episodes` with the shelves that are in force.
   std::vector<Alarm> Alarms(std::vector<Episode> episodes,
                             std::int64_t now_ns) {
     return AsAlarms(std::move(episodes), Shelves(now_ns), now_ns);

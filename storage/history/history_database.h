@@ -14,11 +14,11 @@ namespace fdi::storage {
 /// fault_history; see docs/data.md. Times in tables are INTEGER ns UTC; the
 /// *_utc columns of the view are RFC 3339 text with milliseconds, such as
 /// 2026-11-20T14:56:11.000Z, so that they sort as they read. An episode id is
-/// TEXT, 16 lower-case hex digits. 64-bit masks and hashes other than
-/// that are INTEGER with the same bits.
+/// TEXT, 16 lower-case hex digits. Other 64-bit masks and hashes are INTEGER
+/// with the same bits.
 const Schema& HistorySchema();
 
-/// The one episode whose id begins with `id`, or the newest for "last".
+/// Resolves a unique id prefix, or "last" for the newest episode.
 /// @throws NotFoundError
 std::uint64_t ResolveEpisode(Database& database, std::string_view id);
 

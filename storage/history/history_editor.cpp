@@ -17,7 +17,7 @@ constexpr std::size_t kLongestWho = 128;
 constexpr std::size_t kLongestComment = 2000;
 constexpr std::size_t kLongestValve = 64;
 
-// On one line, without what would move the cursor of a terminal.
+// Replaces control characters, which could move the cursor of a terminal.
 std::string Plain(std::string text) {
   std::replace_if(
       text.begin(), text.end(),
@@ -43,7 +43,7 @@ OperatorNote Checked(const OperatorNote& note) {
           note.now_ns};
 }
 
-// Notes of before there was an origin have none.
+// Actions from versions without an origin take the monitor's name.
 OperatorNote NoteOf(const OperatorAction& action) {
   return Checked({action.who, action.comment,
                   action.origin.empty() ? action.monitor : action.origin,
@@ -64,7 +64,7 @@ std::string CheckedLabel(std::string_view label) {
   return FaultName(*fault);
 }
 
-// As the column fault of an episode: in the order of the numbers.
+// Canonical form of the column fault of an episode: ordered by fault number.
 std::string CheckedFaults(const std::string& faults) {
   if (faults == "unknown") {
     return faults;
@@ -85,8 +85,8 @@ std::string CheckedFaults(const std::string& faults) {
   return JoinNames(names);
 }
 
-// Two notes of a kind at the same instant: the second gets the next
-// nanosecond.
+// Of two notes of one kind at the same instant, the second is stamped one
+// nanosecond later.
 void AddNote(Database& database, const std::string& episode, const char* kind,
              const std::optional<std::string>& value,
              const OperatorNote& note) {
@@ -107,7 +107,7 @@ Shelf ReadShelf(Database& database, std::int64_t shelf_id) {
   return ReadRecord<Shelf>(row);
 }
 
-// Within a transaction. @throws NotFoundError; DataError if it is over.
+// Within a transaction. @throws NotFoundError; DataError if it has ended.
 void EndShelfRow(Database& database, std::int64_t shelf_id,
                  const OperatorNote& note) {
   const Shelf shelf = ReadShelf(database, shelf_id);

@@ -20,14 +20,14 @@ struct OperatorNote {
   std::int64_t now_ns{0};
 };
 
-/// Longest time on the shelf: 90 days. What stays longer is no alarm that
-/// waits but one that is wrong.
+/// Longest time on the shelf: 90 days. An alarm that has to be suppressed for
+/// longer is a wrong alarm.
 inline constexpr std::int64_t kLongestShelfNs = 90LL * 86'400'000'000'000;
 
-/// What operators do, beside a running monitor, as an occasional writer. Every
-/// action stays on record, with its OperatorNote: none replaces another, even
-/// if it comes twice or in the same nanosecond. Control characters in texts
-/// become blanks. On the disk on return.
+/// Operator actions, performed beside a running monitor as an occasional
+/// writer. Every action is recorded with its OperatorNote; none replaces
+/// another, even if it is repeated or in the same nanosecond. Control
+/// characters in texts become blanks. Actions are durable on return.
 ///
 /// All throw ConfigError naming field and range if a text is too long or
 /// empty.
@@ -36,36 +36,36 @@ class HistoryEditor {
   /// @throws DataError, SqliteError as Database.
   explicit HistoryEditor(const std::filesystem::path& path);
 
-  /// The first to acknowledge stays the one that the episode shows.
-  /// @param id as HistoryReader::Show(). @returns the episode.
+  /// The episode shows the first acknowledgement.
+  /// @param id as in HistoryReader::Show(). @returns the episode.
   /// @throws NotFoundError
   std::uint64_t Acknowledge(std::string_view id, const OperatorNote& note);
 
-  /// The last label is the one that the episode shows.
-  /// @param label true (the answer was right), false (there was no fault), or
-  ///   the name of the fault that it was.
+  /// The episode shows the last label.
+  /// @param label true (the diagnosis was right), false (there was no fault),
+  ///   or the actual fault.
   /// @returns the episode. @throws ConfigError for another label;
   ///   NotFoundError.
   std::uint64_t Label(std::string_view id, std::string_view label,
                       const OperatorNote& note);
 
-  /// Puts the alarms of a valve out of the way from now on. What was shelved
-  /// of the same valve and fault ends.
-  /// @param fault names joined by |, "unknown", or none: any.
+  /// Suppresses the alarms of a valve from now on. An earlier shelf for the
+  /// same valve and fault ends.
+  /// @param fault names joined by |, or "unknown"; nothing: any.
   /// @throws ConfigError for another fault, or unless until_ns is after now
   ///   and at most kLongestShelfNs later.
   Shelf Shelve(std::string_view valve_id,
                const std::optional<std::string>& fault, std::int64_t until_ns,
                const OperatorNote& note);
 
-  /// @throws NotFoundError; DataError if it is over already.
+  /// @throws NotFoundError; DataError if it has ended already.
   Shelf EndShelf(std::int64_t shelf_id, const OperatorNote& note);
 
-  /// Records what was done on another monitor, as it was. Both histories show
-  /// the same in the end, whatever comes first: the earliest acknowledgement,
-  /// the latest label.
-  /// @returns false if it is known already.
-  /// @throws NotFoundError if its episode is not there.
+  /// Records an action from another monitor unchanged. Both histories converge,
+  /// whatever the order of arrival: the earliest acknowledgement and the latest
+  /// label are shown.
+  /// @returns false if it is already recorded.
+  /// @throws NotFoundError if its episode does not exist.
   bool Adopt(const OperatorAction& action);
 
  private:

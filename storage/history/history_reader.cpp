@@ -54,7 +54,7 @@ std::string_view FaultCondition(const EpisodeFilter& filter) {
                                     : sql::holds_fault;
 }
 
-// " AND ..." for the state, or nothing.
+// " AND ..." for the state; empty for any.
 std::string StateCondition(EpisodeState state) {
   constexpr const char* kActive = "e.ended_ns IS NULL AND e.cleared_ns IS NULL";
   constexpr const char* kReturned =
@@ -97,7 +97,7 @@ const char* IndexFor(const EpisodeFilter& filter) {
                                     : "episode_by_time";
 }
 
-// The ids, newest first.
+// Query for the ids, newest first.
 std::string NewestIds(const EpisodeFilter& filter) {
   const std::string valve_and_state =
       std::string(ValveCondition(filter)) + StateCondition(filter.state);
@@ -110,7 +110,7 @@ std::string NewestIds(const EpisodeFilter& filter) {
          " ORDER BY e.detected_ns DESC, e.valve_id DESC";
 }
 
-// SQLite refuses a value for a parameter that the text does not have: ?5 is
+// SQLite rejects a value for a parameter that the text does not contain: ?5 is
 // bound only where it occurs, or where ?6 follows it.
 void BindFilter(Statement& statement, const EpisodeFilter& filter) {
   if (filter.state == EpisodeState::kAlarmShelved) {
@@ -276,7 +276,7 @@ std::vector<std::string> HistoryReader::HealthValves(const std::string& glob) {
   return storage::HealthValves(database_, glob);
 }
 
-// SQLite changes it when another connection commits.
+// data_version changes when another connection commits.
 std::string HistoryReader::Version() {
   return std::to_string(database_.DataVersion());
 }

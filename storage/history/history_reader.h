@@ -45,39 +45,39 @@ class HistoryReader : public History {
   Database database_;
 };
 
-/// By detection: the episodes of the filter's valves and fault that touch its
-/// time; its state and limit do not count.
-/// @throws ConfigError for a fault that is none.
+/// The episodes of the filter's valves and fault that overlap its time, ordered
+/// by detection; its state and limit are ignored.
+/// @throws ConfigError for an unknown fault.
 std::vector<AlarmSpan> ReadAlarmSpans(Database& database,
                                       const EpisodeFilter& filter);
 
-/// Which episodes a filter means, as SQL over `episode e` that SQLite and, but
-/// for the signs of parameters and of GLOB, PostgreSQL understand.
+/// The SQL condition for a filter over `episode e`, valid for SQLite and,
+/// except for parameter markers and GLOB, for PostgreSQL.
 struct EpisodeCondition {
   std::string sql;    ///< Parameters ?1 valve, ?2 since, ?3 until, ?4, ?5 now.
   std::string fault;  ///< The value of ?4.
 };
 EpisodeCondition ConditionOf(const EpisodeFilter& filter);
 
-// The queries behind it, whose plans are tested: parameters are ?1 valve,
-// ?2 since, ?3 until, ?4 fault, ?5 now, ?6 limit, as far as they occur.
+// The underlying queries, whose plans are tested. Parameters, as far as they
+// occur: ?1 valve, ?2 since, ?3 until, ?4 fault, ?5 now, ?6 limit.
 
 /// SQL for kFieldsOf<Episode> of the newest `limit` episodes of `filter`,
-/// oldest first. Each filter walks an index of its own, newest first, so that a
-/// limit ends it early; the one that narrows most leads: valve id, fault, open,
-/// unacknowledged, time.
+/// oldest first. Each filter scans an index of its own, newest first, so that a
+/// limit ends the scan early; the most selective condition chooses it: valve
+/// id, fault, open, unacknowledged, time.
 std::string ListQuery(const EpisodeFilter& filter);
 
-/// SQL for the columns of EpisodeStatistics, by valve and fault, from an index
-/// that covers them.
+/// SQL for the columns of EpisodeStatistics, by valve and fault, from a
+/// covering index.
 std::string StatisticsQuery(const EpisodeFilter& filter);
 
-/// SQL for the columns of AlarmSpan, by detection, from the same index: the
-/// episodes that touch the filter's time.
+/// SQL for the columns of AlarmSpan, ordered by detection, from the same index:
+/// the episodes that overlap the filter's time.
 std::string AlarmSpanQuery(const EpisodeFilter& filter);
 
-/// SQL for kFieldsOf<Episode> of open episodes and ended ones that nobody has
-/// acknowledged, newest first; the newest ?1, open ones before others.
+/// SQL for kFieldsOf<Episode> of open and of ended unacknowledged episodes,
+/// newest first; at most ?1, of which open ones take precedence.
 std::string AlarmListQuery();
 
 }  // namespace fdi::storage

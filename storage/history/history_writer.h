@@ -16,16 +16,16 @@
 
 namespace fdi::storage {
 
-/// What BeginSession() found.
+/// Result of BeginSession().
 struct SessionStart {
   std::int64_t session_id{0};
-  /// Last sign of life of a session before that did not end, if there was one.
+  /// Last heartbeat of a previous session that crashed, if there was one.
   std::optional<std::int64_t> died_ns;
 };
 
-/// The recorder of history.db. Every call is repeatable after a SqliteError:
-/// what it got is still pending or was not taken, and recording twice is a
-/// no-op.
+/// The recorder of history.db. Every call can be retried after a SqliteError:
+/// its data is still pending or was rejected as a whole, and recording twice is
+/// a no-op.
 ///
 ///     HistoryWriter history(data.history());
 ///     history.BeginSession(now_ns, software, config);
@@ -38,79 +38,80 @@ struct SessionStart {
 ///     history.Commit(now_ns);                    // Each second.
 ///     history.EndSession(now_ns, true);
 ///
-/// One thread at a time: the one that makes it may use it until it starts the
-/// thread that records, and again after that has ended.
+/// One thread at a time: the creating thread may use it until it starts the
+/// recording thread, and again after that has ended.
 class HistoryWriter {
  public:
   /// Creates or migrates the file. @throws DataError, SqliteError as Database.
   explicit HistoryWriter(const std::filesystem::path& path);
 
-  /// Ends, as not clean, sessions that were left open. Commits.
+  /// Closes sessions that were left open, as not clean. Commits.
   SessionStart BeginSession(std::int64_t now_ns, const std::string& software,
                             const std::string& config);
-  /// Commits all that is pending, and checkpoints the file.
+  /// Commits everything pending and checkpoints the file.
   void EndSession(std::int64_t now_ns, bool clean);
 
-  /// Makes what `batch` does, calls of Record() and Resume(), one transaction
-  /// with the trace, gaps and marks that are pending: on the disk on return. If
-  /// it throws, none of it is stored; do it all again.
+  /// Runs `batch`, which calls Record() and Resume(), in one transaction
+  /// together with pending trace, gaps and marks; durable on return. If it
+  /// throws, nothing is stored and all of it must be repeated.
   void CommitBatch(const std::function<void()>& batch);
 
-  /// Records a transition under event.episode_id, with the trace that is
-  /// pending; it is on the disk on return. A transition without its DETECTED
-  /// before makes the episode. Without event.models, the event closes an
-  /// episode that no engine knows any more.
-  /// @returns false if it was there already, or its episode has ended.
+  /// Records a transition of event.episode_id, with pending trace; durable on
+  /// return. A transition whose DETECTED was not recorded creates the episode.
+  /// Without event.models, the event closes an episode that no engine tracks
+  /// any more.
+  /// @returns false if it is already recorded, or the episode has ended.
   /// @throws NotFoundError if there is no episode to close.
   bool Record(const FaultEvent& event, std::int64_t now_ns);
 
-  /// Notes that an episode left open by a crash goes on. @throws NotFoundError
+  /// Records that an episode left open by a crash continues. @throws
+  /// NotFoundError
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
               std::int64_t now_ns);
 
-  /// Replaces what an earlier second look made of the episode.
+  /// Replaces the result of an earlier second look at the episode.
   /// @throws NotFoundError
   void StoreLook(const EpisodeLook& look);
 
-  /// Adds instants of an episode, in order of arrival: those before detection
-  /// when it begins, then as they come. Buffers. Instants that arrive with the
-  /// channels or faults of another model set are not taken: @returns false.
+  /// Buffers instants of an episode in order of arrival: those before detection
+  /// first, then as they come. Instants with the channels or faults of another
+  /// model set are rejected: @returns false.
   /// @throws NotFoundError if the episode is not recorded.
   bool AppendTrace(std::uint64_t episode_id,
                    std::span<const TracePoint> instants) {
     return traces_.Append(episode_id, instants);
   }
-  /// The trace of the episode is complete; frees its buffer after writing.
+  /// The trace of the episode is complete; frees its buffer once written.
   void EndTrace(std::uint64_t episode_id) { traces_.End(episode_id); }
 
-  /// Adds coverage and health to what is stored, and replaces the accumulators
-  /// and the stretches of the shadow, with what is pending; on the disk on
-  /// return. Twice counts twice.
+  /// Adds coverage and health to what is stored, and replaces accumulators and
+  /// shadow stretches, together with what is pending; durable on return. Not
+  /// idempotent: twice counts twice.
   void CommitCheckpoint(const Checkpoint& checkpoint);
 
-  /// The accumulators as of the last checkpoint, by valve.
+  /// The accumulators of the last checkpoint, by valve.
   std::vector<Accumulator> Accumulators();
-  /// The same of the candidate of --shadow.
+  /// The same for the --shadow candidate.
   std::vector<Accumulator> ShadowAccumulators();
 
-  /// Adds a gap; the same gap twice is one. Buffers.
+  /// Adds a gap, once even if repeated. Buffers.
   void AddGap(const DataGap& gap) { gaps_.push_back(gap); }
 
   /// The event was handed to DDS. Buffers.
   void MarkSent(const FaultEvent& event);
 
-  /// Stores what is pending in one transaction, and a sign of life at least
-  /// every 10 s, and at once after an error; nothing to store costs nothing.
+  /// Commits what is pending in one transaction, and a heartbeat at least every
+  /// 10 s and immediately after an error. Free if nothing is pending.
   void Commit(std::int64_t now_ns);
   bool HasPending() const;
 
-  /// Committed events that were perhaps not handed to DDS, in the order of
-  /// commitment. Rows that cannot be read, e.g. because an id was damaged, are
-  /// left out and described in `damaged`.
+  /// Committed events that may not have been handed to DDS, in commit order.
+  /// Unreadable rows, e.g. with a damaged id, are skipped and described in
+  /// `damaged`.
   /// @throws DataError for such a row if `damaged` is null.
   std::vector<FaultEvent> UnsentEvents(
       std::vector<std::string>* damaged = nullptr);
-  /// Episodes that have not ended, by detection; `damaged` likewise.
+  /// Episodes that have not ended, ordered by detection; `damaged` likewise.
   std::vector<OpenEpisode> OpenEpisodes(
       std::vector<std::string>* damaged = nullptr);
 
@@ -124,7 +125,7 @@ class HistoryWriter {
   };
 
   void StorePending();
-  /// Forgets what is in the file now.
+  /// Discards buffers that are now in the file.
   void Settle();
 
   Database database_;
@@ -134,7 +135,7 @@ class HistoryWriter {
   std::vector<DataGap> gaps_;
   std::vector<SentEvent> sent_;
   bool in_batch_{false};  // Within CommitBatch().
-  bool failed_{false};    // The last transaction did.
+  bool failed_{false};    // The last transaction failed.
 };
 
 }  // namespace fdi::storage

@@ -64,7 +64,7 @@ std::vector<OperatorAction> OperatorLog::Next(std::int64_t since_ns) {
     }
     known->second = ended;
   }
-  data_version_ = version;  // What throws before is read again.
+  data_version_ = version;  // Not set on a throw: the rows are read again.
   return actions;
 }
 

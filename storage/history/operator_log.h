@@ -10,14 +10,14 @@
 
 namespace fdi::storage {
 
-/// What operators did in a history, in order, to bring it to another one.
+/// The operator actions of a history, in order, for copying to another one.
 class OperatorLog {
  public:
   /// @throws DataError, SqliteError as Database.
   explicit OperatorLog(const std::filesystem::path& path);
 
-  /// What has come since the last call; at first, and after Rewind(), all since
-  /// `since_ns`. A shelf comes again when it is ended.
+  /// Actions since the last call; on the first call and after Rewind(), all
+  /// since `since_ns`. A shelf is returned again when it has been ended.
   std::vector<OperatorAction> Next(std::int64_t since_ns);
   void Rewind();
 
@@ -25,7 +25,7 @@ class OperatorLog {
   Database database_;
   std::int64_t data_version_{-1};
   std::int64_t last_event_{0};
-  std::map<std::int64_t, bool> shelves_;  // That have come; whether ended.
+  std::map<std::int64_t, bool> shelves_;  // Returned so far; whether ended.
 };
 
 }  // namespace fdi::storage

@@ -18,15 +18,15 @@ namespace {
 
 constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
 
-/// One kind of item that can be deleted.
+/// One kind of deletable record.
 struct Items {
   const Schema& schema;
-  /// Row id, first stamp and stored bytes of what is not protected; first stamp
-  /// from ?1 on, ended before ?2, the oldest ?3.
+  /// Row id, first stamp and stored bytes of unprotected records with a first
+  /// stamp from ?1 on that ended before ?2; the oldest ?3 of them.
   std::string_view candidates;
   std::string_view erase;
   std::string_view count_protected;
-  int batch;  ///< So many go in one transaction.
+  int batch;  ///< Deletions per transaction.
 };
 
 struct Candidate {
@@ -110,6 +110,8 @@ class Pruner {
   void DeleteWhile(std::int64_t before_ns, Condition more) {
     std::int64_t from_ns = -kEver;
     while (more()) {
+      // The query is inside the transaction, so that no candidate becomes
+      // protected, e.g. by a label, before it is deleted.
       Transaction transaction(database_);
       const auto batch = Candidates(from_ns, before_ns, items_.batch);
       if (batch.empty()) {
@@ -120,6 +122,7 @@ class Pruner {
         Note(item);
       }
       transaction.Commit();
+      // Earlier rows are deleted or protected.
       from_ns = batch.back().stamp_ns;
       result_.bytes_after = database_.UsedBytes();
       std::this_thread::sleep_for(limits_.pause);
@@ -133,7 +136,7 @@ class Pruner {
   PruneResult result_;
 };
 
-// Counts what is older than `hour` into `result`. @returns its bytes.
+// Adds the hours older than `hour` to `result`. @returns their bytes.
 std::uintmax_t CountHealth(Database& database, const std::string& valve,
                            std::int64_t hour, PruneResult& result) {
   Statement row = database.Prepare(sql::old_health);

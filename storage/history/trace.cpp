@@ -16,7 +16,7 @@ namespace fdi::storage {
 namespace sql = history_sql;
 
 // A chunk of a trace is two blobs. The samples are a chunk of sample_codec.h;
-// beside them stand the vectors, with a CRC-32 of their own:
+// the vectors are stored beside them, with a CRC-32 of their own:
 //
 //   vectors  = instants channels faults size  deflated
 //   deflated = zlib of: quality state isolated d_0
@@ -27,7 +27,7 @@ namespace sql = history_sql;
 // integers (quality, state, isolated) or of doubles: see column_codec.h.
 namespace {
 
-// Size that the columns never exceed.
+// Upper bound of the size of the columns.
 constexpr std::uint32_t MaxRawBytes(std::uint32_t count, std::uint32_t channels,
                                     std::uint32_t faults) {
   return 2 * (4 + channels + faults) * (8 * count + 64);
@@ -176,7 +176,7 @@ std::vector<TracePoint> DecodeTrace(const TraceChunk& chunk,
   return instants;
 }
 
-// Largest factor of the isolated set; before isolation, of any fault.
+// Largest factor of the isolated set or, before isolation, of any fault.
 double TraceWriter::Peak(const Buffer& buffer) {
   double peak = 0.0;
   for (const TracePoint& instant : buffer.instants) {
@@ -186,7 +186,7 @@ double TraceWriter::Peak(const Buffer& buffer) {
     }
     for (std::size_t f = 0; f < instant.factors.size(); ++f) {
       if (buffer.isolated == 0 || (buffer.isolated >> f & 1U) != 0) {
-        // A NaN compares false: it does not count.
+        // A NaN compares false and is ignored.
         peak = std::max(peak, instant.factors[f]);
       }
     }

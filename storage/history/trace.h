@@ -26,36 +26,36 @@ inline constexpr int kTraceChunkInstants = 300;
 /// @throws std::invalid_argument if there are none or their sizes differ.
 TraceChunk EncodeTrace(std::span<const TracePoint> instants);
 
-/// @param where the chunk stands, for the message.
+/// @param where the chunk is stored, for error messages.
 /// @throws DataError if the bytes are not what EncodeTrace() writes.
 std::vector<TracePoint> DecodeTrace(const TraceChunk& chunk,
                                     std::string_view where);
 
-/// The traces of the episodes that are being recorded: buffers instants and
-/// stores them in chunks. The last chunk of an episode is replaced by a longer
-/// one until it is full, so that a crash loses what was not committed only.
+/// The traces of the episodes being recorded: buffers instants and stores them
+/// in chunks. The last chunk of an episode is replaced by a longer one until it
+/// is full, so that a crash loses only what was not committed.
 class TraceWriter {
  public:
   explicit TraceWriter(Database& database) : database_(database) {}
 
-  /// As the functions of HistoryWriter of that name.
+  /// Like the functions of HistoryWriter with these names.
   bool Append(std::uint64_t episode_id, std::span<const TracePoint> instants);
   void End(std::uint64_t episode_id);
   void EndAll();
-  /// From now on the peak factor is that of this set.
+  /// The peak factor refers to this set from now on.
   void SetIsolated(std::uint64_t episode_id, FaultSet isolated);
 
   bool HasPending() const;
-  /// Within a transaction: writes what is not yet in the file.
+  /// Within a transaction: writes what is not in the file yet.
   void Store();
-  /// Once that is committed: forgets what is in full chunks.
+  /// After the commit: discards the instants of full chunks.
   void Settle();
 
  private:
   // The instants of an episode that are not yet in full chunks.
   struct Buffer {
     std::vector<TracePoint> instants;
-    std::int64_t chunk{0};  // Number of the chunk that instants[0] begins.
+    std::int64_t chunk{0};  // Number of the chunk that begins at instants[0].
     std::size_t channels{0};
     std::size_t faults{0};
     FaultSet isolated{0};

@@ -6,8 +6,8 @@ namespace fdi::storage {
 namespace sql = history_sql;
 namespace {
 
-// Another history beside the open one, as schema `source` of statements; both
-// are of the same version. It is only read.
+// Attaches a second history, of the same version, as schema `source`. It is
+// only read.
 class Attached {
  public:
   Attached(Database& database, const std::filesystem::path& source)
@@ -17,7 +17,7 @@ class Attached {
   ~Attached() {
     try {
       database_.Run("DETACH source");
-    } catch (const SqliteError&) {  // It goes with the connection.
+    } catch (const SqliteError&) {  // The connection closes it.
     }
   }
   Attached(const Attached&) = delete;

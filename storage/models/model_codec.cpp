@@ -23,15 +23,15 @@ namespace fdi::storage {
 //   file    = "FDIM" format:uint32 length:uint64 payload crc:uint32
 //   payload = the fields of ModelSet in the order of Fields() below
 //
-// The CRC-32 is of all bytes before it. Of a field stand: a double as its 64
-// bits; int as int32; int64 as it is; bool and enumerations as uint8; a text as
-// uint32 length and bytes; a list as uint32 count and its elements; a struct as
-// its fields. A new or moved field needs another kFormat. A set without a floor
-// stands as format 3 had it, so that sets of before keep their bytes and hash.
+// The CRC-32 covers all bytes before it. Encoding: a double as its 64 bits; int
+// as int32; int64 unchanged; bool and enumerations as uint8; a text as uint32
+// length and bytes; a list as uint32 count and its elements; a struct as its
+// fields. A new or moved field needs another kFormat. A set without a floor is
+// encoded as in format 3, so that older sets keep their bytes and hash.
 namespace {
 
 constexpr std::uint32_t kMagic = 0x4D494446;  // "FDIM"
-// 3, and one of these for each of the parts that stand behind the other fields.
+// Format 3, plus one of these for each of the parts appended behind the fields.
 constexpr std::uint32_t kFormat = 3;
 constexpr std::uint32_t kWithPhysics = 1;
 constexpr std::uint32_t kWithFloor = 2;
@@ -47,17 +47,17 @@ constexpr std::uint32_t kMaxTrainingRuns = 65536;
 template <typename T, typename Struct>
 concept Of = std::same_as<std::remove_const_t<T>, Struct>;
 
-/// A vector and the longest it may be.
+/// A vector and its maximum length.
 template <typename Vector>
 struct Limited {
   Vector& values;
   std::uint32_t max;
 };
 template <typename Vector>
-Limited(Vector&, std::uint32_t) -> Limited<Vector>;  // clang 14 needs it.
+Limited(Vector&, std::uint32_t) -> Limited<Vector>;  // For clang 14.
 
 // The fields of every struct, once for both directions. The bindings name all
-// of them: a field that is added does not compile until it stands here too.
+// of them, so a new field does not compile until it is added here.
 
 template <typename A, Of<SignalRange> T>
 void Fields(A& a, T& range) {
@@ -149,7 +149,7 @@ void Fields(A& a, T& drift) {
   a(lower_mean, upper_mean, log_scale);
 }
 
-// Without the drift, which stands behind the other fields.
+// Without the drift, which is appended behind the other fields.
 template <typename A, Of<ChannelSpec> T>
 void Fields(A& a, T& channel) {
   auto& [name, output, lower_threshold, upper_threshold, windows, drift] =
@@ -191,7 +191,7 @@ void Fields(A& a, T& physical) {
 
 template <typename A, Of<ModelSet> T>
 void Fields(A& a, T& models) {
-  // version and content_hash are given by the store.
+  // version and content_hash are assigned by the store.
   auto& [name, version, content_hash, created_ns, software, preset,
          sample_period_s, flow_unit, validity, stuck, floor, decision, channels,
          observers, faults, groups, undetectable, training_runs,
@@ -314,8 +314,8 @@ std::uint32_t Checksum(std::span<const std::byte> bytes) {
               reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-// Sets made before the findings had numbers of their own hold them behind the
-// 22 faults of then.
+// Sets made before findings had a number range of their own number them behind
+// the 22 faults of that time.
 void RenumberFindings(ModelSet& models) {
   constexpr int kBehindFaults = 23;
   if (!models.floor || std::ranges::any_of(models.faults, IsFinding)) {

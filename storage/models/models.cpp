@@ -186,6 +186,7 @@ ModelSet ModelStore::Save(const ModelSet& models, Activation activation,
   const std::vector<std::byte> bytes = EncodeModelSet(saved);
   saved.content_hash = ContentHash(saved);
   Transaction transaction(database_);
+  // Inside the transaction, so that no other writer takes the same version.
   saved.version = static_cast<int>(
       database_.QueryInt64(sql::newest_version, saved.name).value_or(0) + 1);
   const bool activate = activation == Activation::kAlways ||

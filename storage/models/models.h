@@ -21,7 +21,7 @@ namespace fdi::storage {
 /// generation and the view model_summary; see docs/data.md.
 const Schema& ModelsSchema();
 
-/// `NAME`, which means its active version, or `NAME@VERSION`.
+/// `NAME`, meaning its active version, or `NAME@VERSION`.
 struct ModelReference {
   std::string name;
   std::optional<int> version;
@@ -52,8 +52,8 @@ struct ModelSummary {
   double greatest_bias{0.0};  ///< |mean residual| [unit].
 };
 
-/// An episode of history.db that a model set learnt from: what it was labelled,
-/// what that was taken to mean, and where its samples are.
+/// An episode of history.db used for training a model set: its label, how the
+/// label was interpreted, and where its samples are.
 struct TrainingEpisode {
   std::string episode_id;  ///< 16 hex digits.
   std::string valve_id;
@@ -62,13 +62,13 @@ struct TrainingEpisode {
   std::int64_t labelled_ns{0};
   int fault{0};          ///< 0: normal operation.
   double strength{0.0};  ///< Signed; 0 in normal operation.
-  std::string run;       ///< Of runs.db, among the training runs of the set.
+  std::string run;       ///< In runs.db, among the training runs of the set.
   std::int64_t samples{0};
 
   bool operator==(const TrainingEpisode&) const = default;
 };
 
-/// The model set that another one was built on.
+/// The model set from which another one was trained.
 struct ParentSet {
   std::string name;
   int version{0};
@@ -77,23 +77,23 @@ struct ParentSet {
   bool operator==(const ParentSet&) const = default;
 };
 
-/// Where a model set comes from, beside its training runs. Stays in models.db:
-/// an exported file does not carry it.
+/// The origin of a model set beside its training runs. Kept in models.db only:
+/// exported files do not contain it.
 struct Lineage {
-  std::string settings;  ///< JSON of the training; empty: not known.
+  std::string settings;  ///< JSON of the training; empty: unknown.
   std::optional<ParentSet> parent;
-  std::vector<TrainingEpisode> episodes;  ///< Those of the parent, too.
+  std::vector<TrainingEpisode> episodes;  ///< Including those of the parent.
 };
 
-/// Whether the models of a valve were made for the valve as it is now.
+/// Whether the models of a valve match its current epoch.
 enum class BaselineState : std::uint8_t {
-  kNone,         ///< Not onboarded: the models are the user's business.
-  kProvisional,  ///< Onboarded in an earlier epoch: isolation is held.
+  kNone,         ///< Not onboarded: the user is responsible.
+  kProvisional,  ///< Onboarded in an earlier epoch: not isolated.
   kValid,        ///< Onboarded in this epoch.
 };
 std::string_view BaselineStateName(BaselineState state);  ///< "none", ...
 
-/// How a normal model fits the healthy valve.
+/// Fit of a normal model on the healthy valve.
 struct ChannelFigures {
   std::string name;
   double rmse{0.0};  ///< [unit of the output]
@@ -101,17 +101,17 @@ struct ChannelFigures {
   double vaf{0.0};   ///< [%]
 };
 
-/// What onboarding found of a valve in one epoch: the valve as it was found
-/// and as it was left, side by side.
+/// Result of onboarding a valve in one epoch: compares the valve as found and
+/// as left.
 struct BaselineRecord {
   std::uint32_t epoch{0};
   std::string model_set;
   int version{0};
   double hours{0.0};  ///< Of healthy data.
-  /// Fitted, by name, e.g. {"trim.kv_m3_h", 118.2}.
+  /// Fitted parameters by name, e.g. {"trim.kv_m3_h", 118.2}.
   std::vector<std::pair<std::string, double>> parameters{};
   std::vector<ChannelFigures> channels{};
-  std::int64_t created_ns{0};  ///< UTC; filled when it is stored.
+  std::int64_t created_ns{0};  ///< UTC; set by the store.
 };
 
 enum class ValveEventKind : std::uint8_t {
@@ -123,26 +123,26 @@ std::string_view ValveEventKindName(ValveEventKind kind);  ///< "replaced", ...
 /// @throws ConfigError naming the accepted names.
 ValveEventKind ParseValveEventKind(std::string_view name);
 
-/// What was done to a valve; it opens an epoch.
+/// Maintenance of a valve; opens an epoch.
 struct ValveEvent {
-  std::uint32_t epoch{0};  ///< That it opened; filled when it is stored.
+  std::uint32_t epoch{0};  ///< The epoch that it opened; set by the store.
   ValveEventKind kind{ValveEventKind::kReplaced};
   std::string note{};
   std::int64_t at_ns{0};  ///< UTC.
   std::string who{};
 };
 
-/// The effects of the faults on a type of valve, apart from any valve's
-/// baseline. The bytes are the trainer's.
+/// The effects of faults on a type of valve, independent of any valve's
+/// baseline. The bytes are defined by the trainer.
 struct ValveType {
   std::string name;
-  std::int64_t created_ns{0};  ///< UTC; filled when it is stored.
-  std::string summary{};       ///< One line for people.
-  std::size_t size{0};         ///< Of `bytes`, which lists leave empty.
+  std::int64_t created_ns{0};  ///< UTC; set by the store.
+  std::string summary{};       ///< One line of text.
+  std::size_t size{0};         ///< Size of `bytes`, which lists omit.
   std::vector<std::byte> bytes{};
 };
 
-/// What is known about a valve, or about all whose id matches a glob.
+/// Configuration of a valve, or of all valves whose ids match a glob.
 struct ValveEntry {
   std::string pattern;  ///< Id, or glob with * ? [...].
   std::string type;     ///< Free text, e.g. "globe DN100".
@@ -150,9 +150,9 @@ struct ValveEntry {
   Sense sense{Sense::kClosing};
   SignalMask signals{kBasicSignals};
   double period_s{1.0};
-  std::uint32_t epoch{0};  ///< Replacements and recalibrations.
+  std::uint32_t epoch{0};  ///< Number of replacements and recalibrations.
   std::optional<ModelReference> model_set;
-  /// In which the assigned set was made by onboarding; see BaselineState.
+  /// Epoch in which onboarding made the assigned set; see BaselineState.
   std::optional<std::uint32_t> baseline_epoch;
 
   BaselineState baseline() const {
@@ -164,14 +164,14 @@ struct ValveEntry {
   }
 };
 
-/// Whether a version that is stored becomes the active one of its name.
+/// Whether a stored version becomes the active one of its name.
 enum class Activation {
   kIfFirst,  ///< Only if no version of that name is active.
   kAlways,
 };
 
-/// Model sets and valves. Any number of readers; for changes open it as an
-/// occasional writer. One thread at a time.
+/// Model sets and valves. Any number of readers; open it as an occasional
+/// writer for changes. One thread at a time.
 class ModelStore {
  public:
   /// @throws DataError, SqliteError as Database.
@@ -179,24 +179,24 @@ class ModelStore {
                       Access access = Access::kReader);
 
   /// Stores the set as the next version of its name, in one transaction.
-  /// @returns it as Load() gives it: with version and content_hash.
+  /// @returns the set as Load() would: with version and content_hash.
   ModelSet Save(const ModelSet& models,
                 Activation activation = Activation::kIfFirst,
                 const Lineage& lineage = {});
 
-  /// Where the set comes from; empty if that is not known.
+  /// The origin of a set; empty if unknown.
   Lineage LineageOf(const ModelReference& reference);
 
-  /// "NAME" (the active version) or "NAME@VERSION".
-  /// @throws NotFoundError naming what is there.
+  /// Loads "NAME" (the active version) or "NAME@VERSION".
+  /// @throws NotFoundError naming what exists.
   /// @throws DataError if the stored bytes are damaged.
   ModelSet Load(std::string_view reference);
   ModelSet Load(const ModelReference& reference);
 
-  /// By name and version.
+  /// Ordered by name and version.
   std::vector<ModelSummary> List();
   ModelSummary Summary(const ModelReference& reference);
-  /// The version answers from now on; without one, the newest.
+  /// Makes the version, or else the newest one, the active one of its name.
   void Activate(const ModelReference& reference);
 
   /// Writes the canonical bytes to a file that does not exist yet.
@@ -206,38 +206,40 @@ class ModelStore {
   ModelSet ImportFile(const std::filesystem::path& path,
                       Activation activation = Activation::kIfFirst);
 
-  /// Valve entries in the order in which they are tried.
+  /// Valve entries in matching order.
   std::vector<ValveEntry> Valves();
-  /// Adds an entry behind the others, or replaces the one of that pattern.
+  /// Appends an entry, or replaces the one with that pattern.
   void PutValve(const ValveEntry& entry);
-  /// @throws NotFoundError if there is no entry of that pattern.
+  /// @throws NotFoundError if there is no entry with that pattern.
   void RemoveValve(std::string_view pattern);
-  /// Assigns a model set, or none, to the entry of `pattern`; adds the entry
-  /// if it is not there. Another set than before has no baseline.
+  /// Assigns a model set, or none, to the entry with `pattern`, which is added
+  /// if it does not exist. A different set has no baseline.
   /// @throws NotFoundError if there is no such model set.
   void AssignModelSet(std::string_view pattern,
                       const std::optional<ModelReference>& reference);
 
-  /// The valve was onboarded in its present epoch: keeps `record`, assigns its
-  /// model set, and the baseline is valid. Adds the entry if it is not there.
+  /// Stores an onboarding in the valve's current epoch: adds `record`, assigns
+  /// its model set and makes the baseline valid. Adds the entry if it does not
+  /// exist.
   /// @throws NotFoundError if there is no such model set; ConfigError if the
-  ///   epoch is not the valve's.
+  ///   epoch is not the current one.
   void SetBaseline(std::string_view pattern, const BaselineRecord& record);
-  /// By epoch, then time.
+  /// Ordered by epoch, then time.
   std::vector<BaselineRecord> Baselines(std::string_view pattern);
 
-  /// Opens the next epoch; a baseline is provisional from now on.
-  /// @returns the entry as it is now. @throws NotFoundError if there is none.
+  /// Opens the next epoch, which makes an existing baseline provisional.
+  /// @returns the entry after the change. @throws NotFoundError if there is
+  ///   none.
   ValveEntry AddValveEvent(std::string_view pattern, const ValveEvent& event);
   std::vector<ValveEvent> ValveEvents(std::string_view pattern);
 
-  /// Keeps a valve type, in place of one of that name. @throws ConfigError if
-  /// the name is not one of a model set.
+  /// Stores a valve type, replacing one of the same name. @throws ConfigError
+  /// if the name is not valid for a model set.
   void SaveTemplate(const std::string& name, std::span<const std::byte> bytes,
                     const std::string& summary);
-  /// @throws NotFoundError naming what is there.
+  /// @throws NotFoundError naming what exists.
   ValveType LoadTemplate(std::string_view name);
-  /// By name, without bytes.
+  /// Ordered by name, without bytes.
   std::vector<ValveType> ListTemplates();
   /// @throws NotFoundError
   void DeleteTemplate(std::string_view name);
@@ -245,23 +247,22 @@ class ModelStore {
   /// The first entry whose pattern matches.
   std::optional<ValveEntry> FindValve(std::string_view valve_id);
 
-  /// Which version diagnoses the valve: the set of the first matching entry
-  /// that names one (its active version unless it names one), else the active
-  /// set whose name is the valve's id, else none: the valve is UNASSIGNED.
+  /// The model set of a valve: that of the first matching entry which names one
+  /// (its active version unless a version is given), else the active set whose
+  /// name is the valve's id, else none, and the valve is UNASSIGNED.
   std::optional<ModelReference> AssignedModelSet(std::string_view valve_id);
 
-  /// Takes over from `other` what it knows of a valve: the model set that
-  /// diagnoses it, and as its own entry the one that matches, with baselines
-  /// and events. Twice is once.
-  /// @param in_use content hash of the set that counts if none is assigned.
-  /// @returns the set here; nothing if there is none.
-  /// @throws ConfigError if an entry of a glob stands first and gives the valve
-  ///   another set.
+  /// Copies from `other` what belongs to a valve: its model set and, as an
+  /// entry of its own, the matching entry with baselines and events.
+  /// Idempotent.
+  /// @param in_use content hash of the set to use if none is assigned.
+  /// @returns the set in this store; nothing if there is none.
+  /// @throws ConfigError if a glob entry in front of it assigns another set.
   std::optional<ModelReference> TakeValve(ModelStore& other,
                                           const std::string& valve_id,
                                           std::optional<std::uint64_t> in_use);
 
-  /// Counts changes of active sets, assignments and valve entries.
+  /// Incremented by changes of active sets, assignments and valve entries.
   std::int64_t Generation();
 
   Database& database() { return database_; }
@@ -270,10 +271,10 @@ class ModelStore {
   std::int64_t RequireId(const ModelReference& reference);
   void BumpGeneration();
   ValveEntry RequireEntry(std::string_view pattern);
-  /// The entry of `pattern`, or one for valves as the model set needs them.
+  /// The entry of `pattern`, or a new one with the model set's requirements.
   ValveEntry EntryOrNew(std::string_view pattern,
                         const std::optional<ModelReference>& reference);
-  /// Within a transaction.
+  /// Call within a transaction.
   void StoreEntry(const ValveEntry& entry);
   std::optional<ModelReference> FindContent(std::uint64_t hash);
   ModelReference TakeModelSet(ModelStore& other,
@@ -282,14 +283,14 @@ class ModelStore {
   Database database_;
 };
 
-/// Tells cheaply whether assignments may have changed, for a service that
-/// polls: most calls cost one look into shared memory.
+/// Cheap check for changed assignments, for a service that polls: most calls
+/// cost one look into shared memory.
 class ChangeCounter {
  public:
   explicit ChangeCounter(const std::filesystem::path& path);
 
-  /// True if active sets or valve entries changed since the last call (or
-  /// since the construction).
+  /// True if active sets or valve entries changed since the last call, or since
+  /// construction.
   bool Changed();
 
  private:

@@ -288,6 +288,7 @@ std::optional<ModelReference> ModelStore::TakeValve(
   if (assigned) {
     entry.model_set = TakeModelSet(other, *assigned);
   }
+  // Baselines and events are copied once, also if the call is repeated.
   const bool has_past =
       !Baselines(valve_id).empty() || !ValveEvents(valve_id).empty();
   Transaction transaction(database_);
@@ -381,7 +382,8 @@ std::vector<BaselineRecord> ModelStore::Baselines(std::string_view pattern) {
 ValveEntry ModelStore::AddValveEvent(std::string_view pattern,
                                      const ValveEvent& event) {
   ValveEntry entry = RequireEntry(pattern);
-  // Models that were made some other way are those of the valve until now.
+  // Without a baseline, the models are taken to be those of the epoch that
+  // ends.
   entry.baseline_epoch = entry.baseline_epoch.value_or(entry.epoch);
   ++entry.epoch;
   Transaction transaction(database_);
@@ -442,7 +444,7 @@ std::vector<ValveType> ModelStore::ListTemplates() {
 }
 
 void ModelStore::DeleteTemplate(std::string_view name) {
-  LoadTemplate(name);  // It must be there.
+  LoadTemplate(name);  // Throws if it does not exist.
   Transaction transaction(database_);
   database_.Run("DELETE FROM valve_type WHERE name = ?", name);
   transaction.Commit();

@@ -14,7 +14,7 @@
 
 namespace fdi::storage {
 
-// A column is a list of 64-bit numbers that stand for one field over many
+// A column is a list of 64-bit numbers, the values of one field over many
 // instants. As bytes, little endian:
 //
 //   integers = 0 value:int64                        all are equal
@@ -23,15 +23,15 @@ namespace fdi::storage {
 //   doubles  = 0 integers                           the ordered bits
 //            | kind [origin step] integers integers
 //
-// Residuals of order 0 are distances from the one seed, the median; of order 1
-// and 2, first and second differences behind as many seeds. They are zigzag
+// Residuals of order 0 are distances from the single seed, the median; of order
+// 1 and 2, first and second differences after as many seeds. They are zigzag
 // coded: 0, -1, 1, -2 are 0, 1, 2, 3. `kind` is that of a ValuePredictor, with
-// origin and step (doubles) if it is a grid; the two columns of integers are
-// its n and the corrections in units in the last place. Nothing may ever change
-// what p(n) is by a bit: files of today are read by it.
+// origin and step (doubles) for a grid; the two columns of integers are its n
+// and the corrections in units in the last place. p(n) must never change by a
+// single bit, because existing files are decoded with it.
 namespace {
 
-// Differences of the file format wrap around, modulo 2⁶⁴.
+// Differences wrap around modulo 2⁶⁴, as the file format requires.
 std::int64_t WrapSubtract(std::int64_t a, std::int64_t b) {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) -
                                    static_cast<std::uint64_t>(b));
@@ -50,7 +50,7 @@ std::int64_t Unzigzag(std::uint64_t value) {
   return static_cast<std::int64_t>((value >> 1U) ^ (~(value & 1U) + 1U));
 }
 
-/// All doubles as integers in their order; −0 is one below +0.
+/// Maps doubles to integers in the same order; −0 is one below +0.
 std::int64_t Ordered(double value) {
   const auto bits = std::bit_cast<std::int64_t>(value);
   return bits < 0 ? WrapSubtract(std::numeric_limits<std::int64_t>::min(),
@@ -72,7 +72,8 @@ constexpr double kMaxExact = 9007199254740992.0;  // 2⁵³
 constexpr std::array<double, ValuePredictor::kMaxDecimals + 1> kPowers{
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
 
-/// Shares of misfits up to 1/16 pass: a few bad readings spoil no column.
+/// Tolerates up to 1/16 misfits, so that a few bad readings do not spoil a
+/// column.
 bool Fits(const ValuePredictor& predictor, std::span<const double> values,
           std::int64_t tolerance) {
   std::size_t misfits = 0;
@@ -97,7 +98,8 @@ std::uint64_t CorrectionBits(const ValuePredictor& predictor,
   return bits;
 }
 
-/// As good as a search: no fewer decimals would do; a grid is met to one bit.
+/// Whether `hint` is as good as the result of a search: fewer decimals would
+/// not do; a grid is met within a bit per value.
 bool MeetsAgain(const ValuePredictor& hint, std::span<const double> values) {
   if (hint.kind == ValuePredictor::kGrid) {
     return Fits(hint, values, 64) &&
@@ -109,7 +111,7 @@ bool MeetsAgain(const ValuePredictor& hint, std::span<const double> values) {
          (hint.kind == ValuePredictor::kDecimal || !Fits(coarser, values, 0));
 }
 
-/// Greatest common divisor of two lengths known up to `tolerance`.
+/// Greatest common divisor of two lengths with the given `tolerance`.
 double CommonStep(double a, double b, double tolerance) {
   while (b > tolerance) {
     double rest = std::fmod(a, b);
@@ -122,7 +124,7 @@ double CommonStep(double a, double b, double tolerance) {
   return a;
 }
 
-/// The step of the grid that the sorted values lie on, 0 if none shows.
+/// The step of the grid that the sorted values lie on; 0 if there is none.
 double GridStep(const std::vector<double>& sorted) {
   const double largest =
       std::max(std::abs(sorted.front()), std::abs(sorted.back()));
@@ -144,7 +146,7 @@ double GridStep(const std::vector<double>& sorted) {
   return step > 16.0 * tolerance ? step : 0.0;
 }
 
-/// A grid through `origin`, its step such that `far` is met best.
+/// The grid through `origin` whose step fits `far` best.
 std::optional<ValuePredictor> BestGrid(std::span<const double> values,
                                        double origin, double far, double step) {
   const double count = std::round((far - origin) / step);
@@ -202,8 +204,8 @@ std::optional<ValuePredictor> FindGrid(std::span<const double> values) {
 constexpr std::uint8_t kConstant = 0;  // else order + 1
 constexpr std::uint8_t kBits = 0;      // else ValuePredictor::kind
 
-/// Residuals of one order; the first `order` values (for order 0 the median)
-/// stand apart as seeds.
+/// Residuals of one order; the first `order` values (the median for order 0)
+/// are kept as seeds.
 struct Residuals {
   int order{0};
   std::vector<std::int64_t> seeds;

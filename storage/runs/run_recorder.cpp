@@ -12,7 +12,7 @@ namespace fdi::storage {
 namespace sql = runs_sql;
 namespace {
 
-// Marks the runs of recorders that died, and compacts what they left.
+// Marks the runs of crashed recorders as interrupted and compacts their tails.
 void Recover(Database& database, const RecorderLiveness& liveness,
              std::size_t chunk_samples) {
   std::vector<std::int64_t> dead;
@@ -64,7 +64,8 @@ RunRecorder::Key RunRecorder::Begin(const NewRun& run) {
   ActiveRun& active = runs_[key];
   active.id = NewRunId();
   active.run = run;
-  // Of many valves that start at once not all shall fill a chunk at once.
+  // Staggered, so that many valves that start together do not fill their chunks
+  // in the same commit.
   active.committed.threshold =
       chunk_samples_ / 2 + key * 37 % (chunk_samples_ / 2 + 1);
   Touch(key, active);
@@ -111,8 +112,8 @@ void RunRecorder::Touch(Key key, ActiveRun& active) {
   }
 }
 
-// The state of a run in memory follows the file once the transaction is
-// committed, and not before: after an error all is as it was.
+// The in-memory state of a run is updated only after the transaction has been
+// committed: after an error everything is as before.
 void RunRecorder::Commit() {
   if (dirty_.empty()) {
     return;
@@ -150,7 +151,7 @@ void RunRecorder::Close() {
     active.end_asked = true;
     Touch(key, active);
   }
-  // In the order in which they began, for rows in that order.
+  // In the order of Begin(), which is then the order of the rows.
   std::sort(dirty_.begin(), dirty_.end());
   Commit();
   if (recorder_id_ != 0) {
@@ -162,7 +163,7 @@ void RunRecorder::Close() {
   }
 }
 
-// Writes what is pending of a run. @returns its state once committed.
+// Writes what is pending of a run. @returns its state after the commit.
 RunRecorder::Committed RunRecorder::Store(ActiveRun& active) {
   Committed after = active.committed;
   if (after.run_id == 0) {
@@ -190,7 +191,8 @@ RunRecorder::Committed RunRecorder::Store(ActiveRun& active) {
   return after;
 }
 
-// Tail and pending samples become chunks; less than one stays a tail row.
+// Converts tail and pending samples to chunks; an incomplete chunk remains a
+// tail row.
 void RunRecorder::Compact(ActiveRun& active, Committed& after) {
   std::vector<StoredSample> samples;
   if (after.tail > 0) {

@@ -20,25 +20,25 @@ struct RunRecorderOptions {
 };
 
 /// Records many runs at once through one connection. Append() only buffers;
-/// Commit(), which the caller's clock calls each second, stores what is pending
-/// of all runs in one transaction: in the tail table, and as a chunk once there
-/// is enough for one. What was committed outlives kill -9: runs whose recorder
-/// died become `interrupted` when the next one opens the file.
-/// Dropping the recorder drops what was not committed, as a crash would; see
-/// Close(). One thread at a time. Several recorders may share a file.
+/// Commit(), which the caller calls every second, stores what is pending of all
+/// runs in one transaction: in the tail table, and as a chunk once there are
+/// enough samples. Committed samples survive kill -9: runs whose recorder died
+/// become `interrupted` when the next one opens the file. Destroying the
+/// recorder drops what was not committed, as a crash would; see Close(). One
+/// thread at a time. Several recorders may share a file.
 class RunRecorder {
  public:
-  /// Names a run within this recorder.
+  /// Identifies a run within this recorder.
   using Key = std::size_t;
 
   /// @throws DataError, SqliteError as Database.
   explicit RunRecorder(const std::filesystem::path& path,
                        const RunRecorderOptions& options = {});
 
-  /// Begins a run; it is in the file from the next Commit() on.
+  /// Begins a run; the next Commit() writes it to the file.
   Key Begin(const NewRun& run);
-  /// Its id, known from the start until its end is committed: nothing of a
-  /// run is held after that.
+  /// Its id, available until the end of the run is committed, after which
+  /// nothing of the run is kept.
   /// @throws std::invalid_argument for a run that has ended.
   const std::string& Id(Key run) const;
 
@@ -48,17 +48,17 @@ class RunRecorder {
   /// Ends a run: the next Commit() compacts it and marks it complete.
   void End(Key run);
 
-  /// Stores all that is pending. After an error everything is still pending:
-  /// call again, or drop it. @throws SqliteError
+  /// Commits everything pending. After an error it is still pending: retry or
+  /// drop it. @throws SqliteError
   void Commit();
-  /// Drops what is pending, e.g. while the disk is full.
+  /// Drops what is pending, for example while the disk is full.
   /// @returns the number of samples; they are missing from the runs.
   std::int64_t DropPending();
 
   /// Ends all runs, commits and checkpoints. @throws SqliteError
   void Close();
 
-  /// Samples appended, not committed.
+  /// Samples appended but not committed.
   std::int64_t pending() const { return pending_; }
   /// Samples committed.
   std::int64_t recorded() const { return recorded_; }
@@ -67,12 +67,12 @@ class RunRecorder {
   Database& database() { return database_; }
 
  private:
-  /// What the file holds of a run.
+  /// What the file contains of a run.
   struct Committed {
     std::int64_t run_id{0};  ///< 0: no row yet.
     std::int64_t samples{0};
-    std::size_t tail{0};       ///< Of them in the tail table.
-    std::size_t threshold{0};  ///< Length of the tail that makes a chunk.
+    std::size_t tail{0};       ///< Of these, in the tail table.
+    std::size_t threshold{0};  ///< Tail length that triggers compaction.
     bool ended{false};
   };
   struct ActiveRun {

@@ -16,8 +16,8 @@ namespace fdi::storage {
 namespace sql = runs_sql;
 namespace {
 
-// Locks of the open file, not of the process: two recorders in one process see
-// each other, and closing another descriptor of the file frees nothing.
+// Locks of the open file description, not of the process: two recorders in one
+// process exclude each other, and closing another descriptor releases nothing.
 struct flock ByteLock(std::int64_t id) {
   struct flock lock {};
   lock.l_type = F_WRLCK;

@@ -51,8 +51,7 @@ double ParseBound(std::string_view bound, double absent,
   return value;
 }
 
-// Seconds from the start of a run as ns UTC; what is beyond the numbers is
-// their end.
+// Seconds from the start of a run as ns UTC, clamped to the range of int64.
 std::int64_t StampAt(const RunInfo& info, double t_s) {
   constexpr auto kEarliest = std::numeric_limits<std::int64_t>::min();
   constexpr auto kLatest = std::numeric_limits<std::int64_t>::max();
@@ -257,7 +256,7 @@ RunInfo RunStore::ReadRun(const Statement& row) {
   }
   if (info.state == RunState::kRecording &&
       !RecorderLiveness::IsAlive(database_->path(), recorder)) {
-    info.state = RunState::kInterrupted;  // Not yet noted in the file.
+    info.state = RunState::kInterrupted;  // Not marked in the file yet.
   }
   Statement labels = database_->Prepare(sql::labels);
   labels.Bind(info.row_id);

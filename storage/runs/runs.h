@@ -23,28 +23,29 @@ namespace fdi::storage {
 enum class RunOrigin : std::uint8_t { kSimulated, kImported, kRecorded };
 
 enum class RunState : std::uint8_t {
-  kRecording,    ///< A recorder is at it.
+  kRecording,    ///< Being recorded.
   kComplete,     ///< Ended by its recorder, or imported.
-  kInterrupted,  ///< Its recorder died; all committed samples are there.
+  kInterrupted,  ///< Its recorder died; committed samples are intact.
 };
 
 std::string_view RunOriginName(RunOrigin origin);  ///< "simulated", ...
 std::string_view RunStateName(RunState state);     ///< "recording", ...
 
-/// What is known when a run begins: one valve, one source, one sample period.
+/// Properties known when a run begins: one valve, one source, one sample
+/// period.
 struct NewRun {
   std::string valve_id;
   std::uint64_t source_id{0};
-  std::int64_t start_ns{0};  ///< UTC of t = 0; stretches count from here.
+  std::int64_t start_ns{0};  ///< UTC of t = 0.
   double period_s{1.0};
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   RunOrigin origin{RunOrigin::kRecorded};
-  std::string scenario;  ///< Of a simulation: TOML; of an import: the file.
+  std::string scenario;  ///< TOML of a simulation, or file of an import.
   std::optional<std::uint64_t> seed;
   std::string software;  ///< Version and revision of the program.
 };
 
-/// A truth given by a user for t in [from_s, to_s); it overrides a stored one.
+/// A user's label for t in [from_s, to_s); overrides a stored truth.
 struct RunLabel {
   double from_s{0.0};
   double to_s{std::numeric_limits<double>::infinity()};
@@ -62,16 +63,16 @@ struct RunInfo {
   std::int64_t first_stamp_ns{0};  ///< 0 if there is no sample.
   std::int64_t last_stamp_ns{0};
   SignalMask signals{0};  ///< Present in some sample.
-  bool has_truth{false};  ///< Stored beside every sample.
+  bool has_truth{false};  ///< Stored with every sample.
   std::array<std::int64_t, kIntakeCount> intake{};  ///< Samples by verdict.
   std::int64_t stored_bytes{0};
   std::vector<RunLabel> labels;
   std::int64_t row_id{0};  ///< Key of its rows in the tables.
 };
 
-/// Part of a run, written `ID` or `ID@from:to`; a unique beginning of an id
-/// stands for it, `last` for the run that was stored last. t in [from_s, to_s),
-/// seconds from the start of the run.
+/// Part of a run, written `ID` or `ID@from:to`, where ID may be a unique prefix
+/// or `last` for the run stored last. t in [from_s, to_s), seconds from the
+/// start of the run.
 struct RunSelector {
   std::string id;
   double from_s{-std::numeric_limits<double>::infinity()};
@@ -95,8 +96,8 @@ struct RunFilter {
   std::int64_t until_ns{std::numeric_limits<std::int64_t>::max()};
 };
 
-/// A run, or a stretch of it, with its samples in the order of arrival. Labels
-/// are in StoredSample::truth.
+/// A run, or part of one, with its samples in order of arrival. Labels are in
+/// StoredSample::truth.
 struct StoredRun {
   RunInfo info;
   RunSelector selector;
@@ -107,33 +108,33 @@ struct StoredRun {
 /// run_summary; see docs/data.md.
 const Schema& RunsSchema();
 
-/// Reads runs.db and, opened as an occasional writer, imports, labels and
-/// deletes. One thread at a time.
+/// Read access to runs.db; opened as an occasional writer, also imports, labels
+/// and deletes. One thread at a time.
 class RunStore {
  public:
   /// @throws DataError, SqliteError as Database.
   explicit RunStore(const std::filesystem::path& path,
                     Access access = Access::kReader);
 
-  /// By start.
+  /// Ordered by start.
   std::vector<RunInfo> List(const RunFilter& filter = {});
 
-  /// `selector` as in ParseRunSelector(); its stretch is ignored.
-  /// @throws NotFoundError if no run, or more than one, begins like that.
+  /// `selector` as in ParseRunSelector(); its time range is ignored.
+  /// @throws NotFoundError if no run, or more than one, matches.
   RunInfo Info(std::string_view selector);
 
-  /// @throws NotFoundError as Info(), or if the stretch holds no sample.
+  /// @throws NotFoundError as Info(), or if the range contains no sample.
   /// @throws DataError naming run and chunk if stored bytes are damaged.
   StoredRun Load(std::string_view selector);
 
-  /// Stores all runs of a table, or none. @returns their ids, in order.
-  /// `run`: valve, source, start (of t_s = 0), scenario and software count;
-  /// the rest is the table's. A split table makes runs that each start at
-  /// their first sample.
+  /// Stores all runs of a table, or none. @returns their ids, in order. Of
+  /// `run`, valve, source, start (of t_s = 0), scenario and software are used;
+  /// the table supplies the rest. A split table becomes several runs, each
+  /// starting at its first sample.
   std::vector<std::string> Import(std::span<const SampleSeries> series,
                                   const NewRun& run);
 
-  /// Says what was true in a stretch; later labels win.
+  /// Labels the selected range; later labels win.
   void Label(std::string_view selector, int fault, double strength);
   /// @returns how many labels the run had.
   int RemoveLabels(std::string_view selector);
@@ -142,7 +143,7 @@ class RunStore {
   Database& database() { return *database_; }
 
  private:
-  /// The one run that the selector means. @throws NotFoundError
+  /// Resolves a selector to one run. @throws NotFoundError
   RunInfo Find(const RunSelector& selector);
   RunInfo ReadRun(const Statement& row);
   void LoadTable(std::string_view table, std::int64_t from, std::int64_t to,

@@ -11,8 +11,8 @@
 
 namespace fdi::storage {
 
-// The bytes of a chunk, little endian; its count, codec and CRC-32 are columns
-// of the row beside them:
+// The bytes of a chunk, little endian; its count, codec and CRC-32 are separate
+// columns of the row:
 //
 //   plain   = record*
 //   record  = mask:uint32 word:uint64*     bit i of the mask: number i is not 0
@@ -40,7 +40,7 @@ struct Row {
   std::array<double, kDoubles> doubles{};  // values, strength of the truth
 };
 
-/// Inflated size that no chunk of `count` samples exceeds.
+/// Upper bound of the inflated size of a chunk of `count` samples.
 std::size_t MaxInflated(std::size_t count) {
   constexpr std::size_t kColumns = Row::kIntegers + 2 * Row::kDoubles;
   return kColumns * (8 * count + 64);
@@ -72,7 +72,7 @@ Row ToRow(const StoredSample& stored) {
   return row;
 }
 
-/// An integer that is one of 0 .. max.
+/// Checks that an integer is in 0 .. max.
 std::int64_t Within(std::int64_t value, std::int64_t max, const char* what,
                     const ByteReader& reader) {
   if (value < 0 || value > max) {
@@ -116,8 +116,8 @@ StoredSample FromRow(const Row& row, const ByteReader& reader) {
   return stored;
 }
 
-// Of codec, count and bytes, so that a damaged row is found whatever is
-// damaged.
+// Covers codec, count and bytes, so that damage to any part of the row is
+// detected.
 std::uint32_t ChecksumOf(const Chunk& chunk) {
   ByteWriter all;
   all.Put(static_cast<std::uint8_t>(chunk.codec));
@@ -187,7 +187,7 @@ std::vector<StoredSample> DecodeColumns(const Chunk& chunk,
   return samples;
 }
 
-/// Numbers that are zero (as bits) leave only a 0 in the mask of their record.
+/// Zero words (all bits 0) are omitted and marked in the record's mask.
 std::vector<std::byte> EncodePlain(std::span<const StoredSample> samples) {
   ByteWriter writer;
   for (const StoredSample& sample : samples) {

@@ -14,17 +14,17 @@
 
 namespace fdi::storage {
 
-/// A received sample as the recorder keeps it: with what became of it, so that
-/// re-scoring meets what the engine met.
+/// A received sample as recorded, with the outcome of its intake, so that
+/// re-scoring reproduces what the engine saw.
 struct StoredSample {
   Sample sample;
   std::optional<FaultTruth> truth;
   Intake intake{Intake::kAccepted};
   bool initialised{false};    ///< The observers were initialised here.
-  bool model_swapped{false};  ///< Another model set answered from here on.
+  bool model_swapped{false};  ///< First sample judged by another model set.
 };
 
-/// Forms of a stored chunk; numbers are part of the file format.
+/// Encodings of a stored chunk; numbers are part of the file format.
 enum class ChunkCodec : std::uint8_t {
   kPlain = 0,    ///< Fixed records, for the few samples of a tail row.
   kColumns = 1,  ///< Columns of differences, byte planes, zlib.
@@ -40,25 +40,24 @@ struct Chunk {
 
 inline constexpr std::uint32_t kMaxChunkSamples = 65536;
 
-/// What the last chunk of a run tells about the next one: the predictors of its
-/// columns of doubles, so that they need not be searched again.
+/// What a chunk of a run tells about the next one: the predictors of its
+/// columns of doubles, which saves searching for them again.
 struct ChunkHints {
   std::array<std::optional<ValuePredictor>, kSignalCount + 1> columns;
 };
 
-/// Packs samples without loss, whatever their bits are (NaN payloads, −0).
+/// Packs samples without loss, including NaN payloads and −0.
 ///
 /// kColumns: every field of the samples is a column of 64-bit integers. A
-/// column of doubles becomes one of integers n with value = n / 10^d, or
-/// value = a + q·n (the grid of a converter) with the distance in units in the
-/// last place beside it, or the bits themselves; values that fit not are kept
-/// apart. Of each integer column the first or second differences are cut into
-/// planes of bytes, and all of it is deflated.
+/// column of doubles becomes integers n with value = n / 10^d, or with value =
+/// a + q·n (the grid of a converter), plus corrections in units in the last
+/// place; or the bits themselves. Each integer column is stored as first or
+/// second differences, split into byte planes, and everything is deflated.
 /// @throws std::invalid_argument if there are none or too many.
 Chunk EncodeChunk(std::span<const StoredSample> samples, ChunkCodec codec,
                   ChunkHints* hints = nullptr);
 
-/// @param where the chunk stands, for the message.
+/// @param where the chunk is stored, for error messages.
 /// @throws DataError if CRC, sizes or values are not what EncodeChunk() writes.
 std::vector<StoredSample> DecodeChunk(const Chunk& chunk,
                                       std::string_view where);
