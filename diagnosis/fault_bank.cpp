@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+
+#include "diagnosis/observer_kernels.h"
 
 namespace fdi {
 namespace {
@@ -38,6 +41,8 @@ void FaultBank::Score(const ObserverBank& bank, Verdict& verdict) const {
 
 void FaultBank::Restart() {
   trained_.Clear();
+  effects_.fill(0.0);
+  allowance_ = 0.0;
   for (StrengthTracker& tracker : trackers_) {
     tracker.Restart();
   }
@@ -51,13 +56,45 @@ double FaultBank::BestEvidence() const {
   return best;
 }
 
+void FaultBank::FollowEffect(const ObserverBank& bank) {
+  const std::vector<ChannelObserver>& normal =
+      plan_->models().observers.front().channels;
+  for (std::size_t c = 0; c < normal.size(); ++c) {
+    const int channel = static_cast<int>(c);
+    const double residual = bank.residual(0, channel);
+    if (!bank.active(channel) || bank.saturated(channel) ||
+        std::isnan(residual)) {
+      continue;
+    }
+    const double distance = residual / normal[c].residual_sd;
+    effects_[c] = (bank.fades(channel) ? plan_->memory() : 1.0) * effects_[c] +
+                  0.5 * std::min(distance * distance, kMostSurprise) /
+                      plan_->channel_time(c);
+  }
+}
+
+double FaultBank::Allowance() const {
+  double best = trained_.total(0);
+  double interpolation = 0.0;
+  for (const StrengthTracker& tracker : trackers_) {
+    if (tracker.evidence(trained_) > best) {
+      best = tracker.evidence(trained_);
+      interpolation = tracker.Interpolation(trained_);
+    }
+  }
+  return plan_->models().decision.interpolation_allowance * interpolation *
+         std::accumulate(effects_.begin(), effects_.end(), 0.0);
+}
+
 void FaultBank::Follow(const ObserverBank& bank) {
+  FollowEffect(bank);
   trained_.Gather(bank);
   for (StrengthTracker& tracker : trackers_) {
     tracker.Step(bank);
   }
+  allowance_ = Allowance();
   const double least =
-      BestEvidence() -
+      BestEvidence() - allowance_ -
       kMemoryOfContradiction * plan_->models().decision.evidence_support;
   trained_.RaiseTo(least);
   for (StrengthTracker& tracker : trackers_) {
@@ -84,9 +121,10 @@ void FaultBank::Compete(Verdict& verdict) const {
   for (const StrengthTracker& tracker : trackers_) {
     const std::size_t i = tracker.path().fault_index;
     const double evidence = tracker.evidence(trained_);
-    const double factor = std::min({std::max(instant[i], tracker.factor()),
-                                    tracker.refutable() ? 1.0 : candidate,
-                                    EvidenceMembership(best - evidence)});
+    const double factor =
+        std::min({std::max(instant[i], tracker.factor()),
+                  tracker.refutable() ? 1.0 : candidate,
+                  EvidenceMembership(best - evidence - allowance_)});
     verdict.fault_factors[i] = std::max(verdict.fault_factors[i], factor);
     if (evidence > leading[i]) {
       leading[i] = evidence;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -13,12 +14,23 @@ namespace fdi {
 /// the largest factor of its observers, and once an episode is open also that
 /// of its strength tracker, capped by the evidence
 ///
-///     d_f = min( max(γ_observers, γ_tracker), μ_L(L_best − L_f) ),
+///     d_f = min( max(γ_observers, γ_tracker), μ_L(L_best − L_f − a) ),
 ///
 /// μ_L falling from 1 to 0 between the evidence core and support. Normal
-/// operation competes in the same way with d_0. A fault that no reading since
-/// the detection could have refuted has at most d_f = T/2: it is a candidate,
-/// but absence of contrary evidence does not isolate it.
+/// operation competes in the same way with d_0, without a. A fault that no
+/// reading since the detection could have refuted has at most d_f = T/2: it is
+/// a candidate, but absence of contrary evidence does not isolate it.
+///
+/// a allows for interpolation. The error between two trained strengths is the
+/// same sample after sample, so that its likelihood adds up to a verdict that
+/// says nothing about the fault. It is a share of the effect of the fault, with
+/// a variance that is 0 at both ends, as that of a Brownian bridge:
+///
+///     a = ρ 4 |h (1 − h)| E,   E = Σ_c ½ Σ_k λ^(n−k) r_0²/(S_0 τ_c),
+///
+/// where the best explanation lies a share h of the way between two strengths
+/// (StrengthTracker::Interpolation), ρ is the interpolation allowance, and E
+/// how far the normal observer is behind, not counting saturated readings.
 class FaultBank {
  public:
   explicit FaultBank(std::shared_ptr<const FaultPlan> plan);
@@ -40,11 +52,15 @@ class FaultBank {
 
  private:
   double BestEvidence() const;
+  void FollowEffect(const ObserverBank& bank);
+  double Allowance() const;
   double EvidenceMembership(double behind) const;
 
   std::shared_ptr<const FaultPlan> plan_;
   ObserverEvidence trained_;
-  std::vector<StrengthTracker> trackers_;  // one per fault and direction
+  std::vector<StrengthTracker> trackers_;       // one per fault and direction
+  std::array<double, kMaxChannels> effects_{};  // E by channel
+  double allowance_{0.0};                       // a
 };
 
 }  // namespace fdi

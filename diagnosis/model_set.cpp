@@ -37,6 +37,8 @@ void ValidateDecision(const ModelSet& models) {
         "evidence window must be in 2..1e6 samples");
   Check(p.evidence_core >= 0.0 && p.evidence_support > p.evidence_core, models,
         "evidence support must be beyond its core");
+  Check(p.interpolation_allowance >= 0.0 && p.interpolation_allowance <= 1.0,
+        models, "interpolation allowance must be in [0, 1]");
 }
 
 void ValidateChannel(const ModelSet& models, const ChannelSpec& channel) {

@@ -110,6 +110,9 @@ struct DecisionParameters {
   double evidence_window{200.0};  ///< Memory of evidence [samples].
   double evidence_core{3.0};      ///< Up to this far behind the best fault: 1;
   double evidence_support{9.0};   ///< this far or more: 0 [log-likelihood].
+  /// What interpolation between observers may cost a fault in the comparison:
+  /// this share of how far normal operation is behind; see FaultBank. 0: none.
+  double interpolation_allowance{0.0};
 };
 
 /// How often in a row a transmitter may repeat one reading; 0: not watched. See

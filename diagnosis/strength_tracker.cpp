@@ -63,6 +63,16 @@ double StrengthTracker::strength(const ObserverEvidence& trained) const {
          (trained.total(best.observer) > total_ ? best.strength : strength_);
 }
 
+double StrengthTracker::Interpolation(const ObserverEvidence& trained) const {
+  if (trained.total(BestNode(trained).observer) >= total_) {
+    return 0.0;
+  }
+  const PathPlace place = path_->PlaceOf(strength_);
+  const double h = place.from_low / (path_->nodes[place.segment + 1].strength -
+                                     path_->nodes[place.segment].strength);
+  return std::min(1.0, std::abs(4.0 * h * (1.0 - h)));
+}
+
 void StrengthTracker::RaiseEvidence(double least) {
   const double lacking = least - total_;
   if (lacking > 0.0) {

@@ -48,6 +48,9 @@ class StrengthTracker {
   /// For the best explanation, tracked or trained.
   double strength(const ObserverEvidence& trained) const;
   double evidence(const ObserverEvidence& trained) const;
+  /// How far that explanation lies from a trained strength, 4 |h (1 − h)| at a
+  /// share h of the way between two of them: 0 at either, 1 midway and at most.
+  double Interpolation(const ObserverEvidence& trained) const;
 
   /// True once a reading since the detection could have refuted the fault: on a
   /// channel where it differs from normal operation and the transmitter's limit

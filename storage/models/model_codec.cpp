@@ -36,8 +36,9 @@ constexpr std::uint32_t kFormat = 3;
 constexpr std::uint32_t kWithPhysics = 1;
 constexpr std::uint32_t kWithFloor = 2;
 constexpr std::uint32_t kWithDrift = 4;
+constexpr std::uint32_t kWithAllowance = 8;
 constexpr std::uint32_t kLastFormat =
-    kFormat + kWithPhysics + kWithFloor + kWithDrift;
+    kFormat + kWithPhysics + kWithFloor + kWithDrift + kWithAllowance;
 constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
@@ -177,7 +178,8 @@ void Fields(A& a, T& decision) {
   auto& [isolation_threshold, detection_samples, isolation_samples,
          isolation_fraction, join_fraction, reisolation_samples,
          clearing_samples, settling_samples, evidence_window, evidence_core,
-         evidence_support] = decision;
+         evidence_support, interpolation_allowance] = decision;
+  // interpolation_allowance is appended behind the fields.
   a(isolation_threshold, detection_samples, isolation_samples,
     isolation_fraction, join_fraction, reisolation_samples, clearing_samples,
     settling_samples, evidence_window, evidence_core, evidence_support);
@@ -338,10 +340,15 @@ std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
   for (std::size_t c = 0; drifts && c < models.channels.size(); ++c) {
     payload(models.channels[c].drift);
   }
+  const double allowance = models.decision.interpolation_allowance;
+  if (allowance > 0.0) {
+    payload(allowance);
+  }
   ByteWriter writer;
   writer.Put(kMagic);
   writer.Put(kFormat + (models.physics.empty() ? 0U : kWithPhysics) +
-             (models.floor ? kWithFloor : 0U) + (drifts ? kWithDrift : 0U));
+             (models.floor ? kWithFloor : 0U) + (drifts ? kWithDrift : 0U) +
+             (allowance > 0.0 ? kWithAllowance : 0U));
   writer.Put(static_cast<std::uint64_t>(payload.writer.size()));
   writer.Append(payload.writer.view().data(), payload.writer.size());
   writer.Put(Checksum(writer.view()));
@@ -380,6 +387,9 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
     for (ChannelSpec& channel : models.channels) {
       decoder(channel.drift);
     }
+  }
+  if (((format - kFormat) & kWithAllowance) != 0) {
+    decoder(models.decision.interpolation_allowance);
   }
   payload.ExpectEnd();
   RenumberFindings(models);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -243,6 +244,47 @@ TEST(FaultBankTest, FaultIsNotNamedForWantOfEvidence) {
     step(70.0, 1.0);
   }
   EXPECT_EQ(verdict.fault_factors[f6], 1.0);
+}
+
+// f3 at .75, midway between its strengths, where the flow is off by a few per
+// cent of the effect: enough for f6 to gather more evidence in the long run,
+// and no reason to drop f3. At the trained strength 1, nothing is allowed for.
+TEST(FaultBankTest, ErrorsOfInterpolationDoNotAddUpToAVerdict) {
+  ModelSet models = LinearPlant();
+  const auto f3 = static_cast<std::size_t>(FaultIndex(models, 3));
+  const auto f6 = static_cast<std::size_t>(FaultIndex(models, 6));
+  // Which of the two have a factor of T.
+  const auto named = [&](double allowance, double strength) {
+    models.decision.interpolation_allowance = allowance;
+    ObserverBank bank(models);
+    FaultBank faults(models);
+    Verdict verdict;
+    Noise noise(7);
+    constexpr double kSwing = 4.0;
+    bank.Initialise(PlantSample(0, kSwing));
+    faults.Restart();
+    for (std::uint64_t k = 1; k < 400; ++k) {
+      Sample sample = PlantSample(k, kSwing);
+      noise.Add(sample);
+      AddF3(sample, strength);
+      if (strength < 1.0) {
+        // The slope is that of f6 but for a quarter.
+        sample.values[Index(Signal::kF)] -=
+            0.75 * 0.4 * strength * (sample[Signal::kCv] - 50.0);
+      }
+      bank.Step(sample);
+      faults.Score(bank, verdict);
+      faults.Follow(bank);
+      faults.Compete(verdict);
+    }
+    const double threshold = models.decision.isolation_threshold;
+    return std::pair{verdict.fault_factors[f3] >= threshold,
+                     verdict.fault_factors[f6] >= threshold};
+  };
+
+  EXPECT_EQ(named(0.0, 0.75), std::pair(false, true));
+  EXPECT_EQ(named(0.06, 0.75), std::pair(true, true));
+  EXPECT_EQ(named(0.06, 1.0), std::pair(true, false));
 }
 
 // The valve is half closed, and the flow reads the limit all the same: any

@@ -53,6 +53,19 @@ TEST(ModelCodecTest, PhysicsReadBackAndStandInTheirOwnFormat) {
   EXPECT_EQ(back.physics[1].value, -1.0);
 }
 
+TEST(ModelCodecTest, InterpolationAllowanceReadsBackInItsOwnFormat) {
+  ModelSet models = RandomModelSet("valve", 5);
+  const auto without = EncodeModelSet(models);
+  models.decision.interpolation_allowance = 0.06;
+  const auto bytes = EncodeModelSet(models);
+  EXPECT_EQ(without[4], std::byte{3});
+  EXPECT_EQ(bytes[4], std::byte{11});
+  EXPECT_EQ(DecodeModelSet(bytes, "test").decision.interpolation_allowance,
+            0.06);
+  EXPECT_EQ(DecodeModelSet(without, "test").decision.interpolation_allowance,
+            0.0);
+}
+
 TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
   ModelSet models = RandomModelSet("valve", 5);
   models.observers[2].channels[1].model.parallel = false;

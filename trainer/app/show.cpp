@@ -336,7 +336,8 @@ std::string DecisionText(const DecisionParameters& d) {
          std::to_string(d.clearing_samples) + ", settling " +
          std::to_string(d.settling_samples) + " samples; evidence over " +
          Text(d.evidence_window) + " samples, core " + Text(d.evidence_core) +
-         ", support " + Text(d.evidence_support);
+         ", support " + Text(d.evidence_support) +
+         ", interpolation allowance " + Text(d.interpolation_allowance);
 }
 
 std::string TrainingRunsText(const ModelSet& models) {

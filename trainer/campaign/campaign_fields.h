@@ -19,6 +19,7 @@ void VisitDecision(DecisionParameters& d, Visitor&& visit) {
   visit("evidence_window", d.evidence_window, 2.0, 1e6);
   visit("evidence_core", d.evidence_core, 0.0, 1e6);
   visit("evidence_support", d.evidence_support, 1e-6, 1e6);
+  visit("interpolation_allowance", d.interpolation_allowance, 0.0, 1.0);
 }
 
 template <typename Visitor>
