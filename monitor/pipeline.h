@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bitset>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -61,7 +62,8 @@ struct ValveCensus {
   std::uint64_t ended{0};
   std::uint64_t open_episodes{0};
   std::uint64_t trace_bytes{0};
-  std::uint64_t judged{0};  ///< Not silent, with a model set, and settled.
+  std::uint64_t judged{0};      ///< Not silent, with a model set, and settled.
+  std::uint64_t near_bound{0};  ///< Drifted that far (kNearBound).
 };
 
 /// From samples to decisions, events and records. The thread that takes samples
@@ -153,6 +155,9 @@ class Pipeline {
     ValveMonitor monitor;
     ShadowValve* shadow;  // Null: not compared.
     bool known;           // Keeps its place.
+    // Limits that follow the valve no further: two of each channel.
+    std::bitset<2 * kMaxChannels> drift_full{};
+    double drift_used{0.0};  // Of the bounds, at most.
   };
   struct Hash {
     using is_transparent = void;
@@ -174,6 +179,9 @@ class Pipeline {
   void Publish(const Valve& valve, const ValveOutcome& outcome);
   void Recover(const std::vector<OpenEpisode>& episodes);
   void AdoptNextResolver();
+  void TendDrift(Valve& valve);
+  void ReportFull(Valve& valve, std::size_t channel,
+                  const FollowedDrift& drift);
   void TendSilent(TimePoint now);
   void GiveUpRecovery();
   void TakeCensus();
@@ -198,6 +206,7 @@ class Pipeline {
   // Known valves that have no place yet; strangers leave that many free.
   std::unordered_set<std::string, Hash, std::equal_to<>> reserved_;
   std::vector<Valve*> idle_;  // Silent strangers, as of the last Tend().
+  std::vector<FollowedDrift> drift_;         // Of the valve that is tended.
   std::unordered_set<std::size_t> refused_;  // Hashes of ids.
   std::unordered_map<std::string, OpenEpisode> recovered_;
   std::unordered_map<std::string, Accumulator> accumulators_;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "diagnosis/valve_engine.h"
 #include "monitor/checkpoint.h"
@@ -102,6 +103,8 @@ class ValveMonitor {
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
   bool episode_open() const { return engine_ && engine_->episode_open(); }
+  /// How far its limits have followed a drift, by channel of models().
+  void ReadDrift(std::vector<FollowedDrift>& drift) const;
   std::size_t trace_bytes() const { return tracker_.trace_bytes(); }
 
  private:
