@@ -13,6 +13,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "diagnosis/followed_drift.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
 #include "monitor/journal.h"

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/followed_drift.h"
 #include "diagnosis/valve_engine.h"
 #include "monitor/checkpoint.h"
 #include "monitor/episode_names.h"

@@ -8,10 +8,12 @@
 #include <mutex>
 #include <optional>
 #include <shared_mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "diagnosis/followed_drift.h"
 #include "monitor/console/model_facts.h"
 #include "monitor/sinks.h"
 

@@ -1,4 +1,6 @@
+#include <cmath>
 #include <map>
+#include <span>
 
 #include <gmock/gmock.h>
 
