@@ -326,12 +326,13 @@ void TableOptions::AddTo(CLI::App& verb) {
                   "(made by fdi-store runs sniff; docs/import.md)")
       ->type_name("FILE.toml");
   verb.add_option("--zone", zone,
-                  "Zone of times in a file that do not say theirs: "
+                  "Time zone of times in a file that name none: "
                   "Europe/Warsaw, UTC, +01:00 (default: the machine's)")
       ->type_name("ZONE");
   verb.add_option("--resample", resample,
-                  "Bring a file of any timing to a period; AGE limits what is "
-                  "filled (ten periods)")
+                  "Bring a file of any timing to this period; missing values "
+                  "are held or interpolated for at most AGE (default: hold, "
+                  "ten periods)")
       ->type_name("1s[:hold|linear[:AGE]]");
 }
 

@@ -24,6 +24,16 @@ double Towards(double target, double value, double step) {
   return value + std::clamp(target - value, -step, step);
 }
 
+// Of a drift that uses so much of its bound; a window that wavers there, by
+// which it falls back a little, begins nothing anew.
+std::int64_t FullSince(std::int64_t since_ns, double used,
+                       std::int64_t stamp_ns) {
+  if (used < kNearBound) {
+    return 0;
+  }
+  return since_ns == 0 && used >= 1.0 ? stamp_ns : since_ns;
+}
+
 }  // namespace
 
 Detection::Detection(const ModelSet& models)
@@ -81,7 +91,7 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample) {
   return abnormal;
 }
 
-void Detection::Follow() {
+void Detection::Follow(std::int64_t stamp_ns) {
   healthy_s_ += models_->sample_period_s;
   if (healthy_s_ <= kFirstS) {
     return;
@@ -109,14 +119,29 @@ void Detection::Follow() {
         std::clamp(Towards(window.log_rms() - usual, drift.log_scale,
                            share * std::numbers::ln2),
                    0.0, most.log_scale);
+    const FollowedDrift now = followed_drift(c);
+    drift.mean_full_ns =
+        FullSince(drift.mean_full_ns, now.mean_used(), stamp_ns);
+    drift.scale_full_ns =
+        FullSince(drift.scale_full_ns, now.scale_used(), stamp_ns);
   }
+}
+
+FollowedDrift Detection::followed_drift(std::size_t channel) const {
+  const Drift& drift = drifts_.at(channel);
+  const DriftLimits& most = models_->channels.at(channel).drift;
+  return {
+      drift.mean,         drift.mean < 0.0 ? most.lower_mean : most.upper_mean,
+      drift.log_scale,    most.log_scale,
+      drift.mean_full_ns, drift.scale_full_ns};
 }
 
 void Detection::Save(SnapshotWriter& writer) const {
   windows_.Save(writer);
   writer.Put(healthy_s_);
   for (const Drift& drift : drifts_) {
-    writer.Put(drift.mean, drift.log_scale);
+    writer.Put(drift.mean, drift.log_scale, drift.mean_full_ns,
+               drift.scale_full_ns);
   }
 }
 
@@ -124,7 +149,8 @@ bool Detection::Restore(SnapshotReader& reader) {
   return windows_.Restore(reader) && reader.Get(healthy_s_) &&
          std::isfinite(healthy_s_) &&
          std::ranges::all_of(drifts_, [&](Drift& drift) {
-           return reader.Get(drift.mean, drift.log_scale) &&
+           return reader.Get(drift.mean, drift.log_scale, drift.mean_full_ns,
+                             drift.scale_full_ns) &&
                   std::isfinite(drift.mean) && std::isfinite(drift.log_scale);
          });
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "diagnosis/followed_drift.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/residual_windows.h"
 
@@ -28,8 +29,10 @@ class Detection {
   /// DriftLimits. In the first hour nothing moves: what is slow cannot be told
   /// from what is not.
   struct Drift {
-    double mean{0.0};       ///< [unit]
-    double log_scale{0.0};  ///< At least 0.
+    double mean{0.0};              ///< [unit]
+    double log_scale{0.0};         ///< At least 0.
+    std::int64_t mean_full_ns{0};  ///< As FollowedDrift has them.
+    std::int64_t scale_full_ns{0};
   };
 
   /// `models` must outlive the detection.
@@ -46,7 +49,9 @@ class Detection {
   bool Push(const ObserverBank& bank, const Sample& sample);
 
   /// The last sample was that of a healthy valve: no episode is open.
-  void Follow();
+  void Follow(std::int64_t stamp_ns);
+
+  FollowedDrift followed_drift(std::size_t channel) const;
 
   void Save(SnapshotWriter& writer) const;
   /// @returns false, leaving it undefined, if there is nothing to be read.

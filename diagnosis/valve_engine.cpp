@@ -44,7 +44,7 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
   return Intake::kAccepted;
 }
 
-constexpr std::uint32_t kSnapshotFormat = 2;
+constexpr std::uint32_t kSnapshotFormat = 3;
 constexpr int kMostUncertain = 60;  // samples in a row, until nothing is known
 
 }  // namespace
@@ -88,6 +88,9 @@ class ValveEngine::Impl {
   const ModelSet& models() const { return diagnosis_->plan->models(); }
   const Verdict& verdict() const { return verdict_; }
   bool episode_open() const { return verdict_.state != State::kNormal; }
+  FollowedDrift followed_drift(std::size_t channel) const {
+    return diagnosis_->detection.followed_drift(channel);
+  }
 
  private:
   void ClearVerdict();
@@ -258,7 +261,7 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   if (was_open && !episode_open()) {
     detection.Restart();
   } else if (findings.settled && !episode_open()) {
-    detection.Follow();
+    detection.Follow(sample.stamp_ns);
   }
 }
 
@@ -362,6 +365,10 @@ const ModelSet& ValveEngine::models() const {
 
 bool ValveEngine::episode_open() const {
   return impl_->episode_open();
+}
+
+FollowedDrift ValveEngine::followed_drift(std::size_t channel) const {
+  return impl_->followed_drift(channel);
 }
 
 }  // namespace fdi

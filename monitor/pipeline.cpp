@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdio>
 #include <exception>
 #include <utility>
 
@@ -39,6 +41,13 @@ std::string SignalNames(SignalMask signals) {
     }
   }
   return names;
+}
+
+// "1.1"
+std::string ThreeDigits(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
 }
 
 }  // namespace
@@ -458,12 +467,49 @@ void Pipeline::Tend(TimePoint now) {
   }
   if (now - last_tended_ >= kTendPeriod) {
     last_tended_ = now;
+    for (const std::unique_ptr<Valve>& valve : valves_) {
+      TendDrift(*valve);
+    }
     TendSilent(now);
   }
   if (now - last_checkpoint_ >= options_.checkpoint_period) {
     last_checkpoint_ = now;
     TakeCheckpoint();
   }
+}
+
+void Pipeline::TendDrift(Valve& valve) {
+  valve.monitor.ReadDrift(drift_);
+  valve.drift_used = 0.0;
+  for (std::size_t c = 0; c < drift_.size(); ++c) {
+    valve.drift_used = std::max(valve.drift_used, drift_[c].used());
+    ReportFull(valve, c, drift_[c]);
+  }
+  if (live_ != nullptr && !drift_.empty()) {
+    live_->ShowDrift(valve.monitor.id(), drift_);
+  }
+}
+
+// Once, as it stays so for days. Not by Report(), which would leave out another
+// valve that gets there within its interval.
+void Pipeline::ReportFull(Valve& valve, std::size_t channel,
+                          const FollowedDrift& drift) {
+  const auto report = [&](std::size_t place, bool full, const char* direction,
+                          double followed) {
+    if (full && !valve.drift_full[place]) {
+      log_.Line(LogLevel::kWarning,
+                LogLine(LogId::kDriftAtBound, "drift_at_bound",
+                        "valve=" + LogValue(valve.monitor.id()) + " channel=" +
+                            valve.monitor.models()->channels[channel].name +
+                            " direction=" + direction +
+                            " followed=" + ThreeDigits(followed)));
+    }
+    valve.drift_full[place] = full;
+  };
+  report(2 * channel, drift.mean_full_ns != 0, drift.mean < 0.0 ? "down" : "up",
+         drift.mean);
+  report(2 * channel + 1, drift.scale_full_ns != 0, "wider",
+         std::exp(drift.log_scale));
 }
 
 void Pipeline::TendSilent(TimePoint now) {
@@ -525,6 +571,7 @@ void Pipeline::TakeCensus() {
                              monitor.verdict().quality != Quality::kSettling
                          ? 1
                          : 0;
+    census.near_bound += valve->drift_used >= kNearBound ? 1 : 0;
   }
   const std::lock_guard lock(mutex_);
   census_ = census;

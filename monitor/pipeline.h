@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bitset>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -12,6 +13,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "diagnosis/followed_drift.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
 #include "monitor/journal.h"
@@ -61,7 +63,8 @@ struct ValveCensus {
   std::uint64_t ended{0};
   std::uint64_t open_episodes{0};
   std::uint64_t trace_bytes{0};
-  std::uint64_t judged{0};  ///< Not silent, with a model set, and settled.
+  std::uint64_t judged{0};      ///< Not silent, with a model set, and settled.
+  std::uint64_t near_bound{0};  ///< Drifted that far (kNearBound).
 };
 
 /// From samples to decisions, events and records. The thread that takes samples
@@ -156,6 +159,9 @@ class Pipeline {
     ValveMonitor monitor;
     ShadowValve* shadow;  // Null: not compared.
     bool known;           // Never evicted.
+    // Limits at the bound of their drift: two for each channel.
+    std::bitset<2 * kMaxChannels> drift_full{};
+    double drift_used{0.0};  // The largest share of a bound.
   };
   struct Hash {
     using is_transparent = void;
@@ -177,6 +183,9 @@ class Pipeline {
   void Publish(const Valve& valve, const ValveOutcome& outcome);
   void Recover(const std::vector<OpenEpisode>& episodes);
   void AdoptNextResolver();
+  void TendDrift(Valve& valve);
+  void ReportFull(Valve& valve, std::size_t channel,
+                  const FollowedDrift& drift);
   void TendSilent(TimePoint now);
   void GiveUpRecovery();
   void TakeCensus();
@@ -201,6 +210,7 @@ class Pipeline {
   // Known valves without a slot yet; unknown ones leave that many slots free.
   std::unordered_set<std::string, Hash, std::equal_to<>> reserved_;
   std::vector<Valve*> idle_;  // Silent unknown valves, as of the last Tend().
+  std::vector<FollowedDrift> drift_;         // Of the valve at hand in Tend().
   std::unordered_set<std::size_t> refused_;  // Hashes of ids.
   std::unordered_map<std::string, OpenEpisode> recovered_;
   std::unordered_map<std::string, Accumulator> accumulators_;

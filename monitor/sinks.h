@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "diagnosis/followed_drift.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
@@ -154,6 +156,10 @@ class LiveSink {
                     const ValveOutcome& outcome) = 0;
   /// The valve fell silent, until its next sample.
   virtual void ShowSilence(const std::string& valve_id, Silence silence) = 0;
+  /// How far the limits of the valve have followed its drift, by channel of its
+  /// model set; several times a second.
+  virtual void ShowDrift(const std::string& /*valve_id*/,
+                         std::span<const FollowedDrift> /*drift*/) {}
   /// The valve was evicted and is not shown any more.
   virtual void Forget(const std::string& /*valve_id*/) {}
 };

@@ -157,6 +157,13 @@ void ValveMonitor::TakeCheckpoint(Checkpoint& checkpoint) {
   }
 }
 
+void ValveMonitor::ReadDrift(std::vector<FollowedDrift>& drift) const {
+  drift.clear();
+  for (std::size_t c = 0; models_ && c < models_->channels.size(); ++c) {
+    drift.push_back(engine_->followed_drift(c));
+  }
+}
+
 double ValveMonitor::period_s() const {
   return models_ ? models_->sample_period_s
                  : static_cast<double>(unassigned_interval_ns_) / 1e9;

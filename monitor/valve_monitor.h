@@ -5,7 +5,9 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "diagnosis/followed_drift.h"
 #include "diagnosis/valve_engine.h"
 #include "monitor/checkpoint.h"
 #include "monitor/episode_names.h"
@@ -101,6 +103,8 @@ class ValveMonitor {
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
   bool episode_open() const { return engine_ && engine_->episode_open(); }
+  /// How far its limits have followed a drift, by channel of models().
+  void ReadDrift(std::vector<FollowedDrift>& drift) const;
   std::size_t trace_bytes() const { return tracker_.trace_bytes(); }
 
  private:

@@ -103,14 +103,14 @@ void AddConsoleVerb(cli::Program& program) {
       ->type_name("DIR");
   console
       .add_option("--allow-host", options->console.names,
-                  "Answer under this name, too; beside it only localhost, "
-                  "addresses, and the name of the machine are")
+                  "Answer under this name, too, and not only under localhost, "
+                  "addresses and the name of the machine")
       ->type_name("NAME");
   console.add_option("--valves", options->bus.valves,
                      "Only ids that match GLOB");
   console
       .add_option("--max-valves", options->bus.max_valves,
-                  "Room for so many valves")
+                  "Number of valves that there is room for")
       ->check(CLI::Range(1, 100000));
 }
 

@@ -109,16 +109,16 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
       ->transform(AddressOr("127.0.0.1:8080"))
       ->type_name("[=[ADDRESS:]PORT]");
   CLI::Option* token =
-      run.add_option(
-             "--console-write", arguments.console_token,
-             "Let who has the token in FILE acknowledge, shelve and label; "
-             "made with a random one if it is not there")
+      run.add_option("--console-write", arguments.console_token,
+                     "Let everybody who has the token in FILE acknowledge, "
+                     "shelve and label; a FILE that does not exist is made "
+                     "with a random token")
           ->type_name("FILE");
   CLI::Option* users =
-      run.add_option(
-             "--console-users", arguments.console_users,
-             "Ask for a name and a password of FILE, which console-user "
-             "makes, and let everybody do what their role may")
+      run.add_option("--console-users", arguments.console_users,
+                     "Ask for a name and a password of FILE, which "
+                     "console-user makes, and let each user do what the role "
+                     "allows")
           ->excludes(token)
           ->type_name("FILE");
   console::AdmissionOptions& admission = arguments.console_options.admission;
@@ -150,11 +150,10 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
 }
 
 void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
-  run.add_option(
-         "--groups", service.groups,
-         "Groups of valves, [[group]] name, valves, faults, min_valves, "
-         "within_s: faults of many at once get one parent; without it "
-         "DATA/groups.toml")
+  run.add_option("--groups", service.groups,
+                 "Groups of valves, [[group]] name, valves, faults, "
+                 "min_valves, within_s: faults that many have at once get one "
+                 "common cause (default: DATA/groups.toml)")
       ->check(CLI::ExistingFile)
       ->type_name("FILE.toml");
   run.add_option("--on-event", service.on_event,
@@ -163,11 +162,11 @@ void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
                  "it is posted to")
       ->type_name("CMD|URL");
   run.add_option("--on-event-rate", service.on_event_per_minute,
-                 "At most so many a minute; the rest is counted")
+                 "At most this many a minute; the rest is counted")
       ->check(CLI::Range(1, 6000))
       ->capture_default_str();
   run.add_option("--on-event-timeout", service.on_event_timeout_s,
-                 "Give a delivery up after so long [s]")
+                 "Give a delivery up after this time [s]")
       ->check(CLI::Range(0.1, 600.0))
       ->capture_default_str();
 }
@@ -185,8 +184,8 @@ void AddPairOptions(CLI::App& run, PairOptions& pair) {
       ->type_name("1..9")
       ->needs(name);
   run.add_option("--pair-patience", pair.patience_s,
-                 "Take over when the diagnosis of the leader was not heard for "
-                 "so long [s]")
+                 "Take over when nothing was heard from the diagnosis of the "
+                 "leader for this time [s]")
       ->check(CLI::Range(0.1, 60.0))
       ->capture_default_str()
       ->needs(name);
@@ -265,7 +264,7 @@ void AddRunVerb(cli::Program& program) {
                "Name faults as the observers do, without the second look by "
                "the physics of an onboarded valve");
   run.add_option("--stale-timeout", service.stale_timeout_s,
-                 "Close an episode after so much silence of its valve [s]")
+                 "Close an episode when its valve was silent for this time [s]")
       ->check(CLI::Range(1.0, 1e7))
       ->capture_default_str();
   run.add_option("--trace-before", service.trace_before_s,
@@ -283,8 +282,8 @@ void AddRunVerb(cli::Program& program) {
       ->type_name("[=[ADDRESS:]PORT]");
   AddConsoleOptions(run, *arguments);
   run.add_option("--allow-host", service.http_names,
-                 "Answer --http and --console under this name, too; beside it "
-                 "only localhost, addresses, and the name of the machine are")
+                 "Answer --http and --console under this name, too, and not "
+                 "only under localhost, addresses and the name of the machine")
       ->type_name("NAME");
   run.add_option("--status-period", service.status_period_s,
                  "Time between status lines in the log [s]")

@@ -241,6 +241,10 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
       {"valves_contested", "fdi_valves_contested", kGauge,
        "Valves that another monitor takes, too, which is not of our pair", "",
        "", facts.contested.count},
+      {"", "fdi_valves_drift_near_bound", kGauge,
+       "Valves whose limits have followed a drift for 90 % or more of what the "
+       "model set allows",
+       "", "", census.near_bound},
       {"open_episodes", "fdi_open_episodes", kGauge, "Fault episodes now", "",
        "", census.open_episodes},
       {"trace_bytes", "fdi_trace_bytes", kGauge,

@@ -271,15 +271,16 @@ void AddTopVerb(cli::Program& program) {
         return RunTop(*options, context);
       });
   top.add_flag("--once", options->once,
-               "Print the table once and exit; --json alike");
+               "Print the table once and exit, as --json does");
   top.add_option("--wait", options->wait_s,
-                 "With --once: wait so long for a monitor [s]")
+                 "With --once: time to wait for a monitor [s]")
       ->check(CLI::Range(0.1, 600.0));
   top.add_option("--valves", options->bus.valves, "Only ids that match GLOB");
   top.add_option("--filter", options->filter,
-                 "Only valves with this in id, fault, state or quality");
+                 "Only valves with this text in their id, fault, state or "
+                 "quality");
   top.add_option("--max-valves", options->bus.max_valves,
-                 "Room for so many valves")
+                 "Number of valves that there is room for")
       ->check(CLI::Range(1, 100000));
 }
 

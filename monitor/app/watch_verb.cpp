@@ -121,16 +121,19 @@ void AddWatchVerb(cli::Program& program) {
   watch.add_flag("--lossless", options->lossless,
                  "Every decision vector of monitors that run with "
                  "--lossless-decisions");
-  watch.add_flag("--events", options->events_only, "No decision vectors");
+  watch.add_flag("--events", options->events_only,
+                 "Leave out decision vectors");
   watch
       .add_option("--max-valves", options->bus.max_valves,
-                  "Room for so many valves")
+                  "Number of valves that there is room for")
       ->check(CLI::Range(1, 100000));
-  watch.add_option("--for", options->for_s, "Stop after so long [s]")
+  watch
+      .add_option("--for", options->for_s, "Stop after this time [s]; 0: never")
       ->check(CLI::NonNegativeNumber);
   watch
       .add_option("--idle", options->idle_s,
-                  "Stop after so long without a vector or event [s]")
+                  "Stop after this time without a vector or event [s]; 0: "
+                  "never")
       ->check(CLI::NonNegativeNumber);
   watch.add_option("--expect", options->expect,
                    "Stop after N decision vectors; exit code 1 if fewer came");

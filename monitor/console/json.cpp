@@ -79,6 +79,11 @@ void AppendTo(Json& columns, const std::vector<double>& row, int decimals) {
   }
 }
 
+// Of a stamp that is 0 where there is none.
+Json MsOrNull(std::int64_t stamp_ns) {
+  return stamp_ns == 0 ? Json() : Ms(stamp_ns);
+}
+
 std::string_view StateOf(const storage::Episode& episode) {
   if (episode.ended_ns) {
     return "CLOSED";
@@ -141,7 +146,8 @@ Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
       {"factor", named ? Rounded(valve.factor, kFactorDecimals) : Json()},
       {"strength", named ? Rounded(valve.strength, kFactorDecimals) : Json()},
       {"d0", Rounded(valve.d0, kFactorDecimals)},
-      {"stamp_ms", valve.stamp_ns == 0 ? Json() : Ms(valve.stamp_ns)},
+      {"drift_used", Rounded(valve.drift_used, kFactorDecimals)},
+      {"stamp_ms", MsOrNull(valve.stamp_ns)},
       {"since_ms", Ms(alarm.since_ns)},
       {"episode", TextOrNull(alarm.episode)},
       {"model_set", valve.models ? Json(valve.models->model_set) : Json()},
@@ -233,6 +239,28 @@ Json GapJson(const DataGap& gap) {
           {"from_ms", Ms(gap.from_ns)},
           {"to_ms", Ms(gap.to_ns)},
           {"reason", gap.reason}};
+}
+
+Json DriftJson(const ModelFacts* models,
+               const std::vector<FollowedDrift>& drift) {
+  Json list = Json::array();
+  for (std::size_t c = 0;
+       models != nullptr && c < std::min(models->channels.size(), drift.size());
+       ++c) {
+    const FollowedDrift& d = drift[c];
+    list.push_back(
+        {{"channel", models->channels[c].name},
+         {"unit", models->channels[c].unit},
+         {"mean", Rounded(d.mean, kReadingDecimals)},
+         {"mean_bound", Rounded(d.mean_bound, kReadingDecimals)},
+         {"mean_used", Rounded(d.mean_used(), kFactorDecimals)},
+         {"mean_full_since_ms", MsOrNull(d.mean_full_ns)},
+         {"scale", Rounded(std::exp(d.log_scale), kFactorDecimals)},
+         {"scale_bound", Rounded(std::exp(d.log_scale_bound), kFactorDecimals)},
+         {"scale_used", Rounded(d.scale_used(), kFactorDecimals)},
+         {"scale_full_since_ms", MsOrNull(d.scale_full_ns)}});
+  }
+  return list;
 }
 
 Json ShelfJson(const storage::Shelf& shelf) {

@@ -51,6 +51,9 @@ Json SampleJson(const std::string& valve_id, const TracePoint& point);
 Json TrendJson(const ModelFacts* models, const std::string& valve_id,
                const std::vector<TracePoint>& points);
 Json GapJson(const DataGap& gap);
+/// Of the channels of `models`; empty without.
+Json DriftJson(const ModelFacts* models,
+               const std::vector<FollowedDrift>& drift);
 
 Json AlarmJson(const storage::Alarm& alarm, const cli::FaultTexts& texts);
 Json AlarmsJson(const std::vector<storage::Alarm>& alarms,

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "diagnosis/fault_catalogue.h"
@@ -55,6 +57,7 @@ struct LiveBoard::Slot {
   std::uint64_t pushed{0};  // Instants so far.
   std::deque<console::Mark> marks;
   std::deque<DataGap> gaps;
+  std::vector<FollowedDrift> drift;
   std::array<float, kSparkPoints> spark{};
   std::size_t spark_count{0};
   std::int64_t spark_stamp_ns{0};
@@ -78,6 +81,14 @@ struct LiveBoard::Slot {
         now.factor = verdict.fault_factors[f];
         now.strength = verdict.strengths[f];
       }
+    }
+  }
+
+  void ShowDrift(std::span<const FollowedDrift> channels) {
+    drift.assign(channels.begin(), channels.end());
+    now.drift_used = std::numeric_limits<double>::quiet_NaN();
+    for (const FollowedDrift& channel : drift) {
+      now.drift_used = std::fmax(now.drift_used, channel.used());
     }
   }
 
@@ -226,6 +237,7 @@ void LiveBoard::ShowLocked(Slot& slot, const Sample& sample,
   if (models != slot.now.models) {
     slot.now.models = std::move(models);
     slot.ClearTrend();  // Residuals and factors mean other things.
+    slot.ShowDrift({});
   }
   NoteGap(slot, sample);
   slot.Describe(verdict);
@@ -243,6 +255,14 @@ void LiveBoard::ShowSilence(const std::string& valve_id,
   const std::lock_guard lock(slot.mutex);
   slot.now.silence = silence;
   ++slot.now.version;
+}
+
+// The next sample tells that something changed.
+void LiveBoard::ShowDrift(const std::string& valve_id,
+                          std::span<const FollowedDrift> drift) {
+  Slot& slot = At(valve_id);
+  const std::lock_guard lock(slot.mutex);
+  slot.ShowDrift(drift);
 }
 
 void LiveBoard::ShowMonitorSilence(const std::string& valve_id,
@@ -302,7 +322,8 @@ std::optional<LiveTrend> LiveBoard::Trend(std::string_view valve_id,
                    slot->Points(instants),
                    {slot->marks.begin(), slot->marks.end()},
                    {slot->gaps.begin(), slot->gaps.end()},
-                   slot->pushed};
+                   slot->pushed,
+                   slot->drift};
 }
 
 std::optional<LiveTrend> LiveBoard::Since(std::string_view valve_id,

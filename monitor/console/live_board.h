@@ -2,15 +2,18 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <shared_mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "diagnosis/followed_drift.h"
 #include "monitor/console/model_facts.h"
 #include "monitor/sinks.h"
 
@@ -33,6 +36,9 @@ struct ValveState {
   double strength{0.0};  ///< Estimated, of that fault; signed [-].
   double d0{0.0};
   std::int64_t stamp_ns{0};
+  /// The largest share of its bounds that a drift has used, which the limits
+  /// followed [-]; NaN if that is not known.
+  double drift_used{std::numeric_limits<double>::quiet_NaN()};
   std::vector<double> spark;  ///< 1 − d_0, each second or slower; last newest.
   std::string monitor;        ///< On the page of a plant: who judges it,
   std::int64_t heard_ns{0};   ///< and, once that is silent, since when.
@@ -51,8 +57,9 @@ struct LiveTrend {
   ValveState now;
   std::vector<TracePoint> points;  ///< Oldest first.
   std::vector<Mark> marks;
-  std::vector<DataGap> gaps;  ///< Of this valve, in its stream.
-  std::uint64_t next{0};      ///< For LiveBoard::Since().
+  std::vector<DataGap> gaps;           ///< Of this valve, in its stream.
+  std::uint64_t next{0};               ///< For LiveBoard::Since().
+  std::vector<FollowedDrift> drift{};  ///< By channel; empty: not known.
 };
 
 /// The faults that `event` isolates, joined by |; empty if none.
@@ -77,6 +84,8 @@ class LiveBoard : public monitor::LiveSink {
             const monitor::ValveOutcome& outcome) override;
   void ShowSilence(const std::string& valve_id,
                    monitor::Silence silence) override;
+  void ShowDrift(const std::string& valve_id,
+                 std::span<const FollowedDrift> drift) override;
   void Forget(const std::string& valve_id) override;
 
   /// As Show(), of a verdict that came over the bus without the readings.

@@ -129,16 +129,16 @@ std::string Conclusion(const cli::Json& document, bool published) {
 
 void AddDeliveryOptions(CLI::App& verb, DeliveryOptions& options) {
   verb.add_option("--speed", options.speed,
-                  "Times real time, or max: without loss, as fast as the "
-                  "reader takes it (default: 1)")
+                  "Speed in multiples of real time, or max: as fast as the "
+                  "reader takes the samples, without loss (default: 1)")
       ->type_name("N|max");
   verb.add_option("--start", options.start,
                   "UTC of the first sample (default: now)")
       ->type_name("UTC");
   verb.add_option("--wait-reader", options.wait_reader_s,
-                  "Seconds to wait for a reader, without which nothing is "
-                  "published (default: 30 at --speed max; otherwise 2, and "
-                  "none is needed)")
+                  "Seconds to wait for a reader (default: 30 at --speed max, "
+                  "which needs one; otherwise 2, after which the samples are "
+                  "published all the same)")
       ->check(CLI::Range(0.0, 1e6))
       ->type_name("S");
   verb.add_flag("--keep-alive", options.keep_alive,

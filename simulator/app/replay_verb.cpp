@@ -176,16 +176,18 @@ void AddReplayVerb(cli::Program& program) {
   verb.add_option("--run", options->run, "A stored run, or a stretch of it")
       ->type_name("ID[@from:to]");
   verb.add_option("--valve", options->valve,
-                  "Valve id (a run: by default its own)")
+                  "Valve id (default: that of the stored run)")
       ->type_name("ID");
   AddDeliveryOptions(verb, options->delivery);
   verb.add_flag("--keep-stamps", options->keep_stamps,
-                "Keep the stamps; t_s of a CSV or of JSON is then Unix time");
+                "Keep the time stamps instead of beginning now; t_s of a CSV "
+                "or of JSON is then Unix time");
   verb.add_flag("--split-gaps", options->stream.split_gaps,
-                "Accept gaps in time of a CSV or of JSON; they are kept");
+                "Accept gaps in the times of a CSV or of JSON, and keep them");
   verb.add_option("--period", options->stream.period_s,
                   "Sample period of lines on stdin (default: their first "
-                  "step). Without t_s, JSON lines are stamped on arrival (1 s)")
+                  "step; 1 s for JSON lines without t_s, which are stamped "
+                  "on arrival)")
       ->check(CLI::Range(1e-3, 3600.0))
       ->type_name("S");
 }

@@ -224,13 +224,14 @@ void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
       ->default_str("")
       ->allow_extra_args(false);
   verb.add_flag("--cold-start", options.cold_start,
-                "From X = 0 and vented, not in equilibrium");
+                "Start at X = 0 with the actuator vented, not in equilibrium");
   constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
   verb.add_option("--seed", options.seed, "Seed (default: 1)")
       ->check(CLI::Range(std::int64_t{0}, kLargest))
       ->type_name("N");
   verb.add_option("--valves", options.valves,
-                  "So many valves, ID-1, ID-2, ..., with seeds N, N+1, ...")
+                  "Number of valves, named ID-1, ID-2, ...; their seeds "
+                  "count up from --seed")
       ->check(CLI::Range(1, 100'000))
       ->type_name("N");
 }

@@ -204,12 +204,12 @@ Report ListShelf(const ShelfOptions& options, const Context& context) {
 void AddAlarmVerbs(cli::Program& program, CLI::App& group) {
   auto [ack, acked] =
       AddVerb(program, group, "ack",
-              "Acknowledge episodes: somebody knows of them", Acknowledge);
+              "Acknowledge episodes: somebody has seen them", Acknowledge);
   ack.add_option("episodes", acked.ids,
                  "IDs, unique beginnings of them, or last");
   ack.add_flag("--all", acked.all,
-               "All that the options below find and that are not acknowledged "
-               "yet");
+               "All that the options below find and that nobody has "
+               "acknowledged yet");
   acked.filter.AddTo(ack);
   acked.note.AddTo(ack);
 
@@ -224,11 +224,11 @@ void AddAlarmVerbs(cli::Program& program, CLI::App& group) {
       ->required();
   labelled.note.AddTo(label);
 
-  auto [shelve, shelved] =
-      AddVerb(program, group, "shelve",
-              "Put the alarms of a valve out of the way for a while; they are "
-              "recorded all the same",
-              Shelve);
+  auto [shelve, shelved] = AddVerb(
+      program, group, "shelve",
+      "Set the alarms of a valve aside for a while; they are recorded all "
+      "the same",
+      Shelve);
   shelve.add_option("valve", shelved.valve, "Valve id")->required();
   shelve.add_option("--fault", shelved.fault,
                     "Only this answer: f19, 'f3|f6', unknown");
@@ -236,9 +236,8 @@ void AddAlarmVerbs(cli::Program& program, CLI::App& group) {
                     "How long: 8h, 30min, 3d; 90 days at most");
   shelved.note.AddTo(shelve);
 
-  auto [unshelve, ended] =
-      AddVerb(program, group, "unshelve",
-              "Take alarms off the shelf before their time", Unshelve);
+  auto [unshelve, ended] = AddVerb(program, group, "unshelve",
+                                   "Take alarms off the shelf early", Unshelve);
   unshelve.add_option("id", ended.ids, "Ids that history shelf shows");
   unshelve.add_option("--valve", ended.valve, "All of this valve");
   ended.note.AddTo(unshelve);
@@ -246,7 +245,7 @@ void AddAlarmVerbs(cli::Program& program, CLI::App& group) {
   auto [shelf, listed] =
       AddVerb(program, group, "shelf",
               "List what is shelved now, by whom and why", ListShelf);
-  shelf.add_flag("--all", listed.all, "Also what is over");
+  shelf.add_flag("--all", listed.all, "Also what was shelved before");
 }
 
 }  // namespace fdi::storage

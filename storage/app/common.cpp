@@ -38,8 +38,10 @@ void EpisodeOptions::AddTo(CLI::App& verb) {
 
 void PlantOptions::AddTo(CLI::App& verb) {
   verb.add_option("--from", url,
-                  "Of the plant's history: postgresql://user@host/database");
-  verb.add_option("--monitor", monitor, "There: of this monitor alone");
+                  "Read the history of the whole plant instead: "
+                  "postgresql://user@host/database");
+  verb.add_option("--monitor", monitor,
+                  "With --from: only what this monitor recorded");
 }
 
 std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
@@ -87,7 +89,8 @@ void AddOutput(CLI::App& verb, std::string& output) {
 }
 
 void AddLimit(CLI::App& verb, std::int64_t& limit) {
-  verb.add_option("--limit", limit, "The newest so many; 0: all")
+  verb.add_option("--limit", limit,
+                  "At most this many, the newest ones; 0: all")
       ->check(CLI::NonNegativeNumber);
 }
 

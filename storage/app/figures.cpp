@@ -302,10 +302,11 @@ void AddHistoryFigures(cli::Program& program, CLI::App& group) {
 
   auto [causes, cause] =
       AddVerb(program, group, "causes",
-              "List what befell several valves of a group at once", Causes);
+              "List faults that several valves of a group had at once", Causes);
   causes.add_option("--group", cause.filter.group_glob, "Glob over groups");
   cause.window.AddTo(causes);
-  causes.add_flag("--open", cause.filter.open_only, "Those that last");
+  causes.add_flag("--open", cause.filter.open_only,
+                  "Only those that still last");
   AddLimit(causes, cause.filter.limit);
 
   auto [shadow, shown] = AddVerb(

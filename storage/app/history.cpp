@@ -409,7 +409,8 @@ Report PlotEpisode(const PlotOptions& options, const Context& context) {
 
 void AddHistoryVerbs(cli::Program& program) {
   CLI::App& group = program.AddGroup(
-      "history", "Fault episodes: what happened, how sure, who knows of it");
+      "history",
+      "Fault episodes: what happened, how certain it is, who has seen it");
   auto [list, list_options] =
       AddVerb(program, group, "list", "List the episodes, the newest last",
               ListEpisodes);
@@ -441,9 +442,9 @@ void AddHistoryVerbs(cli::Program& program) {
   plot.add_option("-o,--output", plotted.output,
                   "FILE.png or FILE.svg (ID.png)");
   plot.add_option("--from", plotted.figure.from_s,
-                  "From so many s after detection on");
+                  "Start of the picture in s after detection");
   plot.add_option("--to", plotted.figure.to_s,
-                  "Up to so many s after detection");
+                  "End of the picture in s after detection");
 }
 
 }  // namespace fdi::storage

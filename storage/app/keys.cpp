@@ -135,7 +135,7 @@ void AddKeysVerbs(cli::Program& program) {
   {
     auto [verb, options] =
         AddVerb(program, group, "renew",
-                "Make a key anew in its folder, with the same rights", Renew);
+                "Replace a key by a new one with the same rights", Renew);
     AddFolder(verb, options);
     AddName(verb, options);
     AddDaysOption(verb, options);

@@ -288,16 +288,21 @@ void AddPrune(cli::Program& program) {
        {std::pair<std::string, AgeAndSize*>("--runs", &options.runs),
         {"--history", &options.history}}) {
     verb.add_option(what + "-age", limits->age,
-                    "Delete what ended longer ago: 90d, 2d12h, ...");
-    verb.add_option(what + "-size", limits->bytes,
-                    "Then the oldest until so much is left: 20GB, 500MB, ...")
+                    "Delete what ended longer ago than this: 90d, 2d12h, ...");
+    verb.add_option(
+            what + "-size", limits->bytes,
+            "Then delete the oldest until at most this much is left: 20GB, "
+            "500MB, ...")
         ->transform(CLI::AsSizeValue(true));
   }
   verb.add_option("--health-age", options.health.age,
-                  "Delete hours of health that are older: 1000d, ...");
+                  "Delete hours of health that are older than this: 1000d, "
+                  "...");
   verb.add_option("--shadow-age", options.shadow.age,
-                  "Delete differences of a candidate that are older: 90d, ...");
-  verb.add_flag("--dry-run", options.dry_run, "Only say what would go");
+                  "Delete differences of a candidate that are older than "
+                  "this: 90d, ...");
+  verb.add_flag("--dry-run", options.dry_run,
+                "Only print what would be deleted");
 }
 
 }  // namespace
@@ -308,7 +313,9 @@ void AddMaintenanceVerbs(cli::Program& program) {
   auto [backup, target] =
       AddVerb(program, program.root(), "backup",
               "Copy the databases while they are in use", Backup);
-  backup.add_option("folder", target, "Where to; made if it is not there")
+  backup
+      .add_option("folder", target,
+                  "Folder to copy to; made if it does not exist")
       ->required();
   AddVerb(program, program.root(), "migrate",
           "Bring the databases to the current version", Migrate);

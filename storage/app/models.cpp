@@ -272,24 +272,25 @@ void AddModelsVerbs(cli::Program& program) {
               ShowModel);
   show.add_option("model-set", shown, "NAME[@VERSION]")->required();
 
-  auto [activate, activated] = AddVerb(
-      program, group, "activate", "Let a version answer to the name", Activate);
+  auto [activate, activated] =
+      AddVerb(program, group, "activate",
+              "Make a version the active one of its name", Activate);
   activate.add_option("model-set", activated, "NAME@VERSION")->required();
 
   auto [exporting, exported] = AddVerb(
       program, group, "export", "Write a model set to a file", ExportModel);
   exporting.add_option("model-set", exported.reference, "NAME[@VERSION]")
       ->required();
-  exporting.add_option("-o,--output", exported.output, "File to make")
+  exporting.add_option("-o,--output", exported.output, "File to write")
       ->required();
 
   auto [importing, imported] =
       AddVerb(program, group, "import",
               "Store a file as the next version of its model set", ImportModel);
-  importing.add_option("file", imported.file, "File that export wrote")
+  importing.add_option("file", imported.file, "File written by export")
       ->required();
   importing.add_flag("--activate", imported.activate,
-                     "Let it answer from now on");
+                     "Make it the active version of its name");
 }
 
 void AddTypesVerbs(cli::Program& program) {

@@ -186,14 +186,16 @@ Report WorkList(const WorkListOptions& options, const Context& context) {
 void AddPlannerVerbs(cli::Program& program) {
   auto [faults, name] =
       AddVerb(program, program.root(), "faults",
-              "The fault catalogue: names, who goes there, how grave, and of "
-              "one fault what to check",
+              "The fault catalogue: names, severity, who should go there; of "
+              "one fault also what to check",
               Faults);
-  faults.add_option("fault", name,
-                    std::string(kFaultNames) + " or unknown; all without");
+  faults.add_option(
+      "fault", name,
+      std::string(kFaultNames) + " or unknown (default: all of them)");
 
   CLI::App& group = program.AddGroup(
-      "health", "What months did to a valve, and how long until a limit");
+      "health",
+      "How a valve has changed over months, and when it may reach a limit");
   auto [show, shown] = AddVerb(
       program, group, "show",
       "Days or hours of a valve: time, travel, d_0, residuals of the normal "
@@ -210,7 +212,7 @@ void AddPlannerVerbs(cli::Program& program) {
     options->plant.AddTo(*verb);
   }
   show.add_flag("--hourly", shown.hourly, "Hours instead of days");
-  program.AllowCsv(show, "CSV with a line per time and signal");
+  program.AllowCsv(show, "CSV, one line per time and signal");
   shown.csv = show.get_option("--csv");
   trend
       .add_option("--limit", limits.limits,
@@ -223,22 +225,23 @@ void AddPlannerVerbs(cli::Program& program) {
   auto [list, options] =
       AddVerb(program, program.root(), "worklist",
               "The valves to look at at the next stop, and why", WorkList);
-  list.add_option("--top", options.top, "So many valves; 0: all");
-  list.add_option("--valve", options.valve, "Ids that match GLOB");
+  list.add_option("--top", options.top, "Number of valves to list; 0: all");
+  list.add_option("--valve", options.valve,
+                  "Only valves whose ids match this glob");
   list.add_option("--since", options.since,
                   "Episodes and trends from this time on: 90d, 2026-10-01");
   list.add_option("--discipline", options.discipline,
-                  "Only what is for operator, instrument, air or mechanical");
+                  "Only work for operator, instrument, air or mechanical");
   list.add_option("--limit", options.limits,
-                  "Limits of trends as of `health trend`, may be repeated; "
-                  "default F=-10% and F=10%")
+                  "Limits of trends, as in `health trend`; may be repeated "
+                  "(default: F=-10% and F=10%)")
       ->type_name("NAME=VALUE");
   list.add_option("--horizon", options.horizon_days,
-                  "Trends that need more days do not count")
+                  "Leave out trends that reach their limit later than this")
       ->check(CLI::Range(1.0, 36500.0))
       ->type_name("DAYS");
   options.plant.AddTo(list);
-  program.AllowCsv(list, "CSV, a line per valve");
+  program.AllowCsv(list, "CSV, one line per valve");
 }
 
 }  // namespace fdi::storage

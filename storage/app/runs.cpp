@@ -347,7 +347,8 @@ void AddRunsVerbs(cli::Program& program) {
 
   auto [label, label_options] =
       AddVerb(program, group, "label",
-              "Say what was true in a run, or a stretch of it", LabelRun);
+              "Note which fault, if any, a run or a stretch of it really had",
+              LabelRun);
   label.add_option("run", label_options.run, kSelector)->required();
   label.add_option("fault", label_options.fault,
                    "normal or " + std::string(kFaultNames));

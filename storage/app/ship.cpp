@@ -177,15 +177,16 @@ Report Ship(const ShipOptions& given, const Context& context) {
 }  // namespace
 
 void AddShipVerb(cli::Program& program) {
-  auto [verb, options] =
-      AddVerb(program, program.root(), "ship",
-              "Bring the history to the plant's, in PostgreSQL", Ship);
+  auto [verb, options] = AddVerb(
+      program, program.root(), "ship",
+      "Copy the history to that of the whole plant, in PostgreSQL", Ship);
   verb.add_option("--to", options.url, "postgresql://user@host/database");
   verb.add_option("--host", options.host, "This host's name there");
   verb.add_option("--monitor", options.monitor, "This monitor's name there")
       ->capture_default_str();
   verb.add_option("--every", options.every,
-                  "Go on, so often: 10s, 1min, ...; once without it");
+                  "Repeat at this interval: 10s, 1min, ... (default: ship "
+                  "once)");
   CLI::Option* init =
       verb.add_flag("--init", options.init,
                     "Make the schema and the roles, or bring them up to date");
@@ -193,16 +194,17 @@ void AddShipVerb(cli::Program& program) {
       "--prune", options.prune,
       "Delete there, as prune does here: --history-age, --health-age");
   verb.add_option("--history-age", options.history_age,
-                  "Delete episodes that ended longer ago: 1500d, ...")
+                  "Delete episodes that ended longer ago than this: 1500d, ...")
       ->needs(prune);
   verb.add_option("--health-age", options.health_age,
-                  "Delete hours of health that are older")
+                  "Delete hours of health that are older than this")
       ->needs(prune);
-  verb.add_flag("--dry-run", options.dry_run, "Only say what would go")
+  verb.add_flag("--dry-run", options.dry_run,
+                "Only print what would be deleted")
       ->needs(prune);
   verb.add_flag("--forget", options.forget,
-                "End shipping: log no change any more, let prune delete "
-                "what no plant has yet")
+                "Stop shipping for good: changes are no longer logged, and "
+                "prune may delete what was not shipped")
       ->excludes(init, prune);
   init->excludes(prune);
 }

@@ -698,11 +698,11 @@ Report SniffFile(const SniffOptions& options, const Context&) {
 void AddSniffVerb(cli::Program& program, CLI::App& group) {
   auto [verb, options] =
       AddVerb(program, group, "sniff",
-              "Say what a file of a plant holds, and write a tag map to edit",
+              "Describe what a file of the plant holds, and write a tag map to "
+              "edit",
               SniffFile);
-  verb.add_option("file", options.file, "CSV file, gzip too")->required();
-  verb.add_option("--zone", options.zone,
-                  "Zone of times that do not say theirs")
+  verb.add_option("file", options.file, "CSV file, also gzipped")->required();
+  verb.add_option("--zone", options.zone, "Time zone of times that name none")
       ->type_name("ZONE");
   verb.add_option("--map-output", options.output,
                   "Write a tag map to this file")

@@ -368,22 +368,23 @@ Report Move(const MoveOptions& options, const Context& context) {
 }
 
 void AddMove(cli::Program& program, CLI::App& group) {
-  auto [verb, options] = AddVerb(
-      program, group, "move",
-      "Bring valves to another monitor, which goes on where this one is: "
-      "model set, entry, accumulators, open episodes, shelves",
-      Move);
+  auto [verb, options] =
+      AddVerb(program, group, "move",
+              "Move valves to another monitor, which continues where this one "
+              "stopped: model set, entry, accumulators, open episodes, shelves",
+              Move);
   verb.add_option("valve", options.pattern, "Id or glob")->required();
   verb.add_option("--to", options.target,
-                  "Its data directory, or a new one to carry there")
+                  "Data directory of the other monitor, or a new one to "
+                  "carry there")
       ->type_name("DIR")
       ->required();
 }
 
 void AddAdd(cli::Program& program, CLI::App& group) {
-  auto [verb, options] =
-      AddVerb(program, group, "add",
-              "Describe a valve, or all whose id matches a glob", AddValves);
+  auto [verb, options] = AddVerb(
+      program, group, "add",
+      "Describe a valve, or all valves whose ids match a glob", AddValves);
   verb.add_option("valve", options.pattern, "Id or glob")->required();
   verb.add_option("--type", options.type, "Free text");
   verb.add_option("--flow-unit", options.flow_unit, "m3/h or t/h")
@@ -402,8 +403,8 @@ void AddAdd(cli::Program& program, CLI::App& group) {
 void AddEvent(cli::Program& program, CLI::App& group) {
   auto [verb, options] = AddVerb(
       program, group, "event",
-      "Note what was done to a valve: the next epoch, in which no fault is "
-      "isolated until the valve is onboarded again",
+      "Note what was done to a valve; this begins its next epoch, in which no "
+      "fault is isolated until the valve is onboarded again",
       Event);
   verb.add_option("valve", options.pattern, "Id, or the glob of an entry")
       ->required();
@@ -412,7 +413,7 @@ void AddEvent(cli::Program& program, CLI::App& group) {
   verb.add_option("--note", options.note, "Free text");
   verb.add_option("--at", options.at, "When, RFC 3339 in UTC (default: now)")
       ->type_name("UTC");
-  verb.add_option("--by", options.who, "Who says so");
+  verb.add_option("--by", options.who, "Who did this");
 }
 
 }  // namespace

@@ -169,6 +169,100 @@ TEST(DriftTest, NoMoreIsFollowedThanTheSetAllows) {
   EXPECT_LT(*alarm, 15.0);
 }
 
+// F is raised by a limit in 10 h, without noise. The window lags by its 100
+// samples, which are 0.003 limits.
+TEST(DriftTest, TellsHowFarItHasFollowed) {
+  ValveEngine engine(DriftingPlant(kFollowed));
+  const auto drifts = [](Sample& s) {
+    s.values[Index(Signal::kF)] +=
+        kLimit * static_cast<double>(s.seq) / (10.0 * kHour);
+  };
+  StepRange(engine, 0, kHour, drifts);
+  EXPECT_EQ(engine.followed_drift(1).mean, 0.0);
+  StepRange(engine, kHour, 10 * kHour, drifts);
+
+  const FollowedDrift half = engine.followed_drift(1);
+  EXPECT_NEAR(half.mean, kLimit, 0.01 * kLimit);
+  EXPECT_EQ(half.mean_bound, 2.0 * kLimit);
+  EXPECT_EQ(half.mean_used(), half.mean / half.mean_bound);
+  EXPECT_EQ(half.mean_full_ns, 0);
+  EXPECT_EQ(half.log_scale, 0.0);
+  EXPECT_EQ(half.log_scale_bound, std::log(2.0));
+  EXPECT_EQ(engine.followed_drift(0).used(), 0.0);  // X has no windows.
+}
+
+// Downwards, where the bound is half a limit and one is reached in 10 h; then
+// back. Steps of equal size run behind windows with noise, here by 1.3 of their
+// deviations, 0.15 limits. That windows waver at the bound begins nothing anew.
+TEST(DriftTest, TellsSinceWhenItIsAtItsBound) {
+  const DriftLimits less{-0.5 * kLimit, 3.0 * kLimit, 0.0};
+  ValveEngine engine(DriftingPlant(less));
+  Noise noise(9);
+  const auto drifts = [&](Sample& s) {
+    noise.Add(s);
+    const double hours = static_cast<double>(s.seq) / kHour;
+    s.values[Index(Signal::kF)] -=
+        kLimit * std::min(hours, 16.0 - hours) / 10.0;
+  };
+  std::int64_t since_ns = 0;
+  for (int hour = 0; hour < 9; ++hour) {
+    ASSERT_TRUE(StepRange(engine, hour * kHour, (hour + 1) * kHour, drifts)
+                    .transitions.empty());
+    const FollowedDrift drift = engine.followed_drift(1);
+    EXPECT_GE(drift.mean, less.lower_mean);
+    EXPECT_EQ(drift.mean_bound, hour > 0 ? less.lower_mean : less.upper_mean);
+    EXPECT_EQ(drift.mean_full_ns != 0, hour >= 6) << hour;
+    EXPECT_TRUE(since_ns == 0 || drift.mean_full_ns == since_ns) << hour;
+    since_ns = drift.mean_full_ns;
+  }
+  EXPECT_NEAR(static_cast<double>(since_ns), 6.5e9 * kHour, 0.5e9 * kHour);
+  StepRange(engine, 9 * kHour, 16 * kHour, drifts);
+
+  EXPECT_GT(engine.followed_drift(1).mean, 0.5 * less.lower_mean);
+  EXPECT_EQ(engine.followed_drift(1).mean_full_ns, 0);
+}
+
+TEST(DriftTest, TellsHowFarItHasFollowedTheNoise) {
+  ValveEngine engine(DriftingPlant({0.0, 0.0, std::log(1.2)}));
+  Noise noise(9);
+  StepRange(engine, 0, 12 * kHour, [&](Sample& s) {
+    const double flow = s[Signal::kF];
+    noise.Add(s);
+    const double hours = static_cast<double>(s.seq) / kHour;
+    s.values[Index(Signal::kF)] +=
+        (s[Signal::kF] - flow) * std::min(0.05 * hours, 0.4);
+  });
+
+  const FollowedDrift drift = engine.followed_drift(1);
+  EXPECT_EQ(drift.log_scale, std::log(1.2));
+  EXPECT_EQ(drift.scale_used(), 1.0);
+  EXPECT_GT(drift.scale_full_ns, 0);
+  EXPECT_EQ(drift.mean_used(), 0.0);
+}
+
+// F goes on rising while X is faulty.
+TEST(DriftTest, WhatIsToldStopsAtAnAlarm) {
+  ValveEngine engine(DriftingPlant(kFollowed));
+  const auto drifts = [&](Sample& s) {
+    s.values[Index(Signal::kF)] +=
+        kLimit * static_cast<double>(s.seq) / (10.0 * kHour);
+  };
+  StepRange(engine, 0, 5 * kHour, drifts);
+  StepRange(engine, 5 * kHour, 5 * kHour + 10, [&](Sample& s) {
+    drifts(s);
+    s.values[Index(Signal::kX)] -= 10.0;
+  });
+  ASSERT_TRUE(engine.episode_open());
+  const double before = engine.followed_drift(1).mean;
+  ASSERT_GT(before, 0.4 * kLimit);
+  StepRange(engine, 5 * kHour + 10, 8 * kHour, [&](Sample& s) {
+    drifts(s);
+    s.values[Index(Signal::kX)] -= 10.0;
+  });
+
+  EXPECT_EQ(engine.followed_drift(1).mean, before);
+}
+
 // F is shifted by `shift` limits for `hours`, then as far the other way, which
 // is an alarm if the first shift was learnt. X is faulty until then, or not:
 // off at every 15th sample, which lets no episode clear.

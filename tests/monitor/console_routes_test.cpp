@@ -1,5 +1,7 @@
 // What the console tells over HTTP, and to whom.
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -64,6 +66,31 @@ TEST_F(ConsoleRoutesTest, ValvesAndTrendsOfAnyId) {
               StartsWith("rod position 20 % below what the normal model "
                          "expects; fits: "));
   EXPECT_EQ(Get("/api/v1/status")["model_sets"][0]["T"], 0.7);
+}
+
+TEST_F(ConsoleRoutesTest, ATrendTellsHowFarTheLimitsHaveFollowedTheValve) {
+  Start();
+  ShowValve("V1", 3);
+  ShowValve("V2", 3);
+  console_->live().ShowDrift(
+      "V1", std::array{FollowedDrift{-0.25, -0.25, std::log(1.5), std::log(3.0),
+                                     monitor::PlantSample(2).stamp_ns, 0}});
+
+  EXPECT_EQ(Get("/api/v1/valves/V1/trend")["drift"],
+            Json::array({{{"channel", "X"},
+                          {"unit", "%"},
+                          {"mean", -0.25},
+                          {"mean_bound", -0.25},
+                          {"mean_used", 1.0},
+                          {"mean_full_since_ms", 1'700'000'002'000},
+                          {"scale", 1.5},
+                          {"scale_bound", 3.0},
+                          {"scale_used", 0.369},
+                          {"scale_full_since_ms", nullptr}}}));
+  const Json tiles = Get("/api/v1/valves")["valves"];
+  EXPECT_EQ(tiles[0]["drift_used"], 1.0);
+  EXPECT_TRUE(tiles[1]["drift_used"].is_null());
+  EXPECT_EQ(Get("/api/v1/valves/V2/trend")["drift"], Json::array());
 }
 
 TEST_F(ConsoleRoutesTest, AValveThatIsNotJudgedIsNotCalledNormal) {

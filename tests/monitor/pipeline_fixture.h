@@ -30,8 +30,7 @@ class PipelineTest : public testing::Test {
   void Make(SampleSink* samples = nullptr) {
     pipeline_ = std::make_unique<Pipeline>(
         options_, PipelineSinks{bus_, bus_, history_, samples, live_},
-        std::make_shared<FixedResolver>(SharedLinearModels(), assigned_),
-        context_);
+        std::make_shared<FixedResolver>(models_, assigned_), context_);
   }
   void Start(SampleSink* samples = nullptr) {
     Make(samples);
@@ -52,6 +51,7 @@ class PipelineTest : public testing::Test {
   }
 
   PipelineOptions options_;
+  std::shared_ptr<const ModelSet> models_{SharedLinearModels()};
   std::vector<std::string> assigned_;
   FakeBus bus_;
   FakeHistory history_;

@@ -5,6 +5,7 @@ import {barCell} from '../charts/bars.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
+import {driftLines} from '../drift.js';
 import {faultName, faultTitle, inAlarm, priorityNames, priorityOf,
   prioritySign, qualityText, stateWord} from '../faults.js';
 import {durationText, factorText, numberText, percentText, timeText}
@@ -89,6 +90,7 @@ class ValvePage extends View {
   #data = new TrendData();
   #state = h('div', {class: 'state-line'});
   #words = h('p', {class: 'words'});
+  #drift = h('p', {class: 'note'});
   #now = h('div', {class: 'now-tables'});
   #actions = h('div', {class: 'actions'});
   #note = h('p', {class: 'note', role: 'status'});
@@ -114,7 +116,8 @@ class ValvePage extends View {
     this.element = h('article', {class: 'valve'},
         h('div', {class: 'controls'}, h('h1', {}, id), this.#state,
             this.#actions),
-        h('div', {class: 'live'}, this.#words, this.#checks, this.#now),
+        h('div', {class: 'live'}, this.#words, this.#checks, this.#drift,
+            this.#now),
         this.#note,
         h('div', {class: 'row-end'}, button('Save as PNG', () =>
           exportPng(this.#timeline, id)), h('a', {href: link('history', '', {valve: id})},
@@ -162,6 +165,7 @@ class ValvePage extends View {
       if (trend && !this.gone) {
         this.#data.words = trend.words ?? '';
         setText(this.#words, this.#data.words);
+        this.#showDrift(trend);
       }
     } catch {
       // Asked again soon.
@@ -200,6 +204,7 @@ class ValvePage extends View {
     if (same && this.#timeline.panels.length > 0) this.#timeline.update();
     else this.#timeline.rebuild();
     this.#showNow();
+    this.#showDrift(trend);
   }
 
   #take(samples) {
@@ -243,6 +248,13 @@ class ValvePage extends View {
   #showNow() {
     setText(this.#words, this.#data.words);
     if (this.#data.size > 0) replace(this.#now, nowTables(this.#data));
+  }
+
+  #showDrift({drift}) {
+    const lines = driftLines((drift ?? []).map((channel) =>
+      ({...channel, unit: unitText(channel.unit)})));
+    this.#drift.hidden = lines.length === 0;
+    replace(this.#drift, lines.map((line) => h('div', {}, line)));
   }
 
   #showState() {
