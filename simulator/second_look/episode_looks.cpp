@@ -94,6 +94,21 @@ void KeepTogether(const SecondLook& look, double nothing,
   }
 }
 
+std::optional<LookAnswer> TakeGrowthLook(const ValvePhysics& physics,
+                                         const LookTask& task,
+                                         const std::stop_token& stop) {
+  StrengthLook look = EstimateStrengths(physics, task.window, task.known, stop);
+  if (look.faults.empty()) {
+    return std::nullopt;
+  }
+  LookAnswer answer;
+  answer.outcome =
+      look.misfit > kMostMisfit ? LookOutcome::kNoneFits : LookOutcome::kNamed;
+  answer.misfit = look.misfit;
+  answer.faults = std::move(look.faults);
+  return answer;
+}
+
 }  // namespace
 
 LookAnswer AnswerOf(const SecondLook& look, bool early) {
@@ -128,6 +143,9 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
 std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
                                    const LookTask& task,
                                    const std::stop_token& stop) {
+  if (task.occasion == LookOccasion::kGrowth) {
+    return TakeGrowthLook(physics, task, stop);
+  }
   double without_fault = 0.0;
   if (task.occasion != LookOccasion::kEpisode) {
     without_fault = MisfitWithoutFault(physics, task.window);
@@ -259,6 +277,19 @@ std::optional<LookTask> EpisodeLooks::RoutineTask(bool suspected) const {
   if (std::ranges::count_if(task.window.rows, &RecordRow::x_measured) <
       kRoutineMeasured) {
     return std::nullopt;
+  }
+  return task;
+}
+
+std::optional<LookTask> EpisodeLooks::GrowthTask(
+    std::vector<Explanation> known) const {
+  std::optional<LookTask> task;
+  if (detection_ns_ && !rows_.empty()) {
+    task = Task();
+  }
+  if (task) {
+    task->occasion = LookOccasion::kGrowth;
+    task->known = std::move(known);
   }
   return task;
 }

@@ -18,6 +18,7 @@ enum class LookOccasion : std::uint8_t {
   kEpisode,  ///< To name an open episode.
   kRoutine,  ///< There is no episode: should there be one?
   kStill,    ///< A routine look opened it: is the valve abnormal still?
+  kGrowth,   ///< There is a name: how strong are its faults by now?
 };
 
 /// A look that is due: at what, and for which episode.
@@ -26,6 +27,7 @@ struct LookTask {
   std::int64_t stamp_ns{0};            ///< Of the last row.
   std::int64_t detection_stamp_ns{0};  ///< Key of the episode.
   LookOccasion occasion{LookOccasion::kEpisode};
+  std::vector<Explanation> known{};  ///< Of kGrowth: EstimateStrengths().
 
   /// So little of the episode is there that the physics, which is off by some
   /// per cent, may find the wrong fault: see LookAnswer::early.
@@ -78,7 +80,8 @@ inline constexpr double kRoutineGain = 1.0;
 
 LookAnswer AnswerOf(const SecondLook& look, bool early = false);
 
-/// Takes the look that is due. Nothing if it was asked to stop.
+/// Takes the look that is due. Nothing if it was asked to stop. One for growth
+/// answers with the faults that it knows, and names nothing.
 /// @throws CvodeError.
 std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
                                    const LookTask& task,
@@ -114,6 +117,10 @@ class EpisodeLooks {
   /// @param suspected a routine look found the valve abnormal.
   std::optional<LookTask> Step(const Sample& sample, const Verdict& verdict,
                                bool suspected = false);
+
+  /// A look at how strong the faults of the open episode are after the last
+  /// sample. Nothing if there is no episode, or too little was measured.
+  std::optional<LookTask> GrowthTask(std::vector<Explanation> known) const;
 
  private:
   struct Row {
@@ -193,6 +200,11 @@ class ValveLooks {
 
   /// What counts for the open episode at the last sample, if there is one.
   const LookAnswer* Answer() const;
+
+  /// See EpisodeLooks::GrowthTask(). Its answer is not for Enter().
+  std::optional<LookTask> GrowthTask(std::vector<Explanation> known) const {
+    return looks_.GrowthTask(std::move(known));
+  }
 
   /// The engine should have an episode (ValveEngine::Suspect).
   bool suspects() const { return suspicion_.found() != nullptr; }
