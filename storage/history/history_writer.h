@@ -11,6 +11,7 @@
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
+#include "diagnosis/records/strength_point.h"
 #include "storage/database/database.h"
 #include "storage/history/trace.h"
 
@@ -71,6 +72,9 @@ class HistoryWriter {
   /// Replaces what an earlier second look made of the episode.
   /// @throws NotFoundError
   void StoreLook(const EpisodeLook& look);
+
+  /// How strong a fault of the episode was. @throws NotFoundError
+  void StoreStrength(const StrengthPoint& point);
 
   /// Adds instants of an episode, in order of arrival: those before detection
   /// when it begins, then as they come. Buffers. Instants that arrive with the
