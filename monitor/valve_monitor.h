@@ -9,6 +9,7 @@
 #include "diagnosis/valve_engine.h"
 #include "monitor/checkpoint.h"
 #include "monitor/episode_names.h"
+#include "monitor/episode_strengths.h"
 #include "monitor/episode_tracker.h"
 #include "monitor/health_book.h"
 #include "monitor/sinks.h"
@@ -112,6 +113,7 @@ class ValveMonitor {
   void Close(EndReason reason, EpisodeOutlet& outlet);
   void End(const Transition& closed, EpisodeOutlet& outlet);
   void NameEpisodes();
+  void FollowStrengths(const Verdict& verdict, EpisodeOutlet& outlet);
   void RestoreOnce(std::uint64_t source_id);
   double period_s() const;
 
@@ -122,6 +124,7 @@ class ValveMonitor {
   LookWorker* looks_;
   std::unique_ptr<EpisodeNames> names_;  // Null: the engine's count.
   const Verdict* answer_{nullptr};       // On the last sample.
+  EpisodeStrengths strengths_;
   EpisodeTracker tracker_;
   Verdict unassigned_;
   CoverageBook coverage_;
