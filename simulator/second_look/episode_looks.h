@@ -105,7 +105,7 @@ inline constexpr std::int64_t kRoutineDelayNs = 60'000'000'000;
 
 /// Follows the samples and verdicts of one valve and says when the physics
 /// should look at an episode that is open: 20 (early), 40, 150 and 300 s after
-/// its detection, then at ten times the age each time. While there is none, or
+/// its detection, then at twice the age each time. While there is none, or
 /// one that a routine look opened, a routine look is due every 300 s, at the
 /// same stamps whenever a program was started. Keeps the last 420 samples.
 class EpisodeLooks {
@@ -147,6 +147,12 @@ class EpisodeLooks {
 /// episode that was conclusive, else the engine's. A look that fits much worse
 /// than an earlier one, or finds nothing after one that named a fault, is not
 /// heard: the fault may have gone meanwhile, or show less.
+///
+/// More than five minutes after the detection a name stands until there is a
+/// better one. A look is heard that names some of its faults. One that names
+/// all of them and others separates less than those before it. One that leaves
+/// some out and names others is heard if it is the second in a row that finds
+/// the same other fault.
 class LookBook {
  public:
   void Enter(const LookTask& task, LookAnswer answer);
@@ -161,7 +167,11 @@ class LookBook {
     std::int64_t from_ns;
     LookAnswer answer;
   };
+  // Whether a look that comes so late is heard.
+  bool Convinces(const LookAnswer& answer);
+
   std::vector<Entry> entries_;
+  std::vector<Explanation> doubt_;  // What the last look named instead.
 };
 
 /// What routine looks find. Two in a row that name the same fault make the

@@ -353,6 +353,14 @@ TEST(EpisodeLooksTest, LooksOftenInFiveMinutesFromTwoMinutesBefore) {
   EXPECT_EQ(tasks[3].stamp_ns, 500 * kSecond);
 }
 
+TEST(EpisodeLooksTest, ThenAtTwiceTheAgeEach) {
+  const std::vector<LookTask> tasks = Follow(3000, 200);
+  ASSERT_EQ(tasks.size(), 7U);
+  EXPECT_EQ(tasks[4].stamp_ns, (200 + 600) * kSecond);
+  EXPECT_EQ(tasks[5].stamp_ns, (200 + 1200) * kSecond);
+  EXPECT_EQ(tasks[6].stamp_ns, (200 + 2400) * kSecond);
+}
+
 TEST(EpisodeLooksTest, ManagesWithoutALeadIn) {
   const std::vector<LookTask> tasks = Follow(100, 0);
   ASSERT_EQ(tasks.size(), 2U);
@@ -408,6 +416,52 @@ TEST(LookBookTest, CountsAfterItsDelayAndDoesNotHearAWorseFit) {
   book.Enter(task, nothing);
   EXPECT_EQ(book.At(7, 400 * kSecond)->faults.front().fault, 1);
   EXPECT_EQ(book.At(8, 300 * kSecond), nullptr);
+}
+
+// Looks of one episode at twice the age each, from 300 s on.
+class LateLookTest : public ::testing::Test {
+ protected:
+  // @returns the faults of the name then.
+  std::vector<int> Look(std::vector<std::pair<int, double>> distances) {
+    distances.emplace_back(0, 900.0);
+    LookTask task;
+    task.stamp_ns = age_;
+    book_.Enter(task, AnswerOf(Looked(std::move(distances))));
+    const LookAnswer* answer = book_.At(0, age_ + kLookDelayNs);
+    age_ *= 2;
+    return NamesOf(*answer, true).value();
+  }
+
+  LookBook book_;
+  std::int64_t age_{300 * kSecond};
+};
+
+TEST_F(LateLookTest, ANameGetsNarrowerAtOnceAndNotWider) {
+  EXPECT_EQ(Look({{3, 0.0}, {19, 3.0}}), (std::vector{3, 19}));
+  EXPECT_EQ(Look({{19, 0.0}, {3, 30.0}}), std::vector{19});
+  EXPECT_EQ(Look({{19, 0.0}, {3, 3.0}}), std::vector{19});
+  EXPECT_EQ(Look({{3, 0.0}, {19, 3.0}}), std::vector{19});
+  EXPECT_EQ(Look({{3, 0.0}, {19, 3.0}, {1, 1.0}, {10, 1.0}, {16, 1.0}}),
+            std::vector{19});
+}
+
+TEST_F(LateLookTest, AnotherNameTakesTwoLooksInARow) {
+  EXPECT_EQ(Look({{3, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{13, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{3, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{13, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{6, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{13, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{13, 0.0}, {1, 1.0}}), (std::vector{1, 13}));
+  EXPECT_EQ(Look({{13, 0.0}}), std::vector{13});
+}
+
+// In the first minutes each look knows more than the one before.
+TEST_F(LateLookTest, AnEarlierLookIsHeardWhateverItNames) {
+  age_ = 40 * kSecond;
+  EXPECT_EQ(Look({{3, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{13, 0.0}}), std::vector{13});
+  EXPECT_EQ(Look({{13, 0.0}, {3, 1.0}}), (std::vector{3, 13}));
 }
 
 TEST(SecondLookTest, KnowsAHealthyWindowWithoutTryingFaults) {
