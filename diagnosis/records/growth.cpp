@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kNormalQuantile = 1.96;
 constexpr double kLeastDeviation = 0.005;
+constexpr double kScaleDeviation = 0.02;
 constexpr double kSecondsPerDay = 86'400.0;
 
 // |strength| `t` seconds after the last point.
@@ -85,8 +86,8 @@ Line Fit(const std::vector<Reading>& readings) {
   return line;
 }
 
-// |level + rate (t − middle) − 1| ≤ q sqrt(V_level + V_rate (t − middle)²)
-// between the two ends.
+// (level + rate (t − middle) − 1)² ≤ q² (V_level + V_rate (t − middle)²) + z²
+// S² between the two ends, S the deviation of the scale.
 std::optional<TimeToFull> FullAt(const Line& line) {
   const double gap = 1.0 - line.level + line.rate * line.middle;
   if (gap <= 0.0) {
@@ -96,7 +97,8 @@ std::optional<TimeToFull> FullAt(const Line& line) {
   const double off = line.level - 1.0;
   const double a = line.rate * line.rate - q2 * line.rate_variance;
   const double b = line.rate * off;
-  const double c = off * off - q2 * line.level_variance;
+  const double scale = kNormalQuantile * kScaleDeviation;
+  const double c = off * off - q2 * line.level_variance - scale * scale;
   const double root = std::sqrt(std::max(0.0, b * b - a * c));
   return TimeToFull{gap / line.rate,
                     std::max(0.0, line.middle + (-b - root) / a),

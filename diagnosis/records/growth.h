@@ -48,7 +48,8 @@ inline constexpr std::int64_t kPointWindowNs = 420'000'000'000;
 /// is above 1: points then scatter more than their intervals say. Quantiles are
 /// those of Student's t with n − 2 degrees of freedom; the time to full
 /// strength has the interval of Fieller's theorem, which ends wherever the rate
-/// is significant.
+/// is significant. That time also allows for all strengths being off by one
+/// share, of deviation 0.02, which their scatter does not tell.
 ///
 /// Only points of `fault` and of the layer of the last of them count, and of
 /// those that share readings the latest.

@@ -53,7 +53,8 @@ TEST(GrowthTest, TheTimeToFullEndsWhereTheBandMeetsFullStrength) {
   const double q = StudentQuantile(0.975, 3);
   const auto band = [q](double seconds) {
     const double hours = seconds / 3600.0 + 2.0;  // From the middle.
-    return q * kDeviation * std::sqrt(1.0 / 5.0 + hours * hours / 10.0);
+    const double line = q * kDeviation * std::sqrt(0.2 + hours * hours / 10.0);
+    return std::hypot(line, 1.96 * 0.02);
   };
   const auto line = [](double seconds) { return 0.5 + 0.1 * seconds / 3600.0; };
   const double early = growth->full->lowest;

@@ -97,11 +97,11 @@ TEST_F(ValveMonitorTest, AFaultIsDetectedIsolatedAndClearedAsOneEpisode) {
   EXPECT_EQ(notebook_.events[3].transition.reason, EndReason::kCleared);
 }
 
-// From 0.6 on, by 0.1 in a thousand seconds.
+// From 0.8 on, by 0.08 in a thousand seconds.
 TEST_F(ValveMonitorTest, AGrowingFaultIsOneEpisodeWhoseStrengthsAreNoted) {
   Feed(0, 100);
   for (std::uint64_t k = 100; k < 2400; ++k) {
-    Feed(PlantSample(k, kF7Offset * (0.6 + 1e-4 * static_cast<double>(k))));
+    Feed(PlantSample(k, kF7Offset * (0.8 + 8e-5 * static_cast<double>(k))));
   }
   EXPECT_THAT(notebook_.Kinds(), ElementsAre(TransitionKind::kDetected,
                                              TransitionKind::kIsolated));
@@ -111,9 +111,9 @@ TEST_F(ValveMonitorTest, AGrowingFaultIsOneEpisodeWhoseStrengthsAreNoted) {
     EXPECT_EQ(p.fault, 7);
     const auto k =
         static_cast<double>(p.stamp_ns - PlantSample(0).stamp_ns) / kSecond;
-    EXPECT_NEAR(p.strength, 0.6 + 1e-4 * k, 0.01);
-    EXPECT_LE(p.lowest, 0.6 + 1e-4 * k);
-    EXPECT_GE(p.highest, 0.6 + 1e-4 * k);
+    EXPECT_NEAR(p.strength, 0.8 + 8e-5 * k, 0.01);
+    EXPECT_LE(p.lowest, 0.8 + 8e-5 * k);
+    EXPECT_GE(p.highest, 0.8 + 8e-5 * k);
   }
   notebook_.strengths.clear();
   Feed(2400, 2420);

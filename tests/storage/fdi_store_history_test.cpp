@@ -100,7 +100,7 @@ TEST_F(FdiStoreHistoryTest, AGrowingFaultSaysWhenItWillBeFull) {
       Store("history show last").out,
       testing::ContainsRegex("f7: strength 0.40 \\(0.39 to 0.41\\), growing "
                              "by 0.05 a day \\(0.04 to 0.06\\); full in 12.0 "
-                             "days \\(10.7 to 13.6\\), as of 2026-11-24"));
+                             "days \\(10.5 to 13.8\\), as of 2026-11-24"));
 }
 
 TEST_F(FdiStoreHistoryTest, EveryOneNoticedStandsInTheRecord) {
