@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 
 namespace fdi::monitor {
 namespace {
@@ -43,6 +44,7 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     Ask(std::move(*due));
   }
   TakeAnswers();
+  TakeGrowth();
   suspects_ = looks_->suspects() && !held;
   const simulator::LookAnswer* answer = AnswerTo(engine, held);
   const auto named =
@@ -74,6 +76,7 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     Name(*answer, *named);
     if (std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
       look_ = RecordOf(*answer);
+      NoteStrengths(*answer);
     }
   } else if (kept) {
     SetName(*kept_, Unknown::kTooEarly);
@@ -118,6 +121,75 @@ void EpisodeNames::TakeAnswers() {
   }
 }
 
+void EpisodeNames::AskGrowth() {
+  if (known_.empty()) {
+    return;
+  }
+  if (auto task = looks_->GrowthTask(known_)) {
+    const auto rows = static_cast<std::int64_t>(task->window.rows.size());
+    const std::int64_t middle_ns = task->stamp_ns - (rows - 1) * PeriodNs() / 2;
+    growing_.push_back(
+        {middle_ns, look_ns_,
+         worker_->Submit(valve_id_, physics_, std::move(*task))});
+  }
+}
+
+void EpisodeNames::TakeGrowth() {
+  using std::future_status;
+  constexpr std::chrono::seconds kNow{0};
+  while (!growing_.empty() &&
+         growing_.front().answer.wait_for(kNow) == future_status::ready) {
+    const LookWorker::Answer answer = growing_.front().answer.get();
+    if (answer && answer->outcome == simulator::LookOutcome::kNamed) {
+      for (const simulator::Explanation& e : answer->faults) {
+        NoteStrength(e, growing_.front().middle_ns);
+      }
+      // The next one begins where this one ended.
+      if (growing_.front().look_ns == look_ns_) {
+        known_ = answer->faults;
+      }
+    }
+    growing_.pop_front();
+  }
+}
+
+// Of a look that gives a name. An early one does so by a few seconds of data.
+void EpisodeNames::NoteStrengths(const simulator::LookAnswer& answer) {
+  known_.clear();
+  if (answer.outcome != simulator::LookOutcome::kNamed) {
+    return;
+  }
+  known_ = answer.faults;
+  std::erase_if(known_, [this](const simulator::Explanation& e) {
+    return FaultIndex(*models_, e.fault) < 0;
+  });
+  const auto rows = static_cast<std::int64_t>(answer.simulated.size());
+  const std::int64_t first_ns = answer.stamp_ns - (rows - 1) * PeriodNs();
+  for (const simulator::Explanation& e : known_) {
+    const std::int64_t begins_ns =
+        std::max(first_ns, detection_ns_ + e.start * PeriodNs());
+    if (!answer.early) {
+      NoteStrength(e, e.growing ? answer.stamp_ns
+                                : std::midpoint(begins_ns, answer.stamp_ns));
+    }
+  }
+}
+
+void EpisodeNames::NoteStrength(const simulator::Explanation& e,
+                                std::int64_t stamp_ns) {
+  StrengthPoint& point = strength_points_.emplace_back();
+  point.stamp_ns = stamp_ns;
+  point.fault = e.fault;
+  point.strength = e.strength;
+  point.lowest = e.lowest;
+  point.highest = e.highest;
+  point.layer = Layer::kPhysics;
+}
+
+std::int64_t EpisodeNames::PeriodNs() const {
+  return std::llround(models_->sample_period_s * 1e9);
+}
+
 // Faults that the model set does not have cannot be recorded and stay out.
 void EpisodeNames::Name(const simulator::LookAnswer& answer,
                         const std::vector<int>& faults) {
@@ -137,7 +209,7 @@ void EpisodeNames::Name(const simulator::LookAnswer& answer,
 
 EpisodeLook EpisodeNames::RecordOf(const simulator::LookAnswer& answer) const {
   EpisodeLook look;
-  look.period_ns = std::llround(models_->sample_period_s * 1e9);
+  look.period_ns = PeriodNs();
   const auto rows = static_cast<std::int64_t>(answer.simulated.size());
   look.first_ns = answer.stamp_ns - (rows - 1) * look.period_ns;
   look.misfit = answer.misfit;
@@ -216,6 +288,9 @@ void EpisodeNames::Forget() {
   strengths_.clear();
   look_ns_ = 0;
   look_.reset();
+  known_.clear();
+  growing_.clear();
+  strength_points_.clear();
   kept_.reset();
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "diagnosis/records/episode_look.h"
+#include "diagnosis/records/strength_point.h"
 #include "diagnosis/verdict.h"
 #include "monitor/look_worker.h"
 #include "simulator/second_look/episode_looks.h"
@@ -46,6 +47,20 @@ class EpisodeNames {
     return std::exchange(look_, std::nullopt);
   }
 
+  /// A look gave the open episode its name.
+  bool by_physics() const { return by_physics_; }
+
+  /// Asks how strong the faults are that the episode is named after by a look
+  /// of this session, if it is. TakeStrengths() has the answer at some later
+  /// time; it changes no name.
+  void AskGrowth();
+
+  /// The strengths that looks have found since the last call, but for the id of
+  /// their episode.
+  std::vector<StrengthPoint> TakeStrengths() {
+    return std::exchange(strength_points_, {});
+  }
+
   /// The engine was made to end its episode. @returns `closed` with the name
   /// that counted.
   Transition End(Transition closed);
@@ -57,9 +72,20 @@ class EpisodeNames {
     std::future<LookWorker::Answer> answer;
   };
 
+  // A look for growth.
+  struct Growing {
+    std::int64_t middle_ns;  // Of its rows.
+    std::int64_t look_ns;    // Of the look whose faults it knows.
+    std::future<LookWorker::Answer> answer;
+  };
+
   const simulator::LookAnswer* AnswerTo(const Verdict& engine, bool held);
   void Ask(simulator::LookTask task);
   void TakeAnswers();
+  void TakeGrowth();
+  void NoteStrengths(const simulator::LookAnswer& answer);
+  void NoteStrength(const simulator::Explanation& e, std::int64_t stamp_ns);
+  std::int64_t PeriodNs() const;
   void Name(const simulator::LookAnswer& answer,
             const std::vector<int>& faults);
   void SetName(FaultSet faults, Unknown unknown);
@@ -86,6 +112,9 @@ class EpisodeNames {
   std::vector<std::pair<std::size_t, double>> strengths_;
   std::int64_t look_ns_{0};  // Of the look that counts, its last row.
   std::optional<EpisodeLook> look_;
+  std::vector<simulator::Explanation> known_;  // What it is named after.
+  std::deque<Growing> growing_;
+  std::vector<StrengthPoint> strength_points_;
   Verdict verdict_;  // With that name.
 };
 

@@ -81,6 +81,16 @@ void EpisodeTracker::Take(std::optional<EpisodeLook> look,
   }
 }
 
+void EpisodeTracker::Take(const std::vector<StrengthPoint>& points,
+                          EpisodeOutlet& outlet) {
+  for (StrengthPoint point : points) {
+    if (open_) {
+      point.episode_id = open_->episode_id;
+      outlet.Strength(point);
+    }
+  }
+}
+
 // A stretch without accepted samples is a gap.
 void EpisodeTracker::NoteGap(const Sample& sample, const Verdict& verdict,
                              const ModelSet& models, EpisodeOutlet& outlet) {

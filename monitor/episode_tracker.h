@@ -10,6 +10,7 @@
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
+#include "diagnosis/records/strength_point.h"
 #include "diagnosis/verdict.h"
 #include "monitor/trace.h"
 
@@ -31,6 +32,7 @@ class EpisodeOutlet {
   virtual void Event(FaultEvent event) = 0;
   virtual void Evidence(EpisodeTrace trace) = 0;
   virtual void Look(EpisodeLook look) = 0;
+  virtual void Strength(StrengthPoint point) = 0;
   virtual void Gap(DataGap gap) = 0;
   /// An episode of an earlier session goes on.
   virtual void Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) = 0;
@@ -61,6 +63,9 @@ class EpisodeTracker {
 
   /// What a second look made of the open episode, but for its id.
   void Take(std::optional<EpisodeLook> look, EpisodeOutlet& outlet);
+
+  /// How strong its faults were, but for its id.
+  void Take(const std::vector<StrengthPoint>& points, EpisodeOutlet& outlet);
 
   /// The engine was made to end its episode. @param models it ran with.
   void End(const Transition& closed,

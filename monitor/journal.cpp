@@ -121,6 +121,11 @@ void Journal::Look(EpisodeLook look) {
   AddLocked(std::move(look));
 }
 
+void Journal::Strength(StrengthPoint point) {
+  const std::lock_guard lock(mutex_);
+  AddLocked(point);
+}
+
 void Journal::Gap(DataGap gap) {
   counters_.Add(Counter::kGaps);
   log_.Report(
@@ -252,13 +257,15 @@ bool Journal::WriteRecords() {
   }
 }
 
-// Commits events, resumptions and looks together; gaps and marks are buffered
-// only after that succeeded, so that a retry does not buffer them twice.
+// Commits events, resumptions, looks and strengths together; gaps and marks are
+// buffered only after that succeeded, so that a retry does not buffer them
+// twice.
 bool Journal::WriteBatch(const std::vector<const Record*>& batch) {
   const bool any = std::ranges::any_of(batch, [](const Record* record) {
     return std::holds_alternative<PendingEvent>(*record) ||
            std::holds_alternative<Resumption>(*record) ||
-           std::holds_alternative<EpisodeLook>(*record);
+           std::holds_alternative<EpisodeLook>(*record) ||
+           std::holds_alternative<StrengthPoint>(*record);
   });
   const bool committed = !any || Attempt([&] {
     history_.CommitBatch([&] {
@@ -269,6 +276,8 @@ bool Journal::WriteBatch(const std::vector<const Record*>& batch) {
           history_.Resume(resumed->episode_id, resumed->stamp_ns);
         } else if (const auto* look = std::get_if<EpisodeLook>(record)) {
           history_.StoreLook(*look);
+        } else if (const auto* point = std::get_if<StrengthPoint>(record)) {
+          history_.StoreStrength(*point);
         }
       }
     });

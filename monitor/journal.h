@@ -67,6 +67,7 @@ class Journal : public EpisodeOutlet {
   void Event(FaultEvent event) override;
   void Evidence(EpisodeTrace trace) override;
   void Look(EpisodeLook look) override;
+  void Strength(StrengthPoint point) override;
   void Gap(DataGap gap) override;
   void Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) override;
   /// `event` was published before Start(): marks it as sent once that is due.
@@ -112,8 +113,8 @@ class Journal : public EpisodeOutlet {
   struct Sent {  // The event is on the bus.
     PendingEvent pending;
   };
-  using Record =
-      std::variant<PendingEvent, Resumption, EpisodeLook, DataGap, Sent>;
+  using Record = std::variant<PendingEvent, Resumption, EpisodeLook,
+                              StrengthPoint, DataGap, Sent>;
 
   // Used by callers. Functions named Locked require mutex_.
   bool AddLocked(Record record);

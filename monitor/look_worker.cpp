@@ -36,13 +36,17 @@ std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
   Look look{std::move(valve_id), std::move(physics), std::move(task)};
   std::future<Answer> answer = look.answer.get_future();
   const std::lock_guard lock(mutex_);
-  const bool routine = look.task.occasion != simulator::LookOccasion::kEpisode;
-  std::deque<Look>& waiting = routine ? routine_ : waiting_;
-  const auto same = std::ranges::find(waiting, look.valve_id, &Look::valve_id);
+  using simulator::LookOccasion;
+  const bool naming = look.task.occasion == LookOccasion::kEpisode;
+  const bool growth = look.task.occasion == LookOccasion::kGrowth;
+  std::deque<Look>& waiting = naming ? waiting_ : growth ? growth_ : routine_;
+  const auto same =
+      growth ? waiting.end()
+             : std::ranges::find(waiting, look.valve_id, &Look::valve_id);
   if (same != waiting.end()) {
     same->answer.set_value(std::nullopt);
     *same = std::move(look);
-  } else if (waiting.size() < (routine ? kMostRoutine : capacity_)) {
+  } else if (waiting.size() < (naming ? capacity_ : kMostRoutine)) {
     waiting.push_back(std::move(look));
     arrival_.notify_one();
   } else {
@@ -63,6 +67,10 @@ void LookWorker::Stop() {
   thread_.Join();
 }
 
+std::deque<LookWorker::Look>& LookWorker::First() {
+  return !waiting_.empty() ? waiting_ : !routine_.empty() ? routine_ : growth_;
+}
+
 void LookWorker::TakeLooks() {
   // Samples come first. Linux keeps this value by thread, whatever POSIX says
   // of processes; if it refuses, the looks compete with the rest.
@@ -70,9 +78,9 @@ void LookWorker::TakeLooks() {
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
   const std::stop_token stop = stop_.get_token();
   std::unique_lock lock(mutex_);
-  const auto due = [this] { return !waiting_.empty() || !routine_.empty(); };
+  const auto due = [this] { return !First().empty(); };
   while (arrival_.wait(lock, stop, due) && !stop.stop_requested()) {
-    std::deque<Look>& first = waiting_.empty() ? routine_ : waiting_;
+    std::deque<Look>& first = First();
     Look look = std::move(first.front());
     first.pop_front();
     lock.unlock();

@@ -20,8 +20,8 @@ namespace fdi::monitor {
 /// Takes second looks at episodes on a thread of its own, in the order in which
 /// they were asked for. A look costs up to some seconds of processor time: the
 /// thread runs at low priority, and whoever asks never waits for it. A few
-/// looks may wait, one of each valve, and behind them the routine ones; what
-/// does not fit is dropped and counted.
+/// looks may wait, one of each valve, behind them the routine ones, and behind
+/// all the ones for growth; what does not fit is dropped and counted.
 ///
 /// Built idle. Thread safe, but for Start() and Stop().
 class LookWorker {
@@ -40,7 +40,8 @@ class LookWorker {
   /// used, which is counted and logged.
   Physics PhysicsOf(const ModelSet& models) const;
 
-  /// Asks for a look. It replaces one at the same valve that still waits.
+  /// Asks for a look. Unless it is for growth, it replaces one at the same
+  /// valve that still waits.
   std::future<Answer> Submit(std::string valve_id, Physics physics,
                              simulator::LookTask task);
 
@@ -63,6 +64,7 @@ class LookWorker {
     std::promise<Answer> answer{};
   };
 
+  std::deque<Look>& First();
   void TakeLooks();
   Answer Take(const Look& look) const;
   void ReportFailure(const std::string& whose, const char* reason) const;
@@ -76,6 +78,7 @@ class LookWorker {
   std::condition_variable_any arrival_;
   std::deque<Look> waiting_;
   std::deque<Look> routine_;
+  std::deque<Look> growth_;
   Worker thread_;
 };
 

@@ -13,6 +13,7 @@
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
+#include "diagnosis/records/strength_point.h"
 #include "diagnosis/records/trace_point.h"
 #include "diagnosis/verdict.h"
 
@@ -89,8 +90,9 @@ class EventSink {
 class HistorySink {
  public:
   virtual ~HistorySink() = default;
-  /// Makes the calls of Record(), Resume() and StoreLook() in `batch` one
-  /// commit: on return everything is on the disk; on failure, nothing.
+  /// Makes the calls of Record(), Resume(), StoreLook() and StoreStrength() in
+  /// `batch` one commit: on return everything is on the disk; on failure,
+  /// nothing.
   virtual void CommitBatch(const std::function<void()>& batch) = 0;
   /// Within CommitBatch().
   virtual void Record(const FaultEvent& event) = 0;
@@ -98,6 +100,8 @@ class HistorySink {
   virtual void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) = 0;
   /// Replaces the earlier look at the episode. Within CommitBatch().
   virtual void StoreLook(const EpisodeLook& look) = 0;
+  /// Within CommitBatch().
+  virtual void StoreStrength(const StrengthPoint& point) = 0;
   /// Buffers. Evidence of an unknown episode is dropped.
   virtual void AddTrace(const EpisodeTrace& trace) = 0;
   /// Buffers.

@@ -130,8 +130,24 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   if (names_) {
     tracker_.Take(names_->TakeLook(), outlet);
   }
+  FollowStrengths(verdict, outlet);
   const auto missing = static_cast<SignalMask>(required_ & ~sample.present);
   return {verdict, models_.get(), swapped, isolation_held_, missing};
+}
+
+void ValveMonitor::FollowStrengths(const Verdict& verdict,
+                                   EpisodeOutlet& outlet) {
+  const bool by_physics = names_ && names_->by_physics();
+  if (strengths_.Step(verdict, !by_physics)) {
+    if (by_physics) {
+      names_->AskGrowth();
+    } else {
+      tracker_.Take(strengths_.Observed(*models_), outlet);
+    }
+  }
+  if (names_) {
+    tracker_.Take(names_->TakeStrengths(), outlet);
+  }
 }
 
 void ValveMonitor::RestoreOnce(std::uint64_t source_id) {
@@ -201,6 +217,7 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
   }
   models_ = std::move(models);
   answer_ = nullptr;
+  strengths_ = {};
   NameEpisodes();
   required_ = parts ? parts->plan->required() : SignalMask{0};
   swapped_ = true;

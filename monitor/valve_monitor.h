@@ -11,6 +11,7 @@
 #include "diagnosis/valve_engine.h"
 #include "monitor/checkpoint.h"
 #include "monitor/episode_names.h"
+#include "monitor/episode_strengths.h"
 #include "monitor/episode_tracker.h"
 #include "monitor/health_book.h"
 #include "monitor/sinks.h"
@@ -115,6 +116,7 @@ class ValveMonitor {
   void Close(EndReason reason, EpisodeOutlet& outlet);
   void End(const Transition& closed, EpisodeOutlet& outlet);
   void NameEpisodes();
+  void FollowStrengths(const Verdict& verdict, EpisodeOutlet& outlet);
   void RestoreOnce(std::uint64_t source_id);
   double period_s() const;
 
@@ -125,6 +127,7 @@ class ValveMonitor {
   LookWorker* looks_;
   std::unique_ptr<EpisodeNames> names_;  // Null: no second looks.
   const Verdict* answer_{nullptr};       // On the last sample.
+  EpisodeStrengths strengths_;
   EpisodeTracker tracker_;
   Verdict unassigned_;
   CoverageBook coverage_;

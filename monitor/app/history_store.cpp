@@ -107,6 +107,10 @@ void HistoryStore::StoreLook(const EpisodeLook& look) {
   Tolerate("second_look", [&] { writer_.StoreLook(look); });
 }
 
+void HistoryStore::StoreStrength(const StrengthPoint& point) {
+  Tolerate("strength", [&] { writer_.StoreStrength(point); });
+}
+
 void HistoryStore::AddTrace(const EpisodeTrace& trace) {
   Tolerate("trace", [&] {
     const std::vector<TracePoint> instants = trace.trace.Unpack();

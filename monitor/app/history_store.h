@@ -49,6 +49,7 @@ class HistoryStore : public HistorySink {
   void Record(const FaultEvent& event) override;
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) override;
   void StoreLook(const EpisodeLook& look) override;
+  void StoreStrength(const StrengthPoint& point) override;
   void AddTrace(const EpisodeTrace& trace) override;
   void AddGap(const DataGap& gap) override { writer_.AddGap(gap); }
   void CommitCheckpoint(const Checkpoint& checkpoint) override {

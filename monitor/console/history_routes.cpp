@@ -16,6 +16,7 @@
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/time_units.h"
 #include "monitor/console/api.h"
+#include "storage/history/strength.h"
 
 namespace fdi::console {
 namespace {
@@ -225,6 +226,35 @@ Json LookJson(const std::optional<EpisodeLook>& look,
   return {{"misfit", Rounded(look->misfit, 2)}, {"faults", std::move(faults)}};
 }
 
+// How each fault of the name develops.
+Json GrowthJson(const std::vector<Growth>& growths) {
+  Json list = Json::array();
+  for (const Growth& growth : growths) {
+    const StrengthPoint& last = growth.last;
+    Json json = {{"fault", FaultName(last.fault)},
+                 {"at_ms", Ms(last.stamp_ns)},
+                 {"strength", Rounded(last.strength, 3)},
+                 {"lowest", Rounded(last.lowest, 3)},
+                 {"highest", Rounded(last.highest, 3)},
+                 {"rate", Json()},
+                 {"full_in_ms", Json()}};
+    const auto interval = [](double value, double lowest, double highest) {
+      return Json{{"value", Rounded(value, 4)},
+                  {"lowest", Rounded(lowest, 4)},
+                  {"highest", Rounded(highest, 4)}};
+    };
+    if (const auto& rate = growth.rate) {
+      json["rate"] = interval(rate->per_day, rate->lowest, rate->highest);
+    }
+    if (const auto& full = growth.full) {
+      json["full_in_ms"] = interval(1e3 * full->seconds, 1e3 * full->lowest,
+                                    1e3 * full->highest);
+    }
+    list.push_back(std::move(json));
+  }
+  return list;
+}
+
 Json Episode(const Api& api, const httplib::Request& request) {
   const auto reader = api.History();
   const storage::Alarm alarm =
@@ -249,6 +279,8 @@ Json Episode(const Api& api, const httplib::Request& request) {
   return {{"episode", AlarmJson(alarm, api.texts)},
           {"events", std::move(list)},
           {"look", std::move(look)},
+          {"growth", GrowthJson(storage::GrowthOf(
+                         episode, reader->Strengths(episode.id)))},
           {"trace", std::move(trace)},
           {"model_hash", ModelFactsJson(*models)["hash"]}};
 }

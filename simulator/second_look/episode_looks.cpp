@@ -17,7 +17,7 @@ constexpr std::size_t kLongest = 420;  // rows in all
 constexpr std::size_t kFewestMeasured = 20;
 constexpr std::int64_t kEarlyAge = 20 * kNsPerSecond;
 constexpr std::int64_t kFirstAge = 40 * kNsPerSecond;
-constexpr std::int64_t kLastAge = 300 * kNsPerSecond;  // Then ten times each.
+constexpr std::int64_t kLastAge = 300 * kNsPerSecond;  // Then twice each.
 constexpr std::int64_t kRoutineNs = 300 * kNsPerSecond;
 constexpr std::ptrdiff_t kRoutineMeasured = 300;  // of its rows
 // None of the hypotheses follows the record: errors of so many healthy ones.
@@ -33,7 +33,7 @@ std::int64_t AgeAfter(std::int64_t age_ns) {
   return age_ns < kFirstAge            ? kFirstAge
          : age_ns < 150 * kNsPerSecond ? 150 * kNsPerSecond
          : age_ns < kLastAge           ? kLastAge
-                                       : 10 * age_ns;
+                                       : 2 * age_ns;
 }
 
 std::int64_t PeriodOf(const ValvePhysics& physics) {
@@ -94,6 +94,21 @@ void KeepTogether(const SecondLook& look, double nothing,
   }
 }
 
+std::optional<LookAnswer> TakeGrowthLook(const ValvePhysics& physics,
+                                         const LookTask& task,
+                                         const std::stop_token& stop) {
+  StrengthLook look = EstimateStrengths(physics, task.window, task.known, stop);
+  if (look.faults.empty()) {
+    return std::nullopt;
+  }
+  LookAnswer answer;
+  answer.outcome =
+      look.misfit > kMostMisfit ? LookOutcome::kNoneFits : LookOutcome::kNamed;
+  answer.misfit = look.misfit;
+  answer.faults = std::move(look.faults);
+  return answer;
+}
+
 }  // namespace
 
 LookAnswer AnswerOf(const SecondLook& look, bool early) {
@@ -128,6 +143,9 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
 std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
                                    const LookTask& task,
                                    const std::stop_token& stop) {
+  if (task.occasion == LookOccasion::kGrowth) {
+    return TakeGrowthLook(physics, task, stop);
+  }
   double without_fault = 0.0;
   if (task.occasion != LookOccasion::kEpisode) {
     without_fault = MisfitWithoutFault(physics, task.window);
@@ -263,6 +281,19 @@ std::optional<LookTask> EpisodeLooks::RoutineTask(bool suspected) const {
   return task;
 }
 
+std::optional<LookTask> EpisodeLooks::GrowthTask(
+    std::vector<Explanation> known) const {
+  std::optional<LookTask> task;
+  if (detection_ns_ && !rows_.empty()) {
+    task = Task();
+  }
+  if (task) {
+    task->occasion = LookOccasion::kGrowth;
+    task->known = std::move(known);
+  }
+  return task;
+}
+
 std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
                                            const Verdict& verdict,
                                            bool suspected) {
@@ -299,9 +330,12 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
 }
 
 void LookBook::Enter(const LookTask& task, LookAnswer answer) {
-  std::erase_if(entries_, [&](const Entry& entry) {
+  const auto others = std::erase_if(entries_, [&](const Entry& entry) {
     return entry.detection_stamp_ns != task.detection_stamp_ns;
   });
+  if (others > 0) {
+    doubt_.clear();
+  }
   constexpr double kMuchWorse = 2.0;
   for (const Entry& entry : entries_) {
     const bool named = entry.answer.outcome == LookOutcome::kNamed;
@@ -311,9 +345,44 @@ void LookBook::Enter(const LookTask& task, LookAnswer answer) {
       return;
     }
   }
+  if (task.stamp_ns - task.detection_stamp_ns > kLastAge &&
+      !Convinces(answer)) {
+    return;
+  }
   answer.stamp_ns = task.stamp_ns;
   entries_.push_back({task.detection_stamp_ns, task.stamp_ns + kLookDelayNs,
                       std::move(answer)});
+}
+
+bool LookBook::Convinces(const LookAnswer& answer) {
+  const auto doubt = std::exchange(doubt_, {});
+  const auto named =
+      std::find_if(entries_.rbegin(), entries_.rend(), [](const Entry& entry) {
+        return entry.answer.outcome == LookOutcome::kNamed &&
+               !entry.answer.early;
+      });
+  if (named == entries_.rend() || answer.outcome == LookOutcome::kNoneFits) {
+    return true;
+  }
+  const auto within = [](const std::vector<Explanation>& some,
+                         const std::vector<Explanation>& others) {
+    return std::ranges::all_of(
+        some, [&](const Explanation& e) { return Has(others, e.fault); });
+  };
+  const std::vector<Explanation>& name = named->answer.faults;
+  if (within(answer.faults, name)) {
+    return true;
+  }
+  if (answer.outcome != LookOutcome::kNamed || within(name, answer.faults)) {
+    return false;
+  }
+  const bool again = std::ranges::any_of(doubt, [&](const Explanation& e) {
+    return Has(answer.faults, e.fault) && !Has(name, e.fault);
+  });
+  if (!again) {
+    doubt_ = answer.faults;
+  }
+  return again;
 }
 
 void Suspicion::Enter(std::int64_t stamp_ns, LookAnswer answer) {

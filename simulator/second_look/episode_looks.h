@@ -18,6 +18,7 @@ enum class LookOccasion : std::uint8_t {
   kEpisode,  ///< To name an open episode.
   kRoutine,  ///< There is no episode: should there be one?
   kStill,    ///< A routine look opened it: is the valve abnormal still?
+  kGrowth,   ///< There is a name: how strong are its faults by now?
 };
 
 /// A look that is due: at what, and for which episode.
@@ -26,6 +27,7 @@ struct LookTask {
   std::int64_t stamp_ns{0};            ///< Of the last row.
   std::int64_t detection_stamp_ns{0};  ///< Key of the episode.
   LookOccasion occasion{LookOccasion::kEpisode};
+  std::vector<Explanation> known{};  ///< Of kGrowth: EstimateStrengths().
 
   /// So little of the episode is there that the physics, which is off by some
   /// per cent, may find the wrong fault: see LookAnswer::early.
@@ -78,7 +80,8 @@ inline constexpr double kRoutineGain = 1.0;
 
 LookAnswer AnswerOf(const SecondLook& look, bool early = false);
 
-/// Takes the look that is due. Nothing if it was asked to stop.
+/// Takes the look that is due. Nothing if it was asked to stop. One for growth
+/// answers with the faults that it knows, and names nothing.
 /// @throws CvodeError.
 std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
                                    const LookTask& task,
@@ -102,7 +105,7 @@ inline constexpr std::int64_t kRoutineDelayNs = 60'000'000'000;
 
 /// Follows the samples and verdicts of one valve and says when the physics
 /// should look at an episode that is open: 20 (early), 40, 150 and 300 s after
-/// its detection, then at ten times the age each time. While there is none, or
+/// its detection, then at twice the age each time. While there is none, or
 /// one that a routine look opened, a routine look is due every 300 s, at the
 /// same stamps whenever a program was started. Keeps the last 420 samples.
 class EpisodeLooks {
@@ -114,6 +117,10 @@ class EpisodeLooks {
   /// @param suspected a routine look found the valve abnormal.
   std::optional<LookTask> Step(const Sample& sample, const Verdict& verdict,
                                bool suspected = false);
+
+  /// A look at how strong the faults of the open episode are after the last
+  /// sample. Nothing if there is no episode, or too little was measured.
+  std::optional<LookTask> GrowthTask(std::vector<Explanation> known) const;
 
  private:
   struct Row {
@@ -140,6 +147,12 @@ class EpisodeLooks {
 /// episode that was conclusive, else the engine's. A look that fits much worse
 /// than an earlier one, or finds nothing after one that named a fault, is not
 /// heard: the fault may have gone meanwhile, or show less.
+///
+/// More than five minutes after the detection a name stands until there is a
+/// better one. A look is heard that names some of its faults. One that names
+/// all of them and others separates less than those before it. One that leaves
+/// some out and names others is heard if it is the second in a row that finds
+/// the same other fault.
 class LookBook {
  public:
   void Enter(const LookTask& task, LookAnswer answer);
@@ -154,7 +167,11 @@ class LookBook {
     std::int64_t from_ns;
     LookAnswer answer;
   };
+  // Whether a look that comes so late is heard.
+  bool Convinces(const LookAnswer& answer);
+
   std::vector<Entry> entries_;
+  std::vector<Explanation> doubt_;  // What the last look named instead.
 };
 
 /// What routine looks find. Two in a row that name the same fault make the
@@ -193,6 +210,11 @@ class ValveLooks {
 
   /// What counts for the open episode at the last sample, if there is one.
   const LookAnswer* Answer() const;
+
+  /// See EpisodeLooks::GrowthTask(). Its answer is not for Enter().
+  std::optional<LookTask> GrowthTask(std::vector<Explanation> known) const {
+    return looks_.GrowthTask(std::move(known));
+  }
 
   /// The engine should have an episode (ValveEngine::Suspect).
   bool suspects() const { return suspicion_.found() != nullptr; }

@@ -80,6 +80,8 @@ class Looker {
   }
 
   SecondLook Run(const std::stop_token& stop);
+  StrengthLook Follow(const std::vector<Explanation>& known,
+                      const std::stop_token& stop);
   double MisfitOfHealthy() const { return ErrorsOf(healthy_) / Readings(); }
 
  private:
@@ -523,17 +525,28 @@ void Looker::Refine(Hypothesis& h) {
   Try(h, where);
 }
 
-// The interval is where the cost is within 3.84 of the least.
+// The interval is where the cost is within 3.84 of the least, linear between
+// the strengths that it is known at.
 Explanation Looker::Explain(const Hypothesis& h, double scale) const {
   constexpr double kQuantile = 3.84;
   Explanation e{h.fault,    h.sign * h.strength,         h.strength,
                 h.strength, h.course.start - detection_, h.course.growing};
+  e.supply = h.supply;
+  const auto beyond = [&](double strength, const Trajectory& answers) {
+    return CostOf(h, strength, answers) - h.cost - kQuantile * scale;
+  };
+  double last = 0.0;
+  double last_beyond = beyond(0.0, healthy_);
   Between(h, [&](double strength, const Trajectory& answers) {
-    const double cost = CostOf(h, strength, answers);
-    if (cost - h.cost <= kQuantile * scale) {
-      e.lowest = std::min(e.lowest, strength);
-      e.highest = std::max(e.highest, strength);
+    const double now_beyond = beyond(strength, answers);
+    if (last_beyond <= 0.0 || now_beyond <= 0.0) {
+      const double end =
+          std::lerp(last, strength, last_beyond / (last_beyond - now_beyond));
+      e.lowest = std::min(e.lowest, last_beyond <= 0.0 ? last : end);
+      e.highest = std::max(e.highest, now_beyond <= 0.0 ? strength : end);
     }
+    last = strength;
+    last_beyond = now_beyond;
   });
   if (h.sign < 0.0) {
     std::tie(e.lowest, e.highest) = std::pair(-e.highest, -e.lowest);
@@ -669,6 +682,36 @@ SecondLook Looker::Run(const std::stop_token& stop) {
   return look;
 }
 
+StrengthLook Looker::Follow(const std::vector<Explanation>& known,
+                            const std::stop_token& stop) {
+  constexpr double kLeast = 0.02;
+  constexpr double kFurther = 1.5;
+  constexpr int kRefinements = 4;
+  StrengthLook look;
+  look.misfit = kInfinity;
+  for (const Explanation& e : known) {
+    if (stop.stop_requested()) {
+      return {};
+    }
+    Hypothesis h{e.fault, e.strength < 0.0 ? -1.0 : 1.0, {0, false}, e.supply};
+    const double about = std::max(kLeast, std::abs(e.strength));
+    Try(h, 0.75 * about);
+    double most = about;
+    Try(h, most);
+    do {
+      most = std::min(1.0, kFurther * most);
+      Try(h, most);
+    } while (h.strength == most && most < 1.0);
+    for (int i = 0; i < kRefinements; ++i) {
+      Refine(h);
+    }
+    const double misfit = ErrorsOf(h.simulated.at(h.strength)) / Readings();
+    look.faults.push_back(Explain(h, std::max(1.0, misfit)));
+    look.misfit = std::min(look.misfit, misfit);
+  }
+  return look;
+}
+
 void RequireRows(const LookWindow& window) {
   Require(window.rows.size() >= 20 && window.detection < window.rows.size(),
           "a second look takes 20 rows and a detection among them");
@@ -680,6 +723,14 @@ SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window,
                      const std::stop_token& stop) {
   RequireRows(window);
   return Looker(physics, window).Run(stop);
+}
+
+StrengthLook EstimateStrengths(const ValvePhysics& physics,
+                               const LookWindow& window,
+                               const std::vector<Explanation>& known,
+                               const std::stop_token& stop) {
+  RequireRows(window);
+  return Looker(physics, window).Follow(known, stop);
 }
 
 double MisfitWithoutFault(const ValvePhysics& physics,

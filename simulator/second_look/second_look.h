@@ -27,6 +27,7 @@ struct Explanation {
   int start{0};          ///< Row that the fault begins at; < 0: before.
   bool growing{false};   ///< From 0 at `start` to `strength` at the end.
   double distance{0.0};  ///< Behind the best explanation [2 log-likelihood].
+  double supply{1.0};    ///< Of what onboarding took for the supply pressure.
 };
 
 /// What the physics of the valve says about a window.
@@ -65,6 +66,23 @@ struct SecondLook {
 /// @param stop asks it to end between two hypotheses: nothing is ranked then.
 SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window,
                      const std::stop_token& stop = {});
+
+/// The strengths of faults that are known, over a window that they act in all
+/// the time: no other fault, course or supply pressure is tried. A twentieth of
+/// the work of LookAgain().
+struct StrengthLook {
+  /// As they were asked for, with their strengths and intervals; empty if it
+  /// was asked to stop.
+  std::vector<Explanation> faults;
+  double misfit{0.0};  ///< Of the one that fits best, as in SecondLook.
+};
+
+/// @param known fault, sign, supply pressure and about the strength of each.
+/// @throws as LookAgain().
+StrengthLook EstimateStrengths(const ValvePhysics& physics,
+                               const LookWindow& window,
+                               const std::vector<Explanation>& known,
+                               const std::stop_token& stop = {});
 
 /// Misfit of the window without any fault, but for a constant shift of X or F:
 /// 0.7 to 1.1 of a healthy valve. A hundredth of the work of LookAgain().

@@ -8,6 +8,7 @@
 #include "cli/text_table.h"
 #include "storage/app/verbs.h"
 #include "storage/history/history_reader.h"
+#include "storage/history/strength.h"
 
 namespace fdi::storage {
 namespace {
@@ -203,6 +204,101 @@ void AddLook(const std::optional<EpisodeLook>& look, const Context& context,
   AddTextTable(report, table);
 }
 
+// "0.42 (0.38 to 0.46)", "9.6 days (7.2 to 14.5)"
+std::string IntervalText(double value, double lowest, double highest,
+                         int decimals, const std::string& unit = "") {
+  const auto number = [decimals](double x) {
+    return cli::FormatNumber(x, decimals);
+  };
+  return number(value) + unit + " (" + number(lowest) + " to " +
+         number(highest) + ")";
+}
+
+// In a unit of which there is one at least.
+std::string TimeToFullText(const TimeToFull& full) {
+  const auto [unit_s, unit] =
+      full.seconds >= 86'400.0 ? std::pair(86'400.0, " days")
+      : full.seconds >= 3600.0 ? std::pair(3600.0, " hours")
+                               : std::pair(60.0, " minutes");
+  return IntervalText(full.seconds / unit_s, full.lowest / unit_s,
+                      full.highest / unit_s, 1, unit);
+}
+
+// "strength 0.42 (0.38 to 0.46), growing by 0.06 a day (0.04 to 0.08); full in
+// 9.6 days (7.2 to 14.5)"
+std::string GrowthText(const Growth& growth) {
+  const StrengthPoint& last = growth.last;
+  std::string text =
+      "strength " + IntervalText(last.strength, last.lowest, last.highest, 2);
+  if (growth.rate) {
+    const GrowthRate& rate = *growth.rate;
+    text += rate.grows()
+                ? ", growing by " + IntervalText(rate.per_day, rate.lowest,
+                                                 rate.highest, 2, " a day")
+            : rate.falls()
+                ? ", falling by " + IntervalText(-rate.per_day, -rate.highest,
+                                                 -rate.lowest, 2, " a day")
+                : ", neither growing nor falling";
+  }
+  if (growth.full) {
+    text += "; full in " + TimeToFullText(*growth.full);
+  }
+  return text;
+}
+
+const char* TrendName(const GrowthRate& rate) {
+  return rate.grows() ? "growing" : rate.falls() ? "falling" : "steady";
+}
+
+Json GrowthJson(const Growth& growth) {
+  const StrengthPoint& last = growth.last;
+  Json json = {{"fault", FaultName(last.fault)},
+               {"stamp_utc", TimeJson(last.stamp_ns)},
+               {"strength", last.strength},
+               {"lowest", last.lowest},
+               {"highest", last.highest},
+               {"trend", Json()},
+               {"per_day", Json()},
+               {"per_day_lowest", Json()},
+               {"per_day_highest", Json()},
+               {"full_in_s", Json()},
+               {"full_in_s_lowest", Json()},
+               {"full_in_s_highest", Json()}};
+  if (growth.rate) {
+    json.update({{"trend", TrendName(*growth.rate)},
+                 {"per_day", growth.rate->per_day},
+                 {"per_day_lowest", growth.rate->lowest},
+                 {"per_day_highest", growth.rate->highest}});
+  }
+  if (growth.full) {
+    json.update({{"full_in_s", growth.full->seconds},
+                 {"full_in_s_lowest", growth.full->lowest},
+                 {"full_in_s_highest", growth.full->highest}});
+  }
+  return json;
+}
+
+Json StrengthJson(const StrengthPoint& p) {
+  return {{"stamp_utc", TimeJson(p.stamp_ns)},
+          {"fault", FaultName(p.fault)},
+          {"strength", p.strength},
+          {"lowest", p.lowest},
+          {"highest", p.highest},
+          {"layer", LayerName(p.layer)}};
+}
+
+void AddGrowth(const Episode& episode,
+               const std::vector<StrengthPoint>& strengths,
+               const Context& context, Report& report) {
+  const std::vector<Growth> growths = GrowthOf(episode, strengths);
+  report.document["growth"] = Rows(growths, GrowthJson);
+  report.document["strengths"] = Rows(strengths, StrengthJson);
+  for (const Growth& growth : growths) {
+    report.Line(FaultName(growth.last.fault) + ": " + GrowthText(growth) +
+                ", as of " + TimeText(growth.last.stamp_ns, context));
+  }
+}
+
 // "f19: Flow transmitter wrong", "unknown (outside_known): ...".
 std::string FaultLine(const Episode& e, const std::string& name) {
   const std::string why = e.unknown_kind ? " (" + *e.unknown_kind + ")" : "";
@@ -285,6 +381,7 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
   report.Fields("", EpisodeFields(alarm, context));
   AddEvents(history->Events(e.id), context, report);
   AddLook(history->Look(e.id), context, report);
+  AddGrowth(e, history->Strengths(e.id), context, report);
   return report;
 }
 

@@ -9,6 +9,7 @@
 
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/service_records.h"
+#include "diagnosis/records/strength_point.h"
 #include "diagnosis/records/trace_point.h"
 #include "storage/history/alarm.h"
 #include "storage/history/episode.h"
@@ -35,6 +36,9 @@ class History {
   /// The result of the second look at the episode; nothing if there is none.
   /// @throws DataError
   virtual std::optional<EpisodeLook> Look(std::uint64_t episode_id) = 0;
+
+  /// How strong the faults of an episode were, by stamp. @throws DataError
+  virtual std::vector<StrengthPoint> Strengths(std::uint64_t episode_id) = 0;
 
   /// In order of arrival. @throws DataError if stored bytes are damaged.
   virtual std::vector<TracePoint> Trace(std::uint64_t episode_id) = 0;

@@ -9,6 +9,7 @@
 #include "storage/history/episode.h"
 #include "storage/history/look.h"
 #include "storage/history/sql.h"
+#include "storage/history/strength.h"
 #include "storage/history/trace.h"
 
 namespace fdi::storage {
@@ -203,6 +204,10 @@ std::vector<HistoryEntry> HistoryReader::Events(std::uint64_t episode_id) {
 
 std::optional<EpisodeLook> HistoryReader::Look(std::uint64_t episode_id) {
   return ReadLook(database_, episode_id);
+}
+
+std::vector<StrengthPoint> HistoryReader::Strengths(std::uint64_t episode_id) {
+  return ReadStrengths(database_, episode_id);
 }
 
 std::vector<TracePoint> HistoryReader::Trace(std::uint64_t episode_id) {

@@ -13,6 +13,7 @@
 #include "storage/history/look.h"
 #include "storage/history/shadow.h"
 #include "storage/history/sql.h"
+#include "storage/history/strength.h"
 
 namespace fdi::storage {
 
@@ -375,6 +376,10 @@ void HistoryWriter::Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
 
 void HistoryWriter::StoreLook(const EpisodeLook& look) {
   CommitBatch([&] { storage::StoreLook(database_, look); });
+}
+
+void HistoryWriter::StoreStrength(const StrengthPoint& point) {
+  CommitBatch([&] { storage::StoreStrength(database_, point); });
 }
 
 void HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {

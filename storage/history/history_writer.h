@@ -11,6 +11,7 @@
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/service_records.h"
+#include "diagnosis/records/strength_point.h"
 #include "storage/database/database.h"
 #include "storage/history/trace.h"
 
@@ -72,6 +73,9 @@ class HistoryWriter {
   /// Replaces the result of an earlier second look at the episode.
   /// @throws NotFoundError
   void StoreLook(const EpisodeLook& look);
+
+  /// Stores how strong a fault of the episode was. @throws NotFoundError
+  void StoreStrength(const StrengthPoint& point);
 
   /// Buffers instants of an episode in order of arrival: those before detection
   /// first, then as they come. Instants with the channels or faults of another

@@ -193,6 +193,15 @@ FROM episode_look_fault WHERE episode_id = ? ORDER BY rank
 -- name: look_rows
 SELECT x_pct, flow FROM episode_look_row WHERE episode_id = ? ORDER BY row
 
+-- ---- Strengths.
+-- name: insert_strength
+INSERT OR REPLACE INTO episode_strength (episode_id, fault, stamp_ns, strength,
+  lowest, highest, layer)
+VALUES (?, ?, ?, ?, ?, ?, ?)
+-- name: strengths
+SELECT fault, stamp_ns, strength, lowest, highest, layer
+FROM episode_strength WHERE episode_id = ? ORDER BY stamp_ns, fault
+
 -- ---- Sessions and gaps.
 -- name: last_sign_of_life
 SELECT max(alive_ns) FROM monitor_session WHERE stop_ns IS NULL
@@ -331,7 +340,7 @@ WHERE detected_ns >= ?1 AND ended_ns < ?2 AND acked_by IS NOT NULL
   AND episode_id NOT IN (
     SELECT key FROM change
     WHERE number > (SELECT min(number) FROM ship_cursor)
-      AND item IN ('episode', 'trace', 'look'))
+      AND item IN ('episode', 'trace', 'look', 'strength'))
 ORDER BY detected_ns LIMIT ?3
 -- name: protected_episodes
 SELECT count(*) FROM episode e WHERE NOT (
@@ -343,7 +352,7 @@ SELECT count(*) FROM episode e WHERE NOT (
   AND episode_id NOT IN (
     SELECT key FROM change
     WHERE number > (SELECT min(number) FROM ship_cursor)
-      AND item IN ('episode', 'trace', 'look')))
+      AND item IN ('episode', 'trace', 'look', 'strength')))
 -- name: old_health
 SELECT count(*), min(hour), max(hour), sum(length(bytes))
 FROM health_hour WHERE valve_id = ? AND hour < ?
@@ -433,6 +442,11 @@ WHERE e.valve_id = ? AND e.ended_ns IS NULL
 -- name: copy_open_look_rows
 INSERT OR IGNORE INTO episode_look_row
 SELECT s.* FROM source.episode_look_row s
+  JOIN source.episode e USING (episode_id)
+WHERE e.valve_id = ? AND e.ended_ns IS NULL
+-- name: copy_open_strengths
+INSERT OR IGNORE INTO episode_strength
+SELECT s.* FROM source.episode_strength s
   JOIN source.episode e USING (episode_id)
 WHERE e.valve_id = ? AND e.ended_ns IS NULL
 -- name: copy_shelves

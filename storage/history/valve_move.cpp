@@ -55,7 +55,7 @@ MovedHistory CopyProgress(Database& target, const std::filesystem::path& source,
   for (const std::string_view statement :
        {sql::copy_open_faults, sql::copy_open_events, sql::copy_open_outbox,
         sql::copy_open_traces, sql::copy_open_looks, sql::copy_open_look_faults,
-        sql::copy_open_look_rows}) {
+        sql::copy_open_look_rows, sql::copy_open_strengths}) {
     copy(statement);
   }
   target.Run(sql::copy_shelves, valve_id, now_ns);

@@ -221,6 +221,24 @@ std::optional<EpisodeLook> PlantReader::Look(std::uint64_t episode_id) {
   return look;
 }
 
+std::vector<StrengthPoint> PlantReader::Strengths(std::uint64_t episode_id) {
+  const PlantRows rows =
+      AskOf(sql::plant_strengths, episode_id, " ORDER BY stamp_ns, fault");
+  std::vector<StrengthPoint> points;
+  for (int r = 0; r < rows.size(); ++r) {
+    StrengthPoint& p = points.emplace_back();
+    p.episode_id = episode_id;
+    p.fault = RequireFault(rows.Text(r, 0).value_or(""));
+    Parse(rows.Text(r, 1), p.stamp_ns);
+    Parse(rows.Text(r, 2), p.strength);
+    Parse(rows.Text(r, 3), p.lowest);
+    Parse(rows.Text(r, 4), p.highest);
+    p.layer = rows.Text(r, 5) == LayerName(Layer::kPhysics) ? Layer::kPhysics
+                                                            : Layer::kObservers;
+  }
+  return points;
+}
+
 std::vector<TracePoint> PlantReader::Trace(std::uint64_t episode_id) {
   const PlantRows rows = AskOf(sql::plant_trace, episode_id, " ORDER BY chunk");
   std::vector<TracePoint> trace;

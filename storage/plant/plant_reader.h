@@ -24,6 +24,7 @@ class PlantReader : public History {
   Episode Show(std::string_view id) override;
   std::vector<HistoryEntry> Events(std::uint64_t episode_id) override;
   std::optional<EpisodeLook> Look(std::uint64_t episode_id) override;
+  std::vector<StrengthPoint> Strengths(std::uint64_t episode_id) override;
   std::vector<TracePoint> Trace(std::uint64_t episode_id) override;
   std::vector<EpisodeStatistics> Statistics(
       const EpisodeFilter& filter) override;

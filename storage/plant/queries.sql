@@ -36,6 +36,10 @@ UNION ALL
 SELECT 'look', e.episode_id, 0
 FROM episode e CROSS JOIN episode_look USING (episode_id)
 WHERE detected_ns > ?1 AND detected_ns <= ?2
+UNION ALL
+SELECT 'strength', episode_id, 0 FROM episode e
+WHERE detected_ns > ?1 AND detected_ns <= ?2 AND EXISTS (
+  SELECT 1 FROM episode_strength s WHERE s.episode_id = e.episode_id)
 -- name: next_valve
 SELECT min(valve_id) FROM (
   SELECT min(valve_id) AS valve_id FROM coverage_day WHERE valve_id > ?1
@@ -86,6 +90,11 @@ WHERE c.item = 'look'
 SELECT l.episode_id, l.row, l.x_pct, l.flow
 FROM batch c CROSS JOIN episode_look_row l ON l.episode_id = c.key
 WHERE c.item = 'look'
+-- name: episode_strength
+SELECT s.episode_id, s.stamp_ns, s.fault, s.strength, s.lowest, s.highest,
+  s.layer
+FROM batch c CROSS JOIN episode_strength s ON s.episode_id = c.key
+WHERE c.item = 'strength'
 -- name: coverage_day
 SELECT d.valve_id, d.day, d.quality, d.samples, d.seconds
 FROM batch c CROSS JOIN coverage_day d
@@ -185,7 +194,9 @@ l AS (DELETE FROM fdi.episode_look USING gone
 lf AS (DELETE FROM fdi.episode_look_fault USING gone
        WHERE (episode_id, monitor_id) = (e, m)),
 lr AS (DELETE FROM fdi.episode_look_row USING gone
-       WHERE (episode_id, monitor_id) = (e, m))
+       WHERE (episode_id, monitor_id) = (e, m)),
+s AS (DELETE FROM fdi.episode_strength USING gone
+      WHERE (episode_id, monitor_id) = (e, m))
 SELECT count(*) FROM gone
 -- name: old_health_in_plant
 SELECT count(*), min(hour) * 3600000000000, max(hour) * 3600000000000
@@ -270,6 +281,9 @@ SELECT fault, strength, lowest, highest, begins_ns, growing
 FROM episode_look_fault WHERE
 -- name: plant_look_rows
 SELECT x_pct, flow FROM episode_look_row WHERE
+-- name: plant_strengths
+SELECT fault, stamp_ns, strength, lowest, highest, layer
+FROM episode_strength WHERE
 -- The columns are kFieldsOf<Shelf>; $1 when, or NULL, $2 the monitor.
 -- name: plant_shelves
 FROM shelf JOIN monitor m USING (monitor_id)

@@ -37,6 +37,7 @@ constexpr std::array kTables = {
     Table{"episode_look", 1, sql::episode_look},
     Table{"episode_look_fault", 2, sql::episode_look_fault, "episode_look"},
     Table{"episode_look_row", 2, sql::episode_look_row, "episode_look"},
+    Table{"episode_strength", 3, sql::episode_strength},
     Table{"coverage_day", 3, sql::coverage_day},
     Table{"health_hour", 4, sql::health_hour},
     Table{"data_gap", 1, sql::data_gap},

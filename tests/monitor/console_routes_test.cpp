@@ -8,6 +8,7 @@
 
 #include "cli/plot/gnuplot.h"
 #include "diagnosis/error.h"
+#include "diagnosis/time_units.h"
 #include "tests/monitor/console_http_fixture.h"
 #include "tests/storage/message_of.h"
 
@@ -128,10 +129,21 @@ TEST_F(ConsoleRoutesTest, AnEpisodeComesWithItsEvidence) {
   RecordEpisode(writer_, 4);
   writer_.AppendTrace(Id(), Instants(60, -30.0));
   writer_.Commit(kDetected);
+  for (const int day : {0, 1, 2}) {
+    const double strength = -0.2 - 0.1 * day;
+    writer_.StoreStrength({Id(), kDetected + day * kNsPerDay, 19, strength,
+                           strength - 0.01, strength + 0.01, Layer::kPhysics});
+  }
   Start();
 
   const Json answer = Get("/api/v1/episodes/" + IdText());
   EXPECT_EQ(answer["episode"]["fault"], "f19");
+  ASSERT_EQ(answer["growth"].size(), 1U);
+  const Json& growth = answer["growth"][0];
+  EXPECT_EQ(growth["strength"], -0.4);
+  EXPECT_EQ(growth["rate"]["value"], 0.1);
+  EXPECT_GT(growth["rate"]["lowest"], 0.0);
+  EXPECT_NEAR(growth["full_in_ms"]["value"].get<double>(), 6 * 86.4e6, 1.0);
   EXPECT_EQ(answer["events"].size(), 4U);
   EXPECT_EQ(answer["model_hash"], "fedcba9876543210");
   const Json& trace = answer["trace"];

@@ -125,6 +125,12 @@ class FakeHistory : public HistorySink {
       looks[look.episode_id] = look;
     });
   }
+  void StoreStrength(const StrengthPoint& point) override {
+    notice.Apply([&] {
+      FailIfBroken();
+      strengths.push_back(point);
+    });
+  }
   void AddTrace(const EpisodeTrace& trace) override {
     std::this_thread::sleep_for(trace_time.load());
     notice.Apply([&] {
@@ -163,6 +169,7 @@ class FakeHistory : public HistorySink {
   int attempts{0};
   std::map<std::pair<std::uint64_t, TransitionKind>, int> recorded;
   std::map<std::uint64_t, EpisodeLook> looks;
+  std::vector<StrengthPoint> strengths;
   std::vector<DataGap> gaps;
   Checkpoint checkpoint_sum;
   int checkpoints{0};
@@ -184,6 +191,7 @@ class FakeOutlet : public EpisodeOutlet {
   void Event(FaultEvent /*event*/) override {}
   void Evidence(EpisodeTrace /*trace*/) override {}
   void Look(EpisodeLook /*look*/) override {}
+  void Strength(StrengthPoint /*point*/) override {}
   void Gap(DataGap /*gap*/) override {}
   void Resumed(const OpenEpisode& /*episode*/,
                std::int64_t /*stamp_ns*/) override {}

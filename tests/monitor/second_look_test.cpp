@@ -47,8 +47,10 @@ class EventList : public FakeOutlet {
  public:
   void Event(FaultEvent event) override { events.push_back(std::move(event)); }
   void Look(EpisodeLook look) override { looks.push_back(std::move(look)); }
+  void Strength(StrengthPoint point) override { strengths.push_back(point); }
   std::vector<FaultEvent> events;
   std::vector<EpisodeLook> looks;
+  std::vector<StrengthPoint> strengths;
 };
 
 // The engine takes f19 for f7.
@@ -116,6 +118,7 @@ class SecondLookTest : public testing::Test {
     const Verdict& verdict = names_.Step(sample, engine_, held_);
     tracker_.Step(sample, verdict, models_, outlet_);
     tracker_.Take(names_.TakeLook(), outlet_);
+    tracker_.Take(names_.TakeStrengths(), outlet_);
     return verdict;
   }
 
@@ -195,6 +198,75 @@ TEST_F(SecondLookTest, TheSimulationCorrectsTheNameTenSecondsAfterItsSamples) {
     error += std::abs(look.flow[row] - rows_[kAtOnce - 120 + row].flow);
   }
   EXPECT_LT(error / static_cast<double>(look.flow.size()), 0.5);
+}
+
+TEST_F(SecondLookTest, ALookForGrowthTellsTheStrengthAndChangesNoName) {
+  names_.AskGrowth();  // Nothing is named yet.
+  Feed(0, kFirstLook + 1);
+  worker_.Start();
+  ASSERT_TRUE(AwaitLooks(1));
+  Feed(kFirstLook + 1, kCounts + 20);
+  ASSERT_EQ(outlet_.strengths.size(), 1U);  // Of the look that named it.
+  const StrengthPoint named = outlet_.strengths[0];
+  EXPECT_EQ(named.stamp_ns, (outlet_.looks[0].faults[0].begins_ns +
+                             PlantSample(kFirstLook).stamp_ns) /
+                                2);
+  EXPECT_EQ(named.strength, outlet_.looks[0].faults[0].strength);
+
+  names_.AskGrowth();
+  ASSERT_TRUE(AwaitLooks(2));
+  Feed(kCounts + 20, kCounts + 21);
+  ASSERT_EQ(outlet_.strengths.size(), 2U);
+  const StrengthPoint& p = outlet_.strengths[1];
+  EXPECT_EQ(p.episode_id, outlet_.events[0].episode_id);
+  EXPECT_EQ(p.fault, 19);
+  EXPECT_EQ(p.layer, Layer::kPhysics);
+  // From two minutes before the detection to the last row.
+  EXPECT_EQ(p.stamp_ns, (PlantSample(kAtOnce - 120).stamp_ns +
+                         PlantSample(kCounts + 19).stamp_ns) /
+                            2);
+  EXPECT_LT(p.lowest, p.strength);
+  EXPECT_GT(p.highest, p.strength);
+  EXPECT_EQ(outlet_.events.size(), 3U);
+  EXPECT_EQ(outlet_.looks.size(), 1U);
+
+  names_.AskGrowth();
+  ASSERT_TRUE(AwaitLooks(3));
+  Clear(kCounts + 21);
+  Step(kCounts + 21);  // It is over: what the look found is of no use.
+  EXPECT_EQ(outlet_.strengths.size(), 2U);
+}
+
+// The worker takes it last, however early it was asked for.
+TEST_F(SecondLookTest, ALookForGrowthWaitsForTheOthersAndReplacesNone) {
+  const simulator::LookWindow window = simulator::Window({Abrupt(19, 0.25)});
+  const auto ask = [&](simulator::LookOccasion occasion) {
+    simulator::LookTask task;
+    task.window = window;
+    task.stamp_ns = kSecond * 1000;
+    task.occasion = occasion;
+    simulator::Explanation f19;
+    f19.fault = 19;
+    f19.strength = 0.2;
+    task.known = {f19};
+    return worker_.Submit("V1", physics_, std::move(task));
+  };
+  using simulator::LookOccasion;
+  auto growth = ask(LookOccasion::kGrowth);
+  auto again = ask(LookOccasion::kGrowth);
+  auto naming = ask(LookOccasion::kEpisode);
+  auto routine = ask(LookOccasion::kStill);
+  worker_.Start();
+  const auto answer = growth.get();
+  using std::future_status;
+  EXPECT_EQ(naming.wait_for(seconds(0)), future_status::ready);
+  EXPECT_EQ(routine.wait_for(seconds(0)), future_status::ready);
+  EXPECT_TRUE(naming.get() && routine.get());
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->faults.at(0).fault, 19);
+  const auto same = again.get();
+  ASSERT_TRUE(same);
+  EXPECT_EQ(same->faults.at(0).strength, answer->faults.at(0).strength);
 }
 
 TEST_F(SecondLookTest, ThatNameStaysWhateverTheEngineIsolates) {

@@ -23,6 +23,7 @@ class Notebook : public EpisodeOutlet {
     }
   }
   void Look(EpisodeLook /*look*/) override {}
+  void Strength(StrengthPoint point) override { strengths.push_back(point); }
   void Gap(DataGap gap) override { gaps.push_back(std::move(gap)); }
   void Resumed(const OpenEpisode& episode, std::int64_t /*stamp*/) override {
     resumed.push_back(episode.episode_id);
@@ -38,6 +39,7 @@ class Notebook : public EpisodeOutlet {
 
   std::vector<FaultEvent> events;
   std::vector<std::pair<std::uint64_t, TracePoint>> evidence;
+  std::vector<StrengthPoint> strengths;
   std::vector<DataGap> gaps;
   std::vector<std::uint64_t> resumed;
   bool complete{false};
@@ -46,6 +48,7 @@ class Notebook : public EpisodeOutlet {
 class ValveMonitorTest : public testing::Test {
  protected:
   static constexpr std::uint64_t kWriter = 77;
+  static constexpr double kSecond = 1e9;
 
   ValveOutcome Feed(const Sample& sample, std::uint64_t writer = kWriter) {
     return valve_.Step(sample, writer, now_, notebook_);
@@ -92,6 +95,30 @@ TEST_F(ValveMonitorTest, AFaultIsDetectedIsolatedAndClearedAsOneEpisode) {
   EXPECT_EQ(notebook_.events.at(1).candidates.front().fault, 7);
   EXPECT_TRUE(notebook_.events.at(1).candidates.front().isolated);
   EXPECT_EQ(notebook_.events[3].transition.reason, EndReason::kCleared);
+}
+
+// From 0.8 on, by 0.08 in a thousand seconds.
+TEST_F(ValveMonitorTest, AGrowingFaultIsOneEpisodeWhoseStrengthsAreNoted) {
+  Feed(0, 100);
+  for (std::uint64_t k = 100; k < 2400; ++k) {
+    Feed(PlantSample(k, kF7Offset * (0.8 + 8e-5 * static_cast<double>(k))));
+  }
+  EXPECT_THAT(notebook_.Kinds(), ElementsAre(TransitionKind::kDetected,
+                                             TransitionKind::kIsolated));
+  ASSERT_EQ(notebook_.strengths.size(), 5U);
+  for (const StrengthPoint& p : notebook_.strengths) {
+    EXPECT_EQ(p.episode_id, notebook_.events[0].episode_id);
+    EXPECT_EQ(p.fault, 7);
+    const auto k =
+        static_cast<double>(p.stamp_ns - PlantSample(0).stamp_ns) / kSecond;
+    EXPECT_NEAR(p.strength, 0.8 + 8e-5 * k, 0.01);
+    EXPECT_LE(p.lowest, 0.8 + 8e-5 * k);
+    EXPECT_GE(p.highest, 0.8 + 8e-5 * k);
+  }
+  notebook_.strengths.clear();
+  Feed(2400, 2420);
+  Feed(2420, 4000);
+  EXPECT_TRUE(notebook_.strengths.empty());
 }
 
 TEST_F(ValveMonitorTest, AnEpisodeWithoutANameKeepsWhatCouldExplainItLast) {

@@ -10,6 +10,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/records/growth.h"
 #include "simulator/second_look/episode_looks.h"
 #include "tests/simulator/recorded_valve.h"
 
@@ -73,11 +74,68 @@ TEST(SecondLookTest, ComparesASupplyDropWithPerforationAtAnotherSupply) {
   EXPECT_FALSE(LookAgain(Physics(), Window({Abrupt(13, -0.2)})).perforation);
 }
 
+// A fault that grows by a quarter in eight hours, as windows of seven minutes
+// see it each hour or two, which tell when it will be full.
+class GrowingFaultTest
+    : public ::testing::TestWithParam<std::pair<int, double>> {};
+
+TEST_P(GrowingFaultTest, HasItsStrengthsAndTheTimeToFullInTheirIntervals) {
+  const auto [fault, sign] = GetParam();
+  std::vector<StrengthPoint> points;
+  Explanation known;
+  known.fault = fault;
+  known.strength = sign * 0.3;
+  for (const double hour : {0.0, 1.0, 2.0, 4.0, 6.0, 8.0}) {
+    constexpr double kRows = 420.0;
+    const double strength = 0.25 + 0.25 * hour / 8.0;
+    FaultSchedule growing = Abrupt(fault, 0.0);
+    growing.start_s = 0.0;
+    growing.initial_strength = sign * strength;
+    growing.final_strength = sign * (strength + 0.25 * kRows / 28'800.0);
+    growing.development_s = kRows;
+    LookWindow window{
+        Recording(static_cast<std::size_t>(kRows),
+                  static_cast<std::uint64_t>(11 + hour), {growing}),
+        0, kBasicSignals};
+    const StrengthLook look = EstimateStrengths(Physics(), window, {known});
+    ASSERT_EQ(look.faults.size(), 1U);
+    known = look.faults[0];
+    EXPECT_EQ(known.fault, fault);
+    EXPECT_LT(look.misfit, 1.5);
+    const double truth = sign * (strength + 0.125 * kRows / 28'800.0);
+    EXPECT_NEAR(known.strength, truth, 0.02) << hour;
+    EXPECT_LE(known.lowest, truth + 0.002) << hour;
+    EXPECT_GE(known.highest, truth - 0.002) << hour;
+    EXPECT_LT(known.highest - known.lowest, 0.05) << hour;
+    StrengthPoint& p = points.emplace_back();
+    p.stamp_ns = static_cast<std::int64_t>(hour * 3600.0) * kSecond;
+    p.fault = fault;
+    p.strength = known.strength;
+    p.lowest = known.lowest;
+    p.highest = known.highest;
+  }
+  const auto growth = GrowthOf(points, fault);
+  ASSERT_TRUE(growth && growth->rate && growth->full);
+  EXPECT_LT(growth->rate->lowest, 0.75);
+  EXPECT_GT(growth->rate->highest, 0.75);
+  EXPECT_LT(growth->full->lowest, 57'600.0);
+  EXPECT_GT(growth->full->highest, 57'600.0);
+  EXPECT_LT(growth->full->highest - growth->full->lowest, 57'600.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(SecondLook, GrowingFaultTest,
+                         ::testing::Values(std::pair{3, 1.0}, std::pair{2, 1.0},
+                                           std::pair{13, -1.0},
+                                           std::pair{19, -1.0}));
+
 TEST(SecondLookTest, EndsWithoutAnAnswerIfItIsAskedToStop) {
   std::stop_source stop;
   stop.request_stop();
   EXPECT_TRUE(
       LookAgain(Physics(), Window({}), stop.get_token()).ranked.empty());
+  EXPECT_TRUE(
+      EstimateStrengths(Physics(), Window({}), {{19, 0.5}}, stop.get_token())
+          .faults.empty());
 }
 
 TEST(SecondLookTest, TakesAConstantShiftOfXForDrift) {
@@ -295,6 +353,14 @@ TEST(EpisodeLooksTest, LooksOftenInFiveMinutesFromTwoMinutesBefore) {
   EXPECT_EQ(tasks[3].stamp_ns, 500 * kSecond);
 }
 
+TEST(EpisodeLooksTest, ThenAtTwiceTheAgeEach) {
+  const std::vector<LookTask> tasks = Follow(3000, 200);
+  ASSERT_EQ(tasks.size(), 7U);
+  EXPECT_EQ(tasks[4].stamp_ns, (200 + 600) * kSecond);
+  EXPECT_EQ(tasks[5].stamp_ns, (200 + 1200) * kSecond);
+  EXPECT_EQ(tasks[6].stamp_ns, (200 + 2400) * kSecond);
+}
+
 TEST(EpisodeLooksTest, ManagesWithoutALeadIn) {
   const std::vector<LookTask> tasks = Follow(100, 0);
   ASSERT_EQ(tasks.size(), 2U);
@@ -350,6 +416,52 @@ TEST(LookBookTest, CountsAfterItsDelayAndDoesNotHearAWorseFit) {
   book.Enter(task, nothing);
   EXPECT_EQ(book.At(7, 400 * kSecond)->faults.front().fault, 1);
   EXPECT_EQ(book.At(8, 300 * kSecond), nullptr);
+}
+
+// Looks of one episode at twice the age each, from 300 s on.
+class LateLookTest : public ::testing::Test {
+ protected:
+  // @returns the faults of the name then.
+  std::vector<int> Look(std::vector<std::pair<int, double>> distances) {
+    distances.emplace_back(0, 900.0);
+    LookTask task;
+    task.stamp_ns = age_;
+    book_.Enter(task, AnswerOf(Looked(std::move(distances))));
+    const LookAnswer* answer = book_.At(0, age_ + kLookDelayNs);
+    age_ *= 2;
+    return NamesOf(*answer, true).value();
+  }
+
+  LookBook book_;
+  std::int64_t age_{300 * kSecond};
+};
+
+TEST_F(LateLookTest, ANameGetsNarrowerAtOnceAndNotWider) {
+  EXPECT_EQ(Look({{3, 0.0}, {19, 3.0}}), (std::vector{3, 19}));
+  EXPECT_EQ(Look({{19, 0.0}, {3, 30.0}}), std::vector{19});
+  EXPECT_EQ(Look({{19, 0.0}, {3, 3.0}}), std::vector{19});
+  EXPECT_EQ(Look({{3, 0.0}, {19, 3.0}}), std::vector{19});
+  EXPECT_EQ(Look({{3, 0.0}, {19, 3.0}, {1, 1.0}, {10, 1.0}, {16, 1.0}}),
+            std::vector{19});
+}
+
+TEST_F(LateLookTest, AnotherNameTakesTwoLooksInARow) {
+  EXPECT_EQ(Look({{3, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{13, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{3, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{13, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{6, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{13, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{13, 0.0}, {1, 1.0}}), (std::vector{1, 13}));
+  EXPECT_EQ(Look({{13, 0.0}}), std::vector{13});
+}
+
+// In the first minutes each look knows more than the one before.
+TEST_F(LateLookTest, AnEarlierLookIsHeardWhateverItNames) {
+  age_ = 40 * kSecond;
+  EXPECT_EQ(Look({{3, 0.0}}), std::vector{3});
+  EXPECT_EQ(Look({{13, 0.0}}), std::vector{13});
+  EXPECT_EQ(Look({{13, 0.0}, {3, 1.0}}), (std::vector{3, 13}));
 }
 
 TEST(SecondLookTest, KnowsAHealthyWindowWithoutTryingFaults) {

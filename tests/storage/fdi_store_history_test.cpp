@@ -74,6 +74,35 @@ TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
   EXPECT_EQ(Store("history label last perhaps").code, 2);
 }
 
+TEST_F(FdiStoreHistoryTest, AGrowingFaultSaysWhenItWillBeFull) {
+  {
+    HistoryWriter writer(path_);
+    for (int day = 0; day < 5; ++day) {
+      const double strength = 0.2 + 0.05 * day;
+      writer.StoreStrength({Id(), kDetected + day * 86'400 * kSecond, 7,
+                            strength, strength - 0.01, strength + 0.01,
+                            Layer::kPhysics});
+    }
+  }
+  const json shown = StoreJson("history show last");
+  ASSERT_EQ(shown["strengths"].size(), 5U);
+  EXPECT_EQ(shown["strengths"][0]["layer"], "physics");
+  EXPECT_EQ(shown["strengths"][4]["strength"], 0.4);
+  ASSERT_EQ(shown["growth"].size(), 1U);
+  const json& growth = shown["growth"][0];
+  EXPECT_EQ(growth["fault"], "f7");
+  EXPECT_EQ(growth["trend"], "growing");
+  EXPECT_NEAR(growth["per_day"].get<double>(), 0.05, 1e-9);
+  EXPECT_NEAR(growth["full_in_s"].get<double>(), 12 * 86'400.0, 1e-3);
+  EXPECT_LT(growth["full_in_s_lowest"], growth["full_in_s"]);
+  EXPECT_GT(growth["full_in_s_highest"], growth["full_in_s"]);
+  EXPECT_THAT(
+      Store("history show last").out,
+      testing::ContainsRegex("f7: strength 0.40 \\(0.39 to 0.41\\), growing "
+                             "by 0.05 a day \\(0.04 to 0.06\\); full in 12.0 "
+                             "days \\(10.5 to 13.8\\), as of 2026-11-24"));
+}
+
 TEST_F(FdiStoreHistoryTest, EveryOneNoticedStandsInTheRecord) {
   EXPECT_EQ(Store("history ack last --by anna --comment 'on it'").code, 0);
   EXPECT_EQ(Store("history ack last --by jan").code, 0);
@@ -224,7 +253,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 9);
+  EXPECT_EQ(report["databases"][2]["version"], 10);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
 }

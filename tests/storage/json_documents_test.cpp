@@ -237,6 +237,11 @@ class JsonDocumentsTest : public FdiStoreTest {
     look.period_ns = kSecond;
     look.faults = {{7, 0.5, 0.4, 0.6, kDetected, false}};
     writer.StoreLook(look);
+    for (int hour = 0; hour < 3; ++hour) {
+      writer.StoreStrength({Id(), kDetected + hour * 3600 * kSecond, 7,
+                            0.1 * (hour + 1), 0.1 * hour + 0.09,
+                            0.1 * hour + 0.11, Layer::kPhysics});
+    }
     CoverageDay day{"LV-1", 20'000, 1.0, {}};
     day.samples.Add(Quality::kLive, 7200);
     std::vector<HealthHour> hours(12);

@@ -145,6 +145,14 @@ TEST_F(ShipTest, WhatChangesIsShippedAgain) {
   look.flow = {6.0};
   writer.StoreLook(look);
   follow("a shorter one instead");
+  StrengthPoint strength{Id(), kDetected, 7, 0.5, 0.4, 0.6, Layer::kPhysics};
+  writer.StoreStrength(strength);
+  follow("a strength");
+  strength.stamp_ns += kSecond;
+  writer.StoreStrength(strength);
+  strength.strength = 0.45;
+  writer.StoreStrength(strength);
+  follow("a second one, and another instead");
   writer.Record(Event(Kind::kCleared, 90, 0b10, 0.1), kDetected);
   follow("cleared");
   writer.Record(Event(Kind::kClosed, 91, 0b10, 0.1, EndReason::kCleared),
@@ -416,7 +424,7 @@ TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   EXPECT_EQ(Store("history list --from '" + Url("screen") + "'").code, 0);
   owner.Run("UPDATE fdi.plant SET version = version + 1");
   refused(Ship("a"),
-          "schema fdi has version 2, this program needs 1: update "
+          "schema fdi has version 3, this program needs 2: update "
           "this program");
   refused(Store("ship --data " + Folder("a").string() +
                 " --to 'postgresql://x:secret@/plant?host=/nowhere'"),
@@ -550,6 +558,11 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
     look.x_pct = {1.0};
     look.flow = {2.0};
     writer.StoreLook(look);
+    for (const int hour : {0, 1, 2}) {
+      writer.StoreStrength({Id("LV-1"), kDetected + hour * 3600 * kSecond, 1,
+                            0.1 * hour, 0.1 * hour - 0.01, 0.1 * hour + 0.01,
+                            Layer::kPhysics});
+    }
     std::vector<TracePoint> points;
     for (int k = 0; k < 400; ++k) {
       points.push_back(Instant(k));
@@ -609,6 +622,8 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
   };
   EXPECT_EQ(looks(PlantReader(Url()), Id("LV-1")).x_pct,
             looks(HistoryReader(path), Id("LV-1")).x_pct);
+  EXPECT_EQ(PlantReader(Url()).Strengths(Id("LV-1")),
+            HistoryReader(path).Strengths(Id("LV-1")));
   EXPECT_EQ(looks(PlantReader(Url()), Id("LV-1")).flow,
             looks(HistoryReader(path), Id("LV-1")).flow);
   same("health show --valve LV-3");

@@ -92,6 +92,39 @@ function lookParts({faults, misfit}) {
   ];
 }
 
+const kDay = 86_400_000;
+const kUnits = [[kDay, 'days'], [3_600_000, 'hours'], [60_000, 'minutes']];
+
+const intervalText = ({value, lowest, highest}, text, unit = '') =>
+  `${text(value)}${unit} (${text(lowest)} to ${text(highest)})`;
+
+function fullText(full) {
+  const [unit, name] = kUnits.find(([ms]) => full.value >= ms) ?? kUnits[2];
+  return intervalText(full, (ms) => (ms / unit).toFixed(1), ` ${name}`);
+}
+
+function rateText(rate) {
+  const text = (share) => `${(100 * Math.abs(share)).toFixed(1)} %`;
+  const {value, lowest, highest} = rate;
+  return lowest > 0 ? `growing by ${intervalText(rate, text, ' a day')}` :
+    highest < 0 ? `falling by ${intervalText(
+        {value, lowest: highest, highest: lowest}, text, ' a day')}` :
+      'neither growing nor falling';
+}
+
+// The same sentence as `fdi-store history show`.
+function growthPart(growth) {
+  const {fault, strength: value, lowest, highest, rate, full_in_ms: full} =
+      growth;
+  const said = [
+    `strength ${intervalText({value, lowest, highest}, percentText)}`,
+    rate ? rateText(rate) : null,
+  ].filter(Boolean).join(', ');
+  return h('p', {class: 'growth'}, h('strong', {}, faultTitle(fault)), ': ',
+      full ? `${said}; full in ${fullText(full)}` : said,
+      ', as of ', timeCell(growth.at_ms), '.');
+}
+
 class EpisodePage extends View {
   title = 'Episode';
   #content = h('div', {});
@@ -150,6 +183,7 @@ class EpisodePage extends View {
               'href': url(path('episodes', `${this.id}.csv`))},
             'Save as CSV')),
         factList(facts(found)),
+        found.growth.map(growthPart),
         this.#data.words ? h('p', {class: 'words'}, this.#data.words) : null,
         checks.map(({name, check}) => h('p', {class: 'checks'},
             h('strong', {}, `Check for ${name}: `), check)),

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+
+#include "diagnosis/verdict.h"
+
+namespace fdi {
+
+/// How strong a fault was at one time of its episode.
+struct StrengthPoint {
+  std::uint64_t episode_id{0};
+  std::int64_t stamp_ns{0};  ///< Middle of the readings that tell it.
+  int fault{0};
+  double strength{0.0};            ///< Most likely; signed [-].
+  double lowest{0.0};              ///< Ends of its 95 % interval [-].
+  double highest{0.0};             ///<
+  Layer layer{Layer::kObservers};  ///< What estimated it.
+
+  bool operator==(const StrengthPoint&) const = default;
+};
+
+}  // namespace fdi

@@ -1,0 +1,109 @@
+#include "monitor/episode_strengths.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/student.h"
+#include "diagnosis/time_units.h"
+
+namespace fdi::monitor {
+namespace {
+
+constexpr std::int64_t kFirstAge = 450 * kNsPerSecond;
+constexpr std::size_t kMostMinutes = 7;
+constexpr std::size_t kLeastMinutes = 3;
+
+bool Has(FaultSet faults, std::size_t bit) {
+  return (faults >> bit & 1U) != 0;
+}
+
+}  // namespace
+
+bool EpisodeStrengths::Step(const Verdict& verdict, bool observed) {
+  for (const Transition& transition : verdict.Transitions()) {
+    if (transition.kind == TransitionKind::kDetected) {
+      detection_ns_ = transition.detection_stamp_ns;
+      next_age_ns_ = kFirstAge;
+      tracks_.clear();
+    }
+  }
+  if (!verdict.detected) {
+    detection_ns_.reset();
+  }
+  if (!detection_ns_ || !observed) {
+    tracks_.clear();
+  }
+  if (!detection_ns_ || verdict.intake != Intake::kAccepted) {
+    return false;
+  }
+  stamp_ns_ = verdict.stamp_ns;
+  if (observed) {
+    Follow(verdict);
+  }
+  const std::int64_t age_ns = stamp_ns_ - *detection_ns_;
+  const bool due = age_ns >= next_age_ns_;
+  while (age_ns >= next_age_ns_) {
+    next_age_ns_ += next_age_ns_ / 2;
+  }
+  return due;
+}
+
+void EpisodeStrengths::Follow(const Verdict& verdict) {
+  std::erase_if(tracks_, [&](const Track& track) {
+    return !Has(verdict.isolated, track.bit);
+  });
+  for (std::size_t bit = 0; verdict.isolated >> bit != 0; ++bit) {
+    if (!Has(verdict.isolated, bit)) {
+      continue;
+    }
+    auto track = std::ranges::find(tracks_, bit, &Track::bit);
+    if (track == tracks_.end()) {
+      track = tracks_.insert(track, Track{bit});
+    }
+    std::deque<Minute>& minutes = track->minutes;
+    if (minutes.empty() ||
+        verdict.stamp_ns - minutes.back().first_ns >= kNsPerMinute) {
+      minutes.push_back({verdict.stamp_ns});
+    }
+    minutes.back().sum += verdict.strengths[bit];
+    ++minutes.back().samples;
+    if (minutes.size() > kMostMinutes) {
+      minutes.pop_front();
+    }
+  }
+}
+
+std::vector<StrengthPoint> EpisodeStrengths::Observed(
+    const ModelSet& models) const {
+  constexpr double kBothSides = 0.975;
+  std::vector<StrengthPoint> points;
+  for (const auto& [bit, minutes] : tracks_) {
+    const auto n = static_cast<double>(minutes.size());
+    if (minutes.size() < kLeastMinutes || !IsFault(models.faults[bit])) {
+      continue;
+    }
+    double mean = 0.0;
+    for (const Minute& m : minutes) {
+      mean += m.sum / m.samples / n;
+    }
+    double square = 0.0;
+    for (const Minute& m : minutes) {
+      const double away = m.sum / m.samples - mean;
+      square += away * away;
+    }
+    const double half = StudentQuantile(kBothSides, n - 1.0) *
+                        std::sqrt(square / (n - 1.0) / n);
+    StrengthPoint& p = points.emplace_back();
+    p.stamp_ns = std::midpoint(minutes.front().first_ns, stamp_ns_);
+    p.fault = models.faults[bit];
+    p.strength = mean;
+    p.lowest = std::max(-1.0, mean - half);
+    p.highest = std::min(1.0, mean + half);
+    p.layer = Layer::kObservers;
+  }
+  return points;
+}
+
+}  // namespace fdi::monitor

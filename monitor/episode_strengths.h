@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "diagnosis/model_set.h"
+#include "diagnosis/records/strength_point.h"
+#include "diagnosis/verdict.h"
+
+namespace fdi::monitor {
+
+/// Says when it is time to note how strong the faults of an open episode are:
+/// 450 s after its detection, then at 1.5 times the age each, which are 19
+/// points in a month. Gives what the observers say.
+class EpisodeStrengths {
+ public:
+  /// The next verdict, with the name that counts. @param observed the observers
+  /// gave it. @returns whether it is time.
+  bool Step(const Verdict& verdict, bool observed);
+
+  /// Of the faults that the observers have isolated for three minutes or more,
+  /// the mean of their estimates in the last seven. Estimates of neighbouring
+  /// samples hang together: the interval is that of the means of minutes.
+  /// @param models that the verdicts are of.
+  std::vector<StrengthPoint> Observed(const ModelSet& models) const;
+
+ private:
+  struct Minute {
+    std::int64_t first_ns;
+    double sum{0.0};
+    int samples{0};
+  };
+  // Of an isolated fault, by index.
+  struct Track {
+    std::size_t bit;
+    std::deque<Minute> minutes{};
+  };
+
+  void Follow(const Verdict& verdict);
+
+  std::optional<std::int64_t> detection_ns_{};  // Of the open episode.
+  std::int64_t next_age_ns_{0};
+  std::int64_t stamp_ns_{0};
+  std::vector<Track> tracks_{};
+};
+
+}  // namespace fdi::monitor

@@ -1,0 +1,59 @@
+#include "storage/history/strength.h"
+
+#include <string>
+
+#include "diagnosis/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "storage/database/record.h"
+#include "storage/history/sql.h"
+
+namespace fdi::storage {
+namespace sql = history_sql;
+
+void StoreStrength(Database& database, const StrengthPoint& point) {
+  const std::string id = EpisodeIdText(point.episode_id);
+  if (!database.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?", id)) {
+    throw NotFoundError("no episode " + id);
+  }
+  database.Cached(sql::insert_strength)
+      .Bind(id, FaultName(point.fault), point.stamp_ns, point.strength,
+            point.lowest, point.highest, LayerName(point.layer))
+      .Run();
+}
+
+std::vector<StrengthPoint> ReadStrengths(Database& database,
+                                         std::uint64_t episode_id) {
+  const std::string id = EpisodeIdText(episode_id);
+  Statement rows = database.Prepare(sql::strengths);
+  rows.Bind(id);
+  std::vector<StrengthPoint> points;
+  while (rows.Step()) {
+    const std::optional<int> fault = ParseFault(rows.Text(0));
+    if (!fault) {
+      throw DataError("strengths of " + id + ": no fault is called " +
+                      rows.Text(0));
+    }
+    StrengthPoint& p = points.emplace_back();
+    p.episode_id = episode_id;
+    p.fault = *fault;
+    rows.Read(1, p.stamp_ns, p.strength, p.lowest, p.highest);
+    p.layer = rows.Text(5) == LayerName(Layer::kPhysics) ? Layer::kPhysics
+                                                         : Layer::kObservers;
+  }
+  return points;
+}
+
+std::vector<Growth> GrowthOf(const Episode& episode,
+                             const std::vector<StrengthPoint>& strengths) {
+  std::vector<Growth> growths;
+  for (const std::string& name : SplitNames(episode.fault.value_or(""))) {
+    if (const std::optional<int> fault = ParseFault(name)) {
+      if (const auto growth = fdi::GrowthOf(strengths, *fault)) {
+        growths.push_back(*growth);
+      }
+    }
+  }
+  return growths;
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,85 @@
+#include "monitor/episode_strengths.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/fault_catalogue.h"
+#include "tests/monitor/linear_models.h"
+
+namespace fdi::monitor {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+class EpisodeStrengthsTest : public testing::Test {
+ protected:
+  // Second k of an episode that was detected at 0.
+  bool Step(int k, FaultSet isolated, double strength, bool observed = true) {
+    Verdict verdict;
+    verdict.stamp_ns = k * kSecond;
+    verdict.detected = true;
+    verdict.isolated = isolated;
+    verdict.strengths.fill(strength);
+    if (k == 0) {
+      verdict.transitions[0] = {TransitionKind::kDetected, 0, 0};
+      verdict.transition_count = 1;
+    }
+    return strengths_.Step(verdict, observed);
+  }
+
+  EpisodeStrengths strengths_;
+  ModelSet models_{LinearModels()};
+};
+
+TEST_F(EpisodeStrengthsTest, ItIsTimeAtAgesHalfAsMuchAgainEach) {
+  std::vector<int> times;
+  for (int k = 0; k < 2000; ++k) {
+    if (Step(k, 0b10, 0.5)) {
+      times.push_back(k);
+    }
+  }
+  EXPECT_EQ(times, (std::vector{450, 675, 1013, 1519}));
+  Verdict over;
+  over.stamp_ns = 10'000 * kSecond;
+  EXPECT_FALSE(strengths_.Step(over, true));
+}
+
+// In whole minutes 0.41 to 0.47: their mean is 0.44, their deviation
+// 0.0216, Student's quantile of 6 degrees of freedom 2.447.
+TEST_F(EpisodeStrengthsTest, ThePointIsTheMeanOfTheMinutes) {
+  for (int k = 0; k < 8 * 60; ++k) {
+    Step(k, 0b10, 0.40 + 0.01 * (k / 60) + (k % 2 == 0 ? 0.1 : -0.1));
+  }
+  const std::vector<StrengthPoint> points = strengths_.Observed(models_);
+  ASSERT_EQ(points.size(), 1U);
+  EXPECT_EQ(points[0].fault, 7);
+  EXPECT_EQ(points[0].layer, Layer::kObservers);
+  EXPECT_EQ(points[0].stamp_ns, (60 + 479) * kSecond / 2);
+  EXPECT_NEAR(points[0].strength, 0.44, 1e-9);
+  EXPECT_NEAR(points[0].highest - 0.44, 2.447 * 0.0216 / std::sqrt(7.0), 1e-5);
+  EXPECT_NEAR(0.44 - points[0].lowest, 2.447 * 0.0216 / std::sqrt(7.0), 1e-5);
+}
+
+TEST_F(EpisodeStrengthsTest, AFaultCountsFromWhenItWasIsolatedByObservers) {
+  for (int k = 0; k < 300; ++k) {
+    Step(k, k < 200 ? 0b10 : 0b11, 0.5);
+  }
+  ASSERT_EQ(strengths_.Observed(models_).size(), 1U);
+  EXPECT_EQ(strengths_.Observed(models_)[0].fault, 7);
+  Step(300, 0b01, 0.5);
+  EXPECT_TRUE(strengths_.Observed(models_).empty());
+  for (int k = 301; k < 421; ++k) {
+    Step(k, 0b01, 0.5);
+  }
+  EXPECT_EQ(strengths_.Observed(models_).size(), 1U);
+  models_.faults[0] = kTravelDeviation;  // A finding has no strength.
+  EXPECT_TRUE(strengths_.Observed(models_).empty());
+  Step(421, 0b01, 0.5, false);
+  models_.faults[0] = 1;
+  EXPECT_TRUE(strengths_.Observed(models_).empty());
+}
+
+}  // namespace
+}  // namespace fdi::monitor
