@@ -13,6 +13,8 @@ namespace {
 // A refuted fault stays refuted for a while, but for no longer the more often
 // it was refuted: evidence lags behind the best by at most this many supports.
 constexpr double kMemoryOfContradiction = 4.0;
+// With an allowance for interpolation, so many supports beyond it suffice.
+constexpr double kBeyondAllowance = 2.0;
 
 }  // namespace
 
@@ -93,9 +95,10 @@ void FaultBank::Follow(const ObserverBank& bank) {
     tracker.Step(bank);
   }
   allowance_ = Allowance();
+  const double support = plan_->models().decision.evidence_support;
   const double least =
-      BestEvidence() - allowance_ -
-      kMemoryOfContradiction * plan_->models().decision.evidence_support;
+      BestEvidence() - std::max(kMemoryOfContradiction * support,
+                                allowance_ + kBeyondAllowance * support);
   trained_.RaiseTo(least);
   for (StrengthTracker& tracker : trackers_) {
     tracker.RaiseEvidence(least);
