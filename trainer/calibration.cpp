@@ -455,4 +455,15 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
   models.false_alarms_per_hour = rate_per_hour;
 }
 
+void BalanceThresholds(ModelSet& models) {
+  for (std::size_t c = 0; c < models.channels.size(); ++c) {
+    if (RunsOnItself(models.observers.front().channels[c].model)) {
+      ChannelSpec& channel = models.channels[c];
+      channel.upper_threshold =
+          std::max(channel.upper_threshold, -channel.lower_threshold);
+      channel.lower_threshold = -channel.upper_threshold;
+    }
+  }
+}
+
 }  // namespace fdi::trainer

@@ -90,4 +90,9 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
                    double rate_per_hour, ModelSet& models,
                    const std::vector<ResidualSeries>& commands = {});
 
+/// Gives both thresholds of channels that run on their own past the wider of
+/// the two: such a model errs after a large move of the command, one way or the
+/// other, and some hours may hold the largest errors of one way alone.
+void BalanceThresholds(ModelSet& models);
+
 }  // namespace fdi::trainer

@@ -279,19 +279,6 @@ Condition ValidationPart(const FaultCondition& fault,
   return condition;
 }
 
-// A model on its own past errs after a large move of the command, one way or
-// the other: some hours may hold the largest errors of one way alone.
-void BalanceThresholds(ModelSet& models) {
-  for (std::size_t c = 0; c < models.channels.size(); ++c) {
-    if (RunsOnItself(models.observers.front().channels[c].model)) {
-      ChannelSpec& channel = models.channels[c];
-      channel.upper_threshold =
-          std::max(channel.upper_threshold, -channel.lower_threshold);
-      channel.lower_threshold = -channel.upper_threshold;
-    }
-  }
-}
-
 ModelSet Describe(const std::vector<TrainingRun>& healthy,
                   const Condition& normal,
                   const std::vector<FaultCondition>& faults,

@@ -235,4 +235,11 @@ std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s) {
   return floor;
 }
 
+void WidenFloor(const std::vector<Stretch>& normal, FloorLimits& floor) {
+  FloorLimits shown = floor;
+  FitDeviation(normal, shown);
+  floor.deviation = std::max(floor.deviation, shown.deviation);
+  floor.stuck_travel = std::max(floor.stuck_travel, shown.stuck_travel);
+}
+
 }  // namespace fdi::trainer

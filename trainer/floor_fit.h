@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "diagnosis/model_set.h"
 #include "trainer/dataset.h"
@@ -13,5 +14,9 @@ namespace fdi::trainer {
 ///
 /// @return Nothing without CV and X.
 std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s);
+
+/// Widens what the rod may deviate by, and may travel while X repeats, to twice
+/// what further normal operation shows, within the same bounds; never narrows.
+void WidenFloor(const std::vector<Stretch>& normal, FloorLimits& floor);
 
 }  // namespace fdi::trainer

@@ -48,8 +48,15 @@ std::string ParentText(const storage::Lineage& lineage) {
   if (!lineage.parent) {
     return "none";
   }
-  return lineage.parent->name + "@" + std::to_string(lineage.parent->version) +
-         ", hash " + HashText(lineage.parent->content_hash);
+  std::string text = lineage.parent->name + "@" +
+                     std::to_string(lineage.parent->version) + ", hash " +
+                     HashText(lineage.parent->content_hash);
+  const Json settings = Json::parse(lineage.settings, nullptr, false);
+  if (settings.contains("limits")) {
+    text += ", with limits from " +
+            FormatNumber(settings["limits"].value("hours", 0.0), 2) + " h";
+  }
+  return text;
 }
 
 void PrintEpisodes(std::ostream& out, const storage::Lineage& lineage,

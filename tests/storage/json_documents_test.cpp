@@ -422,10 +422,28 @@ TEST_F(JsonDocumentsTest, SimulatorAndTrainerAreOnThePage) {
           "--run " + healthy + " --fault f6:abrupt@10:strength=0.3 -o f6.csv",
           "fdi-trainer");
 
+  {
+    // As if onboarding had made it for the valve.
+    ModelStore models(directory_.path() / "models.db",
+                      Access::kOccasionalWriter);
+    ModelSet set = models.Load("quick");
+    set.name = "U";
+    set.preset = "onboard";
+    models.Save(set);
+  }
+  const std::string more =
+      Printed(page, "run",
+              "--valve U --duration 300 --parameters paper-operating-point "
+              "--no-publish --record",
+              "fdi-simulator")["sources"][0]["run_id"];
+  Printed(page, "limits", "--valve U --runs " + more, "fdi-trainer");
+
   EXPECT_THAT(page.complaints(), IsEmpty());
-  // A set that learnt from labels has a parent and episodes, one of the preset
-  // `extended` has windows.
-  EXPECT_THAT(page.Unseen(called_, {"parent", "training_episode", "window"}),
+  // A set that learnt from labels has episodes, one of the preset `extended`
+  // has windows; limits are compared here without an alarm, and no fault shows
+  // at another strength.
+  EXPECT_THAT(page.Unseen(called_, {"training_episode", "window", "false_alarm",
+                                    "fault_visibility"}),
               IsEmpty());
 }
 

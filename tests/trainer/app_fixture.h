@@ -22,7 +22,7 @@ struct Outcome {
 };
 
 /// Runs the built program in a fresh folder with the data directory `data`.
-class TrainerProgram : public testing::Test {
+class TrainerProgram : public ::testing::Test {
  protected:
   std::filesystem::path Path(const std::string& name) const {
     return directory_.path() / name;

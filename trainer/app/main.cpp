@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   fdi::trainer::AddShowVerb(program);
   fdi::trainer::AddInjectVerb(program);
   fdi::trainer::AddOnboardVerb(program);
+  fdi::trainer::AddLimitsVerb(program);
   fdi::trainer::AddCoverageVerb(program);
   program.AddExamples(
       {{"",

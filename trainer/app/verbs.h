@@ -12,6 +12,7 @@ void AddEvaluateVerb(cli::Program& program);
 void AddCompareVerb(cli::Program& program);
 void AddShowVerb(cli::Program& program);
 void AddInjectVerb(cli::Program& program);
+void AddLimitsVerb(cli::Program& program);
 void AddOnboardVerb(cli::Program& program);
 void AddCoverageVerb(cli::Program& program);
 
