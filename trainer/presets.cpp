@@ -117,7 +117,7 @@ TrainingOptions Extended() {
   options.decision.evidence_window = 400.0;
   options.decision.evidence_core = 4.0;
   options.decision.evidence_support = 10.0;
-  options.decision.interpolation_allowance = 0.05;
+  options.decision.interpolation_allowance = 0.04;
   options.decision.reisolation_samples = 60;
   options.fit.rules.both_methods = true;
   // As if every regressor had noise of 1 % of its deviation: lags of a smooth
