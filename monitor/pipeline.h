@@ -160,7 +160,7 @@ class Pipeline {
     ShadowValve* shadow;  // Null: not compared.
     bool known;           // Never evicted.
     // Limits at the bound of their drift: two for each channel.
-    std::bitset<2 * kMaxChannels> drift_full{};
+    std::bitset<std::size_t{2} * kMaxChannels> drift_full{};
     double drift_used{0.0};  // The largest share of a bound.
   };
   struct Hash {

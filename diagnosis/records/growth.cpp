@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 #include <vector>
 
 #include "diagnosis/student.h"
@@ -38,7 +37,8 @@ std::vector<Reading> Independent(std::span<const StrengthPoint> points,
   const double sign = last.strength < 0.0 ? -1.0 : 1.0;
   std::vector<Reading> readings;
   std::int64_t before_ns = last.stamp_ns + 1;
-  for (const StrengthPoint& p : std::views::reverse(points)) {
+  for (auto at = points.rbegin(); at != points.rend(); ++at) {
+    const StrengthPoint& p = *at;
     if (p.fault == last.fault && p.layer == last.layer &&
         p.stamp_ns < before_ns) {
       const double length = p.highest - p.lowest;
