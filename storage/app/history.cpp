@@ -343,7 +343,9 @@ std::vector<Column> EpisodeFields(const Alarm& alarm, const Context& context) {
       TextField("ended", TimeText(e.ended_ns, context) + " " +
                              e.end_reason.value_or("(open)")),
       {"peak factor", "peak_factor", Format::kPlain, 3},
-      {"strength", "strength", Format::kPlain, 3},
+      TextField("strength", e.fault ? cli::FormatNumber(e.strength, 3) +
+                                          " when it was named"
+                                    : "-"),
       TextField("model set", e.model_set + " " + Hex(e.model_hash)),
       {"label", "label"},
       {"acked by", "acked_by"},

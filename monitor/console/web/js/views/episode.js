@@ -40,7 +40,7 @@ function facts({episode: row, model_hash: hash}) {
     ['End', row.end_reason ? kEndWords[row.end_reason] ?? row.end_reason :
       'still open'],
     ['Peak factor', factorText(row.peak_factor)],
-    ['Strength', percentText(row.strength)],
+    ['Strength when named', percentText(row.strength)],
     ['For', row.discipline ?? '–'],
     ['NE 107', namurText(row.namur)],
     ['Label', labelText(row.label)],
