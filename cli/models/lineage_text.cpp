@@ -59,27 +59,4 @@ std::string ParentText(const storage::Lineage& lineage) {
   return text;
 }
 
-void PrintEpisodes(std::ostream& out, const storage::Lineage& lineage,
-                   bool utc) {
-  if (lineage.episodes.empty()) {
-    return;
-  }
-  TextTable table({{"episode"},
-                   {"valve"},
-                   {"label"},
-                   {"by"},
-                   {"at"},
-                   {"taken as"},
-                   {"strength [-]", Align::kRight},
-                   {"samples", Align::kRight},
-                   {"run"}});
-  for (const storage::TrainingEpisode& e : lineage.episodes) {
-    table.AddRow({e.episode_id, e.valve_id, e.label, e.labelled_by,
-                  FormatTime(e.labelled_ns, utc), FaultName(e.fault),
-                  e.fault != 0 ? FormatNumber(e.strength, 2) : "-",
-                  std::to_string(e.samples), e.run});
-  }
-  table.Print(out);
-}
-
 }  // namespace fdi::cli

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <ostream>
+#include <string>
 
 #include "cli/json_output.h"
 #include "storage/models/models.h"
@@ -15,9 +15,5 @@ Json LineageJson(const storage::Lineage& lineage);
 /// "NAME@VERSION, hash 0123456789abcdef"; "none". Of a set of `fdi-trainer
 /// limits` also ", with limits from 23.92 h".
 std::string ParentText(const storage::Lineage& lineage);
-
-/// The episodes as a table; nothing if there are none.
-void PrintEpisodes(std::ostream& out, const storage::Lineage& lineage,
-                   bool utc);
 
 }  // namespace fdi::cli

@@ -3,7 +3,6 @@
 #include <functional>
 #include <string_view>
 #include <tuple>
-#include <type_traits>
 
 namespace fdi {
 
@@ -39,14 +38,6 @@ constexpr Field<Member> FieldOf(std::string_view name, Member member) {
 /// beside the record. There is no other list of them.
 template <typename Record>
 inline constexpr std::tuple<> kFieldsOf{};
-
-/// Calls visit(name, value) for every field of `record`.
-template <typename Record, typename Visit>
-void ForEachField(Record& record, Visit&& visit) {
-  std::apply(
-      [&](const auto&... field) { (visit(field.name, field(record)), ...); },
-      kFieldsOf<std::remove_const_t<Record>>);
-}
 
 }  // namespace fdi
 

@@ -127,11 +127,6 @@ SqliteError::SqliteError(int code, const std::string& message)
                          message),
       code_(code) {}
 
-bool SqliteError::IsDiskProblem() const {
-  const int primary = code_ & 0xFF;
-  return primary == SQLITE_FULL || primary == SQLITE_IOERR;
-}
-
 bool SqliteError::IsBusy() const {
   const int primary = code_ & 0xFF;
   return primary == SQLITE_BUSY || primary == SQLITE_LOCKED;

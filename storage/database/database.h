@@ -51,8 +51,6 @@ class SqliteError : public std::runtime_error {
   SqliteError(int code, const std::string& message);
   /// Extended SQLite result code.
   int code() const { return code_; }
-  /// SQLITE_FULL or SQLITE_IOERR: the disk, not the data.
-  bool IsDiskProblem() const;
   /// SQLITE_BUSY or SQLITE_LOCKED: another connection is writing.
   bool IsBusy() const;
 

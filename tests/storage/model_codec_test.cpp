@@ -221,7 +221,7 @@ TEST(ModelCodecTest, RefusalsNameThePlaceAndTheReason) {
   auto older = bytes;
   older[4] = std::byte{2};
   EXPECT_THAT(Refusal(WithValidChecksum(older)),
-              HasSubstr("format version 2, this program reads 3 to 10"));
+              HasSubstr("format version 2, this program reads 3 to 18"));
   EXPECT_THAT(Refusal({}), HasSubstr("is not a model set"));
   // The length of the name stands first in the payload, after 16 bytes.
   auto huge = bytes;
