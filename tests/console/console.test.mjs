@@ -155,7 +155,7 @@ test('a killed monitor costs a gap, which is shown', async () => {
 
   assert.match(await summary.textContent(), /[1-9]\d* gaps?: /);
   assert.equal(await begin(), firstBefore);
-  assert.match(await page.locator('.note').textContent(), /started again/);
+  assert.match(await page.locator('.note[role=status]').textContent(), /started again/);
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });
