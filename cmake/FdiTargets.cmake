@@ -111,9 +111,38 @@ function(fdi_program name)
   install(TARGETS ${name} RUNTIME)
 endfunction()
 
+# The headers of most tests, compiled once for all of them. Clang would also
+# demand the same definitions of every test.
+function(fdi_test_precompiled_headers)
+  if(NOT FDI_UNITY OR NOT CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    return()
+  endif()
+  set(source ${CMAKE_CURRENT_BINARY_DIR}/precompiled_headers.cpp)
+  file(TOUCH ${source})
+  add_library(fdi_precompiled OBJECT ${source})
+  target_link_libraries(fdi_precompiled PRIVATE GTest::gmock)
+  fdi_settings(fdi_precompiled)
+  fdi_quick_test(fdi_precompiled)
+  target_precompile_headers(fdi_precompiled PRIVATE <algorithm> <array> <chrono>
+    <cmath> <filesystem> <fstream> <functional> <limits> <map> <memory> <optional>
+    <random> <set> <sstream> <stdexcept> <string> <thread> <vector>
+    <gmock/gmock.h>)
+endfunction()
+
+# A test spends its time in the optimised libraries.
+function(fdi_quick_test name)
+  fdi_quick_build(${name})
+  if(FDI_UNITY AND NOT FDI_SANITIZE)
+    target_compile_options(${name} PRIVATE -O1)
+  endif()
+  if(TARGET fdi_precompiled AND NOT name STREQUAL fdi_precompiled)
+    target_precompile_headers(${name} REUSE_FROM fdi_precompiled)
+  endif()
+endfunction()
+
 # fdi_test(name [NUMERICAL] [THREADS] [ALONE] LABEL unit|system [TIMEOUT 120]
 #          SOURCES a_test.cpp ... LIBRARIES lib ...)
-# NUMERICAL: optimised under sanitizers, too. THREADS: also run under the thread
+# NUMERICAL: optimised, under sanitizers, too. THREADS: also run under the thread
 # sanitizer (preset tsan). ALONE: not beside other tests, for it measures delays.
 function(fdi_test name)
   cmake_parse_arguments(ARG "NUMERICAL;THREADS;ALONE" "LABEL;TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
@@ -123,7 +152,7 @@ function(fdi_test name)
   fdi_settings(${name})
   fdi_test_headers(${name})
   if(NOT ARG_NUMERICAL)
-    fdi_quick_build(${name})
+    fdi_quick_test(${name})
   endif()
   if(NOT TARGET ${ARG_LABEL}_tests)
     add_custom_target(${ARG_LABEL}_tests)  # unit_tests, system_tests

@@ -36,7 +36,7 @@ struct StatusFacts {
   std::size_t recorder_backlog{0};
   bool history_degraded{false};
   bool recording_degraded{false};
-  std::vector<std::string_view> stalled;  ///< Names of threads.
+  std::vector<std::string_view> stalled{};  ///< Names of threads.
   std::optional<Pair::Status> pair{};     ///< Nothing: not in a pair.
   ContestedValves contested{};
 };
