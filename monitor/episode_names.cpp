@@ -1,6 +1,7 @@
 #include "monitor/episode_names.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <numeric>
@@ -46,14 +47,9 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
   TakeAnswers();
   TakeGrowth();
   suspects_ = looks_->suspects() && !held;
-  const simulator::LookAnswer* answer = AnswerTo(engine, held);
-  const auto named =
-      answer != nullptr
-          ? simulator::NamesOf(
-                *answer, simulator::ObserversName(*models_, engine.isolated))
-          : std::optional<std::vector<int>>();
+  const auto name = NameFor(engine, held);
   const bool kept = kept_ && engine.detected && !held;
-  if (!named && !kept && !by_physics_) {
+  if (!name && !kept && !own_) {
     faults_ = engine.isolated;
     layer_ = Layer::kObservers;
     return engine;
@@ -70,32 +66,35 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     Forget();
     return verdict_;
   }
-  by_physics_ = named || kept;
+  own_ = true;
+  by_physics_ = kept || (name && name->answer != nullptr);
   strengths_.clear();
-  if (named) {
-    Name(*answer, *named);
-    if (std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
-      look_ = RecordOf(*answer);
-      NoteStrengths(*answer);
-    }
-  } else if (kept) {
+  if (kept) {
     SetName(*kept_, Unknown::kTooEarly);
+  } else if (by_physics_) {
+    const simulator::LookAnswer& answer = *name->answer;
+    Name(answer, SetOf(name->faults));
+    if (std::exchange(look_ns_, answer.stamp_ns) != answer.stamp_ns) {
+      look_ = RecordOf(answer);
+      NoteStrengths(answer);
+    }
+  } else if (name) {
+    SetName(SetOf(name->faults), Unknown::kTooEarly);
   }
   Announce();
   return verdict_;
 }
 
-// The one that counts at this sample, if any.
-const simulator::LookAnswer* EpisodeNames::AnswerTo(const Verdict& engine,
-                                                    bool held) {
+// The one that counts at this sample, if it is not the engine's.
+std::optional<simulator::EpisodeName> EpisodeNames::NameFor(
+    const Verdict& engine, bool held) {
   if (!engine.detected || held) {
-    return nullptr;
+    return std::nullopt;
   }
-  const simulator::LookAnswer* answer = looks_->Answer();
-  if (answer != nullptr) {
+  if (looks_->Answer() != nullptr) {
     kept_.reset();
   }
-  return answer;
+  return looks_->Name(*models_, engine.isolated);
 }
 
 void EpisodeNames::Ask(simulator::LookTask task) {
@@ -191,20 +190,26 @@ std::int64_t EpisodeNames::PeriodNs() const {
 }
 
 // Faults that the model set does not have cannot be recorded and stay out.
-void EpisodeNames::Name(const simulator::LookAnswer& answer,
-                        const std::vector<int>& faults) {
+FaultSet EpisodeNames::SetOf(const std::vector<int>& faults) const {
   FaultSet set = 0;
+  for (const int fault : faults) {
+    const int index = FaultIndex(*models_, fault);
+    set |= index < 0 ? 0 : FaultSet{1} << static_cast<std::size_t>(index);
+  }
+  return set;
+}
+
+void EpisodeNames::Name(const simulator::LookAnswer& answer, FaultSet faults) {
   for (const simulator::Explanation& e : answer.faults) {
-    const int index = FaultIndex(*models_, e.fault);
-    if (index >= 0 && std::ranges::count(faults, e.fault) > 0) {
-      const auto bit = static_cast<std::size_t>(index);
+    const FaultSet fault = SetOf({e.fault});
+    if ((fault & faults) != 0) {
+      const auto bit = static_cast<std::size_t>(std::countr_zero(fault));
       strengths_.emplace_back(bit, e.strength);
       verdict_.strengths[bit] = e.strength;
-      set |= FaultSet{1} << bit;
     }
   }
   const bool outside = answer.outcome == simulator::LookOutcome::kNoneFits;
-  SetName(set, outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
+  SetName(faults, outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
 }
 
 EpisodeLook EpisodeNames::RecordOf(const simulator::LookAnswer& answer) const {
@@ -271,7 +276,7 @@ void EpisodeNames::WriteName(Transition& transition) const {
 }
 
 Transition EpisodeNames::End(Transition closed) {
-  if (by_physics_) {
+  if (own_) {
     WriteName(closed);
   }
   looks_.emplace(*physics_);
@@ -282,6 +287,7 @@ Transition EpisodeNames::End(Transition closed) {
 }
 
 void EpisodeNames::Forget() {
+  own_ = false;
   by_physics_ = false;
   faults_ = 0;
   layer_ = Layer::kObservers;

@@ -19,9 +19,9 @@ namespace fdi::monitor {
 
 /// Names the episodes of one valve: as its engine does, until a second look has
 /// an answer. While one counts, it is the name, and what the engine isolates
-/// meanwhile is not; see simulator::LookBook. So what leaves the monitor is
-/// what `fdi-trainer evaluate` scores. Routine looks may open an episode that
-/// the engine does not see.
+/// meanwhile is not; see simulator::ValveLooks::Name(). So what leaves the
+/// monitor is what `fdi-trainer evaluate` scores. Routine looks may open an
+/// episode that the engine does not see.
 class EpisodeNames {
  public:
   /// @param worker outlives this.
@@ -79,15 +79,16 @@ class EpisodeNames {
     std::future<LookWorker::Answer> answer;
   };
 
-  const simulator::LookAnswer* AnswerTo(const Verdict& engine, bool held);
+  std::optional<simulator::EpisodeName> NameFor(const Verdict& engine,
+                                                bool held);
   void Ask(simulator::LookTask task);
   void TakeAnswers();
   void TakeGrowth();
   void NoteStrengths(const simulator::LookAnswer& answer);
   void NoteStrength(const simulator::Explanation& e, std::int64_t stamp_ns);
   std::int64_t PeriodNs() const;
-  void Name(const simulator::LookAnswer& answer,
-            const std::vector<int>& faults);
+  FaultSet SetOf(const std::vector<int>& faults) const;
+  void Name(const simulator::LookAnswer& answer, FaultSet faults);
   void SetName(FaultSet faults, Unknown unknown);
   EpisodeLook RecordOf(const simulator::LookAnswer& answer) const;
   void Announce();
@@ -105,6 +106,7 @@ class EpisodeNames {
   std::int64_t detection_ns_{0};
   bool suspects_{false};
   // Of the open episode.
+  bool own_{false};         // Its name was not the engine's, once at least.
   bool by_physics_{false};  // An answer counts.
   FaultSet faults_{0};      // Its name,
   Layer layer_{Layer::kObservers};

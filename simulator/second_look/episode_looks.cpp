@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -162,6 +163,7 @@ std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
     return std::nullopt;
   }
   LookAnswer answer = AnswerOf(look, task.early());
+  answer.late = task.late();
   answer.without_fault = without_fault;
   if (task.occasion == LookOccasion::kRoutine &&
       answer.misfit + kRoutineGain > without_fault) {
@@ -175,6 +177,11 @@ bool LookTask::early() const {
          stamp_ns - detection_stamp_ns < kFirstAge;
 }
 
+bool LookTask::late() const {
+  return occasion == LookOccasion::kEpisode &&
+         stamp_ns - detection_stamp_ns > kLastAge;
+}
+
 bool ObserversName(const ModelSet& models, FaultSet isolated) {
   for (std::size_t i = 0; i < models.faults.size(); ++i) {
     if (((isolated >> i) & 1U) != 0 && IsFault(models.faults[i])) {
@@ -186,12 +193,15 @@ bool ObserversName(const ModelSet& models, FaultSet isolated) {
 
 std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
                                         bool observers_name) {
-  if (answer.outcome == LookOutcome::kNothing ||
+  const bool perhaps = answer.outcome == LookOutcome::kNothing && answer.late &&
+                       !answer.faults.empty() &&
+                       answer.faults.size() <= kMostNamed;
+  if ((answer.outcome == LookOutcome::kNothing && !perhaps) ||
       (answer.early && observers_name)) {
     return std::nullopt;
   }
   std::vector<int> names;
-  if (answer.outcome == LookOutcome::kNamed) {
+  if (answer.outcome == LookOutcome::kNamed || perhaps) {
     for (const Explanation& e : answer.faults) {
       names.push_back(e.fault);
     }
@@ -424,6 +434,26 @@ void Suspicion::Take(LookAnswer answer) {
   }
 }
 
+void ObserversMemory::Step(std::int64_t detection_stamp_ns,
+                           std::int64_t stamp_ns, FaultSet faults) {
+  if (std::exchange(detection_stamp_ns_, detection_stamp_ns) !=
+      detection_stamp_ns) {
+    seen_ = 0;
+  }
+  seen_ |= faults;
+  faults_ = faults;
+  const std::int64_t age_ns = stamp_ns - detection_stamp_ns;
+  for (FaultSet left = seen_; left != 0; left &= left - 1) {
+    const auto bit = static_cast<std::size_t>(std::countr_zero(left));
+    const FaultSet fault = FaultSet{1} << bit;
+    if ((faults & fault) != 0) {
+      last_ns_[bit] = stamp_ns;
+    } else if (age_ns > kLastAge && last_ns_[bit] >= stamp_ns - age_ns / 2) {
+      faults_ |= fault;
+    }
+  }
+}
+
 ValveLooks::ValveLooks(const ValvePhysics& physics)
     : looks_(physics), period_ns_(PeriodOf(physics)) {}
 
@@ -443,6 +473,9 @@ std::optional<LookTask> ValveLooks::Step(const Sample& sample,
       task.detection_stamp_ns = detection_ns_;
       EnterInBook(task, *found);
     }
+  }
+  if (open_) {
+    memory_.Step(detection_ns_, stamp_ns_, verdict.isolated);
   }
   suspicion_.Advance(stamp_ns_);
   return due;
@@ -474,6 +507,30 @@ void ValveLooks::Enter(const LookTask& task, LookAnswer answer) {
 
 const LookAnswer* ValveLooks::Answer() const {
   return open_ ? book_.At(detection_ns_, stamp_ns_) : nullptr;
+}
+
+std::optional<EpisodeName> ValveLooks::Name(const ModelSet& models,
+                                            FaultSet isolated) const {
+  const LookAnswer* answer = Answer();
+  if (answer != nullptr) {
+    if (auto faults = NamesOf(*answer, ObserversName(models, isolated))) {
+      return EpisodeName{std::move(*faults), answer};
+    }
+  }
+  const FaultSet faults = memory_.faults() & ~FindingsOf(models);
+  if (!open_ || faults == (isolated & ~FindingsOf(models))) {
+    return std::nullopt;
+  }
+  EpisodeName name;
+  for (std::size_t i = 0; i < models.faults.size(); ++i) {
+    if ((faults >> i & 1U) != 0) {
+      name.faults.push_back(models.faults[i]);
+    }
+  }
+  if (name.faults.size() > kMostNamed) {
+    name.faults.clear();
+  }
+  return name;
 }
 
 const LookAnswer* LookBook::At(std::int64_t detection_stamp_ns,

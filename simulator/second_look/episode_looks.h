@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -32,6 +33,9 @@ struct LookTask {
   /// So little of the episode is there that the physics, which is off by some
   /// per cent, may find the wrong fault: see LookAnswer::early.
   bool early() const;
+  /// The valve as it is by now, without the first minutes of the episode: see
+  /// LookAnswer::late.
+  bool late() const;
 };
 
 /// What a second look makes of the name of an episode.
@@ -51,6 +55,9 @@ struct LookAnswer {
   /// and no later look is measured by it. It is there for faults that are over
   /// before the others.
   bool early{false};
+  /// Of a late look. The alarm has lasted, so the faults that explain its
+  /// window name the episode even where a constant shift would explain it, too.
+  bool late{false};
   /// The valve's answer under the best explanation, a row each.
   std::vector<RecordAnswer> simulated;
   std::int64_t stamp_ns{0};  ///< Of the last row.
@@ -194,6 +201,30 @@ class Suspicion {
   std::optional<LookAnswer> found_;
 };
 
+/// What the observers name. Near the limits of what they see they change their
+/// mind with the noise. So five minutes after the detection it is every fault
+/// that they have isolated in the second half of the episode.
+class ObserversMemory {
+ public:
+  /// The observers isolate `faults` at `stamp_ns`.
+  void Step(std::int64_t detection_stamp_ns, std::int64_t stamp_ns,
+            FaultSet faults);
+
+  FaultSet faults() const { return faults_; }
+
+ private:
+  std::int64_t detection_stamp_ns_{0};
+  std::array<std::int64_t, 64> last_ns_{};  // When each was isolated.
+  FaultSet seen_{0};                        // Those that ever were.
+  FaultSet faults_{0};
+};
+
+/// The name of an episode where it is not what the engine isolates.
+struct EpisodeName {
+  std::vector<int> faults;            ///< Ascending; empty: unknown.
+  const LookAnswer* answer{nullptr};  ///< Null: by the observers.
+};
+
 /// The looks at one valve and what they make of it: when one is due, the name
 /// of the open episode, and whether there should be one.
 class ValveLooks {
@@ -211,6 +242,12 @@ class ValveLooks {
   /// What counts for the open episode at the last sample, if there is one.
   const LookAnswer* Answer() const;
 
+  /// The name of the open episode at the last sample: by Answer(), or else by
+  /// ObserversMemory. Nothing if it is what the engine says. Stands until the
+  /// next call of Step() or Enter().
+  std::optional<EpisodeName> Name(const ModelSet& models,
+                                  FaultSet isolated) const;
+
   /// See EpisodeLooks::GrowthTask(). Its answer is not for Enter().
   std::optional<LookTask> GrowthTask(std::vector<Explanation> known) const {
     return looks_.GrowthTask(std::move(known));
@@ -226,6 +263,7 @@ class ValveLooks {
   std::int64_t period_ns_;
   LookBook book_;
   Suspicion suspicion_;
+  ObserversMemory memory_;
   std::int64_t stamp_ns_{0};
   std::int64_t detection_ns_{0};
   bool open_{false};

@@ -399,6 +399,50 @@ TEST(LookAnswerTest, AnEarlyOneHasAWiderSetAndDoesNotOverruleObservers) {
   EXPECT_EQ(book.At(0, 60 * kSecond)->faults.front().fault, 3);
 }
 
+TEST(LookAnswerTest, ALateOneNamesWhatAShiftWouldExplainToo) {
+  LookTask task;
+  task.stamp_ns = 300 * kSecond;
+  EXPECT_FALSE(task.late());
+  task.stamp_ns = 600 * kSecond;
+  EXPECT_TRUE(task.late());
+  task.occasion = LookOccasion::kRoutine;
+  EXPECT_FALSE(task.late());
+
+  LookAnswer answer = AnswerOf(Looked({{0, 0.0}, {19, 3.0}, {2, 5.0}}));
+  ASSERT_EQ(answer.outcome, LookOutcome::kNothing);
+  EXPECT_EQ(NamesOf(answer, true), std::nullopt);
+  answer.late = true;
+  EXPECT_EQ(NamesOf(answer, true), (std::vector{2, 19}));
+  answer = AnswerOf(Looked({{0, 0.0}}));
+  answer.late = true;
+  EXPECT_EQ(NamesOf(answer, true), std::nullopt);
+  answer = AnswerOf(
+      Looked({{0, 0.0}, {1, 1.0}, {2, 1.0}, {3, 1.0}, {4, 1.0}, {11, 1.0}}));
+  answer.late = true;
+  EXPECT_EQ(NamesOf(answer, true), std::nullopt);
+}
+
+TEST(ObserversMemoryTest, HoldsTheSecondHalfOfAnEpisodeFromFiveMinutesOn) {
+  ObserversMemory memory;
+  constexpr std::int64_t kDetection = 1000;
+  int age = 0;
+  const auto until = [&](int end, FaultSet faults) {
+    for (; age < end; ++age) {
+      memory.Step(kDetection * kSecond, (kDetection + age) * kSecond, faults);
+    }
+    return memory.faults();
+  };
+  until(200, 0b001);
+  EXPECT_EQ(until(301, 0b010), 0b010U);
+  EXPECT_EQ(until(302, 0b010), 0b011U);
+  EXPECT_EQ(until(399, 0b010), 0b011U);
+  EXPECT_EQ(until(400, 0b010), 0b010U);
+  EXPECT_EQ(until(1000, 0b100), 0b100U);
+  EXPECT_EQ(until(1001, 0b001), 0b101U);
+  memory.Step(3000 * kSecond, 3500 * kSecond, 0b010);
+  EXPECT_EQ(memory.faults(), 0b010U);
+}
+
 TEST(LookBookTest, CountsAfterItsDelayAndDoesNotHearAWorseFit) {
   LookBook book;
   LookTask task;

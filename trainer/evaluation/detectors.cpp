@@ -40,11 +40,9 @@ class SecondLooks {
     if (OutOfOrder(verdict.intake)) {
       return;
     }
-    const simulator::LookAnswer* answer = looks_->Answer();
-    sets_.push_back(
-        answer ? simulator::NamesOf(*answer, simulator::ObserversName(
-                                                 models_, verdict.isolated))
-               : std::nullopt);
+    auto name = looks_->Name(models_, verdict.isolated);
+    sets_.push_back(name ? std::optional(std::move(name->faults))
+                         : std::nullopt);
   }
 
   void Apply(std::vector<Indication>& indications) const {
