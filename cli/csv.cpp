@@ -316,7 +316,7 @@ std::optional<std::size_t> CsvReader::Column(std::string_view name) {
     if (SameName(names_[i], name)) {
       if (found) {
         Refuse("column " + Quoted(name) +
-               " is there twice; expected each name once");
+               " occurs twice; expected each name once");
       }
       found = i;
       used_[i] = true;
@@ -368,7 +368,7 @@ void CsvReader::AddSignal(const Conversion& conversion) {
   if ((header_.signals & MaskOf(conversion.signal)) != 0) {
     Refuse("column " + Quoted(names_[conversion.column]) + ": signal " +
            std::string(SignalName(conversion.signal)) +
-           " is there twice; expected it once");
+           " occurs twice; expected once");
   }
   header_.signals =
       static_cast<SignalMask>(header_.signals | MaskOf(conversion.signal));

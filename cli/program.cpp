@@ -145,7 +145,7 @@ Program::Program(std::string name, std::string description)
   // For tests; hidden from --help.
   app_->add_flag_callback(
           "--check-examples", [] { throw ExampleCheckRequest(); },
-          "Try whether the examples of --help are understood")
+          "Check that the examples in --help are understood")
       ->configurable(false)
       ->group("");
   app_->fallthrough();  // Options of the program may follow the verb.

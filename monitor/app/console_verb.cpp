@@ -110,7 +110,7 @@ void AddConsoleVerb(cli::Program& program) {
                      "Only ids that match GLOB");
   console
       .add_option("--max-valves", options->bus.max_valves,
-                  "Number of valves that there is room for")
+                  "Maximum number of valves")
       ->check(CLI::Range(1, 100000));
 }
 

@@ -166,7 +166,7 @@ void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
       ->check(CLI::Range(1, 6000))
       ->capture_default_str();
   run.add_option("--on-event-timeout", service.on_event_timeout_s,
-                 "Give a delivery up after this time [s]")
+                 "Abandon a delivery after this time [s]")
       ->check(CLI::Range(0.1, 600.0))
       ->capture_default_str();
 }

@@ -69,7 +69,7 @@ void AddDatabases(const storage::DataDirectory& data, Exposition& page) {
 void AddThreads(const std::vector<Heartbeat::Member>& threads,
                 Exposition& page) {
   page.Family("fdi_thread_idle_seconds", Type::kGauge,
-              "Time since the thread got on last");
+              "Time since the thread last made progress");
   const auto now = Pulse::Clock::now();
   for (const Heartbeat::Member& member : threads) {
     const std::chrono::duration<double> idle = now - member.pulse->last();
@@ -102,7 +102,7 @@ std::vector<Measure> ConsoleMeasures(const MetricsFacts& facts) {
       {"", "fdi_console_streams", Type::kGauge, "Live streams now", "", "",
        streams.clients},
       {"", kStreams, Type::kCounter,
-       "Live streams that were begun, refused for want of a place, or "
+       "Live streams opened, refused because all places were taken, or "
        "dropped because the client did not keep up",
        "outcome", "admitted", streams.admitted},
       {"", kStreams, Type::kCounter, "", "outcome", "refused", streams.refused},
@@ -208,9 +208,10 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
   AddWhatWasRefused(facts, measures);
   const std::vector<Measure> others{
       {"dds_lost", "fdi_dds_samples_lost_total", kCounter,
-       "Samples written that will never come", "", "", samples.lost},
+       "Samples that were published but will never arrive", "", "",
+       samples.lost},
       {"dds_undecodable", "fdi_dds_samples_undecodable_total", kCounter,
-       "Samples with a value that no publisher of ours sends", "", "",
+       "Samples with a value that no publisher of this project sends", "", "",
        samples.undecodable},
       {"dds_rejected_instances", kRejected, kCounter, kRejectedHelp, "reason",
        "max_valves", samples.rejected_instances},

@@ -280,7 +280,7 @@ void AddTopVerb(cli::Program& program) {
                  "Only valves with this text in their id, fault, state or "
                  "quality");
   top.add_option("--max-valves", options->bus.max_valves,
-                 "Number of valves that there is room for")
+                 "Maximum number of valves")
       ->check(CLI::Range(1, 100000));
 }
 

@@ -125,7 +125,7 @@ void AddWatchVerb(cli::Program& program) {
                  "Leave out decision vectors");
   watch
       .add_option("--max-valves", options->bus.max_valves,
-                  "Number of valves that there is room for")
+                  "Maximum number of valves")
       ->check(CLI::Range(1, 100000));
   watch
       .add_option("--for", options->for_s, "Stop after this time [s]; 0: never")

@@ -112,15 +112,15 @@ void AddKeysVerbs(cli::Program& program) {
       "keys", "Keys of DDS Security, for --security of the other programs");
   {
     auto [verb, options] =
-        AddVerb(program, group, "init", "Make an authority, which signs keys",
+        AddVerb(program, group, "init", "Create an authority, which signs keys",
                 InitAuthority);
     options.days = kAuthorityDays;
     AddFolder(verb, options);
     AddDaysOption(verb, options);
   }
   {
-    auto [verb, options] = AddVerb(program, group, "add",
-                                   "Make the key of a program or host", AddKey);
+    auto [verb, options] = AddVerb(
+        program, group, "add", "Create a key for a program or host", AddKey);
     AddFolder(verb, options);
     AddName(verb, options);
     verb.add_option("--role", options.role,

@@ -243,13 +243,13 @@ Report Prune(const PruneOptions& options, const Context& context) {
   const Json databases = PruneAll(options, DataOf(context));
   if (databases.empty()) {
     throw ConfigError(
-        "prune: say what may go: --runs-age, --runs-size, --history-age, "
-        "--history-size, --health-age or --shadow-age");
+        "prune: choose what may be deleted: --runs-age, --runs-size, "
+        "--history-age, --history-size, --health-age or --shadow-age");
   }
   Report report;
   report.document = {{"dry_run", options.dry_run}, {"databases", databases}};
   if (options.dry_run) {
-    report.Line("Nothing is deleted; this would go:");
+    report.Line("Nothing is deleted; this would be deleted:");
   }
   const auto kilobytes = [](std::string heading, const char* key) {
     return TextColumn(

@@ -111,7 +111,8 @@ Report PruneThere(const ShipOptions& options) {
   };
   if (options.history_age.empty() && options.health_age.empty()) {
     throw ConfigError(
-        "ship --prune: say what may go: --history-age or --health-age");
+        "ship --prune: choose what may be deleted: --history-age or "
+        "--health-age");
   }
   PlantDatabase plant(options.url);
   Json rows = Json::array();
@@ -132,7 +133,7 @@ Report PruneThere(const ShipOptions& options) {
   Report report;
   report.document = {{"dry_run", options.dry_run}, {"pruned", rows}};
   if (options.dry_run) {
-    report.Line("Nothing is deleted; this would go:");
+    report.Line("Nothing is deleted; this would be deleted:");
   }
   return report.Table("pruned", {{"deleted", "deleted"},
                                  {"items", "items"},

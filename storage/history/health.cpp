@@ -155,7 +155,7 @@ void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour) {
   const auto head = in.Get<std::uint8_t>();
   if ((head & ~kTonnes) != kFormat) {
     in.Refuse("format " + std::to_string(head & ~kTonnes) +
-              " is none that this program knows");
+              " is not known to this program");
   }
   hour.flow_unit =
       (head & kTonnes) != 0 ? FlowUnit::kTPerHour : FlowUnit::kM3PerHour;

@@ -141,11 +141,11 @@ TEST(CsvTest, RefusalsNameFileLineColumnAndReason) {
   EXPECT_THAT(Refusal(std::string(kHeader)), HasSubstr("no rows"));
   EXPECT_THAT(Refusal(Table({"0"})), HasSubstr("sample period"));
   EXPECT_THAT(Refusal(std::string(kHeader) + ",CV_pct\n0,1,2,3,4,5,6,7"),
-              HasSubstr("signal CV is there twice"));
+              HasSubstr("signal CV occurs twice"));
   EXPECT_THAT(Refusal(std::string(kHeader) + ",F_t_h\n0,1,2,3,4,5,6,7"),
-              HasSubstr("signal F is there twice"));
+              HasSubstr("signal F occurs twice"));
   EXPECT_THAT(Refusal(std::string(kHeader) + ",t_s\n0,1,2,3,4,5,6,7"),
-              HasSubstr("\"t_s\" is there twice"));
+              HasSubstr("\"t_s\" occurs twice"));
   EXPECT_THAT(Refusal(Table({"0"}) + ",7"),
               AllOf(HasSubstr("plant.csv:2:"), HasSubstr("8 cells")));
   EXPECT_THAT(Refusal(std::string(kHeader) + ",fault\n0,1,2,3,4,5,6,f1"),

@@ -36,11 +36,11 @@ cli::Report CompareSets(const CompareOptions& options,
 
 void AddCompareVerb(cli::Program& program) {
   auto options = std::make_shared<CompareOptions>();
-  CLI::App& verb = program.AddVerb(
-      "compare", "Set two model sets side by side on the same runs",
-      [options](const cli::Context& context) -> cli::Report {
-        return CompareSets(*options, context);
-      });
+  CLI::App& verb =
+      program.AddVerb("compare", "Compare two model sets on the same runs",
+                      [options](const cli::Context& context) -> cli::Report {
+                        return CompareSets(*options, context);
+                      });
   verb.add_option("a", options->a, "The set in use")
       ->required()
       ->type_name("NAME[@VERSION]");
@@ -49,7 +49,7 @@ void AddCompareVerb(cli::Program& program) {
       ->type_name("NAME[@VERSION]");
   options->selection.AddTo(verb);
   verb.add_flag("--assume-normal", options->assume_normal,
-                "What has no truth counts as free of faults");
+                "Samples without truth count as free of faults");
   verb.add_flag("--all", options->all,
                 "List runs on which both are alike, too");
 }

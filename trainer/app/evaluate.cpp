@@ -306,7 +306,7 @@ void AddOutputs(CLI::App& verb, EvaluateOptions& options) {
                 "Score what the observers say, without the second look by "
                 "the physics of an onboarded valve");
   verb.add_flag("--assume-normal", options.assume_normal,
-                "What has no truth counts as free of faults");
+                "Samples without truth count as free of faults");
   verb.add_flag("--csv", options.csv, "One line per run instead of tables");
 }
 
