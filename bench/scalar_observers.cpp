@@ -14,7 +14,7 @@ ScalarObservers::ScalarObservers(const ModelSet& models)
     for (const Observer& observer : models.observers) {
       const ChannelObserver& channel = observer.channels[c];
       const bool shares =
-          !channels_[c].empty() && !RunsOnItself(channel.model) &&
+          !channels_[c].empty() && !IsFreeRunning(channel.model) &&
           SharesAntecedents(channels_[c].back().channel->model, channel.model);
       channels_[c].push_back({&channel, !shares, {}});
     }
@@ -35,9 +35,9 @@ void ScalarObservers::WeighSlot(const Slot& slot) {
         std::clamp(w.x[j], model.regressor_min[j], model.regressor_max[j]);
     w.beyond = w.beyond || w.inside[j] != w.x[j];
   }
-  Weigh(model, w.x.data(), w.firing);
+  ComputeFiring(model, w.x.data(), w.firing);
   if (w.beyond) {
-    Weigh(model, w.inside.data(), w.firing_inside);
+    ComputeFiring(model, w.inside.data(), w.firing_inside);
   }
 }
 

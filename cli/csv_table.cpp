@@ -20,7 +20,7 @@ namespace {
 /// Tolerance of time steps, as a share of the period.
 constexpr double kStepTolerance = 0.01;
 /// Share of the period; less than half, since a row in the middle is ambiguous.
-constexpr double kLargestShift = 0.499;
+constexpr double kMaxGridShift = 0.499;
 
 std::string PercentText(std::size_t part, std::size_t whole) {
   char text[32];
@@ -367,7 +367,7 @@ void TableReader::PutOnGrid() {
     const double grid_s = begin_s + static_cast<double>(at) * period_s_;
     if (k > 0 &&
         (at <= last || (at > last + 1 && !MayHaveGaps()) ||
-         std::abs(grid_s - rows_[k].t_s) > kLargestShift * period_s_)) {
+         std::abs(grid_s - rows_[k].t_s) > kMaxGridShift * period_s_)) {
       RefuseStep(k);
     }
     last = at;

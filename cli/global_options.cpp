@@ -214,7 +214,7 @@ void AddLogLevel(CLI::App& app, GlobalOptions& options) {
 
 // If an option is repeated, the last one wins, so that the options of a script
 // can be overridden.
-void LetTheLastCount(CLI::App& app) {
+void SetTakeLastPolicy(CLI::App& app) {
   for (CLI::Option* option : app.get_options()) {
     option->take_last();
   }
@@ -234,7 +234,7 @@ void AddGlobalOptions(CLI::App& app, GlobalOptions& options) {
   app.add_flag("--utc", options.utc,
                "Show times in UTC instead of the local time zone");
   AddLogLevel(app, options);
-  LetTheLastCount(app);
+  SetTakeLastPolicy(app);
   app.config_formatter(std::make_shared<TomlConfig>(app));
   app.set_config("--config", "",
                  "Read options from a TOML file: KEY = VALUE for the option "
@@ -272,7 +272,7 @@ void AddBusOptions(CLI::App& app, GlobalOptions& options) {
                  "ones")
       ->check(CLI::ExistingFile)
       ->type_name("FILE.xml");
-  LetTheLastCount(app);
+  SetTakeLastPolicy(app);
 }
 
 void AddFaultCatalogueOption(CLI::App& app, GlobalOptions& options) {
@@ -282,7 +282,7 @@ void AddFaultCatalogueOption(CLI::App& app, GlobalOptions& options) {
                  "directory")
       ->check(CLI::ExistingFile)
       ->type_name("FILE.toml");
-  LetTheLastCount(app);
+  SetTakeLastPolicy(app);
 }
 
 std::string EffectiveToml(CLI::App& root) {

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kColumn = 30;     // Where the texts begin.
 constexpr std::size_t kTextWidth = 50;  // 80 columns in total.
-constexpr std::size_t kLongestHeading = 26;
+constexpr std::size_t kMaxHeadingLength = 26;
 /// The name that PrepareHelp() gives to CLI11's checks for files and folders.
 constexpr const char* kMustExist = "must exist";
 
@@ -153,7 +153,7 @@ std::string TakeChecks(CLI::Option& option) {
   const std::string name = option.get_type_name();
   const bool plain = name == "INT" || name == "UINT" || name == "FLOAT" ||
                      name == "TEXT" || name == "NAME" || name == "LEVEL";
-  const bool short_enough = accepted.size() <= kLongestHeading &&
+  const bool short_enough = accepted.size() <= kMaxHeadingLength &&
                             accepted.find(' ') == std::string::npos;
   if (plain && !accepted.empty() && short_enough) {
     option.type_name(std::exchange(accepted, ""));

@@ -19,7 +19,7 @@ namespace fdi::cli {
 namespace {
 
 /// std::regex recurses with the length of its input.
-constexpr std::size_t kLongestTime = 64;
+constexpr std::size_t kMaxTimeLength = 64;
 
 [[noreturn]] void RefuseTime(std::string_view text) {
   throw ConfigError("'" + std::string(text) +
@@ -258,7 +258,7 @@ std::string FormatTime(std::int64_t stamp_ns, bool utc) {
 std::optional<CivilTime> ScanTime(std::string_view text, DateOrder order) {
   CivilTime time;
   Scanner in(text);
-  if (text.size() > kLongestTime || !ScanDate(in, order, time.fields)) {
+  if (text.size() > kMaxTimeLength || !ScanDate(in, order, time.fields)) {
     return std::nullopt;
   }
   const bool clock = in.Take("Tt ");
@@ -369,7 +369,7 @@ std::int64_t ParseDuration(std::string_view text) {
   static const std::regex part(
       R"((\d+\.?\d*|\.\d+)(ns|us|ms|s|min|m|h|d|w)(?![a-z]))");
   double seconds = 0.0;
-  const std::string whole(text.substr(0, kLongestTime + 1));
+  const std::string whole(text.substr(0, kMaxTimeLength + 1));
   if (std::regex_match(whole, plain)) {
     seconds = std::strtod(whole.c_str(), nullptr);
   } else {
@@ -387,7 +387,7 @@ std::int64_t ParseDuration(std::string_view text) {
       RefuseDuration(text);
     }
   }
-  if (whole.size() > kLongestTime || seconds > 100.0 * 365.25 * 86400.0) {
+  if (whole.size() > kMaxTimeLength || seconds > 100.0 * 365.25 * 86400.0) {
     RefuseDuration(text);
   }
   return std::llround(seconds * 1e9);

@@ -45,9 +45,9 @@ void Coverage::Restart() {
   last_stamp_ns_.reset();
 }
 
-bool Coverage::Settle(std::int64_t stamp_ns) {
+bool Coverage::StartSettling(std::int64_t stamp_ns) {
   const bool holds = last_stamp_ns_ && stamp_ns > *last_stamp_ns_ &&
-                     stamp_ns - *last_stamp_ns_ <= kLongestInterruptionNs;
+                     stamp_ns - *last_stamp_ns_ <= kMaxInterruptionNs;
   if (!holds) {
     Restart();
   }
@@ -56,7 +56,7 @@ bool Coverage::Settle(std::int64_t stamp_ns) {
   return holds;
 }
 
-bool Coverage::Parked(const Sample& sample) {
+bool Coverage::IsParked(const Sample& sample) {
   const ValidityRegion& region = models_->validity;
   const double cv = sample[Signal::kCv];
   const bool closed = cv >= 100.0 - kEndOfTravel;
@@ -91,7 +91,7 @@ CoverageReasons Coverage::Operation(const Sample& sample) {
       (averaged_ < kCvMeanSettling || region.cv_mean.Contains(mean_cv_));
   reasons |= If(!within, CoverageReason::kCv);
   reasons |= If(steps, CoverageReason::kCvStep);
-  reasons |= If(Parked(sample), CoverageReason::kParked);
+  reasons |= If(IsParked(sample), CoverageReason::kParked);
   return reasons;
 }
 

@@ -12,7 +12,7 @@
 namespace fdi {
 
 /// Longest interruption after which accumulators are still valid: 10 min.
-inline constexpr std::int64_t kLongestInterruptionNs = 600'000'000'000;
+inline constexpr std::int64_t kMaxInterruptionNs = 600'000'000'000;
 
 /// Decides whether a valve operates where its model set was trained. It is
 /// either ARMED, and judged, or not.
@@ -40,8 +40,8 @@ class Coverage {
 
   /// The observers were initialised at `stamp_ns` and have to settle. @returns
   /// true if the earlier state is still valid, i.e. the last sample is at most
-  /// kLongestInterruptionNs older.
-  bool Settle(std::int64_t stamp_ns);
+  /// kMaxInterruptionNs older.
+  bool StartSettling(std::int64_t stamp_ns);
 
   /// @returns kLive, kSettling, kInhibited or kUncovered.
   /// @param found the floor has a finding.
@@ -71,7 +71,7 @@ class Coverage {
 
   CoverageReasons Operation(const Sample& sample);
   CoverageReasons Inputs(const Sample& sample, const ObserverBank& bank) const;
-  bool Parked(const Sample& sample);
+  bool IsParked(const Sample& sample);
   Quality JudgeArmed(CoverageReasons inputs, bool episode_open);
   Quality JudgeDisarmed(CoverageReasons operation, CoverageReasons inputs);
 

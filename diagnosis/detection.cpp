@@ -11,7 +11,7 @@ namespace fdi {
 namespace {
 
 // What is left of a residual when the extrapolation in it is taken away.
-double Certain(double residual, double uncertain) {
+double SoftThreshold(double residual, double uncertain) {
   return std::copysign(std::max(std::abs(residual) - uncertain, 0.0), residual);
 }
 
@@ -51,11 +51,11 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample) {
   std::array<double, kMaxChannels> certain{};
   for (std::size_t c = 0; c < channels; ++c) {
     const int channel = static_cast<int>(c);
-    certain[c] =
-        bank.active(channel)
-            ? Certain(bank.residual(0, channel),
-                      kExtrapolationError * bank.extrapolation(0, channel))
-            : kNan;
+    certain[c] = bank.active(channel)
+                     ? SoftThreshold(
+                           bank.residual(0, channel),
+                           kExtrapolationError * bank.extrapolation(0, channel))
+                     : kNan;
   }
   windows_.Push({certain.data(), channels},
                 sample.Has(Signal::kCv) ? sample[Signal::kCv] : kNan);
@@ -91,7 +91,7 @@ bool Detection::Push(const ObserverBank& bank, const Sample& sample) {
   return abnormal;
 }
 
-void Detection::Follow(std::int64_t stamp_ns) {
+void Detection::AdaptLimits(std::int64_t stamp_ns) {
   healthy_s_ += models_->sample_period_s;
   if (healthy_s_ <= kFirstS) {
     return;

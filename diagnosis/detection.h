@@ -16,9 +16,9 @@ namespace fdi {
 /// detection. What extrapolation put into a residual is taken away first.
 ///
 /// A healthy valve drifts: with the season, its air supply, its wear. While
-/// there is no alarm, Follow() moves the limits with the residual, slowly and
-/// not far, see Drift. What is followed is taken from the residual before it is
-/// compared: (r − mean)/scale, of the means of windows the mean alone.
+/// there is no alarm, AdaptLimits() moves the limits with the residual, slowly
+/// and not far, see Drift. What is followed is taken from the residual before
+/// it is compared: (r − mean)/scale, of the means of windows the mean alone.
 class Detection {
  public:
   /// What a channel has drifted by since training, as far as it is followed:
@@ -49,7 +49,7 @@ class Detection {
   bool Push(const ObserverBank& bank, const Sample& sample);
 
   /// The last sample was that of a healthy valve: no episode is open.
-  void Follow(std::int64_t stamp_ns);
+  void AdaptLimits(std::int64_t stamp_ns);
 
   FollowedDrift followed_drift(std::size_t channel) const;
 
@@ -76,7 +76,7 @@ class Detection {
   const ModelSet* models_;
   ResidualWindows windows_;
   std::array<Drift, kMaxChannels> drifts_{};
-  double healthy_s_{0.0};  // that Follow() was called for
+  double healthy_s_{0.0};  // that AdaptLimits() was called for
   std::array<Run, kTestsPerChannel * kMaxChannels> runs_{};
 };
 

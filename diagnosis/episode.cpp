@@ -7,7 +7,7 @@
 namespace fdi {
 namespace {
 
-constexpr int kLargestSet = 4;  // more faults than this are no diagnosis
+constexpr int kMaxFaultSetSize = 4;  // more faults than this are no diagnosis
 
 int CountOf(double fraction, int samples) {
   return static_cast<int>(std::ceil(fraction * samples - 1e-9));
@@ -62,8 +62,8 @@ namespace {
 constexpr double kMeanShare = 0.3;        // of the threshold
 constexpr double kExcitationShare = 0.5;  // of the deviation at the detection
 // Samples over which the variation of CV is measured.
-constexpr int kFewestCommands = 60;
-constexpr int kMostCommands = 200;
+constexpr int kMinCommands = 60;
+constexpr int kMaxCommands = 200;
 
 }  // namespace
 
@@ -97,8 +97,8 @@ double CommandHistory::range() const {
 
 ClearingWindow::ClearingWindow(const ModelSet& models)
     : models_(&models),
-      commands_(std::clamp(models.decision.clearing_samples, kFewestCommands,
-                           kMostCommands)),
+      commands_(std::clamp(models.decision.clearing_samples, kMinCommands,
+                           kMaxCommands)),
       ring_(static_cast<std::size_t>(models.decision.clearing_samples)) {}
 
 void ClearingWindow::Observe(double cv) {
@@ -163,7 +163,7 @@ bool ClearingWindow::Cleared() const {
 namespace {
 
 // A stuck transmitter is certain, so observers are not needed.
-void KnowStuck(FaultSet stuck, Verdict& verdict) {
+void ApplyStuckFindings(FaultSet stuck, Verdict& verdict) {
   verdict.normal_factor = 0.0;
   for (std::size_t i = 0; i < verdict.fault_factors.size(); ++i) {
     const bool is = (stuck >> i & 1U) != 0;
@@ -204,16 +204,16 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
   }
   if (begun_) {
     if (findings.settled) {
-      faults_.Follow(bank);
+      faults_.Update(bank);
     }
-    faults_.Compete(verdict);
+    faults_.ApplyEvidence(verdict);
   } else {
     std::ranges::fill(verdict.fault_factors, 0.0);
   }
   if (findings.stuck != 0) {
-    KnowStuck(findings.stuck, verdict);
+    ApplyStuckFindings(findings.stuck, verdict);
   }
-  Tell(findings, verdict);
+  ApplyFloorFindings(findings, verdict);
   if (begins) {
     Open(*findings.detected, verdict);
   }
@@ -239,7 +239,7 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
 }
 
 void Episode::Hold(Verdict& verdict) const {
-  faults_.Compete(verdict);
+  faults_.ApplyEvidence(verdict);
 }
 
 Transition Episode::Close(EndReason reason, std::int64_t stamp_ns,
@@ -266,7 +266,8 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
 }
 
 // Sets the factors of the floor's findings beside those of the faults.
-void Episode::Tell(const Findings& findings, Verdict& verdict) const {
+void Episode::ApplyFloorFindings(const Findings& findings,
+                                 Verdict& verdict) const {
   const std::size_t first = models_->faults.size() - Floor::kTests;
   for (std::size_t i = 0; floor_names_ != 0 && i < Floor::kTests; ++i) {
     const bool found = (findings.floor >> (first + i) & 1U) != 0;
@@ -324,7 +325,7 @@ void Episode::Isolate(Verdict& verdict) {
   }
   supported = WithGroups(supported, verdict);
   // A set this large is no diagnosis: its faults remain candidates.
-  if (models_->floor && std::popcount(supported) > kLargestSet) {
+  if (models_->floor && std::popcount(supported) > kMaxFaultSetSize) {
     supported = floor_;
   }
   if ((verdict.isolated & ~floor_names_) == 0) {

@@ -144,7 +144,7 @@ class Episode {
   void Open(std::int64_t stamp_ns, Verdict& verdict);
   void Isolate(Verdict& verdict);
   void NameFloor(Verdict& verdict);
-  void Tell(const Findings& findings, Verdict& verdict) const;
+  void ApplyFloorFindings(const Findings& findings, Verdict& verdict) const;
   void JudgeUnknown(Verdict& verdict);
   FaultSet FactorsFrom(double threshold, const Verdict& verdict) const;
   FaultSet WithGroups(FaultSet set, const Verdict& verdict) const;

@@ -58,7 +58,7 @@ double FaultBank::BestEvidence() const {
   return best;
 }
 
-void FaultBank::FollowEffect(const ObserverBank& bank) {
+void FaultBank::UpdateEffect(const ObserverBank& bank) {
   const std::vector<ChannelObserver>& normal =
       plan_->models().observers.front().channels;
   for (std::size_t c = 0; c < normal.size(); ++c) {
@@ -70,7 +70,7 @@ void FaultBank::FollowEffect(const ObserverBank& bank) {
     }
     const double distance = residual / normal[c].residual_sd;
     effects_[c] = (bank.fades(channel) ? plan_->memory() : 1.0) * effects_[c] +
-                  0.5 * std::min(distance * distance, kMostSurprise) /
+                  0.5 * std::min(distance * distance, kMaxSquaredDistance) /
                       plan_->channel_time(c);
   }
 }
@@ -88,8 +88,8 @@ double FaultBank::Allowance() const {
          std::accumulate(effects_.begin(), effects_.end(), 0.0);
 }
 
-void FaultBank::Follow(const ObserverBank& bank) {
-  FollowEffect(bank);
+void FaultBank::Update(const ObserverBank& bank) {
+  UpdateEffect(bank);
   trained_.Gather(bank);
   for (StrengthTracker& tracker : trackers_) {
     tracker.Step(bank);
@@ -111,7 +111,7 @@ double FaultBank::EvidenceMembership(double behind) const {
   return std::clamp((support - behind) / (support - core), 0.0, 1.0);
 }
 
-void FaultBank::Compete(Verdict& verdict) const {
+void FaultBank::ApplyEvidence(Verdict& verdict) const {
   const double best = BestEvidence();
   const double candidate = 0.5 * plan_->models().decision.isolation_threshold;
   verdict.normal_factor = std::min(

@@ -45,14 +45,14 @@ class FaultBank {
 
   /// Updates strengths and evidence with the residuals of one more sample of an
   /// open episode.
-  void Follow(const ObserverBank& bank);
+  void Update(const ObserverBank& bank);
 
   /// Applies the evidence so far to the factors set by Score().
-  void Compete(Verdict& verdict) const;
+  void ApplyEvidence(Verdict& verdict) const;
 
  private:
   double BestEvidence() const;
-  void FollowEffect(const ObserverBank& bank);
+  void UpdateEffect(const ObserverBank& bank);
   double Allowance() const;
   double EvidenceMembership(double behind) const;
 

@@ -17,7 +17,7 @@ constexpr double kFlowBorder = 0.9;  // of the largest flow: not saturated
 
 }  // namespace
 
-double Follow(const FloorLimits::Rod& rod, double x, double command) {
+double NextRodPosition(const FloorLimits::Rod& rod, double x, double command) {
   return x + std::clamp(rod.share * (command - x), -rod.rate, rod.rate);
 }
 
@@ -32,11 +32,11 @@ void RodBand::Step(double command) {
   std::shift_right(commands_.begin(), commands_.end(), 1);
   commands_[0] = std::clamp(command, 0.0, 100.0);
   const double target = commands_[static_cast<std::size_t>(limits_->delay)];
-  quick_ = Follow(limits_->quick, quick_, target);
+  quick_ = NextRodPosition(limits_->quick, quick_, target);
   wait_ = resting_ && wait_ > 0 && std::abs(target - slow_) > kStop ? wait_ - 1
                                                                     : wait_;
   if (!resting_ || wait_ == 0) {
-    slow_ = Follow(limits_->slow, slow_, target);
+    slow_ = NextRodPosition(limits_->slow, slow_, target);
     resting_ = slow_ < kStop || slow_ > 100.0 - kStop;
     const bool left = std::abs(target - slow_) > kStop;
     wait_ = resting_ && !left ? kBreakaway : wait_;

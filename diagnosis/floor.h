@@ -10,7 +10,7 @@
 namespace fdi {
 
 /// Rod position one sample later, for a constant `command` [%].
-double Follow(const FloorLimits::Rod& rod, double x, double command);
+double NextRodPosition(const FloorLimits::Rod& rod, double x, double command);
 
 /// The range of positions that the rod of a healthy valve may have, between
 /// those of the quickest and the slowest response, x ← x + min(s |u − x|, v)

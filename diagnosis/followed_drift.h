@@ -9,8 +9,8 @@ namespace fdi {
 inline constexpr double kNearBound = 0.9;
 
 /// How far the limits of one channel have followed the drift of a healthy valve
-/// (Detection::Follow), and how far they may (DriftLimits). Where the bound is
-/// zero nothing is followed.
+/// (Detection::AdaptLimits), and how far they may (DriftLimits). Where the
+/// bound is zero nothing is followed.
 struct FollowedDrift {
   double mean{0.0};             ///< By which the limits moved, signed [unit].
   double mean_bound{0.0};       ///< In that direction, of its sign [unit].

@@ -50,7 +50,7 @@ struct WindowLimits {
 };
 
 /// How far the limits of a channel may follow a drift of the healthy valve
-/// (Detection::Follow); zeros: no drift.
+/// (Detection::AdaptLimits); zeros: no drift.
 struct DriftLimits {
   double lower_mean{0.0};  ///< <= 0 [unit].
   double upper_mean{0.0};  ///< >= 0 [unit].

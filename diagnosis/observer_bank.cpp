@@ -39,7 +39,7 @@ void ObserverBank::Initialise(const Sample& sample) {
   for (const ObserverGroup& group : plan_->groups()) {
     Quad rest;
     rest.lane.fill(sample[plan_->models().channels[group.channel].output]);
-    for (int lag = 0; group.runs_on_itself && lag < state_.depth; ++lag) {
+    for (int lag = 0; group.free_running && lag < state_.depth; ++lag) {
       const auto row =
           state_.own_past.begin() +
           static_cast<std::ptrdiff_t>(state_.Row(lag) * plan_->own_blocks() +

@@ -73,7 +73,7 @@ FDI_INLINE void Gather(const ObserverPlan& plan, const ObserverState& state,
     }
     density = terms.counts_spread ? density : All<Lanes>(0.0);
     const Lanes distance =
-        Min(residual * residual / variance, All<Lanes>(kMostSurprise));
+        Min(residual * residual / variance, All<Lanes>(kMaxSquaredDistance));
     const Lanes faded = Load<Lanes>(parts[b]) * terms.memory;
     const Lanes gain = -0.5 * (distance + density) / terms.time;
     Store(Select(residual != residual, faded, faded + gain), parts[b]);

@@ -54,7 +54,7 @@ struct GainTerms {
 };
 
 /// Upper bound of r²/S in evidence, against outliers.
-inline constexpr double kMostSurprise = 25.0;
+inline constexpr double kMaxSquaredDistance = 25.0;
 
 /// Loops over observers, four at a time.
 struct ObserverKernels {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 // Minimum number of observers for which sharing rule weights pays off.
-constexpr std::size_t kFewestShared = 8;
+constexpr std::size_t kMinSharedMembers = 8;
 
 // One rule per lane; null where there are fewer.
 using LaneRules = std::array<const TsRule*, kLanes>;
@@ -186,7 +186,7 @@ ObserverPlan::ObserverPlan(const ModelSet& models)
     unsigned mask = MaskOf(models.channels[c].output);
     for (std::size_t o = 0; o < models.observers.size(); ++o) {
       mask |= RequiredSignals(At(o, c).model);
-      depth_ = std::max(depth_, LongestLag(At(o, c).model) + 1);
+      depth_ = std::max(depth_, MaxLag(At(o, c).model) + 1);
     }
     signals_.push_back(static_cast<SignalMask>(mask));
     first_blocks_.push_back(blocks_.size());
@@ -214,10 +214,10 @@ void ObserverPlan::AddChannel(std::size_t channel) {
     });
     Members rest;
     for (const Members& members : Sorted(some, [&](auto a, auto b) {
-           return !RunsOnItself(model(b)) &&
+           return !IsFreeRunning(model(b)) &&
                   SharesAntecedents(model(a), model(b));
          })) {
-      if (members.size() >= kFewestShared) {
+      if (members.size() >= kMinSharedMembers) {
         AddGroup(channel, members, true);
       } else {
         rest.insert(rest.end(), members.begin(), members.end());
@@ -246,9 +246,9 @@ void ObserverPlan::AddGroup(std::size_t channel, const Members& members,
   group.first_block = blocks_.size();
   group.blocks = (ordered.size() + kLanes - 1) / kLanes;
   group.regressors = Sources(first.model);
-  group.runs_on_itself = RunsOnItself(first.model);
+  group.free_running = IsFreeRunning(first.model);
   group.own_block = own_blocks_;
-  own_blocks_ += group.runs_on_itself ? group.blocks : 0;
+  own_blocks_ += group.free_running ? group.blocks : 0;
   if (shared) {
     AddSharedPremises(first.model, group);
   }

@@ -52,7 +52,7 @@ struct ObserverGroup {
   std::vector<RegressorSource> regressors;
   std::size_t first_block{0};
   std::size_t blocks{0};
-  bool runs_on_itself{false};
+  bool free_running{false};
   std::size_t own_block{0};  ///< First of its own past, if it runs on itself.
   /// Rules of each block of observers; the same in all if shared.
   std::vector<std::size_t> rules;

@@ -121,8 +121,8 @@ struct Prediction {
     std::array<double, kMaxRules> weights;
   };
 
-  FDI_INLINE static void Weigh(const ObserverGroup& group, const Regressors& x,
-                               Firing& firing) {
+  FDI_INLINE static void ComputeFiring(const ObserverGroup& group,
+                                       const Regressors& x, Firing& firing) {
     std::array<Lanes, kMaxRules / kLanes> exponents;
     const std::size_t quads = group.premises.size();
     Lanes most = All<Lanes>(-std::numeric_limits<double>::infinity());
@@ -190,9 +190,9 @@ struct Prediction {
 
   // Stores the outputs of four observers: their own part of the prediction, and
   // the same with all regressors clamped to the trained range.
-  FDI_INLINE static void Keep(const Common& common, const Lanes& own,
-                              const Lanes& inside, std::size_t block,
-                              ObserverState& state) {
+  FDI_INLINE static void StoreOutputs(const Common& common, const Lanes& own,
+                                      const Lanes& inside, std::size_t block,
+                                      ObserverState& state) {
     const Lanes prediction = common.base + own;
     const Lanes saturation =
         Load<Lanes>(common.plan.blocks()[block].saturation);
@@ -243,19 +243,20 @@ struct Prediction {
     }
     Firing firing;
     Firing firing_inside;
-    Weigh(group, x, firing);
+    ComputeFiring(group, x, firing);
     const bool beyond =
         Beyond(group.minimum.data(), group.maximum.data(), n, x, inside);
     if (beyond) {
-      Weigh(group, inside, firing_inside);
+      ComputeFiring(group, inside, firing_inside);
     }
     for (std::size_t b = 0; b < group.blocks; ++b) {
       const std::size_t block = group.first_block + b;
       const ObserverBlock& limits = plan.blocks()[block];
       const Lanes own = Blend(group, b, limits, firing, x);
-      Keep(common, own,
-           beyond ? Blend(group, b, limits, firing_inside, inside) : own, block,
-           state);
+      StoreOutputs(
+          common, own,
+          beyond ? Blend(group, b, limits, firing_inside, inside) : own, block,
+          state);
     }
   }
 
@@ -276,9 +277,10 @@ struct Prediction {
       const Lanes own = Evaluate(group, b, limits, x);
       const bool beyond =
           Beyond(&group.minimum[b * n], &group.maximum[b * n], n, x, inside);
-      Keep(common, own, beyond ? Evaluate(group, b, limits, inside) : own,
-           block, state);
-      if (group.runs_on_itself) {
+      StoreOutputs(common, own,
+                   beyond ? Evaluate(group, b, limits, inside) : own, block,
+                   state);
+      if (group.free_running) {
         state.own_past[now + b] = state.outputs->predictions[block];
       }
     }

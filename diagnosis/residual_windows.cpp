@@ -6,8 +6,8 @@
 namespace fdi {
 namespace {
 
-constexpr double kLeastVariance = 1e-24;
-constexpr double kMostActivity = 4.0;  // as a multiple of that in training
+constexpr double kMinVariance = 1e-24;
+constexpr double kMaxActivity = 4.0;  // as a multiple of that in training
 
 }  // namespace
 
@@ -20,7 +20,7 @@ void ResidualWindow::Push(double residual) {
 }
 
 double ResidualWindow::log_rms() const {
-  return 0.5 * std::log(std::max(variance_, kLeastVariance));
+  return 0.5 * std::log(std::max(variance_, kMinVariance));
 }
 
 void ResidualWindow::Save(SnapshotWriter& writer) const {
@@ -39,7 +39,7 @@ double UpperLogRms(const WindowLimits& limits, const ResidualWindow& command) {
     return limits.upper_log_rms;
   }
   const double more = std::clamp(command.log_rms() - limits.log_activity, 0.0,
-                                 std::log(kMostActivity));
+                                 std::log(kMaxActivity));
   return limits.upper_log_rms + limits.activity_slope * more;
 }
 

@@ -10,7 +10,7 @@ constexpr int kSearchSamples = 40;  // initial samples with a grid search
 // A fault rarely develops faster than to full strength in 10 minutes.
 constexpr double kRateDeviation = 1.0 / 1500.0;
 // An effect on a channel counts from this share of the deviation on.
-constexpr double kLeastEffect = 0.25;
+constexpr double kMinEffect = 0.25;
 
 double Lane(const std::vector<Quad>& quads, std::size_t slot) {
   return quads[slot / kLanes].lane[slot % kLanes];
@@ -94,7 +94,7 @@ double StrengthTracker::Sum(const double* parts) const {
 double StrengthTracker::Gain(const ObserverBank& bank, std::size_t channel,
                              double residual, double variance) const {
   const double distance =
-      std::min(residual * residual / variance, kMostSurprise);
+      std::min(residual * residual / variance, kMaxSquaredDistance);
   const double density =
       bank.saturated(static_cast<int>(channel)) ? 0.0 : std::log(variance);
   return -0.5 * (distance + density) / plan_->channel_time(channel);
@@ -137,11 +137,11 @@ StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
 }
 
 void StrengthTracker::Step(const ObserverBank& bank) {
-  refutable_ = refutable_ || CouldBeRefuted(bank);
+  refutable_ = refutable_ || IsRefutable(bank);
   if (age_ < kSearchSamples) {
     Search(bank);
   } else {
-    Follow(bank);
+    Track(bank);
   }
   ++age_;
   UpdateFactor(bank);
@@ -151,7 +151,7 @@ void StrengthTracker::Step(const ObserverBank& bank) {
 // its observers makes a different prediction, unless the transmitter's limit
 // hides both. A reading at the limit that normal operation does not explain
 // counts as a test passed.
-bool StrengthTracker::CouldBeRefuted(const ObserverBank& bank) const {
+bool StrengthTracker::IsRefutable(const ObserverBank& bank) const {
   for (std::size_t c = 0; c < channels_; ++c) {
     const int channel = static_cast<int>(c);
     if (!bank.active(channel) || std::isnan(bank.residual(0, channel))) {
@@ -162,7 +162,7 @@ bool StrengthTracker::CouldBeRefuted(const ObserverBank& bank) const {
       const double effect =
           std::abs(Lane(bank.state().outputs->predictions, point.slot) -
                    bank.prediction(0, channel));
-      if (effect > kLeastEffect * point.sd) {
+      if (effect > kMinEffect * point.sd) {
         return true;
       }
     }
@@ -212,14 +212,14 @@ void StrengthTracker::SearchChannel(const ObserverBank& bank,
   }
 }
 
-void StrengthTracker::Follow(const ObserverBank& bank) {
+void StrengthTracker::Track(const ObserverBank& bank) {
   const double memory = plan_->memory();
   // Prediction step: s ← s + ṡ; old information fades by λ.
   strength_ += rate_;
   var_strength_ = (var_strength_ + 2.0 * covariance_ + var_rate_) / memory;
   covariance_ = (covariance_ + var_rate_) / memory;
   var_rate_ = std::min(var_rate_ / memory, kRateDeviation * kRateDeviation);
-  KeepBounded();
+  ClampEstimate();
   double s = std::clamp(strength_, path_->lowest, path_->highest);
   PathPlace place = path_->PlaceOf(s);
   for (std::size_t c = 0; c < channels_; ++c) {
@@ -242,7 +242,7 @@ void StrengthTracker::Follow(const ObserverBank& bank) {
     }
   }
   total_ = Sum(evidence_.data());
-  KeepBounded();
+  ClampEstimate();
   if (strength_ < path_->lowest || strength_ > path_->highest) {
     strength_ = std::clamp(strength_, path_->lowest, path_->highest);
     rate_ = 0.0;
@@ -257,8 +257,9 @@ void StrengthTracker::Correct(const Prediction& prediction, double strength,
   const double slope = prediction.slope;
   const double distance = residual * residual / spread;
   const double innovation =
-      residual *
-      (distance > kMostSurprise ? std::sqrt(kMostSurprise / distance) : 1.0);
+      residual * (distance > kMaxSquaredDistance
+                      ? std::sqrt(kMaxSquaredDistance / distance)
+                      : 1.0);
   const double gain_s = slope * var_strength_ / spread;
   const double gain_r = slope * covariance_ / spread;
   strength_ = strength + gain_s * innovation;
@@ -270,7 +271,7 @@ void StrengthTracker::Correct(const Prediction& prediction, double strength,
 
 // Bounds a strength on which the residuals have no information to [0, 1] in
 // standard deviation.
-void StrengthTracker::KeepBounded() {
+void StrengthTracker::ClampEstimate() {
   var_strength_ = std::clamp(var_strength_, 0.0, 1.0);
   var_rate_ = std::max(var_rate_, 0.0);
   const double most = std::sqrt(var_strength_ * var_rate_);

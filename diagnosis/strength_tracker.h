@@ -87,12 +87,12 @@ class StrengthTracker {
   double Gain(const ObserverBank& bank, std::size_t channel, double residual,
               double variance) const;
   double Sum(const double* parts) const;
-  bool CouldBeRefuted(const ObserverBank& bank) const;
+  bool IsRefutable(const ObserverBank& bank) const;
   void Search(const ObserverBank& bank);
   void SearchChannel(const ObserverBank& bank, std::size_t channel);
-  void Follow(const ObserverBank& bank);
+  void Track(const ObserverBank& bank);
   void Correct(const Prediction& prediction, double strength, double spread);
-  void KeepBounded();
+  void ClampEstimate();
   void UpdateFactor(const ObserverBank& bank);
 
   const FaultPlan* plan_;

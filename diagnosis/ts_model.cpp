@@ -165,7 +165,7 @@ void ValidateRule(const TsRule& rule, std::size_t n, const Checker& checker) {
 
 // prediction_kernel.h computes the same in the same order, bit for bit: change
 // both together.
-void Weigh(const TsModel& model, const double* x, FiringRules& firing) {
+void ComputeFiring(const TsModel& model, const double* x, FiringRules& firing) {
   std::array<double, kMaxRules> exponents;
   const std::size_t count =
       std::min<std::size_t>(model.rules.size(), kMaxRules);
@@ -201,7 +201,7 @@ double Blend(const TsModel& model, const double* x, const FiringRules& firing) {
 
 TsPrediction Evaluate(const TsModel& model, const double* x) {
   FiringRules firing;
-  Weigh(model, x, firing);
+  ComputeFiring(model, x, firing);
   return {Blend(model, x, firing), firing.covered};
 }
 
@@ -223,14 +223,14 @@ double Residual(const TsModel& model, double reading, double prediction) {
   return Residual(model.saturation, reading, prediction);
 }
 
-bool RunsOnItself(const TsModel& model) {
+bool IsFreeRunning(const TsModel& model) {
   return model.parallel &&
          std::any_of(
              model.regressors.begin(), model.regressors.end(),
              [&](const Regressor& r) { return r.signal == model.output; });
 }
 
-int LongestLag(const TsModel& model) {
+int MaxLag(const TsModel& model) {
   int longest = 0;
   for (const Regressor& regressor : model.regressors) {
     longest = std::max(longest, regressor.lag);

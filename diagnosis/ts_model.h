@@ -95,13 +95,13 @@ struct FiringRules {
 };
 
 /// Finds the rules with a weight of at least 4e-18 of the strongest.
-void Weigh(const TsModel& model, const double* x, FiringRules& firing);
+void ComputeFiring(const TsModel& model, const double* x, FiringRules& firing);
 
 /// ŷ of `model` from the weights of a model with the same antecedents.
 double Blend(const TsModel& model, const double* x, const FiringRules& firing);
 
 /// True if the models have the same regressors, ranges and antecedents, so that
-/// one Weigh() serves both.
+/// one ComputeFiring() serves both.
 bool SharesAntecedents(const TsModel& a, const TsModel& b);
 
 /// r = y − min(ŷ, saturation); NaN if reading and prediction are both at the
@@ -110,10 +110,10 @@ double Residual(double saturation, double reading, double prediction);
 double Residual(const TsModel& model, double reading, double prediction);
 
 /// True if the model is parallel and has its own output among its regressors.
-bool RunsOnItself(const TsModel& model);
+bool IsFreeRunning(const TsModel& model);
 
 /// The largest lag of the regressors.
-int LongestLag(const TsModel& model);
+int MaxLag(const TsModel& model);
 
 /// The signals that the model reads from the transmitters.
 SignalMask RequiredSignals(const TsModel& model);

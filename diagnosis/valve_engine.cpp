@@ -45,7 +45,8 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
 }
 
 constexpr std::uint32_t kSnapshotFormat = 3;
-constexpr int kMostUncertain = 60;  // samples in a row, until nothing is known
+// Samples in a row, until nothing is known.
+constexpr int kMaxUncertainRun = 60;
 
 }  // namespace
 
@@ -151,7 +152,7 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
   const ObserverBank& bank = diagnosis_->bank;
   const bool uncertain =
       bank.active_channels() > 0 && bank.measured_channels() == 0;
-  uncertain_ = uncertain ? std::min(uncertain_ + 1, kMostUncertain + 1) : 0;
+  uncertain_ = uncertain ? std::min(uncertain_ + 1, kMaxUncertainRun + 1) : 0;
   if (!uncertain) {
     diagnosis_->episode.Score(bank, verdict_);
   }
@@ -196,7 +197,7 @@ void ValveEngine::Impl::Initialise(const Sample& sample) {
   diagnosis_->bank.Initialise(sample);
   present_ = sample.present;
   needs_initialisation_ = false;
-  if (diagnosis_->coverage.Settle(sample.stamp_ns)) {
+  if (diagnosis_->coverage.StartSettling(sample.stamp_ns)) {
     diagnosis_->detection.Interrupt();
   } else {
     diagnosis_->detection.Restart();
@@ -218,7 +219,8 @@ void ValveEngine::Impl::ReadResiduals() {
 
 Quality ValveEngine::Impl::Judge(const Sample& sample) {
   verdict_.uncovered = 0;
-  if (diagnosis_->bank.active_channels() == 0 || uncertain_ > kMostUncertain) {
+  if (diagnosis_->bank.active_channels() == 0 ||
+      uncertain_ > kMaxUncertainRun) {
     return Quality::kBadInput;
   }
   const Quality quality = diagnosis_->coverage.Judge(
@@ -261,7 +263,7 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   if (was_open && !episode_open()) {
     detection.Restart();
   } else if (findings.settled && !episode_open()) {
-    detection.Follow(sample.stamp_ns);
+    detection.AdaptLimits(sample.stamp_ns);
   }
 }
 

@@ -5,7 +5,7 @@ namespace {
 
 // Reordered acknowledgements are closer together than this.
 constexpr std::uint32_t kOvertaken = 64;
-constexpr std::size_t kMostAcknowledgements = 16'384;
+constexpr std::size_t kMaxAcknowledgements = 16'384;
 
 }  // namespace
 
@@ -15,7 +15,7 @@ std::uint32_t AckCounts::Next(const WriterGuid& reader, std::uint32_t entity,
   const States::key_type key(reader, entity);
   auto found = recent_.find(key);
   if (found == recent_.end()) {
-    if (recent_.size() == kMostAcknowledgements) {
+    if (recent_.size() == kMaxAcknowledgements) {
       older_ = std::exchange(recent_, {});
     }
     const auto old = older_.find(key);

@@ -98,10 +98,10 @@ class CheckedType : public Generated {
     return Checked(payload, data);
   }
   void* createData() override {
-    return Owned(Generated::createData());
+    return RegisterObject(Generated::createData());
   }
   void deleteData(void* data) override {
-    Disown(data);
+    UnregisterObject(data);
     Generated::deleteData(data);
   }
   bool getKey(void* data, rtps::InstanceHandle_t* handle,
@@ -117,10 +117,10 @@ class CheckedType : public Generated {
     return Checked(payload, data);
   }
   void* create_data() override {
-    return Owned(Generated::create_data());
+    return RegisterObject(Generated::create_data());
   }
   void delete_data(void* data) override {
-    Disown(data);
+    UnregisterObject(data);
     Generated::delete_data(data);
   }
   bool compute_key(const void* data, rtps::InstanceHandle_t& handle,
@@ -141,7 +141,7 @@ class CheckedType : public Generated {
     typename Generated::type message;
     rtps::InstanceHandle_t of_none;
     compute_key(&message, of_none, force_md5);
-    static_cast<void>(IsRead(payload, &message));
+    static_cast<void>(TryDeserialize(payload, &message));
     compute_key(&message, handle, force_md5);
     if (handle == of_none) {
       handle = rtps::InstanceHandle_t();
@@ -159,7 +159,7 @@ class CheckedType : public Generated {
   static constexpr bool kKeyHasGaps =
       std::is_same_v<Generated, v1::ModelSetInfoPubSubType>;
 
-  bool IsRead(auto& payload, void* data) {
+  bool TryDeserialize(auto& payload, void* data) {
     try {
       return Generated::deserialize(payload, data);
     } catch (const std::exception&) {
@@ -167,8 +167,8 @@ class CheckedType : public Generated {
     }
   }
 #if FDI_FAST_DDS == 2
-  static bool IsWhole(const rtps::SerializedPayload_t* /*payload*/,
-                      const void* /*data*/) {
+  static bool IsComplete(const rtps::SerializedPayload_t* /*payload*/,
+                         const void* /*data*/) {
     return true;
   }
 #else
@@ -176,7 +176,7 @@ class CheckedType : public Generated {
   // of the message; the remaining members keep their old values. So a message
   // must be as long as what was read from it. The calculated size may be a few
   // bytes too large, because it aligns the elements of an empty list.
-  bool IsWhole(const rtps::SerializedPayload_t& payload, const void* data) {
+  bool IsComplete(const rtps::SerializedPayload_t& payload, const void* data) {
     constexpr rtps::octet kFirstOfXcdr2 = 6;  // Of the encapsulations.
     const auto form = payload.data[1] < kFirstOfXcdr2
                           ? dds::XCDR_DATA_REPRESENTATION
@@ -191,7 +191,7 @@ class CheckedType : public Generated {
   }
 #endif
   bool Checked(auto& payload, void* data) {
-    if (IsRead(payload, data) && IsWhole(payload, data)) {
+    if (TryDeserialize(payload, data) && IsComplete(payload, data)) {
       return true;
     }
     const std::lock_guard lock(objects_mutex_);
@@ -201,15 +201,15 @@ class CheckedType : public Generated {
     }
     // For the key: use this message as far as it can be read, not the last one.
     *static_cast<typename Generated::type*>(data) = {};
-    static_cast<void>(IsRead(payload, data));
+    static_cast<void>(TryDeserialize(payload, data));
     return false;
   }
-  void* Owned(void* data) {
+  void* RegisterObject(void* data) {
     const std::lock_guard lock(objects_mutex_);
     objects_of_library_.insert(data);
     return data;
   }
-  void Disown(void* data) {
+  void UnregisterObject(void* data) {
     const std::lock_guard lock(objects_mutex_);
     objects_of_library_.erase(data);
   }

@@ -41,10 +41,10 @@ constexpr std::uint16_t kKeyHash = 0x70;
 constexpr std::int64_t kSequenceLimit = std::int64_t{1} << 40;
 // The library allocates the sample size that a fragment claims. Our samples
 // have a few kB.
-constexpr std::int64_t kMostSampleBytes = 65'536;
+constexpr std::int64_t kMaxSampleBytes = 65'536;
 
 // Minimum size of a body; -1 for an unknown kind.
-int LeastBody(std::uint8_t kind, std::uint8_t flags) {
+int MinBodySize(std::uint8_t kind, std::uint8_t flags) {
   switch (kind) {
     case kPad:
       return 0;
@@ -149,7 +149,7 @@ bool ContentIsSound(std::uint8_t kind, std::uint8_t flags, const Body& body) {
       // gets both whole and in fragments.
       return IsOfDiscovery(body.bytes[11]) && DataIsSound(body, flags, 32) &&
              body.U32(20) > 0 && body.U16(24) > 0 && body.U16(26) > 0 &&
-             body.U32(28) <= kMostSampleBytes;
+             body.U32(28) <= kMaxSampleBytes;
     case kHeartbeat:
       return body.Sequence(8) > 0 && body.Sequence(16) >= 0;
     case kGap:
@@ -185,8 +185,8 @@ class Speaker {
 
 // Whether a valid submessage contains only numbers that its writer can have
 // reached.
-bool KeepsPace(std::uint8_t kind, const Body& body, Speaker& speaker,
-               WriterPace& pace, WriterPace::Clock::time_point now) {
+bool HasPlausibleNumbers(std::uint8_t kind, const Body& body, Speaker& speaker,
+                         WriterPace& pace, WriterPace::Clock::time_point now) {
   switch (kind) {
     case kData:
     case kDataFrag:
@@ -274,7 +274,7 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
     const std::size_t end =
         begin + std::min((length + 3) & ~std::size_t{3}, size - begin);
     if (kind < kFirstOfVendors) {
-      const int least = LeastBody(kind, flags);
+      const int least = MinBodySize(kind, flags);
       if (least < 0 || at != sound) {  // Follows a vendor submessage.
         return {DatagramVerdict::kKind, 0};
       }
@@ -285,7 +285,7 @@ CheckedDatagram CheckDatagram(Bytes datagram, WriterPace& pace,
       if (!ContentIsSound(kind, flags, body)) {
         return {DatagramVerdict::kContent, 0};
       }
-      if (!KeepsPace(kind, body, speaker, pace, now)) {
+      if (!HasPlausibleNumbers(kind, body, speaker, pace, now)) {
         return {DatagramVerdict::kPace, 0};
       }
       if (kind == kData && IsBareKey(body, flags)) {

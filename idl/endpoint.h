@@ -76,9 +76,9 @@ class Publisher {
   /// PublisherStatus::matched, at the cost of one atomic load.
   int matched() const;
   /// Readers matched since the start, including those that have left.
-  int came() const;
+  int total_matched() const;
   /// Later readers do not get what was written before.
-  void Forget();
+  void ClearHistory();
 
  private:
   struct Impl;
@@ -134,7 +134,7 @@ struct Handlers {
 };
 
 /// Handlers that call `each` with every vector of a batch.
-inline Handlers<DecisionBatchMessage> EachVector(
+inline Handlers<DecisionBatchMessage> ForEachVector(
     std::function<void(const DecisionMessage&, const Reception&)> each) {
   return {[each = std::move(each)](const DecisionBatchMessage& batch,
                                    const Reception& reception) {

@@ -27,7 +27,7 @@ struct Registry {
 };
 
 // Never destroyed: the library's log thread outlives our statics.
-Registry& TheRegistry() {
+Registry& GlobalRegistry() {
   static Registry& registry = *new Registry;
   return registry;
 }
@@ -61,7 +61,7 @@ class Throttle : public eprosima::fastdds::dds::LogConsumer {
       line += " suppressed=" + std::to_string(seen.suppressed);
     }
     seen = {now, seen.count + 1, 0};
-    Registry& registry = TheRegistry();
+    Registry& registry = GlobalRegistry();
     const std::lock_guard lock(registry.mutex);
     if (!registry.sinks.empty() && *registry.sinks.back()) {
       (*registry.sinks.back())(LevelOf(entry.kind), line);
@@ -80,7 +80,7 @@ class Throttle : public eprosima::fastdds::dds::LogConsumer {
 }  // namespace
 
 LibraryLog::LibraryLog(LogSink sink) : sink_(std::move(sink)) {
-  Registry& registry = TheRegistry();
+  Registry& registry = GlobalRegistry();
   const std::lock_guard lock(registry.mutex);
   if (!registry.installed) {
     Log::ClearConsumers();
@@ -91,7 +91,7 @@ LibraryLog::LibraryLog(LogSink sink) : sink_(std::move(sink)) {
 }
 
 LibraryLog::~LibraryLog() {
-  Registry& registry = TheRegistry();
+  Registry& registry = GlobalRegistry();
   const std::lock_guard lock(registry.mutex);
   std::erase(registry.sinks, &sink_);
 }

@@ -48,7 +48,7 @@ constexpr std::uint32_t kSendBufferBytes = 4U << 20U;
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
 // Bounds remote endpoints per topic, and participants without a key.
-constexpr std::size_t kRemembered = 64;
+constexpr std::size_t kMaxRemembered = 64;
 
 std::vector<std::string> Addresses(const std::string& interfaces) {
   std::vector<std::string> addresses;
@@ -427,11 +427,11 @@ void Participant::Impl::ReportIncompatible(const std::string& topic,
                 : " offered_here=" + own_text + " requested_there=" + theirs));
 }
 
-void Participant::Impl::Remember(const RemoteKey& key, PolicyTexts texts) {
+void Participant::Impl::StorePolicies(const RemoteKey& key, PolicyTexts texts) {
   const std::lock_guard lock(remotes_mutex_);
   std::deque<PolicyTexts>& known = remotes_[key];
   known.push_front(std::move(texts));
-  if (known.size() > kRemembered) {
+  if (known.size() > kMaxRemembered) {
     known.pop_back();
   }
 }
@@ -451,7 +451,7 @@ void Participant::Impl::onParticipantAuthentication(
       return;
     }
     refused_guids_.push_front(info.guid);
-    if (refused_guids_.size() > kRemembered) {
+    if (refused_guids_.size() > kMaxRemembered) {
       refused_guids_.pop_back();
     }
   }
@@ -467,14 +467,16 @@ void Participant::Impl::onParticipantAuthentication(
 void Participant::Impl::on_publisher_discovery(
     dds::DomainParticipant* /*participant*/, rtps::WriterDiscoveryInfo&& info) {
   if (info.status == rtps::WriterDiscoveryInfo::DISCOVERED_WRITER) {
-    Remember({info.info.topicName().c_str(), true}, Describe(info.info.m_qos));
+    StorePolicies({info.info.topicName().c_str(), true},
+                  Describe(info.info.m_qos));
   }
 }
 
 void Participant::Impl::on_subscriber_discovery(
     dds::DomainParticipant* /*participant*/, rtps::ReaderDiscoveryInfo&& info) {
   if (info.status == rtps::ReaderDiscoveryInfo::DISCOVERED_READER) {
-    Remember({info.info.topicName().c_str(), false}, Describe(info.info.m_qos));
+    StorePolicies({info.info.topicName().c_str(), false},
+                  Describe(info.info.m_qos));
   }
 }
 #else
@@ -482,7 +484,7 @@ void Participant::Impl::on_data_writer_discovery(
     dds::DomainParticipant* /*participant*/, rtps::WriterDiscoveryStatus status,
     const RemoteWriterQos& info, bool& /*should_be_ignored*/) {
   if (status == rtps::WriterDiscoveryStatus::DISCOVERED_WRITER) {
-    Remember({info.topic_name.c_str(), true}, Describe(info));
+    StorePolicies({info.topic_name.c_str(), true}, Describe(info));
   }
 }
 
@@ -490,7 +492,7 @@ void Participant::Impl::on_data_reader_discovery(
     dds::DomainParticipant* /*participant*/, rtps::ReaderDiscoveryStatus status,
     const RemoteReaderQos& info, bool& /*should_be_ignored*/) {
   if (status == rtps::ReaderDiscoveryStatus::DISCOVERED_READER) {
-    Remember({info.topic_name.c_str(), false}, Describe(info));
+    StorePolicies({info.topic_name.c_str(), false}, Describe(info));
   }
 }
 #endif

@@ -155,7 +155,7 @@ class Participant::Impl : private dds::DomainParticipantListener {
                                 const RemoteReaderQos& info,
                                 bool& should_be_ignored) override;
 #endif
-  void Remember(const RemoteKey& key, PolicyTexts texts);
+  void StorePolicies(const RemoteKey& key, PolicyTexts texts);
 
   DdsOptions options_;
   LogSink log_;

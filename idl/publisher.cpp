@@ -117,7 +117,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   void on_publication_matched(
       dds::DataWriter* /*writer*/,
       const dds::PublicationMatchedStatus& status) override {
-    came.store(status.total_count);
+    total_matched.store(status.total_count);
     matched.Set(status.current_count);
   }
 
@@ -136,7 +136,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   dds::DataWriter* writer{nullptr};
   PolicyTexts policies;
   Matched matched;
-  std::atomic<int> came{0};
+  std::atomic<int> total_matched{0};
   std::atomic<std::uint64_t> written{0};
   std::atomic<std::uint64_t> retries{0};
   std::atomic<std::uint64_t> refused{0};
@@ -219,12 +219,12 @@ int Publisher<Message>::matched() const {
 }
 
 template <typename Message>
-int Publisher<Message>::came() const {
-  return impl_->came.load();
+int Publisher<Message>::total_matched() const {
+  return impl_->total_matched.load();
 }
 
 template <typename Message>
-void Publisher<Message>::Forget() {
+void Publisher<Message>::ClearHistory() {
   const std::lock_guard lock(impl_->mutex);
   std::size_t removed = 0;
   impl_->writer->clear_history(&removed);

@@ -86,8 +86,8 @@ EndpointQos Common(const std::string& name) {
   return qos;
 }
 
-void KeepLast(EndpointQos& qos, int instances, int writer_depth,
-              int reader_depth) {
+void SetKeepLast(EndpointQos& qos, int instances, int writer_depth,
+                 int reader_depth) {
   qos.writer.history().kind = dds::KEEP_LAST_HISTORY_QOS;
   qos.writer.history().depth = writer_depth;
   SetLimits(qos.writer.resource_limits(), instances, writer_depth, 64);
@@ -112,7 +112,7 @@ void ReaderKeepsAll(EndpointQos& qos, int instances) {
 }
 
 // Lossless, for writers with one instance.
-void KeepInFlight(EndpointQos& qos, int messages) {
+void SetKeepAll(EndpointQos& qos, int messages) {
   qos.writer.history().kind = dds::KEEP_ALL_HISTORY_QOS;
   SetLimits(qos.writer.resource_limits(), 1, messages, 1);
   qos.writer.resource_limits().extra_samples = 1;
@@ -174,11 +174,11 @@ PolicyTexts Texts(const dds::ReliabilityQosPolicy& reliability,
 }
 
 // Our QoS has accessor functions where discovered QoS has members.
-PolicyTexts TextsOfOurs(const auto& qos) {
+PolicyTexts LocalPolicyTexts(const auto& qos) {
   return Texts(qos.reliability(), qos.durability(), qos.deadline(),
                qos.liveliness(), qos.ownership());
 }
-PolicyTexts TextsOfRemote(const auto& qos) {
+PolicyTexts RemotePolicyTexts(const auto& qos) {
 #if FDI_FAST_DDS == 2
   return Texts(qos.m_reliability, qos.m_durability, qos.m_deadline,
                qos.m_liveliness, qos.m_ownership);
@@ -193,7 +193,7 @@ PolicyTexts TextsOfRemote(const auto& qos) {
 template <>
 EndpointQos QosFor<ValveSampleMessage>(Profile profile, int valves) {
   EndpointQos qos = Common("fdi_valve_sample");
-  KeepLast(qos, valves, std::clamp(kLiveHistory / valves, 2, 16), 16);
+  SetKeepLast(qos, valves, std::clamp(kLiveHistory / valves, 2, 16), 16);
   ReaderKeepsAll(qos, valves);
   if (profile == Profile::kLossless) {
     qos.name += "_lossless";
@@ -210,7 +210,7 @@ template <>
 EndpointQos QosFor<DecisionMessage>(Profile /*profile*/, int valves) {
   EndpointQos qos = Common("fdi_decision_vector");
   TransientLocal(qos);
-  KeepLast(qos, valves, 1, 16);
+  SetKeepLast(qos, valves, 1, 16);
   return qos;
 }
 
@@ -219,7 +219,7 @@ EndpointQos QosFor<DecisionMessage>(Profile /*profile*/, int valves) {
 template <>
 EndpointQos QosFor<DecisionBatchMessage>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_decision_batch");
-  KeepInFlight(qos, kBatchesInFlight);
+  SetKeepAll(qos, kBatchesInFlight);
   HeartbeatPeriod(qos.writer) = Milliseconds(10);
   return qos;
 }
@@ -228,7 +228,7 @@ template <>
 EndpointQos QosFor<FaultEvent>(Profile /*profile*/, int valves) {
   EndpointQos qos = Common("fdi_fault_event");
   TransientLocal(qos);
-  KeepLast(qos, valves, 16, 16);
+  SetKeepLast(qos, valves, 16, 16);
   return qos;
 }
 
@@ -236,7 +236,7 @@ template <>
 EndpointQos QosFor<ModelSetInfoMessage>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_model_set_info");
   TransientLocal(qos);
-  KeepLast(qos, kModelSets, 1, 1);
+  SetKeepLast(qos, kModelSets, 1, 1);
   return qos;
 }
 
@@ -246,7 +246,7 @@ template <>
 EndpointQos QosFor<MonitorStatusMessage>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_monitor_status");
   TransientLocal(qos);
-  KeepLast(qos, kMonitors, 1, 1);
+  SetKeepLast(qos, kMonitors, 1, 1);
   qos.writer.liveliness().kind = dds::MANUAL_BY_TOPIC_LIVELINESS_QOS;
   qos.writer.liveliness().lease_duration = Milliseconds(5000);
   qos.writer.liveliness().announcement_period = Milliseconds(2000);
@@ -259,21 +259,21 @@ EndpointQos QosFor<MonitorStatusMessage>(Profile /*profile*/, int /*valves*/) {
 template <>
 EndpointQos QosFor<PairState>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_pair_state");
-  KeepLast(qos, kMonitors, 1, 1);
+  SetKeepLast(qos, kMonitors, 1, 1);
   return qos;
 }
 
 template <>
 EndpointQos QosFor<MonitorShare>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_monitor_share");
-  KeepLast(qos, kMonitors, 1, 1);
+  SetKeepLast(qos, kMonitors, 1, 1);
   return qos;
 }
 
 template <>
 EndpointQos QosFor<OperatorAction>(Profile /*profile*/, int /*valves*/) {
   EndpointQos qos = Common("fdi_operator_action");
-  KeepInFlight(qos, kActionsInFlight);
+  SetKeepAll(qos, kActionsInFlight);
   return qos;
 }
 
@@ -293,16 +293,16 @@ const std::set<std::string>& EndpointNames() {
 }
 
 PolicyTexts Describe(const dds::DataWriterQos& qos) {
-  return TextsOfOurs(qos);
+  return LocalPolicyTexts(qos);
 }
 PolicyTexts Describe(const dds::DataReaderQos& qos) {
-  return TextsOfOurs(qos);
+  return LocalPolicyTexts(qos);
 }
 PolicyTexts Describe(const RemoteWriterQos& qos) {
-  return TextsOfRemote(qos);
+  return RemotePolicyTexts(qos);
 }
 PolicyTexts Describe(const RemoteReaderQos& qos) {
-  return TextsOfRemote(qos);
+  return RemotePolicyTexts(qos);
 }
 
 std::string PolicyName(dds::QosPolicyId_t id) {

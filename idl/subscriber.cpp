@@ -36,8 +36,8 @@ constexpr std::size_t QueueCapacity() {
   return std::clamp<std::size_t>((8U << 20U) / bytes, 16, 32768);
 }
 
-constexpr std::chrono::hours kLongestWait{1};  // Avoids overflow of the clock.
-constexpr std::chrono::milliseconds kLongestFarewell{500};
+constexpr std::chrono::hours kMaxWait{1};  // Avoids overflow of the clock.
+constexpr std::chrono::milliseconds kMaxFinalDrain{500};
 
 struct HandleHash {
   std::size_t operator()(const dds::InstanceHandle_t& handle) const {
@@ -125,10 +125,10 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   // moment, as when it retransmits what had no room here (matched_reader_remove
   // against the flow controller, upstream pull request 3468). Hence a reader
   // with a backlog takes and acknowledges everything before it leaves, within
-  // kLongestFarewell. This does not help against a writer that never pauses.
+  // kMaxFinalDrain. This does not help against a writer that never pauses.
   void LetWritersFinish() {
     const Duration two_heartbeats{0, 100'000'000};
-    const auto end = std::chrono::steady_clock::now() + kLongestFarewell;
+    const auto end = std::chrono::steady_clock::now() + kMaxFinalDrain;
     const std::lock_guard lock(drain_mutex);
     dds::SampleInfo info;
     const auto take = [&] {
@@ -148,7 +148,7 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
       if (next == batch.size()) {
         next = 0;
         queue.PopAll(batch, handed == 0 ? std::min<std::chrono::milliseconds>(
-                                              timeout, kLongestWait)
+                                              timeout, kMaxWait)
                                         : std::chrono::milliseconds(0));
         if (queue.Reopened()) {
           Drain(false);

@@ -17,7 +17,7 @@ constexpr std::int64_t kPerSecondOfSilence = 100'000;
 constexpr seconds kSilence{10};
 // The library keeps each skipped number in a set, at 48 bytes.
 constexpr std::int64_t kCostOfLeftOut = 64;
-constexpr std::size_t kMostRecent = 32'768;
+constexpr std::size_t kMaxRecentWriters = 32'768;
 
 std::int64_t Growth(WriterPace::Clock::duration since) {
   const auto of = [](WriterPace::Clock::duration time, std::int64_t rate) {
@@ -41,7 +41,7 @@ WriterPace::State& WriterPace::Find(const WriterGuid& writer,
   if (const auto found = recent_.find(writer); found != recent_.end()) {
     return found->second;
   }
-  if (recent_.size() == kMostRecent) {
+  if (recent_.size() == kMaxRecentWriters) {
     older_ = std::exchange(recent_, {});
   }
   // Discovery writers start at 1 with their participant; others may have been
@@ -57,7 +57,7 @@ bool WriterPace::Admit(const WriterGuid& writer, std::int64_t number,
                        std::int64_t left_out, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   State& state = Find(writer, number, now);
-  const std::int64_t allowed = state.burst + Growth(now - state.last_word);
+  const std::int64_t allowed = state.burst + Growth(now - state.last_message);
   const std::int64_t cost = std::max<std::int64_t>(0, number - state.number) +
                             std::min(left_out, allowed) * kCostOfLeftOut;
   if (cost > allowed) {
@@ -65,7 +65,7 @@ bool WriterPace::Admit(const WriterGuid& writer, std::int64_t number,
   }
   state.number = std::max(state.number, number);
   state.burst = std::min(kBurst, allowed - cost);
-  state.last_word = now;
+  state.last_message = now;
   return true;
 }
 

@@ -37,7 +37,7 @@ class WriterPace {
   struct State {
     std::int64_t number{0};
     std::int64_t burst{0};  ///< Remaining burst.
-    Clock::time_point last_word;
+    Clock::time_point last_message;
   };
   struct Hash {
     std::size_t operator()(const WriterGuid& writer) const;

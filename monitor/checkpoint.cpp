@@ -10,7 +10,7 @@
 namespace fdi::monitor {
 namespace {
 
-constexpr std::size_t kMostRecords = 100'000;
+constexpr std::size_t kMaxRecords = 100'000;
 
 std::int64_t DayOf(std::int64_t stamp_ns) {
   return stamp_ns / kNsPerDay - (stamp_ns % kNsPerDay < 0 ? 1 : 0);
@@ -30,7 +30,7 @@ void Merge(std::vector<T>& older, std::vector<T> newer, KeyOf key_of,
         places.try_emplace(key_of(record), older.size());
     const bool combined = !added && place->second < older.size() &&
                           combine(older[place->second], record);
-    if (!combined && older.size() < kMostRecords) {
+    if (!combined && older.size() < kMaxRecords) {
       older.push_back(std::move(record));
     }
   }
@@ -101,8 +101,8 @@ void CoverageBook::Add(std::int64_t stamp_ns, Quality quality,
   row->samples.Add(quality, samples);
 }
 
-void CoverageBook::TakeInto(const std::string& valve_id, double period_s,
-                            std::vector<CoverageDay>& days) {
+void CoverageBook::DrainInto(const std::string& valve_id, double period_s,
+                             std::vector<CoverageDay>& days) {
   for (const Day& day : days_) {
     days.push_back({valve_id, day.day, period_s, day.samples});
   }

@@ -24,7 +24,7 @@ std::vector<ShadowDifference> Merged(std::vector<ShadowDifference> older,
                                      std::vector<ShadowDifference> newer);
 
 /// The most days or hours that a valve accumulates between checkpoints.
-inline constexpr std::size_t kMostBookRows = 256;
+inline constexpr std::size_t kMaxBookRows = 256;
 
 /// The row of a book to which a sample is added: the one for which `is` holds,
 /// else the last one if no row may be opened (`may_open` is false, or there are
@@ -36,7 +36,7 @@ Row* FindRow(std::vector<Row>& rows, Is is, bool may_open) {
   if (own != rows.rend()) {
     return &*own;
   }
-  const bool open = may_open && rows.size() < kMostBookRows;
+  const bool open = may_open && rows.size() < kMaxBookRows;
   return rows.empty() || open ? nullptr : &rows.back();
 }
 
@@ -48,8 +48,8 @@ class CoverageBook {
            bool accepted = true);
   std::size_t rows() const { return days_.size(); }
   /// Appends all that was added since the last call.
-  void TakeInto(const std::string& valve_id, double period_s,
-                std::vector<CoverageDay>& days);
+  void DrainInto(const std::string& valve_id, double period_s,
+                 std::vector<CoverageDay>& days);
 
  private:
   struct Day {

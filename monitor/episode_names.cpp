@@ -42,14 +42,14 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     detection_ns_ = transition.detection_stamp_ns;
   }
   if (due && !held) {
-    Ask(std::move(*due));
+    RequestLook(std::move(*due));
   }
-  TakeAnswers();
-  TakeGrowth();
+  CollectAnswers();
+  CollectGrowth();
   suspects_ = looks_->suspects() && !held;
   const auto name = NameFor(engine, held);
-  const bool kept = kept_ && engine.detected && !held;
-  if (!name && !kept && !own_) {
+  const bool inherited = inherited_ && engine.detected && !held;
+  if (!name && !inherited && !own_) {
     faults_ = engine.isolated;
     layer_ = Layer::kObservers;
     return engine;
@@ -63,25 +63,25 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     for (Transition& transition : verdict_.transitions) {
       WriteName(transition);
     }
-    Forget();
+    Reset();
     return verdict_;
   }
   own_ = true;
-  by_physics_ = kept || (name && name->answer != nullptr);
+  by_physics_ = inherited || (name && name->answer != nullptr);
   strengths_.clear();
-  if (kept) {
-    SetName(*kept_, Unknown::kTooEarly);
+  if (inherited) {
+    SetName(*inherited_, Unknown::kTooEarly);
   } else if (by_physics_) {
     const simulator::LookAnswer& answer = *name->answer;
     Name(answer, SetOf(name->faults));
     if (std::exchange(look_ns_, answer.stamp_ns) != answer.stamp_ns) {
       look_ = RecordOf(answer);
-      NoteStrengths(answer);
+      RecordStrengths(answer);
     }
   } else if (name) {
     SetName(SetOf(name->faults), Unknown::kTooEarly);
   }
-  Announce();
+  EmitNameChange();
   return verdict_;
 }
 
@@ -92,68 +92,68 @@ std::optional<simulator::EpisodeName> EpisodeNames::NameFor(
     return std::nullopt;
   }
   if (looks_->Answer() != nullptr) {
-    kept_.reset();
+    inherited_.reset();
   }
   return looks_->Name(*models_, engine.isolated);
 }
 
-void EpisodeNames::Ask(simulator::LookTask task) {
+void EpisodeNames::RequestLook(simulator::LookTask task) {
   simulator::LookTask key;
   key.occasion = task.occasion;
   key.stamp_ns = task.stamp_ns;
   key.window.detection = task.window.detection;
   key.detection_stamp_ns = task.detection_stamp_ns;
-  asked_.push_back(
+  pending_looks_.push_back(
       {std::move(key), worker_->Submit(valve_id_, physics_, std::move(task))});
 }
 
-void EpisodeNames::TakeAnswers() {
+void EpisodeNames::CollectAnswers() {
   using std::future_status;
   constexpr std::chrono::seconds kNow{0};
-  while (!asked_.empty() &&
-         asked_.front().answer.wait_for(kNow) == future_status::ready) {
-    LookWorker::Answer answer = asked_.front().answer.get();
+  while (!pending_looks_.empty() &&
+         pending_looks_.front().answer.wait_for(kNow) == future_status::ready) {
+    LookWorker::Answer answer = pending_looks_.front().answer.get();
     if (answer) {
-      looks_->Enter(asked_.front().task, std::move(*answer));
+      looks_->Enter(pending_looks_.front().task, std::move(*answer));
     }
-    asked_.pop_front();
+    pending_looks_.pop_front();
   }
 }
 
-void EpisodeNames::AskGrowth() {
+void EpisodeNames::RequestGrowth() {
   if (known_.empty()) {
     return;
   }
   if (auto task = looks_->GrowthTask(known_)) {
     const auto rows = static_cast<std::int64_t>(task->window.rows.size());
     const std::int64_t middle_ns = task->stamp_ns - (rows - 1) * PeriodNs() / 2;
-    growing_.push_back(
+    pending_growth_.push_back(
         {middle_ns, look_ns_,
          worker_->Submit(valve_id_, physics_, std::move(*task))});
   }
 }
 
-void EpisodeNames::TakeGrowth() {
+void EpisodeNames::CollectGrowth() {
   using std::future_status;
   constexpr std::chrono::seconds kNow{0};
-  while (!growing_.empty() &&
-         growing_.front().answer.wait_for(kNow) == future_status::ready) {
-    const LookWorker::Answer answer = growing_.front().answer.get();
+  while (!pending_growth_.empty() && pending_growth_.front().answer.wait_for(
+                                         kNow) == future_status::ready) {
+    const LookWorker::Answer answer = pending_growth_.front().answer.get();
     if (answer && answer->outcome == simulator::LookOutcome::kNamed) {
       for (const simulator::Explanation& e : answer->faults) {
-        NoteStrength(e, growing_.front().middle_ns);
+        RecordStrength(e, pending_growth_.front().middle_ns);
       }
       // The next one begins where this one ended.
-      if (growing_.front().look_ns == look_ns_) {
+      if (pending_growth_.front().look_ns == look_ns_) {
         known_ = answer->faults;
       }
     }
-    growing_.pop_front();
+    pending_growth_.pop_front();
   }
 }
 
 // Of a look that gives a name. An early one does so by a few seconds of data.
-void EpisodeNames::NoteStrengths(const simulator::LookAnswer& answer) {
+void EpisodeNames::RecordStrengths(const simulator::LookAnswer& answer) {
   known_.clear();
   if (answer.outcome != simulator::LookOutcome::kNamed) {
     return;
@@ -168,14 +168,14 @@ void EpisodeNames::NoteStrengths(const simulator::LookAnswer& answer) {
     const std::int64_t begins_ns =
         std::max(first_ns, detection_ns_ + e.start * PeriodNs());
     if (!answer.early) {
-      NoteStrength(e, e.growing ? answer.stamp_ns
-                                : std::midpoint(begins_ns, answer.stamp_ns));
+      RecordStrength(e, e.growing ? answer.stamp_ns
+                                  : std::midpoint(begins_ns, answer.stamp_ns));
     }
   }
 }
 
-void EpisodeNames::NoteStrength(const simulator::Explanation& e,
-                                std::int64_t stamp_ns) {
+void EpisodeNames::RecordStrength(const simulator::Explanation& e,
+                                  std::int64_t stamp_ns) {
   StrengthPoint& point = strength_points_.emplace_back();
   point.stamp_ns = stamp_ns;
   point.fault = e.fault;
@@ -240,7 +240,7 @@ void EpisodeNames::SetName(FaultSet faults, Unknown unknown) {
 }
 
 // Another name than before is a transition.
-void EpisodeNames::Announce() {
+void EpisodeNames::EmitNameChange() {
   if (verdict_.isolated == faults_) {
     return;
   }
@@ -281,12 +281,12 @@ Transition EpisodeNames::End(Transition closed) {
   }
   looks_.emplace(*physics_);
   suspects_ = false;
-  asked_.clear();
-  Forget();
+  pending_looks_.clear();
+  Reset();
   return closed;
 }
 
-void EpisodeNames::Forget() {
+void EpisodeNames::Reset() {
   own_ = false;
   by_physics_ = false;
   faults_ = 0;
@@ -295,9 +295,9 @@ void EpisodeNames::Forget() {
   look_ns_ = 0;
   look_.reset();
   known_.clear();
-  growing_.clear();
+  pending_growth_.clear();
   strength_points_.clear();
-  kept_.reset();
+  inherited_.reset();
 }
 
 }  // namespace fdi::monitor

@@ -30,7 +30,7 @@ class EpisodeNames {
 
   /// `faults`, by an earlier session's look, name the episode that goes on
   /// until a look of this session has an answer; nothing: none goes on.
-  void Keep(std::optional<FaultSet> faults) { kept_ = faults; }
+  void SetInheritedName(std::optional<FaultSet> faults) { inherited_ = faults; }
 
   /// Takes a sample and the verdict of the engine. @param held nothing is to be
   /// named; see ModelResolver::IsolationHeld().
@@ -53,7 +53,7 @@ class EpisodeNames {
   /// Asks how strong the faults are that the episode is named after by a look
   /// of this session, if it is. TakeStrengths() has the answer at some later
   /// time; it changes no name.
-  void AskGrowth();
+  void RequestGrowth();
 
   /// The strengths that looks have found since the last call, but for the id of
   /// their episode.
@@ -67,13 +67,13 @@ class EpisodeNames {
 
  private:
   // A look that was asked for.
-  struct Asked {
+  struct PendingLook {
     simulator::LookTask task;  // Without its rows.
     std::future<LookWorker::Answer> answer;
   };
 
   // A look for growth.
-  struct Growing {
+  struct PendingGrowth {
     std::int64_t middle_ns;  // Of its rows.
     std::int64_t look_ns;    // Of the look whose faults it knows.
     std::future<LookWorker::Answer> answer;
@@ -81,27 +81,27 @@ class EpisodeNames {
 
   std::optional<simulator::EpisodeName> NameFor(const Verdict& engine,
                                                 bool held);
-  void Ask(simulator::LookTask task);
-  void TakeAnswers();
-  void TakeGrowth();
-  void NoteStrengths(const simulator::LookAnswer& answer);
-  void NoteStrength(const simulator::Explanation& e, std::int64_t stamp_ns);
+  void RequestLook(simulator::LookTask task);
+  void CollectAnswers();
+  void CollectGrowth();
+  void RecordStrengths(const simulator::LookAnswer& answer);
+  void RecordStrength(const simulator::Explanation& e, std::int64_t stamp_ns);
   std::int64_t PeriodNs() const;
   FaultSet SetOf(const std::vector<int>& faults) const;
   void Name(const simulator::LookAnswer& answer, FaultSet faults);
   void SetName(FaultSet faults, Unknown unknown);
   EpisodeLook RecordOf(const simulator::LookAnswer& answer) const;
-  void Announce();
+  void EmitNameChange();
   void WriteName(Transition& transition) const;
-  void Forget();
+  void Reset();
 
   std::string valve_id_;
   std::shared_ptr<const ModelSet> models_;
   LookWorker::Physics physics_;
   LookWorker* worker_;
   std::optional<simulator::ValveLooks> looks_;  // Made anew at an end.
-  std::deque<Asked> asked_;
-  std::optional<FaultSet> kept_;
+  std::deque<PendingLook> pending_looks_;
+  std::optional<FaultSet> inherited_;
   std::int64_t stamp_ns_{0};
   std::int64_t detection_ns_{0};
   bool suspects_{false};
@@ -115,7 +115,7 @@ class EpisodeNames {
   std::int64_t look_ns_{0};  // Of the look that counts, its last row.
   std::optional<EpisodeLook> look_;
   std::vector<simulator::Explanation> known_;  // What it is named after.
-  std::deque<Growing> growing_;
+  std::deque<PendingGrowth> pending_growth_;
   std::vector<StrengthPoint> strength_points_;
   Verdict verdict_;  // With that name.
 };

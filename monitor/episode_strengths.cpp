@@ -12,8 +12,8 @@ namespace fdi::monitor {
 namespace {
 
 constexpr std::int64_t kFirstAge = 450 * kNsPerSecond;
-constexpr std::size_t kMostMinutes = 7;
-constexpr std::size_t kLeastMinutes = 3;
+constexpr std::size_t kMaxMinutes = 7;
+constexpr std::size_t kMinMinutes = 3;
 
 bool Has(FaultSet faults, std::size_t bit) {
   return (faults >> bit & 1U) != 0;
@@ -40,7 +40,7 @@ bool EpisodeStrengths::Step(const Verdict& verdict, bool observed) {
   }
   stamp_ns_ = verdict.stamp_ns;
   if (observed) {
-    Follow(verdict);
+    UpdateTracks(verdict);
   }
   const std::int64_t age_ns = stamp_ns_ - *detection_ns_;
   const bool due = age_ns >= next_age_ns_;
@@ -50,7 +50,7 @@ bool EpisodeStrengths::Step(const Verdict& verdict, bool observed) {
   return due;
 }
 
-void EpisodeStrengths::Follow(const Verdict& verdict) {
+void EpisodeStrengths::UpdateTracks(const Verdict& verdict) {
   std::erase_if(tracks_, [&](const Track& track) {
     return !Has(verdict.isolated, track.bit);
   });
@@ -69,7 +69,7 @@ void EpisodeStrengths::Follow(const Verdict& verdict) {
     }
     minutes.back().sum += verdict.strengths[bit];
     ++minutes.back().samples;
-    if (minutes.size() > kMostMinutes) {
+    if (minutes.size() > kMaxMinutes) {
       minutes.pop_front();
     }
   }
@@ -81,7 +81,7 @@ std::vector<StrengthPoint> EpisodeStrengths::Observed(
   std::vector<StrengthPoint> points;
   for (const auto& [bit, minutes] : tracks_) {
     const auto n = static_cast<double>(minutes.size());
-    if (minutes.size() < kLeastMinutes || !IsFault(models.faults[bit])) {
+    if (minutes.size() < kMinMinutes || !IsFault(models.faults[bit])) {
       continue;
     }
     double mean = 0.0;

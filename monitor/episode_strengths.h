@@ -39,7 +39,7 @@ class EpisodeStrengths {
     std::deque<Minute> minutes{};
   };
 
-  void Follow(const Verdict& verdict);
+  void UpdateTracks(const Verdict& verdict);
 
   std::optional<std::int64_t> detection_ns_{};  // Of the open episode.
   std::int64_t next_age_ns_{0};

@@ -49,7 +49,7 @@ void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
   if (OutOfOrder(verdict.intake)) {
     return;
   }
-  NoteGap(sample, verdict, *models, outlet);
+  RecordGap(sample, verdict, *models, outlet);
   TryRecovery(sample, *models, outlet);
   const int channels = static_cast<int>(models->channels.size());
   const int faults = static_cast<int>(models->faults.size());
@@ -77,7 +77,7 @@ void EpisodeTracker::Take(std::optional<EpisodeLook> look,
                           EpisodeOutlet& outlet) {
   if (look && open_) {
     look->episode_id = open_->episode_id;
-    outlet.Look(std::move(*look));
+    outlet.OnLook(std::move(*look));
   }
 }
 
@@ -86,14 +86,14 @@ void EpisodeTracker::Take(const std::vector<StrengthPoint>& points,
   for (StrengthPoint point : points) {
     if (open_) {
       point.episode_id = open_->episode_id;
-      outlet.Strength(point);
+      outlet.OnStrength(point);
     }
   }
 }
 
 // A stretch without accepted samples is a gap.
-void EpisodeTracker::NoteGap(const Sample& sample, const Verdict& verdict,
-                             const ModelSet& models, EpisodeOutlet& outlet) {
+void EpisodeTracker::RecordGap(const Sample& sample, const Verdict& verdict,
+                               const ModelSet& models, EpisodeOutlet& outlet) {
   if (seen_ && sample.source_id != source_id_) {
     accepted_stamp_ns_ = 0;
   }
@@ -104,8 +104,8 @@ void EpisodeTracker::NoteGap(const Sample& sample, const Verdict& verdict,
   const std::int64_t since = accepted_stamp_ns_;
   if (since != 0 &&
       sample.stamp_ns - since > Ns(kGapPeriods * models.sample_period_s)) {
-    outlet.Gap({valve_id_, since, sample.stamp_ns,
-                rejected_since_ ? "bad_input" : "stream"});
+    outlet.OnGap({valve_id_, since, sample.stamp_ns,
+                  rejected_since_ ? "bad_input" : "stream"});
   }
   accepted_stamp_ns_ = sample.stamp_ns;
   rejected_since_ = false;
@@ -116,8 +116,8 @@ void EpisodeTracker::TryRecovery(const Sample& sample, const ModelSet& models,
   if (!std::exchange(seen_, true)) {
     first_stamp_ns_ = sample.stamp_ns;
     if (recovered_ && sample.stamp_ns > recovered_->last_stamp_ns) {
-      outlet.Gap({valve_id_, recovered_->last_stamp_ns, sample.stamp_ns,
-                  "monitor_down"});
+      outlet.OnGap({valve_id_, recovered_->last_stamp_ns, sample.stamp_ns,
+                    "monitor_down"});
     }
   }
   if (!recovered_) {
@@ -156,7 +156,7 @@ void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
   event.model_set = episode.model_set;
   event.model_version = episode.model_version;
   event.model_hash = episode.model_hash;
-  outlet.Event(std::move(event));
+  outlet.OnEvent(std::move(event));
 }
 
 void EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
@@ -171,7 +171,7 @@ void EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
     open_->faults = recovered_->faults;
     open_->candidates = recovered_->candidates;
     open_->resumed = true;
-    outlet.Resumed(*recovered_, verdict.stamp_ns);
+    outlet.OnResumed(*recovered_, verdict.stamp_ns);
     recovered_.reset();
     return;
   }
@@ -254,14 +254,14 @@ void EpisodeTracker::Emit(Transition transition,
   event.model_set = models->name;
   event.model_version = models->version;
   event.model_hash = models->content_hash;
-  outlet.Event(std::move(event));
+  outlet.OnEvent(std::move(event));
   if (closed && open_->tracing && !superseded) {
     WriteTrace(true, outlet);
   } else if (closed && open_->tracing) {
     // What is in the trace by now came from the next source.
-    outlet.Evidence({open_->episode_id,
-                     Trace(options_.before_points, Ns(options_.before_s)),
-                     true});
+    outlet.OnEvidence({open_->episode_id,
+                       Trace(options_.before_points, Ns(options_.before_s)),
+                       true});
   }
   if (closed) {
     open_.reset();
@@ -276,10 +276,11 @@ void EpisodeTracker::End(const Transition& closed,
   }
 }
 
-void EpisodeTracker::GiveUpRecovery(std::int64_t now_ns,
+void EpisodeTracker::ExpireRecovery(std::int64_t now_ns,
                                     EpisodeOutlet& outlet) {
   if (recovered_ && !seen_ && now_ns > recovered_->last_stamp_ns) {
-    outlet.Gap({valve_id_, recovered_->last_stamp_ns, now_ns, "monitor_down"});
+    outlet.OnGap(
+        {valve_id_, recovered_->last_stamp_ns, now_ns, "monitor_down"});
   }
   AbandonRecovery(EndReason::kUnknown, outlet);
 }
@@ -297,7 +298,7 @@ void EpisodeTracker::Flush(EpisodeOutlet& outlet) {
 }
 
 void EpisodeTracker::WriteTrace(bool complete, EpisodeOutlet& outlet) {
-  outlet.Evidence({open_->episode_id, trace_.Take(), complete});
+  outlet.OnEvidence({open_->episode_id, trace_.Take(), complete});
   open_->tracing = !complete;
 }
 

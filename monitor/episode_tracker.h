@@ -29,13 +29,13 @@ struct TraceOptions {
 class EpisodeOutlet {
  public:
   virtual ~EpisodeOutlet() = default;
-  virtual void Event(FaultEvent event) = 0;
-  virtual void Evidence(EpisodeTrace trace) = 0;
-  virtual void Look(EpisodeLook look) = 0;
-  virtual void Strength(StrengthPoint point) = 0;
-  virtual void Gap(DataGap gap) = 0;
+  virtual void OnEvent(FaultEvent event) = 0;
+  virtual void OnEvidence(EpisodeTrace trace) = 0;
+  virtual void OnLook(EpisodeLook look) = 0;
+  virtual void OnStrength(StrengthPoint point) = 0;
+  virtual void OnGap(DataGap gap) = 0;
   /// An episode of an earlier session goes on.
-  virtual void Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) = 0;
+  virtual void OnResumed(const OpenEpisode& episode, std::int64_t stamp_ns) = 0;
 };
 
 /// Turns what the engine of one valve says into the episodes of that valve:
@@ -74,7 +74,7 @@ class EpisodeTracker {
 
   /// The samples stay away: closes what was to be resumed, with `unknown`.
   /// @param now_ns UTC, the end of the gap if none came at all.
-  void GiveUpRecovery(std::int64_t now_ns, EpisodeOutlet& outlet);
+  void ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet);
 
   /// Closes what was to be resumed.
   void AbandonRecovery(EndReason reason, EpisodeOutlet& outlet);
@@ -98,8 +98,8 @@ class EpisodeTracker {
     std::vector<FaultCandidate> candidates;
   };
 
-  void NoteGap(const Sample& sample, const Verdict& verdict,
-               const ModelSet& models, EpisodeOutlet& outlet);
+  void RecordGap(const Sample& sample, const Verdict& verdict,
+                 const ModelSet& models, EpisodeOutlet& outlet);
   void TryRecovery(const Sample& sample, const ModelSet& models,
                    EpisodeOutlet& outlet);
   void CloseRecovered(EndReason reason, std::int64_t stamp_ns,

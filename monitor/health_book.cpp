@@ -112,8 +112,8 @@ void HealthBook::Add(const Sample& sample, const Verdict& verdict,
   }
 }
 
-void HealthBook::TakeInto(const std::string& valve_id,
-                          std::vector<HealthHour>& hours) {
+void HealthBook::DrainInto(const std::string& valve_id,
+                           std::vector<HealthHour>& hours) {
   for (HealthHour& hour : hours_) {
     hour.valve_id = valve_id;
     hours.push_back(std::move(hour));

@@ -44,7 +44,7 @@ class HealthBook {
            double period_s);
 
   /// Appends what was added since the last call.
-  void TakeInto(const std::string& valve_id, std::vector<HealthHour>& hours);
+  void DrainInto(const std::string& valve_id, std::vector<HealthHour>& hours);
   std::size_t rows() const { return hours_.size(); }
 
  private:

@@ -14,7 +14,7 @@
 namespace fdi::monitor {
 namespace {
 
-constexpr double kLeastLiveHours = 1.0;  // A day needs this many.
+constexpr double kMinLiveHours = 1.0;  // A day needs this many.
 constexpr double kCoveredShare = 0.2;
 
 using Kind = HealthLimit::Kind;
@@ -254,7 +254,7 @@ HealthSeries SeriesOf(std::span<const HealthHour> all,
   }
   std::vector<Cell> usable = cells.Usable();
   std::erase_if(usable, [&live](const Cell& cell) {
-    return live[cell.day] < kLeastLiveHours;
+    return live[cell.day] < kMinLiveHours;
   });
   series.days = Adjusted(usable);
   return series;

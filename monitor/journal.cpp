@@ -77,7 +77,7 @@ void Journal::Stop() {
   errors.Rethrow();
 }
 
-void Journal::Event(FaultEvent event) {
+void Journal::OnEvent(FaultEvent event) {
   if (event.transition.kind == TransitionKind::kDetected) {
     counters_.Add(Counter::kEpisodes);
   }
@@ -92,11 +92,11 @@ void Journal::Event(FaultEvent event) {
     counters_.Add(Counter::kEventsLost);
   }
   if (!kept || degraded_) {
-    SettleLocked(*pending, false);
+    SetStageLocked(*pending, false);
   }
 }
 
-void Journal::Published(const FaultEvent& event) {
+void Journal::MarkPublished(const FaultEvent& event) {
   auto pending = std::make_shared<Pending>();
   pending->event = event;
   pending->published = Clock::now();
@@ -104,7 +104,7 @@ void Journal::Published(const FaultEvent& event) {
   undelivered_.push_back(std::move(pending));
 }
 
-void Journal::Evidence(EpisodeTrace trace) {
+void Journal::OnEvidence(EpisodeTrace trace) {
   const std::lock_guard lock(mutex_);
   const std::size_t points = trace.trace.size();
   if (trace_points_ + points > options_.max_trace_points) {
@@ -116,17 +116,17 @@ void Journal::Evidence(EpisodeTrace trace) {
   work_.notify_one();
 }
 
-void Journal::Look(EpisodeLook look) {
+void Journal::OnLook(EpisodeLook look) {
   const std::lock_guard lock(mutex_);
   AddLocked(std::move(look));
 }
 
-void Journal::Strength(StrengthPoint point) {
+void Journal::OnStrength(StrengthPoint point) {
   const std::lock_guard lock(mutex_);
   AddLocked(point);
 }
 
-void Journal::Gap(DataGap gap) {
+void Journal::OnGap(DataGap gap) {
   counters_.Add(Counter::kGaps);
   log_.Report(
       LogId::kGap, "data_gap",
@@ -138,7 +138,7 @@ void Journal::Gap(DataGap gap) {
   AddLocked(std::move(gap));
 }
 
-void Journal::Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) {
+void Journal::OnResumed(const OpenEpisode& episode, std::int64_t stamp_ns) {
   log_.Line(LogLevel::kInfo,
             "episode_resumed valve=" + LogValue(episode.valve_id));
   const std::lock_guard lock(mutex_);
@@ -164,7 +164,7 @@ bool Journal::AddLocked(Record record) {
   return true;
 }
 
-void Journal::SettleLocked(Pending& pending, bool committed) {
+void Journal::SetStageLocked(Pending& pending, bool committed) {
   pending.stage =
       committed ? Pending::Stage::kCommitted : Pending::Stage::kFailed;
   unsent_changed_.notify_one();
@@ -286,7 +286,7 @@ bool Journal::WriteBatch(const std::vector<const Record*>& batch) {
     const std::lock_guard lock(mutex_);
     for (const Record* record : batch) {
       if (const auto* event = std::get_if<PendingEvent>(record)) {
-        SettleLocked(**event, committed);
+        SetStageLocked(**event, committed);
       }
     }
   }
@@ -340,14 +340,14 @@ bool Journal::WriteTraces() {
     if (late || !Attempt([&] { history_.AddTrace(*trace); })) {
       counters_.Add(Counter::kTraceDropped, trace->trace.size());
     }
-    if (EventWaits()) {
+    if (HasQueuedEvent()) {
       return WriteRecords();
     }
   }
   return CommitBuffered();
 }
 
-bool Journal::EventWaits() const {
+bool Journal::HasQueuedEvent() const {
   const std::lock_guard lock(mutex_);
   return std::ranges::any_of(records_, [](const Record& record) {
     return std::holds_alternative<PendingEvent>(record);
@@ -382,7 +382,7 @@ void Journal::FailWaitingEvents() {
   const std::lock_guard lock(mutex_);
   for (const Record& record : records_) {
     if (const auto* event = std::get_if<PendingEvent>(&record)) {
-      SettleLocked(**event, false);
+      SetStageLocked(**event, false);
     }
   }
 }
@@ -390,7 +390,8 @@ void Journal::FailWaitingEvents() {
 void Journal::Recovered() {
   degraded_ = false;
   log_.Line(LogLevel::kInfo, "persistence_recovered");
-  Gap({"", degraded_since_ns_, context_.utc_now_ns(), "persistence_degraded"});
+  OnGap(
+      {"", degraded_since_ns_, context_.utc_now_ns(), "persistence_degraded"});
 }
 
 void Journal::PublishAll() {

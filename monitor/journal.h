@@ -64,14 +64,14 @@ class Journal : public EpisodeOutlet {
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
-  void Event(FaultEvent event) override;
-  void Evidence(EpisodeTrace trace) override;
-  void Look(EpisodeLook look) override;
-  void Strength(StrengthPoint point) override;
-  void Gap(DataGap gap) override;
-  void Resumed(const OpenEpisode& episode, std::int64_t stamp_ns) override;
+  void OnEvent(FaultEvent event) override;
+  void OnEvidence(EpisodeTrace trace) override;
+  void OnLook(EpisodeLook look) override;
+  void OnStrength(StrengthPoint point) override;
+  void OnGap(DataGap gap) override;
+  void OnResumed(const OpenEpisode& episode, std::int64_t stamp_ns) override;
   /// `event` was published before Start(): marks it as sent once that is due.
-  void Published(const FaultEvent& event);
+  void MarkPublished(const FaultEvent& event);
   /// Commits `checkpoint`, merged with one that is still waiting.
   void Commit(Checkpoint checkpoint);
 
@@ -118,7 +118,7 @@ class Journal : public EpisodeOutlet {
 
   // Used by callers. Functions named Locked require mutex_.
   bool AddLocked(Record record);
-  void SettleLocked(Pending& pending, bool committed);
+  void SetStageLocked(Pending& pending, bool committed);
 
   // Used by the history thread.
   void Write();
@@ -127,7 +127,7 @@ class Journal : public EpisodeOutlet {
   bool WriteBatch(const std::vector<const Record*>& batch);
   bool WriteCheckpoint();
   bool WriteTraces();
-  bool EventWaits() const;
+  bool HasQueuedEvent() const;
   bool CommitBuffered();
   bool Attempt(const std::function<void()>& call);
   void FailWaitingEvents();

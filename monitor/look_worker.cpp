@@ -46,7 +46,7 @@ std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
   if (same != waiting.end()) {
     same->answer.set_value(std::nullopt);
     *same = std::move(look);
-  } else if (waiting.size() < (naming ? capacity_ : kMostRoutine)) {
+  } else if (waiting.size() < (naming ? capacity_ : kMaxRoutineLooks)) {
     waiting.push_back(std::move(look));
     arrival_.notify_one();
   } else {

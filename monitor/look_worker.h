@@ -71,7 +71,7 @@ class LookWorker {
 
   MonitorContext context_;
   // 27 kB each: what 2000 valves that start at once ask for.
-  static constexpr std::size_t kMostRoutine = 2000;
+  static constexpr std::size_t kMaxRoutineLooks = 2000;
   const std::size_t capacity_;
   std::stop_source stop_;
   mutable std::mutex mutex_;  // Guards what follows.

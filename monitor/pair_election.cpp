@@ -13,28 +13,29 @@ PairElection::PairElection(PairState self, Duration patience,
       stepped_(now),
       listen_until_(now + listening) {}
 
-bool PairElection::Heard(const PairState& word, TimePoint now) {
-  if (word.pair != self_.pair || word.instance == self_.instance) {
+bool PairElection::OnState(const PairState& state, TimePoint now) {
+  if (state.pair != self_.pair || state.instance == self_.instance) {
     return false;
   }
   const auto [found, fresh] =
-      heard_.try_emplace(word.instance, Other{word, now, now, std::nullopt});
-  Other& other = found->second;
-  if (word.received != other.word.received) {
-    other.received = now;
-    other.deaf_since.reset();
+      peers_.try_emplace(state.instance, Peer{state, now, now, std::nullopt});
+  Peer& peer = found->second;
+  if (state.received != peer.state.received) {
+    peer.received = now;
+    peer.lagging_since.reset();
   }
-  other.word = word;
-  other.heard = now;
+  peer.state = state;
+  peer.heard = now;
   return true;
 }
 
 // A leader that receives nothing while we do is alive and yet has nothing to
 // publish. Samples often come in bursts, so ours may arrive somewhat before or
 // after the leader's: only a lag of more than half the patience counts.
-bool PairElection::Sound(const Other& other, TimePoint now) const {
-  const bool deaf = other.deaf_since && now - *other.deaf_since > patience_;
-  return !other.word.leaving && now - other.heard <= patience_ && !deaf;
+bool PairElection::IsHealthy(const Peer& peer, TimePoint now) const {
+  const bool lagging =
+      peer.lagging_since && now - *peer.lagging_since > patience_;
+  return !peer.state.leaving && now - peer.heard <= patience_ && !lagging;
 }
 
 bool PairElection::Better(const PairState& a, const PairState& b) {
@@ -44,35 +45,35 @@ bool PairElection::Better(const PairState& a, const PairState& b) {
 
 void PairElection::Step(std::uint64_t received, int judged, TimePoint now) {
   if (now - std::exchange(stepped_, now) > patience_) {
-    Lapse(now);
+    OnLeaseExpired(now);
   }
   if (std::exchange(self_.received, received) != received) {
-    for (auto& [instance, other] : heard_) {
-      if (!other.deaf_since && now - other.received > patience_ / 2) {
-        other.deaf_since = now;
+    for (auto& [instance, peer] : peers_) {
+      if (!peer.lagging_since && now - peer.received > patience_ / 2) {
+        peer.lagging_since = now;
       }
     }
   }
   self_.judged = judged;
   leader_.clear();
-  twin_.clear();
+  same_rank_.clear();
   others_ = 0;
   int better = 0;
   const PairState* rival = nullptr;
-  for (const auto& [instance, other] : heard_) {
-    if (!Sound(other, now)) {
+  for (const auto& [instance, peer] : peers_) {
+    if (!IsHealthy(peer, now)) {
       continue;
     }
     ++others_;
-    better += Better(other.word, self_) ? 1 : 0;
-    if (other.word.rank == self_.rank) {
-      twin_ = other.word.monitor;
+    better += Better(peer.state, self_) ? 1 : 0;
+    if (peer.state.rank == self_.rank) {
+      same_rank_ = peer.state.monitor;
     }
-    if (other.word.leads && (rival == nullptr || Better(other.word, *rival))) {
-      rival = &other.word;
+    if (peer.state.leads && (rival == nullptr || Better(peer.state, *rival))) {
+      rival = &peer.state;
     }
   }
-  std::erase_if(heard_, [&](const auto& each) {
+  std::erase_if(peers_, [&](const auto& each) {
     return now - each.second.heard > 100 * patience_;
   });
   if (self_.leaving || (rival != nullptr && Better(*rival, self_))) {
@@ -91,12 +92,12 @@ void PairElection::Step(std::uint64_t received, int judged, TimePoint now) {
   }
 }
 
-void PairElection::Lapse(TimePoint now) {
+void PairElection::OnLeaseExpired(TimePoint now) {
   self_.leads = false;
   listen_until_ = now + patience_;
 }
 
-void PairElection::Leave(TimePoint now) {
+void PairElection::StepDown(TimePoint now) {
   Step(self_.received, self_.judged, now);
   if (others_ > 0) {
     self_.leaving = true;

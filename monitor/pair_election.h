@@ -40,7 +40,7 @@ class PairElection {
 
   /// Takes a message of a monitor. @returns false if it is ignored because it
   /// belongs to another pair or is our own.
-  bool Heard(const PairState& word, TimePoint now);
+  bool OnState(const PairState& state, TimePoint now);
 
   /// Reports progress of the diagnosis. Call several times within `patience`.
   /// @param received samples so far. @param judged valves at present.
@@ -48,10 +48,10 @@ class PairElection {
 
   /// The lease has run out, so another monitor may lead by now: stands by and
   /// listens first.
-  void Lapse(TimePoint now);
+  void OnLeaseExpired(TimePoint now);
 
   /// Announces that this monitor leaves, if another one can take over.
-  void Leave(TimePoint now);
+  void StepDown(TimePoint now);
 
   bool leads() const { return self_.leads; }
   /// The own state, as of the last call.
@@ -61,18 +61,18 @@ class PairElection {
   /// Number of other monitors that are alive.
   int others() const { return others_; }
   /// Another monitor with the same rank; empty if there is none.
-  const std::string& twin() const { return twin_; }
+  const std::string& same_rank() const { return same_rank_; }
 
  private:
-  struct Other {
-    PairState word;
+  struct Peer {
+    PairState state;
     TimePoint heard;     // When the last message came,
     TimePoint received;  // and the last with new samples.
     // Since when we have been receiving samples that it has not.
-    std::optional<TimePoint> deaf_since;
+    std::optional<TimePoint> lagging_since;
   };
 
-  bool Sound(const Other& other, TimePoint now) const;
+  bool IsHealthy(const Peer& peer, TimePoint now) const;
   static bool Better(const PairState& a, const PairState& b);
 
   PairState self_;
@@ -80,9 +80,9 @@ class PairElection {
   TimePoint stepped_;
   TimePoint listen_until_;
   std::optional<TimePoint> leaderless_;
-  std::map<std::uint64_t, Other> heard_;  // By instance.
+  std::map<std::uint64_t, Peer> peers_;  // By instance.
   std::string leader_;
-  std::string twin_;
+  std::string same_rank_;
   int others_{0};
 };
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kMaxIdLength = 64;
 constexpr std::size_t kRememberedRefusals = 65536;
-constexpr std::chrono::milliseconds kTendPeriod{250};
+constexpr std::chrono::milliseconds kPollPeriod{250};
 constexpr std::uint64_t kBeatSamples = 64;
 
 // Indexed by Intake.
@@ -68,7 +68,7 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
               ? nullptr
               : std::make_unique<Recorder>(
                     *sinks.samples, context, options_.recorder,
-                    [this](DataGap gap) { journal_.Gap(std::move(gap)); })),
+                    [this](DataGap gap) { journal_.OnGap(std::move(gap)); })),
       shadow_(options_.shadow.candidate
                   ? std::make_unique<ShadowBank>(options_.shadow, log_)
                   : nullptr),
@@ -99,7 +99,7 @@ void Pipeline::Start(const std::vector<OpenEpisode>& open,
   if (shadow_) {
     shadow_->Restore(std::move(shadow_accumulators));
   }
-  last_tended_ = last_checkpoint_ = std::chrono::steady_clock::now();
+  last_poll_ = last_checkpoint_ = std::chrono::steady_clock::now();
   Recover(open);
   started_ = true;
   journal_.Start();
@@ -127,7 +127,7 @@ void Pipeline::Recover(const std::vector<OpenEpisode>& episodes) {
     tracker.AbandonRecovery(EndReason::kUnknown, journal_);
   }
   if (!recovered_.empty()) {
-    recovery_deadline_ = last_tended_ + options_.recovery_window;
+    recovery_deadline_ = last_poll_ + options_.recovery_window;
   }
 }
 
@@ -137,7 +137,7 @@ void Pipeline::Stop() {
   }
   FirstError errors;
   errors.Try([this] {
-    TendSilent(std::chrono::steady_clock::now());
+    CheckSilentValves(std::chrono::steady_clock::now());
     for (const std::unique_ptr<Valve>& valve : valves_) {
       valve->monitor.Flush(journal_);
     }
@@ -174,7 +174,7 @@ Pipeline::Valve* Pipeline::Admit(std::string_view valve_id) {
   const auto places = static_cast<std::size_t>(options_.max_valves);
   const bool is_known = reserved_.contains(valve_id);
   const std::size_t kept = is_known ? 0 : reserved_.size();
-  if (valves_.size() + kept < places || FreePlace(is_known)) {
+  if (valves_.size() + kept < places || FreeSlot(is_known)) {
     return &AddValve(valve_id);
   }
   return Refuse(valve_id, valves_.size() < places ? "reserved" : "max_valves");
@@ -190,38 +190,38 @@ void Pipeline::Reserve(const std::string& valve_id) {
 }
 
 // Only unknown valves without an open episode can be evicted.
-bool Pipeline::MayGiveUp(const Valve& valve) const {
+bool Pipeline::IsEvictable(const Valve& valve) const {
   return !valve.known && !valve.monitor.episode_open();
 }
 
 // Evicts an unknown valve that is silent or, in favour of a known valve, the
 // one that has been silent longest. @returns whether a slot was freed.
-bool Pipeline::FreePlace(bool for_known) {
-  const TimePoint now = last_tended_;
+bool Pipeline::FreeSlot(bool for_known) {
+  const TimePoint now = last_poll_;
   while (!idle_.empty()) {
     Valve* const valve = idle_.back();
     idle_.pop_back();
-    if (MayGiveUp(*valve) &&
+    if (IsEvictable(*valve) &&
         valve->monitor.Silence(now) >= options_.place_timeout) {
-      GiveUp(*valve);
+      Evict(*valve);
       return true;
     }
   }
   Valve* longest = nullptr;
   for (const std::unique_ptr<Valve>& valve : valves_) {
-    if (for_known && MayGiveUp(*valve) &&
+    if (for_known && IsEvictable(*valve) &&
         (longest == nullptr ||
          valve->monitor.Silence(now) > longest->monitor.Silence(now))) {
       longest = valve.get();
     }
   }
   if (longest != nullptr) {
-    GiveUp(*longest);
+    Evict(*longest);
   }
   return longest != nullptr;
 }
 
-void Pipeline::GiveUp(Valve& valve) {
+void Pipeline::Evict(Valve& valve) {
   const std::string id = valve.monitor.id();
   log_.Line(LogLevel::kDebug, "valve_forgotten valve=" + id);
   Checkpoint checkpoint;
@@ -233,7 +233,7 @@ void Pipeline::GiveUp(Valve& valve) {
   }
   journal_.Commit(std::move(checkpoint));
   if (live_ != nullptr) {
-    live_->Forget(id);
+    live_->Remove(id);
   }
   {
     const std::lock_guard lock(mutex_);
@@ -312,8 +312,8 @@ bool Pipeline::Resolve(const std::string& valve_id,
   return true;
 }
 
-void Pipeline::Offer(std::string_view valve_id, const Sample& sample,
-                     std::uint64_t writer, TimePoint received) {
+void Pipeline::OnSample(std::string_view valve_id, const Sample& sample,
+                        std::uint64_t writer, TimePoint received) {
   if (offered_++ % kBeatSamples == 0) {
     pulse_.Beat();
   }
@@ -322,7 +322,7 @@ void Pipeline::Offer(std::string_view valve_id, const Sample& sample,
   if (valve == nullptr) {
     return;
   }
-  if (!valve->monitor.WithinShare(sample, received)) {
+  if (!valve->monitor.WithinRateLimit(sample, received)) {
     counters_.Add(Counter::kOverShare);
     log_.Report(LogId::kOverShare, "sample_rejected", [valve] {
       return "reason=over_share valve=" + valve->monitor.id();
@@ -352,7 +352,7 @@ void Pipeline::Offer(std::string_view valve_id, const Sample& sample,
   }
 }
 
-void Pipeline::OfferEnd(std::string_view valve_id, std::uint64_t writer) {
+void Pipeline::OnStreamEnded(std::string_view valve_id, std::uint64_t writer) {
   // The end of a stream that was never seen evicts no valve.
   const bool expected =
       by_id_.contains(valve_id) || reserved_.contains(valve_id);
@@ -382,7 +382,7 @@ void Pipeline::Adopt(FaultEvent event) {
     return;
   }
   event.models = parts->plan->shared_models();
-  journal_.Event(event);
+  journal_.OnEvent(event);
   if (const auto found = by_id_.find(event.valve_id); found != by_id_.end()) {
     found->second->monitor.Adopt(event);
     return;
@@ -396,7 +396,7 @@ void Pipeline::Adopt(FaultEvent event) {
     return;
   }
   recovered_.insert_or_assign(event.valve_id, OpenEpisodeOf(event));
-  recovery_deadline_ = last_tended_ + options_.recovery_window;
+  recovery_deadline_ = last_poll_ + options_.recovery_window;
   Reserve(event.valve_id);
 }
 
@@ -458,19 +458,19 @@ void Pipeline::FlushDecisions() {
   }
 }
 
-void Pipeline::Tend(TimePoint now) {
+void Pipeline::Poll(TimePoint now) {
   pulse_.Beat();
   AdoptNextResolver();
   FlushDecisions();
-  if (decisions_.WantsLast()) {
+  if (decisions_.LastValuesDue()) {
     PublishLast();
   }
-  if (now - last_tended_ >= kTendPeriod) {
-    last_tended_ = now;
+  if (now - last_poll_ >= kPollPeriod) {
+    last_poll_ = now;
     for (const std::unique_ptr<Valve>& valve : valves_) {
-      TendDrift(*valve);
+      UpdateDrift(*valve);
     }
-    TendSilent(now);
+    CheckSilentValves(now);
   }
   if (now - last_checkpoint_ >= options_.checkpoint_period) {
     last_checkpoint_ = now;
@@ -478,12 +478,12 @@ void Pipeline::Tend(TimePoint now) {
   }
 }
 
-void Pipeline::TendDrift(Valve& valve) {
+void Pipeline::UpdateDrift(Valve& valve) {
   valve.monitor.ReadDrift(drift_);
   valve.drift_used = 0.0;
   for (std::size_t c = 0; c < drift_.size(); ++c) {
     valve.drift_used = std::max(valve.drift_used, drift_[c].used());
-    ReportFull(valve, c, drift_[c]);
+    ReportDriftAtBound(valve, c, drift_[c]);
   }
   if (live_ != nullptr && !drift_.empty()) {
     live_->ShowDrift(valve.monitor.id(), drift_);
@@ -492,8 +492,8 @@ void Pipeline::TendDrift(Valve& valve) {
 
 // Once, as it stays so for days. Not by Report(), which would leave out another
 // valve that gets there within its interval.
-void Pipeline::ReportFull(Valve& valve, std::size_t channel,
-                          const FollowedDrift& drift) {
+void Pipeline::ReportDriftAtBound(Valve& valve, std::size_t channel,
+                                  const FollowedDrift& drift) {
   const auto report = [&](std::size_t place, bool full, const char* direction,
                           double followed) {
     if (full && !valve.drift_full[place]) {
@@ -512,15 +512,15 @@ void Pipeline::ReportFull(Valve& valve, std::size_t channel,
          std::exp(drift.log_scale));
 }
 
-void Pipeline::TendSilent(TimePoint now) {
+void Pipeline::CheckSilentValves(TimePoint now) {
   idle_.clear();
   Checkpoint full;  // Of valves that are running out of rows.
   for (const std::unique_ptr<Valve>& valve : valves_) {
     ValveMonitor& monitor = valve->monitor;
-    if (monitor.book_rows() >= kMostBookRows / 2) {
+    if (monitor.book_rows() >= kMaxBookRows / 2) {
       monitor.TakeCheckpoint(full);
     }
-    if (MayGiveUp(*valve) && monitor.Silence(now) >= options_.place_timeout) {
+    if (IsEvictable(*valve) && monitor.Silence(now) >= options_.place_timeout) {
       idle_.push_back(valve.get());
     }
     if (monitor.CheckStale(now)) {
@@ -536,27 +536,27 @@ void Pipeline::TendSilent(TimePoint now) {
   }
   if (recovery_deadline_ && now >= *recovery_deadline_) {
     recovery_deadline_.reset();
-    GiveUpRecovery();
+    ExpireRecovery();
   }
   if (!full.empty()) {
     journal_.Commit(std::move(full));
   }
-  TakeCensus();
+  UpdateCensus();
 }
 
-void Pipeline::GiveUpRecovery() {
+void Pipeline::ExpireRecovery() {
   const std::int64_t now_ns = context_.utc_now_ns();
   for (const std::unique_ptr<Valve>& valve : valves_) {
-    valve->monitor.GiveUpRecovery(now_ns, journal_);
+    valve->monitor.ExpireRecovery(now_ns, journal_);
   }
   for (const auto& [id, episode] : std::exchange(recovered_, {})) {
     EpisodeTracker tracker(id, options_.trace);
     tracker.Recover(episode);
-    tracker.GiveUpRecovery(now_ns, journal_);
+    tracker.ExpireRecovery(now_ns, journal_);
   }
 }
 
-void Pipeline::TakeCensus() {
+void Pipeline::UpdateCensus() {
   ValveCensus census;
   for (const std::unique_ptr<Valve>& valve : valves_) {
     const ValveMonitor& monitor = valve->monitor;

@@ -72,7 +72,7 @@ struct ValveCensus {
 /// at the subscriber, which then stops receiving, so nothing is dropped and no
 /// thread is needed to move samples.
 ///
-///     diagnosis thread: Offer() -> engine -> decision vectors
+///     diagnosis thread: OnSample() -> engine -> decision vectors
 ///                                    |-> Journal: history thread, publisher
 ///                                    |-> Recorder: recorder thread
 ///                                    \-> LookWorker, which answers later
@@ -100,28 +100,28 @@ class Pipeline {
 
   /// Reports that `event`, of an earlier session, was published. Before
   /// Start().
-  void Published(const FaultEvent& event) { journal_.Published(event); }
+  void MarkPublished(const FaultEvent& event) { journal_.MarkPublished(event); }
 
   /// Processes a received sample. @param writer its DDS writer.
-  void Offer(std::string_view valve_id, const Sample& sample,
-             std::uint64_t writer,
-             TimePoint received = std::chrono::steady_clock::now());
+  void OnSample(std::string_view valve_id, const Sample& sample,
+                std::uint64_t writer,
+                TimePoint received = std::chrono::steady_clock::now());
   /// Another monitor of the same valves raised an event that this one did not:
   /// records it and, if its episode is open, continues that here.
   void Adopt(FaultEvent event);
   /// True while nothing of this valve is judged, at first or after a restart.
   bool IsSettling(const std::string& valve_id) const;
   /// The writer ended the stream of the valve.
-  void OfferEnd(std::string_view valve_id, std::uint64_t writer);
+  void OnStreamEnded(std::string_view valve_id, std::uint64_t writer);
 
   /// Periodic work: silent valves, checkpoints, new subscribers, changed
   /// assignments. Call about ten times a second, even under load. @param now
   /// all samples received earlier have been offered.
-  void Tend(TimePoint now = std::chrono::steady_clock::now());
-  /// Sends the decision vectors that the sink has buffered, as Tend() does.
+  void Poll(TimePoint now = std::chrono::steady_clock::now());
+  /// Sends the decision vectors that the sink has buffered, as Poll() does.
   void FlushDecisions();
 
-  /// Has all valves use `resolver` from the next Tend() on: the change falls
+  /// Has all valves use `resolver` from the next Poll() on: the change falls
   /// between two samples, of which none is lost or diagnosed twice. Thread
   /// safe.
   void Reassign(std::shared_ptr<const ModelResolver> resolver);
@@ -139,7 +139,7 @@ class Pipeline {
     return journal_.failed() || (recorder_ && recorder_->failed()) ||
            (looks_ && looks_->failed());
   }
-  ValveCensus census() const;                    ///< As of the last Tend().
+  ValveCensus census() const;                    ///< As of the last Poll().
   std::vector<std::string> valve_names() const;  ///< Of all valves seen.
   /// Counts of the candidate; null without one.
   const ShadowCounts* shadow_counts() const {
@@ -173,9 +173,9 @@ class Pipeline {
   Valve* Admit(std::string_view valve_id);
   Valve* Refuse(std::string_view valve_id, const char* reason);
   void Reserve(const std::string& valve_id);
-  bool FreePlace(bool for_known);
-  void GiveUp(Valve& valve);
-  bool MayGiveUp(const Valve& valve) const;
+  bool FreeSlot(bool for_known);
+  void Evict(Valve& valve);
+  bool IsEvictable(const Valve& valve) const;
   Valve& AddValve(std::string_view valve_id);
   bool Resolve(const std::string& valve_id, std::optional<EngineParts>& parts);
   void Count(const Valve& valve, const Sample& sample,
@@ -183,12 +183,12 @@ class Pipeline {
   void Publish(const Valve& valve, const ValveOutcome& outcome);
   void Recover(const std::vector<OpenEpisode>& episodes);
   void AdoptNextResolver();
-  void TendDrift(Valve& valve);
-  void ReportFull(Valve& valve, std::size_t channel,
-                  const FollowedDrift& drift);
-  void TendSilent(TimePoint now);
-  void GiveUpRecovery();
-  void TakeCensus();
+  void UpdateDrift(Valve& valve);
+  void ReportDriftAtBound(Valve& valve, std::size_t channel,
+                          const FollowedDrift& drift);
+  void CheckSilentValves(TimePoint now);
+  void ExpireRecovery();
+  void UpdateCensus();
   void PublishLast();
   void TakeCheckpoint();
 
@@ -209,8 +209,8 @@ class Pipeline {
   std::unordered_map<std::string, Valve*, Hash, std::equal_to<>> by_id_;
   // Known valves without a slot yet; unknown ones leave that many slots free.
   std::unordered_set<std::string, Hash, std::equal_to<>> reserved_;
-  std::vector<Valve*> idle_;  // Silent unknown valves, as of the last Tend().
-  std::vector<FollowedDrift> drift_;         // Of the valve at hand in Tend().
+  std::vector<Valve*> idle_;  // Silent unknown valves, as of the last Poll().
+  std::vector<FollowedDrift> drift_;         // Of the valve at hand in Poll().
   std::unordered_set<std::size_t> refused_;  // Hashes of ids.
   std::unordered_map<std::string, OpenEpisode> recovered_;
   std::unordered_map<std::string, Accumulator> accumulators_;
@@ -219,7 +219,7 @@ class Pipeline {
   bool started_{false};
   Pulse pulse_;
   std::uint64_t offered_{0};
-  TimePoint last_tended_;
+  TimePoint last_poll_;
   TimePoint last_checkpoint_;
 
   mutable std::mutex mutex_;  // Guards what follows.

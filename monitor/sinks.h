@@ -69,7 +69,7 @@ class DecisionSink {
 
   /// True once the first subscribers arrive: PublishLast() is due for every
   /// valve, and nothing is sent to them before.
-  virtual bool WantsLast() { return false; }
+  virtual bool LastValuesDue() { return false; }
   /// Publishes a vector that Publish() accepted without subscribers.
   virtual void PublishLast(const std::string& /*valve_id*/,
                            const ModelSet* /*models*/,
@@ -165,7 +165,7 @@ class LiveSink {
   virtual void ShowDrift(const std::string& /*valve_id*/,
                          std::span<const FollowedDrift> /*drift*/) {}
   /// The valve was evicted and is not shown any more.
-  virtual void Forget(const std::string& /*valve_id*/) {}
+  virtual void Remove(const std::string& /*valve_id*/) {}
 };
 
 }  // namespace fdi::monitor

@@ -28,8 +28,8 @@ std::uint32_t PackQuality(const Sample& sample) {
 // Rotates a ring of rows of `columns` values so that its oldest row, at
 // `first`, comes to the front, and resizes it to `rows`.
 template <typename T>
-void Straighten(std::vector<T>& ring, std::size_t first, std::size_t columns,
-                std::size_t rows) {
+void Linearize(std::vector<T>& ring, std::size_t first, std::size_t columns,
+               std::size_t rows) {
   std::rotate(ring.begin(),
               ring.begin() + static_cast<std::ptrdiff_t>(first * columns),
               ring.end());
@@ -67,10 +67,10 @@ void Trace::Begin(const Sample& sample, const Verdict& verdict, int channels,
 void Trace::Grow() {
   const std::size_t rows =
       std::min(capacity_, std::max(kFirstGrowth, 2 * heads_.size()));
-  Straighten(heads_, first_, 1, rows);
-  Straighten(values_, first_, layout_.signal_count, rows);
-  Straighten(residuals_, first_, layout_.channels, rows);
-  Straighten(factors_, first_, layout_.faults + 1, rows);
+  Linearize(heads_, first_, 1, rows);
+  Linearize(values_, first_, layout_.signal_count, rows);
+  Linearize(residuals_, first_, layout_.channels, rows);
+  Linearize(factors_, first_, layout_.faults + 1, rows);
   first_ = 0;
 }
 

@@ -9,12 +9,12 @@ namespace fdi::monitor {
 namespace {
 
 constexpr double kStalePeriods = 3.0;
-constexpr double kSharePerSample = 0.5;
-constexpr double kSharePerSecond = 5.0;
+constexpr double kTokensPerSample = 0.5;
+constexpr double kTokensPerSecond = 5.0;
 // Bounds of the period of a valve without a model set, measured from its
 // samples.
-constexpr std::int64_t kShortestNs = 1'000'000;
-constexpr std::int64_t kLongestNs = 3'600'000'000'000;
+constexpr std::int64_t kMinPeriodNs = 1'000'000;
+constexpr std::int64_t kMaxPeriodNs = 3'600'000'000'000;
 
 std::shared_ptr<const ModelSet> ModelsOf(
     const std::optional<EngineParts>& parts) {
@@ -43,7 +43,7 @@ void ValveMonitor::Recover(const OpenEpisode& episode) {
   tracker_.Recover(episode);
   if (names_ && episode.layer == Layer::kPhysics &&
       episode.model_hash == models_->content_hash) {
-    names_->Keep(episode.faults);
+    names_->SetInheritedName(episode.faults);
   }
 }
 
@@ -57,30 +57,32 @@ void ValveMonitor::NameEpisodes() {
                    : nullptr;
 }
 
-bool ValveMonitor::BeginsAnew(const Sample& sample) const {
+bool ValveMonitor::RestartsEngine(const Sample& sample) const {
   const std::int64_t moved = sample.stamp_ns - stamp_ns_;
   const std::int64_t longest =
       models_ ? std::llround(kStalePeriods * models_->sample_period_s * 1e9)
-              : kLongestNs;
+              : kMaxPeriodNs;
   return sample.source_id != source_id_ || sample.epoch != epoch_ ||
          moved <= 0 || moved > longest;
 }
 
-bool ValveMonitor::WithinShare(const Sample& sample, TimePoint received) {
-  if (!BeginsAnew(sample)) {
-    share_ = std::min(share_ + kSharePerSample, kFullShare);
+bool ValveMonitor::WithinRateLimit(const Sample& sample, TimePoint received) {
+  if (!RestartsEngine(sample)) {
+    restart_tokens_ =
+        std::min(restart_tokens_ + kTokensPerSample, kMaxRestartTokens);
     return true;
   }
-  const std::chrono::duration<double> since = received - share_at_;
-  share_at_ = received;
-  share_ = std::min(share_ + kSharePerSecond * std::max(since.count(), 0.0),
-                    kFullShare);
-  return share_ >= 1.0;
+  const std::chrono::duration<double> since = received - tokens_at_;
+  tokens_at_ = received;
+  restart_tokens_ = std::min(
+      restart_tokens_ + kTokensPerSecond * std::max(since.count(), 0.0),
+      kMaxRestartTokens);
+  return restart_tokens_ >= 1.0;
 }
 
-void ValveMonitor::Place(const Sample& sample) {
-  // Before the update: BeginsAnew() compares with the previous sample.
-  share_ -= BeginsAnew(sample) ? 1.0 : 0.0;
+void ValveMonitor::RecordPosition(const Sample& sample) {
+  // Before the update: RestartsEngine() compares with the previous sample.
+  restart_tokens_ -= RestartsEngine(sample) ? 1.0 : 0.0;
   source_id_ = sample.source_id;
   stamp_ns_ = sample.stamp_ns;
   epoch_ = sample.epoch;
@@ -98,19 +100,19 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     writer_ = writer;
     if (!first && sample.stamp_ns > unassigned_.stamp_ns) {
       unassigned_interval_ns_ = std::clamp(
-          sample.stamp_ns - unassigned_.stamp_ns, kShortestNs, kLongestNs);
+          sample.stamp_ns - unassigned_.stamp_ns, kMinPeriodNs, kMaxPeriodNs);
     }
     unassigned_.stamp_ns = sample.stamp_ns;
     unassigned_.source_id = sample.source_id;
     unassigned_.seq = sample.seq;
-    Place(sample);
+    RecordPosition(sample);
     coverage_.Add(sample.stamp_ns, Quality::kUnassigned);
     health_.Add(sample, unassigned_, nullptr, period_s());
     return {unassigned_, nullptr, swapped, isolation_held_, 0};
   }
   RestoreOnce(sample.source_id);
   if (names_ && !tracker_.recovering() && !engine_->episode_open()) {
-    names_->Keep(std::nullopt);
+    names_->SetInheritedName(std::nullopt);
   }
   const Verdict& engine = engine_->Step(sample);
   const Verdict& verdict =
@@ -118,7 +120,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   engine_->Suspect(names_ && names_->suspects());
   answer_ = &verdict;
   if (CountsAsTime(verdict)) {
-    Place(sample);
+    RecordPosition(sample);
     coverage_.Add(sample.stamp_ns, verdict.quality, 1,
                   verdict.intake == Intake::kAccepted);
     health_.Add(sample, verdict, models_.get(), period_s());
@@ -140,7 +142,7 @@ void ValveMonitor::FollowStrengths(const Verdict& verdict,
   const bool by_physics = names_ && names_->by_physics();
   if (strengths_.Step(verdict, !by_physics)) {
     if (by_physics) {
-      names_->AskGrowth();
+      names_->RequestGrowth();
     } else {
       tracker_.Take(strengths_.Observed(*models_), outlet);
     }
@@ -165,8 +167,8 @@ void ValveMonitor::HoldIsolation(bool hold) {
 }
 
 void ValveMonitor::TakeCheckpoint(Checkpoint& checkpoint) {
-  coverage_.TakeInto(id_, period_s(), checkpoint.coverage);
-  health_.TakeInto(id_, checkpoint.health);
+  coverage_.DrainInto(id_, period_s(), checkpoint.coverage);
+  health_.DrainInto(id_, checkpoint.health);
   if (engine_ && seen_ && !stale_ && !ended_) {
     checkpoint.accumulators.push_back(
         {id_, source_id_, models_->content_hash, stamp_ns_, engine_->Save()});
@@ -260,9 +262,9 @@ void ValveMonitor::CheckTimeout(TimePoint now,
   }
 }
 
-void ValveMonitor::GiveUpRecovery(std::int64_t now_ns, EpisodeOutlet& outlet) {
+void ValveMonitor::ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet) {
   if (!seen_ || stale_ || !engine_) {
-    tracker_.GiveUpRecovery(now_ns, outlet);
+    tracker_.ExpireRecovery(now_ns, outlet);
   }
 }
 

@@ -53,7 +53,7 @@ class ValveMonitor {
   /// another epoch) costs many times as much as others and adds rows to the
   /// history. So 200 of them in a row are accepted, then five a second plus one
   /// for every two other samples. @returns false if `sample` is to be rejected.
-  bool WithinShare(const Sample& sample, TimePoint received);
+  bool WithinRateLimit(const Sample& sample, TimePoint received);
 
   /// @param writer its DDS writer; see EndStream().
   ValveOutcome Step(const Sample& sample, std::uint64_t writer,
@@ -80,7 +80,7 @@ class ValveMonitor {
                     EpisodeOutlet& outlet);
 
   /// Closes an episode that was to be resumed if the valve is silent.
-  void GiveUpRecovery(std::int64_t now_ns, EpisodeOutlet& outlet);
+  void ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet);
 
   void Flush(EpisodeOutlet& outlet) { tracker_.Flush(outlet); }
 
@@ -109,10 +109,10 @@ class ValveMonitor {
   std::size_t trace_bytes() const { return tracker_.trace_bytes(); }
 
  private:
-  static constexpr double kFullShare = 200.0;
+  static constexpr double kMaxRestartTokens = 200.0;
 
-  bool BeginsAnew(const Sample& sample) const;
-  void Place(const Sample& sample);
+  bool RestartsEngine(const Sample& sample) const;
+  void RecordPosition(const Sample& sample);
   void Close(EndReason reason, EpisodeOutlet& outlet);
   void End(const Transition& closed, EpisodeOutlet& outlet);
   void NameEpisodes();
@@ -137,9 +137,9 @@ class ValveMonitor {
   std::int64_t stamp_ns_{0};
   bool isolation_held_{false};
   std::int64_t unassigned_interval_ns_{1'000'000'000};
-  double share_{kFullShare};  // Restarts left
-  TimePoint share_at_;        // as of this time.
-  std::uint32_t epoch_{0};    // Of the last sample in order.
+  double restart_tokens_{kMaxRestartTokens};  // Restarts left
+  TimePoint tokens_at_;                       // as of this time.
+  std::uint32_t epoch_{0};                    // Of the last sample in order.
   bool swapped_{false};
   bool seen_{false};
   bool stale_{false};

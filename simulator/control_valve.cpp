@@ -10,9 +10,9 @@
 namespace fdi::simulator {
 namespace {
 
-constexpr double kGravity = 9.81;            // m/s2.
-constexpr double kGasConstant = 287.0;       // J/(kg K), air.
-constexpr double kLeastSupplyGauge = 120e3;  // Below, the relay gives no air.
+constexpr double kGravity = 9.81;          // m/s2.
+constexpr double kGasConstant = 287.0;     // J/(kg K), air.
+constexpr double kMinSupplyGauge = 120e3;  // Below, the relay gives no air.
 
 }  // namespace
 
@@ -26,8 +26,7 @@ void ValveDynamics::SetEffects(const FaultEffects& effects) {
   effects_ = effects;
   const ActuatorParameters& a = parameters_.actuator;
   const double gauge = a.supply_pressure_gauge_pa * effects.supply_factor;
-  supply_pa_ =
-      a.ambient_pressure_pa + (gauge < kLeastSupplyGauge ? 0.0 : gauge);
+  supply_pa_ = a.ambient_pressure_pa + (gauge < kMinSupplyGauge ? 0.0 : gauge);
   rod_limit_ = effects.upper_stop_factor;
   rod_ = std::clamp(rod_, 0.0, rod_limit_);
 }

@@ -73,7 +73,7 @@ int CallRoots(double t, N_Vector x, double* g, void* system) {
 }
 
 // Stores CVODE's error message for the exception.
-void Keep(const char* text, void* message) {
+void CopyMessage(const char* text, void* message) {
   try {
     *static_cast<std::string*>(message) = text;
   } catch (...) {
@@ -83,12 +83,12 @@ void Keep(const char* text, void* message) {
 
 #if SUNDIALS_VERSION_MAJOR < 7
 void KeepMessage(int, const char*, const char*, char* text, void* message) {
-  Keep(text, message);
+  CopyMessage(text, message);
 }
 #else
 void KeepMessage(int, const char*, const char*, const char* text, SUNErrCode,
                  void* message, SUNContext) {
-  Keep(text, message);
+  CopyMessage(text, message);
 }
 #endif
 

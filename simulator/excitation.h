@@ -116,7 +116,7 @@ class Excitation {
   virtual bool is_open_loop() const { return true; }
 
   /// Inputs at which a closed loop starts; its first Next() follows.
-  virtual ProcessInputs Rest() const { return {}; }
+  virtual ProcessInputs InitialInputs() const { return {}; }
 
   /// Opening of the bypass hand valve V3, 0..1.
   virtual double bypass_opening() const { return 0.0; }

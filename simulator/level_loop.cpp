@@ -63,7 +63,7 @@ LevelLoop::LevelLoop(const LevelLoopExcitation& config, double period_s,
               kFiringW},
       integral_pct_(config.initial_cv_pct) {}
 
-ProcessInputs LevelLoop::Rest() const {
+ProcessInputs LevelLoop::InitialInputs() const {
   const double flow = boiler_.feed_flow_kg_s * 3600.0 / FeedDensity();
   return {config_.initial_cv_pct / 100.0, InletPressure(flow),
           OutletPressure(flow), kFeedTemperatureC};

@@ -37,7 +37,7 @@ class LevelLoop final : public Excitation {
             std::uint64_t seed);
 
   bool is_open_loop() const override { return false; }
-  ProcessInputs Rest() const override;
+  ProcessInputs InitialInputs() const override;
   double bypass_opening() const override { return config_.bypass_opening; }
   void Hold(bool held) override { held_ = held; }
   ProcessInputs Next(const FlowOfPressures& flow) override;

@@ -31,16 +31,16 @@ double CommandTravel(const RecordSegment& segment) {
 
 std::vector<RecordSegment> LiveliestSegments(
     const std::vector<HealthyRecord>& records, std::size_t max_rows) {
-  constexpr std::size_t kLongest = 600;
-  constexpr std::size_t kShortest = 180;
+  constexpr std::size_t kMaxPieceRows = 600;
+  constexpr std::size_t kMinPieceRows = 180;
   std::vector<RecordSegment> segments;
   for (const HealthyRecord& record : records) {
     const std::size_t count = record.rows.size();
-    const std::size_t pieces = (count + kLongest - 1) / kLongest;
+    const std::size_t pieces = (count + kMaxPieceRows - 1) / kMaxPieceRows;
     for (std::size_t i = 0; i < pieces; ++i) {
       const RecordSegment piece{&record.rows, i * count / pieces,
                                 (i + 1) * count / pieces};
-      if (piece.size() >= kShortest) {
+      if (piece.size() >= kMinPieceRows) {
         segments.push_back(piece);
       }
     }
@@ -166,8 +166,8 @@ double EffectiveKv(const RecordRow& row, const InstrumentParameters& i) {
       1e3 * row.input.p1_kpa, 1e3 * row.input.p2_kpa, row.input.t1_degc);
   const double drop =
       EffectivePressureDrop(medium, RecoveryCoefficient(0.01 * row.x_pct));
-  constexpr double kLeastDropPa = 1e4;
-  if (drop < kLeastDropPa) {
+  constexpr double kMinDropPa = 1e4;
+  if (drop < kMinDropPa) {
     return 0.0;
   }
   const double to_m3 =
@@ -281,14 +281,14 @@ TrimParameters RegressTrim(const std::vector<HealthyRecord>& records,
       }
     }
   }
-  constexpr int kLeastRows = 30;
-  if (sums.rows < kLeastRows) {
+  constexpr int kMinRows = 30;
+  if (sums.rows < kMinRows) {
     return trim;
   }
   const double x_mean = sums.x / sums.w;
   const double x_variance = sums.xx / sums.w - x_mean * x_mean;
-  constexpr double kLeastSpread = 0.02;  // Of X, standard deviation.
-  if (exponential && x_variance > kLeastSpread * kLeastSpread) {
+  constexpr double kMinSpread = 0.02;  // Of X, standard deviation.
+  if (exponential && x_variance > kMinSpread * kMinSpread) {
     const double n =
         -(sums.xy / sums.w - x_mean * sums.y / sums.w) / x_variance;
     trim.exponent = std::clamp(n, 0.5 * trim.exponent, 2.0 * trim.exponent);
@@ -305,10 +305,10 @@ using Eigen::VectorXd;
 
 constexpr double kHuber = 1.345;   // Corner of the loss.
 constexpr double kAtBound = 1e-3;  // Of a search, in the logarithm.
-constexpr int kMostIterations = 10;
+constexpr int kMaxIterations = 10;
 
 // The transmitter's noise, or at least its resolution.
-double LeastScale(const Transmitter& transmitter) {
+double MinScale(const Transmitter& transmitter) {
   return std::max(transmitter.noise_sd,
                   1e-5 * (transmitter.high - transmitter.low));
 }
@@ -487,9 +487,9 @@ RobustFit Identification::Fit(const Hypothesis& hypothesis,
   options.huber = kHuber;
   const InstrumentParameters& i = nominal_.instruments;
   options.least_scale.resize(options_.has_flow ? 2 : 1);
-  options.least_scale[0] = LeastScale(i.position);
+  options.least_scale[0] = MinScale(i.position);
   if (options_.has_flow) {
-    options.least_scale[1] = LeastScale(i.flow);
+    options.least_scale[1] = MinScale(i.flow);
   }
   return FitRobustly(residuals, hypothesis.point, BoundsOf(hypothesis.unknowns),
                      options);
@@ -528,7 +528,7 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
 void Identification::KeepIdentified(
     Hypothesis& hypothesis, std::vector<FittedParameter>& rejected) const {
   for (bool changed = true; changed && !hypothesis.unknowns.empty();) {
-    hypothesis.fit = Fit(hypothesis, segments_, kMostIterations, kFine);
+    hypothesis.fit = Fit(hypothesis, segments_, kMaxIterations, kFine);
     hypothesis.point = hypothesis.fit.point;
     const PointBounds bounds = BoundsOf(hypothesis.unknowns);
     std::vector<Index> kept = AllOf(hypothesis.unknowns);
@@ -560,7 +560,7 @@ void Identification::AddStated(Hypothesis& hypothesis,
     trial.unknowns.push_back(unknown);
     trial.point.conservativeResize(trial.point.size() + 1);
     trial.point.tail<1>() = BoundsOf({unknown}).prior_mean;
-    trial.fit = Fit(trial, segments_, kMostIterations, kFine);
+    trial.fit = Fit(trial, segments_, kMaxIterations, kFine);
     trial.point = trial.fit.point;
     const double sd =
         StandardDeviations(trial.fit, BoundsOf(trial.unknowns),

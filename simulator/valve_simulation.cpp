@@ -92,8 +92,8 @@ class Profiled final : public Excitation {
 
   // Uses copies of the profiles, because their noise streams belong to the
   // samples.
-  ProcessInputs Rest() const override {
-    ProcessInputs inputs = base_->Rest();
+  ProcessInputs InitialInputs() const override {
+    ProcessInputs inputs = base_->InitialInputs();
     std::vector<Profile> at_start = profiles_;
     for (Profile& profile : at_start) {
       profile.Apply(0.0, inputs);
@@ -191,7 +191,7 @@ namespace {
 
 constexpr double kNsPerS = 1e9;
 // Fault onsets this close to a sample are moved to it [s].
-constexpr double kLeastSegmentS = 1e-6;
+constexpr double kMinSegmentS = 1e-6;
 
 std::uint64_t SampleCount(const ValveSimulationConfig& config) {
   const double samples = std::ceil(config.duration_s / config.period_s - 1e-9);
@@ -298,7 +298,7 @@ ProcessInputs ValveSimulation::Impl::NextInputs() {
 
 void ValveSimulation::Impl::Start() {
   const bool open_loop = excitation_->is_open_loop();
-  inputs_ = open_loop ? NextInputs() : excitation_->Rest();
+  inputs_ = open_loop ? NextInputs() : excitation_->InitialInputs();
   if (config_.cold_start) {
     valve_.ColdStart();
   } else {
@@ -323,7 +323,7 @@ void ValveSimulation::Impl::AdvanceAcrossFaults(double from_s, double to_s,
     double until_s = to_s;
     for (const FaultSchedule& fault : config_.faults) {
       for (const double edge : {fault.start_s, fault.end_s}) {
-        if (edge > at_s + kLeastSegmentS && edge < to_s - kLeastSegmentS) {
+        if (edge > at_s + kMinSegmentS && edge < to_s - kMinSegmentS) {
           until_s = std::min(until_s, edge);
         }
       }

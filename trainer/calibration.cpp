@@ -19,8 +19,8 @@ namespace {
 constexpr double kTailQuantile = 0.95;
 constexpr double kShrinkage = 50.0;
 constexpr double kUpperBound = 1.645;  // 95 % of a normal distribution
-constexpr double kLowestShape = -0.1;
-constexpr double kHighestShape = 0.3;
+constexpr double kMinShape = -0.1;
+constexpr double kMaxShape = 0.3;
 
 double Quantile(std::vector<double> values, double q) {
   const auto at =
@@ -62,8 +62,7 @@ void FitPareto(const std::vector<double>& maxima, TailThreshold& tail) {
   }
   const double difference = b0 - 2.0 * b1;
   const double raw = difference > 0.0 ? 2.0 - b0 / difference : 0.0;
-  tail.shape =
-      std::clamp(raw * n / (n + kShrinkage), kLowestShape, kHighestShape);
+  tail.shape = std::clamp(raw * n / (n + kShrinkage), kMinShape, kMaxShape);
   // σ keeps the mean excess σ/(1 − ξ), at its 95 % upper bound.
   tail.scale = b0 * (1.0 - tail.shape) * (1.0 + kUpperBound / std::sqrt(n));
 }
@@ -99,18 +98,18 @@ TailThreshold FitTail(std::span<const double> series, double rate,
 
 namespace {
 
-constexpr std::size_t kFewestValues = 100;
+constexpr std::size_t kMinValues = 100;
 constexpr int kFewClusters = 10;      // too few for a tail of their own
 constexpr int kSomeClusters = 30;     // too few for their tail to be trusted
 constexpr double kSeenMean = 1.5;     // times what the record showed
 constexpr double kSeenLogRms = 0.25;  // more than what the record showed
 constexpr double kMargin = 1.25;      // on what correlation makes plausible
 constexpr double kCommandedDrift = 0.75;  // deviations
-constexpr double kLeastMean = 0.5;        // deviations
-constexpr double kLeastRms = 1.4;
-constexpr double kCommandMargin = 0.5;           // of the range
-constexpr double kLeastCommandMargin = 2.0;      // %
-constexpr double kLeastActivityVariance = 1e-6;  // to tell a slope from
+constexpr double kMinMean = 0.5;          // deviations
+constexpr double kMinRms = 1.4;
+constexpr double kCommandMargin = 0.5;         // of the range
+constexpr double kMinCommandMargin = 2.0;      // %
+constexpr double kMinActivityVariance = 1e-6;  // to tell a slope from
 
 // What the windows of all series have seen, one entry per full window.
 struct WindowHistory {
@@ -153,7 +152,7 @@ double Slope(std::span<const double> x, std::span<const double> y) {
     covariance += (x[k] - mean_x) * (y[k] - mean_y);
   }
   const double variance = Variance(x) * static_cast<double>(x.size());
-  return variance > kLeastActivityVariance * static_cast<double>(x.size())
+  return variance > kMinActivityVariance * static_cast<double>(x.size())
              ? std::clamp(covariance / variance, 0.0, 1.0)
              : 0.0;
 }
@@ -165,7 +164,7 @@ void FitActivity(WindowHistory& history, WindowLimits& limits) {
   const auto [lowest, highest] =
       std::minmax_element(history.command.begin(), history.command.end());
   const double margin =
-      std::max(kCommandMargin * (*highest - *lowest), kLeastCommandMargin);
+      std::max(kCommandMargin * (*highest - *lowest), kMinCommandMargin);
   limits.command = {*lowest - margin, *highest + margin};
   limits.activity_slope = Slope(history.activity, history.energy);
   std::vector<double> sorted = history.activity;
@@ -250,7 +249,7 @@ std::optional<WindowLimits> FitWindow(const ResidualSeries& residuals,
                                       int length, double share,
                                       bool commanded) {
   WindowHistory history = SlideWindow(residuals, commands, length);
-  if (history.mean.size() < kFewestValues) {
+  if (history.mean.size() < kMinValues) {
     return std::nullopt;
   }
   WindowLimits limits;
@@ -265,7 +264,7 @@ std::optional<WindowLimits> FitWindow(const ResidualSeries& residuals,
     const double drift = commanded ? kCommandedDrift * sd : 0.0;
     return std::max(Level(history.mean, share, length,
                           std::max({plausible.mean, kSeenMean * seen, drift})),
-                    kLeastMean * sd);
+                    kMinMean * sd);
   };
   limits.upper_mean = mean_level();
   for (double& mean : history.mean) {
@@ -277,20 +276,20 @@ std::optional<WindowLimits> FitWindow(const ResidualSeries& residuals,
   limits.upper_log_rms =
       std::max(Level(history.energy, share, length,
                      std::max(plausible.log_rms, seen + kSeenLogRms)),
-               std::log(kLeastRms * sd));
+               std::log(kMinRms * sd));
   return limits;
 }
 
 // T1, P1 and P2 vary more from day to day, and with where the valve stays, than
 // in the hours of a training: means over windows within so many deviations are
 // normal, and single readings beyond the thresholds tell.
-constexpr double kLeastMeanOfInput = 2.0;
+constexpr double kMinMeanOfInput = 2.0;
 
 constexpr double kBlockS = 600.0;     // of the slow part
 constexpr double kPriorDays = 4.0;    // ν₀
 constexpr double kOutputStray = 0.2;  // κ, deviations
 constexpr double kInputStray = 1.0;
-constexpr double kMostSlowShare = 0.05;
+constexpr double kMaxSlowShare = 0.05;
 
 constexpr double kCoreQuantile = 0.05;
 constexpr double kSupportMargin = 1.0;  // standard deviations
@@ -399,7 +398,7 @@ double SlowAllowance(const ResidualSeries& residuals, std::size_t block,
   const double freedom = kPriorDays + blocks - 1.0;
   const double variance =
       (kPriorDays * stray * stray + blocks * Variance(means)) / freedom;
-  return StudentQuantile(1.0 - std::min(share, kMostSlowShare), freedom) *
+  return StudentQuantile(1.0 - std::min(share, kMaxSlowShare), freedom) *
          std::sqrt(variance * (1.0 + 1.0 / blocks));
 }
 
@@ -440,10 +439,9 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
                               commands.empty() ? ResidualSeries() : commands[c],
                               length, share, ReadsCommand(models, c));
       if (limits) {
-        const double least =
-            IsInput(channel.output)
-                ? kLeastMeanOfInput * std::sqrt(Variance(joined))
-                : 0.0;
+        const double least = IsInput(channel.output)
+                                 ? kMinMeanOfInput * std::sqrt(Variance(joined))
+                                 : 0.0;
         limits->upper_mean = std::max(limits->upper_mean + slow, least);
         limits->lower_mean = std::min(limits->lower_mean - slow, -least);
         channel.windows.push_back(*limits);
@@ -457,7 +455,7 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
 
 void BalanceThresholds(ModelSet& models) {
   for (std::size_t c = 0; c < models.channels.size(); ++c) {
-    if (RunsOnItself(models.observers.front().channels[c].model)) {
+    if (IsFreeRunning(models.observers.front().channels[c].model)) {
       ChannelSpec& channel = models.channels[c];
       channel.upper_threshold =
           std::max(channel.upper_threshold, -channel.lower_threshold);

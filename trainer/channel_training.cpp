@@ -159,8 +159,8 @@ TsModel FitRows(const ChannelPlan& plan,
   const auto validation_error = [&](const std::vector<TsRule>& rules) {
     const TsModel model =
         MakeModel(rules, data, regressors, plan.output, plan.parallel);
-    if (plan.from_any_past && RunsOnItself(model)) {
-      const double error = ErrorFromAnyPast(model, condition.validation);
+    if (plan.from_any_past && IsFreeRunning(model)) {
+      const double error = FreeRunError(model, condition.validation);
       if (!std::isnan(error)) {
         return error;
       }
@@ -180,8 +180,8 @@ TsModel FitRows(const ChannelPlan& plan,
 
 }  // namespace
 
-double ErrorFromAnyPast(const TsModel& model,
-                        const std::vector<Stretch>& stretches) {
+double FreeRunError(const TsModel& model,
+                    const std::vector<Stretch>& stretches) {
   constexpr std::size_t kPiece = 40;
   constexpr int kSettling = 10;
   double low = std::numeric_limits<double>::infinity();
@@ -330,7 +330,7 @@ TsModel FitFaultChannel(const ChannelPlan& plan, const TsModel& normal_model,
   if (error(normal_model) <= kReuseTolerance * own_error) {
     return normal_model;
   }
-  if (RunsOnItself(normal_model)) {
+  if (IsFreeRunning(normal_model)) {
     return own;
   }
   const RegressionData as_many =

@@ -66,7 +66,7 @@ struct ChannelPlan {
   /// What a normal observer that runs on its own past may read, for difference
   /// observers (FitNormalChannel); empty: it never does.
   std::vector<std::vector<Regressor>> own_past{};
-  /// Models that run on their own past are told apart by ErrorFromAnyPast().
+  /// Models that run on their own past are told apart by FreeRunError().
   bool from_any_past{false};
   bool saturates{false};       ///< The transmitter may be at its upper limit.
   std::vector<int> windows{};  ///< Lengths N of the windows [samples].
@@ -88,8 +88,8 @@ struct FitOptions {
 /// step ahead, it can rest for half a minute where no valve would, now and then
 /// over a day, and the plain error of some hours does not show it. NaN where no
 /// stretch has 40 samples.
-double ErrorFromAnyPast(const TsModel& model,
-                        const std::vector<Stretch>& stretches);
+double FreeRunError(const TsModel& model,
+                    const std::vector<Stretch>& stretches);
 
 /// `options` with the numbers of rules that the plan tries.
 FitOptions FitOptionsOf(const ChannelPlan& plan, FitOptions options);

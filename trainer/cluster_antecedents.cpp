@@ -187,7 +187,7 @@ using Eigen::VectorXd;
 // A column that varies by less than this share of its size is constant.
 constexpr double kConstantTolerance = 1e-12;
 // Least thickness of a cluster as a share of the deviation of a regressor.
-constexpr double kLeastThickness = 0.01;
+constexpr double kMinThickness = 0.01;
 // The set of a regressor that tells no rules apart: 1 everywhere.
 constexpr FuzzySet kAnyValue{0.0, 0.0, std::numeric_limits<double>::infinity(),
                              std::numeric_limits<double>::infinity()};
@@ -282,7 +282,7 @@ std::vector<TsRule> ProductSpaceRules(const RegressionData& data,
             deviation) +
         clusters.mean.head(m).transpose();
     MatrixXd restricted = f.topLeftCorner(m, m);
-    restricted.diagonal().array() += kLeastThickness * kLeastThickness;
+    restricted.diagonal().array() += kMinThickness * kMinThickness;
     PlaceByDistance(
         clusters.columns, center,
         deviation.asDiagonal() * restricted * deviation.asDiagonal(),

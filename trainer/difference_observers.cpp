@@ -18,9 +18,9 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr double kWorthOwnPast = 0.98;   // of the error without
-constexpr double kLowestPosition = 0.0;  // ends of the position transmitter [%]
-constexpr double kHighestPosition = 100.0;
+constexpr double kMaxOwnPastErrorRatio = 0.98;  // of the error without
+constexpr double kMinPosition = 0.0;  // ends of the position transmitter [%]
+constexpr double kMaxPosition = 100.0;
 
 // The plan of a normal model that runs on its own past.
 ChannelPlan OwnPastPlan(const ChannelPlan& plan,
@@ -44,7 +44,7 @@ TsModel FitPlan(const ChannelPlan& plan, const Condition& normal,
 bool AtLimit(const TsModel& normal, double reading) {
   return reading >= normal.saturation ||
          (normal.output == Signal::kX &&
-          (reading <= kLowestPosition || reading >= kHighestPosition));
+          (reading <= kMinPosition || reading >= kMaxPosition));
 }
 
 std::vector<std::vector<double>> PredictAll(
@@ -169,9 +169,9 @@ NormalChannel ChooseNormal(const ChannelPlan& plan, const Condition& normal,
   for (const std::vector<Regressor>& regressors : plan.own_past) {
     const ChannelPlan own_plan = OwnPastPlan(plan, regressors);
     TsModel own = FitPlan(own_plan, normal, options, saturation);
-    const double from_any_past = ErrorFromAnyPast(own, normal.validation);
-    if (RunsOnItself(own) && from_any_past < least &&
-        error(own) < kWorthOwnPast * error(channel.inputs)) {
+    const double from_any_past = FreeRunError(own, normal.validation);
+    if (IsFreeRunning(own) && from_any_past < least &&
+        error(own) < kMaxOwnPastErrorRatio * error(channel.inputs)) {
       least = from_any_past;
       channel.plan = own_plan;
       channel.normal = std::move(own);
@@ -213,9 +213,8 @@ ChannelObserver FitDifference(const NormalChannel& channel,
   for (double& residual : readings.residuals) {
     residual *= widening;
   }
-  ChannelObserver observer =
-      CalibrateChannel(adapted.model, readings.residuals, readings.outputs,
-                       kLeastDeviation * sd);
+  ChannelObserver observer = CalibrateChannel(
+      adapted.model, readings.residuals, readings.outputs, kMinDeviation * sd);
   observer.difference = channel.difference;
   return observer;
 }
@@ -230,8 +229,8 @@ constexpr double kObserverShare = 0.75;
 // faults are exact, and more of the same tells nothing about them.
 std::vector<Stretch> Excerpt(const std::vector<Stretch>& stretches) {
   constexpr std::size_t kBlock = 600;
-  constexpr std::size_t kMost = 3600;
-  if (CountSamples(stretches) <= static_cast<std::int64_t>(kMost)) {
+  constexpr std::size_t kMaxSamples = 3600;
+  if (CountSamples(stretches) <= static_cast<std::int64_t>(kMaxSamples)) {
     return stretches;
   }
   std::vector<Stretch> blocks;
@@ -243,12 +242,13 @@ std::vector<Stretch> Excerpt(const std::vector<Stretch>& stretches) {
                         {begin, begin + static_cast<std::ptrdiff_t>(kBlock)}});
     }
   }
-  if (blocks.size() * kBlock <= kMost) {
+  if (blocks.size() * kBlock <= kMaxSamples) {
     return blocks.empty() ? stretches : blocks;
   }
   std::vector<Stretch> chosen;
-  for (std::size_t i = 0; i < kMost / kBlock; ++i) {
-    chosen.push_back(std::move(blocks[i * blocks.size() * kBlock / kMost]));
+  for (std::size_t i = 0; i < kMaxSamples / kBlock; ++i) {
+    chosen.push_back(
+        std::move(blocks[i * blocks.size() * kBlock / kMaxSamples]));
   }
   return chosen;
 }
@@ -326,7 +326,7 @@ NormalResiduals CalibrateHealthy(const Healthy& healthy,
     plans.push_back(healthy.channels[c].plan);
     observer.channels[c] =
         CalibrateOn(healthy.channels[c].normal, healthy.normal,
-                    options.fit.settling, kLeastSd);
+                    options.fit.settling, kMinSd);
   }
   NormalResiduals held_out = CrossValidate(healthy.normal, observer, plans,
                                            options.fit, options.threads);
@@ -367,9 +367,9 @@ std::vector<Condition> FitFaults(const Healthy& healthy,
     }
     compared[static_cast<std::size_t>(i) + 1] =
         ValidationPart(fault, faulty, options.dataset.validation_share);
-    reporter.Tell(kNormalShare + kObserverShare * ++done /
-                                     static_cast<double>(faults.size()),
-                  "fitting " + observer.name);
+    reporter.Report(kNormalShare + kObserverShare * ++done /
+                                       static_cast<double>(faults.size()),
+                    "fitting " + observer.name);
   });
   return compared;
 }
@@ -384,20 +384,20 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
   Require(!options.channels.empty(), "a model set needs a channel");
   Require(faults.size() < kMaxObservers, "there are too many faults");
   Reporter reporter(progress);
-  reporter.Tell(0.0, "fitting the normal observer");
+  reporter.Report(0.0, "fitting the normal observer");
   const Healthy fitted = FitHealthy(healthy, flow_limit, options);
   ModelSet models = Describe(healthy, fitted.normal, faults, options);
   const NormalResiduals held_out =
       CalibrateHealthy(fitted, options, models.observers.front());
   const std::vector<Condition> compared =
       FitFaults(fitted, faults, synthesize, options, reporter, models);
-  reporter.Tell(kNormalShare + kObserverShare, "comparing faults");
+  reporter.Report(kNormalShare + kObserverShare, "comparing faults");
   FitLimits(fitted, held_out, options, models);
   FitInterpolationErrors(compared, models);
   FindGroups(compared, options.threads, models);
   FitDriftLimits(compared, models);
   Validate(models);
-  reporter.Tell(1.0, "done");
+  reporter.Report(1.0, "done");
   return models;
 }
 
@@ -446,7 +446,7 @@ Healthy RefitHealthy(const ModelSet& of_type,
         const auto i = static_cast<std::size_t>(c);
         const TsModel& model = of_type.observers.front().channels[i].model;
         NormalChannel& channel = healthy.channels[i];
-        channel.plan = RunsOnItself(model)
+        channel.plan = IsFreeRunning(model)
                            ? OwnPastPlan(options.channels[i], model.regressors)
                            : options.channels[i];
         channel.plan.rule_counts = {static_cast<int>(model.rules.size())};
@@ -481,7 +481,7 @@ ChannelObserver Transfer(ChannelObserver fault, const ChannelObserver& of_type,
   }
   const auto square = [](double value) { return value * value; };
   const double own =
-      std::max(square(kLeastDeviation * normal.residual_sd),
+      std::max(square(kMinDeviation * normal.residual_sd),
                square(fault.residual_sd) - square(of_type.residual_sd) +
                    square(normal.residual_sd));
   const double factor = std::sqrt(own) / fault.residual_sd;
@@ -509,10 +509,10 @@ DriftLimits Transfer(DriftLimits drift, const ChannelSpec& of_type,
 
 }  // namespace
 
-bool ServesAnother(const ModelSet& of_type,
-                   const std::vector<TrainingRun>& healthy,
-                   const TrainingOptions& options) {
-  constexpr double kLeastShare = 0.95;
+bool IsTransferable(const ModelSet& of_type,
+                    const std::vector<TrainingRun>& healthy,
+                    const TrainingOptions& options) {
+  constexpr double kMinShare = 0.95;
   const bool same_channels =
       std::ranges::equal(of_type.channels, options.channels, {},
                          &ChannelSpec::name, &ChannelPlan::name);
@@ -523,7 +523,7 @@ bool ServesAnother(const ModelSet& of_type,
                                return SameAntecedents(of_type.observers.front(),
                                                       fault);
                              }) &&
-         ShareWithin(of_type.validity, healthy) >= kLeastShare;
+         ShareWithin(of_type.validity, healthy) >= kMinShare;
 }
 
 ModelSet TransferDifferenceSet(const ModelSet& of_type,
@@ -531,7 +531,7 @@ ModelSet TransferDifferenceSet(const ModelSet& of_type,
                                const TrainingOptions& options,
                                const Progress& progress) {
   Reporter reporter(progress);
-  reporter.Tell(0.0, "fitting the normal observer");
+  reporter.Report(0.0, "fitting the normal observer");
   const Healthy fitted = RefitHealthy(of_type, healthy, options);
   std::vector<FaultCondition> faults;
   for (const Observer& observer : of_type.observers) {
@@ -540,7 +540,7 @@ ModelSet TransferDifferenceSet(const ModelSet& of_type,
     }
   }
   ModelSet models = Describe(healthy, fitted.normal, faults, options);
-  reporter.Tell(0.5, "setting the limits");
+  reporter.Report(0.5, "setting the limits");
   FitLimits(fitted, CalibrateHealthy(fitted, options, models.observers.front()),
             options, models);
   const Observer& normal = models.observers.front();
@@ -558,7 +558,7 @@ ModelSet TransferDifferenceSet(const ModelSet& of_type,
   models.groups = of_type.groups;
   models.undetectable = of_type.undetectable;
   Validate(models);
-  reporter.Tell(1.0, "done");
+  reporter.Report(1.0, "done");
   return models;
 }
 

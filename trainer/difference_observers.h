@@ -88,9 +88,9 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
 /// flow unit and channels are the same, the observers are differences or share
 /// the normal one's antecedents, and 95 % of the samples lie where the set
 /// was trained (CV, dP, T1).
-bool ServesAnother(const ModelSet& of_type,
-                   const std::vector<TrainingRun>& healthy,
-                   const TrainingOptions& options);
+bool IsTransferable(const ModelSet& of_type,
+                    const std::vector<TrainingRun>& healthy,
+                    const TrainingOptions& options);
 
 /// The same for a further valve of a type, without a simulation: the normal
 /// observer has regressors and number of rules of the type's, is fitted to the

@@ -13,21 +13,22 @@ namespace {
 constexpr std::array kShares{0.15, 0.25, 0.35, 0.5, 0.65, 0.8, 1.0};
 constexpr std::array kRates{2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 100.0};
 constexpr int kDelays = 3;
-constexpr std::size_t kMost = 7200;     // samples that dynamics are sought on
-constexpr std::size_t kSettling = 30;   // samples of every stretch
-constexpr double kLargestError = 10.0;  // counts; one more is an outlier [%]
-constexpr double kTolerance = 1.1;      // of the smallest squared error
-constexpr double kSlower = 0.5;       // than any rate that explains the record
-constexpr double kLeastError = 0.05;  // [%²], that of the reading
-constexpr double kFloorMargin = 2.0;  // times what the record showed
-constexpr double kLeastFloorDeviation = 8.0;
-constexpr double kMostFloorDeviation = 15.0;  // a positioner's alert is at 20 %
+constexpr std::size_t kMaxSamples =
+    7200;                              // samples that dynamics are sought on
+constexpr std::size_t kSettling = 30;  // samples of every stretch
+constexpr double kMaxError = 10.0;     // counts; one more is an outlier [%]
+constexpr double kTolerance = 1.1;     // of the smallest squared error
+constexpr double kSlower = 0.5;        // than any rate that explains the record
+constexpr double kMinError = 0.05;     // [%²], that of the reading
+constexpr double kFloorMargin = 2.0;   // times what the record showed
+constexpr double kMinFloorDeviation = 8.0;
+constexpr double kMaxFloorDeviation = 15.0;  // a positioner's alert is at 20 %
 constexpr double kDeviationS = 5.0;
-constexpr double kLeastStuckTravel = 5.0;
+constexpr double kMinStuckTravel = 5.0;
 constexpr double kFlowS = 10.0;
-constexpr double kLeastTravel = 1.5;  // of X, to tell an exponent [% rms]
-constexpr double kMostFlow = 0.9;     // of the largest: no saturation
-constexpr double kFlowMargin = 1.3;   // times what the record showed
+constexpr double kMinTravel = 1.5;     // of X, to tell an exponent [% rms]
+constexpr double kMaxFlowShare = 0.9;  // of the largest: no saturation
+constexpr double kFlowMargin = 1.3;    // times what the record showed
 
 // Filling and venting have a rate each; the floor keeps the extremes.
 struct Answer {
@@ -53,12 +54,13 @@ double SquaredError(const std::vector<Stretch>& stretches,
   std::size_t count = 0;
   for (const Stretch& stretch : stretches) {
     double x = stretch.samples.front()[Signal::kX];
-    for (std::size_t k = 0; k < stretch.samples.size() && count < kMost; ++k) {
+    for (std::size_t k = 0; k < stretch.samples.size() && count < kMaxSamples;
+         ++k) {
       const double command = Command(stretch, k, answer.delay);
-      x = Follow(answer.Towards(command, x), x, command);
+      x = NextRodPosition(answer.Towards(command, x), x, command);
       if (k >= kSettling) {
-        const double error = std::min(
-            std::abs(stretch.samples[k][Signal::kX] - x), kLargestError);
+        const double error =
+            std::min(std::abs(stretch.samples[k][Signal::kX] - x), kMaxError);
         sum += error * error;
         ++count;
       }
@@ -85,7 +87,7 @@ void FitRod(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   floor.slow = {best.share, std::min(best.closing, best.opening)};
   for (const Answer& answer : answers) {
     if (answer.delay == best.delay &&
-        answer.error <= kTolerance * best.error + kLeastError) {
+        answer.error <= kTolerance * best.error + kMinError) {
       const auto [low, high] = std::minmax(answer.closing, answer.opening);
       floor.quick.share = std::max(floor.quick.share, answer.share);
       floor.quick.rate = std::max(floor.quick.rate, high);
@@ -134,9 +136,9 @@ void FitDeviation(const std::vector<Stretch>& stretches, FloorLimits& floor) {
     most = std::max({most, Sustained(above, floor.deviation_samples),
                      Sustained(below, floor.deviation_samples)});
   }
-  floor.deviation = std::clamp(kFloorMargin * most, kLeastFloorDeviation,
-                               kMostFloorDeviation);
-  floor.stuck_travel = std::max(kLeastStuckTravel, kFloorMargin * repeated);
+  floor.deviation =
+      std::clamp(kFloorMargin * most, kMinFloorDeviation, kMaxFloorDeviation);
+  floor.stuck_travel = std::max(kMinStuckTravel, kFloorMargin * repeated);
 }
 
 bool HasDp(const Sample& sample) {
@@ -176,7 +178,7 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
       const double flow = sample[Signal::kF];
       const double dp = DpOf(sample, floor);
       if (flow <= floor.flow_margin * floor.flow_high ||
-          flow >= kMostFlow * floor.flow_high || dp <= 0.0) {
+          flow >= kMaxFlowShare * floor.flow_high || dp <= 0.0) {
         continue;
       }
       const double weight = flow * flow;
@@ -193,7 +195,7 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
     return;
   }
   const double variance = wxx / w - wx / w * (wx / w);
-  if (variance > 1e-4 * kLeastTravel * kLeastTravel) {
+  if (variance > 1e-4 * kMinTravel * kMinTravel) {
     floor.flow_exponent =
         std::clamp(-(wxy / w - wx / w * (wy / w)) / variance, 1.0, 8.0);
   }

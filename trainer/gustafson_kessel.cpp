@@ -69,7 +69,7 @@ FuzzyPartition DrawMemberships(Index rows, Index num_clusters, unsigned seed) {
   return start;
 }
 
-constexpr double kSmallest = std::numeric_limits<double>::min();
+constexpr double kMinPositive = std::numeric_limits<double>::min();
 // Factor on the tolerance while starts compete on a subset of the points.
 constexpr double kCoarseTolerance = 10.0;
 
@@ -178,7 +178,7 @@ class Iteration {
     const auto count = static_cast<double>(z_.rows());
     const MatrixXd f0 = centered_.transpose() * centered_ / count;
     const auto n = static_cast<double>(z_.cols());
-    smallest_eigenvalue_ = std::max(1e-30 * f0.trace() / n, kSmallest);
+    smallest_eigenvalue_ = std::max(1e-30 * f0.trace() / n, kMinPositive);
     const VectorXd eigenvalues =
         Eigen::SelfAdjointEigenSolver<MatrixXd>(f0, Eigen::EigenvaluesOnly)
             .eigenvalues()
@@ -202,7 +202,7 @@ class Iteration {
   void UpdateCluster(Index i) {
     const Index n = z_.cols();
     UpdateWeights(i);
-    const double total = std::max(weights_.sum(), kSmallest);
+    const double total = std::max(weights_.sum(), kMinPositive);
     for (Index a = 0; a < n; ++a) {
       centers_(i, a) = weights_.matrix().dot(z_.col(a)) / total;
       centered_.col(a).array() = z_.col(a).array() - centers_(i, a);
@@ -254,7 +254,7 @@ class Iteration {
   // U from the distances; returns max|ΔU|. A point on a center has a distance
   // of 0: the floor gives it to that center, or evenly to those it lies on.
   double UpdateMemberships() {
-    distances_ = distances_.max(kSmallest);
+    distances_ = distances_.max(kMinPositive);
     nearest_ = distances_.rowwise().minCoeff();
     weights_.setZero();
     for (Index i = 0; i < u_.cols(); ++i) {
@@ -301,7 +301,7 @@ class Iteration {
   MatrixXd centers_;
   std::vector<MatrixXd> covariances_;
   double spread_{0.0};
-  double smallest_eigenvalue_{kSmallest};
+  double smallest_eigenvalue_{kMinPositive};
 };
 
 // Whether `a` is the better of two results.

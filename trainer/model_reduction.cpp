@@ -33,7 +33,7 @@ std::ptrdiff_t RequireChannel(const ModelSet& models, const std::string& name) {
 }
 
 // Nor is a transmitter watched whose channel is gone.
-void ForgetRepeats(Signal signal, StuckLimits& limits) {
+void ClearRepeats(Signal signal, StuckLimits& limits) {
   switch (signal) {
     case Signal::kT1:
       limits.t1 = 0;
@@ -86,8 +86,8 @@ ModelSet WithoutChannels(ModelSet models,
       throw ConfigError("model set " + models.name +
                         " would be left without channels");
     }
-    ForgetRepeats(models.channels[static_cast<std::size_t>(index)].output,
-                  models.stuck);
+    ClearRepeats(models.channels[static_cast<std::size_t>(index)].output,
+                 models.stuck);
     models.channels.erase(models.channels.begin() + index);
     for (Observer& observer : models.observers) {
       observer.channels.erase(observer.channels.begin() + index);

@@ -16,14 +16,14 @@ namespace fdi::trainer {
 namespace {
 
 constexpr double kValidMargin = 0.1;  // of the range
-constexpr double kLeastValidMargin = 5.0;
+constexpr double kMinValidMargin = 5.0;
 constexpr double kMeanCommandMargin = 0.25;  // of the range
-constexpr double kLeastMeanCommandMargin = 2.0;
+constexpr double kMinMeanCommandMargin = 2.0;
 constexpr double kStepFactor = 2.0;
-constexpr double kLeastStep = 5.0;
+constexpr double kMinStep = 5.0;
 constexpr double kInputMargin = 0.5;  // of the range
-constexpr double kLeastPressureShare = 0.05;
-constexpr double kLeastTemperature = 10.0;
+constexpr double kMinPressureShare = 0.05;
+constexpr double kMinTemperature = 10.0;
 constexpr int kStuckFactor = 10;
 constexpr int kStuckMargin = 60;  // samples
 constexpr double kNoFlow = 0.02;  // of the largest flow
@@ -140,18 +140,18 @@ ValidityRegion TrainedRegion(const std::vector<Condition>& conditions) {
     }
     if (mean.minimum <= mean.maximum) {
       const double room =
-          std::max(kLeastMeanCommandMargin,
+          std::max(kMinMeanCommandMargin,
                    kMeanCommandMargin * (mean.maximum - mean.minimum));
       region.cv_mean = {mean.minimum - room, mean.maximum + room};
     }
     const double margin =
-        std::max(kLeastValidMargin, kValidMargin * (cv.maximum - cv.minimum));
+        std::max(kMinValidMargin, kValidMargin * (cv.maximum - cv.minimum));
     region.cv = {cv.minimum - margin, cv.maximum + margin};
-    region.cv_step = std::max(kStepFactor * step, kLeastStep);
+    region.cv_step = std::max(kStepFactor * step, kMinStep);
   }
   const auto pressure = [&](Signal signal) {
     const SignalRange range = RangeOf(normal, of(signal));
-    return Widened(range, kLeastPressureShare * Largest(range));
+    return Widened(range, kMinPressureShare * Largest(range));
   };
   region.p1 = first.Has(Signal::kP1) ? pressure(Signal::kP1) : kUnbounded;
   region.p2 = first.Has(Signal::kP2) ? pressure(Signal::kP2) : kUnbounded;
@@ -159,10 +159,10 @@ ValidityRegion TrainedRegion(const std::vector<Condition>& conditions) {
     const SignalRange dp = RangeOf(normal, [](const Sample& sample) {
       return sample[Signal::kP1] - sample[Signal::kP2];
     });
-    region.dp = Widened(dp, kLeastPressureShare * Largest(dp));
+    region.dp = Widened(dp, kMinPressureShare * Largest(dp));
   }
   if (first.Has(Signal::kT1)) {
-    region.t1 = Widened(RangeOf(normal, of(Signal::kT1)), kLeastTemperature);
+    region.t1 = Widened(RangeOf(normal, of(Signal::kT1)), kMinTemperature);
   }
   if (first.Has(Signal::kF)) {
     region.flow_cutoff = kNoFlow * Largest(RangeOf(normal, of(Signal::kF)));

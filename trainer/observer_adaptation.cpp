@@ -23,7 +23,7 @@ using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t kPenaltyFolds = 4;
-constexpr int kFewest = 20;
+constexpr int kMinFitRows = 20;
 constexpr std::array<double, 5> kPenalties{0.03, 0.3, 3.0, 30.0, 300.0};
 constexpr double kSharedPenalty = 0.01;  // of what all rules have in common
 constexpr double kWorthAdapting = 0.98;  // of the normal model's error
@@ -194,11 +194,11 @@ TsModel Widened(const TsModel& normal, const VectorXd& y) {
 }
 
 void RequireEnough(const Condition& condition, const Rows& rows) {
-  if (rows.data.y.size() < kFewest) {
+  if (rows.data.y.size() < kMinFitRows) {
     throw DataError(FaultName(condition.fault) + " at strength " +
                     std::to_string(condition.strength) + ": " +
                     std::to_string(rows.data.y.size()) + " samples, at least " +
-                    std::to_string(kFewest) + " are needed");
+                    std::to_string(kMinFitRows) + " are needed");
   }
 }
 
@@ -298,7 +298,7 @@ VectorXd Adaptation::Impl::CrossPredict(const Target& target,
 }
 
 Adaptation::Adaptation(const TsModel& normal, const Condition& condition) {
-  Require(!RunsOnItself(normal), "only a model of measured past is adapted");
+  Require(!IsFreeRunning(normal), "only a model of measured past is adapted");
   impl_ = std::make_unique<Impl>(normal, condition);
 }
 Adaptation::~Adaptation() = default;

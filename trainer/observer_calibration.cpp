@@ -72,7 +72,7 @@ void CalibrateNormal(const std::vector<ResidualSeries>& series,
     }
     channel.membership = FitMembership(residuals);
     channel.residual_sd = std::max(
-        std::sqrt(square / static_cast<double>(residuals.size())), kLeastSd);
+        std::sqrt(square / static_cast<double>(residuals.size())), kMinSd);
     channel.correlation_time = CorrelationTime(residuals);
   }
 }
@@ -155,8 +155,8 @@ NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
 
 namespace {
 
-constexpr double kLowestInterpolationError = 0.02;
-constexpr double kHighestInterpolationError = 1.0;
+constexpr double kMinInterpolationError = 0.02;
+constexpr double kMaxInterpolationError = 1.0;
 constexpr double kErrorFloor = 0.3;  // residual deviations
 constexpr double kDetectableShare = 0.05;
 constexpr double kGroupShare = 0.5;
@@ -246,11 +246,11 @@ void SetInterpolationErrors(const std::vector<InterpolationSums>& sums,
         std::max(0.0, sums[c].error - floor * floor * sums[c].samples);
     channel.interpolation_error =
         std::clamp(sums[c].move > 0.0 ? std::sqrt(excess / sums[c].move) : 0.0,
-                   kLowestInterpolationError, kHighestInterpolationError);
+                   kMinInterpolationError, kMaxInterpolationError);
   }
 }
 
-void TakeOverErrors(const Observer& from, Observer& to) {
+void CopyErrors(const Observer& from, Observer& to) {
   for (std::size_t c = 0; c < to.channels.size(); ++c) {
     to.channels[c].interpolation_error = from.channels[c].interpolation_error;
   }
@@ -314,8 +314,8 @@ void ScoreStretch(const Stretch& stretch,
     windows.Push({residuals.data(), models.channels.size()},
                  stretch.samples[k][Signal::kCv]);
     faults.Score(bank, verdict);
-    faults.Follow(bank);
-    faults.Compete(verdict);
+    faults.Update(bank);
+    faults.ApplyEvidence(verdict);
     if (static_cast<int>(k) < start + kEvidenceSamples) {
       continue;
     }
@@ -342,7 +342,7 @@ void FitInterpolationErrors(const std::vector<Condition>& conditions,
             sums, models.observers[static_cast<std::size_t>(chain[n])]);
       }
       if (chain.size() > 2) {
-        TakeOverErrors(
+        CopyErrors(
             models.observers[static_cast<std::size_t>(chain[chain.size() - 2])],
             models.observers[static_cast<std::size_t>(chain.back())]);
       }
@@ -352,7 +352,7 @@ void FitInterpolationErrors(const std::vector<Condition>& conditions,
 
 namespace {
 
-constexpr double kMostDrift = 3.0;
+constexpr double kMaxDriftFactor = 3.0;
 
 // What the longest window of a channel shows of a condition, on average.
 struct WindowAverage {
@@ -416,13 +416,13 @@ struct Witness {
   double* bound{nullptr};
   double at_most{0.0};
 
-  void Hear(const Witness& other) {
+  void Update(const Witness& other) {
     *this = other.ratio > ratio ? other : *this;
   }
 };
 
-void Hear(const std::vector<WindowAverage>& averages, ModelSet& models,
-          Witness& witness) {
+void UpdateWitness(const std::vector<WindowAverage>& averages, ModelSet& models,
+                   Witness& witness) {
   for (std::size_t c = 0; c < averages.size(); ++c) {
     if (averages[c].samples == 0.0) {
       continue;
@@ -431,11 +431,11 @@ void Hear(const std::vector<WindowAverage>& averages, ModelSet& models,
     DriftLimits& drift = models.channels[c].drift;
     const double mean = averages[c].mean;
     const double excess = averages[c].excess;
-    witness.Hear({mean / limits.lower_mean, &drift.lower_mean,
-                  0.5 * (mean - limits.lower_mean)});
-    witness.Hear({mean / limits.upper_mean, &drift.upper_mean,
-                  0.5 * (mean - limits.upper_mean)});
-    witness.Hear({std::exp(excess), &drift.log_scale, 0.5 * excess});
+    witness.Update({mean / limits.lower_mean, &drift.lower_mean,
+                    0.5 * (mean - limits.lower_mean)});
+    witness.Update({mean / limits.upper_mean, &drift.upper_mean,
+                    0.5 * (mean - limits.upper_mean)});
+    witness.Update({std::exp(excess), &drift.log_scale, 0.5 * excess});
   }
 }
 
@@ -446,8 +446,9 @@ void FitDriftLimits(const std::vector<Condition>& conditions,
   for (ChannelSpec& channel : models.channels) {
     if (!channel.windows.empty()) {
       const WindowLimits& limits = channel.windows.back();
-      channel.drift = {kMostDrift * limits.lower_mean,
-                       kMostDrift * limits.upper_mean, std::log(kMostDrift)};
+      channel.drift = {kMaxDriftFactor * limits.lower_mean,
+                       kMaxDriftFactor * limits.upper_mean,
+                       std::log(kMaxDriftFactor)};
     }
   }
   const ModelSet healthy = WithObservers(models, {0});
@@ -457,8 +458,9 @@ void FitDriftLimits(const std::vector<Condition>& conditions,
       Witness witness;
       for (const int i : Chain(models, fault, negative)) {
         if (i > 0) {
-          Hear(AverageWindows(conditions[static_cast<std::size_t>(i)], normal),
-               models, witness);
+          UpdateWitness(
+              AverageWindows(conditions[static_cast<std::size_t>(i)], normal),
+              models, witness);
         }
       }
       if (witness.bound != nullptr &&

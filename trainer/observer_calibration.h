@@ -11,9 +11,9 @@
 namespace fdi::trainer {
 
 /// Least deviation of a residual that counts as noise [unit of the output].
-inline constexpr double kLeastSd = 1e-6;
+inline constexpr double kMinSd = 1e-6;
 /// Least deviation of a fault observer's residual, of the normal one's.
-inline constexpr double kLeastDeviation = 0.2;
+inline constexpr double kMinDeviation = 0.2;
 
 /// A channel of an observer from the residuals of its model on data it was not
 /// fitted to: membership, deviation, correlation time, figures.

@@ -9,7 +9,7 @@
 namespace fdi::trainer {
 namespace {
 
-int LongestLagOf(const std::vector<Regressor>& regressors) {
+int MaxLagOf(const std::vector<Regressor>& regressors) {
   int longest = 0;
   for (const Regressor& regressor : regressors) {
     longest = std::max(longest, regressor.lag);
@@ -29,7 +29,7 @@ class MeasuredRows {
   MeasuredRows(std::span<const Stretch> stretches,
                const std::vector<Regressor>& regressors, Signal output)
       : regressors_(regressors), output_(output) {
-    const auto lag = static_cast<std::size_t>(LongestLagOf(regressors));
+    const auto lag = static_cast<std::size_t>(MaxLagOf(regressors));
     std::size_t measured = 0;
     std::size_t wholly = 0;
     for (const Stretch& stretch : stretches) {
@@ -61,7 +61,7 @@ RegressionData BuildRegression(std::span<const Stretch> stretches,
                                const std::vector<Regressor>& regressors,
                                Signal output, bool measured_only) {
   Require(!regressors.empty(), "a model needs at least one regressor");
-  const int lag = LongestLagOf(regressors);
+  const int lag = MaxLagOf(regressors);
   Eigen::Index rows = 0;
   for (const Stretch& stretch : stretches) {
     rows += std::max<Eigen::Index>(
@@ -124,8 +124,8 @@ void Run(const TsModel& model, const Stretch& stretch, int settling,
   const std::vector<double> predictions =
       RunPredictions(model, stretch, past_output);
   const MeasuredRows measured({&stretch, 1}, model.regressors, model.output);
-  const auto left_out = static_cast<std::size_t>(
-      RunsOnItself(model) ? settling : LongestLag(model));
+  const auto left_out =
+      static_cast<std::size_t>(IsFreeRunning(model) ? settling : MaxLag(model));
   for (std::size_t k = left_out; k < stretch.samples.size(); ++k) {
     const Sample& sample = stretch.samples[k];
     const double residual =

@@ -25,7 +25,7 @@ struct SignTest {
 
 /// So many pairs must differ before the test can fall below 5 % at all:
 /// 2·2⁻⁵ > 0.05 ≥ 2·2⁻⁶.
-inline constexpr int kLeastDecidedPairs = 6;
+inline constexpr int kMinDecidedPairs = 6;
 
 /// Counts the signs of `differences`; NaN is no pair.
 SignTest CountSigns(const std::vector<double>& differences);

@@ -21,8 +21,8 @@ ChannelObserver FitObserver(const ChannelPlan& plan,
                             const Condition& normal, const Condition& condition,
                             const FitOptions& options) {
   const TsModel& normal_model = normal_channel.model;
-  const double least = kLeastDeviation * normal_channel.residual_sd;
-  if (!plan.adapted || RunsOnItself(normal_model)) {
+  const double least = kMinDeviation * normal_channel.residual_sd;
+  if (!plan.adapted || IsFreeRunning(normal_model)) {
     return CalibrateOn(
         FitFaultChannel(plan, normal_model, normal, condition, options),
         condition, options.settling, least);
@@ -49,7 +49,7 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
   const int channels = static_cast<int>(options.channels.size());
   std::vector<std::vector<Regressor>> regressors(options.channels.size());
   std::vector<double> saturations(options.channels.size());
-  reporter.Tell(0.0, "choosing regressors");
+  reporter.Report(0.0, "choosing regressors");
   ParallelFor(channels, options.threads, [&](int c) {
     const auto i = static_cast<std::size_t>(c);
     saturations[i] = FindSaturation(options.channels[i], conditions);
@@ -63,7 +63,7 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
         FitChannel(options.channels[i], regressors[i], conditions.front(),
                    FitOptionsOf(options.channels[i], options.fit),
                    saturations[i]),
-        conditions.front(), options.fit.settling, kLeastSd);
+        conditions.front(), options.fit.settling, kMinSd);
   });
   const int fits = static_cast<int>(conditions.size() - 1) * channels;
   std::atomic<int> done{0};
@@ -73,10 +73,10 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
     models.observers[o].channels[c] =
         FitObserver(options.channels[c], normal.channels[c], conditions.front(),
                     conditions[o], options.fit);
-    reporter.Tell(kStructureShare + kFitShare * ++done / fits,
-                  "fitting " + models.observers[o].name);
+    reporter.Report(kStructureShare + kFitShare * ++done / fits,
+                    "fitting " + models.observers[o].name);
   });
-  reporter.Tell(kStructureShare + kFitShare, "setting thresholds");
+  reporter.Report(kStructureShare + kFitShare, "setting thresholds");
   const NormalResiduals normal_data =
       CrossValidate(conditions.front(), models.observers.front(),
                     options.channels, options.fit, options.threads);
@@ -87,12 +87,12 @@ ModelSet TrainModelSet(const std::vector<TrainingRun>& runs,
   }
   FitThresholds(normal_data.residuals, windows, options.false_alarms_per_hour,
                 models, normal_data.commands);
-  reporter.Tell(0.9, "comparing faults");
+  reporter.Report(0.9, "comparing faults");
   FitInterpolationErrors(conditions, models);
   FindGroups(conditions, options.threads, models);
   FitDriftLimits(conditions, models);
   Validate(models);
-  reporter.Tell(1.0, "done");
+  reporter.Report(1.0, "done");
   return models;
 }
 

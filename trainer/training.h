@@ -52,7 +52,7 @@ class Reporter {
   /// `progress` must outlive the reporter; it may be empty.
   explicit Reporter(const Progress& progress) : progress_(progress) {}
 
-  void Tell(double share, std::string_view stage) {
+  void Report(double share, std::string_view stage) {
     const std::scoped_lock lock(mutex_);
     if (progress_) {
       progress_(share, stage);

@@ -11,7 +11,7 @@ namespace fdi {
 namespace {
 
 constexpr double kNormalQuantile = 1.96;
-constexpr double kLeastDeviation = 0.005;
+constexpr double kMinDeviation = 0.005;
 constexpr double kScaleDeviation = 0.02;
 constexpr double kSecondsPerDay = 86'400.0;
 
@@ -45,7 +45,7 @@ std::vector<Reading> Independent(std::span<const StrengthPoint> points,
       readings.push_back(
           {static_cast<double>(p.stamp_ns - last.stamp_ns) / kNsPerSecond,
            sign * p.strength,
-           std::max(0.5 * length / kNormalQuantile, kLeastDeviation)});
+           std::max(0.5 * length / kNormalQuantile, kMinDeviation)});
       before_ns = p.stamp_ns - kPointWindowNs + 1;
     }
   }
@@ -117,8 +117,8 @@ std::optional<Growth> GrowthOf(std::span<const StrengthPoint> points,
   }
   Growth growth{*latest, {}, {}};
   const std::vector<Reading> readings = Independent(points, growth.last);
-  if (readings.size() < kLeastPoints ||
-      readings.back().t * kNsPerSecond > -kLeastSpanNs) {
+  if (readings.size() < kMinPoints ||
+      readings.back().t * kNsPerSecond > -kMinSpanNs) {
     return growth;
   }
   const Line line = Fit(readings);

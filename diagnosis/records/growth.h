@@ -33,9 +33,9 @@ struct Growth {
 };
 
 /// A rate needs as many points, which no reading is common to,
-inline constexpr int kLeastPoints = 3;
+inline constexpr int kMinPoints = 3;
 /// over so much time.
-inline constexpr std::int64_t kLeastSpanNs = 1'200'000'000'000;
+inline constexpr std::int64_t kMinSpanNs = 1'200'000'000'000;
 /// A point is the mean of readings of at most so much time.
 inline constexpr std::int64_t kPointWindowNs = 420'000'000'000;
 

@@ -19,17 +19,17 @@ std::vector<std::string> PartitionNames(const std::string& text) {
 
 std::vector<std::string> ParsePartitions(const std::string& text,
                                          bool patterns) {
-  constexpr std::size_t kMost = 8;
-  constexpr std::size_t kLongest = 30;
+  constexpr std::size_t kMaxPartitions = 8;
+  constexpr std::size_t kMaxNameLength = 30;
   constexpr std::string_view kPlain =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_./";
   const std::string accepted = std::string(kPlain) + (patterns ? "*?[]!" : "");
   std::vector<std::string> names = PartitionNames(text);
   const bool fit = std::ranges::all_of(names, [&](const std::string& name) {
-    return !name.empty() && name.size() <= kLongest &&
+    return !name.empty() && name.size() <= kMaxNameLength &&
            name.find_first_not_of(accepted) == std::string::npos;
   });
-  if (!fit || names.size() > kMost) {
+  if (!fit || names.size() > kMaxPartitions) {
     throw ConfigError(
         "--partition is '" + text +
         "', accepted are at most 8 names of 1 to 30 letters, digits and -_./" +

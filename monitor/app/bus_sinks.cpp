@@ -13,7 +13,7 @@ namespace {
 
 // A UDP datagram holds at most 64 kB, part of which goes to the security
 // header.
-constexpr std::size_t kMostBatchBytes = 48'000;
+constexpr std::size_t kMaxBatchBytes = 48'000;
 
 // Upper bound of the CDR size of one vector.
 std::size_t BytesOf(const idl::DecisionMessage& message) {
@@ -64,8 +64,8 @@ void BusDecisionSink::Fill(const std::string& valve_id, const ModelSet* models,
 }
 
 bool BusDecisionSink::ToLive() {
-  unheard_ = unheard_ || live_.matched() == 0;
-  return !unheard_;
+  has_unsent_ = has_unsent_ || live_.matched() == 0;
+  return !has_unsent_;
 }
 
 bool BusDecisionSink::Publish(const std::string& valve_id,
@@ -87,7 +87,7 @@ bool BusDecisionSink::Send(const idl::DecisionMessage& message) {
 void BusDecisionSink::AddToBatch(const idl::DecisionMessage& message) {
   const std::size_t bytes = BytesOf(message);
   if (batch_.vectors.size() >= idl::kMaxBatch ||
-      batch_bytes_ + bytes > kMostBatchBytes) {
+      batch_bytes_ + bytes > kMaxBatchBytes) {
     SendBatch();
   }
   batch_.vectors.push_back(message);
@@ -111,11 +111,11 @@ std::uint64_t BusDecisionSink::Flush() {
   return std::exchange(unsent_, 0);
 }
 
-bool BusDecisionSink::WantsLast() {
-  if (!unheard_ || live_.matched() == 0) {
+bool BusDecisionSink::LastValuesDue() {
+  if (!has_unsent_ || live_.matched() == 0) {
     return false;
   }
-  unheard_ = false;
+  has_unsent_ = false;
   return true;
 }
 

@@ -29,7 +29,7 @@ class BusDecisionSink : public DecisionSink {
   bool Publish(const std::string& valve_id, const ModelSet* models,
                const Verdict& verdict) override;
   std::uint64_t Flush() override;
-  bool WantsLast() override;
+  bool LastValuesDue() override;
   void PublishLast(const std::string& valve_id, const ModelSet* models,
                    const Verdict& verdict) override;
 
@@ -39,9 +39,9 @@ class BusDecisionSink : public DecisionSink {
   /// Publishes a message that Fill() has prepared.
   bool Send(const idl::DecisionMessage& message);
   /// Drops the last-value cache: later subscribers get nothing sent before.
-  void Forget() { live_.Forget(); }
+  void ClearHistory() { live_.ClearHistory(); }
   /// Subscribers matched so far; see idl::Publisher.
-  int came() const { return live_.came(); }
+  int total_matched() const { return live_.total_matched(); }
 
   /// Waits until all subscribers have acknowledged what was published.
   bool WaitForAcknowledged(std::chrono::milliseconds timeout);
@@ -61,7 +61,7 @@ class BusDecisionSink : public DecisionSink {
   std::size_t batch_bytes_{0};
   std::uint64_t unsent_{0};  // Vectors in batches since the last Flush().
   idl::DecisionMessage message_;
-  bool unheard_{false};  // Vectors were dropped for lack of subscribers.
+  bool has_unsent_{false};  // Vectors were dropped for lack of subscribers.
 };
 
 /// Publishes fault events over DDS, and logs one line for each.
@@ -75,7 +75,7 @@ class BusEventSink : public EventSink {
   /// Republishes `event`, first published by another monitor, for new
   /// subscribers.
   void Repeat(const FaultEvent& event) { publisher_.Write(event); }
-  int came() const { return publisher_.came(); }
+  int total_matched() const { return publisher_.total_matched(); }
 
   bool WaitForAcknowledged(std::chrono::milliseconds timeout) {
     return publisher_.WaitForAcknowledged(timeout);

@@ -43,7 +43,7 @@ bool BusView::Matches(const std::string& valve_id) const {
   return GlobMatches(valves_, valve_id);
 }
 
-void ModelNames::Learn(const idl::ModelSetInfoMessage& info) {
+void ModelNames::Add(const idl::ModelSetInfoMessage& info) {
   infos_[info.model_hash] = info;
 }
 

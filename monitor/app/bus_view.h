@@ -56,7 +56,7 @@ class BusView {
           kMoment, 1000);
     }
     if (batches_) {
-      batches_->Take(idl::EachVector(matching), kMoment, 10);
+      batches_->Take(idl::ForEachVector(matching), kMoment, 10);
     }
   }
 
@@ -78,7 +78,7 @@ class BusView {
 /// The meaning of the arrays in decision vectors, learnt from ModelSetInfo.
 class ModelNames {
  public:
-  void Learn(const idl::ModelSetInfoMessage& info);
+  void Add(const idl::ModelSetInfoMessage& info);
   /// Null if the ModelSetInfo has not arrived yet.
   const idl::ModelSetInfoMessage* Find(std::uint64_t hash) const;
   /// Whether the factors of `message` can be named, or there are none.

@@ -12,7 +12,7 @@
 namespace fdi::monitor {
 namespace {
 
-constexpr double kLongestWindowS = 86'400.0;
+constexpr double kMaxWindowS = 86'400.0;
 
 storage::CauseGroup ReadGroup(cli::TomlReader& table) {
   storage::CauseGroup group;
@@ -40,7 +40,7 @@ storage::CauseGroup ReadGroup(cli::TomlReader& table) {
     table.Refuse("min_valves", "is not in 2..100000");
   }
   group.min_valves = static_cast<int>(valves);
-  if (const auto seconds = table.Number("within_s", 1.0, kLongestWindowS)) {
+  if (const auto seconds = table.Number("within_s", 1.0, kMaxWindowS)) {
     group.within_ns = static_cast<std::int64_t>(*seconds * 1e9);
   }
   return group;

@@ -59,16 +59,16 @@ int RunConsole(PlantConsoleOptions options, const cli::Context& context) {
         [&](const auto& message, const idl::Reception& reception) {
           using Message = std::decay_t<decltype(message)>;
           if constexpr (std::is_same_v<Message, FaultEvent>) {
-            console.Hear(message);
+            console.OnEvent(message);
           } else if constexpr (std::is_same_v<Message,
                                               idl::ModelSetInfoMessage>) {
-            console.Hear(feed->Add(message));
+            console.OnModels(feed->Add(message));
           } else {
             feed->Add(message, reception, PlantFeed::Clock::now());
           }
         },
         [](const std::string& /*valve_id*/) {});
-    feed->Tend(PlantFeed::Clock::now());
+    feed->Poll(PlantFeed::Clock::now());
   }
   console.Close();
   return cli::kExitOk;

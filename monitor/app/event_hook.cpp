@@ -99,12 +99,12 @@ void EventHook::Notify(cli::Json event) {
     }
     newest_ = std::move(event);
   } else {
-    Admit(std::move(event));
+    Enqueue(std::move(event));
   }
   changed_.notify_one();
 }
 
-void EventHook::Admit(cli::Json event) {
+void EventHook::Enqueue(cli::Json event) {
   event["left_out"] = std::exchange(left_out_, 0);
   waiting_.push_back(std::move(event));
 }
@@ -129,7 +129,7 @@ void EventHook::Run() {
                       [this] { return stopping_ || !waiting_.empty(); });
     if (newest_ && waiting_.size() < options_.max_waiting &&
         TakeToken(options_.now())) {
-      Admit(*std::exchange(newest_, std::nullopt));
+      Enqueue(*std::exchange(newest_, std::nullopt));
     }
     if (waiting_.empty()) {
       if (stopping_) {
@@ -144,12 +144,12 @@ void EventHook::Run() {
     const std::optional<std::string> failure = delivery_->Deliver(text);
     lock.lock();
     busy_ = false;
-    Settle(failure);
+    RecordResult(failure);
     changed_.notify_all();
   }
 }
 
-void EventHook::Settle(const std::optional<std::string>& failure) {
+void EventHook::RecordResult(const std::optional<std::string>& failure) {
   if (!failure) {
     ++counts_.delivered;
     return;

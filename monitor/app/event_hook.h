@@ -105,8 +105,8 @@ class EventHook {
 
   void Run();
   bool TakeToken(TimePoint now);
-  void Admit(cli::Json event);
-  void Settle(const std::optional<std::string>& failure);
+  void Enqueue(cli::Json event);
+  void RecordResult(const std::optional<std::string>& failure);
 
   std::unique_ptr<EventDelivery> delivery_;
   EventHookOptions options_;

@@ -53,23 +53,23 @@ void HistoryStore::CommitBatch(const std::function<void()>& batch) {
 }
 
 void HistoryStore::Record(const FaultEvent& event) {
-  Tolerate("record", [&] {
+  SkipIfNotFound("record", [&] {
     writer_.Record(event, utc_now_ns_());
-    LookForCauses(event);
+    DetectCauses(event);
   });
 }
 
 void HistoryStore::WatchCauses(
     std::vector<storage::CauseGroup> groups,
-    std::function<void(const storage::CauseChange&)> told) {
+    std::function<void(const storage::CauseChange&)> on_change) {
   causes_.emplace(writer_.database(), std::move(groups));
-  cause_told_ = std::move(told);
+  on_cause_change_ = std::move(on_change);
   writer_.CommitBatch([this] { cause_changes_ = causes_->EndFinished(); });
   PublishCauses();
 }
 
 // Called within the transaction that records the event.
-void HistoryStore::LookForCauses(const FaultEvent& event) {
+void HistoryStore::DetectCauses(const FaultEvent& event) {
   if (!causes_) {
     return;
   }
@@ -94,25 +94,25 @@ void HistoryStore::PublishCauses() {
                          {"cause", cause.cause_id},
                          {"group", cause.group},
                          {"episodes", std::to_string(cause.members.size())}}));
-    cause_told_(change);
+    on_cause_change_(change);
   }
 }
 
 void HistoryStore::Resume(std::uint64_t episode_id, std::int64_t stamp_ns) {
-  Tolerate("resume",
-           [&] { writer_.Resume(episode_id, stamp_ns, utc_now_ns_()); });
+  SkipIfNotFound("resume",
+                 [&] { writer_.Resume(episode_id, stamp_ns, utc_now_ns_()); });
 }
 
 void HistoryStore::StoreLook(const EpisodeLook& look) {
-  Tolerate("second_look", [&] { writer_.StoreLook(look); });
+  SkipIfNotFound("second_look", [&] { writer_.StoreLook(look); });
 }
 
 void HistoryStore::StoreStrength(const StrengthPoint& point) {
-  Tolerate("strength", [&] { writer_.StoreStrength(point); });
+  SkipIfNotFound("strength", [&] { writer_.StoreStrength(point); });
 }
 
 void HistoryStore::AddTrace(const EpisodeTrace& trace) {
-  Tolerate("trace", [&] {
+  SkipIfNotFound("trace", [&] {
     const std::vector<TracePoint> instants = trace.trace.Unpack();
     if (!instants.empty()) {
       writer_.AppendTrace(trace.episode_id, instants);
@@ -123,8 +123,8 @@ void HistoryStore::AddTrace(const EpisodeTrace& trace) {
   });
 }
 
-void HistoryStore::Tolerate(const char* operation,
-                            const std::function<void()>& call) {
+void HistoryStore::SkipIfNotFound(const char* operation,
+                                  const std::function<void()>& call) {
   try {
     call();
   } catch (const NotFoundError& error) {

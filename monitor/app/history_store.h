@@ -40,10 +40,10 @@ class HistoryStore : public HistorySink {
   /// ones are reported and skipped.
   std::vector<FaultEvent> UnsentEvents();
 
-  /// Looks for common causes in what is recorded from now on. `told` is called
-  /// by the history thread after each change has been committed.
+  /// Looks for common causes in what is recorded from now on. `on_change` is
+  /// called by the history thread after each change has been committed.
   void WatchCauses(std::vector<storage::CauseGroup> groups,
-                   std::function<void(const storage::CauseChange&)> told);
+                   std::function<void(const storage::CauseChange&)> on_change);
 
   void CommitBatch(const std::function<void()>& batch) override;
   void Record(const FaultEvent& event) override;
@@ -62,16 +62,16 @@ class HistoryStore : public HistorySink {
   void EndSession() { writer_.EndSession(utc_now_ns_(), true); }
 
  private:
-  void LookForCauses(const FaultEvent& event);
+  void DetectCauses(const FaultEvent& event);
   void PublishCauses();
   void ReportDamage(const std::vector<std::string>& damaged);
-  void Tolerate(const char* operation, const std::function<void()>& call);
+  void SkipIfNotFound(const char* operation, const std::function<void()>& call);
 
   storage::HistoryWriter writer_;
   Clock utc_now_ns_;
   LogSink log_;
   std::optional<storage::CommonCauseBook> causes_;
-  std::function<void(const storage::CauseChange&)> cause_told_;
+  std::function<void(const storage::CauseChange&)> on_cause_change_;
   std::vector<storage::CauseChange> cause_changes_;  // Of the current batch.
 };
 

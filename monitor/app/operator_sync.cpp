@@ -12,10 +12,10 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kPeriod{200};
-constexpr std::int64_t kBroughtNs = 30LL * 86'400'000'000'000;
+constexpr std::int64_t kMaxActionAgeNs = 30LL * 86'400'000'000'000;
 // An event that the other monitor missed is adopted within seconds.
-constexpr std::chrono::seconds kEpisodeMayCome{60};
-constexpr std::size_t kMostReceived = 10'000;
+constexpr std::chrono::seconds kEpisodeTimeout{60};
+constexpr std::size_t kMaxReceivedActions = 10'000;
 
 }  // namespace
 
@@ -24,7 +24,7 @@ OperatorSync::OperatorSync(idl::Participant& participant,
                            const std::filesystem::path& history,
                            ThrottledLog& log)
     : monitor_(std::move(monitor)),
-      done_here_(history),
+      local_actions_(history),
       history_(history),
       log_(log),
       out_(participant, {idl::Profile::kLossless, 0, PartitionsOf(options)}),
@@ -36,15 +36,15 @@ void OperatorSync::Start() {
     while (!stop.stop_requested()) {
       in_.Take(
           {[this](const OperatorAction& action, const auto&) {
-             if (received_.size() < kMostReceived) {
+             if (received_.size() < kMaxReceivedActions) {
                received_.push_back({std::chrono::steady_clock::now(), action});
              }
            },
            {}},
           kPeriod);
       try {
-        Adopt();
-        Bring();
+        ApplyReceived();
+        SendActions();
       } catch (const std::exception& error) {  // Retried in the next period.
         const std::string reason = error.what();
         log_.Report(LogId::kOperatorSync, "operator_action_waits",
@@ -54,17 +54,17 @@ void OperatorSync::Start() {
   });
 }
 
-void OperatorSync::Bring() {
+void OperatorSync::SendActions() {
   if (out_.matched() == 0) {
     return;
   }
-  if (const int came = out_.came(); came != came_) {
-    came_ = came;
+  if (const int readers = out_.total_matched(); readers != seen_readers_) {
+    seen_readers_ = readers;
     unsent_.clear();
-    done_here_.Rewind();
+    local_actions_.Rewind();
   }
   for (OperatorAction& action :
-       done_here_.Next(storage::UtcNow() - kBroughtNs)) {
+       local_actions_.Next(storage::UtcNow() - kMaxActionAgeNs)) {
     unsent_.push_back(std::move(action));
   }
   for (; !unsent_.empty(); unsent_.pop_front()) {
@@ -80,7 +80,7 @@ void OperatorSync::Bring() {
 }
 
 // The history already has an action that comes back to us, which ends the loop.
-void OperatorSync::Adopt() {
+void OperatorSync::ApplyReceived() {
   const auto now = std::chrono::steady_clock::now();
   for (std::size_t waiting = received_.size(); waiting > 0; --waiting) {
     const Received& received = received_.front();
@@ -92,7 +92,7 @@ void OperatorSync::Adopt() {
                                        " who=" + LogValue(received.action.who));
       }
     } catch (const NotFoundError&) {
-      keep = now - received.since < kEpisodeMayCome;
+      keep = now - received.since < kEpisodeTimeout;
     } catch (const ConfigError& error) {  // Not a valid action.
       ReportRefusal(error);
     }

@@ -37,17 +37,17 @@ class OperatorSync {
     OperatorAction action;
   };
 
-  void Bring();
-  void Adopt();
+  void SendActions();
+  void ApplyReceived();
   void ReportRefusal(const std::exception& error);
 
   const std::string monitor_;
-  storage::OperatorLog done_here_;
+  storage::OperatorLog local_actions_;
   storage::HistoryEditor history_;
   ThrottledLog& log_;
   idl::Publisher<OperatorAction> out_;
   idl::Subscriber<OperatorAction> in_;
-  int came_{0};
+  int seen_readers_{0};
   std::deque<OperatorAction> unsent_;
   std::deque<Received> received_;  // Its episode may still be adopted.
   std::jthread thread_;

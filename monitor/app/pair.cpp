@@ -43,17 +43,17 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kElectionPeriod{10};
-constexpr milliseconds kWordPeriod{50};
-constexpr milliseconds kListening{1500};  // Discovery takes some 100 ms.
-constexpr milliseconds kHoldVectors{3000};
+constexpr milliseconds kStatePeriod{50};
+constexpr milliseconds kListenTime{1500};  // Discovery takes some 100 ms.
+constexpr milliseconds kMaxHoldTime{3000};
 // By then a live writer has delivered its messages to all its readers.
-constexpr milliseconds kUnderWay{200};
-constexpr std::size_t kMostVectors = 20'000;  // 46 MB
-constexpr std::size_t kMostEvents = 10'000;
-constexpr std::size_t kMostPlaces = 200'000;
+constexpr milliseconds kMaxDeliveryTime{200};
+constexpr std::size_t kMaxHeldVectors = 20'000;  // 46 MB
+constexpr std::size_t kMaxHeldEvents = 10'000;
+constexpr std::size_t kMaxCoveredValves = 200'000;
 // If no counterpart has arrived by then, the two monitors judged differently.
 constexpr milliseconds kAdoptAfter{2000};
-constexpr milliseconds kHeardWithin{60'000};
+constexpr milliseconds kMaxEventAge{60'000};
 constexpr std::size_t kEventsPerValve = 16;  // The writer's DDS history depth.
 
 bool Same(const FaultEvent& a, const FaultEvent& b) {
@@ -107,13 +107,13 @@ Pair::Pair(idl::Participant& participant, const PairOptions& options,
       bus_(bus),
       events_(events),
       log_(log),
-      own_word_(participant),
-      words_(participant),
-      heard_vectors_(participant, idl::Profile::kLive, idl::Overflow::kLibrary,
-                     PartitionOfOthers(options)),
-      heard_events_(participant, idl::Profile::kLive, idl::Overflow::kLibrary,
+      own_state_(participant),
+      states_(participant),
+      peer_vectors_(participant, idl::Profile::kLive, idl::Overflow::kLibrary,
                     PartitionOfOthers(options)),
-      election_(OwnState(options, monitor), patience_, kListening,
+      peer_events_(participant, idl::Profile::kLive, idl::Overflow::kLibrary,
+                   PartitionOfOthers(options)),
+      election_(OwnState(options, monitor), patience_, kListenTime,
                 Clock::now()) {
   status_.name = options.name;
   status_.rank = options.rank;
@@ -132,7 +132,7 @@ bool Pair::Publish(const std::string& valve_id, const ModelSet* models,
   if (held_vectors_.empty() && Leads()) {
     return decisions_.Publish(valve_id, models, verdict);
   }
-  if (held_vectors_.size() >= kMostVectors) {
+  if (held_vectors_.size() >= kMaxHeldVectors) {
     held_vectors_.pop_front();
   }
   HeldVector& held = held_vectors_.emplace_back();
@@ -141,16 +141,16 @@ bool Pair::Publish(const std::string& valve_id, const ModelSet* models,
   return true;
 }
 
-bool Pair::WantsLast() {
+bool Pair::LastValuesDue() {
   if (!Leads()) {
     return false;
   }
   const bool lacks =
-      vectors_lacked_ >= 0 && decisions_.came() > vectors_lacked_;
+      vectors_lacked_ >= 0 && decisions_.total_matched() > vectors_lacked_;
   if (lacks) {
     vectors_lacked_ = -1;
   }
-  return decisions_.WantsLast() || lacks;
+  return decisions_.LastValuesDue() || lacks;
 }
 
 // Called by the journal's publisher thread, and at the start by the main
@@ -160,16 +160,16 @@ bool Pair::Publish(const FaultEvent& event, bool persisted) {
   FaultEvent own = event;
   own.persisted = persisted;
   if (held_events_.empty() && Leads()) {
-    return !RememberLocked(own) || events_.Publish(event, persisted);
+    return !MarkPublishedLocked(own) || events_.Publish(event, persisted);
   }
   const auto same = [&](const HeldEvent& held) {
     return Same(held.event, event);
   };
-  std::erase_if(foreign_, same);
+  std::erase_if(unmatched_events_, same);
   if (IsPublishedLocked(event)) {
     return true;
   }
-  if (held_events_.size() >= kMostEvents) {
+  if (held_events_.size() >= kMaxHeldEvents) {
     held_events_.pop_front();
   }
   held_events_.push_back({Clock::now(), std::move(own)});
@@ -185,7 +185,7 @@ bool Pair::IsPublishedLocked(const FaultEvent& event) const {
 }
 
 // @returns false if the event is on the bus already.
-bool Pair::RememberLocked(const FaultEvent& event) {
+bool Pair::MarkPublishedLocked(const FaultEvent& event) {
   if (IsPublishedLocked(event)) {
     return false;
   }
@@ -197,8 +197,8 @@ bool Pair::RememberLocked(const FaultEvent& event) {
   return true;
 }
 
-void Pair::Hear(const idl::DecisionMessage& message) {
-  if (covered_.size() >= kMostPlaces) {
+void Pair::OnVector(const idl::DecisionMessage& message) {
+  if (covered_.size() >= kMaxCoveredValves) {
     covered_.clear();
   }
   const Verdict& verdict = message.verdict;
@@ -207,84 +207,86 @@ void Pair::Hear(const idl::DecisionMessage& message) {
   }
 }
 
-void Pair::Hear(const FaultEvent& event, TimePoint now) {
+void Pair::OnEvent(const FaultEvent& event, TimePoint now) {
   const std::lock_guard lock(mutex_);
-  if (!RememberLocked(event)) {
+  if (!MarkPublishedLocked(event)) {
     return;
   }
   if (std::erase_if(held_events_, [&](const HeldEvent& held) {
         return Same(held.event, event);
       }) == 0) {
-    foreign_.push_back({now, event});
+    unmatched_events_.push_back({now, event});
   }
 }
 
 void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
   const TimePoint now = Clock::now();
-  if (now - ticked_ < kElectionPeriod) {
+  if (now - last_tick_ < kElectionPeriod) {
     return;
   }
-  ticked_ = now;
+  last_tick_ = now;
   constexpr milliseconds kNow{0};
-  words_.Take(
-      {[&](const PairState& word, const auto&) {
-         if (election_.Heard(word, now) && (word.leads || word.leaving)) {
-           arrived_ = word.leaving ? now : now - kUnderWay;
+  states_.Take(
+      {[&](const PairState& state, const auto&) {
+         if (election_.OnState(state, now) && (state.leads || state.leaving)) {
+           arrived_ = state.leaving ? now : now - kMaxDeliveryTime;
          }
        },
        {}},
       kNow);
-  heard_vectors_.Take(
-      {[&](const idl::DecisionMessage& message, const auto&) { Hear(message); },
-       {}},
-      kNow);
-  heard_events_.Take(
-      {[&](const FaultEvent& event, const auto&) { Hear(event, now); }, {}},
+  peer_vectors_.Take({[&](const idl::DecisionMessage& message, const auto&) {
+                        OnVector(message);
+                      },
+                      {}},
+                     kNow);
+  peer_events_.Take(
+      {[&](const FaultEvent& event, const auto&) { OnEvent(event, now); }, {}},
       kNow);
   // The lease counts from our last message, as the other monitors count, which
   // was sent before the last step.
   if (led_ && now >= lease_until_.load()) {
-    election_.Lapse(now);
+    election_.OnLeaseExpired(now);
   }
   election_.Step(received, static_cast<int>(pipeline.census().judged), now);
-  DropHeard(now);
-  Follow(now);
+  DropCovered(now);
+  ApplyElection(now);
   Adopt(now, pipeline);
-  if (led_ && events_lacked_ >= 0 && bus_.came() > events_lacked_) {
+  if (led_ && events_lacked_ >= 0 && bus_.total_matched() > events_lacked_) {
     events_lacked_ = -1;
     RepeatEvents(TimePoint{});
   }
 }
 
-void Pair::Leave() {
+void Pair::StepDown() {
   const TimePoint now = Clock::now();
-  election_.Leave(now);
-  Follow(now);
+  election_.StepDown(now);
+  ApplyElection(now);
   if (led_) {
     lease_until_ = TimePoint::max();  // Nobody else publishes the rest.
   }
-  own_word_.WaitForAcknowledged(milliseconds(100));
+  own_state_.WaitForAcknowledged(milliseconds(100));
 }
 
 // Carries out the decision of the election.
-void Pair::Follow(TimePoint now) {
+void Pair::ApplyElection(TimePoint now) {
   const bool leads = election_.leads();
   const bool changed = leads != led_;
   if (changed && !leads) {
     lease_until_ = TimePoint{};
-    decisions_.Forget();
+    decisions_.ClearHistory();
   }
-  if (changed || election_.self().leaving || now - said_ >= kWordPeriod) {
-    said_ = now;
-    own_word_.Write(election_.self());
+  if (changed || election_.self().leaving ||
+      now - state_sent_ >= kStatePeriod) {
+    state_sent_ = now;
+    own_state_.Write(election_.self());
   }
   if (leads) {
-    lease_until_ = said_ + patience_;
+    lease_until_ = state_sent_ + patience_;
   }
   if (changed && leads) {
     const std::lock_guard lock(mutex_);
-    vectors_lacked_ = covered_.empty() ? -1 : decisions_.came();
-    events_lacked_ = published_.empty() ? -1 : bus_.came();
+    vectors_lacked_ = covered_.empty() ? -1 : decisions_.total_matched();
+    events_lacked_ = published_.empty() ? -1 : bus_.total_matched();
   }
   led_ = leads;
   if (changed && leads) {
@@ -294,26 +296,26 @@ void Pair::Follow(TimePoint now) {
     arrived_ = now;
     PublishHeld();
   }
-  if (!election_.twin().empty()) {
+  if (!election_.same_rank().empty()) {
     log_.Report(
         LogId::kPairTwin, "pair_rank_taken",
         [this] {
           return "pair=" + options_.name +
                  " rank=" + std::to_string(options_.rank) +
-                 " other=" + LogValue(election_.twin());
+                 " other=" + LogValue(election_.same_rank());
         },
         LogLevel::kError);
   }
-  if (followed_ != election_.leader()) {
-    followed_ = election_.leader();
+  if (leader_ != election_.leader()) {
+    leader_ = election_.leader();
     log_.Line(LogLevel::kInfo,
-              "pair_leader pair=" + options_.name + " leader=" +
-                  (followed_.empty() ? "none" : LogValue(followed_)) +
+              "pair_leader pair=" + options_.name +
+                  " leader=" + (leader_.empty() ? "none" : LogValue(leader_)) +
                   " here=" + (leads ? "true" : "false"));
   }
   const std::lock_guard lock(mutex_);
   status_.leads = leads;
-  status_.leader = followed_;
+  status_.leader = leader_;
   status_.others = election_.others();
   status_.takeovers += changed && leads ? 1 : 0;
 }
@@ -323,7 +325,7 @@ void Pair::Follow(TimePoint now) {
 // until it is sent.
 void Pair::PublishHeld() {
   std::unordered_set<std::string> sent;
-  const bool all = held_vectors_.size() > kMostVectors / 2;
+  const bool all = held_vectors_.size() > kMaxHeldVectors / 2;
   while (!held_vectors_.empty()) {
     const idl::DecisionMessage& message = held_vectors_.front().message;
     if (!sent.insert(message.valve_id).second && !all) {
@@ -334,7 +336,7 @@ void Pair::PublishHeld() {
   }
   const std::lock_guard lock(mutex_);
   for (const HeldEvent& held : std::exchange(held_events_, {})) {
-    if (RememberLocked(held.event)) {
+    if (MarkPublishedLocked(held.event)) {
       events_.Publish(held.event, held.event.persisted);
     }
   }
@@ -342,13 +344,13 @@ void Pair::PublishHeld() {
 
 // Drops vectors that the leader has published or never will, and closed
 // episodes' events that are too old.
-void Pair::DropHeard(TimePoint now) {
+void Pair::DropCovered(TimePoint now) {
   while (!held_vectors_.empty() && !led_) {
     const HeldVector& first = held_vectors_.front();
     const bool arrived =
         first.since < arrived_ &&
         IsCovered(first.message.valve_id, first.message.verdict);
-    if (now - first.since < kHoldVectors && !arrived) {
+    if (now - first.since < kMaxHoldTime && !arrived) {
       break;
     }
     held_vectors_.pop_front();
@@ -357,7 +359,7 @@ void Pair::DropHeard(TimePoint now) {
   std::set<std::uint64_t> over;
   for (const HeldEvent& held : held_events_) {
     if (held.event.transition.kind == TransitionKind::kClosed &&
-        now - held.since > kHeardWithin) {
+        now - held.since > kMaxEventAge) {
       over.insert(held.event.episode_id);
     }
   }
@@ -372,7 +374,7 @@ void Pair::Adopt(TimePoint now, Pipeline& pipeline) {
   std::vector<FaultEvent> due;
   {
     const std::lock_guard lock(mutex_);
-    std::erase_if(foreign_, [&](HeldEvent& held) {
+    std::erase_if(unmatched_events_, [&](HeldEvent& held) {
       const bool is_due = now - held.since >= kAdoptAfter ||
                           pipeline.IsSettling(held.event.valve_id);
       if (is_due) {
@@ -403,11 +405,11 @@ Pair::Status Pair::status() const {
   return status_;
 }
 
-bool Pair::HeardAllEvents() const {
+bool Pair::AllEventsCovered() const {
   const TimePoint now = Clock::now();
   const std::lock_guard lock(mutex_);
   return std::ranges::all_of(held_events_, [&](const HeldEvent& held) {
-    return now - held.since > kHeardWithin;
+    return now - held.since > kMaxEventAge;
   });
 }
 

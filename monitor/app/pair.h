@@ -52,7 +52,7 @@ class Pair : public DecisionSink, public EventSink {
   bool Publish(const std::string& valve_id, const ModelSet* models,
                const Verdict& verdict) override;
   std::uint64_t Flush() override { return decisions_.Flush(); }
-  bool WantsLast() override;
+  bool LastValuesDue() override;
   void PublishLast(const std::string& valve_id, const ModelSet* models,
                    const Verdict& verdict) override {
     decisions_.PublishLast(valve_id, models, verdict);
@@ -63,7 +63,7 @@ class Pair : public DecisionSink, public EventSink {
   /// own. Called by the diagnosis thread, several times per patience interval.
   void Tick(std::uint64_t received, Pipeline& pipeline);
   /// Hands leadership over if another monitor is there; call before the end.
-  void Leave();
+  void StepDown();
 
   /// Thread safe.
   struct Status {
@@ -77,7 +77,7 @@ class Pair : public DecisionSink, public EventSink {
   Status status() const;
   /// True if every event was heard from the leader or is too old to be heard.
   /// Thread safe.
-  bool HeardAllEvents() const;
+  bool AllEventsCovered() const;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -97,15 +97,15 @@ class Pair : public DecisionSink, public EventSink {
 
   bool Leads() const { return Clock::now() < lease_until_.load(); }
   bool IsCovered(const std::string& valve_id, const Verdict& verdict) const;
-  void Hear(const idl::DecisionMessage& message);
-  void Hear(const FaultEvent& event, TimePoint now);
-  void Follow(TimePoint now);
+  void OnVector(const idl::DecisionMessage& message);
+  void OnEvent(const FaultEvent& event, TimePoint now);
+  void ApplyElection(TimePoint now);
   void PublishHeld();
-  void DropHeard(TimePoint now);
+  void DropCovered(TimePoint now);
   void Adopt(TimePoint now, Pipeline& pipeline);
   void RepeatEvents(TimePoint since);
   bool IsPublishedLocked(const FaultEvent& event) const;
-  bool RememberLocked(const FaultEvent& event);
+  bool MarkPublishedLocked(const FaultEvent& event);
 
   const PairOptions options_;
   const Clock::duration patience_;
@@ -113,19 +113,19 @@ class Pair : public DecisionSink, public EventSink {
   BusEventSink& bus_;
   EventSink& events_;
   ThrottledLog& log_;
-  idl::Publisher<PairState> own_word_;
-  idl::Subscriber<PairState> words_;
-  idl::Subscriber<idl::DecisionMessage> heard_vectors_;
-  idl::Subscriber<FaultEvent> heard_events_;
+  idl::Publisher<PairState> own_state_;
+  idl::Subscriber<PairState> states_;
+  idl::Subscriber<idl::DecisionMessage> peer_vectors_;
+  idl::Subscriber<FaultEvent> peer_events_;
   // Until then we certainly lead: no other monitor takes over earlier.
   std::atomic<TimePoint> lease_until_{TimePoint{}};
 
   // Used by the diagnosis thread only.
   PairElection election_;
-  TimePoint ticked_;
-  TimePoint said_;
+  TimePoint last_tick_;
+  TimePoint state_sent_;
   bool led_{false};
-  std::string followed_;
+  std::string leader_;
   // Messages heard earlier have reached all subscribers: their leader was alive
   // until then.
   TimePoint arrived_;
@@ -141,7 +141,7 @@ class Pair : public DecisionSink, public EventSink {
   // The last events of each valve that are on the bus.
   std::map<std::string, std::deque<HeldEvent>> published_;
   std::deque<HeldEvent> held_events_;  // Ours, not heard from the leader yet.
-  std::deque<HeldEvent> foreign_;      // Heard, not raised by us yet.
+  std::deque<HeldEvent> unmatched_events_;  // Heard, not raised by us yet.
 };
 
 }  // namespace fdi::monitor

@@ -6,8 +6,8 @@
 namespace fdi::monitor {
 namespace {
 
-constexpr std::chrono::seconds kLeastPatience{3};
-constexpr std::chrono::seconds kForgotten{60};
+constexpr std::chrono::seconds kMinPatience{3};
+constexpr std::chrono::seconds kMonitorExpiry{60};
 constexpr double kSilentPeriods = 3.0;
 
 // "leader" or "standby"; empty for a monitor that is not in a pair.
@@ -44,8 +44,8 @@ std::shared_ptr<const console::ModelFacts> PlantFeed::Add(
   return facts;
 }
 
-console::MonitorLine& PlantFeed::Hear(const idl::Reception& reception,
-                                      Clock::time_point now) {
+console::MonitorLine& PlantFeed::MarkAlive(const idl::Reception& reception,
+                                           Clock::time_point now) {
   Monitor& monitor = monitors_[reception.participant_id];
   monitor.heard = now;
   monitor.line.heard_ns = reception.received_ns;
@@ -57,7 +57,7 @@ void PlantFeed::Add(const idl::DecisionMessage& message,
   std::string monitor;
   {
     const std::lock_guard lock(mutex_);
-    monitor = Hear(reception, now).name;
+    monitor = MarkAlive(reception, now).name;
   }
   const Verdict& verdict = message.verdict;
   Valve& valve = valves_[message.valve_id];
@@ -69,13 +69,13 @@ void PlantFeed::Add(const idl::DecisionMessage& message,
   }
   const auto models = models_.find(message.model_hash);
   const auto facts = models == models_.end() ? nullptr : models->second;
-  board_.ShowHeard(message.valve_id, verdict, facts, monitor);
+  board_.ShowRemote(message.valve_id, verdict, facts, monitor);
   valve.source_id = verdict.source_id;
   valve.seq = verdict.seq;
   valve.heard = now;
   valve.silence = Silence::kNone;
   valve.patience = std::max<Clock::duration>(
-      kLeastPatience,
+      kMinPatience,
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
           facts ? kSilentPeriods * facts->period_s : 0.0)));
 }
@@ -83,7 +83,7 @@ void PlantFeed::Add(const idl::DecisionMessage& message,
 void PlantFeed::Add(const idl::MonitorStatusMessage& status,
                     const idl::Reception& reception, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
-  console::MonitorLine& line = Hear(reception, now);
+  console::MonitorLine& line = MarkAlive(reception, now);
   line.name = status.monitor;
   line.software = status.software;
   line.health = idl::HealthName(status.health);
@@ -91,7 +91,7 @@ void PlantFeed::Add(const idl::MonitorStatusMessage& status,
   line.pair = PairOf(status);
 }
 
-void PlantFeed::Tend(Clock::time_point now) {
+void PlantFeed::Poll(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   for (auto& [participant, monitor] : monitors_) {
     monitor.line.silent = now - monitor.heard > kMonitorSilence;
@@ -100,15 +100,16 @@ void PlantFeed::Tend(Clock::time_point now) {
   for (auto& [id, valve] : valves_) {
     Monitor& monitor = monitors_[valve.participant];
     ++monitor.line.valves;
-    Mark(id, valve, monitor, now);
+    UpdateSilence(id, valve, monitor, now);
   }
   std::erase_if(monitors_, [now](const auto& item) {
-    return item.second.line.valves == 0 && now - item.second.heard > kForgotten;
+    return item.second.line.valves == 0 &&
+           now - item.second.heard > kMonitorExpiry;
   });
 }
 
-void PlantFeed::Mark(const std::string& valve_id, Valve& valve,
-                     const Monitor& monitor, Clock::time_point now) {
+void PlantFeed::UpdateSilence(const std::string& valve_id, Valve& valve,
+                              const Monitor& monitor, Clock::time_point now) {
   const Silence silence = monitor.line.silent ? Silence::kMonitor
                           : now - valve.heard > valve.patience ? Silence::kStale
                                                                : Silence::kNone;

@@ -37,7 +37,7 @@ class PlantFeed {
   /// Marks as silent the valves that sent nothing for three of their periods
   /// and at least 3 s, or whose monitor is silent. Forgets monitors without
   /// valves after a minute of silence. Call several times a second.
-  void Tend(Clock::time_point now);
+  void Poll(Clock::time_point now);
 
   /// Ordered by name; thread safe.
   std::vector<console::MonitorLine> monitors() const;
@@ -55,10 +55,10 @@ class PlantFeed {
     Clock::duration patience{0};
     Silence silence{Silence::kNone};
   };
-  console::MonitorLine& Hear(const idl::Reception& reception,
-                             Clock::time_point now);
-  void Mark(const std::string& valve_id, Valve& valve, const Monitor& monitor,
-            Clock::time_point now);
+  console::MonitorLine& MarkAlive(const idl::Reception& reception,
+                                  Clock::time_point now);
+  void UpdateSilence(const std::string& valve_id, Valve& valve,
+                     const Monitor& monitor, Clock::time_point now);
 
   console::LiveBoard& board_;
   std::map<std::uint64_t, std::shared_ptr<const console::ModelFacts>> models_;

@@ -91,9 +91,9 @@ std::filesystem::path LockOf(const storage::DataDirectory& data) {
 // The reader never frees the slot of a valve while its publisher is alive, so
 // it needs more slots than the pipeline, which does free them.
 int IntakeValves(int max_valves) {
-  constexpr int kStrangers = 60'000;
-  constexpr int kMost = 100'000;  // See idl::DdsOptions.
-  return std::min(max_valves + kStrangers, kMost);
+  constexpr int kSpareSlots = 60'000;
+  constexpr int kMaxSlots = 100'000;  // See idl::DdsOptions.
+  return std::min(max_valves + kSpareSlots, kMaxSlots);
 }
 
 std::vector<std::string> Partitions(const ServiceOptions& options) {
@@ -201,13 +201,13 @@ EventSink& Service::EventsOut() {
 PipelineSinks Service::Sinks() {
   EventSink& events = pair_ ? *pair_ : EventsOut();
   return {pair_ ? static_cast<DecisionSink&>(*pair_) : decisions_,
-          console_ ? console_->Before(events) : events, history_, runs_.get(),
+          console_ ? console_->Wrap(events) : events, history_, runs_.get(),
           console_ ? &console_->live() : nullptr};
 }
 
 PipelineOptions Service::WithDelivery(PipelineOptions options) {
   options.journal.acknowledged = [this](milliseconds patience) {
-    return (!pair_ || pair_->HeardAllEvents()) &&
+    return (!pair_ || pair_->AllEventsCovered()) &&
            events_.WaitForAcknowledged(patience);
   };
   return options;
@@ -256,7 +256,7 @@ void Service::Start() {
 void Service::ResendEvents() {
   for (const FaultEvent& event : history_.UnsentEvents()) {
     if (pair_ ? pair_->Publish(event, true) : events_.Publish(event, true)) {
-      pipeline_.Published(event);
+      pipeline_.MarkPublished(event);
       counters_.Add(Counter::kEventsResent);
     }
   }
@@ -313,12 +313,12 @@ void Service::Diagnose() {
           const idl::Reception& reception) {
         received = TimePoint(
             std::chrono::nanoseconds(reception.received_ns + utc_to_steady_ns));
-        pipeline_.Offer(message.valve_id, message.sample, reception.writer_id,
-                        received);
+        pipeline_.OnSample(message.valve_id, message.sample,
+                           reception.writer_id, received);
       },
       [&](const idl::ValveSampleMessage& message,
           const idl::Reception& reception) {
-        pipeline_.OfferEnd(message.valve_id, reception.writer_id);
+        pipeline_.OnStreamEnded(message.valve_id, reception.writer_id);
       }};
   const int limit = pair_ ? kPairTakeLimit : kTakeLimit;
   const auto take = [&](milliseconds timeout) {
@@ -331,13 +331,13 @@ void Service::Diagnose() {
   while (!stopping_) {
     // While samples wait, silence is measured up to the newest one handled.
     const int taken = take(pair_ ? kPairTakeTimeout : kTakeTimeout);
-    pipeline_.Tend(taken < limit ? Clock::now() : received);
+    pipeline_.Poll(taken < limit ? Clock::now() : received);
     if (pair_) {
       pair_->Tick(counters_[Counter::kReceived], pipeline_);
     }
   }
   if (pair_) {
-    pair_->Leave();
+    pair_->StepDown();
   }
   // Drains what has arrived already; publishers that continue to send do not
   // delay the shutdown beyond drain_until_.

@@ -15,8 +15,8 @@ namespace {
 using std::chrono::milliseconds;
 
 // A monitor announces its share once a second.
-constexpr milliseconds kGoneAfter{3500};
-constexpr std::size_t kMostMonitors = 64;
+constexpr milliseconds kPeerTimeout{3500};
+constexpr std::size_t kMaxMonitors = 64;
 
 // Whether a publisher can be in both partitions. For two patterns this is known
 // only if one matches the other as text.
@@ -32,7 +32,7 @@ bool Overlap(const std::string& a, const std::string& b) {
   });
 }
 
-bool Rivals(const MonitorShare& own, const MonitorShare& other) {
+bool AreCompetitors(const MonitorShare& own, const MonitorShare& other) {
   const bool stands_in = !own.pair.empty() && other.pair == own.pair;
   return other.monitor != own.monitor && !stands_in &&
          Overlap(own.partitions, other.partitions);
@@ -44,8 +44,9 @@ ContestedValves FindContested(const MonitorShare& own,
                               const std::vector<MonitorShare>& others,
                               const std::vector<std::string>& valves) {
   std::vector<MonitorShare> rivals;
-  std::ranges::copy_if(others, std::back_inserter(rivals),
-                       [&](const auto& other) { return Rivals(own, other); });
+  std::ranges::copy_if(
+      others, std::back_inserter(rivals),
+      [&](const auto& other) { return AreCompetitors(own, other); });
   ContestedValves contested;
   if (rivals.empty()) {
     return contested;
@@ -76,19 +77,19 @@ void ShareWatch::Tick(const std::function<std::vector<std::string>()>& valves) {
   const Clock::time_point now = Clock::now();
   in_.Take(
       {[&](const MonitorShare& share, const auto&) {
-         if (heard_.size() < kMostMonitors || heard_.contains(share.monitor)) {
-           heard_[share.monitor] = {share, now};
+         if (peers_.size() < kMaxMonitors || peers_.contains(share.monitor)) {
+           peers_[share.monitor] = {share, now};
          }
        },
        {}},
       milliseconds(0));
-  std::erase_if(heard_, [&](const auto& each) {
-    return now - each.second.at > kGoneAfter;
+  std::erase_if(peers_, [&](const auto& each) {
+    return now - each.second.at > kPeerTimeout;
   });
   std::vector<MonitorShare> others;
-  for (const auto& [monitor, heard] : heard_) {
-    if (Rivals(own_, heard.share)) {
-      others.push_back(heard.share);
+  for (const auto& [monitor, peer] : peers_) {
+    if (AreCompetitors(own_, peer.share)) {
+      others.push_back(peer.share);
     }
   }
   const ContestedValves found = others.empty()

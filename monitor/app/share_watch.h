@@ -47,7 +47,7 @@ class ShareWatch {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Heard {
+  struct PeerShare {
     MonitorShare share;
     Clock::time_point at;
   };
@@ -56,7 +56,7 @@ class ShareWatch {
   ThrottledLog& log_;
   idl::Publisher<MonitorShare> out_;
   idl::Subscriber<MonitorShare> in_;
-  std::map<std::string, Heard> heard_;  // By monitor.
+  std::map<std::string, PeerShare> peers_;  // By monitor.
   mutable std::mutex mutex_;
   ContestedValves contested_;  // Guarded by mutex_.
 };

@@ -161,8 +161,7 @@ HttpPage ReadinessPage(const Readiness& readiness) {
 }
 
 // What was refused on the network, and from how many participants.
-void AddWhatWasRefused(const StatusFacts& facts,
-                       std::vector<Measure>& measures) {
+void AddRefusals(const StatusFacts& facts, std::vector<Measure>& measures) {
   constexpr Type kCounter = Type::kCounter;
   std::uint64_t refused_datagrams = 0;
   for (std::size_t i = 0; i < idl::kDatagramVerdictCount; ++i) {
@@ -205,7 +204,7 @@ std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
   constexpr std::string_view kWaitingHelp =
       "Samples, records or points of evidence in a queue";
   std::vector<Measure> measures = facts.counters.Measures();
-  AddWhatWasRefused(facts, measures);
+  AddRefusals(facts, measures);
   const std::vector<Measure> others{
       {"dds_lost", "fdi_dds_samples_lost_total", kCounter,
        "Samples that were published but will never arrive", "", "",

@@ -136,7 +136,7 @@ TopSort NextSort(TopSort sort) {
 
 void TopBoard::Add(const idl::ModelSetInfoMessage& info,
                    Clock::time_point /*now*/) {
-  names_.Learn(info);
+  names_.Add(info);
 }
 
 void TopBoard::Add(const idl::DecisionMessage& message, Clock::time_point now) {
@@ -179,8 +179,8 @@ std::string TopBoard::Health(Clock::time_point now) const {
   return text;
 }
 
-Json TopBoard::RowOf(const Heard& heard, Clock::time_point now) const {
-  const idl::DecisionMessage& message = heard.message;
+Json TopBoard::RowOf(const LatestVector& latest, Clock::time_point now) const {
+  const idl::DecisionMessage& message = latest.message;
   const Verdict& verdict = message.verdict;
   const idl::ModelSetInfoMessage* info = names_.Find(message.model_hash);
   const Json factors = names_.Factors(message);
@@ -208,7 +208,7 @@ Json TopBoard::RowOf(const Heard& heard, Clock::time_point now) const {
   return {{"valve_id", message.valve_id},
           {"state", console::ShownState(verdict.state, verdict.quality)},
           {"quality", QualityName(verdict.quality)},
-          {"silent", now - heard.at > silence_},
+          {"silent", now - latest.at > silence_},
           {"fault", faults.empty() ? Json() : Json(faults)},
           {"name",
            faults.empty() ? Json() : Json(texts_.Words(faults, strength).name)},
@@ -234,8 +234,8 @@ cli::Report TopBoard::Valves(TopSort sort, const std::string& filter,
   // Sort keys in order of precedence; those that `sort` ignores are equal.
   using Order = std::tuple<int, std::int64_t, double, std::string>;
   std::vector<std::pair<Order, Json>> rows;
-  for (const auto& [valve_id, heard] : decisions_) {
-    Json row = RowOf(heard, now);
+  for (const auto& [valve_id, latest] : decisions_) {
+    Json row = RowOf(latest, now);
     if (!lower.empty() && !Contains(row, lower)) {
       continue;
     }

@@ -53,16 +53,16 @@ class TopBoard {
   std::string Health(Clock::time_point now) const;
 
  private:
-  struct Heard {
+  struct LatestVector {
     idl::DecisionMessage message;
     Clock::time_point at;
   };
-  cli::Json RowOf(const Heard& heard, Clock::time_point now) const;
+  cli::Json RowOf(const LatestVector& latest, Clock::time_point now) const;
 
   cli::FaultTexts texts_;
   std::chrono::milliseconds silence_;
   ModelNames names_;
-  std::map<std::string, Heard> decisions_;
+  std::map<std::string, LatestVector> decisions_;
   /// First abnormal sample of the open episode, and its id.
   std::map<std::string, std::pair<std::int64_t, std::uint64_t>> open_;
   std::map<std::string, std::pair<idl::MonitorStatusMessage, Clock::time_point>>

@@ -22,7 +22,7 @@ Json Utc(std::int64_t stamp_ns) {
 }
 
 // Why there is no name: the candidates, or that no known fault fits.
-std::string WhyUnknown(const FaultEvent& message) {
+std::string UnknownReason(const FaultEvent& message) {
   if (message.transition.faults != 0) {
     return "";
   }
@@ -134,7 +134,7 @@ void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
            message.model_set + "@" + std::to_string(message.model_version)},
           {"persisted", message.persisted}},
          Start(t.stamp_ns, message.valve_id) + " EVENT " + kind + " " + faults +
-             WhyUnknown(message) + " factor=" + FormatNumber(t.factor, 2) +
+             UnknownReason(message) + " factor=" + FormatNumber(t.factor, 2) +
              " episode=" + Hex(message.episode_id) +
              (t.reason == EndReason::kNone ? "" : " reason=" + reason) +
              (message.persisted ? "" : " NOT_PERSISTED")});
@@ -166,7 +166,7 @@ void WatchRecords::Add(const idl::MonitorStatusMessage& message,
 
 void WatchRecords::Add(const idl::ModelSetInfoMessage& message,
                        Clock::time_point now) {
-  names_.Learn(message);
+  names_.Add(message);
   Json faults = Json::array();
   for (const int fault : message.faults) {
     faults.push_back(FaultName(fault));

@@ -102,7 +102,7 @@ Permission TokenGuard::Check(std::string_view authorization,
   constexpr std::string_view kScheme = "Bearer ";
   if (authorization.starts_with(kScheme) &&
       SameSecret(authorization.substr(kScheme.size()), token_)) {
-    failures_.Forget(origin);
+    failures_.Reset(origin);
     return Permission::kGranted;
   }
   failures_.Add(origin, now);

@@ -40,7 +40,7 @@ class FailureLimit {
   bool Allows(const std::string& origin, Clock::time_point now);
   /// Records that a checked attempt failed.
   void Add(const std::string& origin, Clock::time_point now);
-  void Forget(const std::string& origin) { failing_.erase(origin); }
+  void Reset(const std::string& origin) { failing_.erase(origin); }
 
  private:
   // Remaining attempts, refilled at one per second.

@@ -11,7 +11,7 @@
 namespace fdi::console {
 namespace {
 
-constexpr std::int64_t kMaxMinutes = storage::kLongestShelfNs / kNsPerMinute;
+constexpr std::int64_t kMaxMinutes = storage::kMaxShelfNs / kNsPerMinute;
 
 std::string TextOf(const Json& body, const char* key) {
   const auto found = body.find(key);
@@ -123,7 +123,7 @@ void Perform(const Api& api, const Action& action,
       body.is_object() && body.contains("who") && body["who"].is_string();
   std::string who = named ? body["who"].get<std::string>() : "";
   // Checked first: a client without permission learns nothing about the body.
-  if (!api.access.MayAct(request, response, action.role, who)) {
+  if (!api.access.Authorize(request, response, action.role, who)) {
     return;
   }
   if (!body.is_object()) {
@@ -134,7 +134,7 @@ void Perform(const Api& api, const Action& action,
   }
   const Json result = action.perform(api, request, body);
   SendJson(response, result);
-  api.access.Acted(request, action.name, who, SubjectOf(request, result));
+  api.access.LogAction(request, action.name, who, SubjectOf(request, result));
   api.stream.Wake();
 }
 

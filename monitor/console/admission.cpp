@@ -28,7 +28,7 @@ std::string_view PlainAddress(std::string_view address) {
 
 // Whether a page of this server sent the request: browsers state the origin of
 // each POST, and scripts cannot forge it.
-bool OfOurPage(const httplib::Request& request) {
+bool IsSameOrigin(const httplib::Request& request) {
   const std::string origin = request.get_header_value("Origin");
   const std::string host = request.get_header_value("Host");
   return origin == "http://" + host || origin == "https://" + host;
@@ -83,16 +83,16 @@ void Admission::AddTo(httplib::Server& server, const std::string& cookie) {
 bool Admission::Admit(const httplib::Request& request,
                       httplib::Response& response) {
   if (!UserHeader(request).empty() && !FromProxy(request)) {
-    Note(request, "proxy_header", UserHeader(request));
+    LogRefusal(request, "proxy_header", UserHeader(request));
   }
-  if (request.method == "POST" && !OfOurPage(request)) {
+  if (request.method == "POST" && !IsSameOrigin(request)) {
     Refuse(request, response, 403, "origin",
            "Origin: expected http:// or https:// and " +
                request.get_header_value("Host"));
     return false;
   }
   if (!request.path.starts_with(kApi) || request.path == kLogIn ||
-      WhoSent(request)) {
+      Authenticate(request)) {
     return true;
   }
   if (FromProxy(request)) {
@@ -128,7 +128,8 @@ std::string Admission::SessionOf(const httplib::Request& request) const {
   return cookies.substr(from, cookies.find(';', from) - from);
 }
 
-std::optional<Visitor> Admission::WhoSent(const httplib::Request& request) {
+std::optional<Visitor> Admission::Authenticate(
+    const httplib::Request& request) {
   if (!logins_) {
     return std::nullopt;
   }
@@ -136,7 +137,8 @@ std::optional<Visitor> Admission::WhoSent(const httplib::Request& request) {
                             : logins_->OfSession(SessionOf(request));
 }
 
-std::function<bool()> Admission::StillAdmits(const httplib::Request& request) {
+std::function<bool()> Admission::AdmissionCheck(
+    const httplib::Request& request) {
   if (!logins_) {
     return [] { return true; };
   }
@@ -155,7 +157,7 @@ bool Admission::HasSession(const httplib::Request& request) const {
 }
 
 bool Admission::MayWrite(const httplib::Request& request) {
-  const std::optional<Visitor> visitor = WhoSent(request);
+  const std::optional<Visitor> visitor = Authenticate(request);
   return visitor ? visitor->role >= Role::kAcknowledge : token_.writable();
 }
 
@@ -178,7 +180,7 @@ void Admission::LogIn(const httplib::Request& request,
                     "too many wrong passwords came from this address: one "
                     "attempt per second is looked at");
     case Logins::Outcome::kWrong:
-      Note(request, "password", name);
+      LogRefusal(request, "password", name);
       return SendError(response, 401, "the name or the password is wrong");
     case Logins::Outcome::kAdmitted:
       break;
@@ -190,23 +192,23 @@ void Admission::LogIn(const httplib::Request& request,
   response.set_header("Set-Cookie", cookie_ + "=" + session +
                                         "; Path=/; HttpOnly; SameSite=Strict" +
                                         (secure ? "; Secure" : ""));
-  Acted(request, "login", name, "");
+  LogAction(request, "login", name, "");
   SendJson(response, {{"user", name}});
 }
 
 void Admission::LogOut(const httplib::Request& request,
                        httplib::Response& response) {
-  const std::optional<Visitor> visitor = WhoSent(request);
+  const std::optional<Visitor> visitor = Authenticate(request);
   logins_->LogOut(SessionOf(request));
-  Acted(request, "logout", visitor ? visitor->name : "", "");
+  LogAction(request, "logout", visitor ? visitor->name : "", "");
   response.set_header("Set-Cookie", cookie_ + "=; Path=/; Max-Age=0; HttpOnly");
   SendJson(response, Json::object());
 }
 
-bool Admission::MayAct(const httplib::Request& request,
-                       httplib::Response& response, Role needed,
-                       std::string& who) {
-  if (const std::optional<Visitor> visitor = WhoSent(request)) {
+bool Admission::Authorize(const httplib::Request& request,
+                          httplib::Response& response, Role needed,
+                          std::string& who) {
+  if (const std::optional<Visitor> visitor = Authenticate(request)) {
     if (visitor->role < needed) {
       Refuse(request, response, 403, "role",
              visitor->name + " has the role " + RoleName(visitor->role) +
@@ -246,8 +248,8 @@ bool Admission::MayAct(const httplib::Request& request,
   return true;
 }
 
-void Admission::Acted(const httplib::Request& request, const char* action,
-                      const std::string& who, const std::string& subject) {
+void Admission::LogAction(const httplib::Request& request, const char* action,
+                          const std::string& who, const std::string& subject) {
   const auto visitor = logins_ ? logins_->OfName(who) : std::nullopt;
   std::string line = "console_action user=" + Quoted(who) + " role=";
   line.append(visitor ? RoleName(visitor->role) : "token")
@@ -262,8 +264,8 @@ void Admission::Acted(const httplib::Request& request, const char* action,
   ++counts_.actions[action];
 }
 
-void Admission::Note(const httplib::Request& request, std::string_view reason,
-                     const std::string& user) {
+void Admission::LogRefusal(const httplib::Request& request,
+                           std::string_view reason, const std::string& user) {
   {
     const std::lock_guard lock(mutex_);
     ++counts_.refused[reason];
@@ -291,11 +293,11 @@ void Admission::Note(const httplib::Request& request, std::string_view reason,
 void Admission::Refuse(const httplib::Request& request,
                        httplib::Response& response, int status,
                        std::string_view reason, const std::string& what) {
-  const std::optional<Visitor> visitor = WhoSent(request);
-  Note(request, reason,
-       visitor              ? visitor->name
-       : FromProxy(request) ? UserHeader(request)
-                            : "");
+  const std::optional<Visitor> visitor = Authenticate(request);
+  LogRefusal(request, reason,
+             visitor              ? visitor->name
+             : FromProxy(request) ? UserHeader(request)
+                                  : "");
   response.set_header("Cache-Control", "no-store");
   SendError(response, status, what);
 }

@@ -56,10 +56,10 @@ class Admission {
   void AddTo(httplib::Server& server, const std::string& cookie);
 
   /// The sender of the request; nothing without users or without a login.
-  std::optional<Visitor> WhoSent(const httplib::Request& request);
+  std::optional<Visitor> Authenticate(const httplib::Request& request);
   /// For streaming responses: a function that tells whether the visitor is
   /// still admitted; callable from any thread.
-  std::function<bool()> StillAdmits(const httplib::Request& request);
+  std::function<bool()> AdmissionCheck(const httplib::Request& request);
   /// Whether the visitor may perform any action at all.
   bool MayWrite(const httplib::Request& request);
   /// Whether the request carries a session, which can be logged out.
@@ -67,11 +67,11 @@ class Admission {
   /// Whether `who`, as named in the request (may be empty), may perform the
   /// action; if not, an error response is sent. @param who is set to the
   /// visitor's name.
-  bool MayAct(const httplib::Request& request, httplib::Response& response,
-              Role needed, std::string& who);
+  bool Authorize(const httplib::Request& request, httplib::Response& response,
+                 Role needed, std::string& who);
   /// Records an action in log and counters. @param subject "episode=...".
-  void Acted(const httplib::Request& request, const char* action,
-             const std::string& who, const std::string& subject);
+  void LogAction(const httplib::Request& request, const char* action,
+                 const std::string& who, const std::string& subject);
 
   /// Whether anybody can act at all.
   bool writable() const { return logins_ || token_.writable(); }
@@ -89,8 +89,8 @@ class Admission {
   bool FromProxy(const httplib::Request& request) const;
   std::string UserHeader(const httplib::Request& request) const;
   std::string SessionOf(const httplib::Request& request) const;
-  void Note(const httplib::Request& request, std::string_view reason,
-            const std::string& user = "");
+  void LogRefusal(const httplib::Request& request, std::string_view reason,
+                  const std::string& user = "");
   void Refuse(const httplib::Request& request, httplib::Response& response,
               int status, std::string_view reason, const std::string& what);
 

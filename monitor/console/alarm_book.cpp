@@ -69,7 +69,7 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   if (version_ == version && now_ns < earliest_shelf_end_ns_) {
     return {};
   }
-  const std::vector<Alarm> alarms = history.AlarmList(now_ns, kMostAlarms);
+  const std::vector<Alarm> alarms = history.AlarmList(now_ns, kMaxAlarms);
   const auto shelves = history.Shelves(now_ns);
   std::map<std::string, std::string> rows;
   std::vector<Json> changed;
@@ -103,9 +103,10 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   auto by_valve = std::make_shared<ByValveMap>(ByValveOf(alarms, shelves));
   const std::lock_guard lock(mutex_);
   rows_ = std::move(rows);
-  std::erase_if(
-      heard_, [this](const auto& item) { return rows_.contains(item.first); });
-  for (const auto& [id, alarm] : heard_) {
+  std::erase_if(unstored_, [this](const auto& item) {
+    return rows_.contains(item.first);
+  });
+  for (const auto& [id, alarm] : unstored_) {
     AddTo((*by_valve)[alarm.episode.valve_id], alarm);
   }
   by_valve_ = std::move(by_valve);
@@ -117,7 +118,7 @@ std::shared_ptr<const AlarmBook::ByValveMap> AlarmBook::ByValve() const {
   return by_valve_;
 }
 
-bool AlarmBook::Hear(const FaultEvent& event) {
+bool AlarmBook::OnEvent(const FaultEvent& event) {
   const Alarm alarm = AlarmOf(event);
   const std::string& id = alarm.episode.episode_id;
   const std::lock_guard lock(mutex_);
@@ -127,20 +128,20 @@ bool AlarmBook::Hear(const FaultEvent& event) {
   auto by_valve = std::make_shared<ByValveMap>(*by_valve_);
   ValveAlarm& valve = (*by_valve)[event.valve_id];
   if (alarm.episode.ended_ns) {
-    heard_.erase(id);
+    unstored_.erase(id);
     valve = {};
   } else {
-    heard_[id] = alarm;
+    unstored_[id] = alarm;
     AddTo(valve, alarm);
   }
   by_valve_ = std::move(by_valve);
   return true;
 }
 
-std::vector<Alarm> AlarmBook::Heard() const {
+std::vector<Alarm> AlarmBook::UnstoredAlarms() const {
   std::vector<Alarm> alarms;
   const std::lock_guard lock(mutex_);
-  for (const auto& [id, alarm] : heard_) {
+  for (const auto& [id, alarm] : unstored_) {
     alarms.push_back(alarm);
   }
   return alarms;

@@ -14,7 +14,7 @@
 
 namespace fdi::console {
 
-inline constexpr std::int64_t kMostAlarms = 500;
+inline constexpr std::int64_t kMaxAlarms = 500;
 
 /// Opens the history that the console shows; throws while it is unavailable.
 using OpenHistory = std::function<std::unique_ptr<storage::History>()>;
@@ -45,9 +45,9 @@ class AlarmBook {
   /// Adds an event heard on the bus: its episode counts as an alarm until the
   /// history contains it or it closes. @returns false if the history already
   /// has it, with its acknowledgement. Thread safe.
-  bool Hear(const FaultEvent& event);
+  bool OnEvent(const FaultEvent& event);
   /// Alarms that were heard and are not in the history. Thread safe.
-  std::vector<storage::Alarm> Heard() const;
+  std::vector<storage::Alarm> UnstoredAlarms() const;
   /// The error of the last Refresh(), if it failed. Thread safe.
   std::optional<HistoryAway> away() const;
 
@@ -64,7 +64,7 @@ class AlarmBook {
   mutable std::mutex mutex_;  // Guards the members below.
   std::optional<HistoryAway> away_;
   std::map<std::string, std::string> rows_;  // By episode, as last returned.
-  std::map<std::string, storage::Alarm> heard_;  // By episode.
+  std::map<std::string, storage::Alarm> unstored_;  // By episode.
   std::shared_ptr<const ByValveMap> by_valve_{std::make_shared<ByValveMap>()};
 };
 

@@ -63,7 +63,7 @@ class Console::Events : public monitor::EventSink {
 
   bool Publish(const FaultEvent& event, bool persisted) override {
     const bool sent = bus_.Publish(event, persisted);
-    console_.board_.Mark(event);
+    console_.board_.AddMark(event);
     if (persisted) {
       console_.stream_.Wake();
     } else {
@@ -77,9 +77,9 @@ class Console::Events : public monitor::EventSink {
   Console& console_;
 };
 
-void Console::Hear(const FaultEvent& event) {
-  board_.Mark(event);
-  if (alarms_->Hear(event)) {
+void Console::OnEvent(const FaultEvent& event) {
+  board_.AddMark(event);
+  if (alarms_->OnEvent(event)) {
     stream_.AddUnstored(event);
   }
 }
@@ -111,7 +111,7 @@ Console::~Console() {
   Close();
 }
 
-monitor::EventSink& Console::Before(monitor::EventSink& bus) {
+monitor::EventSink& Console::Wrap(monitor::EventSink& bus) {
   events_ = std::make_unique<Events>(bus, *this);
   return *events_;
 }
@@ -128,7 +128,7 @@ void Console::Start(ConsoleSources sources) {
   api_ = std::make_unique<Api>(
       Api{std::move(sources), board_, stream_, *alarms_, *models_, work_list_,
           texts_, access_, NewInstance(), stopping_.get_token()});
-  SetRulesOfEveryAnswer();
+  SetDefaultResponses();
   RenewTls();
   httplib::Server& routes = server_->routes();
   // Cookies ignore the port, and a host may run two consoles.
@@ -145,10 +145,10 @@ void Console::Start(ConsoleSources sources) {
   }
   stream_.Start(std::move(parts));
   server_->Start();
-  SayWhereItListens();
+  LogListenAddress();
 }
 
-void Console::SayWhereItListens() const {
+void Console::LogListenAddress() const {
   const bool local = monitor::IsLoopback(server_->address().host);
   log_(local ? LogLevel::kInfo : LogLevel::kWarning,
        "console_listening address=" + ToString(server_->address()) + " write=" +
@@ -201,7 +201,7 @@ void Console::Close() {
   stream_.Stop();
 }
 
-void Console::SetRulesOfEveryAnswer() {
+void Console::SetDefaultResponses() {
   httplib::Server& routes = server_->routes();
   routes.set_default_headers({{"Content-Security-Policy", kPolicy},
                               {"X-Content-Type-Options", "nosniff"},

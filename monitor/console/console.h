@@ -49,13 +49,13 @@ class Console {
   LiveBoard& live() { return board_; }
   /// Event sink for the pipeline, in front of `bus`: an event is shown once it
   /// is on the bus, by which time it is in the history unless that failed.
-  monitor::EventSink& Before(monitor::EventSink& bus);
+  monitor::EventSink& Wrap(monitor::EventSink& bus);
 
   /// For a plant: a model set or an event from the bus; call after Start().
-  void Hear(std::shared_ptr<const ModelFacts> models) {
-    models_->Learn(std::move(models));
+  void OnModels(std::shared_ptr<const ModelFacts> models) {
+    models_->Add(std::move(models));
   }
-  void Hear(const FaultEvent& event);
+  void OnEvent(const FaultEvent& event);
 
   /// Starts serving. Call once and, with a history, before the pipeline starts.
   /// If it throws, no thread is left behind. The history of a plant may be
@@ -76,9 +76,9 @@ class Console {
 
  private:
   class Events;
-  void SetRulesOfEveryAnswer();
+  void SetDefaultResponses();
   void RenewTls();
-  void SayWhereItListens() const;
+  void LogListenAddress() const;
 
   std::unique_ptr<monitor::HttpServer> server_;
   std::filesystem::path files_;

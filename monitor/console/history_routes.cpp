@@ -27,9 +27,9 @@ Json Alarms(const Api& api, const httplib::Request& /*request*/) {
   const std::int64_t now_ns = api.sources.utc_now_ns();
   // While the history of a plant is unavailable, alarms heard on the bus are
   // used.
-  std::vector<storage::Alarm> alarms = api.alarms.Heard();
+  std::vector<storage::Alarm> alarms = api.alarms.UnstoredAlarms();
   if (!api.sources.plant_history || !api.alarms.away()) {
-    std::ranges::move(api.History()->AlarmList(now_ns, kMostAlarms),
+    std::ranges::move(api.History()->AlarmList(now_ns, kMaxAlarms),
                       std::back_inserter(alarms));
   }
   return {{"now_ms", Ms(now_ns)}, {"alarms", AlarmsJson(alarms, api.texts)}};
@@ -186,8 +186,8 @@ Json GapsOf(storage::History& history, const storage::Episode& episode,
 
 // The most informative instant of the episode: at its isolation, else the last
 // abnormal one.
-const TracePoint* Telling(const storage::Episode& episode,
-                          const std::vector<TracePoint>& points) {
+const TracePoint* MostInformativePoint(const storage::Episode& episode,
+                                       const std::vector<TracePoint>& points) {
   const TracePoint* telling = nullptr;
   for (const TracePoint& point : points) {
     const bool before_isolation =
@@ -270,7 +270,8 @@ Json Episode(const Api& api, const httplib::Request& request) {
   Json trace = TrendJson(models.get(), episode.valve_id, points);
   trace["gaps"] = GapsOf(*reader, episode, points);
   trace["marks"] = MarksOf(events);
-  trace["words"] = api.Words(models.get(), Telling(episode, points));
+  trace["words"] =
+      api.Words(models.get(), MostInformativePoint(episode, points));
   Json list = Json::array();
   for (const storage::HistoryEntry& event : events) {
     list.push_back(EventJson(event));

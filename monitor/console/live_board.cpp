@@ -189,7 +189,7 @@ std::shared_ptr<const ModelFacts> LiveBoard::Facts(const ModelSet& models) {
   return facts;
 }
 
-void LiveBoard::NoteGap(Slot& slot, const Sample& sample) {
+void LiveBoard::RecordGap(Slot& slot, const Sample& sample) {
   const double period_s = slot.now.models ? slot.now.models->period_s : 0.0;
   const std::int64_t from_ns = slot.now.stamp_ns;
   const std::int64_t limit_ns =
@@ -218,9 +218,9 @@ void LiveBoard::Show(const std::string& valve_id, const Sample& sample,
   ShowLocked(slot, sample, outcome.verdict, std::move(facts));
 }
 
-void LiveBoard::ShowHeard(const std::string& valve_id, const Verdict& verdict,
-                          std::shared_ptr<const ModelFacts> models,
-                          const std::string& monitor) {
+void LiveBoard::ShowRemote(const std::string& valve_id, const Verdict& verdict,
+                           std::shared_ptr<const ModelFacts> models,
+                           const std::string& monitor) {
   Sample sample;
   sample.source_id = verdict.source_id;
   sample.seq = verdict.seq;
@@ -239,7 +239,7 @@ void LiveBoard::ShowLocked(Slot& slot, const Sample& sample,
     slot.ClearTrend();  // Residuals and factors mean other things.
     slot.ShowDrift({});
   }
-  NoteGap(slot, sample);
+  RecordGap(slot, sample);
   slot.Describe(verdict);
   slot.AddSpark(verdict);
   const ModelFacts* const facts = slot.now.models.get();
@@ -274,12 +274,12 @@ void LiveBoard::ShowMonitorSilence(const std::string& valve_id,
   ++slot.now.version;
 }
 
-void LiveBoard::Forget(const std::string& valve_id) {
+void LiveBoard::Remove(const std::string& valve_id) {
   const std::unique_lock lock(slots_mutex_);
   slots_.erase(valve_id);
 }
 
-void LiveBoard::Mark(const FaultEvent& event) {
+void LiveBoard::AddMark(const FaultEvent& event) {
   const std::shared_ptr<Slot> slot = Find(event.valve_id);
   if (slot == nullptr) {
     return;  // An episode of an earlier session, of a valve that is silent.

@@ -86,17 +86,17 @@ class LiveBoard : public monitor::LiveSink {
                    monitor::Silence silence) override;
   void ShowDrift(const std::string& valve_id,
                  std::span<const FollowedDrift> drift) override;
-  void Forget(const std::string& valve_id) override;
+  void Remove(const std::string& valve_id) override;
 
   /// As Show(), of a verdict that came over the bus without the readings.
-  void ShowHeard(const std::string& valve_id, const Verdict& verdict,
-                 std::shared_ptr<const ModelFacts> models,
-                 const std::string& monitor);
+  void ShowRemote(const std::string& valve_id, const Verdict& verdict,
+                  std::shared_ptr<const ModelFacts> models,
+                  const std::string& monitor);
   /// Nothing was heard of the valve's monitor since `heard_ns`.
   void ShowMonitorSilence(const std::string& valve_id, std::int64_t heard_ns);
 
   /// An event of an episode. Any thread.
-  void Mark(const FaultEvent& event);
+  void AddMark(const FaultEvent& event);
 
   /// By id. @param spark false: of the sparklines only the newest point.
   std::vector<ValveState> Valves(bool spark = true) const;
@@ -120,7 +120,7 @@ class LiveBoard : public monitor::LiveSink {
   std::shared_ptr<const ModelFacts> Facts(const ModelSet& models);
   void ShowLocked(Slot& slot, const Sample& sample, const Verdict& verdict,
                   std::shared_ptr<const ModelFacts> models);
-  void NoteGap(Slot& slot, const Sample& sample);
+  void RecordGap(Slot& slot, const Sample& sample);
 
   mutable std::shared_mutex slots_mutex_;
   std::map<std::string, std::shared_ptr<Slot>, std::less<>> slots_;

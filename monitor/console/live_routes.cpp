@@ -16,7 +16,7 @@ constexpr std::chrono::milliseconds kPingPeriod{5000};
 constexpr std::size_t kMaxIdLength = 64;
 
 Json Status(const Api& api, const httplib::Request& request) {
-  const std::optional<Visitor> visitor = api.access.WhoSent(request);
+  const std::optional<Visitor> visitor = api.access.Authenticate(request);
   const MonitorFacts facts = api.sources.facts();
   Json counters = Json::object();
   for (const auto& [name, value] : facts.counters) {
@@ -157,8 +157,8 @@ void Stream(const Api& api, const httplib::Request& request,
   response.set_chunked_content_provider(
       "text/event-stream",
       [&stream = api.stream, client,
-       admitted = api.access.StillAdmits(request)](std::size_t /*offset*/,
-                                                   httplib::DataSink& sink) {
+       admitted = api.access.AdmissionCheck(request)](std::size_t /*offset*/,
+                                                      httplib::DataSink& sink) {
         Message message;
         const auto outcome = stream.Next(*client, kPingPeriod, message);
         if (!admitted()) {

@@ -14,7 +14,7 @@ constexpr milliseconds kTilePeriod{1000};
 // Latency of changes that other programs make to the history.
 constexpr milliseconds kAlarmPeriod{2000};
 // Longest pause between attempts to read an unavailable history.
-constexpr milliseconds kLongestPause{60'000};
+constexpr milliseconds kMaxPause{60'000};
 constexpr std::size_t kUnstoredLimit = 1000;
 
 }  // namespace
@@ -186,7 +186,7 @@ void LiveStream::FollowAlarms() {
         parts_->log(LogLevel::kInfo, "console_history_goes_on");
       }
     } catch (const std::exception& error) {
-      pause = std::clamp(2 * pause, kAlarmPeriod, kLongestPause);
+      pause = std::clamp(2 * pause, kAlarmPeriod, kMaxPause);
       if (reason != error.what()) {
         reason = error.what();
         parts_->log(LogLevel::kWarning,

@@ -12,13 +12,13 @@ constexpr std::size_t kMaxSessions = 64;
 }  // namespace
 
 Logins::Logins(Users users)
-    : nobody_(HashPassword(RandomToken())), users_(std::move(users)) {}
+    : dummy_hash_(HashPassword(RandomToken())), users_(std::move(users)) {}
 
 Logins::Outcome Logins::LogIn(const std::string& name,
                               const std::string& password,
                               const std::string& origin, std::string& session,
                               Clock::time_point now) {
-  std::string hash = nobody_;
+  std::string hash = dummy_hash_;
   {
     const std::lock_guard lock(mutex_);
     if (!failures_.Allows(origin, now)) {
@@ -29,7 +29,7 @@ Logins::Outcome Logins::LogIn(const std::string& name,
       hash = user->second.hash;
     }
   }
-  const bool fits = PasswordFits(password, hash) && hash != nobody_;
+  const bool fits = PasswordFits(password, hash) && hash != dummy_hash_;
   const std::lock_guard lock(mutex_);
   const auto user = users_.find(name);  // May have changed during the hash.
   if (!fits || user == users_.end() || user->second.hash != hash) {

@@ -54,7 +54,7 @@ class Logins {
     Clock::time_point used;
   };
 
-  const std::string nobody_;  // Dummy hash for unknown names; equally slow.
+  const std::string dummy_hash_;  // Dummy hash for unknown names; equally slow.
   mutable std::mutex mutex_;
   Users users_;
   std::vector<Session> sessions_;

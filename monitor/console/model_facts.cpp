@@ -126,16 +126,16 @@ std::shared_ptr<const ModelFacts> StoredModels::For(
   if (!facts || facts->hash != episode.model_hash) {
     return FactsOf(episode);
   }
-  Remember(facts);
+  Cache(facts);
   return facts;
 }
 
-void StoredModels::Learn(std::shared_ptr<const ModelFacts> facts) {
+void StoredModels::Add(std::shared_ptr<const ModelFacts> facts) {
   const std::lock_guard lock(mutex_);
-  Remember(std::move(facts));
+  Cache(std::move(facts));
 }
 
-void StoredModels::Remember(std::shared_ptr<const ModelFacts> facts) {
+void StoredModels::Cache(std::shared_ptr<const ModelFacts> facts) {
   if (known_.size() >= kCachedSets) {
     known_.erase(known_.begin());
   }

@@ -50,10 +50,10 @@ class StoredModels {
   /// the names recorded in the episode, without thresholds (NaN).
   std::shared_ptr<const ModelFacts> For(const storage::Episode& episode);
   /// Adds a set that then need not be loaded from models.db.
-  void Learn(std::shared_ptr<const ModelFacts> facts);
+  void Add(std::shared_ptr<const ModelFacts> facts);
 
  private:
-  void Remember(std::shared_ptr<const ModelFacts> facts);
+  void Cache(std::shared_ptr<const ModelFacts> facts);
 
   std::filesystem::path path_;
   std::mutex mutex_;

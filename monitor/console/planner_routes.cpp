@@ -12,7 +12,7 @@ namespace fdi::console {
 namespace {
 
 constexpr std::int64_t kDays = 90;  // Unless since_ms says otherwise.
-constexpr std::int64_t kMostRows = 1000;
+constexpr std::int64_t kMaxRows = 1000;
 constexpr std::int64_t kCacheNs = 60'000'000'000;
 
 std::vector<monitor::HealthLimit> LimitsOf(const httplib::Request& request) {
@@ -39,7 +39,7 @@ cli::Report ReadReport(const Api& api, const httplib::Request& request) {
     work.since_ns =
         TimeParameter(request, "since_ms", now_ns - kDays * kNsPerDay);
     work.top = static_cast<std::size_t>(
-        IntegerParameter(request, "top", 10, 1, kMostRows));
+        IntegerParameter(request, "top", 10, 1, kMaxRows));
     work.discipline = Parameter(request, "discipline").value_or("");
     work.limits = LimitsOf(request);
     const auto history = api.History();

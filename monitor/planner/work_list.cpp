@@ -23,7 +23,7 @@ using storage::Episode;
 
 constexpr double kOtherReasons = 0.25;
 constexpr double kRepetition = 0.1;
-constexpr double kMostRepetition = 2.0;
+constexpr double kMaxRepetition = 2.0;
 
 double Points(cli::Severity severity) {
   return std::ldexp(1.0, static_cast<int>(severity));  // 1, 2, 4, 8
@@ -287,7 +287,7 @@ double WeightOf(const FaultReason& reason, const WorkOptions& options) {
                          kNsPerDay)
           : 0.0;
   const double repetition = std::min(
-      kMostRepetition, 1.0 + kRepetition * std::max(0, reason.episodes - 1));
+      kMaxRepetition, 1.0 + kRepetition * std::max(0, reason.episodes - 1));
   return Points(reason.words.severity) * confidence *
          std::exp2(-days / options.half_life_days) * repetition;
 }
@@ -318,7 +318,7 @@ std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
     std::erase_if(work.trends, [&](const LimitTrend& reason) {
       return WeightOf(reason, options) <= 0.0;
     });
-    const std::string why = WhyText(work, options);
+    const std::string why = ReasonText(work, options);
     rows.push_back({0, score, std::move(work), why});
   }
   std::ranges::stable_sort(rows, [](const WorkRow& a, const WorkRow& b) {
@@ -331,7 +331,7 @@ std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
   return rows;
 }
 
-std::string WhyText(const ValveWork& work, const WorkOptions& options) {
+std::string ReasonText(const ValveWork& work, const WorkOptions& options) {
   std::vector<WeightedText> texts = TextsOf(work, options);
   std::ranges::stable_sort(texts, std::greater{}, &WeightedText::weight);
   std::string why;

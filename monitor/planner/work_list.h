@@ -81,7 +81,7 @@ double WeightOf(const FaultReason& reason, const WorkOptions& options);
 double WeightOf(const LimitTrend& trend, const WorkOptions& options);
 
 /// The reasons in words, in order of decreasing weight.
-std::string WhyText(const ValveWork& work, const WorkOptions& options);
+std::string ReasonText(const ValveWork& work, const WorkOptions& options);
 
 /// Settings of ReadWorkList().
 struct WorkQuery {

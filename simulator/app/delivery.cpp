@@ -23,7 +23,7 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 // At full speed samples are committed by number rather than by time.
-constexpr std::int64_t kMostPending = 50'000;
+constexpr std::int64_t kMaxPending = 50'000;
 constexpr milliseconds kCommitPeriod(750);  // Bounds the loss to less than 1 s.
 
 std::filesystem::path Prepared(const storage::DataDirectory& directory) {
@@ -50,9 +50,9 @@ class Pacer {
       if (std::isinf(speed_) || left.count() <= 0.0) {
         return true;
       }
-      constexpr milliseconds kLongestWait(60'000);
+      constexpr milliseconds kMaxWait(60'000);
       signals_.WaitFor(std::min(
-          kLongestWait,
+          kMaxWait,
           std::chrono::duration_cast<milliseconds>(left) + milliseconds(1)));
     }
     return false;
@@ -204,7 +204,7 @@ void RunSink::Append(std::size_t valve, const LabelledSample& sample) {
   recorder_.Append(keys_[valve], sample);
   const auto now = steady_clock::now();
   if (now - last_commit_ >= kCommitPeriod ||
-      recorder_.pending() >= kMostPending) {
+      recorder_.pending() >= kMaxPending) {
     recorder_.Commit();
     last_commit_ = now;
   }

@@ -225,9 +225,9 @@ void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
       ->allow_extra_args(false);
   verb.add_flag("--cold-start", options.cold_start,
                 "Start at X = 0 with the actuator vented, not in equilibrium");
-  constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
+  constexpr std::int64_t kMaxInt64 = std::numeric_limits<std::int64_t>::max();
   verb.add_option("--seed", options.seed, "Seed (default: 1)")
-      ->check(CLI::Range(std::int64_t{0}, kLargest))
+      ->check(CLI::Range(std::int64_t{0}, kMaxInt64))
       ->type_name("N");
   verb.add_option("--valves", options.valves,
                   "Number of valves, named ID-1, ID-2, ...; their seeds "

@@ -13,8 +13,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-constexpr double kNeededWaitS = 30.0;
-constexpr double kCourtesyWaitS = 2.0;
+constexpr double kRequiredWaitS = 30.0;
+constexpr double kOptionalWaitS = 2.0;
 // Interval at which waits check for signals and for readers that have left.
 constexpr milliseconds kLook(100);
 constexpr int kStalled = 50;  // checks before a stall is logged
@@ -66,7 +66,7 @@ SamplePublisher::SamplePublisher(const SamplePublisherOptions& options,
 void SamplePublisher::AwaitReader() {
   const bool needed = options_.needs_reader;
   const double wait_s =
-      options_.wait_s.value_or(needed ? kNeededWaitS : kCourtesyWaitS);
+      options_.wait_s.value_or(needed ? kRequiredWaitS : kOptionalWaitS);
   const auto deadline =
       steady_clock::now() + std::chrono::duration_cast<milliseconds>(
                                 std::chrono::duration<double>(wait_s));

@@ -81,8 +81,8 @@ class FieldReader {
     field = table_.Number(key).value_or(field);
   }
   void operator()(const char* key, int& field) {
-    constexpr int kMost = std::numeric_limits<int>::max();
-    if (table_.Number(key, -kMost, kMost)) {
+    constexpr int kMaxInt = std::numeric_limits<int>::max();
+    if (table_.Number(key, -kMaxInt, kMaxInt)) {
       field = static_cast<int>(*table_.Integer(key));
     }
   }
@@ -318,10 +318,10 @@ void ReadModes(TomlReader& table, ValveSimulationConfig& config) {
 }
 
 void ReadNumbers(TomlReader& table, ValveSimulationConfig& config) {
-  constexpr double kLongest = 1e10;
+  constexpr double kMaxDurationS = 1e10;
   constexpr double kTiny = 1e-6;
-  config.duration_s =
-      table.Number("duration_s", kTiny, kLongest).value_or(config.duration_s);
+  config.duration_s = table.Number("duration_s", kTiny, kMaxDurationS)
+                          .value_or(config.duration_s);
   config.period_s =
       table.Number("period_s", 1e-3, 1e6).value_or(config.period_s);
   config.tolerance_scale = table.Number("tolerance_scale", kTiny, 1e6)

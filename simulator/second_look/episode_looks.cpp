@@ -14,17 +14,17 @@ namespace fdi::simulator {
 namespace {
 
 constexpr std::size_t kBefore = 120;   // rows before the detection
-constexpr std::size_t kLongest = 420;  // rows in all
-constexpr std::size_t kFewestMeasured = 20;
+constexpr std::size_t kMaxRows = 420;  // rows in all
+constexpr std::size_t kMinMeasuredRows = 20;
 constexpr std::int64_t kEarlyAge = 20 * kNsPerSecond;
 constexpr std::int64_t kFirstAge = 40 * kNsPerSecond;
 constexpr std::int64_t kLastAge = 300 * kNsPerSecond;  // Then twice each.
 constexpr std::int64_t kRoutineNs = 300 * kNsPerSecond;
 constexpr std::ptrdiff_t kRoutineMeasured = 300;  // of its rows
 // None of the hypotheses follows the record: errors of so many healthy ones.
-constexpr double kMostMisfit = 12.0;
+constexpr double kMaxMisfit = 12.0;
 // Nor does no fault, where no fault gains on it.
-constexpr double kMostHealthy = 4.0;
+constexpr double kMaxHealthyMisfit = 4.0;
 // Faults that act alike differ by less than this share of what none is behind.
 constexpr double kAlike = 0.06;
 // Healthy windows have about 1.
@@ -73,8 +73,8 @@ constexpr Likeness kLikenesses[] = {
        return look.misfit > kGoodMisfit && e.distance <= kAlike * nothing;
      }}};
 
-void KeepTogether(const SecondLook& look, double nothing,
-                  std::vector<Explanation>& set) {
+void AddIndistinguishable(const SecondLook& look, double nothing,
+                          std::vector<Explanation>& set) {
   if (look.perforation && look.perforation->distance <= kLookMargin &&
       !Has(set, look.perforation->fault)) {
     set.push_back(*look.perforation);
@@ -104,7 +104,7 @@ std::optional<LookAnswer> TakeGrowthLook(const ValvePhysics& physics,
   }
   LookAnswer answer;
   answer.outcome =
-      look.misfit > kMostMisfit ? LookOutcome::kNoneFits : LookOutcome::kNamed;
+      look.misfit > kMaxMisfit ? LookOutcome::kNoneFits : LookOutcome::kNamed;
   answer.misfit = look.misfit;
   answer.faults = std::move(look.faults);
   return answer;
@@ -130,14 +130,15 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
       answer.faults.push_back(e);
     }
   }
-  KeepTogether(look, nothing, answer.faults);
+  AddIndistinguishable(look, nothing, answer.faults);
   const bool healthy =
-      nothing <= std::max(kLookMargin, kLeastGain * look.readings);
-  const double most = healthy ? kMostHealthy : kMostMisfit;
-  answer.outcome = look.misfit > most                  ? LookOutcome::kNoneFits
-                   : healthy                           ? LookOutcome::kNothing
-                   : answer.faults.size() > kMostNamed ? LookOutcome::kUnclear
-                                                       : LookOutcome::kNamed;
+      nothing <= std::max(kLookMargin, kMinGain * look.readings);
+  const double most = healthy ? kMaxHealthyMisfit : kMaxMisfit;
+  answer.outcome = look.misfit > most ? LookOutcome::kNoneFits
+                   : healthy          ? LookOutcome::kNothing
+                   : answer.faults.size() > kMaxNamedFaults
+                       ? LookOutcome::kUnclear
+                       : LookOutcome::kNamed;
   return answer;
 }
 
@@ -158,7 +159,7 @@ std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
       return answer;
     }
   }
-  const SecondLook look = LookAgain(physics, task.window, stop);
+  const SecondLook look = RunSecondLook(physics, task.window, stop);
   if (look.ranked.empty()) {
     return std::nullopt;
   }
@@ -195,7 +196,7 @@ std::optional<std::vector<int>> NamesOf(const LookAnswer& answer,
                                         bool observers_name) {
   const bool perhaps = answer.outcome == LookOutcome::kNothing && answer.late &&
                        !answer.faults.empty() &&
-                       answer.faults.size() <= kMostNamed;
+                       answer.faults.size() <= kMaxNamedFaults;
   if ((answer.outcome == LookOutcome::kNothing && !perhaps) ||
       (answer.early && observers_name)) {
     return std::nullopt;
@@ -215,14 +216,14 @@ EpisodeLooks::EpisodeLooks(const ValvePhysics& physics)
 
 // One row a period; up to three missing ones are held, a longer gap begins
 // anew.
-void EpisodeLooks::Keep(const Sample& sample) {
-  constexpr std::int64_t kMostHeld = 3;
+void EpisodeLooks::AddRow(const Sample& sample) {
+  constexpr std::int64_t kMaxHeldSteps = 3;
   const std::int64_t step =
       rows_.empty()
           ? 1
           : (sample.stamp_ns - rows_.back().stamp_ns + period_ns_ / 2) /
                 period_ns_;
-  if (step < 1 || step > 1 + kMostHeld || sample.present != signals_) {
+  if (step < 1 || step > 1 + kMaxHeldSteps || sample.present != signals_) {
     rows_.clear();
   }
   signals_ = sample.present;
@@ -243,7 +244,7 @@ void EpisodeLooks::Keep(const Sample& sample) {
     rows_.back().row.x_measured = rows_.back().row.flow_measured = false;
   }
   rows_.push_back({sample.stamp_ns, row});
-  while (rows_.size() > kLongest) {
+  while (rows_.size() > kMaxRows) {
     rows_.pop_front();
   }
 }
@@ -269,7 +270,7 @@ std::optional<LookTask> EpisodeLooks::Task() const {
   }
   const auto measured = static_cast<std::size_t>(
       std::ranges::count_if(task.window.rows, &RecordRow::x_measured));
-  if (measured < kFewestMeasured ||
+  if (measured < kMinMeasuredRows ||
       task.window.detection + 10 > task.window.rows.size()) {
     return std::nullopt;
   }
@@ -310,7 +311,7 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
   if (verdict.intake != Intake::kAccepted) {
     return std::nullopt;
   }
-  Keep(sample);
+  AddRow(sample);
   std::optional<LookTask> due;
   for (const Transition& transition : verdict.Transitions()) {
     if (transition.kind == TransitionKind::kDetected) {
@@ -330,10 +331,10 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
   }
   const bool judged = verdict.quality == Quality::kLive &&
                       (!detection_ns_ || suspected) &&
-                      rows_.size() > std::min(judged_, kLongest - 1);
+                      rows_.size() > std::min(judged_, kMaxRows - 1);
   judged_ = judged ? judged_ + 1 : 0;
   const std::int64_t slot = sample.stamp_ns / kRoutineNs;
-  if (std::exchange(slot_, slot) != slot && judged_ >= kLongest && !due) {
+  if (std::exchange(slot_, slot) != slot && judged_ >= kMaxRows && !due) {
     due = RoutineTask(suspected);
   }
   return due;
@@ -356,7 +357,7 @@ void LookBook::Enter(const LookTask& task, LookAnswer answer) {
     }
   }
   if (task.stamp_ns - task.detection_stamp_ns > kLastAge &&
-      !Convinces(answer)) {
+      !AcceptsLate(answer)) {
     return;
   }
   answer.stamp_ns = task.stamp_ns;
@@ -364,7 +365,7 @@ void LookBook::Enter(const LookTask& task, LookAnswer answer) {
                       std::move(answer)});
 }
 
-bool LookBook::Convinces(const LookAnswer& answer) {
+bool LookBook::AcceptsLate(const LookAnswer& answer) {
   const auto doubt = std::exchange(doubt_, {});
   const auto named =
       std::find_if(entries_.rbegin(), entries_.rend(), [](const Entry& entry) {
@@ -527,7 +528,7 @@ std::optional<EpisodeName> ValveLooks::Name(const ModelSet& models,
       name.faults.push_back(models.faults[i]);
     }
   }
-  if (name.faults.size() > kMostNamed) {
+  if (name.faults.size() > kMaxNamedFaults) {
     name.faults.clear();
   }
   return name;

@@ -74,9 +74,9 @@ inline constexpr double kEarlyLookShare = 0.1;
 /// A fault that gains less over none, per independent reading, may be what a
 /// healthy valve and its simulation differ by: up to 0.20 were seen without
 /// one.
-inline constexpr double kLeastGain = 0.25;
+inline constexpr double kMinGain = 0.25;
 /// A set of more faults is a shortlist.
-inline constexpr std::size_t kMostNamed = 4;
+inline constexpr std::size_t kMaxNamedFaults = 4;
 
 /// A window that the valve without a fault follows with a larger misfit is not
 /// that of a healthy valve, for which it is about 1.
@@ -135,7 +135,7 @@ class EpisodeLooks {
     RecordRow row;
   };
 
-  void Keep(const Sample& sample);
+  void AddRow(const Sample& sample);
   std::optional<LookTask> Task() const;
   std::optional<LookTask> RoutineTask(bool suspected) const;
 
@@ -175,7 +175,7 @@ class LookBook {
     LookAnswer answer;
   };
   // Whether a look that comes so late is heard.
-  bool Convinces(const LookAnswer& answer);
+  bool AcceptsLate(const LookAnswer& answer);
 
   std::vector<Entry> entries_;
   std::vector<Explanation> doubt_;  // What the last look named instead.

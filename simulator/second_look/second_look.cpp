@@ -25,7 +25,7 @@ constexpr double kFreedom = 6.0;       // nu
 constexpr double kEffectError = 0.05;  // kappa
 // 2 log-likelihood that a fault has to gain over none, for its free strength
 // and start; a constant shift alike.
-constexpr double kPriceOfFault = 6.0;
+constexpr double kFaultPenalty = 6.0;
 
 // When a fault acts: from `start` on (from before the window if it is 0 and the
 // fault is constant), or growing from there to the end of the window.
@@ -80,8 +80,8 @@ class Looker {
   }
 
   SecondLook Run(const std::stop_token& stop);
-  StrengthLook Follow(const std::vector<Explanation>& known,
-                      const std::stop_token& stop);
+  StrengthLook EstimateStrengths(const std::vector<Explanation>& known,
+                                 const std::stop_token& stop);
   double MisfitOfHealthy() const { return ErrorsOf(healthy_) / Readings(); }
 
  private:
@@ -108,7 +108,7 @@ class Looker {
   ChannelFit FitWithoutFault() const;
   std::vector<Hypothesis> Hypotheses() const;
   std::vector<Hypothesis> FitHypotheses(const std::stop_token& stop);
-  double StopAsSeen() const;
+  double ObservedStop() const;
   void Try(Hypothesis& hypothesis, double strength);
   void TryCourse(Hypothesis& hypothesis, Course course);
   Hypothesis PerforationLike(const Hypothesis& supply_drop, Course course);
@@ -137,10 +137,10 @@ double Looker::StrengthAt(int row, double strength, Course course) const {
 }
 
 void Looker::FindUsualInputs() {
-  constexpr int kLeastRows = 30;
+  constexpr int kMinRows = 30;
   constexpr int kGuard = 5;  // Of the rows before a late detection.
   usual_ = {0.0, physics_.p1.mean, physics_.p2.mean, physics_.t1.mean};
-  if (detection_ < kLeastRows + kGuard) {
+  if (detection_ < kMinRows + kGuard) {
     return;
   }
   usual_ = {};
@@ -364,13 +364,13 @@ double Looker::InputCost(int fault, double strength, Course course,
 // A flow transmitter that goes wrong moves no command, unless the loop reads
 // it. One that moved with the fault tells against it.
 double Looker::CommandCost() const {
-  constexpr int kLeastBefore = 60;
+  constexpr int kMinRowsBefore = 60;
   constexpr int kGap = 10;
-  constexpr int kLeastAfter = 10;
+  constexpr int kMinRowsAfter = 10;
   const LoopHabit& loop = physics_.loop;
   const int first = detection_ + kGap;
-  if (loop.reads_flow || loop.command_sd <= 0.0 || detection_ < kLeastBefore ||
-      rows_ < first + kLeastAfter) {
+  if (loop.reads_flow || loop.command_sd <= 0.0 ||
+      detection_ < kMinRowsBefore || rows_ < first + kMinRowsAfter) {
     return 0.0;
   }
   const auto mean = [&](int from, int to) {
@@ -421,7 +421,7 @@ std::vector<Hypothesis> Looker::Hypotheses() const {
 
 // Where a stop would be that X does not pass behind the detection, as a
 // strength of f1. Between two stops, one passed and one not, X is not linear.
-double Looker::StopAsSeen() const {
+double Looker::ObservedStop() const {
   std::vector<double> x;
   for (int k = detection_; k < rows_; ++k) {
     x.push_back(window_.rows[static_cast<std::size_t>(k)].x_pct);
@@ -565,7 +565,7 @@ ChannelFit Looker::FitWithoutFault() const {
     ChannelFit fit = FitChannel(healthy_, flow,
                                 kDrift * (transmitter.high - transmitter.low));
     const ChannelFit usual = FitChannel(healthy_, flow, scatter.slow_sd);
-    fit.cost += kPriceOfFault - usual.cost;
+    fit.cost += kFaultPenalty - usual.cost;
     fit.errors -= usual.errors;
     return fit;
   };
@@ -599,7 +599,7 @@ std::vector<Hypothesis> Looker::FitHypotheses(const std::stop_token& stop) {
       Try(h, strength);
     }
     if (h.fault == 1) {
-      Try(h, StopAsSeen());
+      Try(h, ObservedStop());
     } else if (h.fault == 10 || h.fault == 16) {
       // Nothing shows until the force lacks, and little more does beyond.
       for (const double strength : {0.5, 0.7, 0.8, 0.9}) {
@@ -646,8 +646,8 @@ SecondLook Looker::Run(const std::stop_token& stop) {
   }
   const double readings = Readings();
   const Hypothesis& first = hypotheses.front();
-  const bool faulty = first.cost + kPriceOfFault < unmoved.cost;
-  const double best = faulty ? first.cost + kPriceOfFault : unmoved.cost;
+  const bool faulty = first.cost + kFaultPenalty < unmoved.cost;
+  const double best = faulty ? first.cost + kFaultPenalty : unmoved.cost;
   SecondLook look;
   look.best = faulty ? first.simulated.at(first.strength) : healthy_;
   look.readings = readings;
@@ -661,7 +661,7 @@ SecondLook Looker::Run(const std::stop_token& stop) {
       continue;
     }
     Explanation explanation = Explain(h, scale);
-    explanation.distance = (h.cost + kPriceOfFault - best) / scale;
+    explanation.distance = (h.cost + kFaultPenalty - best) / scale;
     look.ranked.push_back(explanation);
   }
   std::stable_sort(look.ranked.begin(), look.ranked.end(),
@@ -676,15 +676,15 @@ SecondLook Looker::Run(const std::stop_token& stop) {
       torn = other.cost < torn.cost ? std::move(other) : std::move(torn);
     }
     look.perforation = Explain(torn, scale);
-    look.perforation->distance = (torn.cost + kPriceOfFault - best) / scale;
+    look.perforation->distance = (torn.cost + kFaultPenalty - best) / scale;
   }
   look.simulated_rows = simulated_;
   return look;
 }
 
-StrengthLook Looker::Follow(const std::vector<Explanation>& known,
-                            const std::stop_token& stop) {
-  constexpr double kLeast = 0.02;
+StrengthLook Looker::EstimateStrengths(const std::vector<Explanation>& known,
+                                       const std::stop_token& stop) {
+  constexpr double kMinStrength = 0.02;
   constexpr double kFurther = 1.5;
   constexpr int kRefinements = 4;
   StrengthLook look;
@@ -694,7 +694,7 @@ StrengthLook Looker::Follow(const std::vector<Explanation>& known,
       return {};
     }
     Hypothesis h{e.fault, e.strength < 0.0 ? -1.0 : 1.0, {0, false}, e.supply};
-    const double about = std::max(kLeast, std::abs(e.strength));
+    const double about = std::max(kMinStrength, std::abs(e.strength));
     Try(h, 0.75 * about);
     double most = about;
     Try(h, most);
@@ -719,8 +719,8 @@ void RequireRows(const LookWindow& window) {
 
 }  // namespace
 
-SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window,
-                     const std::stop_token& stop) {
+SecondLook RunSecondLook(const ValvePhysics& physics, const LookWindow& window,
+                         const std::stop_token& stop) {
   RequireRows(window);
   return Looker(physics, window).Run(stop);
 }
@@ -730,7 +730,7 @@ StrengthLook EstimateStrengths(const ValvePhysics& physics,
                                const std::vector<Explanation>& known,
                                const std::stop_token& stop) {
   RequireRows(window);
-  return Looker(physics, window).Follow(known, stop);
+  return Looker(physics, window).EstimateStrengths(known, stop);
 }
 
 double MisfitWithoutFault(const ValvePhysics& physics,

@@ -64,12 +64,12 @@ struct SecondLook {
 /// Deterministic: no clock, no threads. @throws CvodeError.
 ///
 /// @param stop asks it to end between two hypotheses: nothing is ranked then.
-SecondLook LookAgain(const ValvePhysics& physics, const LookWindow& window,
-                     const std::stop_token& stop = {});
+SecondLook RunSecondLook(const ValvePhysics& physics, const LookWindow& window,
+                         const std::stop_token& stop = {});
 
 /// The strengths of faults that are known, over a window that they act in all
 /// the time: no other fault, course or supply pressure is tried. A twentieth of
-/// the work of LookAgain().
+/// the work of RunSecondLook().
 struct StrengthLook {
   /// As they were asked for, with their strengths and intervals; empty if it
   /// was asked to stop.
@@ -78,15 +78,15 @@ struct StrengthLook {
 };
 
 /// @param known fault, sign, supply pressure and about the strength of each.
-/// @throws as LookAgain().
+/// @throws as RunSecondLook().
 StrengthLook EstimateStrengths(const ValvePhysics& physics,
                                const LookWindow& window,
                                const std::vector<Explanation>& known,
                                const std::stop_token& stop = {});
 
 /// Misfit of the window without any fault, but for a constant shift of X or F:
-/// 0.7 to 1.1 of a healthy valve. A hundredth of the work of LookAgain().
-/// @throws CvodeError; std::invalid_argument as LookAgain().
+/// 0.7 to 1.1 of a healthy valve. A hundredth of the work of RunSecondLook().
+/// @throws CvodeError; std::invalid_argument as RunSecondLook().
 double MisfitWithoutFault(const ValvePhysics& physics,
                           const LookWindow& window);
 

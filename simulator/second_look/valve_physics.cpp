@@ -14,7 +14,7 @@ namespace fdi::simulator {
 namespace {
 
 constexpr std::size_t kSettleRows = 60;  // The simulation starts at rest.
-constexpr std::size_t kShortest = 180;
+constexpr std::size_t kMinStretchRows = 180;
 constexpr std::size_t kSlowRows = 600;
 
 double Mean(const std::vector<double>& values) {
@@ -56,7 +56,7 @@ Scatter ScatterOf(std::vector<double> raw) {
   Scatter scatter;
   scatter.sd = std::sqrt(squares / static_cast<double>(errors.size()));
   constexpr double kUncorrelated = 0.05;
-  for (std::size_t lag = 1; lag < kShortest / 2; ++lag) {
+  for (std::size_t lag = 1; lag < kMinStretchRows / 2; ++lag) {
     double sum = 0.0;
     for (std::size_t k = lag; k < errors.size(); ++k) {
       sum += errors[k] * errors[k - lag];
@@ -78,9 +78,9 @@ Scatter ScatterOf(std::vector<double> raw) {
     means += mean * mean;
   }
   // Hours do not show how days differ.
-  constexpr double kLeastSlow = 0.3;
+  constexpr double kMinSlowRatio = 0.3;
   scatter.slow_sd = std::max(std::sqrt(means / static_cast<double>(pieces)),
-                             kLeastSlow * scatter.sd);
+                             kMinSlowRatio * scatter.sd);
   return scatter;
 }
 
@@ -178,10 +178,10 @@ class LoopObserver {
   }
 
   LoopHabit Habit() const {
-    constexpr double kLeastRows = 1800.0;
+    constexpr double kMinRows = 1800.0;
     constexpr double kSignificant = 4.0;
     LoopHabit habit;
-    if (changes_.empty() || count_ < kLeastRows || moved_ <= 0.0) {
+    if (changes_.empty() || count_ < kMinRows || moved_ <= 0.0) {
       return habit;
     }
     double squares = 0.0;
@@ -224,7 +224,7 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
   std::vector<double> t1;
   LoopObserver loop;
   for (const std::vector<RecordRow>& rows : records) {
-    if (rows.size() < kShortest) {
+    if (rows.size() < kMinStretchRows) {
       continue;
     }
     const auto answers =

@@ -109,12 +109,12 @@ Json NumberJson(const std::optional<double>& number) {
 // The VAF of an output that stood still is rounding noise: its variance is some
 // 1e-28 of that of the residual. For an output that varies, a model would have
 // to be off by 3000 standard deviations to get here.
-bool VafSaysSomething(double vaf) {
+bool IsVafMeaningful(double vaf) {
   return vaf > -1e9;
 }
 
 Json VafJson(double vaf) {
-  return VafSaysSomething(vaf) ? NumberJson(vaf) : Json();
+  return IsVafMeaningful(vaf) ? NumberJson(vaf) : Json();
 }
 
 std::string Hex(std::uint64_t value) {

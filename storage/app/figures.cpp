@@ -26,7 +26,7 @@ std::string SecondsText(double seconds) {
 
 // The rows of `map`, most episodes first, ties by name.
 template <typename Row>
-std::vector<std::pair<std::string, Row>> MostFirst(
+std::vector<std::pair<std::string, Row>> SortedByCount(
     const std::map<std::string, Row>& map) {
   std::vector<std::pair<std::string, Row>> rows(map.begin(), map.end());
   std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) {
@@ -71,8 +71,8 @@ Json StatisticsJson(const AlarmStatistics& alarms) {
             {"wrong", row.second.wrong}};
   };
   return {{"days", Rows(alarms.days, DayJson)},
-          {"valves", Rows(MostFirst(alarms.valves), valve)},
-          {"faults", Rows(MostFirst(alarms.faults), fault)},
+          {"valves", Rows(SortedByCount(alarms.valves), valve)},
+          {"faults", Rows(SortedByCount(alarms.faults), fault)},
           {"labelled",
            {{"true", alarms.labelled_true},
             {"false", alarms.labelled_false},
@@ -81,8 +81,8 @@ Json StatisticsJson(const AlarmStatistics& alarms) {
 }
 
 void AddDays(const std::vector<DayAlarms>& days, Report& report) {
-  constexpr std::size_t kMost = 31;
-  const std::size_t first = days.size() - std::min(days.size(), kMost);
+  constexpr std::size_t kMaxDays = 31;
+  const std::size_t first = days.size() - std::min(days.size(), kMaxDays);
   cli::TextTable table({{"day (UTC)"},
                         {"episodes", Align::kRight},
                         {"time in alarm", Align::kRight}});
@@ -92,7 +92,7 @@ void AddDays(const std::vector<DayAlarms>& days, Report& report) {
   }
   AddTextTable(report, table);
   if (first > 0) {
-    report.Line("(the last " + std::to_string(kMost) + " of " +
+    report.Line("(the last " + std::to_string(kMaxDays) + " of " +
                 std::to_string(days.size()) + " days; all with --json)");
   }
 }

@@ -42,7 +42,7 @@ std::vector<File> FilesOf(const DataDirectory& data) {
              "SELECT count(*) FROM monitor_session WHERE clean = 0"}}}};
 }
 
-bool IsThere(const std::filesystem::path& path) {
+bool Exists(const std::filesystem::path& path) {
   std::error_code error;
   const bool there = std::filesystem::exists(path, error);
   if (error) {
@@ -61,7 +61,7 @@ Json Examine(const File& file) {
                   {"troubles", Json::array()}};
   Json& troubles = finding["troubles"];
   try {
-    if (!IsThere(file.path)) {
+    if (!Exists(file.path)) {
       return finding;
     }
     finding["present"] = true;
@@ -110,7 +110,7 @@ cli::Column NumberColumn(std::string heading, const char* key, int divisor) {
 
 Report Doctor(const NoOptions&, const Context& context) {
   const DataDirectory data = DataOf(context);
-  if (!IsThere(data.path)) {
+  if (!Exists(data.path)) {
     throw DataError("no data directory " + data.path.string());
   }
   const Json databases = Rows(FilesOf(data), Examine);
@@ -138,8 +138,8 @@ Report Backup(const std::string& target, const Context& context) {
   const DataDirectory data = DataOf(context);
   std::vector<File> present;
   for (File& file : FilesOf(data)) {
-    if (IsThere(file.path)) {
-      if (IsThere(folder / file.name)) {
+    if (Exists(file.path)) {
+      if (Exists(folder / file.name)) {
         throw DataError("backup " + (folder / file.name).string() +
                         " exists already");
       }
@@ -164,7 +164,7 @@ Report Migrate(const NoOptions&, const Context& context) {
   Report report;
   report.document["databases"] = Json::array();
   for (const File& file : FilesOf(DataOf(context))) {
-    if (!IsThere(file.path)) {
+    if (!Exists(file.path)) {
       continue;
     }
     const Database database(file.path, *file.schema, Access::kOccasionalWriter);

@@ -121,7 +121,7 @@ void AddObservers(const ModelSet& models, Report& report) {
     for (std::size_t c = 0; c < observer.channels.size(); ++c) {
       const ChannelObserver& channel = observer.channels[c];
       const ValidationFigures& v = channel.validation;
-      const bool varies = VafSaysSomething(v.vaf);
+      const bool varies = IsVafMeaningful(v.vaf);
       table.AddRow(
           {observer.name, FaultName(observer.fault),
            FormatNumber(observer.strength, 2), models.channels[c].name,

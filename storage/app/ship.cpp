@@ -14,7 +14,7 @@
 namespace fdi::storage {
 namespace {
 
-constexpr std::chrono::nanoseconds kLongestPause = std::chrono::minutes(5);
+constexpr std::chrono::nanoseconds kMaxPause = std::chrono::minutes(5);
 
 struct ShipOptions {
   std::string url;
@@ -97,13 +97,13 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
         context.log(LogLevel::kWarning,
                     cli::EventLine("ship_failed", {{"reason", failure}}));
       }
-      pause = std::min(pause * 2, std::max(every, kLongestPause));
+      pause = std::min(pause * 2, std::max(every, kMaxPause));
     }
     std::this_thread::sleep_for(pause);
   }
 }
 
-Report PruneThere(const ShipOptions& options) {
+Report PrunePlant(const ShipOptions& options) {
   struct Rule {
     const std::string& age;
     const char* items;
@@ -153,7 +153,7 @@ Report Ship(const ShipOptions& given, const Context& context) {
     throw NotFoundError("no database " + data.history().string());
   }
   if (options.forget) {
-    ForgetPlants(data);
+    StopShipping(data);
     Report report;
     report.document = {{"forgotten", true}};
     return report.Line(
@@ -166,7 +166,7 @@ Report Ship(const ShipOptions& given, const Context& context) {
     return InitPlant(options);
   }
   if (options.prune) {
-    return PruneThere(options);
+    return PrunePlant(options);
   }
   if (!options.every.empty()) {
     ShipForEver(options, context);

@@ -114,7 +114,7 @@ void AddComparison(const std::vector<BaselineRecord>& records, Report& report) {
     for (const ChannelFigures& channel : record.channels) {
       add(channel.name + " rmse", channel.rmse);
       add(channel.name + " bias", channel.bias);
-      if (VafSaysSomething(channel.vaf)) {
+      if (IsVafMeaningful(channel.vaf)) {
         add(channel.name + " VAF [%]", channel.vaf);
       }
     }

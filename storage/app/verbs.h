@@ -140,7 +140,7 @@ Json TextJson(const std::optional<std::string>& text);  ///< Null if empty, too.
 Json NumberJson(const std::optional<double>& number);   ///< Null if not finite.
 /// False if the variance accounted for, 100 (1 - var(residual) / var(output))
 /// %, is meaningless because the output stood still in the validation data.
-bool VafSaysSomething(double vaf);
+bool IsVafMeaningful(double vaf);
 Json VafJson(double vaf);              ///< Null if it is meaningless.
 std::string Hex(std::uint64_t value);  ///< 16 digits
 

@@ -68,8 +68,8 @@ std::int64_t Chattering(const std::vector<std::int64_t>& stamps,
 }
 
 // The largest number of the sorted stamps in any window.
-std::int64_t MostWithin(const std::vector<std::int64_t>& stamps,
-                        std::int64_t window_ns) {
+std::int64_t MaxCountWithin(const std::vector<std::int64_t>& stamps,
+                            std::int64_t window_ns) {
   std::size_t most = 0;
   std::size_t first = 0;
   for (std::size_t last = 0; last < stamps.size(); ++last) {
@@ -83,7 +83,7 @@ std::int64_t MostWithin(const std::vector<std::int64_t>& stamps,
 
 }  // namespace
 
-bool InForce(const Shelf& shelf, std::int64_t now_ns) {
+bool IsActive(const Shelf& shelf, std::int64_t now_ns) {
   return shelf.from_ns <= now_ns && now_ns < shelf.until_ns &&
          (!shelf.ended_ns || now_ns < *shelf.ended_ns);
 }
@@ -129,7 +129,7 @@ std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,
                             std::int64_t now_ns) {
   std::multimap<std::string, const Shelf*> in_force;
   for (const Shelf& shelf : shelves) {
-    if (InForce(shelf, now_ns)) {
+    if (IsActive(shelf, now_ns)) {
       in_force.emplace(shelf.valve_id, &shelf);
     }
   }
@@ -204,7 +204,7 @@ AlarmStatistics ComputeAlarmStatistics(const std::vector<AlarmSpan>& spans,
     statistics.valves[valve].chattering = Chattering(stamps, criteria);
   }
   statistics.most_in_flood_window =
-      MostWithin(all, Nanoseconds(criteria.flood_window_s));
+      MaxCountWithin(all, Nanoseconds(criteria.flood_window_s));
   return statistics;
 }
 

@@ -34,7 +34,7 @@ std::vector<Shelf> ReadShelves(Database& database,
                                std::optional<std::int64_t> in_force_at_ns = {});
 
 /// [from, until), or less if it was ended early.
-bool InForce(const Shelf& shelf, std::int64_t now_ns);
+bool IsActive(const Shelf& shelf, std::int64_t now_ns);
 
 /// Whether `shelf` applies to this valve and diagnosis. A shelved fault covers
 /// only episodes with exactly this diagnosis: not those that are not isolated,

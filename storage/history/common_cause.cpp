@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::array<std::string_view, 3> kChanges{"OPENED", "GROWN", "ENDED"};
 // An episode may be detected long before it isolates a fault of the group.
-constexpr std::int64_t kLongestIsolationNs = 86'400'000'000'000;
+constexpr std::int64_t kMaxIsolationNs = 86'400'000'000'000;
 
 bool GlobMatches(const std::string& glob, std::string_view text) {
   return fnmatch(glob.c_str(), std::string(text).c_str(), FNM_NOESCAPE) == 0;
@@ -44,9 +44,9 @@ CommonCause ReadCause(Database& database, const std::string& cause_id) {
 
 // The subset of `members`, which are ordered by isolation, that contains
 // `episode_id`, spans at most `within_ns` and has the most valves.
-std::vector<CauseMember> Crowd(const std::vector<CauseMember>& members,
-                               std::int64_t within_ns,
-                               const std::string& episode_id) {
+std::vector<CauseMember> LargestCluster(const std::vector<CauseMember>& members,
+                                        std::int64_t within_ns,
+                                        const std::string& episode_id) {
   std::vector<CauseMember> best;
   std::size_t best_valves = 0;
   for (auto first = members.begin(); first != members.end(); ++first) {
@@ -133,7 +133,7 @@ std::optional<CauseChange> CommonCauseBook::Join(
 std::optional<CauseChange> CommonCauseBook::Open(const CauseGroup& group,
                                                  const std::string& episode_id,
                                                  std::int64_t stamp_ns) {
-  const auto crowd = Crowd(
+  const auto crowd = LargestCluster(
       Candidates(group, stamp_ns - group.within_ns, stamp_ns + group.within_ns),
       group.within_ns, episode_id);
   std::set<std::string> valves;
@@ -167,7 +167,7 @@ std::vector<CauseMember> CommonCauseBook::Candidates(const CauseGroup& group,
   Statement row = database_.Prepare(sql::cause_candidates);
   std::vector<CauseMember> members;
   for (const std::string& fault : group.faults) {
-    row.Bind(fault, from_ns, to_ns, kLongestIsolationNs, group.name);
+    row.Bind(fault, from_ns, to_ns, kMaxIsolationNs, group.name);
     while (row.Step()) {
       auto member = ReadRecord<CauseMember>(row);
       const bool known =
@@ -191,15 +191,15 @@ void CommonCauseBook::Insert(const std::string& cause_id,
 std::vector<CauseChange> CommonCauseBook::Ended(const std::string& episode_id) {
   Statement causes = database_.Prepare(sql::open_causes_of_episode);
   causes.Bind(episode_id);
-  return EndIfOver(causes);
+  return EndIfFinished(causes);
 }
 
 std::vector<CauseChange> CommonCauseBook::EndFinished() {
   Statement causes = database_.Prepare(sql::open_causes);
-  return EndIfOver(causes);
+  return EndIfFinished(causes);
 }
 
-std::vector<CauseChange> CommonCauseBook::EndIfOver(Statement& causes) {
+std::vector<CauseChange> CommonCauseBook::EndIfFinished(Statement& causes) {
   std::vector<std::string> ids;
   while (causes.Step()) {
     ids.push_back(causes.Text(0));

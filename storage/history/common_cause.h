@@ -74,7 +74,7 @@ class CommonCauseBook {
   std::vector<CauseChange> EndFinished();
 
  private:
-  std::vector<CauseChange> EndIfOver(Statement& causes);
+  std::vector<CauseChange> EndIfFinished(Statement& causes);
   std::optional<CauseChange> Join(const CauseGroup& group,
                                   const std::string& cause_id,
                                   const std::string& episode_id);

@@ -13,9 +13,9 @@ namespace fdi::storage {
 namespace sql = history_sql;
 namespace {
 
-constexpr std::size_t kLongestWho = 128;
-constexpr std::size_t kLongestComment = 2000;
-constexpr std::size_t kLongestValve = 64;
+constexpr std::size_t kMaxWhoLength = 128;
+constexpr std::size_t kMaxCommentLength = 2000;
+constexpr std::size_t kMaxValveIdLength = 64;
 
 // Replaces control characters, which could move the cursor of a terminal.
 std::string Plain(std::string text) {
@@ -36,8 +36,8 @@ void RequireLength(const std::string& text, const char* field,
 }
 
 OperatorNote Checked(const OperatorNote& note) {
-  RequireLength(note.who, "who", 1, kLongestWho);
-  RequireLength(note.comment, "comment", 0, kLongestComment);
+  RequireLength(note.who, "who", 1, kMaxWhoLength);
+  RequireLength(note.comment, "comment", 0, kMaxCommentLength);
   Require(!note.origin.empty(), "HistoryEditor: origin is empty");
   return {Plain(note.who), Plain(note.comment), Plain(note.origin),
           note.now_ns};
@@ -111,7 +111,7 @@ Shelf ReadShelf(Database& database, std::int64_t shelf_id) {
 void EndShelfRow(Database& database, std::int64_t shelf_id,
                  const OperatorNote& note) {
   const Shelf shelf = ReadShelf(database, shelf_id);
-  if (!InForce(shelf, note.now_ns)) {
+  if (!IsActive(shelf, note.now_ns)) {
     throw DataError("shelved alarm " + std::to_string(shelf_id) + " of " +
                     shelf.valve_id + " is over already");
   }
@@ -177,7 +177,7 @@ bool HistoryEditor::AdoptNote(const OperatorAction& action) {
 
 bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
   const OperatorNote note = NoteOf(action);
-  RequireLength(action.valve_id, "valve", 1, kLongestValve);
+  RequireLength(action.valve_id, "valve", 1, kMaxValveIdLength);
   const std::optional<std::string> fault =
       action.value.empty() ? std::nullopt
                            : std::optional(CheckedFaults(action.value));
@@ -210,11 +210,11 @@ Shelf HistoryEditor::Shelve(std::string_view valve_id,
   const OperatorNote checked = Checked(note);
   Shelf shelf;
   shelf.valve_id = Plain(std::string(valve_id));
-  RequireLength(shelf.valve_id, "valve", 1, kLongestValve);
+  RequireLength(shelf.valve_id, "valve", 1, kMaxValveIdLength);
   shelf.fault = fault ? std::optional(CheckedFaults(*fault)) : std::nullopt;
   shelf.from_ns = checked.now_ns;
   shelf.until_ns = until_ns;
-  if (until_ns <= shelf.from_ns || until_ns - shelf.from_ns > kLongestShelfNs) {
+  if (until_ns <= shelf.from_ns || until_ns - shelf.from_ns > kMaxShelfNs) {
     throw ConfigError(
         "an alarm is shelved until a time after now, and for "
         "90 days at most");

@@ -22,7 +22,7 @@ struct OperatorNote {
 
 /// Longest time on the shelf: 90 days. An alarm that has to be suppressed for
 /// longer is a wrong alarm.
-inline constexpr std::int64_t kLongestShelfNs = 90LL * 86'400'000'000'000;
+inline constexpr std::int64_t kMaxShelfNs = 90LL * 86'400'000'000'000;
 
 /// Operator actions, performed beside a running monitor as an occasional
 /// writer. Every action is recorded with its OperatorNote; none replaces
@@ -53,7 +53,7 @@ class HistoryEditor {
   /// same valve and fault ends.
   /// @param fault names joined by |, or "unknown"; nothing: any.
   /// @throws ConfigError for another fault, or unless until_ns is after now
-  ///   and at most kLongestShelfNs later.
+  ///   and at most kMaxShelfNs later.
   Shelf Shelve(std::string_view valve_id,
                const std::optional<std::string>& fault, std::int64_t until_ns,
                const OperatorNote& note);

@@ -22,7 +22,7 @@ bool IsExact(const EpisodeFilter& filter) {
   return filter.valve_glob.find_first_of("*?[") == std::string::npos;
 }
 
-bool NamesAFault(const EpisodeFilter& filter) {
+bool HasFaultFilter(const EpisodeFilter& filter) {
   return !filter.fault.empty() && filter.fault != kUnknown;
 }
 
@@ -39,8 +39,8 @@ bool IsUnacked(EpisodeState state) {
 }
 
 std::string FaultOf(const EpisodeFilter& filter) {
-  return NamesAFault(filter) ? FaultName(RequireFault(filter.fault))
-                             : filter.fault;
+  return HasFaultFilter(filter) ? FaultName(RequireFault(filter.fault))
+                                : filter.fault;
 }
 
 const char* ValveCondition(const EpisodeFilter& filter) {
@@ -102,7 +102,7 @@ const char* IndexFor(const EpisodeFilter& filter) {
 std::string NewestIds(const EpisodeFilter& filter) {
   const std::string valve_and_state =
       std::string(ValveCondition(filter)) + StateCondition(filter.state);
-  if (NamesAFault(filter) && !IsExact(filter)) {
+  if (HasFaultFilter(filter) && !IsExact(filter)) {
     return std::string(sql::newest_of_fault) + " " + valve_and_state +
            " ORDER BY f.detected_ns DESC, e.valve_id DESC";
   }

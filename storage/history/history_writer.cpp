@@ -336,7 +336,7 @@ void HistoryWriter::CommitBatch(const std::function<void()>& batch) {
   }
   in_batch_ = false;
   failed_ = false;
-  Settle();
+  DiscardCommitted();
 }
 
 bool HistoryWriter::Record(const FaultEvent& event, std::int64_t now_ns) {
@@ -420,10 +420,10 @@ void HistoryWriter::StorePending() {
   }
 }
 
-void HistoryWriter::Settle() {
+void HistoryWriter::DiscardCommitted() {
   gaps_.clear();
   sent_.clear();
-  traces_.Settle();
+  traces_.DiscardCommitted();
 }
 
 bool HistoryWriter::HasPending() const {

@@ -130,7 +130,7 @@ class HistoryWriter {
 
   void StorePending();
   /// Discards buffers that are now in the file.
-  void Settle();
+  void DiscardCommitted();
 
   Database database_;
   TraceWriter traces_{database_};

@@ -72,7 +72,7 @@ class Pruner {
     return found;
   }
 
-  void Note(const Candidate& item) {
+  void CountDeleted(const Candidate& item) {
     ++result_.deleted;
     result_.from_ns = std::min(result_.from_ns.value_or(kEver), item.stamp_ns);
     result_.to_ns =
@@ -86,7 +86,7 @@ class Pruner {
     const auto old = Candidates(-kEver, limits_.before_ns.value_or(-kEver), -1);
     std::unordered_set<std::int64_t> dropped;
     const auto drop = [this, &dropped](const Candidate& item) {
-      Note(item);
+      CountDeleted(item);
       dropped.insert(item.row);
       result_.bytes_after -= std::min(result_.bytes_after, item.bytes);
     };
@@ -119,7 +119,7 @@ class Pruner {
       }
       for (const Candidate& item : batch) {
         database_.Run(items_.erase, item.row);
-        Note(item);
+        CountDeleted(item);
       }
       transaction.Commit();
       // Earlier rows are deleted or protected.

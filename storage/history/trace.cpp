@@ -284,7 +284,7 @@ void TraceWriter::StoreBuffer(std::uint64_t episode_id, const Buffer& buffer) {
   database_.Cached(sql::raise_peak).Bind(Peak(buffer), id).Run();
 }
 
-void TraceWriter::Settle() {
+void TraceWriter::DiscardCommitted() {
   for (auto it = buffers_.begin(); it != buffers_.end();) {
     Buffer& buffer = it->second;
     const std::size_t full = buffer.instants.size() / kTraceChunkInstants;

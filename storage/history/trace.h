@@ -49,7 +49,7 @@ class TraceWriter {
   /// Within a transaction: writes what is not in the file yet.
   void Store();
   /// After the commit: discards the instants of full chunks.
-  void Settle();
+  void DiscardCommitted();
 
  private:
   // The instants of an episode that are not yet in full chunks.

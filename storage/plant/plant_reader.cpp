@@ -121,7 +121,8 @@ PlantReader::PlantReader(const std::string& url, std::string monitor)
 }
 
 // Runs `sql` with its {episodes}, the condition of the filter.
-PlantRows PlantReader::Ask(std::string_view sql, const EpisodeFilter& filter) {
+PlantRows PlantReader::Query(std::string_view sql,
+                             const EpisodeFilter& filter) {
   const EpisodeCondition condition = ConditionOf(filter);
   // The index of what is open goes by end_reason, the column of the view.
   const std::string open =
@@ -139,8 +140,9 @@ PlantRows PlantReader::Ask(std::string_view sql, const EpisodeFilter& filter) {
 }
 
 // Runs `sql`, which ends with WHERE, for the rows of one episode.
-PlantRows PlantReader::AskOf(std::string_view sql, std::uint64_t episode_id,
-                             const char* order) {
+PlantRows PlantReader::QueryEpisode(std::string_view sql,
+                                    std::uint64_t episode_id,
+                                    const char* order) {
   return plant_.Run(
       std::string(sql) + " " + std::string(sql::of_episode) + order,
       {EpisodeIdText(episode_id), monitor_});
@@ -156,7 +158,7 @@ std::vector<Episode> PlantReader::ListWhere(const std::string& more,
   list = Replaced(list, "{limit}",
                   filter.limit > 0 ? std::to_string(filter.limit) : "ALL");
   const PlantRows rows =
-      Ask(Replaced(list, "{episodes}", "{episodes}" + more), filter);
+      Query(Replaced(list, "{episodes}", "{episodes}" + more), filter);
   auto episodes = Records<Episode>(rows);
   for (int r = 0; r < rows.size(); ++r) {
     Episode& episode = episodes[static_cast<std::size_t>(r)];
@@ -187,12 +189,12 @@ Episode PlantReader::Show(std::string_view id) {
 
 std::vector<HistoryEntry> PlantReader::Events(std::uint64_t episode_id) {
   return Records<HistoryEntry>(
-      AskOf(SelectSql<HistoryEntry>("FROM episode_event WHERE"), episode_id,
-            " ORDER BY event_id"));
+      QueryEpisode(SelectSql<HistoryEntry>("FROM episode_event WHERE"),
+                   episode_id, " ORDER BY event_id"));
 }
 
 std::optional<EpisodeLook> PlantReader::Look(std::uint64_t episode_id) {
-  const PlantRows header = AskOf(sql::plant_look, episode_id);
+  const PlantRows header = QueryEpisode(sql::plant_look, episode_id);
   if (header.size() == 0) {
     return std::nullopt;
   }
@@ -202,7 +204,7 @@ std::optional<EpisodeLook> PlantReader::Look(std::uint64_t episode_id) {
   Parse(header.Text(0, 1), look.period_ns);
   Parse(header.Text(0, 2), look.misfit);
   const PlantRows rows =
-      AskOf(sql::plant_look_faults, episode_id, " ORDER BY rank");
+      QueryEpisode(sql::plant_look_faults, episode_id, " ORDER BY rank");
   for (int r = 0; r < rows.size(); ++r) {
     LookFault& f = look.faults.emplace_back();
     f.fault = RequireFault(rows.Text(r, 0).value_or(""));
@@ -213,7 +215,7 @@ std::optional<EpisodeLook> PlantReader::Look(std::uint64_t episode_id) {
     Parse(rows.Text(r, 5), f.growing);
   }
   const PlantRows simulated =
-      AskOf(sql::plant_look_rows, episode_id, " ORDER BY row");
+      QueryEpisode(sql::plant_look_rows, episode_id, " ORDER BY row");
   for (int r = 0; r < simulated.size(); ++r) {
     Parse(simulated.Text(r, 0), look.x_pct.emplace_back());
     Parse(simulated.Text(r, 1), look.flow.emplace_back());
@@ -222,8 +224,8 @@ std::optional<EpisodeLook> PlantReader::Look(std::uint64_t episode_id) {
 }
 
 std::vector<StrengthPoint> PlantReader::Strengths(std::uint64_t episode_id) {
-  const PlantRows rows =
-      AskOf(sql::plant_strengths, episode_id, " ORDER BY stamp_ns, fault");
+  const PlantRows rows = QueryEpisode(sql::plant_strengths, episode_id,
+                                      " ORDER BY stamp_ns, fault");
   std::vector<StrengthPoint> points;
   for (int r = 0; r < rows.size(); ++r) {
     StrengthPoint& p = points.emplace_back();
@@ -240,7 +242,8 @@ std::vector<StrengthPoint> PlantReader::Strengths(std::uint64_t episode_id) {
 }
 
 std::vector<TracePoint> PlantReader::Trace(std::uint64_t episode_id) {
-  const PlantRows rows = AskOf(sql::plant_trace, episode_id, " ORDER BY chunk");
+  const PlantRows rows =
+      QueryEpisode(sql::plant_trace, episode_id, " ORDER BY chunk");
   std::vector<TracePoint> trace;
   for (int r = 0; r < rows.size(); ++r) {
     TraceChunk chunk;
@@ -259,17 +262,17 @@ std::vector<TracePoint> PlantReader::Trace(std::uint64_t episode_id) {
 
 std::vector<EpisodeStatistics> PlantReader::Statistics(
     const EpisodeFilter& filter) {
-  return Records<EpisodeStatistics>(Ask(sql::plant_statistics, filter));
+  return Records<EpisodeStatistics>(Query(sql::plant_statistics, filter));
 }
 
 std::vector<DataGap> PlantReader::Gaps(const EpisodeFilter& filter) {
-  return Records<DataGap>(Ask(
+  return Records<DataGap>(Query(
       Replaced(std::string(sql::plant_gaps), "{columns}", ColumnsOf<DataGap>()),
       filter));
 }
 
 std::vector<CoverageTime> PlantReader::Coverage(const EpisodeFilter& filter) {
-  return Records<CoverageTime>(Ask(sql::plant_coverage, filter));
+  return Records<CoverageTime>(Query(sql::plant_coverage, filter));
 }
 
 std::vector<Alarm> PlantReader::AlarmList(std::int64_t now_ns,
@@ -344,9 +347,9 @@ AlarmStatistics PlantReader::AlarmFigures(const EpisodeFilter& filter,
   any.state = EpisodeState::kAny;
   any.since_ns = EpisodeFilter{}.since_ns;
   const PlantRows spans =
-      Ask(Replaced(std::string(sql::plant_spans), "{since}",
-                   "'" + std::to_string(filter.since_ns) + "'::bigint"),
-          any);
+      Query(Replaced(std::string(sql::plant_spans), "{since}",
+                     "'" + std::to_string(filter.since_ns) + "'::bigint"),
+            any);
   return ComputeAlarmStatistics(Records<AlarmSpan>(spans), filter.since_ns,
                                 filter.until_ns, now_ns);
 }

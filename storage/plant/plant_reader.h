@@ -43,9 +43,9 @@ class PlantReader : public History {
  private:
   std::vector<Episode> ListWhere(const std::string& more,
                                  const EpisodeFilter& filter);
-  PlantRows Ask(std::string_view sql, const EpisodeFilter& filter);
-  PlantRows AskOf(std::string_view sql, std::uint64_t episode_id,
-                  const char* order = "");
+  PlantRows Query(std::string_view sql, const EpisodeFilter& filter);
+  PlantRows QueryEpisode(std::string_view sql, std::uint64_t episode_id,
+                         const char* order = "");
 
   PlantDatabase plant_;
   std::string monitor_;

@@ -173,7 +173,7 @@ namespace {
 // The plant was away for long, and the log names the same valves again and
 // again. A transaction is short: the monitor waits for it.
 void ShortenLog(Database& history) {
-  constexpr std::size_t kAtOnce = 1000;
+  constexpr std::size_t kBatchSize = 1000;
   if (history.QueryInt64("SELECT count(*) FROM change").value_or(0) <=
       kLongLog) {
     return;
@@ -187,7 +187,7 @@ void ShortenLog(Database& history) {
   Statement row = history.Prepare("DELETE FROM change WHERE number = ?");
   for (std::size_t i = 0; i < repeated.size();) {
     Transaction transaction(history);
-    const std::size_t end = std::min(i + kAtOnce, repeated.size());
+    const std::size_t end = std::min(i + kBatchSize, repeated.size());
     for (; i < end; ++i) {
       row.Bind(repeated[i]).Run();
     }
@@ -202,7 +202,7 @@ PlantDatabase Connect(Database& history, const std::string& url) {
 
 }  // namespace
 
-void ForgetPlants(const DataDirectory& data) {
+void StopShipping(const DataDirectory& data) {
   Database history(data.history(), HistorySchema(), Access::kOccasionalWriter);
   Transaction transaction(history);
   history.Run("DELETE FROM ship_cursor");
@@ -287,7 +287,7 @@ bool Shipper::TakeItems(Cursor& cursor) {
 }
 
 // What all plants have is not needed any more.
-void Shipper::Note(const Cursor& cursor) {
+void Shipper::StoreCursor(const Cursor& cursor) {
   Transaction noted(history_);
   history_.Cached(sql::set_ship_cursor)
       .Bind(
@@ -327,7 +327,7 @@ bool Shipper::ShipBatch(Shipped& shipped) {
              {monitor_id_, std::to_string(cursor.shipped_ns)});
   transaction.Commit();
   if (found) {
-    Note(cursor);
+    StoreCursor(cursor);
     ++shipped.batches;
   }
   return found;

@@ -28,7 +28,7 @@ struct Shipped {
 /// Ends shipping: no change is logged any more, none is kept, and `prune` waits
 /// for no plant. The next shipping begins anew.
 /// @throws DataError, SqliteError
-void ForgetPlants(const DataDirectory& data);
+void StopShipping(const DataDirectory& data);
 
 /// Brings what changed in a data directory to the plant's history, in order.
 ///
@@ -66,7 +66,7 @@ class Shipper {
   void Merge(const Batch& batch, Shipped& shipped);
   Cursor ReadCursor(std::int64_t shipped_ns_there);
   bool TakeItems(Cursor& cursor);
-  void Note(const Cursor& cursor);
+  void StoreCursor(const Cursor& cursor);
   void MakeStage(const Batch& batch);
 
   DataDirectory data_;

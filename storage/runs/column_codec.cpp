@@ -100,7 +100,7 @@ std::uint64_t CorrectionBits(const ValuePredictor& predictor,
 
 /// Whether `hint` is as good as the result of a search: fewer decimals would
 /// not do; a grid is met within a bit per value.
-bool MeetsAgain(const ValuePredictor& hint, std::span<const double> values) {
+bool StillFits(const ValuePredictor& hint, std::span<const double> values) {
   if (hint.kind == ValuePredictor::kGrid) {
     return Fits(hint, values, 64) &&
            CorrectionBits(hint, values) <= values.size();
@@ -303,7 +303,7 @@ std::int64_t ValuePredictor::Correction(double value, std::int64_t n) const {
 
 std::optional<ValuePredictor> FindPredictor(
     std::span<const double> values, const std::optional<ValuePredictor>& hint) {
-  if (hint && MeetsAgain(*hint, values)) {
+  if (hint && StillFits(*hint, values)) {
     return hint;
   }
   for (int d = 0; d <= ValuePredictor::kMaxDecimals; ++d) {

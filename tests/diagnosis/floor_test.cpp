@@ -86,9 +86,9 @@ TEST(FloorTest, CommandedTravelIsNoFinding) {
                 const double cv =
                     std::vector{0.0, 100.0, 30.0,
                                 80.0}[static_cast<std::size_t>(k / 50 % 4)];
-                x = Follow(slow ? FloorLimits::Rod{0.4, 8.0}
-                                : FloorLimits::Rod{1.0, 100.0},
-                           x, cv);
+                x = NextRodPosition(slow ? FloorLimits::Rod{0.4, 8.0}
+                                         : FloorLimits::Rod{1.0, 100.0},
+                                    x, cv);
                 // A reading that is off by 6 % and noisy is still healthy.
                 return Valve{cv, x + 5.0 + 0.1 * (k % 3), 5.0};
               }),
@@ -102,7 +102,7 @@ TEST(FloorTest, BreakawayFromAStopIsNoFinding) {
     double x = 0.0;
     EXPECT_EQ(FirstFindings([&](int k) {
                 const double cv = k < start ? 0.0 : 90.0;
-                x = k < start + 4 ? 0.0 : Follow({0.4, 12.0}, x, cv);
+                x = k < start + 4 ? 0.0 : NextRodPosition({0.4, 12.0}, x, cv);
                 return Valve{cv, x, 5.0};
               }),
               kNothing)

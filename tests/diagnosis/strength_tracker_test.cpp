@@ -232,8 +232,8 @@ TEST(FaultBankTest, FaultIsNotNamedForWantOfEvidence) {
     }
     bank.Step(sample);
     faults.Score(bank, verdict);
-    faults.Follow(bank);
-    faults.Compete(verdict);
+    faults.Update(bank);
+    faults.ApplyEvidence(verdict);
   };
   for (int i = 0; i < 50; ++i) {
     step(10.0, 1.0);
@@ -274,8 +274,8 @@ TEST(FaultBankTest, ErrorsOfInterpolationDoNotAddUpToAVerdict) {
       }
       bank.Step(sample);
       faults.Score(bank, verdict);
-      faults.Follow(bank);
-      faults.Compete(verdict);
+      faults.Update(bank);
+      faults.ApplyEvidence(verdict);
     }
     const double threshold = models.decision.isolation_threshold;
     return std::pair{verdict.fault_factors[f3] >= threshold,
@@ -303,8 +303,8 @@ TEST(FaultBankTest, ReadingAtTheLimitSpeaksForWhatPredictsIt) {
     sample.Set(Signal::kF, 60.0);
     bank.Step(sample);
     faults.Score(bank, verdict);
-    faults.Follow(bank);
-    faults.Compete(verdict);
+    faults.Update(bank);
+    faults.ApplyEvidence(verdict);
   }
   EXPECT_EQ(verdict.fault_factors[f6], 1.0);
   EXPECT_LT(verdict.normal_factor, 0.1);

@@ -174,7 +174,7 @@ TEST(TsModelTest, PredictionStaysWithinTheLimitsOfTheOutput) {
 TEST(TsModelTest, AParallelModelDoesNotReadItsOwnOutput) {
   TsModel model = TwoRules();
   EXPECT_EQ(RequiredSignals(model), MaskOf(Signal::kX) | MaskOf(Signal::kF));
-  EXPECT_EQ(LongestLag(model), 3);
+  EXPECT_EQ(MaxLag(model), 3);
 
   model.parallel = true;
   EXPECT_EQ(RequiredSignals(model), MaskOf(Signal::kX));

@@ -190,7 +190,7 @@ TEST_F(DeliveryTest, BatchesAllArrive) {
   std::uint64_t count = 0;
   std::uint64_t out_of_order = 0;
   const Handlers<DecisionBatchMessage> handlers =
-      EachVector([&](const DecisionMessage& message, const Reception&) {
+      ForEachVector([&](const DecisionMessage& message, const Reception&) {
         std::uint64_t& expected = next[message.valve_id];
         out_of_order += message.verdict.seq != expected ? 1 : 0;
         expected = message.verdict.seq + 1;

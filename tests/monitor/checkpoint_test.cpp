@@ -28,7 +28,7 @@ TEST(CheckpointTest, TimeIsBookedOnTheDayOfItsSample) {
   book.Add(3 * kDay, Quality::kLive, 5);
   book.Add(3 * kDay, Quality::kStale, 2);
   std::vector<CoverageDay> days;
-  book.TakeInto("V1", 2.0, days);
+  book.DrainInto("V1", 2.0, days);
   ASSERT_EQ(days.size(), 2U);
   EXPECT_EQ(days[0].day, 2);
   EXPECT_EQ(days[0].samples[Quality::kLive], 1U);
@@ -37,7 +37,7 @@ TEST(CheckpointTest, TimeIsBookedOnTheDayOfItsSample) {
   EXPECT_EQ(days[1].samples[Quality::kLive], 5U);
   EXPECT_EQ(days[1].samples[Quality::kStale], 2U);
   days.clear();
-  book.TakeInto("V1", 2.0, days);
+  book.DrainInto("V1", 2.0, days);
   EXPECT_TRUE(days.empty());
 }
 
@@ -47,9 +47,9 @@ TEST(CheckpointTest, DaysAreBoundedAndOfAcceptedSamples) {
     book.Add(day * kDay, Quality::kLive);
     book.Add((day + 5000) * kDay, Quality::kBadInput, 1, false);
   }
-  EXPECT_EQ(book.rows(), kMostBookRows);
+  EXPECT_EQ(book.rows(), kMaxBookRows);
   std::vector<CoverageDay> days;
-  book.TakeInto("V1", 1.0, days);
+  book.DrainInto("V1", 1.0, days);
   QualityCount all;
   for (const CoverageDay& day : days) {
     EXPECT_LT(day.day, 1000);
@@ -63,13 +63,13 @@ TEST(CheckpointTest, MergingAddsTimeAndKeepsTheNewestAccumulator) {
   CoverageBook book;
   Checkpoint older;
   book.Add(0, Quality::kLive, 3);
-  book.TakeInto("V1", 1.0, older.coverage);
+  book.DrainInto("V1", 1.0, older.coverage);
   older.accumulators = {{"V1", 1, 1, 10, {}}, {"V2", 1, 1, 10, {}}};
   Checkpoint newer;
   book.Add(0, Quality::kLive, 4);
-  book.TakeInto("V1", 1.0, newer.coverage);
+  book.DrainInto("V1", 1.0, newer.coverage);
   book.Add(kDay, Quality::kLive, 1);
-  book.TakeInto("V1", 1.0, newer.coverage);
+  book.DrainInto("V1", 1.0, newer.coverage);
   newer.accumulators = {{"V1", 1, 1, 20, {}}};
 
   const Checkpoint merged = Merged(older, newer);
@@ -115,7 +115,7 @@ class RestartTest : public testing::Test {
                       context_);
     pipeline.Start({}, std::move(kept));
     for (std::uint64_t k = from; k < to; ++k) {
-      pipeline.Offer(valve, PlantSample(k, k < 400 ? 0.0 : 1.0), 1);
+      pipeline.OnSample(valve, PlantSample(k, k < 400 ? 0.0 : 1.0), 1);
     }
     pipeline.Stop();
     detected_.reset();
@@ -187,10 +187,10 @@ TEST_F(RestartTest, AHistoryThatFailsGetsAllTimeLater) {
                     std::make_shared<FixedResolver>(WatchedModels()), context_);
   pipeline.Start({});
   for (std::uint64_t k = 0; k < 200; ++k) {
-    pipeline.Offer("V1", PlantSample(k), 1);
+    pipeline.OnSample("V1", PlantSample(k), 1);
   }
   while (!pipeline.history_degraded()) {
-    pipeline.Tend();
+    pipeline.Poll();
     std::this_thread::yield();
   }
   history.notice.Apply([&] { history.broken = false; });
@@ -209,8 +209,8 @@ TEST_F(RestartTest, AProvisionalBaselineIsDetectedAndNotNamed) {
                       context_);
     pipeline.Start({});
     for (std::uint64_t k = 0; k < 100; ++k) {
-      pipeline.Offer(provisional ? "provisional1" : "V1",
-                     PlantSample(k, k < 50 ? 0.0 : kF7Offset), 1);
+      pipeline.OnSample(provisional ? "provisional1" : "V1",
+                        PlantSample(k, k < 50 ? 0.0 : kF7Offset), 1);
     }
     pipeline.Stop();
     ASSERT_FALSE(bus.events.empty());

@@ -97,18 +97,18 @@ TEST_F(AlarmBookTest, WhatWasHeardIsAnAlarmUntilTheHistoryHasIt) {
   const auto event = [this](TransitionKind kind, const std::string& valve) {
     return Event(kind, 0, 0, 0.3, EndReason::kNone, valve);
   };
-  EXPECT_TRUE(book_.Hear(event(TransitionKind::kDetected, "V")));
-  EXPECT_TRUE(book_.Hear(event(TransitionKind::kDetected, "W")));
-  EXPECT_EQ(book_.Heard().size(), 2U);
+  EXPECT_TRUE(book_.OnEvent(event(TransitionKind::kDetected, "V")));
+  EXPECT_TRUE(book_.OnEvent(event(TransitionKind::kDetected, "W")));
+  EXPECT_EQ(book_.UnstoredAlarms().size(), 2U);
   EXPECT_EQ(book_.ByValve()->at("V").episode, IdOf("V"));
   EXPECT_TRUE(book_.ByValve()->at("W").unacked);
 
-  EXPECT_TRUE(book_.Hear(event(TransitionKind::kClosed, "W")));
+  EXPECT_TRUE(book_.OnEvent(event(TransitionKind::kClosed, "W")));
   EXPECT_EQ(book_.ByValve()->at("W"), ValveAlarm{});
   Begin("V");
   EXPECT_EQ(book_.Refresh(kDetected).size(), 1U);
-  EXPECT_TRUE(book_.Heard().empty());
-  EXPECT_FALSE(book_.Hear(event(TransitionKind::kIsolated, "V")));
+  EXPECT_TRUE(book_.UnstoredAlarms().empty());
+  EXPECT_FALSE(book_.OnEvent(event(TransitionKind::kIsolated, "V")));
 }
 
 TEST_F(AlarmBookTest, TellsWhenAShelfRunsOut) {

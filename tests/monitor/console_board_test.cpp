@@ -145,9 +145,9 @@ TEST_F(LiveBoardTest, AnEndedEpisodeIsMarkedAndTheStateReturnsToNormal) {
   event.valve_id = "V1";
   event.transition.kind = TransitionKind::kClosed;
   event.transition.reason = EndReason::kStaleTimeout;
-  board_.Mark(event);
+  board_.AddMark(event);
   event.valve_id = "never seen";
-  board_.Mark(event);
+  board_.AddMark(event);
 
   const LiveTrend trend = board_.Trend("V1").value();
   ASSERT_EQ(trend.marks.size(), 1U);

@@ -61,7 +61,7 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
                        const std::lock_guard lock(log_mutex_);
                        log_.append(line).append("\n");
                      });
-    events_ = &console_->Before(bus_);
+    events_ = &console_->Wrap(bus_);
     console_->Start({path_, directory_.path() / "models.db", "0.0", kDetected,
                      [] {
                        return MonitorFacts{"OK", {{"received", 7}}, 1};

@@ -188,13 +188,13 @@ class FakeHistory : public HistorySink {
 /// Takes what a valve says, and forgets it.
 class FakeOutlet : public EpisodeOutlet {
  public:
-  void Event(FaultEvent /*event*/) override {}
-  void Evidence(EpisodeTrace /*trace*/) override {}
-  void Look(EpisodeLook /*look*/) override {}
-  void Strength(StrengthPoint /*point*/) override {}
-  void Gap(DataGap /*gap*/) override {}
-  void Resumed(const OpenEpisode& /*episode*/,
-               std::int64_t /*stamp_ns*/) override {}
+  void OnEvent(FaultEvent /*event*/) override {}
+  void OnEvidence(EpisodeTrace /*trace*/) override {}
+  void OnLook(EpisodeLook /*look*/) override {}
+  void OnStrength(StrengthPoint /*point*/) override {}
+  void OnGap(DataGap /*gap*/) override {}
+  void OnResumed(const OpenEpisode& /*episode*/,
+                 std::int64_t /*stamp_ns*/) override {}
 };
 
 class FakeRuns : public SampleSink {

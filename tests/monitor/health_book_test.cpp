@@ -34,7 +34,7 @@ Verdict Live(double residual, double normal_factor = 1.0) {
 
 std::vector<HealthHour> Taken(HealthBook& book) {
   std::vector<HealthHour> hours;
-  book.TakeInto("V1", hours);
+  book.DrainInto("V1", hours);
   return hours;
 }
 
@@ -161,12 +161,12 @@ TEST(HealthBookTest, PartsMergeToTheWholeExactly) {
     cut.Add(sample, verdict, &models, 1.0);
     if (i % 61 == 0) {
       Checkpoint part;
-      cut.TakeInto("V1", part.health);
+      cut.DrainInto("V1", part.health);
       merged = Merged(std::move(merged), std::move(part));
     }
   }
   Checkpoint rest;
-  cut.TakeInto("V1", rest.health);
+  cut.DrainInto("V1", rest.health);
   merged = Merged(std::move(merged), std::move(rest));
 
   EXPECT_EQ(merged.health, Taken(whole));

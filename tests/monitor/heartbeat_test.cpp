@@ -78,10 +78,10 @@ class PipelineHeartbeatTest : public testing::Test {
     diagnosis_ = std::jthread([this](const std::stop_token& stop) {
       while (!stop.stop_requested()) {
         for (; offered_ < wanted_; ++offered_) {
-          pipeline_->Offer(
+          pipeline_->OnSample(
               "V1", PlantSample(offered_, offered_ < 50 ? 0.0 : kF7Offset), 1);
         }
-        pipeline_->Tend();
+        pipeline_->Poll();
         std::this_thread::sleep_for(milliseconds(5));
       }
     });

@@ -14,7 +14,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kPatience{300};
-constexpr milliseconds kListening{1500};
+constexpr milliseconds kListenTime{1500};
 constexpr milliseconds kStep{20};
 
 // Monitors that step every 20 ms and hear each other's words at once.
@@ -37,13 +37,13 @@ class PairElectionTest : public testing::Test {
     Member& member = members_.emplace_back();
     member.judged = judged;
     member.election =
-        std::make_unique<PairElection>(self, kPatience, kListening, now_);
+        std::make_unique<PairElection>(self, kPatience, kListenTime, now_);
   }
 
   void Say(std::size_t from) {
     for (std::size_t to = 0; to < members_.size(); ++to) {
       if (members_[to].runs && !cut_.contains({from, to})) {
-        members_[to].election->Heard(members_[from].election->self(), now_);
+        members_[to].election->OnState(members_[from].election->self(), now_);
       }
     }
   }
@@ -90,7 +90,7 @@ class PairElectionTest : public testing::Test {
 TEST_F(PairElectionTest, OfTwoThatStartTogetherTheLowerRankLeads) {
   Add(2);
   Add(1);
-  Pass(kListening - kStep);
+  Pass(kListenTime - kStep);
   EXPECT_EQ(Leaders(), Who{});
   Pass(2 * kStep);
   EXPECT_EQ(Leaders(), Who{1});
@@ -99,9 +99,9 @@ TEST_F(PairElectionTest, OfTwoThatStartTogetherTheLowerRankLeads) {
 
 TEST_F(PairElectionTest, WhoIsAloneLeads) {
   Add(2);
-  Pass(kListening + kStep);
+  Pass(kListenTime + kStep);
   EXPECT_EQ(Leaders(), Who{0});
-  members_[0].election->Leave(now_);
+  members_[0].election->StepDown(now_);
   EXPECT_TRUE(members_[0].election->leads()) << "nobody could take over";
 }
 
@@ -141,7 +141,7 @@ TEST_F(PairElectionTest, ALeaderThatLeavesIsReplacedAtOnce) {
   Add(1);
   Add(2);
   Pass(milliseconds(2000));
-  members_[0].election->Leave(now_);
+  members_[0].election->StepDown(now_);
   EXPECT_FALSE(members_[0].election->leads());
   Say(0);
   members_[0].runs = false;
@@ -214,8 +214,8 @@ TEST_F(PairElectionTest, TheSameRankTwiceIsToldAndOneOfThemLeads) {
   Add(1);
   Pass(milliseconds(2000));
   EXPECT_EQ(Leaders().size(), 1U);
-  EXPECT_EQ(members_[0].election->twin(), "m1");
-  EXPECT_EQ(members_[1].election->twin(), "m0");
+  EXPECT_EQ(members_[0].election->same_rank(), "m1");
+  EXPECT_EQ(members_[1].election->same_rank(), "m0");
 }
 
 TEST_F(PairElectionTest, WordsOfAnotherPairDoNotCount) {
@@ -225,7 +225,7 @@ TEST_F(PairElectionTest, WordsOfAnotherPairDoNotCount) {
   word.instance = 7;
   word.leads = true;
   for (int i = 0; i < 100; ++i) {
-    members_[0].election->Heard(word, now_);
+    members_[0].election->OnState(word, now_);
     Pass(kStep);
   }
   EXPECT_EQ(Leaders(), Who{0});
@@ -248,7 +248,7 @@ TEST_F(PairElectionTest, WhoseLeaseHasRunOutFollowsWhoLeadsByNow) {
     members_.clear();
     Add(1);
     Add(2);
-    Pass(kListening + 2 * kStep);
+    Pass(kListenTime + 2 * kStep);
     ASSERT_EQ(Leaders(), Who{0});
     Cut(0, 1);
     Cut(1, 0);
@@ -256,7 +256,7 @@ TEST_F(PairElectionTest, WhoseLeaseHasRunOutFollowsWhoLeadsByNow) {
     ASSERT_EQ(Leaders(), (Who{0, 1}));
     cut_.clear();
     if (lapses) {
-      members_[0].election->Lapse(now_);
+      members_[0].election->OnLeaseExpired(now_);
       EXPECT_FALSE(members_[0].election->leads());
     }
     Pass(3 * kPatience);

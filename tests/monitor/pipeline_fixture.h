@@ -36,15 +36,15 @@ class PipelineTest : public testing::Test {
     Make(samples);
     pipeline_->Start({});
   }
-  void Offer(const std::string& valve, std::uint64_t from, std::uint64_t to,
-             double offset = 0.0) {
+  void Feed(const std::string& valve, std::uint64_t from, std::uint64_t to,
+            double offset = 0.0) {
     for (std::uint64_t k = from; k < to; ++k) {
-      pipeline_->Offer(valve, PlantSample(k, offset), 1);
+      pipeline_->OnSample(valve, PlantSample(k, offset), 1);
     }
   }
   void OfferEpisode(const std::string& valve) {
-    Offer(valve, 0, 50);
-    Offer(valve, 50, 80, kF7Offset);
+    Feed(valve, 0, 50);
+    Feed(valve, 50, 80, kF7Offset);
   }
   bool AwaitEvents(std::size_t count) {
     return bus_.notice.Await([&] { return bus_.events.size() >= count; });

@@ -46,10 +46,10 @@ class PipelineLiveTest : public PipelineTest {
 
 TEST_F(PipelineLiveTest, ShowsEverySampleInItsOrder) {
   Start();
-  Offer("V1", 0, 2);
-  Offer("V1", 1, 2);  // Repeated: nothing new to show.
-  pipeline_->Offer("V1", BadSample(2), 1);
-  Offer("bare", 0, 1);
+  Feed("V1", 0, 2);
+  Feed("V1", 1, 2);  // Repeated: nothing new to show.
+  pipeline_->OnSample("V1", BadSample(2), 1);
+  Feed("bare", 0, 1);
 
   ASSERT_TRUE(board_.notice.Await([this] { return board_.shown.size() == 4; }));
   EXPECT_THAT(board_.shown,
@@ -61,7 +61,7 @@ TEST_F(PipelineLiveTest, ASignalThatIsMissingIsShownAndLogged) {
   Start();
   Sample sample = PlantSample(0);
   sample.present = MaskOf(Signal::kCv);
-  pipeline_->Offer("V1", sample, 1);
+  pipeline_->OnSample("V1", sample, 1);
 
   EXPECT_THAT(board_.shown, ElementsAre("V1/0/missing"));
   EXPECT_EQ(bus_.decisions.at(0).quality, Quality::kBadInput);
@@ -73,11 +73,11 @@ TEST_F(PipelineLiveTest, ASignalThatIsMissingIsShownAndLogged) {
 
 TEST_F(PipelineLiveTest, ShowsWhenAValveEndsOrFallsSilent) {
   Start();
-  Offer("V1", 0, 2);
-  Offer("V2", 0, 2);
-  pipeline_->OfferEnd("V1", 2);  // Somebody else's.
-  pipeline_->OfferEnd("V1", 1);
-  pipeline_->Tend(std::chrono::steady_clock::now() + std::chrono::seconds(4));
+  Feed("V1", 0, 2);
+  Feed("V2", 0, 2);
+  pipeline_->OnStreamEnded("V1", 2);  // Somebody else's.
+  pipeline_->OnStreamEnded("V1", 1);
+  pipeline_->Poll(std::chrono::steady_clock::now() + std::chrono::seconds(4));
 
   ASSERT_TRUE(
       board_.notice.Await([this] { return board_.silences.size() == 2; }));
@@ -95,14 +95,14 @@ TEST_F(PipelineLiveTest, ADriftIsShownAndOnceAtItsBoundCountedAndLogged) {
   models_ = std::make_shared<const ModelSet>(models);
   Start();
   const auto offer = [this](std::uint64_t from, std::uint64_t to) {
-    Offer("V1", from, to, -0.2);
-    Offer("V2", from, to, 0.2);
+    Feed("V1", from, to, -0.2);
+    Feed("V2", from, to, 0.2);
     for (std::uint64_t k = from; k < to; ++k) {
-      pipeline_->Offer("V3", PlantSample(k, k % 2 == 0 ? -2.3 : 2.3), 1);
+      pipeline_->OnSample("V3", PlantSample(k, k % 2 == 0 ? -2.3 : 2.3), 1);
     }
   };
   auto tend = [this, now = std::chrono::steady_clock::now()]() mutable {
-    pipeline_->Tend(now += std::chrono::milliseconds(300));
+    pipeline_->Poll(now += std::chrono::milliseconds(300));
   };
 
   offer(0, 3600 + 720);

@@ -59,11 +59,11 @@ TEST_F(PipelineStorageTest, EventsThatWaitTogetherAreStoredInOneCommit) {
   history_.commit_time = milliseconds(40);
   Start();
   for (int v = 0; v < kValves; ++v) {
-    Offer(ValveName(v), 0, 50);
+    Feed(ValveName(v), 0, 50);
   }
   for (std::uint64_t k = 50; k < 80; ++k) {
     for (int v = 0; v < kValves; ++v) {
-      Offer(ValveName(v), k, k + 1, kF7Offset);
+      Feed(ValveName(v), k, k + 1, kF7Offset);
     }
   }
   ASSERT_TRUE(AwaitEvents(2 * kValves));
@@ -169,10 +169,10 @@ TEST_F(PipelineStorageTest, ALosslessRecorderHoldsEverySampleInOrder) {
   options_.recorder.queue_samples = 8;
   FakeRuns runs;
   Start(&runs);
-  Offer("V1", 0, 3000);
-  pipeline_->Offer("V1", BadSample(3000), 1);
-  pipeline_->Offer("V1", PlantSample(5), 1);
-  pipeline_->OfferEnd("V1", 1);
+  Feed("V1", 0, 3000);
+  pipeline_->OnSample("V1", BadSample(3000), 1);
+  pipeline_->OnSample("V1", PlantSample(5), 1);
+  pipeline_->OnStreamEnded("V1", 1);
   pipeline_->Stop();
 
   ASSERT_EQ(runs.stored.size(), 3002U);
@@ -192,7 +192,7 @@ TEST_F(PipelineStorageTest, ARecorderThatFallsBehindCountsWhatIsMissing) {
   FakeRuns runs;
   runs.held = true;
   Start(&runs);
-  Offer("V1", 0, 1000);
+  Feed("V1", 0, 1000);
   ASSERT_TRUE(bus_.notice.Await([&] { return bus_.decisions.size() == 1000; }));
   runs.notice.Apply([&] { runs.held = false; });
   pipeline_->Stop();
@@ -210,7 +210,7 @@ TEST_F(PipelineStorageTest,
   FakeRuns runs;
   runs.broken = true;
   Start(&runs);
-  Offer("V1", 0, 1000);
+  Feed("V1", 0, 1000);
   pipeline_->Stop();
 
   EXPECT_EQ(bus_.decisions.size(), 1000U);
@@ -224,12 +224,12 @@ TEST_F(PipelineStorageTest,
   FakeRuns runs;
   runs.broken = true;
   Start(&runs);
-  Offer("V1", 0, 150);
+  Feed("V1", 0, 150);
   ASSERT_TRUE(history_.notice.Await(
       [&] { return counters_[Counter::kRecordDropped] == 100; }));
   runs.notice.Apply([&] { runs.broken = false; });
   ASSERT_TRUE(history_.notice.Await([&] { return history_.gaps.size() == 1; }));
-  Offer("V1", 150, 200);
+  Feed("V1", 150, 200);
   pipeline_->Stop();
 
   EXPECT_EQ(history_.gaps.size(), 1U);

@@ -17,7 +17,7 @@ TEST_F(PipelineTest, EverySampleInOrderGivesOneDecision) {
   Start();
   for (std::uint64_t k = 0; k < 1000; ++k) {
     for (const char* valve : {"V1", "V2", "bare1"}) {
-      pipeline_->Offer(valve, PlantSample(k), 1);
+      pipeline_->OnSample(valve, PlantSample(k), 1);
     }
   }
   pipeline_->Stop();
@@ -35,16 +35,16 @@ TEST_F(PipelineTest, EverySampleInOrderGivesOneDecision) {
 
 TEST_F(PipelineTest, UnusableSamplesAreCountedByReasonAndTheServiceGoesOn) {
   Start();
-  Offer("V1", 0, 10);
-  pipeline_->Offer("V1", BadSample(10), 1);
+  Feed("V1", 0, 10);
+  pipeline_->OnSample("V1", BadSample(10), 1);
   Sample far = PlantSample(11);
   far.Set(Signal::kX, 1e6);
-  pipeline_->Offer("V1", far, 1);
-  pipeline_->Offer("V1", PlantSample(11), 1);
-  pipeline_->Offer("V1", PlantSample(3), 1);
-  pipeline_->Offer("", PlantSample(0), 1);
-  pipeline_->Offer(std::string(65, 'x'), PlantSample(0), 1);
-  Offer("V1", 12, 20);
+  pipeline_->OnSample("V1", far, 1);
+  pipeline_->OnSample("V1", PlantSample(11), 1);
+  pipeline_->OnSample("V1", PlantSample(3), 1);
+  pipeline_->OnSample("", PlantSample(0), 1);
+  pipeline_->OnSample(std::string(65, 'x'), PlantSample(0), 1);
+  Feed("V1", 12, 20);
   pipeline_->Stop();
 
   EXPECT_EQ(counters_[Intake::kAccepted], 18U);
@@ -64,7 +64,7 @@ TEST_F(PipelineTest, ValvesBeyondTheLimitAreCountedNotServed) {
   options_.valve_glob = "V*";
   Start();
   for (const char* valve : {"V1", "V2", "V3", "V4", "V4", "W1", "V1"}) {
-    pipeline_->Offer(valve, PlantSample(counters_[Counter::kReceived]), 1);
+    pipeline_->OnSample(valve, PlantSample(counters_[Counter::kReceived]), 1);
   }
   pipeline_->Stop();
 
@@ -79,7 +79,8 @@ TEST_F(PipelineTest, KnownValvesHaveAPlaceAndSilentStrangersGiveTheirsUp) {
   Start();
   const auto start = std::chrono::steady_clock::now();
   const auto offer = [&](const char* valve, std::uint64_t k) {
-    pipeline_->Offer(valve, PlantSample(k), 1, start + std::chrono::seconds(k));
+    pipeline_->OnSample(valve, PlantSample(k), 1,
+                        start + std::chrono::seconds(k));
   };
   offer("S1", 0);
   offer("S2", 0);  // The place of K1.
@@ -88,14 +89,14 @@ TEST_F(PipelineTest, KnownValvesHaveAPlaceAndSilentStrangersGiveTheirsUp) {
   EXPECT_THAT(pipeline_->valve_names(), testing::ElementsAre("S1", "K1"));
   EXPECT_EQ(counters_[Counter::kRefusedSamples], 2U);
 
-  pipeline_->Tend(start + std::chrono::seconds(70));
+  pipeline_->Poll(start + std::chrono::seconds(70));
   offer("S3", 71);
   EXPECT_THAT(pipeline_->valve_names(), testing::ElementsAre("K1", "S3"));
   offer("S1", 71);  // S3 speaks.
   EXPECT_EQ(counters_[Counter::kRefusedSamples], 3U);
 
   // Nobody takes a place by the end of a stream that was never seen.
-  pipeline_->OfferEnd("S4", 1);
+  pipeline_->OnStreamEnded("S4", 1);
   EXPECT_EQ(pipeline_->valve_names().size(), 2U);
   pipeline_->Stop();
   EXPECT_EQ(bus_.decisions.size(), 3U);
@@ -110,13 +111,13 @@ TEST_F(PipelineTest, WhatMakesADiagnosisBeginAnewIsLimited) {
     Sample sample = PlantSample(k);
     sample.stamp_ns += (k % 2 == 0 ? 1 : -1) * static_cast<std::int64_t>(k) *
                        86'400'000'000'000;
-    pipeline_->Offer("J1", sample, 1, now);
+    pipeline_->OnSample("J1", sample, 1, now);
     sample = PlantSample(k);
     sample.epoch = static_cast<std::uint32_t>(k);
-    pipeline_->Offer("E1", sample, 1, now);
-    pipeline_->Offer("V1", PlantSample(k), 1, now);
+    pipeline_->OnSample("E1", sample, 1, now);
+    pipeline_->OnSample("V1", PlantSample(k), 1, now);
   }
-  pipeline_->Tend(now + std::chrono::seconds(1));
+  pipeline_->Poll(now + std::chrono::seconds(1));
   pipeline_->Stop();
 
   EXPECT_EQ(counters_[Counter::kOverShare], 2 * (kSent - 200));
@@ -131,7 +132,7 @@ TEST_F(PipelineTest, WhatMakesADiagnosisBeginAnewIsLimited) {
 
 TEST_F(PipelineTest, AModelSetThatCannotBeHadLeavesTheValveUnassigned) {
   Start();
-  Offer("broken1", 0, 5);
+  Feed("broken1", 0, 5);
   pipeline_->Stop();
 
   EXPECT_EQ(bus_.decisions.size(), 5U);
@@ -169,7 +170,7 @@ TEST_F(PipelineTest, WhatAThreadEndsWithIsThrownByStop) {
   options_.recorder.queue_samples = 8;
   options_.recorder.commit_period = milliseconds(0);
   Start(&runs);
-  Offer("V1", 0, 100);  // Nobody makes room any more, and nobody waits.
+  Feed("V1", 0, 100);  // Nobody makes room any more, and nobody waits.
 
   EXPECT_THROW(pipeline_->Stop(), int);
   EXPECT_TRUE(pipeline_->failed());
@@ -180,8 +181,8 @@ TEST_F(PipelineTest, ASwapUnderLoadNeitherLosesNorRepeatsASample) {
   Start();
   std::thread diagnosis([&] {
     for (std::uint64_t k = 0; k < 20'000; k += 100) {
-      Offer("V1", k, k + 100);
-      pipeline_->Tend();
+      Feed("V1", k, k + 100);
+      pipeline_->Poll();
     }
   });
   const auto seen = [&](std::size_t count) {
@@ -212,7 +213,7 @@ TEST_F(PipelineTest, AnOpenEpisodeOfAValveThatStaysSilentIsClosedUnknown) {
   open.valve_id = "gone";
   open.episode_id = 42;
   pipeline_->Start({open});
-  pipeline_->Tend(std::chrono::steady_clock::now() + std::chrono::seconds(1));
+  pipeline_->Poll(std::chrono::steady_clock::now() + std::chrono::seconds(1));
   ASSERT_TRUE(AwaitEvents(1));
   pipeline_->Stop();
 

@@ -40,7 +40,7 @@ class PlantFeedTest : public testing::Test {
   }
   void Pass(PlantFeed::Clock::duration time) {
     now_ += time;
-    feed_.Tend(now_);
+    feed_.Poll(now_);
   }
   console::ValveState Valve(const std::string& id = "V1") const {
     return board_.Trend(id).value().now;

@@ -45,9 +45,11 @@ constexpr FaultSet kF19 = 0b1000;
 
 class EventList : public FakeOutlet {
  public:
-  void Event(FaultEvent event) override { events.push_back(std::move(event)); }
-  void Look(EpisodeLook look) override { looks.push_back(std::move(look)); }
-  void Strength(StrengthPoint point) override { strengths.push_back(point); }
+  void OnEvent(FaultEvent event) override {
+    events.push_back(std::move(event));
+  }
+  void OnLook(EpisodeLook look) override { looks.push_back(std::move(look)); }
+  void OnStrength(StrengthPoint point) override { strengths.push_back(point); }
   std::vector<FaultEvent> events;
   std::vector<EpisodeLook> looks;
   std::vector<StrengthPoint> strengths;
@@ -201,7 +203,7 @@ TEST_F(SecondLookTest, TheSimulationCorrectsTheNameTenSecondsAfterItsSamples) {
 }
 
 TEST_F(SecondLookTest, ALookForGrowthTellsTheStrengthAndChangesNoName) {
-  names_.AskGrowth();  // Nothing is named yet.
+  names_.RequestGrowth();  // Nothing is named yet.
   Feed(0, kFirstLook + 1);
   worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));
@@ -213,7 +215,7 @@ TEST_F(SecondLookTest, ALookForGrowthTellsTheStrengthAndChangesNoName) {
                                 2);
   EXPECT_EQ(named.strength, outlet_.looks[0].faults[0].strength);
 
-  names_.AskGrowth();
+  names_.RequestGrowth();
   ASSERT_TRUE(AwaitLooks(2));
   Feed(kCounts + 20, kCounts + 21);
   ASSERT_EQ(outlet_.strengths.size(), 2U);
@@ -230,7 +232,7 @@ TEST_F(SecondLookTest, ALookForGrowthTellsTheStrengthAndChangesNoName) {
   EXPECT_EQ(outlet_.events.size(), 3U);
   EXPECT_EQ(outlet_.looks.size(), 1U);
 
-  names_.AskGrowth();
+  names_.RequestGrowth();
   ASSERT_TRUE(AwaitLooks(3));
   Clear(kCounts + 21);
   Step(kCounts + 21);  // It is over: what the look found is of no use.
@@ -384,7 +386,7 @@ TEST_F(SecondLookTest, AResumedEpisodeKeepsItsNameUntilALookAnswers) {
   Feed(0, kAtOnce - 40);
   tracker_ = EpisodeTracker("V1", {});
   tracker_.Recover(open);
-  names_.Keep(open.faults);
+  names_.SetInheritedName(open.faults);
   Feed(kAtOnce - 40, kFirstLook + 1);
   worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));

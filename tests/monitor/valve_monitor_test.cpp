@@ -15,17 +15,19 @@ using testing::ElementsAre;
 
 class Notebook : public EpisodeOutlet {
  public:
-  void Event(FaultEvent event) override { events.push_back(std::move(event)); }
-  void Evidence(EpisodeTrace trace) override {
+  void OnEvent(FaultEvent event) override {
+    events.push_back(std::move(event));
+  }
+  void OnEvidence(EpisodeTrace trace) override {
     complete = complete || trace.complete;
     for (TracePoint& point : trace.trace.Unpack()) {
       evidence.emplace_back(trace.episode_id, std::move(point));
     }
   }
-  void Look(EpisodeLook /*look*/) override {}
-  void Strength(StrengthPoint point) override { strengths.push_back(point); }
-  void Gap(DataGap gap) override { gaps.push_back(std::move(gap)); }
-  void Resumed(const OpenEpisode& episode, std::int64_t /*stamp*/) override {
+  void OnLook(EpisodeLook /*look*/) override {}
+  void OnStrength(StrengthPoint point) override { strengths.push_back(point); }
+  void OnGap(DataGap gap) override { gaps.push_back(std::move(gap)); }
+  void OnResumed(const OpenEpisode& episode, std::int64_t /*stamp*/) override {
     resumed.push_back(episode.episode_id);
   }
 
@@ -364,8 +366,8 @@ TEST_F(ValveMonitorTest, ASilentValveGivesItsOpenEpisodeUp) {
   valve_.Recover(LeftOpen());
   const std::int64_t now_ns = PlantSample(500).stamp_ns;
 
-  valve_.GiveUpRecovery(now_ns, notebook_);
-  valve_.GiveUpRecovery(now_ns, notebook_);
+  valve_.ExpireRecovery(now_ns, notebook_);
+  valve_.ExpireRecovery(now_ns, notebook_);
 
   ASSERT_EQ(notebook_.events.size(), 1U);
   EXPECT_EQ(notebook_.events.at(0).transition.reason, EndReason::kUnknown);

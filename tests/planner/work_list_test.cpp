@@ -98,7 +98,7 @@ TEST(WorkListTest, GravestStandsFirstAndReasonsAddUp) {
 TEST(WorkListTest, WhySaysItInTheWordsOfTheCatalogue) {
   FaultReason reason = Reason("f19", -0.5);
   reason.episodes = 3;
-  const std::string why = WhyText(Valve("V1", {reason}), Options());
+  const std::string why = ReasonText(Valve("V1", {reason}), Options());
   EXPECT_EQ(why,
             "Flow transmitter wrong: stands for 100 days, severity high at "
             "strength -0.50, 3 episodes");

@@ -25,7 +25,7 @@ class NamedFaultTest : public ::testing::TestWithParam<std::pair<int, double>> {
 TEST_P(NamedFaultTest, ComesFirstWithItsStrengthInTheInterval) {
   const auto [fault, strength] = GetParam();
   const SecondLook look =
-      LookAgain(Physics(), Window({Abrupt(fault, strength)}));
+      RunSecondLook(Physics(), Window({Abrupt(fault, strength)}));
   const Explanation& best = look.ranked.front();
   EXPECT_EQ(best.fault, fault);
   EXPECT_NEAR(best.strength, strength, 0.05);
@@ -45,19 +45,19 @@ TEST(SecondLookTest, FindsAGrowingFault) {
   FaultSchedule growing = Abrupt(13, 0.4);
   growing.start_s = 60.0;
   growing.development_s = 260.0;
-  const SecondLook look = LookAgain(Physics(), Window({growing}));
+  const SecondLook look = RunSecondLook(Physics(), Window({growing}));
   EXPECT_EQ(look.ranked.front().fault, 13);
   EXPECT_TRUE(look.ranked.front().growing);
   EXPECT_NEAR(look.ranked.front().strength, 0.4, 0.05);
 }
 
 TEST(SecondLookTest, FindsNothingInAHealthyWindow) {
-  EXPECT_EQ(AnswerOf(LookAgain(Physics(), Window({}))).outcome,
+  EXPECT_EQ(AnswerOf(RunSecondLook(Physics(), Window({}))).outcome,
             LookOutcome::kNothing);
 }
 
 TEST(SecondLookTest, MisfitDoesNotGrowWithTheEffectOfAFault) {
-  const SecondLook look = LookAgain(Physics(), Window({Abrupt(10, 0.85)}));
+  const SecondLook look = RunSecondLook(Physics(), Window({Abrupt(10, 0.85)}));
   EXPECT_EQ(look.ranked.front().fault, 10);
   EXPECT_LT(look.misfit, 1.2);
 }
@@ -65,13 +65,14 @@ TEST(SecondLookTest, MisfitDoesNotGrowWithTheEffectOfAFault) {
 // The supply pressure, which a healthy record leaves open, decides between the
 // two: f10 gains by another one, here not enough.
 TEST(SecondLookTest, ComparesASupplyDropWithPerforationAtAnotherSupply) {
-  const SecondLook look = LookAgain(Physics(), Window({Abrupt(16, 0.7)}));
+  const SecondLook look = RunSecondLook(Physics(), Window({Abrupt(16, 0.7)}));
   const auto f10 = std::ranges::find(look.ranked, 10, &Explanation::fault);
   ASSERT_TRUE(look.perforation);
   EXPECT_EQ(look.perforation->fault, 10);
   EXPECT_LT(look.perforation->distance, f10->distance);
   EXPECT_GT(look.perforation->distance, kLookMargin);
-  EXPECT_FALSE(LookAgain(Physics(), Window({Abrupt(13, -0.2)})).perforation);
+  EXPECT_FALSE(
+      RunSecondLook(Physics(), Window({Abrupt(13, -0.2)})).perforation);
 }
 
 // A fault that grows by a quarter in eight hours, as windows of seven minutes
@@ -132,7 +133,7 @@ TEST(SecondLookTest, EndsWithoutAnAnswerIfItIsAskedToStop) {
   std::stop_source stop;
   stop.request_stop();
   EXPECT_TRUE(
-      LookAgain(Physics(), Window({}), stop.get_token()).ranked.empty());
+      RunSecondLook(Physics(), Window({}), stop.get_token()).ranked.empty());
   EXPECT_TRUE(
       EstimateStrengths(Physics(), Window({}), {{19, 0.5}}, stop.get_token())
           .faults.empty());
@@ -143,7 +144,7 @@ TEST(SecondLookTest, TakesAConstantShiftOfXForDrift) {
   for (RecordRow& row : window.rows) {
     row.x_pct += 1.0;
   }
-  EXPECT_EQ(AnswerOf(LookAgain(Physics(), window)).outcome,
+  EXPECT_EQ(AnswerOf(RunSecondLook(Physics(), window)).outcome,
             LookOutcome::kNothing);
 }
 
@@ -156,7 +157,7 @@ TEST(SecondLookTest, WhatIsNotMeasuredSaysNothing) {
       row.flow *= 1.5;
       row.x_measured = row.flow_measured = !marked;
     }
-    const SecondLook look = LookAgain(Physics(), window);
+    const SecondLook look = RunSecondLook(Physics(), window);
     const Explanation& best = look.ranked.front();
     EXPECT_EQ(best.fault == 19 && std::abs(best.strength - 0.25) < 0.05,
               marked);
@@ -165,8 +166,8 @@ TEST(SecondLookTest, WhatIsNotMeasuredSaysNothing) {
 
 TEST(SecondLookTest, GivesTheSameBitsTwice) {
   const LookWindow window = Window({Abrupt(10, 0.5)});
-  const SecondLook one = LookAgain(Physics(), window);
-  const SecondLook two = LookAgain(Physics(), window);
+  const SecondLook one = RunSecondLook(Physics(), window);
+  const SecondLook two = RunSecondLook(Physics(), window);
   ASSERT_EQ(one.ranked.size(), two.ranked.size());
   for (std::size_t i = 0; i < one.ranked.size(); ++i) {
     EXPECT_EQ(one.ranked[i].fault, two.ranked[i].fault);
@@ -240,7 +241,7 @@ TEST(SecondLookTest, ACommandThatMovedTellsAgainstTheFlowTransmitter) {
   const auto behind = [&window](const LoopHabit& loop) {
     ValvePhysics physics = Physics();
     physics.loop = loop;
-    const SecondLook look = LookAgain(physics, window);
+    const SecondLook look = RunSecondLook(physics, window);
     const auto distance = [&look](int fault) {
       return std::ranges::find(look.ranked, fault, &Explanation::fault)
           ->distance;

@@ -51,15 +51,15 @@ TEST(AlarmStateTest, AnEpisodeReturnsWhenItIsClearedOrEndsOtherwise) {
 
 TEST(ShelfTest, HoldsFromItsBeginningUntilItsEnd) {
   Shelf shelf = ShelfOf("V", 10, 20);
-  EXPECT_FALSE(InForce(shelf, 9));
-  EXPECT_TRUE(InForce(shelf, 10));
-  EXPECT_TRUE(InForce(shelf, 19));
-  EXPECT_FALSE(InForce(shelf, 20));
+  EXPECT_FALSE(IsActive(shelf, 9));
+  EXPECT_TRUE(IsActive(shelf, 10));
+  EXPECT_TRUE(IsActive(shelf, 19));
+  EXPECT_FALSE(IsActive(shelf, 20));
 
   shelf.ended_ns = 15;
 
-  EXPECT_TRUE(InForce(shelf, 14));
-  EXPECT_FALSE(InForce(shelf, 15));
+  EXPECT_TRUE(IsActive(shelf, 14));
+  EXPECT_FALSE(IsActive(shelf, 15));
 }
 
 TEST(ShelfTest, OfAFaultCoversJustThatAnswer) {

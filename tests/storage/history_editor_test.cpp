@@ -159,7 +159,7 @@ TEST_F(HistoryEditorTest, ShelvingHasItsLimits) {
                ConfigError);
   EXPECT_THROW(editor_.Shelve("LV-1", std::nullopt, now_, By("a", now_)),
                ConfigError);
-  EXPECT_THROW(editor_.Shelve("LV-1", std::nullopt, now_ + kLongestShelfNs + 1,
+  EXPECT_THROW(editor_.Shelve("LV-1", std::nullopt, now_ + kMaxShelfNs + 1,
                               By("a", now_)),
                ConfigError);
   EXPECT_EQ(HistoryReader(path_).Shelves().size(), 0U);

@@ -26,11 +26,11 @@ inline double OffsetOf(int valve, std::uint64_t k) {
 /// less.
 class FaultyPlant {
  public:
-  static constexpr int kMostValves = 1000;
+  static constexpr int kMaxValves = 1000;
 
   explicit FaultyPlant(idl::Participant& participant)
       : samples_(participant,
-                 idl::PublisherOptions{idl::Profile::kLive, kMostValves}),
+                 idl::PublisherOptions{idl::Profile::kLive, kMaxValves}),
         thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
   void SetValves(int count) { valves_ = count; }
@@ -39,7 +39,7 @@ class FaultyPlant {
   void EndStreams() {
     thread_.request_stop();
     thread_.join();
-    for (int v = 0; v < kMostValves; ++v) {
+    for (int v = 0; v < kMaxValves; ++v) {
       samples_.Dispose({ValveName(v), {}});
     }
   }

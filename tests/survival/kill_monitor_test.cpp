@@ -270,7 +270,7 @@ TEST_F(KilledMonitor, LosesNoPersistedEventAndDiagnosesAgainAtOnce) {
   for (int round = 0; round < rounds; ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
     const int valves = round == 0
-                           ? FaultyPlant::kMostValves
+                           ? FaultyPlant::kMaxValves
                            : moments.Choose({20, 20, 50, 100, 300, 1000});
     plant_->SetValves(valves);
     const std::uint64_t from = plant_->next() + 1;
@@ -293,9 +293,9 @@ TEST_F(KilledMonitor, LosesNoPersistedEventAndDiagnosesAgainAtOnce) {
     ExpectRecorded(from, killed);
   }
 
-  plant_->SetValves(FaultyPlant::kMostValves);
+  plant_->SetValves(FaultyPlant::kMaxValves);
   const auto monitor = Start("--record");
-  ASSERT_TRUE(AwaitAnswers(FaultyPlant::kMostValves).has_value())
+  ASSERT_TRUE(AwaitAnswers(FaultyPlant::kMaxValves).has_value())
       << monitor->errors();
   plant_->EndStreams();
   TakeFor(seconds(2));

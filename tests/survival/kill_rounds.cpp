@@ -13,7 +13,7 @@ namespace {
 using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kLongest{120};
+constexpr std::chrono::seconds kMaxRuntime{120};
 
 int Setting(const char* name, int otherwise) {
   const char* text = std::getenv(name);
@@ -56,7 +56,7 @@ int RandomMoments::Choose(const std::vector<int>& values) {
 Finished RunProgram(const std::vector<std::string>& command) {
   const Clock::time_point start = Clock::now();
   ChildProcess process(Silent(command));
-  const int code = process.AwaitExit(kLongest).value_or(-1);
+  const int code = process.AwaitExit(kMaxRuntime).value_or(-1);
   return {code, process.errors(),
           std::chrono::duration_cast<milliseconds>(Clock::now() - start)};
 }

@@ -173,7 +173,7 @@ class Witness {
     }
     return count;
   }
-  void Forget() { seen_.clear(); }
+  void Clear() { seen_.clear(); }
 
  private:
   std::optional<idl::Participant> participant_;
@@ -193,7 +193,7 @@ TEST_F(KilledSimulator, HasRecordedWhatItPublishedButTheLastSecond) {
   int last_second = 0;
   for (int round = 0; round < rounds; ++round) {
     SCOPED_TRACE("round " + std::to_string(round));
-    witness.Forget();
+    witness.Clear();
     ChildProcess simulator(
         Command(data, {"--duration", "100000", "--speed", "100"}));
     ASSERT_TRUE(witness.AwaitFirst()) << simulator.errors();

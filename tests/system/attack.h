@@ -11,7 +11,7 @@
 
 namespace fdi::monitor {
 
-inline constexpr double kMostMemory = 300.0;  // [MB]
+inline constexpr double kMaxMemory = 300.0;  // [MB]
 
 /// Of each attack: FDI_ATTACK_SECONDS, or 3 s.
 inline std::chrono::seconds AttackTime() {

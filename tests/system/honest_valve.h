@@ -87,7 +87,7 @@ class HonestValve {
   }
   void Take(std::chrono::milliseconds patience) {
     decisions_.Take(
-        idl::EachVector([this](const idl::DecisionMessage& m, const auto&) {
+        idl::ForEachVector([this](const idl::DecisionMessage& m, const auto&) {
           const auto found = sent_.find(m.verdict.seq);
           if (m.valve_id == kId && found != sent_.end()) {
             const std::chrono::duration<double, std::milli> delay =

@@ -220,9 +220,10 @@ TEST_F(LoadTest, AModelSetSwappedUnderLoadLosesAndDoublesNothing) {
     const Clock::time_point deadline = Clock::now() + kMonitorPatience;
     while (!condition() && Clock::now() < deadline) {
       decisions_->Take(
-          idl::EachVector([&](const idl::DecisionMessage& vector, const auto&) {
-            streams[vector.valve_id].Add(vector);
-          }),
+          idl::ForEachVector(
+              [&](const idl::DecisionMessage& vector, const auto&) {
+                streams[vector.valve_id].Add(vector);
+              }),
           std::chrono::milliseconds(10), 10);
     }
     return condition();

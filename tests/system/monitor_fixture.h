@@ -127,7 +127,7 @@ class MonitorFixture : public testing::Test {
 
   void TakeVectors(std::chrono::milliseconds patience) {
     decisions_->Take(
-        idl::EachVector([this](const idl::DecisionMessage& m, const auto&) {
+        idl::ForEachVector([this](const idl::DecisionMessage& m, const auto&) {
           vectors_.push_back(m);
         }),
         patience);

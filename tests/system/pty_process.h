@@ -20,9 +20,9 @@ class PtyProcess {
   PtyProcess(const PtyProcess&) = delete;
   PtyProcess& operator=(const PtyProcess&) = delete;
 
-  /// Waits until `text` has come since the last Forget().
+  /// Waits until `text` has come since the last ClearOutput().
   bool AwaitText(const std::string& text);
-  void Forget() { output_.clear(); }
+  void ClearOutput() { output_.clear(); }
   void Type(const std::string& keys) const;
   void Signal(int signal) const;
   /// Waits for the end. @returns the exit code, or nothing if it still runs.

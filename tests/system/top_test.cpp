@@ -63,7 +63,7 @@ TEST_F(TopSystemTest, KeysSortFilterAndQuitAndTheTerminalIsAsBefore) {
   EXPECT_TRUE(top.AwaitText("by valve")) << top.output();
   top.Type("/nothing\r");
   EXPECT_TRUE(top.AwaitText("0 with 'nothing'")) << top.output();
-  top.Forget();
+  top.ClearOutput();
   top.Type("/\x1b");
   EXPECT_TRUE(top.AwaitText("ISOLATED")) << top.output();
   top.Type("q");

@@ -100,8 +100,8 @@ TEST(DifferenceObserversTest, AModelThatDoesNotForgetErrsFromAnyPast) {
       {"r", {stretch.samples.begin(), stretch.samples.end() - 2}}};
 
   EXPECT_LT(MeanSquare(RunResiduals(WithMemory(0.99), but_last, 30)), 1e-9);
-  EXPECT_GT(ErrorFromAnyPast(WithMemory(0.99), {stretch}), 400.0);
-  EXPECT_LT(ErrorFromAnyPast(WithMemory(0.5), {stretch}), 1.5e2);
+  EXPECT_GT(FreeRunError(WithMemory(0.99), {stretch}), 400.0);
+  EXPECT_LT(FreeRunError(WithMemory(0.5), {stretch}), 1.5e2);
 }
 
 // 2 % of a flow of 18 is half its noise: fitted to the noisy readings the
@@ -121,7 +121,7 @@ TEST(DifferenceObserversTest, SaysWhatTheFaultChangesWithoutTheNoise) {
 
 TEST(DifferenceObserversTest, FaultObserversFollowTheDynamicsOfTheNormalOne) {
   const ModelSet& models = Trained();
-  ASSERT_TRUE(RunsOnItself(models.observers[0].channels[0].model));
+  ASSERT_TRUE(IsFreeRunning(models.observers[0].channels[0].model));
   EXPECT_TRUE(models.observers[2].channels[0].difference);
   EXPECT_FALSE(models.observers[2].channels[1].difference);
   EXPECT_LT(models.observers[2].channels[0].residual_sd, 0.6);
@@ -165,7 +165,7 @@ TrainingRun FurtherValve(unsigned seed, int count) {
 
 TEST(DifferenceObserversTest, AFurtherValveOfTheTypeTakesTheFaultsOver) {
   const std::vector<TrainingRun> healthy{FurtherValve(7, 1500)};
-  ASSERT_TRUE(ServesAnother(Trained(), healthy, TwoChannels()));
+  ASSERT_TRUE(IsTransferable(Trained(), healthy, TwoChannels()));
 
   const auto models = std::make_shared<const ModelSet>(
       TransferDifferenceSet(Trained(), healthy, TwoChannels()));
@@ -180,11 +180,11 @@ TEST(DifferenceObserversTest, OtherWorkOrChannelsAreNotServed) {
   for (LabelledSample& labelled : elsewhere.samples) {
     labelled.sample.Set(Signal::kCv, labelled.sample[Signal::kCv] + 60.0);
   }
-  EXPECT_FALSE(ServesAnother(Trained(), {elsewhere}, TwoChannels()));
+  EXPECT_FALSE(IsTransferable(Trained(), {elsewhere}, TwoChannels()));
 
   TrainingOptions without_flow = TwoChannels();
   without_flow.channels.pop_back();
-  EXPECT_FALSE(ServesAnother(Trained(), {HealthyRun(7, 1500)}, without_flow));
+  EXPECT_FALSE(IsTransferable(Trained(), {HealthyRun(7, 1500)}, without_flow));
 }
 
 TEST(DifferenceObserversTest, HealthyDataGiveNoEpisode) {

@@ -19,7 +19,7 @@ Condition Healthy(double opening, bool flow = true) {
   double x = 60.0;
   double cv = 60.0;
   for (std::size_t k = 0; k < 3000; ++k) {
-    x = Follow({0.8, cv > x ? 8.0 : opening}, x, cv);
+    x = NextRodPosition({0.8, cv > x ? 8.0 : opening}, x, cv);
     cv = std::clamp(60.0 + 15.0 * std::sin(0.02 * static_cast<double>(k)) +
                         5.0 * noise[2 * k],
                     0.0, 100.0);

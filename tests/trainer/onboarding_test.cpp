@@ -54,7 +54,8 @@ TEST(OnboardingPresetTest, WhatIsHardlyReadIsNoChannel) {
   std::vector<ChannelPlan> channels = OnboardingPreset(kBasicSignals).channels;
   const std::size_t all = channels.size();
 
-  EXPECT_EQ(LeaveOutUnread({run}, channels), std::vector<std::string>{"T1"});
+  EXPECT_EQ(DropUnreadChannels({run}, channels),
+            std::vector<std::string>{"T1"});
   EXPECT_EQ(channels.size(), all - 1);
   EXPECT_TRUE(std::ranges::none_of(channels, [](const ChannelPlan& plan) {
     return plan.output == Signal::kT1;

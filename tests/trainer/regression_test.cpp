@@ -65,9 +65,9 @@ TEST(RegressionTest, PastOutputReplacesTheMeasuredStart) {
 TEST(RegressionTest, StaticModelLosesOnlyItsLags) {
   TsModel model = Decay();
   model.regressors = {{Signal::kCv, 1}};
-  EXPECT_FALSE(RunsOnItself(model));
+  EXPECT_FALSE(IsFreeRunning(model));
   EXPECT_EQ(RunResiduals(model, Ramp(50, 0.0), 30).size(), 49U);
-  EXPECT_TRUE(RunsOnItself(Decay()));
+  EXPECT_TRUE(IsFreeRunning(Decay()));
   EXPECT_EQ(RunResiduals(Decay(), Ramp(50, 0.0), 30).size(), 20U);
 }
 

@@ -16,8 +16,8 @@ TEST(SignTestTest, ValuesOfTheBinomialDistribution) {
 }
 
 TEST(SignTestTest, FewestPairsThatCanTellAreSix) {
-  EXPECT_GT(PValue({kLeastDecidedPairs - 1, 0, 0}), 0.05);
-  EXPECT_LE(PValue({kLeastDecidedPairs, 0, 0}), 0.05);
+  EXPECT_GT(PValue({kMinDecidedPairs - 1, 0, 0}), 0.05);
+  EXPECT_LE(PValue({kMinDecidedPairs, 0, 0}), 0.05);
 }
 
 // Twice the sum of comb(2000, i) for i up to 900 over 2 ** 2000 in integers.

@@ -336,7 +336,7 @@ CLI::Option* AddHistory(CLI::App& verb, EvaluateOptions& options) {
 
 // Ways of scoring other than by the model set; each excludes the others and the
 // outputs it lacks.
-void AddWays(CLI::App& verb, EvaluateOptions& options) {
+void AddScoringOptions(CLI::App& verb, EvaluateOptions& options) {
   CLI::Option* leave =
       verb.add_flag("--leave-one-out", options.leave_one_out,
                     "Score each fault by a set that does not know it");
@@ -402,7 +402,7 @@ void AddEvaluateVerb(cli::Program& program) {
   AddModels(verb, *options);
   options->selection.AddTo(verb);
   AddOutputs(verb, *options);
-  AddWays(verb, *options);
+  AddScoringOptions(verb, *options);
 }
 
 }  // namespace fdi::trainer

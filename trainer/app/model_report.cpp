@@ -141,8 +141,8 @@ cli::Json FaultsJson(const std::vector<int>& faults) {
 }
 
 Json VafJson(double vaf) {
-  constexpr double kLeast = -1e9;  // %
-  return vaf > kLeast ? Json(vaf) : Json();
+  constexpr double kMinVaf = -1e9;  // %
+  return vaf > kMinVaf ? Json(vaf) : Json();
 }
 
 cli::Json ModelsJson(const ModelSet& models) {

@@ -92,7 +92,7 @@ Campaign MakeCampaign(const TrainOptions& options) {
   return campaign;
 }
 
-void RequireGoOn(const cli::StopSignals& signals) {
+void ThrowIfStopped(const cli::StopSignals& signals) {
   if (signals.stop_requested()) {
     throw Interrupted("interrupted: no model set was stored");
   }
@@ -107,7 +107,7 @@ std::vector<std::string> Collect(const Campaign& campaign,
       CollectRuns(campaign.runs, directory,
                   {context.software, cli::NowNs(), campaign.training.threads},
                   [&](double share, const std::string& what) {
-                    RequireGoOn(signals);
+                    ThrowIfStopped(signals);
                     if (!progress) {
                       progress.emplace("simulate");
                     }
@@ -153,10 +153,10 @@ cli::Report TrainAndStore(const std::vector<TrainingRun>& runs,
   cli::Progress progress("train");
   const ModelSet trained =
       TrainModelSet(runs, training, [&](double share, std::string_view stage) {
-        RequireGoOn(signals);
+        ThrowIfStopped(signals);
         progress.Update(share, std::string(stage));
       });
-  RequireGoOn(signals);
+  ThrowIfStopped(signals);
   progress.Finish();
   const ModelSet models = store.Save(
       trained,

@@ -16,7 +16,7 @@ namespace fdi::trainer {
 namespace {
 
 constexpr double kRidge = 1e-6;
-constexpr int kLongestOrder = 6;
+constexpr int kMaxOrder = 6;
 constexpr Eigen::Index kRowsPerRegressor = 10;
 
 std::vector<Regressor> ArxRegressors(Signal output,
@@ -88,7 +88,7 @@ LinearModel FitArx(const std::string& name, Signal output,
                    std::span<const Stretch> validation) {
   LinearModel best;
   double least = std::numeric_limits<double>::infinity();
-  for (int order = 1; order <= kLongestOrder; ++order) {
+  for (int order = 1; order <= kMaxOrder; ++order) {
     LinearModel model =
         FitLinear(name, output, ArxRegressors(output, inputs, order), training);
     const double mse = Residuals(model, validation).array().square().mean();
@@ -155,7 +155,7 @@ std::vector<double> StandardResiduals(const LinearModel& model,
 namespace {
 
 constexpr int kClusterSeparation = 100;  // samples
-constexpr std::size_t kFewest = 100;
+constexpr std::size_t kMinSums = 100;
 
 }  // namespace
 
@@ -185,9 +185,9 @@ double CusumLimit(const std::vector<std::vector<double>>& series, double rate) {
       sums.push_back(std::max(up, down));
     }
   }
-  if (sums.size() < kFewest) {
+  if (sums.size() < kMinSums) {
     throw DataError("limits of a CUSUM need at least " +
-                    std::to_string(kFewest) +
+                    std::to_string(kMinSums) +
                     " samples of normal operation, there are " +
                     std::to_string(sums.size()));
   }

@@ -197,14 +197,14 @@ class Reader {
 
   void ReadSimulated(TomlReader& table, CampaignRun run,
                      std::vector<CampaignRun>& runs) {
-    constexpr int kMostRepeats = 10000;
+    constexpr int kMaxRepeats = 10000;
     simulator::Scenario scenario = common_;
     TomlReader own = *table.Table("simulate");
     simulator::ApplyScenario(own, folder_, scenario);
     const bool own_seed = own.Has("seed");
     int repeat = 1;
     FieldReader fields(table);
-    fields("repeat", repeat, 1, kMostRepeats);
+    fields("repeat", repeat, 1, kMaxRepeats);
     // Seeds follow the place of the run in its table if the table has a seed
     // of its own, else its place among all simulated runs.
     std::uint64_t index = 0;

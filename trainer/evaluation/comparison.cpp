@@ -71,7 +71,7 @@ struct ComparedMeasure {
   std::string name;
   SignTest better;  // Positive: runs on which b is better.
 
-  bool enough() const { return better.decided() >= kLeastDecidedPairs; }
+  bool enough() const { return better.decided() >= kMinDecidedPairs; }
 };
 
 std::vector<std::string> DifferencesOf(const EvaluatedRun& a,
@@ -119,7 +119,7 @@ std::string JudgementOf(const ComparedMeasure& measure, const std::string& a,
   }
   if (!measure.enough()) {
     return "too few runs differ (" + std::to_string(test.decided()) +
-           ", needed are " + std::to_string(kLeastDecidedPairs) + ")";
+           ", needed are " + std::to_string(kMinDecidedPairs) + ")";
   }
   const double p = PValue(test);
   const std::string value =

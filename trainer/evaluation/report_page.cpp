@@ -26,10 +26,10 @@ using cli::FormatNumber;
 constexpr double kPictureWidth = 1100.0;  // [px]
 constexpr double kLegendWidth = 210.0;    // [px]
 // A picture may take so many bytes; a larger one is drawn again with fewer
-// points, down to kFewestGroups.
+// points, down to kMinGroups.
 constexpr std::size_t kPictureBytes = 90'000;
-constexpr std::size_t kMostGroups = 720;
-constexpr std::size_t kFewestGroups = 80;
+constexpr std::size_t kMaxGroups = 720;
+constexpr std::size_t kMinGroups = 80;
 
 constexpr std::string_view kPageStyle =
     R"(body{margin:1.5em auto;max-width:1240px;padding:0 1em;background:#fff;color:#222;font:14px/1.45 system-ui,"DejaVu Sans",sans-serif}
@@ -325,7 +325,7 @@ class ReportPage::RunPicture {
           {fault_start_s, TruthText(run), plot::ink::kBlack});
     }
     std::string svg;
-    for (figure.groups = kMostGroups; figure.groups >= kFewestGroups;
+    for (figure.groups = kMaxGroups; figure.groups >= kMinGroups;
          figure.groups = figure.groups * 3 / 4) {
       svg = Embedded(plot::DrawFigure(figure, plot::Format::kSvg));
       if (svg.size() <= kPictureBytes) {

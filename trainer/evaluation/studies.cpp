@@ -44,8 +44,8 @@ std::string NamedText(const Json& left_out) {
 // upwards, so the seeds of the next repetition begin at a multiple of 100 that
 // lies beyond them.
 std::uint64_t SeedStep(std::size_t runs) {
-  constexpr std::uint64_t kLeastSeedStep = 100;
-  return (runs + kLeastSeedStep - 1) / kLeastSeedStep * kLeastSeedStep;
+  constexpr std::uint64_t kMinSeedStep = 100;
+  return (runs + kMinSeedStep - 1) / kMinSeedStep * kMinSeedStep;
 }
 
 std::vector<CampaignRun> SimulatedScenarios(

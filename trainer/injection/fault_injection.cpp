@@ -22,7 +22,7 @@ constexpr SignalMask kF = MaskOf(Signal::kF);
 constexpr SignalMask kFlowEquation = kP1 | kP2 | kF | MaskOf(Signal::kX);
 
 constexpr double kColdWaterC = 20.0;
-constexpr double kLargestGain = 2.0;
+constexpr double kMaxGain = 2.0;
 
 struct Injectable {
   int fault;
@@ -98,10 +98,9 @@ double AddedFlow(const ValveParameters& valve, const Sample& sample,
                           : 1.0;
   const double healthy = unit * FlowOf(valve.trim, closing, medium, {});
   const double faulty = unit * FlowOf(valve.trim, closing, medium, effects);
-  const double gain = healthy > 0.0
-                          ? std::clamp(sample[Signal::kF] / healthy,
-                                       1.0 / kLargestGain, kLargestGain)
-                          : 1.0;
+  const double gain = healthy > 0.0 ? std::clamp(sample[Signal::kF] / healthy,
+                                                 1.0 / kMaxGain, kMaxGain)
+                                    : 1.0;
   return gain * (faulty - healthy);
 }
 

@@ -16,7 +16,7 @@ namespace {
 constexpr double kExcerptS = 900.0;
 
 // The normal observer alone: it needs no time for those of faults.
-std::shared_ptr<const ModelSet> NormalAlone(const ModelSet& models) {
+std::shared_ptr<const ModelSet> NormalObserverOnly(const ModelSet& models) {
   ModelSet normal = models;
   normal.observers.resize(1);
   normal.faults.clear();
@@ -60,7 +60,7 @@ class Reader {
     }
     if (verdict.initialised) {
       bank_.Initialise(sample);
-      coverage_.Settle(sample.stamp_ns);
+      coverage_.StartSettling(sample.stamp_ns);
     }
     bank_.Step(sample);
     const Quality quality = coverage_.Judge(sample, bank_, false);
@@ -129,7 +129,7 @@ std::vector<Sample> EndOf(const ResidualStretch& stretch,
 void AddResiduals(const std::shared_ptr<const ModelSet>& models,
                   const storage::StoredRun& run, HealthyResiduals& data) {
   RequireNoFault(run);
-  const std::shared_ptr<const ModelSet> normal = NormalAlone(*models);
+  const std::shared_ptr<const ModelSet> normal = NormalObserverOnly(*models);
   std::size_t longest = 0;
   for (const ResidualStretch& stretch : data.stretches) {
     longest = std::max(longest, stretch.stamps_ns.size());

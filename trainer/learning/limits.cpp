@@ -19,11 +19,11 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr std::size_t kFewestResiduals = 100;
+constexpr std::size_t kMinResiduals = 100;
 constexpr double kCommandsCovered = 0.8;
 constexpr double kSeenMean = 1.5;     // times what was seen; as in calibration
 constexpr double kSeenLogRms = 0.25;  // more than what was seen; likewise
-constexpr double kMostDrift = 3.0;    // as FitDriftLimits has it
+constexpr double kMaxDriftFactor = 3.0;  // as FitDriftLimits has it
 
 // Calls visit(channel, window or null, kind, limit) for every limit, in the
 // order of LimitsOf(). That on a deviation is a logarithm.
@@ -164,11 +164,11 @@ ModelSet FitToData(const ModelSet& parent, const HealthyResiduals& data) {
   std::vector<std::vector<int>> lengths(channels);
   for (std::size_t c = 0; c < channels; ++c) {
     const std::size_t count = Joined(residuals[c]).size();
-    if (count < kFewestResiduals) {
+    if (count < kMinResiduals) {
       throw DataError("channel " + parent.channels[c].name + " has " +
                       std::to_string(count) +
                       " residuals in the healthy data, needed are " +
-                      std::to_string(kFewestResiduals));
+                      std::to_string(kMinResiduals));
     }
     for (const WindowLimits& window : parent.channels[c].windows) {
       lengths[c].push_back(window.length);
@@ -265,8 +265,9 @@ ModelSet Combine(const ModelSet& parent, const ModelSet& fitted,
 }
 
 // A bound that leaves half of what a fault passes its limit by.
-double Follow(double bound, double before, double after) {
-  return std::clamp(bound + 0.5 * (before - after), 0.0, kMostDrift * after);
+double AdaptBound(double bound, double before, double after) {
+  return std::clamp(bound + 0.5 * (before - after), 0.0,
+                    kMaxDriftFactor * after);
 }
 
 void SetDrift(const ModelSet& parent, ModelSet& models) {
@@ -279,12 +280,12 @@ void SetDrift(const ModelSet& parent, ModelSet& models) {
     const WindowLimits& to = models.channels[c].windows.back();
     DriftLimits& drift = models.channels[c].drift;
     drift.lower_mean =
-        -Follow(-before.drift.lower_mean, -from.lower_mean, -to.lower_mean);
+        -AdaptBound(-before.drift.lower_mean, -from.lower_mean, -to.lower_mean);
     drift.upper_mean =
-        Follow(before.drift.upper_mean, from.upper_mean, to.upper_mean);
+        AdaptBound(before.drift.upper_mean, from.upper_mean, to.upper_mean);
     drift.log_scale = std::clamp(
         before.drift.log_scale + 0.5 * (from.upper_log_rms - to.upper_log_rms),
-        0.0, std::log(kMostDrift));
+        0.0, std::log(kMaxDriftFactor));
   }
 }
 
@@ -379,7 +380,7 @@ void RequireHealthy(const ModelSet& first, const ModelSet& parent,
       most = times;
     }
   }
-  if (most <= kMostSeen) {
+  if (most <= kMaxReachRatio) {
     return;
   }
   throw DataError(
@@ -388,7 +389,7 @@ void RequireHealthy(const ModelSet& first, const ModelSet& parent,
       first.channels[limits[worst].channel].name + ": the residual is at " +
       Digits(most, 3) + " times the limit of onboarding (" +
       LimitText(limits[worst]) + "), accepted is up to " +
-      Digits(kMostSeen, 2) +
+      Digits(kMaxReachRatio, 2) +
       " times. That is hardly a healthy valve: leave this time out (--runs "
       "ID@from:to), or label its episode false if the valve was healthy");
 }

@@ -72,12 +72,12 @@ NewLimits SetLimits(const ModelSet& parent, const HealthyResiduals& data);
 
 /// How far beyond the limits of onboarding data may reach that no person called
 /// healthy: twice the limit, which then becomes three times as wide.
-inline constexpr double kMostSeen = 2.0;
+inline constexpr double kMaxReachRatio = 2.0;
 
 /// @param first The set of onboarding, whose observers `parent` has.
 /// @param peaks Of the data, against `parent`.
 /// @throws DataError naming run, time and channel if the data pass a limit of
-///   `parent` and reach beyond kMostSeen times that of `first`.
+///   `parent` and reach beyond kMaxReachRatio times that of `first`.
 void RequireHealthy(const ModelSet& first, const ModelSet& parent,
                     const std::vector<Peak>& peaks);
 

@@ -63,7 +63,7 @@ std::shared_ptr<const ModelSet> AssignedSet(const std::string& valve,
   return models;
 }
 
-bool MadeHere(const storage::Lineage& lineage) {
+bool HasLearnedLimits(const storage::Lineage& lineage) {
   return nlohmann::json::parse(lineage.settings, nullptr, false)
       .contains(kLimits);
 }
@@ -72,7 +72,7 @@ bool MadeHere(const storage::Lineage& lineage) {
 ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store) {
   ModelSet first = models;
   storage::Lineage lineage = store.LineageOf({first.name, first.version});
-  while (MadeHere(lineage) && lineage.parent) {
+  while (HasLearnedLimits(lineage) && lineage.parent) {
     const storage::ModelReference parent{lineage.parent->name,
                                          lineage.parent->version};
     first = store.Load(parent);
@@ -94,7 +94,7 @@ std::vector<storage::Episode> EpisodesOf(const std::string& valve,
 }
 
 // The time that is not known to be healthy, or that is read with an episode.
-std::vector<TimeSpan> TimeToLeaveOut(
+std::vector<TimeSpan> ExcludedSpans(
     const std::vector<storage::Episode>& episodes, const LabelPlan& labels) {
   const std::int64_t clearing_ns =
       std::llround(labels.parent->decision.clearing_samples *
@@ -302,7 +302,7 @@ LimitsPlan MakeLimitsPlan(LimitsRequest request,
                  plan.labels);
   }
   ReadRuns(request, directory.runs(),
-           RunReader(plan, TimeToLeaveOut(episodes, plan.labels)),
+           RunReader(plan, ExcludedSpans(episodes, plan.labels)),
            plan.since_ns);
   plan.labels.runs = RunsOfParent(plan.labels, episodes, directory.runs());
   SetLimitsOf(plan, first, EvidenceOf(plan.labels, directory.runs()));

@@ -65,7 +65,7 @@ namespace {
 
 using simulator::Transmitter;
 
-constexpr double kLeastRatioFlow = 0.02;  // of the range of the transmitter
+constexpr double kMinRatioFlow = 0.02;  // of the range of the transmitter
 
 double Held(const Transmitter& transmitter, double value) {
   return std::clamp(value, transmitter.low, transmitter.high);
@@ -82,7 +82,7 @@ std::vector<Sample> Run(const simulator::ValveSimulationConfig& config) {
 
 double FaultyFlow(const Transmitter& transmitter, double reading,
                   double healthy, double faulty) {
-  const double least = kLeastRatioFlow * (transmitter.high - transmitter.low);
+  const double least = kMinRatioFlow * (transmitter.high - transmitter.low);
   return Held(transmitter, healthy > least ? reading * faulty / healthy
                                            : reading + faulty - healthy);
 }

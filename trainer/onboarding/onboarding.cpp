@@ -17,14 +17,15 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr std::size_t kLeadIn = 120;   // healthy samples before a fault
-constexpr std::size_t kLongest = 900;  // samples that it is given to show
+constexpr std::size_t kLeadIn = 120;  // healthy samples before a fault
+constexpr std::size_t kMaxShownSamples =
+    900;  // samples that it is given to show
 constexpr std::size_t kIsolableSize = 2;
 
 // The last part of the stretch.
 Stretch Shortened(const Stretch& stretch) {
   const std::size_t count =
-      std::min(stretch.samples.size(), kLeadIn + kLongest);
+      std::min(stretch.samples.size(), kLeadIn + kMaxShownSamples);
   return {stretch.run_id,
           {stretch.samples.end() - static_cast<std::ptrdiff_t>(count),
            stretch.samples.end()}};
@@ -210,9 +211,9 @@ bool IsMeasured(const Sample& sample, Signal signal) {
 
 }  // namespace
 
-std::vector<std::string> LeaveOutUnread(const std::vector<TrainingRun>& runs,
-                                        std::vector<ChannelPlan>& channels) {
-  constexpr std::ptrdiff_t kLeastReadings = 100;
+std::vector<std::string> DropUnreadChannels(
+    const std::vector<TrainingRun>& runs, std::vector<ChannelPlan>& channels) {
+  constexpr std::ptrdiff_t kMinReadings = 100;
   std::vector<std::string> unread;
   std::erase_if(channels, [&](const ChannelPlan& plan) {
     if (plan.output == Signal::kX || plan.output == Signal::kF) {
@@ -224,10 +225,10 @@ std::vector<std::string> LeaveOutUnread(const std::vector<TrainingRun>& runs,
         return IsMeasured(labelled.sample, plan.output);
       });
     }
-    if (readings < kLeastReadings) {
+    if (readings < kMinReadings) {
       unread.push_back(plan.name);
     }
-    return readings < kLeastReadings;
+    return readings < kMinReadings;
   });
   return unread;
 }
@@ -235,7 +236,7 @@ std::vector<std::string> LeaveOutUnread(const std::vector<TrainingRun>& runs,
 std::vector<TrainingRun> WithoutStops(std::vector<TrainingRun> runs) {
   constexpr double kStop = 2.0;  // from an end of the travel [%]
   constexpr double kAfterS = 60.0;
-  constexpr double kRarely = 0.05;
+  constexpr double kMaxStopShare = 0.05;
   const auto at_stop = [](const LabelledSample& labelled) {
     const double x = labelled.sample[Signal::kX];
     return x <= kStop || x >= 100.0 - kStop;
@@ -246,7 +247,7 @@ std::vector<TrainingRun> WithoutStops(std::vector<TrainingRun> runs) {
     stops += static_cast<double>(std::ranges::count_if(run.samples, at_stop));
     samples += static_cast<double>(run.samples.size());
   }
-  if (stops > kRarely * samples) {
+  if (stops > kMaxStopShare * samples) {
     return runs;
   }
   for (TrainingRun& run : runs) {
@@ -266,7 +267,7 @@ namespace {
 constexpr double kFitShare = 0.2;
 constexpr double kTrainShare = 0.7;
 
-constexpr std::size_t kLeastSamples = 600;
+constexpr std::size_t kMinSamples = 600;
 
 Progress Part(const Progress& progress, double from, double share) {
   return [&progress, from, share](double done, std::string_view stage) {
@@ -301,10 +302,10 @@ void RequireHealthy(const std::vector<TrainingRun>& runs) {
     }
   }
   const std::size_t longest = LongestStretch(runs).samples.size();
-  if (longest < kLeastSamples) {
+  if (longest < kMinSamples) {
     throw DataError("the runs have at most " + std::to_string(longest) +
                     " samples in a row, onboarding takes at least " +
-                    std::to_string(kLeastSamples));
+                    std::to_string(kMinSamples));
   }
 }
 
@@ -467,7 +468,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   TrainingOptions training = TrainingOf(options, signals);
   CheckRecords(runs);
   Onboarding result;
-  result.unread = LeaveOutUnread(runs, training.channels);
+  result.unread = DropUnreadChannels(runs, training.channels);
   result.type = (signals & MaskOf(Signal::kF)) != 0
                     ? InUnit(options.type, runs.front().flow_unit)
                     : options.type;
@@ -488,7 +489,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   const std::vector<FaultCondition> faults = OnboardingFaults(signals);
   const Progress part = Part(progress, kFitShare, kTrainShare);
   result.transferred =
-      options.of_type && ServesAnother(*options.of_type, runs, training);
+      options.of_type && IsTransferable(*options.of_type, runs, training);
   result.models =
       result.transferred
           ? TransferDifferenceSet(*options.of_type, runs, training, part)

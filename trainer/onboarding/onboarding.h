@@ -68,8 +68,8 @@ TrainingOptions OnboardingPreset(SignalMask signals);
 /// readings of them, the others being filled in by resampling: a slow
 /// transmitter in a swinging-door export.
 /// @returns the names of these channels.
-std::vector<std::string> LeaveOutUnread(const std::vector<TrainingRun>& runs,
-                                        std::vector<ChannelPlan>& channels);
+std::vector<std::string> DropUnreadChannels(
+    const std::vector<TrainingRun>& runs, std::vector<ChannelPlan>& channels);
 
 struct OnboardingOptions {
   std::string name;  ///< Of the model set.
@@ -101,7 +101,7 @@ struct Onboarding {
   ValveType type;  ///< With the parameters that the faults were simulated by.
   std::optional<simulator::ValveFit> fit;
   std::vector<ChannelFit> channels;
-  std::vector<std::string> unread;  ///< Channels of LeaveOutUnread().
+  std::vector<std::string> unread;  ///< Channels of DropUnreadChannels().
   std::optional<CoverageTable> coverage;
   SignalMask signals{0};   ///< That the valve measures.
   double hours{0.0};       ///< Of healthy data.

@@ -12,13 +12,13 @@
 namespace fdi::trainer {
 namespace {
 
-constexpr double kLargestShare = 1.5;    // of CV or X: per cent goes to 100
-constexpr double kLeastPressure = 50.0;  // water boils below at 81 degC [kPa]
-constexpr double kBoilingShare = 0.8;    // of the vapour pressure
-constexpr double kLeastVariation = 1.0;  // of CV, X [% rms]; 2 % of the flow
-constexpr double kAgainst = 0.3;         // correlation of the wrong sign
-constexpr double kWorse = 1.05;          // times the error of the naive model
-constexpr double kAtBound = 1e-3;        // relative
+constexpr double kMaxShare = 1.5;      // of CV or X: per cent goes to 100
+constexpr double kMinPressure = 50.0;  // water boils below at 81 degC [kPa]
+constexpr double kBoilingShare = 0.8;  // of the vapour pressure
+constexpr double kMinVariation = 1.0;  // of CV, X [% rms]; 2 % of the flow
+constexpr double kAgainst = 0.3;       // correlation of the wrong sign
+constexpr double kWorse = 1.05;        // times the error of the naive model
+constexpr double kAtBound = 1e-3;      // relative
 
 std::string Text(double value) {
   char text[32];
@@ -64,7 +64,7 @@ Readings ReadingsOf(const std::vector<TrainingRun>& runs, Signal signal) {
 }
 
 void CheckShare(const Readings& r) {
-  if (r.measured() && r.high <= kLargestShare && r.low >= -kLargestShare) {
+  if (r.measured() && r.high <= kMaxShare && r.low >= -kMaxShare) {
     throw DataError(r.Seen() +
                     ": expected per cent of closing, 0 to 100; if "
                     "it counts in shares of 1, map it with scale = 100");
@@ -76,7 +76,7 @@ void CheckPressures(const Readings& p1, const Readings& p2,
   const double vapour =
       t1.measured() ? 1e-3 * simulator::VapourPressure(t1.middle) : 0.0;
   if (p1.measured() &&
-      p1.middle < std::max(kLeastPressure, kBoilingShare * vapour)) {
+      p1.middle < std::max(kMinPressure, kBoilingShare * vapour)) {
     throw DataError(
         p1.Seen() +
         (t1.measured() ? ", and " + t1.Seen() +
@@ -107,7 +107,7 @@ double Correlation(const Readings& a, const Readings& b) {
 }
 
 void CheckSense(const Readings& cv, const Readings& x, const Readings& f) {
-  if (std::min(cv.deviation, x.deviation) < kLeastVariation) {
+  if (std::min(cv.deviation, x.deviation) < kMinVariation) {
     return;
   }
   const double follows = Correlation(cv, x);
@@ -117,7 +117,7 @@ void CheckSense(const Readings& cv, const Readings& x, const Readings& f) {
                     "counts opening with sense = \"opening\"");
   }
   if (f.values.size() != x.values.size() ||
-      f.deviation < 0.01 * kLeastVariation * std::abs(f.high)) {
+      f.deviation < 0.01 * kMinVariation * std::abs(f.high)) {
     return;
   }
   const double rises = Correlation(x, f);
@@ -162,12 +162,12 @@ void CheckFit(const std::vector<TrainingRun>& runs,
   }
   const double naive =
       std::sqrt(squares / static_cast<double>(x.values.size()));
-  if (simulation.x_rmse_pct > std::max(kWorse * naive, kLeastVariation)) {
+  if (simulation.x_rmse_pct > std::max(kWorse * naive, kMinVariation)) {
     refuse("X", simulation.x_rmse_pct, naive, "X = CV", " %");
   }
   if (f.measured() &&
       simulation.flow_rmse >
-          std::max(kWorse * f.deviation, 0.02 * kLeastVariation * f.high)) {
+          std::max(kWorse * f.deviation, 0.02 * kMinVariation * f.high)) {
     refuse("F", simulation.flow_rmse, f.deviation, "the mean of F", "");
   }
   for (const simulator::FittedParameter& p : parameters) {

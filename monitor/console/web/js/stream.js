@@ -5,7 +5,7 @@ import {errorOf, url} from './api.js';
 
 const kSilenceMs = 12000;
 const kFirstDelayMs = 500;
-const kLongestDelayMs = 10000;
+const kMaxDelayMs = 10000;
 // A browser has six connections to a monitor and a monitor has room for sixteen
 // pages: one that nobody looks at gives its own back.
 const kHiddenMs = 20000;
@@ -163,7 +163,7 @@ export class Stream extends EventTarget {
     }
     const delay = error.retryAfterS ? 1000 * error.retryAfterS :
       this.#delayMs * (0.8 + 0.4 * Math.random());
-    this.#delayMs = Math.min(2 * this.#delayMs, kLongestDelayMs);
+    this.#delayMs = Math.min(2 * this.#delayMs, kMaxDelayMs);
     this.retryMs = Date.now() + delay;
     this.#timer = setTimeout(() => this.#connect(), delay);
     this.dispatchEvent(new Event('state'));

@@ -8,7 +8,7 @@ import {reasonText} from './overlay.js';
 import {PanelStack} from './panel.js';
 import {panelsOf} from './panels.js';
 
-const kLeastSpanMs = 5000;
+const kMinSpanMs = 5000;
 let count = 0;
 
 export class Timeline {
@@ -125,7 +125,7 @@ export class Timeline {
     const last = t.at(-1) ?? this.nowMs();
     const end = last + (this.live ? this.silentMs() : 0);
     const begin = this.#spanMs === null ? first : end - this.#spanMs;
-    return [begin, Math.max(end, begin + kLeastSpanMs)];
+    return [begin, Math.max(end, begin + kMinSpanMs)];
   }
 
   #apply([min, max]) {
@@ -142,9 +142,9 @@ export class Timeline {
   }
 
   #look([min, max]) {
-    if (max - min < kLeastSpanMs) {
+    if (max - min < kMinSpanMs) {
       const middle = (min + max) / 2;
-      [min, max] = [middle - kLeastSpanMs / 2, middle + kLeastSpanMs / 2];
+      [min, max] = [middle - kMinSpanMs / 2, middle + kMinSpanMs / 2];
     }
     this.#window = [min, max];
     this.#apply(this.#window);

@@ -5,7 +5,7 @@ const kCapacity = 7200;
 const kSignals = [
   'cv', 'x', 'f', 'sp', 'p1', 'p2', 't1', 'x_sim', 'f_sim'];
 const kGapPeriods = 3;
-const kLeastGapMs = 2500;
+const kMinGapMs = 2500;
 
 function medianStep(t) {
   const steps = [];
@@ -131,7 +131,7 @@ export class TrendData {
   allGaps() {
     const found = [];
     const t = this.columns?.t ?? [];
-    const limit = Math.max(kLeastGapMs, kGapPeriods * medianStep(t));
+    const limit = Math.max(kMinGapMs, kGapPeriods * medianStep(t));
     for (let i = 1; i < t.length; ++i) {
       if (t[i] - t[i - 1] > limit) {
         found.push({from_ms: t[i - 1], to_ms: t[i], reason: 'no samples'});

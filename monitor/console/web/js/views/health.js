@@ -8,7 +8,7 @@ import {h} from '../dom.js';
 import {numberText} from '../format.js';
 import {dataTable} from './table.js';
 
-const kLeastDays = 2;
+const kMinDays = 2;
 
 function panelsOf(health) {
   const residuals = health.channels.map(({signal, unit}, c) => ({
@@ -75,7 +75,7 @@ export class HealthSection {
     if (health === null || health.t_ms.length === 0 || this.#gone) return;
     this.element.append(h('h2', {}, 'Months'),
         dataTable('Trends to limits', kTrendColumns, health.trends));
-    if (health.t_ms.length < kLeastDays) {
+    if (health.t_ms.length < kMinDays) {
       this.element.append(h('p', {class: 'hint'},
           'Charts come with the second day.'));
       return;

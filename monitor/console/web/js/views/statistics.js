@@ -7,7 +7,7 @@ import {dateText, durationText} from '../format.js';
 import {dataTable, timeCell, valveLink} from './table.js';
 
 const kDayMs = 86400000;
-const kMostDays = 120;
+const kMaxDays = 120;
 const kTopRows = 10;
 
 /** Days without an alarm are days, too. */
@@ -15,7 +15,7 @@ function everyDay(perDay, {since_ms: since, until_ms: until}) {
   const known = new Map(perDay.map((day) => [day.day, day]));
   const end = until ?? Date.now();
   const days = [];
-  const first = Math.max(since, end - kMostDays * kDayMs);
+  const first = Math.max(since, end - kMaxDays * kDayMs);
   for (let ms = first - first % kDayMs; ms < end; ms += kDayMs) {
     const name = new Date(ms).toISOString().slice(0, 10);
     days.push(known.get(name) ?? {day: name, episodes: 0, alarm_s: 0});
