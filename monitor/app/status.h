@@ -37,7 +37,7 @@ struct StatusFacts {
   bool history_degraded{false};
   bool recording_degraded{false};
   std::vector<std::string_view> stalled{};  ///< Names of threads.
-  std::optional<Pair::Status> pair{};     ///< Nothing: not in a pair.
+  std::optional<Pair::Status> pair{};       ///< Nothing: not in a pair.
   ContestedValves contested{};
 };
 
