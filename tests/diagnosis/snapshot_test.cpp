@@ -110,14 +110,14 @@ TEST(SnapshotTest, DriftThatWasFollowedStays) {
   const double limit = models.channels[1].windows[0].upper_mean;
   models.channels[1].drift = {0.0, 1.4 * limit, 0.0};
   const auto shared = std::make_shared<const ModelSet>(models);
-  const auto sample = [&](int k) {
+  const auto drifting = [&](int k) {
     Sample sample = PlantSample(static_cast<std::uint64_t>(k));
     sample.values[Index(Signal::kF)] += std::min(k / 43200.0, 1.5) * limit;
     return sample;
   };
   ValveEngine before(shared);
   for (int k = 0; k < 64800; ++k) {
-    ASSERT_FALSE(before.Step(sample(k)).detected) << k;
+    ASSERT_FALSE(before.Step(drifting(k)).detected) << k;
   }
   for (const bool resumed : {false, true}) {
     ValveEngine after(shared);
@@ -130,7 +130,7 @@ TEST(SnapshotTest, DriftThatWasFollowedStays) {
     }
     bool detected = false;
     for (int k = 65800; k < 66400; ++k) {
-      detected = after.Step(sample(k)).detected || detected;
+      detected = after.Step(drifting(k)).detected || detected;
     }
     EXPECT_EQ(detected, !resumed);
   }
