@@ -202,7 +202,7 @@ class Suspicion {
 };
 
 /// What the observers name. Near the limits of what they see they change their
-/// mind with the noise. So five minutes after the detection it is every fault
+/// mind with the noise. So ten minutes after the detection it is every fault
 /// that they have isolated in the second half of the episode.
 class ObserversMemory {
  public:

@@ -350,9 +350,9 @@ TEST_F(SecondLookTest, TheObserversNameStandsIfTheValveLooksHealthy) {
 }
 
 // Before a look has answered.
-TEST_F(SecondLookTest, WhatObserversNameAfterFiveMinutesJoinsWhatTheyNamed) {
-  constexpr std::uint64_t kOther = kAtOnce + 400;
-  constexpr std::uint64_t kAlone = kAtOnce + 2 * 399 + 1;  // f7 was in half 1.
+TEST_F(SecondLookTest, WhatObserversNameAfterTenMinutesJoinsWhatTheyNamed) {
+  constexpr std::uint64_t kOther = kAtOnce + 700;
+  constexpr std::uint64_t kAlone = kAtOnce + 2 * 699 + 1;  // f7 was in half 1.
   rows_ = simulator::Recording(kAlone + 20, 2, {});
   Feed(0, kOther);
   for (std::uint64_t k = kOther; k <= kAlone; ++k) {

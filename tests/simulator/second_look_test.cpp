@@ -423,7 +423,7 @@ TEST(LookAnswerTest, ALateOneNamesWhatAShiftWouldExplainToo) {
   EXPECT_EQ(NamesOf(answer, true), std::nullopt);
 }
 
-TEST(ObserversMemoryTest, HoldsTheSecondHalfOfAnEpisodeFromFiveMinutesOn) {
+TEST(ObserversMemoryTest, HoldsTheSecondHalfOfAnEpisodeFromTenMinutesOn) {
   ObserversMemory memory;
   constexpr std::int64_t kDetection = 1000;
   int age = 0;
@@ -433,14 +433,14 @@ TEST(ObserversMemoryTest, HoldsTheSecondHalfOfAnEpisodeFromFiveMinutesOn) {
     }
     return memory.faults();
   };
-  until(200, 0b001);
-  EXPECT_EQ(until(301, 0b010), 0b010U);
-  EXPECT_EQ(until(302, 0b010), 0b011U);
-  EXPECT_EQ(until(399, 0b010), 0b011U);
-  EXPECT_EQ(until(400, 0b010), 0b010U);
-  EXPECT_EQ(until(1000, 0b100), 0b100U);
-  EXPECT_EQ(until(1001, 0b001), 0b101U);
-  memory.Step(3000 * kSecond, 3500 * kSecond, 0b010);
+  until(400, 0b001);
+  EXPECT_EQ(until(601, 0b010), 0b010U);
+  EXPECT_EQ(until(602, 0b010), 0b011U);
+  EXPECT_EQ(until(799, 0b010), 0b011U);
+  EXPECT_EQ(until(800, 0b010), 0b010U);
+  EXPECT_EQ(until(2000, 0b100), 0b100U);
+  EXPECT_EQ(until(2001, 0b001), 0b101U);
+  memory.Step(4000 * kSecond, 4500 * kSecond, 0b010);
   EXPECT_EQ(memory.faults(), 0b010U);
 }
 
