@@ -3,5 +3,4 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 cmake/prepare.sh tests
-# Many tests wait for others, and only those that measure delays run alone.
-ctest --preset release -j$(($(nproc) + 1))
+ctest --preset release -j2
