@@ -449,7 +449,8 @@ void ObserversMemory::Step(std::int64_t detection_stamp_ns,
     const FaultSet fault = FaultSet{1} << bit;
     if ((faults & fault) != 0) {
       last_ns_[bit] = stamp_ns;
-    } else if (age_ns > 2 * kLastAge && last_ns_[bit] >= stamp_ns - age_ns / 2) {
+    } else if (age_ns > 2 * kLastAge &&
+               last_ns_[bit] >= stamp_ns - age_ns / 2) {
       faults_ |= fault;
     }
   }

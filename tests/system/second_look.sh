@@ -22,8 +22,8 @@ wanted=$(sqlite3 :memory: "select group_concat(value, '|') from
    '\$.runs[0].final_set') order by value)")
 
 start
-timeout 200 "$bin/fdi-simulator" --domain "$domain" replay --csv faulty.csv \
-  --valve LV-1 --speed 20 >simulator.log 2>&1 || fail "the simulator fails"
+timeout 400 "$bin/fdi-simulator" --domain "$domain" replay --csv faulty.csv \
+  --valve LV-1 --speed 10 >simulator.log 2>&1 || fail "the simulator fails"
 stop
 
 found=$(history "select group_concat(name, '|') from
