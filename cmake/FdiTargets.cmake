@@ -135,15 +135,12 @@ function(fdi_quick_test name)
   if(FDI_UNITY AND NOT FDI_SANITIZE)
     target_compile_options(${name} PRIVATE -O1)
   endif()
-  if(TARGET fdi_precompiled AND NOT name STREQUAL fdi_precompiled)
-    target_precompile_headers(${name} REUSE_FROM fdi_precompiled)
-  endif()
 endfunction()
 
 # fdi_test(name [NUMERICAL] [THREADS] [ALONE] LABEL unit|system [TIMEOUT 120]
 #          SOURCES a_test.cpp ... LIBRARIES lib ...)
-# NUMERICAL: optimised, under sanitizers, too. THREADS: also run under the thread
-# sanitizer (preset tsan). ALONE: not beside other tests, for it measures delays.
+# NUMERICAL: fully optimised, under sanitizers, too. THREADS: also run under the
+# thread sanitizer (preset tsan). ALONE: not beside other tests, for it measures delays.
 function(fdi_test name)
   cmake_parse_arguments(ARG "NUMERICAL;THREADS;ALONE" "LABEL;TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
@@ -153,6 +150,9 @@ function(fdi_test name)
   fdi_test_headers(${name})
   if(NOT ARG_NUMERICAL)
     fdi_quick_test(${name})
+    if(TARGET fdi_precompiled)
+      target_precompile_headers(${name} REUSE_FROM fdi_precompiled)
+    endif()
   endif()
   if(NOT TARGET ${ARG_LABEL}_tests)
     add_custom_target(${ARG_LABEL}_tests)  # unit_tests, system_tests

@@ -1,7 +1,6 @@
 #include "monitor/episode_names.h"
 
 #include <algorithm>
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <numeric>
@@ -47,9 +46,16 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
   CollectAnswers();
   CollectGrowth();
   suspects_ = looks_->suspects() && !held;
-  const auto name = NameFor(engine, held);
+  const simulator::LookAnswer* answer = AnswerTo(engine, held);
+  const auto named =
+      answer != nullptr
+          ? simulator::NamesOf(
+                *answer, simulator::ObserversName(*models_, engine.isolated))
+          : std::optional<std::vector<int>>();
   const bool inherited = inherited_ && engine.detected && !held;
-  if (!name && !inherited && !own_) {
+  const FaultSet observed =
+      held ? engine.isolated : looks_->Observed(*models_, engine.isolated);
+  if (!named && !inherited && !own_ && observed == engine.isolated) {
     faults_ = engine.isolated;
     layer_ = Layer::kObservers;
     return engine;
@@ -67,34 +73,34 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     return verdict_;
   }
   own_ = true;
-  by_physics_ = inherited || (name && name->answer != nullptr);
+  by_physics_ = named || inherited;
   strengths_.clear();
-  if (inherited) {
-    SetName(*inherited_, Unknown::kTooEarly);
-  } else if (by_physics_) {
-    const simulator::LookAnswer& answer = *name->answer;
-    Name(answer, SetOf(name->faults));
-    if (std::exchange(look_ns_, answer.stamp_ns) != answer.stamp_ns) {
-      look_ = RecordOf(answer);
-      RecordStrengths(answer);
+  if (named) {
+    Name(*answer, *named);
+    if (std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
+      look_ = RecordOf(*answer);
+      RecordStrengths(*answer);
     }
-  } else if (name) {
-    SetName(SetOf(name->faults), Unknown::kTooEarly);
+  } else if (inherited) {
+    SetName(*inherited_, Unknown::kTooEarly);
+  } else if (observed != engine.isolated) {
+    SetName(observed, Unknown::kTooEarly);
   }
   EmitNameChange();
   return verdict_;
 }
 
-// The one that counts at this sample, if it is not the engine's.
-std::optional<simulator::EpisodeName> EpisodeNames::NameFor(
-    const Verdict& engine, bool held) {
+// The one that counts at this sample, if any.
+const simulator::LookAnswer* EpisodeNames::AnswerTo(const Verdict& engine,
+                                                    bool held) {
   if (!engine.detected || held) {
-    return std::nullopt;
+    return nullptr;
   }
-  if (looks_->Answer() != nullptr) {
+  const simulator::LookAnswer* answer = looks_->Answer();
+  if (answer != nullptr) {
     inherited_.reset();
   }
-  return looks_->Name(*models_, engine.isolated);
+  return answer;
 }
 
 void EpisodeNames::RequestLook(simulator::LookTask task) {
@@ -190,26 +196,20 @@ std::int64_t EpisodeNames::PeriodNs() const {
 }
 
 // Faults that the model set does not have cannot be recorded and stay out.
-FaultSet EpisodeNames::SetOf(const std::vector<int>& faults) const {
+void EpisodeNames::Name(const simulator::LookAnswer& answer,
+                        const std::vector<int>& faults) {
   FaultSet set = 0;
-  for (const int fault : faults) {
-    const int index = FaultIndex(*models_, fault);
-    set |= index < 0 ? 0 : FaultSet{1} << static_cast<std::size_t>(index);
-  }
-  return set;
-}
-
-void EpisodeNames::Name(const simulator::LookAnswer& answer, FaultSet faults) {
   for (const simulator::Explanation& e : answer.faults) {
-    const FaultSet fault = SetOf({e.fault});
-    if ((fault & faults) != 0) {
-      const auto bit = static_cast<std::size_t>(std::countr_zero(fault));
+    const int index = FaultIndex(*models_, e.fault);
+    if (index >= 0 && std::ranges::count(faults, e.fault) > 0) {
+      const auto bit = static_cast<std::size_t>(index);
       strengths_.emplace_back(bit, e.strength);
       verdict_.strengths[bit] = e.strength;
+      set |= FaultSet{1} << bit;
     }
   }
   const bool outside = answer.outcome == simulator::LookOutcome::kNoneFits;
-  SetName(faults, outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
+  SetName(set, outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
 }
 
 EpisodeLook EpisodeNames::RecordOf(const simulator::LookAnswer& answer) const {

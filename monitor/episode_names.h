@@ -17,11 +17,12 @@
 
 namespace fdi::monitor {
 
-/// Names the episodes of one valve: as its engine does, until a second look has
-/// an answer. While one counts, it is the name, and what the engine isolates
-/// meanwhile is not; see simulator::ValveLooks::Name(). So what leaves the
-/// monitor is what `fdi-trainer evaluate` scores. Routine looks may open an
-/// episode that the engine does not see.
+/// Names the episodes of one valve: as its engine does, with the memory of
+/// simulator::ObserversMemory, until a second look has an answer. While one
+/// counts, it is the name, and what the engine isolates meanwhile is not; see
+/// simulator::LookBook. So what leaves the monitor is what `fdi-trainer
+/// evaluate` scores. Routine looks may open an episode that the engine does not
+/// see.
 class EpisodeNames {
  public:
   /// @param worker outlives this.
@@ -79,16 +80,15 @@ class EpisodeNames {
     std::future<LookWorker::Answer> answer;
   };
 
-  std::optional<simulator::EpisodeName> NameFor(const Verdict& engine,
-                                                bool held);
+  const simulator::LookAnswer* AnswerTo(const Verdict& engine, bool held);
   void RequestLook(simulator::LookTask task);
   void CollectAnswers();
   void CollectGrowth();
   void RecordStrengths(const simulator::LookAnswer& answer);
   void RecordStrength(const simulator::Explanation& e, std::int64_t stamp_ns);
   std::int64_t PeriodNs() const;
-  FaultSet SetOf(const std::vector<int>& faults) const;
-  void Name(const simulator::LookAnswer& answer, FaultSet faults);
+  void Name(const simulator::LookAnswer& answer,
+            const std::vector<int>& faults);
   void SetName(FaultSet faults, Unknown unknown);
   EpisodeLook RecordOf(const simulator::LookAnswer& answer) const;
   void EmitNameChange();

@@ -64,8 +64,8 @@ void BusDecisionSink::Fill(const std::string& valve_id, const ModelSet* models,
 }
 
 bool BusDecisionSink::ToLive() {
-  has_unsent_ = has_unsent_ || live_.matched() == 0;
-  return !has_unsent_;
+  skipped_ = skipped_ || live_.matched() == 0;
+  return !skipped_;
 }
 
 bool BusDecisionSink::Publish(const std::string& valve_id,
@@ -112,10 +112,10 @@ std::uint64_t BusDecisionSink::Flush() {
 }
 
 bool BusDecisionSink::LastValuesDue() {
-  if (!has_unsent_ || live_.matched() == 0) {
+  if (!skipped_ || live_.matched() == 0) {
     return false;
   }
-  has_unsent_ = false;
+  skipped_ = false;
   return true;
 }
 

@@ -61,7 +61,7 @@ class BusDecisionSink : public DecisionSink {
   std::size_t batch_bytes_{0};
   std::uint64_t unsent_{0};  // Vectors in batches since the last Flush().
   idl::DecisionMessage message_;
-  bool has_unsent_{false};  // Vectors were dropped for lack of subscribers.
+  bool skipped_{false};  // Vectors were dropped for lack of subscribers.
 };
 
 /// Publishes fault events over DDS, and logs one line for each.

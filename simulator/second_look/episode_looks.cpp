@@ -511,28 +511,13 @@ const LookAnswer* ValveLooks::Answer() const {
   return open_ ? book_.At(detection_ns_, stamp_ns_) : nullptr;
 }
 
-std::optional<EpisodeName> ValveLooks::Name(const ModelSet& models,
-                                            FaultSet isolated) const {
-  const LookAnswer* answer = Answer();
-  if (answer != nullptr) {
-    if (auto faults = NamesOf(*answer, ObserversName(models, isolated))) {
-      return EpisodeName{std::move(*faults), answer};
-    }
+FaultSet ValveLooks::Observed(const ModelSet& models, FaultSet isolated) const {
+  const FaultSet known = ~FindingsOf(models);
+  const FaultSet faults = memory_.faults() & known;
+  if (!open_ || faults == (isolated & known)) {
+    return isolated;
   }
-  const FaultSet faults = memory_.faults() & ~FindingsOf(models);
-  if (!open_ || faults == (isolated & ~FindingsOf(models))) {
-    return std::nullopt;
-  }
-  EpisodeName name;
-  for (std::size_t i = 0; i < models.faults.size(); ++i) {
-    if ((faults >> i & 1U) != 0) {
-      name.faults.push_back(models.faults[i]);
-    }
-  }
-  if (name.faults.size() > kMaxNamedFaults) {
-    name.faults.clear();
-  }
-  return name;
+  return std::popcount(faults) > static_cast<int>(kMaxNamedFaults) ? 0 : faults;
 }
 
 const LookAnswer* LookBook::At(std::int64_t detection_stamp_ns,

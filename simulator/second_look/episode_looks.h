@@ -219,12 +219,6 @@ class ObserversMemory {
   FaultSet faults_{0};
 };
 
-/// The name of an episode where it is not what the engine isolates.
-struct EpisodeName {
-  std::vector<int> faults;            ///< Ascending; empty: unknown.
-  const LookAnswer* answer{nullptr};  ///< Null: by the observers.
-};
-
 /// The looks at one valve and what they make of it: when one is due, the name
 /// of the open episode, and whether there should be one.
 class ValveLooks {
@@ -242,11 +236,10 @@ class ValveLooks {
   /// What counts for the open episode at the last sample, if there is one.
   const LookAnswer* Answer() const;
 
-  /// The name of the open episode at the last sample: by Answer(), or else by
-  /// ObserversMemory. Nothing if it is what the engine says. Stands until the
-  /// next call of Step() or Enter().
-  std::optional<EpisodeName> Name(const ModelSet& models,
-                                  FaultSet isolated) const;
+  /// What the observers name at the last sample, where the engine isolates
+  /// `isolated`: see ObserversMemory. Empty if that is more than
+  /// kMaxNamedFaults.
+  FaultSet Observed(const ModelSet& models, FaultSet isolated) const;
 
   /// See EpisodeLooks::GrowthTask(). Its answer is not for Enter().
   std::optional<LookTask> GrowthTask(std::vector<Explanation> known) const {

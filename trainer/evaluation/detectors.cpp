@@ -40,9 +40,7 @@ class SecondLooks {
     if (OutOfOrder(verdict.intake)) {
       return;
     }
-    auto name = looks_->Name(models_, verdict.isolated);
-    sets_.push_back(name ? std::optional(std::move(name->faults))
-                         : std::nullopt);
+    sets_.push_back(NamesAt(verdict.isolated));
   }
 
   void Apply(std::vector<Indication>& indications) const {
@@ -55,6 +53,19 @@ class SecondLooks {
   }
 
  private:
+  // Nothing if what the engine says stands.
+  std::optional<std::vector<int>> NamesAt(FaultSet isolated) const {
+    if (const simulator::LookAnswer* answer = looks_->Answer()) {
+      if (auto names = simulator::NamesOf(
+              *answer, simulator::ObserversName(models_, isolated))) {
+        return names;
+      }
+    }
+    const FaultSet observed = looks_->Observed(models_, isolated);
+    return observed == isolated ? std::nullopt
+                                : std::optional(FaultsIn(models_, observed));
+  }
+
   const ModelSet& models_;
   simulator::ValvePhysics physics_;
   std::optional<simulator::ValveLooks> looks_;
