@@ -111,8 +111,8 @@ function(fdi_program name)
   install(TARGETS ${name} RUNTIME)
 endfunction()
 
-# The headers of most tests, compiled once for all of them. Clang would also
-# demand the same definitions of every test.
+# The headers of most tests, compiled once for all of them. With GCC alone: Clang
+# takes such a file only for a test that has the same definitions.
 function(fdi_test_precompiled_headers)
   if(NOT FDI_UNITY OR NOT CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     return()

@@ -201,9 +201,9 @@ class Suspicion {
   std::optional<LookAnswer> found_;
 };
 
-/// What the observers name. Near the limits of what they see they change their
-/// mind with the noise. So ten minutes after the detection it is every fault
-/// that they have isolated in the second half of the episode.
+/// What the observers name. Near the limits of what they can see, their answer
+/// changes with the noise. From ten minutes after the detection on, it is
+/// therefore every fault that they isolated in the second half of the episode.
 class ObserversMemory {
  public:
   /// The observers isolate `faults` at `stamp_ns`.
