@@ -46,14 +46,12 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
   CollectAnswers();
   CollectGrowth();
   suspects_ = looks_->suspects() && !held;
-  const simulator::LookAnswer* answer =
-      engine.detected && !held ? looks_->Answer() : nullptr;
+  const simulator::LookAnswer* answer = AnswerTo(engine, held);
   const auto named =
       answer != nullptr
           ? simulator::NamesOf(
                 *answer, simulator::ObserversName(*models_, engine.isolated))
           : std::optional<std::vector<int>>();
-  EndInheritance(answer != nullptr, named.has_value(), engine.isolated);
   const bool inherited = inherited_ && engine.detected && !held;
   const FaultSet observed =
       held ? engine.isolated : looks_->Observed(*models_, engine.isolated);
@@ -75,7 +73,7 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
     return verdict_;
   }
   own_ = true;
-  by_physics_ = named || (inherited && inherited_->layer == Layer::kPhysics);
+  by_physics_ = named || inherited;
   strengths_.clear();
   if (named) {
     Name(*answer, *named);
@@ -84,7 +82,7 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
       RecordStrengths(*answer);
     }
   } else if (inherited) {
-    SetName(inherited_->faults, Unknown::kTooEarly);
+    SetName(*inherited_, Unknown::kTooEarly);
   } else if (observed != engine.isolated) {
     SetName(observed, Unknown::kTooEarly);
   }
@@ -92,14 +90,17 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
   return verdict_;
 }
 
-void EpisodeNames::EndInheritance(bool answered, bool named,
-                                  FaultSet isolated) {
-  if (inherited_ &&
-      (inherited_->layer == Layer::kPhysics
-           ? answered
-           : named || simulator::ObserversName(*models_, isolated))) {
+// The one that counts at this sample, if any.
+const simulator::LookAnswer* EpisodeNames::AnswerTo(const Verdict& engine,
+                                                    bool held) {
+  if (!engine.detected || held) {
+    return nullptr;
+  }
+  const simulator::LookAnswer* answer = looks_->Answer();
+  if (answer != nullptr) {
     inherited_.reset();
   }
+  return answer;
 }
 
 void EpisodeNames::RequestLook(simulator::LookTask task) {

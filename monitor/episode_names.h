@@ -29,17 +29,9 @@ class EpisodeNames {
   EpisodeNames(std::string valve_id, std::shared_ptr<const ModelSet> models,
                LookWorker::Physics physics, LookWorker& worker);
 
-  /// What an earlier session named the episode that goes on.
-  struct InheritedName {
-    FaultSet faults;
-    Layer layer;
-  };
-
-  /// By a look, it stands until a look of this session has an answer; by the
-  /// observers, until either names a fault again. Nothing: no episode goes on.
-  void SetInheritedName(std::optional<InheritedName> name) {
-    inherited_ = name;
-  }
+  /// `faults`, by an earlier session's look, name the episode that goes on
+  /// until a look of this session has an answer; nothing: none goes on.
+  void SetInheritedName(std::optional<FaultSet> faults) { inherited_ = faults; }
 
   /// Takes a sample and the verdict of the engine. @param held nothing is to be
   /// named; see ModelResolver::IsolationHeld().
@@ -88,7 +80,7 @@ class EpisodeNames {
     std::future<LookWorker::Answer> answer;
   };
 
-  void EndInheritance(bool answered, bool named, FaultSet isolated);
+  const simulator::LookAnswer* AnswerTo(const Verdict& engine, bool held);
   void RequestLook(simulator::LookTask task);
   void CollectAnswers();
   void CollectGrowth();
@@ -109,7 +101,7 @@ class EpisodeNames {
   LookWorker* worker_;
   std::optional<simulator::ValveLooks> looks_;  // Made anew at an end.
   std::deque<PendingLook> pending_looks_;
-  std::optional<InheritedName> inherited_;
+  std::optional<FaultSet> inherited_;
   std::int64_t stamp_ns_{0};
   std::int64_t detection_ns_{0};
   bool suspects_{false};

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "diagnosis/model_set.h"
+
 namespace fdi::monitor {
 namespace {
 
@@ -193,23 +195,29 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
   if (!open_) {
     return;
   }
+  const bool ends = transition.kind == TransitionKind::kCleared ||
+                    transition.kind == TransitionKind::kClosed;
+  const bool keeps = KeepsName(transition, *models);
   if (transition.kind == TransitionKind::kIsolated) {
     open_->trace_until_ns =
         transition.stamp_ns + Ns(options_.after_isolation_s);
-    if (open_->resumed && open_->isolated &&
-        open_->faults == transition.faults) {
-      return;
-    }
+  }
+  if (keeps && !ends) {
+    return;
+  }
+  if (transition.kind == TransitionKind::kIsolated) {
     recorded.kind = open_->isolated ? TransitionKind::kReisolated
                                     : TransitionKind::kIsolated;
     open_->isolated = true;
   }
-  open_->faults = transition.faults;
-  const bool ends = transition.kind == TransitionKind::kCleared ||
-                    transition.kind == TransitionKind::kClosed;
-  if (transition.reason != EndReason::kSuperseded &&
-      !(ends && transition.faults == 0)) {
-    open_->candidates = CandidatesOf(*models, verdict, transition.faults);
+  if (keeps) {
+    recorded.faults = open_->faults;
+  } else {
+    open_->faults = transition.faults;
+    if (transition.reason != EndReason::kSuperseded &&
+        !(ends && transition.faults == 0)) {
+      open_->candidates = CandidatesOf(*models, verdict, transition.faults);
+    }
   }
   // What the observers hold likely beside is refuted by the simulation.
   if (transition.layer == Layer::kPhysics) {
@@ -217,6 +225,22 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
                   [](const FaultCandidate& each) { return !each.isolated; });
   }
   Emit(recorded, models, outlet);
+}
+
+// Whether the episode was resumed under this name, or under a fault of which
+// the floor alone finds a sign so far.
+bool EpisodeTracker::KeepsName(const Transition& transition,
+                               const ModelSet& models) {
+  if (transition.kind == TransitionKind::kDetected || !open_->resumed ||
+      !open_->isolated || open_->renamed) {
+    return false;
+  }
+  const FaultSet known = ~FindingsOf(models);
+  const bool finding =
+      transition.faults != 0 && (transition.faults & known) == 0;
+  open_->renamed = !finding;
+  return transition.faults == open_->faults ||
+         (finding && (open_->faults & known) != 0);
 }
 
 // An episode without a name keeps the faults that could explain it last; none

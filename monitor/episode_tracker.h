@@ -44,7 +44,8 @@ class EpisodeOutlet {
 /// An episode that an earlier session left open is resumed, under its old id,
 /// if the same source goes on and is detected abnormal again within the first
 /// minute (or twice the settling time, if that is longer); else it is closed
-/// with `unknown`.
+/// with `unknown`. It keeps the fault that it was named after until a fault is
+/// named again: what the floor finds meanwhile is no name for it.
 class EpisodeTracker {
  public:
   EpisodeTracker(std::string valve_id, const TraceOptions& options);
@@ -93,6 +94,7 @@ class EpisodeTracker {
     std::int64_t trace_until_ns{0};
     bool isolated{false};
     bool resumed{false};
+    bool renamed{false};  // Since it was resumed.
     bool tracing{true};
     FaultSet faults{0};  // isolated last
     std::vector<FaultCandidate> candidates;
@@ -109,6 +111,7 @@ class EpisodeTracker {
             EpisodeOutlet& outlet);
   void Begin(const Transition& transition, const Verdict& verdict,
              EpisodeOutlet& outlet);
+  bool KeepsName(const Transition& transition, const ModelSet& models);
   void FollowUnknown(const Verdict& verdict, const ModelSet& models);
   void Emit(Transition transition,
             const std::shared_ptr<const ModelSet>& models,

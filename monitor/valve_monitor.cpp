@@ -41,9 +41,9 @@ ValveMonitor::ValveMonitor(const std::string& id,
 
 void ValveMonitor::Recover(const OpenEpisode& episode) {
   tracker_.Recover(episode);
-  if (names_ && episode.model_hash == models_->content_hash &&
-      (episode.layer == Layer::kPhysics || episode.faults != 0)) {
-    names_->SetInheritedName({{episode.faults, episode.layer}});
+  if (names_ && episode.layer == Layer::kPhysics &&
+      episode.model_hash == models_->content_hash) {
+    names_->SetInheritedName(episode.faults);
   }
 }
 

@@ -8,7 +8,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "diagnosis/fault_catalogue.h"
 #include "monitor/counters.h"
 #include "monitor/episode_names.h"
 #include "monitor/episode_tracker.h"
@@ -36,15 +35,13 @@ constexpr std::uint64_t kCounts = kFirstLook + 10;
 
 std::shared_ptr<const ModelSet> Models() {
   ModelSet models = LinearModels();
-  models.faults = {1, 7, 13, 19, kFirstFinding};
+  models.faults = {1, 7, 13, 19};
   models.physics = simulator::ToValues(simulator::Physics());
   return std::make_shared<const ModelSet>(std::move(models));
 }
 
 constexpr FaultSet kF7 = 0b0010;
-constexpr FaultSet kF13 = 0b0100;
 constexpr FaultSet kF19 = 0b1000;
-constexpr FaultSet kFinding = 0b10000;
 
 class EventList : public FakeOutlet {
  public:
@@ -125,24 +122,6 @@ class SecondLookTest : public testing::Test {
     tracker_.Take(names_.TakeLook(), outlet_);
     tracker_.Take(names_.TakeStrengths(), outlet_);
     return verdict;
-  }
-
-  // Row kAtOnce - 40 is the first after a restart in an episode with that name.
-  void Resume(FaultSet faults, Layer layer) {
-    OpenEpisode open;
-    open.valve_id = "V1";
-    open.source_id = 1;
-    open.episode_id = 5;
-    open.detection_stamp_ns = PlantSample(0).stamp_ns - 9 * kSecond;
-    open.last_stamp_ns = PlantSample(0).stamp_ns - kSecond;
-    open.isolated = true;
-    open.faults = faults;
-    open.layer = layer;
-    open.model_hash = models_->content_hash;
-    Feed(0, kAtOnce - 40);
-    tracker_ = EpisodeTracker("V1", {});
-    tracker_.Recover(open);
-    names_.SetInheritedName({{faults, layer}});
   }
 
   // Rows [from, to).
@@ -394,36 +373,31 @@ TEST_F(SecondLookTest, WhatObserversNameAfterTenMinutesJoinsWhatTheyNamed) {
 }
 
 TEST_F(SecondLookTest, AResumedEpisodeKeepsItsNameUntilALookAnswers) {
-  Resume(kF13, Layer::kPhysics);
+  OpenEpisode open;
+  open.valve_id = "V1";
+  open.source_id = 1;
+  open.episode_id = 5;
+  open.detection_stamp_ns = PlantSample(0).stamp_ns - 9 * kSecond;
+  open.last_stamp_ns = PlantSample(0).stamp_ns - kSecond;
+  open.isolated = true;
+  open.faults = 0b0100;
+  open.layer = Layer::kPhysics;
+  open.model_hash = models_->content_hash;
+  Feed(0, kAtOnce - 40);
+  tracker_ = EpisodeTracker("V1", {});
+  tracker_.Recover(open);
+  names_.SetInheritedName(open.faults);
   Feed(kAtOnce - 40, kFirstLook + 1);
   worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));
   Observe(kFirstLook + 1);
-  EXPECT_EQ(Step(kFirstLook + 1).isolated, kF13);
+  EXPECT_EQ(Step(kFirstLook + 1).isolated, 0b0100U);
   EXPECT_THAT(outlet_.events, IsEmpty());
   Feed(kFirstLook + 2, kCounts + 1);
   ASSERT_EQ(outlet_.events.size(), 1U);
   EXPECT_EQ(outlet_.events[0].episode_id, 5U);
   EXPECT_EQ(outlet_.events[0].transition.kind, TransitionKind::kReisolated);
   EXPECT_EQ(outlet_.events[0].transition.faults, kF19);
-}
-
-TEST_F(SecondLookTest, AnObserversNameIsKeptUntilTheyNameAFaultAgain) {
-  Resume(kF13, Layer::kObservers);
-  Feed(kAtOnce - 40, kAtOnce + 2);
-  Observe(kAtOnce + 2);
-  engine_.isolated = kFinding;
-  Transit(TransitionKind::kIsolated);
-  EXPECT_EQ(Step(kAtOnce + 2).isolated, kF13);
-  Feed(kAtOnce + 3, kAtOnce + 5);
-  EXPECT_FALSE(names_.by_physics());
-  EXPECT_THAT(outlet_.events, IsEmpty());
-  Feed(kAtOnce + 5, kAtOnce + 6);
-  ASSERT_EQ(outlet_.events.size(), 1U);
-  EXPECT_EQ(outlet_.events[0].episode_id, 5U);
-  EXPECT_EQ(outlet_.events[0].transition.kind, TransitionKind::kReisolated);
-  EXPECT_EQ(outlet_.events[0].transition.layer, Layer::kObservers);
-  EXPECT_EQ(outlet_.events[0].transition.faults, kF7);
 }
 
 TEST_F(SecondLookTest, NothingIsNamedWhileIsolationIsHeld) {

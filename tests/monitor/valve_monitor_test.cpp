@@ -1,10 +1,15 @@
 #include "monitor/valve_monitor.h"
 
 #include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "diagnosis/fault_catalogue.h"
+#include "monitor/episode_tracker.h"
 #include "tests/monitor/linear_models.h"
 
 namespace fdi::monitor {
@@ -328,6 +333,72 @@ TEST_F(ValveMonitorTest, AResumedEpisodeWithAnotherFaultIsReisolated) {
 
   EXPECT_THAT(notebook_.Kinds(), ElementsAre(TransitionKind::kReisolated));
   EXPECT_EQ(notebook_.events.at(0).candidates.front().fault, 1);
+}
+
+// An episode of f7 goes on after a restart. Row by row, the engine says that it
+// is detected, that there is a finding of the floor, and what the test adds.
+class ResumedNameTest : public ValveMonitorTest {
+ protected:
+  static constexpr FaultSet kF1 = 0b001;
+  static constexpr FaultSet kF7 = 0b010;
+  static constexpr FaultSet kFinding = 0b100;
+
+  ResumedNameTest() {
+    ModelSet models = LinearModels();
+    models.faults.push_back(kFirstFinding);
+    models_ = std::make_shared<const ModelSet>(std::move(models));
+    OpenEpisode episode = LeftOpen();
+    episode.model_hash = models_->content_hash;
+    tracker_.Recover(episode);
+    Engine(TransitionKind::kDetected, 0);
+    Engine(TransitionKind::kIsolated, kFinding);
+  }
+
+  void Engine(TransitionKind kind, FaultSet faults) {
+    const Sample sample = PlantSample(k_++, kF7Offset);
+    Verdict verdict;
+    verdict.stamp_ns = sample.stamp_ns;
+    verdict.source_id = sample.source_id;
+    verdict.detected = true;
+    verdict.transition_count = 1;
+    verdict.transitions[0].kind = kind;
+    verdict.transitions[0].stamp_ns = sample.stamp_ns;
+    verdict.transitions[0].faults = faults;
+    tracker_.Step(sample, verdict, models_, notebook_);
+  }
+
+  std::vector<FaultSet> Names() const {
+    std::vector<FaultSet> names;
+    for (const FaultEvent& event : notebook_.events) {
+      names.push_back(event.transition.faults);
+    }
+    return names;
+  }
+
+  std::shared_ptr<const ModelSet> models_;
+  EpisodeTracker tracker_{"V1", {}};
+  std::uint64_t k_{150};
+};
+
+TEST_F(ResumedNameTest, StaysUntilAFaultIsNamedAgain) {
+  Engine(TransitionKind::kReisolated, kF7);
+  EXPECT_TRUE(notebook_.events.empty());
+  Engine(TransitionKind::kReisolated, kF1);
+  Engine(TransitionKind::kReisolated, kFinding);
+
+  EXPECT_THAT(notebook_.Kinds(), ElementsAre(TransitionKind::kReisolated,
+                                             TransitionKind::kReisolated));
+  EXPECT_THAT(Names(), ElementsAre(kF1, kFinding));
+}
+
+TEST_F(ResumedNameTest, EndsTheEpisodeIfNoneIsNamedAgain) {
+  Engine(TransitionKind::kCleared, kFinding);
+  Engine(TransitionKind::kClosed, kFinding);
+
+  EXPECT_THAT(notebook_.Kinds(),
+              ElementsAre(TransitionKind::kCleared, TransitionKind::kClosed));
+  EXPECT_THAT(Names(), ElementsAre(kF7, kF7));
+  EXPECT_EQ(notebook_.events.at(1).candidates.front().fault, 7);
 }
 
 TEST_F(ValveMonitorTest, ANormalMinuteAfterARestartClosesTheEpisodeUnknown) {
