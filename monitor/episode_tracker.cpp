@@ -296,7 +296,11 @@ void EpisodeTracker::End(const Transition& closed,
                          const std::shared_ptr<const ModelSet>& models,
                          EpisodeOutlet& outlet) {
   if (open_) {
-    Emit(closed, models, outlet);
+    Transition recorded = closed;
+    if (KeepsName(closed, *models)) {
+      recorded.faults = open_->faults;
+    }
+    Emit(recorded, models, outlet);
   }
 }
 

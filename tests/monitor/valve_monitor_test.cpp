@@ -401,6 +401,15 @@ TEST_F(ResumedNameTest, EndsTheEpisodeIfNoneIsNamedAgain) {
   EXPECT_EQ(notebook_.events.at(1).candidates.front().fault, 7);
 }
 
+TEST_F(ResumedNameTest, EndsTheEpisodeThatIsEndedFromOutside) {
+  Transition closed;
+  closed.kind = TransitionKind::kClosed;
+  closed.faults = kFinding;
+  tracker_.End(closed, models_, notebook_);
+
+  EXPECT_THAT(Names(), ElementsAre(kF7));
+}
+
 TEST_F(ValveMonitorTest, ANormalMinuteAfterARestartClosesTheEpisodeUnknown) {
   valve_.Recover(LeftOpen());
   Feed(150, 210);
