@@ -31,6 +31,7 @@ bool IsOneOf(std::string_view text, std::string_view words) {
   std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
     return static_cast<char>(std::tolower(c));
   });
+  // A text with a bar of its own could match across two words.
   return lower.find('|') == std::string::npos &&
          words.find('|' + lower + '|') != std::string_view::npos;
 }
@@ -91,6 +92,8 @@ std::vector<std::string> RowOf(const LabelledSample& labelled,
                                const Columns& columns, std::int64_t start_ns) {
   const Sample& sample = labelled.sample;
   std::vector<std::string> cells{
+      // The difference is taken in whole nanoseconds: a stamp since 1970 has
+      // more digits than a double.
       NumberText(static_cast<double>(sample.stamp_ns - start_ns) / 1e9)};
   for (const SignalColumn& column : columns.signals) {
     const bool there =
@@ -102,6 +105,8 @@ std::vector<std::string> RowOf(const LabelledSample& labelled,
     cells.emplace_back(ValveModeName(sample.mode));
   }
   if (columns.truth) {
+    // A cell cannot say "unknown": rows without a truth are written as normal
+    // operation as soon as any row of the run has one.
     const FaultTruth truth = labelled.truth.value_or(FaultTruth{});
     cells.push_back(FaultName(truth.fault));
     cells.push_back(NumberText(truth.strength));
@@ -111,6 +116,9 @@ std::vector<std::string> RowOf(const LabelledSample& labelled,
 
 }  // namespace
 
+// What historians, OPC clients and spreadsheets write where there is no value.
+// The words are complete cells, and "-" and "*" are no numbers, so no reading
+// is lost.
 bool IsNoReading(std::string_view cell) {
   constexpr std::string_view kWords =
       "|nan|-nan|n/a|na|#n/a|#na|#value!|#ref!|#div/0!|#name?|#num!|#null!|"
@@ -123,12 +131,16 @@ bool IsNoReading(std::string_view cell) {
   return cell.empty() || IsOneOf(cell, kWords);
 }
 
+// With the period T and the step d of two samples, |d - T| < T/2 is accepted:
+// the nearest instant of the grid is then unambiguous. A longer step is a gap,
+// which only `split_gaps_` allows. A step that is too short is never a gap.
 std::string StepCheck::Take(double t_s) {
   const std::optional<double> last = std::exchange(last_t_s_, t_s);
   if (!last) {
     return {};
   }
   const double step = t_s - *last;
+  // Negated so that NaN is refused, too.
   if (!(step > 0.0)) {
     return "time goes back or stands still: from " + NumberText(*last) +
            " s to " + NumberText(t_s) +
@@ -162,6 +174,14 @@ void CsvReader::Refuse(const std::string& reason) const {
                   reason);
 }
 
+//     table  = skipped ["sep=" sign] header {row}
+//     row    = cell {separator cell}          as many cells as the header has
+//     wide:    time [clock] signal ... [mode] [fault strength]
+//     long:    time [clock] tag value [quality]    one reading per row
+//
+// skipped are ColumnMap::skip lines. Blank lines may be anywhere. A record can
+// take several lines, because a quoted cell may contain line breaks: all
+// decisions about the separator come before a record is begun.
 std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
   ++line_;
   if (line_ <= options_.map.skip) {
@@ -173,6 +193,9 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
       options_.map.separator = line[4];
       return std::nullopt;
     }
+    // A pipe shows the header alone, so its separator is the one that cuts it
+    // into most cells. For whole tables WithSigns() has settled this with the
+    // first row.
     if (options_.map.separator == '\0' &&
         line.find_first_not_of(" \t\r") != std::string_view::npos) {
       options_.map.separator = FindSeparator(line, {});
@@ -199,6 +222,8 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
   row.line = line_;
   Sample& sample = row.labelled.sample;
   sample.flow_unit = header_.flow_unit;
+  // The tag comes before the time: it selects the clock that TakeTime()
+  // continues, and rows of unmapped tags may contain anything.
   if (tag_column_ && !TakeTagged(sample)) {
     return std::nullopt;
   }
@@ -256,6 +281,7 @@ bool CsvReader::TakeTagged(Sample& sample) {
   return true;
 }
 
+//     quality = word / number      the list `good`, if given, overrides both
 SignalQuality CsvReader::TaggedQuality() const {
   constexpr std::string_view kGood =
       "|good|g|ok|raw|good non-specific|0x00000000|";
@@ -310,6 +336,8 @@ void CsvReader::Finish() const {
   }
 }
 
+// All names are compared although the first match would do, because a second
+// column of the same name makes the choice arbitrary.
 std::optional<std::size_t> CsvReader::Column(std::string_view name) {
   std::optional<std::size_t> found;
   for (std::size_t i = 0; i < names_.size(); ++i) {
@@ -345,6 +373,8 @@ void CsvReader::TakeHeader() {
       quality_column_ = Column(map.long_table->quality);
     }
     CheckLongHeader();
+    // From here on `used_` counts tags instead of columns: Finish() reports
+    // mapped tags that never occurred.
     used_.assign(map.columns.size(), false);
     for (const ColumnMapping& m : map.columns) {
       AddSignal(
@@ -353,12 +383,15 @@ void CsvReader::TakeHeader() {
     header_.flow_unit = map.flow_unit.value_or(header_.flow_unit);
     return;
   }
+  // Mapped columns come first. A name of the contract that the map gives
+  // another meaning is then used already, and AddByContract() leaves it alone.
   AddMapped();
   for (std::size_t i = 0; i < names_.size(); ++i) {
     if (!used_[i] && !AddByContract(i, names_[i]) && !names_[i].empty()) {
       header_.ignored_columns.push_back(names_[i]);
     }
   }
+  // Emptied, so that Finish() does not take columns for tags.
   used_.clear();
   header_.has_truth = fault_column_ || strength_column_;
   CheckHeader();
@@ -430,6 +463,8 @@ void CsvReader::CheckLongHeader() const {
     }
   };
   require(time_column_.has_value(), options_.map.time_column);
+  require(clock_column_ || options_.map.clock_column.empty(),
+          options_.map.clock_column);
   require(tag_column_.has_value(), expected.tag);
   require(value_column_ < names_.size(), expected.value);
   require(quality_column_ || expected.quality.empty(), expected.quality);
@@ -477,6 +512,8 @@ void CsvReader::CheckHeader() const {
   }
 }
 
+// Words for "no reading" come first, because Number() refuses all that is no
+// number.
 std::optional<double> CsvReader::Reading(std::size_t column) const {
   return IsNoReading(Cell(column)) ? std::nullopt
                                    : std::optional(Number(column));
@@ -487,6 +524,8 @@ double CsvReader::Number(std::size_t column) const {
   const char decimal = options_.map.decimal;
   char sign = '.';
   auto value = ParseNumber(cell, decimal == '\0' ? '.' : decimal);
+  // Line by line nothing is known of the other rows. A decimal comma is
+  // therefore accepted only in cells where it cannot group thousands.
   if (!value && decimal == '\0' && DigitsOf(cell, sign) == Digits::kDecimal) {
     value = ParseNumber(cell, sign);
   }
@@ -537,6 +576,8 @@ FaultTruth CsvReader::Truth() const {
     }
     fault = *parsed;
   }
+  // The fault is checked before the strength, so that a mistyped name is
+  // refused even where it does not count yet.
   if (strength == 0.0) {
     return {};  // Simulators name a fault before it starts.
   }
@@ -546,6 +587,16 @@ FaultTruth CsvReader::Truth() const {
   return {fault, strength};
 }
 
+// A first cell that is a number may be on any of three axes, told apart by name
+// and size:
+//
+//     t_s           elapsed seconds
+//     3e4 .. 7e4    days of a spreadsheet, 1982 to 2091
+//     6e8 .. 4e9    seconds since 1970, 1989 to 2096
+//     else          elapsed seconds
+//
+// A whole number between 3e4 and 7e4 is rather a count of seconds than a
+// midnight. What rests on size alone is noted for the user.
 void CsvReader::FindTimeForm(const std::string& cell) {
   const ColumnMap& map = options_.map;
   time_form_ = map.time_form;
@@ -582,6 +633,8 @@ void CsvReader::TakeTime(CsvRow& row) {
   if (clock_column_) {
     cell += ' ' + Cell(*clock_column_);
   }
+  // The form of the first row holds for all rows: if each cell were judged by
+  // itself, a count of seconds would change its meaning on the way.
   if (time_form_ == TimeForm::kFindOut) {
     FindTimeForm(cell);
   }
@@ -605,6 +658,8 @@ void CsvReader::TakeTime(CsvRow& row) {
       // errors.
       const auto ms =
           std::llround((days - kSerialOf1970) * kSecondsPerDay * 1e3);
+      // Rounded towards minus infinity, so that the fraction is not negative
+      // before 1970 either.
       const std::time_t seconds = (ms - ((ms % 1000) + 1000) % 1000) / 1000;
       time.emplace();
       gmtime_r(&seconds, &time->fields);
@@ -625,6 +680,8 @@ void CsvReader::TakeTime(CsvRow& row) {
           "times without a zone taken as local time of this machine "
           "(guessed; --zone says which)");
     }
+    // Of an hour that the clock shows twice, the time of the row before decides
+    // which one it is (LocalClock::Utc).
     const auto utc = clock_.Utc(*time, last_ns_[tag_]);
     if (!utc) {
       Refuse(column + Quoted(cell) + " was never shown in zone '" +

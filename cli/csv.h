@@ -249,7 +249,7 @@ class CsvReader {
 };
 
 /// Reads a whole table (UTF-8, see ReadTextFile()). The sample period is the
-/// option's, or else the most frequent step. Samples within half a period of
+/// option's, or else the median step. Samples within half a period of
 /// its grid are moved onto it; ColumnMap::resampling makes a grid from any
 /// table, where instants without a nearby reading have quality UNCERTAIN.
 /// @throws DataError as CsvReader, or naming the line of a step that is not the

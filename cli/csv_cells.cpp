@@ -48,6 +48,9 @@ void AppendUtf8(char32_t code, std::string& out) {
   }
 }
 
+// A code point above U+FFFF less 0x10000 has twenty bits: a pair of units,
+// 0xD800 plus the upper and 0xDC00 plus the lower ten. A byte order mark is
+// dropped.
 std::string FromUtf16(std::string_view bytes, bool big_endian) {
   const auto unit = [&](std::size_t i) {
     const auto byte = [&](std::size_t at) {
@@ -70,6 +73,9 @@ std::string FromUtf16(std::string_view bytes, bool big_endian) {
   return text;
 }
 
+// Checks the number of continuation bytes (10xxxxxx) after each first byte, not
+// whether the code point is valid. That is enough: in Latin-1 a letter with an
+// accent is rarely followed by just such bytes.
 bool IsUtf8(std::string_view text) {
   std::size_t more = 0;
   for (const char c : text) {
@@ -109,6 +115,8 @@ bool IsGuarded(const std::string& cell) {
 
 }  // namespace
 
+// The state is kept between lines only while a quote is open; the line break,
+// which the caller has removed, belongs to the cell then.
 bool CsvCells::TakeLine(std::string_view line) {
   if (first_line_ && line.starts_with(kByteOrderMark)) {
     line.remove_prefix(kByteOrderMark.size());
@@ -168,6 +176,8 @@ void CsvCells::Take(char c) {
   }
 }
 
+// Blanks are dropped behind a cell without quotes only: quoted ones are part of
+// it.
 void CsvCells::EndCell() {
   while (state_ == State::kText && !cell_.empty() && IsBlank(cell_.back())) {
     cell_.pop_back();
@@ -180,9 +190,14 @@ void CsvCells::EndCell() {
   state_ = State::kBefore;
 }
 
+// std::from_chars, unlike strtod(), does not depend on the locale, skips no
+// blanks and gives the double nearest to the text. It accepts no leading +,
+// which is therefore skipped, and accepts nan and inf, which are refused below.
 std::optional<double> ParseNumber(std::string_view text, char decimal) {
   std::string point;
   if (decimal != '.') {
+    // Beside a decimal comma a point can only group thousands: "1.234" would be
+    // read as 1.234 instead of 1234.
     if (text.find('.') != std::string_view::npos) {
       return std::nullopt;
     }
@@ -208,6 +223,8 @@ std::string Quoted(std::string_view text) {
   return '"' + std::string(text.substr(0, 60)) + '"';
 }
 
+// std::to_chars without a precision gives the shortest digits that read back as
+// the same double, at most 24 characters.
 std::string NumberText(double value) {
   std::array<char, 32> digits;
   const auto end =
@@ -223,6 +240,11 @@ std::string Listed(const std::vector<std::string>& names) {
   return list;
 }
 
+//     grouped = 1*3DIGIT sign 3DIGIT       not beginning with 0
+//
+// "0.123" and "1.2345" have decimals, "1.234" may have either, and a second
+// sign in a grouped number means thousands. With an exponent a number is not
+// grouped.
 Digits DigitsOf(std::string_view cell, char& sign) {
   if (!cell.empty() && (cell.front() == '+' || cell.front() == '-')) {
     cell.remove_prefix(1);
@@ -246,6 +268,10 @@ Digits DigitsOf(std::string_view cell, char& sign) {
   return grouped ? Digits::kThousands : Digits::kNone;
 }
 
+// Separators are compared by (header and row have as many cells, number of
+// cells). The agreement comes first: a semicolon table with decimal commas may
+// have more commas than semicolons, but not as many in the header as in the
+// row. Of equal ones the first in the list is taken.
 char FindSeparator(std::string_view header, std::string_view row) {
   char best = ',';
   std::pair<bool, std::size_t> most{false, 1};
@@ -264,6 +290,9 @@ char FindSeparator(std::string_view header, std::string_view row) {
   return best;
 }
 
+// The order of the tests matters. A file in UTF-16 of ASCII text is also valid
+// UTF-8 with zeros in it, so UTF-16 is tested first. Latin-1 comes last,
+// because every sequence of bytes is valid in it.
 std::string ToUtf8(std::string bytes, const std::string& source) {
   const auto zero_at = [&](std::size_t i) {
     return bytes.size() > i && bytes[i] == '\0';
@@ -275,6 +304,7 @@ std::string ToUtf8(std::string bytes, const std::string& source) {
     text = FromUtf16(bytes, true);
   } else if (IsUtf8(bytes)) {
     text = std::move(bytes);
+    text.erase(0, text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0);
   } else {
     for (const char c : bytes) {
       AppendUtf8(static_cast<unsigned char>(c), text);
@@ -293,6 +323,7 @@ std::string ToUtf8(std::string bytes, const std::string& source) {
   if (text.find('\0') != std::string::npos) {
     throw DataError(source + ": is binary, not text: export it as CSV");
   }
+  // Without any LF, CR is taken as the line break (old Macintosh files).
   if (text.find('\n') == std::string::npos) {
     std::replace(text.begin(), text.end(), '\r', '\n');
   }
@@ -312,6 +343,8 @@ std::string ReadTextFile(const std::filesystem::path& path) {
   // zlib passes uncompressed files through.
   const auto close = [](gzFile file) { gzclose(file); };
   const std::unique_ptr<gzFile_s, decltype(close)> file(
+      // gzclose() closes the descriptor. stdin itself has to stay open, hence
+      // dup().
       is_stdin ? gzdopen(dup(STDIN_FILENO), "rb") : gzopen(path.c_str(), "rb"),
       close);
   if (!file) {
@@ -323,6 +356,8 @@ std::string ReadTextFile(const std::filesystem::path& path) {
   while ((count = gzread(file.get(), part.data(), part.size())) > 0) {
     bytes.append(part.data(), static_cast<std::size_t>(count));
   }
+  // gzread() returns 0 at the end of a truncated file, too; only gzerror() then
+  // says Z_BUF_ERROR.
   int code = Z_OK;
   const char* reason = gzerror(file.get(), &code);
   if (count < 0 || code != Z_OK) {
@@ -340,6 +375,8 @@ bool SameName(std::string_view a, std::string_view b) {
   });
 }
 
+// The guard is added before the cell is quoted: it is part of the content, and
+// reading removes the quotes first.
 void WriteCsvLine(std::ostream& out, const std::vector<std::string>& cells) {
   const char* separator = "";
   for (const std::string& text : cells) {

@@ -49,8 +49,13 @@ SampleSeries EmptyRun(const CsvHeader& header, double period_s) {
 }
 
 // Detects the decimal sign from all cells of the table.
-char FindDecimal(const std::vector<std::string_view>& lines, char separator,
-                 const std::string& source) {
+// Every cell is evidence (Digits): "12.34" shows a decimal sign, "1.234" may be
+// a decimal or a thousand, and "1.234.567" has thousands. Contradictions are
+// refused, and so is a table of ambiguous cells only, unless commas separate
+// them and all signs are points: a wrong guess would be off by a factor of
+// 1000.
+char FindDecimal(const std::vector<std::string_view>& lines, std::size_t begin,
+                 char separator, const std::string& source) {
   struct Seen {
     std::string cell;
     std::size_t line{0};
@@ -64,7 +69,7 @@ char FindDecimal(const std::vector<std::string_view>& lines, char separator,
                     "; try decimal = \".\" or decimal = \",\" under [file] "
                     "of --map, or export without thousands separators");
   };
-  for (std::size_t i = 0; i < lines.size(); ++i) {
+  for (std::size_t i = begin; i < lines.size(); ++i) {
     if (!record.TakeLine(lines[i])) {
       continue;
     }
@@ -115,7 +120,7 @@ ColumnMap WithSigns(std::string_view text, ColumnMap map,
   const std::vector<std::string_view> lines = Lines(text);
   // The header and the first row after it; blank lines do not count.
   std::vector<std::string_view> first;
-  auto begin = static_cast<std::size_t>(map.skip);
+  const auto begin = static_cast<std::size_t>(map.skip);
   for (std::size_t i = begin; i < lines.size() && first.size() < 2; ++i) {
     if (lines[i].starts_with("sep=") && first.empty()) {
       map.separator = lines[i].size() > 4 ? lines[i][4] : ',';
@@ -128,7 +133,7 @@ ColumnMap WithSigns(std::string_view text, ColumnMap map,
     map.separator = FindSeparator(first[0], first[1]);
   }
   if (map.decimal == '\0') {
-    map.decimal = FindDecimal(lines, map.separator, source);
+    map.decimal = FindDecimal(lines, begin, map.separator, source);
   }
   return map;
 }
@@ -187,6 +192,9 @@ class TableReader {
   CsvTable table_;
 };
 
+// The order of the steps matters: tags are joined before the order in time is
+// checked, since a long table may be sorted by tag; the period is found from
+// ordered rows; and runs are cut on the final grid.
 CsvTable TableReader::Read() {
   TakeRows();
   table_.header = reader_.header();
@@ -273,6 +281,8 @@ void TableReader::JoinTags() {
     }
   }
   rows_ = std::move(joined);
+  // The reader counted from the first row of the file, which need not be the
+  // earliest.
   const double first_s = rows_.empty() ? 0.0 : rows_.front().t_s;
   for (CsvRow& row : rows_) {
     row.t_s -= table_.dated ? first_s : 0.0;
@@ -292,8 +302,8 @@ void TableReader::CheckOrder() const {
   }
 }
 
-// The most frequent step. Jitter blurs it, so a nearby round value is
-// preferred.
+// The median step, which is the period if most steps are one. Jitter blurs it,
+// so a nearby round value is preferred.
 void TableReader::FindPeriod() {
   period_s_ = options().map.resampling ? options().map.resampling->period_s
                                        : options().period_s;
@@ -308,6 +318,8 @@ void TableReader::FindPeriod() {
   for (std::size_t k = 1; k < rows_.size(); ++k) {
     steps.push_back(rows_[k].t_s - rows_[k - 1].t_s);
   }
+  // Of two middle steps the shorter one: a gap must not become the period of a
+  // short table.
   const auto middle =
       steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
   std::nth_element(steps.begin(), middle, steps.end());
@@ -315,6 +327,8 @@ void TableReader::FindPeriod() {
   if (IsSteady()) {
     return;
   }
+  // Steady tables keep their exact step, however odd. Only steps with jitter
+  // are taken for a blurred round period.
   for (const double round : {0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0,
                              10.0, 12.0, 15.0, 20.0, 30.0, 60.0, 120.0}) {
     if (std::abs(period_s_ - round) < 0.05 * round) {
@@ -327,6 +341,8 @@ void TableReader::FindPeriod() {
 bool TableReader::IsSteady() const {
   for (std::size_t k = 1; k < rows_.size(); ++k) {
     const double off = rows_[k].t_s - rows_[k - 1].t_s - period_s_;
+    // Half a period too much, or more, is a gap. What is less is jitter, which
+    // PutOnGrid() removes.
     if (std::abs(off) > kStepTolerance * period_s_ &&
         !(MayHaveGaps() && off >= 0.5 * period_s_)) {
       return false;
@@ -347,6 +363,9 @@ void TableReader::RefuseStep(std::size_t k) const {
                "--resample " + NumberText(period_s_) + "s:linear");
 }
 
+// The first row may be early or late itself, so the grid does not begin there.
+// With remainders in [-T/2, T/2] of all rows against it, the median is the
+// shift that most rows agree on, and outliers do not move it.
 double TableReader::Phase() const {
   std::vector<double> off;
   for (const CsvRow& row : rows_) {
@@ -361,10 +380,13 @@ void TableReader::PutOnGrid() {
   const double begin_s = rows_.front().t_s + Phase();
   std::int64_t last = 0;
   double largest = 0.0;
+  // A copy, so that RefuseStep() shows the times that the file has.
   std::vector<CsvRow> placed = rows_;
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     const std::int64_t at = std::llround((rows_[k].t_s - begin_s) / period_s_);
     const double grid_s = begin_s + static_cast<double>(at) * period_s_;
+    // Each row needs an instant of its own, the next one unless gaps are
+    // allowed. Two rows on one instant would silently lose a sample.
     if (k > 0 &&
         (at <= last || (at > last + 1 && !MayHaveGaps()) ||
          std::abs(grid_s - rows_[k].t_s) > kMaxGridShift * period_s_)) {
@@ -406,6 +428,8 @@ std::optional<Resampled> At(const std::vector<TimedReading>& readings,
     const TimedReading& nearest = later ? *after : *before;
     return Resampled{nearest.value, nearest.quality != SignalQuality::kGood};
   }
+  // A line over two periods bridges a single missing sample, whatever the limit
+  // says.
   if (before != nullptr && after != nullptr && how.linear &&
       after->t_s - before->t_s <= std::max(how.limit_s, 2.0 * how.period_s)) {
     const double share = (t_s - before->t_s) / (after->t_s - before->t_s);
@@ -452,10 +476,15 @@ void TableReader::NoteResampling(
       (shares.empty() ? "" : "; kept out of fits and thresholds"));
 }
 
+// One pass over the grid with one cursor per signal: O(samples + readings).
+// Each signal is resampled from its own readings, because the tags of a long
+// table are read at different times. Truth and mode are those of the last row
+// up to half a period after the instant.
 void TableReader::Resample() {
   const Resampling& how = *options().map.resampling;
   const double begin_s = rows_.front().t_s + Phase();
   const double length_s = rows_.back().t_s - begin_s + 0.5 * period_s_;
+  // A period in the wrong unit would otherwise end only with the memory.
   if (length_s / period_s_ > 1e8) {
     throw ConfigError("--resample " + NumberText(period_s_) +
                       "s: more than 100 million samples");
@@ -496,6 +525,7 @@ void TableReader::Resample() {
     }
     if (!sample.Has(Signal::kCv) ||
         (!sample.Has(Signal::kX) && !sample.Has(Signal::kF))) {
+      // Otherwise a gap of months would be walked through instant by instant.
       if (row + 1 < rows_.size() && rows_[row + 1].t_s > t_s + period_s_) {
         // Continue after the gap.
         k = std::max(k, static_cast<std::int64_t>(std::floor(
@@ -544,6 +574,9 @@ void TableReader::CheckValues() {
       }
     }
     const std::string name(SignalName(signal));
+    // Single impossible readings are left to the diagnosis, which refuses such
+    // samples. A mapped signal is refused, because the map states the
+    // conversion; others are only noted.
     if (2 * beyond > count) {
       const std::string what =
           name + " is " + NumberText(first->labelled.sample[signal]) +
@@ -607,6 +640,7 @@ void TableReader::Cut() {
   double longest_s = 0.0;
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     const double step = k == 0 ? 0.0 : rows_[k].t_s - rows_[k - 1].t_s;
+    // The limit between jitter and a gap is that of IsSteady().
     const bool gap = step > 1.5 * period_s_;
     if (gap) {
       ++gaps;

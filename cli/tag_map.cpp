@@ -106,6 +106,12 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
     table.Refuse("unit", "unknown unit '" + name + "'; accepted are" +
                              UnitNames(signal));
   }
+  // raw and span are two points of a line, reading = offset + scale · cell:
+  //
+  //     scale = (span₁ − span₀)/(raw₁ − raw₀),   offset = span₀ − scale · raw₀.
+  //
+  // By default a current in mA is 4 to 20, and a percentage is 0 to 100 % over
+  // `raw`. Other signals have to state both.
   std::vector<double> raw = table.Numbers("raw");
   std::vector<double> span = table.Numbers("span");
   if (name == "mA" && raw.empty()) {
@@ -235,6 +241,8 @@ std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
     }
     return std::nullopt;
   };
+  // The whole name comes first, because "Pa" and "kPa" end with the a of
+  // "absolute".
   auto found = find();
   for (const std::string_view suffix : {"gauge", "abs", "g", "a"}) {
     if (!found && QuantityOf(signal) == Quantity::kPressure &&
@@ -268,6 +276,7 @@ std::string UnitNames(Signal signal) {
   }
 }
 
+//     resampling = period [":" ("hold" / "linear") [":" age]]
 Resampling ParseResampling(const std::string& text) {
   const auto parts = CLI::detail::split(text, ':');
   try {
@@ -305,6 +314,8 @@ ColumnMap ReadTagMap(const std::filesystem::path& path) {
     tall.quality = table->Text("quality").value_or("");
     tall.good = table->Texts("good");
   }
+  // The keys of [signal] are data, so they are not known to the reader in
+  // advance: each is checked here, and Table() marks it as known for Finish().
   if (auto signals = file.Table("signal")) {
     for (const std::string& name : signals->Keys()) {
       const auto signal = ParseSignal(name);
@@ -336,6 +347,8 @@ void TableOptions::AddTo(CLI::App& verb) {
       ->type_name("1s[:hold|linear[:AGE]]");
 }
 
+// For the zone: the option, then the file, then UTC if `utc`. A zone in the
+// file is part of what is known about it, so `utc` does not override it.
 ColumnMap TableOptions::Read(bool utc) const {
   ColumnMap columns = map.empty() ? ColumnMap{} : ReadTagMap(map);
   if (!zone.empty()) {

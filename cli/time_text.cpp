@@ -29,6 +29,16 @@ constexpr std::size_t kMaxTimeLength = 64;
 }
 
 // A cursor over the text of a time.
+// The grammar is:
+//
+//     time    = date [("T" / "t" / " ") clock] [offset]
+//     date    = YYYY s month s day / day s month s (YYYY / YY)   one s per date
+//     month   = number / "Jan" ... "Dec"
+//     clock   = hh ":" mm [":" ss [("." / ",") 1*DIGIT]] [[" "] ("AM" / "PM")]
+//     offset  = [" "] ("Z" / "UTC" / "GMT" / ("+" / "-") hh [[":"] mm])
+//
+// A year of two digits is accepted only beside the name of a month: in
+// "01-02-03" nothing shows which number is the year.
 class Scanner {
  public:
   explicit Scanner(std::string_view text) : rest_(text) {}
@@ -67,6 +77,7 @@ class Scanner {
     rest_.remove_prefix(word.size());
     return word;
   }
+  // Digits beyond nanoseconds are read and dropped: `unit` is 0 by then.
   std::int64_t Fraction() {
     std::int64_t unit = kNsPerSecond;
     std::int64_t fraction = 0;
@@ -124,6 +135,8 @@ bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
   } else if (!iso && digits != 4) {
     return false;
   }
+  // Dates with points are taken as day first. With slashes or dashes the order
+  // depends on the country, so a file has to say it.
   if (!iso && !named && separator != '.') {
     if (order == DateOrder::kNotSaid) {
       return false;
@@ -135,6 +148,7 @@ bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
   fields.tm_year = *year - 1900;
   fields.tm_mon = *month - 1;
   fields.tm_mday = *day;
+  // mktime() and timegm() would turn 31 February into 3 March without an error.
   return std::chrono::year_month_day{
       std::chrono::year(*year),
       std::chrono::month(static_cast<unsigned>(*month)),
@@ -164,6 +178,7 @@ bool ScanClock(Scanner& in, CivilTime& time) {
       time.fraction_ns = in.Fraction();
     }
   }
+  // A copy looks ahead, because the blank may belong to an offset: "14:56 UTC".
   Scanner ahead = in;
   ahead.Take(" ");
   const std::string half = Lower(ahead.Word());
@@ -172,6 +187,7 @@ bool ScanClock(Scanner& in, CivilTime& time) {
     if (*hour < 1 || *hour > 12) {
       return false;
     }
+    // 12 AM is midnight and 12 PM is noon.
     time.fields.tm_hour = *hour % 12 + (half == "pm" ? 12 : 0);
   }
   // A leap second has number 60.
@@ -269,6 +285,8 @@ std::optional<CivilTime> ScanTime(std::string_view text, DateOrder order) {
   return time;
 }
 
+// glibc takes an unknown TZ for UTC without an error. The name must therefore
+// be a file of the zone database, inside its folder.
 LocalClock::LocalClock(std::string zone) : zone_(std::move(zone)) {
   CivilTime offset;
   Scanner scanner(zone_);
@@ -284,6 +302,14 @@ LocalClock::LocalClock(std::string zone) : zone_(std::move(zone)) {
   }
 }
 
+// The offsets from UTC, in summer and in standard time, with which the clock
+// showed `fields`: none in the hour that is skipped in spring, two in the hour
+// that is repeated in autumn, else one. Summer time comes first, because it is
+// the earlier of the two.
+//
+// The C library has one time zone per process, so TZ is exchanged and restored.
+// setenv() and tzset() are not thread-safe: no other thread may read the
+// environment or convert local times meanwhile.
 void LocalClock::FindOffsets(const std::tm& fields) {
   const char* before = std::getenv("TZ");
   const std::optional<std::string> saved =
@@ -319,6 +345,9 @@ std::optional<std::int64_t> LocalClock::Utc(const CivilTime& time,
   }
   std::vector<int> offsets{time.offset_s.value_or(fixed_s_.value_or(0))};
   if (!time.offset_s && !fixed_s_) {
+    // Asking the C library anew for every row would be slow. Today's zones
+    // change their offsets at full or half hours, so those of half an hour are
+    // kept.
     if (std::time_t half = shown / kHalfHour; half != known_) {
       FindOffsets(time.fields);
       known_ = half;
@@ -326,6 +355,9 @@ std::optional<std::int64_t> LocalClock::Utc(const CivilTime& time,
     offsets = offsets_s_;
   }
   std::optional<std::int64_t> found;
+  // stamp = shown - offset. The offsets descend, so the stamps ascend, and the
+  // first one that is not before the previous row is taken. If all are before
+  // it, it is the last.
   for (const int offset : offsets) {
     const std::int64_t stamp =
         (shown - offset) * kNsPerSecond + time.fraction_ns;
@@ -365,6 +397,7 @@ std::int64_t ParseTimeOrAgo(std::string_view text, bool utc,
 }
 
 std::int64_t ParseDuration(std::string_view text) {
+  //     duration = number / 1*(number unit)     without a unit: seconds
   static const std::regex plain(R"(\d+\.?\d*|\.\d+)");
   static const std::regex part(
       R"((\d+\.?\d*|\.\d+)(ns|us|ms|s|min|m|h|d|w)(?![a-z]))");
@@ -387,6 +420,9 @@ std::int64_t ParseDuration(std::string_view text) {
       RefuseDuration(text);
     }
   }
+  // `whole` was cut one character beyond the limit, which shows that `text` is
+  // longer. 100 years in nanoseconds fit into 64 bits, also when subtracted
+  // from now.
   if (whole.size() > kMaxTimeLength || seconds > 100.0 * 365.25 * 86400.0) {
     RefuseDuration(text);
   }

@@ -14,6 +14,10 @@
 namespace fdi::cli {
 
 // The file and, for each of its tables, the keys that were read.
+// Places refer to the document and to its tables. The document is on the heap,
+// shared by all readers of the file, and its tables never change after parsing.
+// Readers can therefore be moved and outlive the root, and a table's address
+// can serve as its key.
 struct TomlReader::Document {
   std::string name;
   toml::table root;
@@ -39,6 +43,7 @@ struct TomlReader::Place {
     if (node == nullptr) {
       return std::nullopt;
     }
+    // value<T>() would convert between types.
     auto value = node->value_exact<T>();
     if (!value) {
       Refuse(key, std::string("expected ") + expected);
@@ -63,6 +68,8 @@ struct TomlReader::Place {
   // The table `node` at `key`; none of its keys is known yet.
   std::unique_ptr<Place> Inner(const toml::node& node,
                                std::string_view key) const {
+    // Makes the entry even if no getter follows, so that Finish() checks this
+    // table.
     document.known[node.as_table()];
     return std::make_unique<Place>(
         Place{document, node.as_table(), path + std::string(key) + '.'});
@@ -134,6 +141,7 @@ bool TomlReader::IsTable(std::string_view key) const {
   return node != nullptr && node->is_table();
 }
 
+// TOML tells 1 from 1.0; a number may be written either way.
 std::optional<double> TomlReader::Number(std::string_view key) {
   const toml::node* node = place_->Find(key);
   if (node != nullptr && !node->is_number()) {
@@ -145,6 +153,7 @@ std::optional<double> TomlReader::Number(std::string_view key) {
 std::optional<double> TomlReader::Number(std::string_view key, double minimum,
                                          double maximum) {
   const auto value = Number(key);
+  // Negated so that TOML's nan is refused, too.
   if (value && !(*value >= minimum && *value <= maximum)) {
     std::ostringstream message;
     message << *value << " is not in " << minimum << ".." << maximum;
@@ -225,6 +234,8 @@ void TomlReader::Refuse(std::string_view key, std::string_view message) const {
   place_->Refuse(key, message);
 }
 
+// Only tables that were opened have an entry. A table that nobody opened is
+// itself a key of its parent, unknown there.
 void TomlReader::Finish() const {
   // A key that no getter has read is unknown: usually it is mistyped, and
   // ignoring it would silently use the default.

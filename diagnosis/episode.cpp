@@ -9,6 +9,8 @@ namespace {
 
 constexpr int kMaxFaultSetSize = 4;  // more faults than this are no diagnosis
 
+// In binary, a product such as 0.55 · 100 lies above the whole number; without
+// the margin, ceil() would ask for one sample more.
 int CountOf(double fraction, int samples) {
   return static_cast<int>(std::ceil(fraction * samples - 1e-9));
 }
@@ -23,6 +25,9 @@ IsolationWindow::IsolationWindow(const DecisionParameters& parameters,
       ring_(static_cast<std::size_t>(length_), 0),
       counts_(faults, 0) {}
 
+// counts_[i] is how many of the last filled_ sets contain fault i; a sample
+// costs O(faults), however long t_k is. The ring needs no clearing: a slot is
+// subtracted only once the ring has been filled again.
 void IsolationWindow::Restart() {
   filled_ = 0;
   next_ = 0;
@@ -61,7 +66,8 @@ namespace {
 
 constexpr double kMeanShare = 0.3;        // of the threshold
 constexpr double kExcitationShare = 0.5;  // of the deviation at the detection
-// Samples over which the variation of CV is measured.
+// Samples over which the variation of CV is measured: t_c within these bounds,
+// because t_c itself may be anything from 1 to 100000.
 constexpr int kMinCommands = 60;
 constexpr int kMaxCommands = 200;
 
@@ -73,6 +79,8 @@ void CommandHistory::Push(double cv) {
   filled_ = std::min(filled_ + 1, ring_.size());
 }
 
+// In two passes: for a command that hardly varies, Σ cv²/n − mean² would be the
+// difference of two nearly equal numbers.
 double CommandHistory::deviation() const {
   const auto count = static_cast<double>(filled_);
   double mean = 0.0;
@@ -106,6 +114,8 @@ void ClearingWindow::Observe(double cv) {
   commands_.Push(cv);
 }
 
+// The commands so far are those up to the detection: Observe() has already
+// taken this sample.
 void ClearingWindow::Restart() {
   deviation_then_ = commands_.deviation();
   range_then_ = commands_.range();
@@ -129,6 +139,7 @@ void ClearingWindow::Push(std::span<const double> residuals,
     normal_count_ -= entry.normal ? 1 : 0;
   }
   for (std::size_t c = 0; c < residuals.size(); ++c) {
+    // A residual that abstains counts as 0: a NaN would never leave the sum.
     const double value = std::isfinite(residuals[c]) ? residuals[c] : 0.0;
     sums_[c] += value - (full ? entry.residuals[c] : 0.0);
     entry.residuals[c] = value;
@@ -157,6 +168,7 @@ bool ClearingWindow::Cleared() const {
       return false;
     }
   }
+  // Last, because it may pass over all the commands.
   return Excited();
 }
 
@@ -187,6 +199,7 @@ void Episode::Score(const ObserverBank& bank, Verdict& verdict) const {
 
 void Episode::Step(const Sample& sample, const ObserverBank& bank,
                    const Findings& findings, Verdict& verdict) {
+  // Before any return: at a detection, the commands before it are needed.
   clearing_.Observe(sample.Has(Signal::kCv) ? sample[Signal::kCv] : 0.0);
   const bool begins = verdict.state == State::kNormal;
   if (begins && !findings.detected) {
@@ -197,6 +210,9 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     begun_ = false;
     floor_ = 0;
   }
+  // The floor may open an episode before the observers have settled. What they
+  // show meanwhile is a transient that the evidence would carry for the length
+  // of its memory, so no fault has a factor until then.
   if (findings.settled && !begun_) {
     faults_.Restart();
     isolation_.Restart();
@@ -210,6 +226,9 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
   } else {
     std::ranges::fill(verdict.fault_factors, 0.0);
   }
+  // Stuck transmitters set every factor, so the floor sets its own after them.
+  // The detection follows both, because its transition carries the factors of
+  // this sample.
   if (findings.stuck != 0) {
     ApplyStuckFindings(findings.stuck, verdict);
   }
@@ -218,6 +237,8 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     Open(*findings.detected, verdict);
   }
   floor_ |= findings.floor;
+  // A fault isolated by this sample takes precedence over the findings of the
+  // floor, so NameFloor() comes after Isolate().
   if (findings.settled) {
     Isolate(verdict);
     JudgeUnknown(verdict);
@@ -229,6 +250,7 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
   clearing_.Push({verdict.residuals.data(), models_->channels.size()},
                  verdict.normal_factor, findings.abnormal);
   if (clearing_.Cleared()) {
+    // Both transitions carry the name of the episode, which is reset below.
     Emit(TransitionKind::kCleared, verdict.stamp_ns, verdict);
     Emit(TransitionKind::kClosed, verdict.stamp_ns, verdict,
          EndReason::kCleared);
@@ -297,9 +319,14 @@ FaultSet Episode::FactorsFrom(double threshold, const Verdict& verdict) const {
       from |= FaultSet{1} << i;
     }
   }
+  // A finding has the factor 1 while it lasts and would be isolated like a
+  // fault.
   return from & ~floor_names_;
 }
 
+// Among faults that training could not separate (docs/method.md, 10), noise may
+// favour one throughout the window. The others of its group join it unless they
+// are refuted, that is, below T/2.
 FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
   FaultSet joined = set;
   const FaultSet close =
@@ -318,16 +345,20 @@ FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
 
 void Episode::Isolate(Verdict& verdict) {
   const double threshold = models_->decision.isolation_threshold;
+  // Before any return, so that the window is full when a hold ends or the valve
+  // no longer looks normal.
   isolation_.Push(FactorsFrom(threshold, verdict));
   FaultSet supported = isolation_.Supported();
   if (isolation_held_ || supported == 0 || verdict.normal_factor >= threshold) {
     return;
   }
   supported = WithGroups(supported, verdict);
-  // A set this large is no diagnosis: its faults remain candidates.
+  // A set this large is no diagnosis: its faults remain candidates. Older model
+  // sets have no floor and keep their answers.
   if (models_->floor && std::popcount(supported) > kMaxFaultSetSize) {
     supported = floor_;
   }
+  // The first fault replaces findings of the floor at once.
   if ((verdict.isolated & ~floor_names_) == 0) {
     if ((supported & ~floor_names_) != 0) {
       const bool first = verdict.state == State::kDetected;
@@ -388,6 +419,9 @@ Transition Episode::Make(TransitionKind kind, std::int64_t stamp_ns,
   return transition;
 }
 
+// Verdict::transitions has room for the most that one sample brings: a
+// detection, a name, CLEARED and CLOSED; or, from a new source, the end of the
+// former episode, a detection and a name.
 void Episode::Emit(TransitionKind kind, std::int64_t stamp_ns, Verdict& verdict,
                    EndReason reason) const {
   verdict.transitions[static_cast<std::size_t>(verdict.transition_count++)] =

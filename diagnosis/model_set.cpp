@@ -1,7 +1,9 @@
 #include "diagnosis/model_set.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <functional>
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
@@ -9,6 +11,7 @@
 namespace fdi {
 namespace {
 
+// Conditions are written so that NaN fails them.
 void Check(bool condition, const ModelSet& models, const std::string& what) {
   if (!condition) {
     throw DataError("model set '" + models.name + "': " + what);
@@ -21,6 +24,8 @@ void ValidateDecision(const ModelSet& models) {
         "isolation threshold T must be in (0, 1)");
   Check(p.isolation_fraction > 0.0 && p.isolation_fraction <= 1.0, models,
         "isolation fraction must be in (0, 1]");
+  // IsolationWindow::Supported() relies on it: what supports a set also joins
+  // it.
   Check(p.join_fraction > 0.0 && p.join_fraction <= p.isolation_fraction,
         models, "join fraction must be in (0, isolation fraction]");
   Check(p.detection_samples >= 1 && p.detection_samples <= 1000, models,
@@ -33,6 +38,7 @@ void ValidateDecision(const ModelSet& models) {
         "t_c must be in 1..100000");
   Check(p.settling_samples >= 0 && p.settling_samples <= 100000, models,
         "settling samples must be in 0..100000");
+  // StrengthTracker divides by λ = 1 − 1/window, FaultBank by support − core.
   Check(p.evidence_window >= 2.0 && p.evidence_window <= 1e6, models,
         "evidence window must be in 2..1e6 samples");
   Check(p.evidence_core >= 0.0 && p.evidence_support > p.evidence_core, models,
@@ -86,6 +92,7 @@ void ValidateObserver(const ModelSet& models, const Observer& observer) {
     Validate(channel.model, observer.name.c_str());
     Check(channel.model.output == models.channels[c].output, models,
           where + "output is not the channel's");
+    // The evidence divides by its square and takes the logarithm of that.
     Check(std::isfinite(channel.residual_sd) && channel.residual_sd > 0.0,
           models, where + "residual deviation must be positive");
     Check(channel.correlation_time >= 1.0, models,
@@ -119,8 +126,9 @@ void ValidateFloor(const ModelSet& models, const FloorLimits& floor) {
     Check(rod.share > 0.0 && rod.share <= 1.0 && rod.rate > 0.0, models,
           "the rod of the floor must move towards the command");
   }
+  // RodBand keeps the last kMaxLag commands.
   Check(floor.delay >= 0 && floor.delay < kMaxLag, models,
-        "the delay of the floor must be in 0..." + std::to_string(kMaxLag));
+        "the delay of the floor must be in 0..." + std::to_string(kMaxLag - 1));
   Check(floor.deviation > 0.0 && floor.stuck_travel > 0.0 &&
             floor.flow_factor >= 1.0 && floor.flow_margin > 0.0 &&
             floor.flow_gain >= 0.0 && floor.flow_high >= 0.0,
@@ -179,6 +187,8 @@ void Validate(const ModelSet& models) {
         "the name must have 1 to 64 characters");
   Check(models.sample_period_s > 0.0 && models.sample_period_s <= 3600.0,
         models, "the sample period must be in (0, 3600] s");
+  // Sizes are checked before anything is indexed: the arrays of Verdict and the
+  // bits of a FaultSet hold no more.
   Check(!models.channels.empty() && models.channels.size() <= kMaxChannels,
         models, "there must be 1 to 16 channels");
   Check(!models.observers.empty() && models.observers.size() <= kMaxObservers,
@@ -187,15 +197,19 @@ void Validate(const ModelSet& models) {
         "there may be at most 64 faults");
   Check(models.observers.front().fault == 0, models,
         "the first observer must be the normal one");
-  Check(std::is_sorted(models.faults.begin(), models.faults.end()), models,
-        "faults must be ascending");
+  // Findings have the largest numbers, so they are the last bits: Floor and
+  // Episode count them from the end.
+  Check(std::ranges::adjacent_find(models.faults, std::greater_equal<>{}) ==
+            models.faults.end(),
+        models, "faults must be ascending");
   ValidateDecision(models);
   ValidateRegion(models);
   if (models.floor) {
     ValidateFloor(models, *models.floor);
   }
-  Check((FindingsOf(models) != 0) == models.floor.has_value(), models,
-        "a floor and its findings belong together");
+  constexpr int kFindings = kLastFinding - kFirstFinding + 1;
+  Check(std::popcount(FindingsOf(models)) == (models.floor ? kFindings : 0),
+        models, "a floor and its findings belong together");
   for (std::size_t i = 0; i < models.observers.size(); ++i) {
     const Observer& observer = models.observers[i];
     Check((i == 0) == (observer.fault == 0), models,

@@ -19,6 +19,17 @@ using LaneRules = std::array<const TsRule*, kLanes>;
 // One model per lane; likewise.
 using LaneModels = std::array<const TsModel*, kLanes>;
 
+// The kernels read the numbers of a group in this order, each a Quad, with n
+// regressors and m entries of the longest center:
+//
+//     nearness    = (v{m} L{m (m + 1)/2})*   by premise; L row by row
+//     sets        = set*                     by premise, then regressor
+//     consequents = (b a{n})*                by block, then rule
+//     minimum     = value{n}*                by block, or once if shared;
+//     maximum       likewise
+//
+// Beside other rules of its lane, a missing rule has the exponent −∞ and thus
+// the weight 0.
 Quad ByLane(const std::function<double(std::size_t)>& number) {
   Quad quad;
   for (std::size_t i = 0; i < kLanes; ++i) {
@@ -76,6 +87,8 @@ void AddNearness(const LaneRules& rules, ObserverGroup& group,
 
 void AddPremise(const LaneRules& rules, ObserverGroup& group) {
   QuadPremise premise;
+  // Unlike 0.0, −0.0 changes no addend, not even the sign of a zero: where sets
+  // are omitted, the exponent has the bits of Exponent() in ts_model.cpp.
   premise.start =
       ByLane([&](auto i) { return rules[i] != nullptr ? -0.0 : -kInfinite; });
   premise.least = ByLane([&](auto i) {
@@ -148,6 +161,8 @@ void AddBlock(const LaneModels& models, ObserverGroup& group) {
 std::vector<RegressorSource> Sources(const TsModel& model) {
   std::vector<RegressorSource> sources;
   for (const Regressor& regressor : model.regressors) {
+    // Validate() has refused a lag of 0 on the output, so own values are past
+    // ones.
     const bool own = model.parallel && regressor.signal == model.output;
     sources.push_back({own, Index(regressor.signal), regressor.lag});
   }
@@ -158,7 +173,8 @@ bool SameRegressors(const TsModel& a, const TsModel& b) {
   return a.regressors == b.regressors && a.parallel == b.parallel;
 }
 
-// Groups items that are `alike`, in order of first occurrence.
+// Groups items that are `alike`, in order of first occurrence. Quadratic at
+// worst, but once per model set and for at most kMaxObservers.
 template <typename Alike>
 std::vector<std::vector<std::size_t>> Sorted(
     const std::vector<std::size_t>& observers, const Alike& alike) {
@@ -212,6 +228,8 @@ void ObserverPlan::AddChannel(std::size_t channel) {
     std::copy_if(all.begin(), all.end(), std::back_inserter(some), [&](auto o) {
       return At(o, channel).difference == difference;
     });
+    // A free-running model reads its own past, so that equal antecedents still
+    // fire differently.
     Members rest;
     for (const Members& members : Sorted(some, [&](auto a, auto b) {
            return !IsFreeRunning(model(b)) &&
@@ -234,6 +252,9 @@ void ObserverPlan::AddChannel(std::size_t channel) {
 void ObserverPlan::AddGroup(std::size_t channel, const Members& members,
                             bool shared) {
   Members ordered = members;
+  // A block evaluates as many rules as its first model has, so models with
+  // similar numbers of rules share one. The sort is stable to leave observers
+  // with equally many in order, for in_order().
   std::stable_sort(ordered.begin(), ordered.end(), [&](auto a, auto b) {
     return At(a, channel).model.rules.size() >
            At(b, channel).model.rules.size();
@@ -264,6 +285,8 @@ void ObserverPlan::AddGroup(std::size_t channel, const Members& members,
   groups_.push_back(std::move(group));
 }
 
+// Appends the blocks of the group, whose first_block must be the number of
+// blocks so far.
 void ObserverPlan::AddSlots(const ObserverGroup& group,
                             const Members& members) {
   for (std::size_t k = 0; k < members.size(); ++k) {

@@ -7,7 +7,8 @@ namespace fdi {
 namespace {
 
 constexpr int kSearchSamples = 40;  // initial samples with a grid search
-// A fault rarely develops faster than to full strength in 10 minutes.
+// A fault rarely develops faster than to full strength in 10 minutes: at 1 Hz
+// that is 1/600 per sample, 2.5 of these deviations.
 constexpr double kRateDeviation = 1.0 / 1500.0;
 // An effect on a channel counts from this share of the deviation on.
 constexpr double kMinEffect = 0.25;
@@ -46,6 +47,7 @@ void StrengthTracker::Restart() {
 
 const StrengthPath::Node& StrengthTracker::BestNode(
     const ObserverEvidence& trained) const {
+  // The first node is normal operation.
   return *std::max_element(path_->nodes.begin() + 1, path_->nodes.end(),
                            [&](const auto& a, const auto& b) {
                              return trained.total(a.observer) <
@@ -70,9 +72,13 @@ double StrengthTracker::Interpolation(const ObserverEvidence& trained) const {
   const PathPlace place = path_->PlaceOf(strength_);
   const double h = place.from_low / (path_->nodes[place.segment + 1].strength -
                                      path_->nodes[place.segment].strength);
+  // h (1 − h) is negative beyond the trained strengths.
   return std::min(1.0, std::abs(4.0 * h * (1.0 - h)));
 }
 
+// What is forgiven is the contradiction of the channel that objects most; the
+// others keep what they have gathered. In the first samples this lasts until
+// the next one, because Search() sums the cells again.
 void StrengthTracker::RaiseEvidence(double least) {
   const double lacking = least - total_;
   if (lacking > 0.0) {
@@ -90,7 +96,8 @@ double StrengthTracker::Sum(const double* parts) const {
   return total;
 }
 
-// The evidence −½ (ν²/S + ln S)/τ of one channel.
+// The evidence −½ (ν²/S + ln S)/τ of one channel. Division by τ counts readings
+// that repeat each other once.
 double StrengthTracker::Gain(const ObserverBank& bank, std::size_t channel,
                              double residual, double variance) const {
   const double distance =
@@ -117,6 +124,13 @@ StrengthTracker::Segment StrengthTracker::SegmentOf(const ObserverBank& bank,
           high.sd};
 }
 
+// With w = high_share, the residual of the interpolation has the variance
+//
+//     S = (w σ_h + (1 − w) σ_l)² + (w e_h)² + ((1 − w) e_l)² + (κ Δs dŷ/ds)².
+//
+// The deviations σ add up, because both nodes are compared with the same noisy
+// reading; the errors e of extrapolation are taken as independent. The last
+// term is the error of interpolation at a distance Δs from place.nearest.
 StrengthTracker::Prediction StrengthTracker::At(const ObserverBank& bank,
                                                 std::size_t channel,
                                                 const Segment& segment,
@@ -187,6 +201,8 @@ void StrengthTracker::Search(const ObserverBank& bank) {
   }
   strength_ = path_->cells[best];
   std::copy_n(&cells_[best * channels_], channels_, evidence_.begin());
+  // The filter starts with what the grid leaves open: one cell in strength, and
+  // any likely rate.
   const double width = (path_->highest - path_->lowest) / (kStrengthCells - 1);
   var_strength_ = width * width;
   var_rate_ = kRateDeviation * kRateDeviation;
@@ -194,6 +210,7 @@ void StrengthTracker::Search(const ObserverBank& bank) {
   rate_ = 0.0;
 }
 
+// The cells ascend, so the predictions of each segment are read only once.
 void StrengthTracker::SearchChannel(const ObserverBank& bank,
                                     std::size_t channel) {
   std::size_t index = path_->places[0].segment;
@@ -212,6 +229,15 @@ void StrengthTracker::SearchChannel(const ObserverBank& bank,
   }
 }
 
+// Kalman filter for the state (s, ṡ) with covariance P, in units of samples:
+//
+//     s ← s + ṡ,   P ← F P Fᵀ / λ,   F = [1 1; 0 1].
+//
+// Division by λ replaces process noise: what is n samples old counts λⁿ. The
+// channels correct the state in turn, which for independent errors equals a
+// joint correction but needs no matrix inverse. Each gains its evidence before
+// it corrects the state: an innovation is the error of a prediction, and after
+// the correction every fault would seem to fit.
 void StrengthTracker::Track(const ObserverBank& bank) {
   const double memory = plan_->memory();
   // Prediction step: s ← s + ṡ; old information fades by λ.
@@ -243,6 +269,7 @@ void StrengthTracker::Track(const ObserverBank& bank) {
   }
   total_ = Sum(evidence_.data());
   ClampEstimate();
+  // A rate that points out of the range would hold the estimate at its end.
   if (strength_ < path_->lowest || strength_ > path_->highest) {
     strength_ = std::clamp(strength_, path_->lowest, path_->highest);
     rate_ = 0.0;
@@ -250,7 +277,12 @@ void StrengthTracker::Track(const ObserverBank& bank) {
 }
 
 // Correction step of the filter for one channel; outliers have bounded
-// influence.
+// influence. With H = [dŷ/ds 0], the innovation ν and its variance S = spread,
+//
+//     K = P Hᵀ/S,   (s, ṡ) ← (s, ṡ) + K ν,   P ← P − K H P.
+//
+// The variance of the rate comes first, because it needs the covariance from
+// before the correction.
 void StrengthTracker::Correct(const Prediction& prediction, double strength,
                               double spread) {
   const double residual = prediction.residual;
@@ -291,6 +323,7 @@ void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
     }
     const StrengthPath::Point& nearest =
         path_->points[place.nearest * channels_ + c];
+    // The trapezoid is that of residuals with deviation σ; these have √S.
     const double shrunk = p.residual * nearest.sd / std::sqrt(p.variance);
     factor_ = std::min(factor_, nearest.membership(shrunk));
   }

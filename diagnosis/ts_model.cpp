@@ -30,7 +30,8 @@ double LogMembership(const FuzzySet& set, double x) {
   return -0.5 * z * z;
 }
 
-// −½ ‖L (x − v)‖²; 0 for a rule without a center.
+// −½ ‖L (x − v)‖²; 0 for a rule without a center. Of row i of L, only the i + 1
+// entries up to the diagonal are stored.
 double LogNearness(const TsRule& rule, const double* x) {
   const double* entry = rule.metric.data();
   double squares = 0.0;
@@ -77,6 +78,7 @@ class Checker {
  public:
   explicit Checker(std::string where) : where_(std::move(where)) {}
 
+  // Conditions are written so that NaN fails them.
   void Check(bool condition, const std::string& message) const {
     if (!condition) {
       throw DataError(where_ + ": " + message);
@@ -163,6 +165,12 @@ void ValidateRule(const TsRule& rule, std::size_t n, const Checker& checker) {
 
 }  // namespace
 
+// With the exponents E_i and the largest of them, E,
+//
+//     β_i / Σ β_j = exp(E_i − E) / Σ exp(E_j − E),
+//
+// whose denominator is at least 1 even where all β_i underflow.
+//
 // prediction_kernel.h computes the same in the same order, bit for bit: change
 // both together.
 void ComputeFiring(const TsModel& model, const double* x, FiringRules& firing) {
@@ -196,6 +204,7 @@ double Blend(const TsModel& model, const double* x, const FiringRules& firing) {
     const auto rule = static_cast<std::size_t>(firing.rules[i]);
     value += firing.weights[i] * Output(model.rules[rule], x);
   }
+  // A parallel model feeds this back and could diverge without bounds.
   return std::clamp(value, model.output_min, model.output_max);
 }
 
@@ -205,6 +214,8 @@ TsPrediction Evaluate(const TsModel& model, const double* x) {
   return {Blend(model, x, firing), firing.covered};
 }
 
+// Exact comparison suffices: a model that is adapted from the normal one keeps
+// its antecedents to the bit (docs/method.md, 3).
 bool SharesAntecedents(const TsModel& a, const TsModel& b) {
   return a.regressors == b.regressors && a.parallel == b.parallel &&
          a.output == b.output && a.regressor_min == b.regressor_min &&
@@ -213,6 +224,8 @@ bool SharesAntecedents(const TsModel& a, const TsModel& b) {
                     b.rules.end(), SamePremise);
 }
 
+// A reading below the limit contradicts a prediction beyond it by the distance
+// to the limit at least, which is what counts.
 double Residual(double saturation, double reading, double prediction) {
   return reading >= saturation && prediction >= saturation
              ? std::numeric_limits<double>::quiet_NaN()

@@ -34,6 +34,7 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
     if (sample.quality[i] == SignalQuality::kBad) {
       return Intake::kBadQuality;
     }
+    // Before the range, which does not contain NaN either: the reason differs.
     if (!std::isfinite(sample.values[i])) {
       return Intake::kNotFinite;
     }
@@ -44,6 +45,18 @@ Intake CheckValues(const ModelSet& models, SignalMask required,
   return Intake::kAccepted;
 }
 
+// What Save() writes and Restore() reads, little endian and without padding:
+//
+//     snapshot  = format:u32 content_hash:u64 coverage detection
+//     coverage  = stamped:u8 last_stamp_ns:i64 armed:u8
+//     detection = windows healthy_s:f64 drift*
+//     windows   = (window window)*  residual and CV, by channel and length
+//     window    = length:i32 count:i32 mean:f64 variance:f64
+//     drift     = mean:f64 log_scale:f64 mean_full_ns:i64 scale_full_ns:i64
+//
+// There are kMaxChannels drifts, and as many windows as the model set has,
+// which content_hash identifies. A change to any part, also in the Save() of
+// ResidualWindow, needs another format number.
 constexpr std::uint32_t kSnapshotFormat = 3;
 // Samples in a row, until nothing is known.
 constexpr int kMaxUncertainRun = 60;
@@ -109,6 +122,7 @@ class ValveEngine::Impl {
   bool suspected_{false};
   bool has_source_{false};
   bool needs_initialisation_{true};
+  std::int64_t stamp_ns_{0};  // of the last sample in order
   SignalMask present_{0};
   int uncertain_{0};  // samples in a row of which no channel was measured
 };
@@ -129,6 +143,9 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
   if (OutOfOrder(placement.intake)) {
     return verdict_;
   }
+  stamp_ns_ = sample.stamp_ns;
+  // A newer source takes over by its first sample, even if its values are then
+  // rejected.
   if (placement.new_source) {
     TakeSource(sample);
   }
@@ -142,6 +159,8 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
     Reject(values);
     return verdict_;
   }
+  // The bank chooses the channels that it can evaluate when it is initialised,
+  // so other signals than before need that as much as a gap does.
   if (needs_initialisation_ || placement.gap || sample.present != present_) {
     Initialise(sample);
   }
@@ -153,6 +172,8 @@ const Verdict& ValveEngine::Impl::Step(const Sample& sample) {
   const bool uncertain =
       bank.active_channels() > 0 && bank.measured_channels() == 0;
   uncertain_ = uncertain ? std::min(uncertain_ + 1, kMaxUncertainRun + 1) : 0;
+  // With nothing measured, Score() would set every factor to 0, as if each
+  // fault and normal operation were refuted. So the last factors stand.
   if (!uncertain) {
     diagnosis_->episode.Score(bank, verdict_);
   }
@@ -190,6 +211,7 @@ void ValveEngine::Impl::Reject(Intake intake) {
   verdict_.quality = Quality::kBadInput;
   verdict_.uncovered = 0;
   verdict_.detected = episode_open();
+  // The past of the observers has to be consecutive, and lacks this sample.
   needs_initialisation_ = true;
 }
 
@@ -197,6 +219,7 @@ void ValveEngine::Impl::Initialise(const Sample& sample) {
   diagnosis_->bank.Initialise(sample);
   present_ = sample.present;
   needs_initialisation_ = false;
+  // Windows outlast a short interruption; runs of consecutive samples do not.
   if (diagnosis_->coverage.StartSettling(sample.stamp_ns)) {
     diagnosis_->detection.Interrupt();
   } else {
@@ -223,6 +246,9 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
       uncertain_ > kMaxUncertainRun) {
     return Quality::kBadInput;
   }
+  // A fault moves the command, so whether the valve is abnormal has to be known
+  // before its command may disarm it (docs/method.md, 8): the floor has taken
+  // this sample, and pending() is that of the last judged one.
   const Quality quality = diagnosis_->coverage.Judge(
       sample, diagnosis_->bank, episode_open(),
       diagnosis_->floor.findings() != 0, diagnosis_->detection.pending());
@@ -233,6 +259,7 @@ Quality ValveEngine::Impl::Judge(const Sample& sample) {
 void ValveEngine::Impl::Decide(const Sample& sample) {
   Detection& detection = diagnosis_->detection;
   const Floor& floor = diagnosis_->floor;
+  // What the windows may hold dates from before the valve was disarmed.
   if (diagnosis_->coverage.armed_now()) {
     detection.Restart();
   }
@@ -249,6 +276,8 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   }
   if (findings.settled) {
     findings.stuck = diagnosis_->stuck.faults();
+    // Push() comes first: after another operand, || could skip it and the
+    // windows would miss the sample.
     findings.abnormal = detection.Push(diagnosis_->bank, sample) ||
                         findings.stuck != 0 || findings.abnormal || suspected_;
     const auto suspicion =
@@ -260,6 +289,9 @@ void ValveEngine::Impl::Decide(const Sample& sample) {
   }
   const bool was_open = episode_open();
   diagnosis_->episode.Step(sample, diagnosis_->bank, findings, verdict_);
+  // After an episode the windows still contain its fault, which would open the
+  // next one at once. During an episode the limits do not adapt, or they would
+  // follow the fault.
   if (was_open && !episode_open()) {
     detection.Restart();
   } else if (findings.settled && !episode_open()) {
@@ -273,10 +305,12 @@ std::optional<Transition> ValveEngine::Impl::EndEpisode(EndReason reason) {
   if (!episode_open()) {
     return std::nullopt;
   }
-  return diagnosis_->episode.Close(reason, verdict_.stamp_ns, verdict_);
+  return diagnosis_->episode.Close(reason, stamp_ns_, verdict_);
 }
 
 std::optional<Transition> ValveEngine::Impl::Adopt(EngineParts parts) {
+  // If this throws, nothing has changed yet. The episode ends before the
+  // exchange, because the bits of its faults belong to the old set.
   auto replacement = std::make_unique<Diagnosis>(std::move(parts));
   replacement->episode.HoldIsolation(isolation_held_);
   std::optional<Transition> closed = EndEpisode(EndReason::kModelChanged);
@@ -303,6 +337,7 @@ bool ValveEngine::Impl::Restore(std::span<const std::byte> bytes) {
   SnapshotReader reader(bytes);
   std::uint32_t format = 0;
   std::uint64_t content_hash = 0;
+  // Into copies, so that damaged bytes change nothing.
   Coverage coverage(models());
   Detection detection(models());
   if (!reader.Get(format, content_hash) || format != kSnapshotFormat ||
@@ -312,6 +347,8 @@ bool ValveEngine::Impl::Restore(std::span<const std::byte> bytes) {
   }
   diagnosis_->coverage = coverage;
   diagnosis_->detection = std::move(detection);
+  // The initialisation compares the next stamp with the restored one, and
+  // discards all of this if too much time has passed.
   needs_initialisation_ = true;
   return true;
 }

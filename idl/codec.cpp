@@ -122,6 +122,8 @@ class Transfer {
   // A list of records, of messages, or of fault numbers.
   template <typename Ours, typename Wire>
   void List(const char* field, Ours& ours, Wire&& wire, std::size_t most) {
+    // The library does not enforce the bounds of a sequence: the count is
+    // checked before anything is resized.
     const std::size_t count = kEncodes ? ours.size() : wire.size();
     if (!CountFits(field, count, most)) {
       return;
@@ -171,6 +173,7 @@ class Transfer {
  private:
   template <typename Ours, typename Wire>
   void Text(const char* field, Ours& ours, Wire& wire) {
+    // The library's texts of bounded length cut off silently what is too long.
     if constexpr (!kEncodes) {
       ours = wire.c_str();
     } else if (ours.size() > Wire::max_size ||
@@ -229,6 +232,9 @@ void SignalsField(auto& t, const char* field, Mask& mask, Wire&& wire) {
   t.Ranged(field, mask, wire, 0, (1 << kSignalCount) - 1);
 }
 
+// The wire object is used for one message after another, and nothing clears it
+// in between: each function has to set every member of its type. Their order is
+// free, because the library serialises them in that of the IDL.
 void Fields(auto& t, Is<ValveSampleMessage> auto& message, auto& w) {
   auto& m = message.sample;
   FDI_FOR_EACH(FDI_FIELD, source_id, seq)
@@ -263,6 +269,8 @@ void Fields(auto& t, Is<DecisionMessage> auto& message, auto& w) {
           w.fault_factors());
   t.Array("fault_strengths", m.strengths, message.fault_count,
           w.fault_strengths());
+  // Both arrays set fault_count. If a foreign writer sends them in different
+  // lengths, the count would be right for the second one only.
   t.Require("fault_strengths",
             w.fault_strengths().size() == w.fault_factors().size());
   t.Array("observer_factors", m.observer_factors, message.observer_count,
@@ -367,6 +375,7 @@ void Codec<Message>::Encode(const Message& message, Wire& wire) {
 
 template <typename Message>
 bool Codec<Message>::Decode(const Wire& wire, Message& message) {
+  // Goes on after a field that does not fit: each field is bounded by itself.
   Transfer<false> transfer;
   KeyFields(transfer, message, wire);
   Fields(transfer, message, wire);

@@ -36,8 +36,11 @@ using transport::SharedMemTransportDescriptor;
 using transport::UDPv4TransportDescriptor;
 using transport::UDPv6TransportDescriptor;
 
+// The port of discovery is 7400 + 250 domain [RTPS, 9.6], at most 65 535.
 constexpr int kMaxDomain = 232;
 constexpr int kMaxValvesLimit = 100000;
+// The kernel's default of some 200 kB is the first queue to overflow, and what
+// it drops has to be retransmitted. Capped by net.core.rmem_max.
 constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
 // Larger than the 208 kB that the kernel queues for a host which does not
 // answer (net.ipv4.neigh.default.unres_qlen_bytes); otherwise sending to all
@@ -45,6 +48,7 @@ constexpr std::uint32_t kReceiveBufferBytes = 4U << 20U;
 // net.core.wmem_max, of which the kernel takes twice the value: its default
 // suffices.
 constexpr std::uint32_t kSendBufferBytes = 4U << 20U;
+// Shared memory is slow with the library's default of 512 kB.
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
 // Bounds remote endpoints per topic, and participants without a key.
@@ -151,6 +155,8 @@ class CheckedTransport : public transport::ChainingTransport {
   }
   // NOLINTEND(readability-function-size)
 
+  // Each port has a thread that calls this; what they share, `log_`, is thread
+  // safe. `buffer` belongs to the transport, so changes need a copy.
   void receive(transport::TransportReceiverInterface* receiver,
                const rtps::octet* buffer, std::uint32_t bytes,
                const rtps::Locator_t& local,
@@ -237,6 +243,8 @@ void SetTransports(const DdsOptions& options, dds::DomainParticipantQos& qos) {
 // Wraps the transports, also those of a QoS file; TCP is left as it is.
 void CheckTransports(const std::shared_ptr<DatagramLog>& log,
                      dds::TransportConfigQos& qos) {
+  // The library would create its built-in transports itself, unchecked. The
+  // same ones, UDPv4 and shared memory, stand in for them.
   if (std::exchange(qos.use_builtin_transports, false)) {
     auto udp = std::make_shared<UDPv4TransportDescriptor>();
     udp->sendBufferSize = qos.send_socket_buffer_size;
@@ -256,6 +264,8 @@ void CheckTransports(const std::shared_ptr<DatagramLog>& log,
 void Secure(const std::filesystem::path& folder, const LogSink& log,
             dds::DomainParticipantQos& qos) {
   const std::int64_t now = NowNs();
+  // For a file that is missing or wrong, create_participant() returns null and
+  // no reason; CheckKey() names both before the library sees the files.
   const KeyInfo key = CheckKey(folder, now);
   const std::int64_t days = (key.until_ns - now) / kNsPerDay;
   if (days < kDaysOfWarning && log) {
@@ -286,6 +296,8 @@ dds::DomainParticipantQos MakeQos(const DdsOptions& options,
                                   const std::shared_ptr<DatagramLog>& datagrams,
                                   const LogSink& log, const std::string& name) {
   dds::DomainParticipantQos qos;
+  // The profile is read first, because reading it replaces the whole QoS: what
+  // it does not state gets the library's defaults.
   const std::set<std::string>* stated = profiles.Stated(kParticipantProfile);
   if (stated != nullptr) {
     Check(dds::DomainParticipantFactory::get_instance()
@@ -305,6 +317,8 @@ dds::DomainParticipantQos MakeQos(const DdsOptions& options,
   }
   if (!states("builtin")) {
     auto& discovery = qos.wire_protocol().builtin.discovery_config;
+    // By default a peer that died is noticed after 20 s. Five announcements in
+    // a lease, so that four of them may be lost.
     discovery.leaseDuration = {5, 0};
     discovery.leaseDuration_announcementperiod = {1, 0};
   }
@@ -371,6 +385,9 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
   SetUpLibraryOnce();
   const dds::DomainParticipantQos qos =
       MakeQos(options_, profiles_, datagrams_, log_, name);
+  // The participant is active at once: its callbacks may come before `handle_`
+  // is set and use only members initialised above. It listens to discovery
+  // alone; the status of an endpoint goes to the listener of that endpoint.
   handle_ = NotNull(
       dds::DomainParticipantFactory::get_instance()->create_participant(
           static_cast<std::uint32_t>(options_.domain), qos, this,
@@ -380,6 +397,8 @@ Participant::Impl::Impl(const DdsOptions& options, LogSink log,
 
 Participant::Impl::~Impl() {
   handle_->set_listener(nullptr);
+  // A Participant outlives its endpoints, so only topics are left. They go
+  // first: the library does not delete a participant that contains entities.
   for (const auto& [name, topic] : topics_) {
     handle_->delete_topic(topic);
   }
@@ -403,6 +422,8 @@ void Participant::Impl::ReportIncompatible(const std::string& topic,
                                            bool remote_is_writer,
                                            dds::QosPolicyId_t id,
                                            const PolicyTexts& ours) {
+  // The library tells the policy, neither the endpoint nor its value. What is
+  // shown is the newest endpoint of the topic whose value differs from ours.
   const auto own = ours.find(id);
   std::string theirs = "unknown";
   {

@@ -11,6 +11,18 @@
 #include "idl/participant_impl.h"
 #include "idl/qos.h"
 
+// The XML of Fast DDS, as far as it is accepted:
+//
+//     file        = profiles | root containing profiles
+//     profiles    = {<transport_descriptors> | participant | writer | reader}
+//     participant = <participant profile_name="fdi_participant">
+//     writer      = <data_writer profile_name="ENDPOINT_writer">
+//     reader      = <data_reader profile_name="ENDPOINT_reader">
+//
+// ENDPOINT is one of EndpointNames(); <publisher> and <subscriber> are other
+// names of <data_writer> and <data_reader>. The file is parsed here as well as
+// by the library, which fills in its defaults and does not tell which policies
+// a profile states.
 namespace fdi::idl {
 namespace {
 
@@ -79,7 +91,9 @@ bool CanOverride(const std::string& element) {
   return known;
 }
 
-// Copies the policies common to both kinds of endpoint.
+// Copies the policies common to both kinds of endpoint, each as a whole: parts
+// that the profile does not state get the library's defaults, such as ten
+// instances in resourceLimitsQos.
 template <typename Qos>
 void CopyStated(const std::set<std::string>& stated, const Qos& from, Qos& to) {
   ForEachPolicy([&](const char* name, auto policy) {
@@ -149,7 +163,8 @@ ProfileFile::ProfileFile(const std::string& path) {
   }
   const tinyxml2::XMLElement* root = document.RootElement();
   const tinyxml2::XMLElement* profiles =
-      std::string_view(root->Name()) == "profiles"
+      root == nullptr ? nullptr
+      : std::string_view(root->Name()) == "profiles"
           ? root
           : root->FirstChildElement("profiles");
   if (profiles == nullptr) {
@@ -175,6 +190,7 @@ ProfileFile::ProfileFile(const std::string& path) {
                  : reader ? "_reader"
                           : "");
   });
+  // Last, because what the library has loaded it never forgets.
   LoadOnce(path);
 }
 

@@ -60,6 +60,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
     dds::Topic* topic =
         bus.TopicOf(Traits::kTopic,
                     dds::TypeSupport(new CheckedType<typename Traits::Type>()));
+    // Callbacks may come before create_datawriter() returns. They use
+    // `policies`, set before, and never `writer`.
     writer = NotNull(publisher->create_datawriter(
                          topic, qos, this,
                          dds::StatusMask::publication_matched()
@@ -106,6 +108,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
       if (!IsFull(code)) {
         Check(code, std::string(operation) + " on " + Traits::kTopic);
       }
+      // A message that found no room was not sent: trying again does not repeat
+      // it.
       retries.fetch_add(1, std::memory_order_relaxed);
       if (!lossless || stop.stop_requested() || Clock::now() >= deadline) {
         return false;
@@ -141,6 +145,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   std::atomic<std::uint64_t> retries{0};
   std::atomic<std::uint64_t> refused{0};
   std::atomic<std::uint64_t> incompatible{0};
+  // Held while Write() waits for room, because `wire` has to keep its message
+  // until the library accepts it: all threads that write wait together.
   std::mutex mutex;  // Guards what follows.
   std::map<Key<Message>, dds::InstanceHandle_t, std::less<>> instances;
   typename Traits::Wire wire;
@@ -166,6 +172,8 @@ WriteResult Publisher<Message>::Write(const Message& message,
     impl.refused.fetch_add(1, std::memory_order_relaxed);
     return WriteResult::kTooManyValves;
   }
+  // With a handle: in Fast DDS 2.9 write() without one returns a bool, which
+  // does not tell a full history from an error.
   const auto send = [&] { return impl.writer->write(&impl.wire, *instance); };
   if (!impl.Retry(send, "write", stop, DeadlineIn(timeout))) {
     return WriteResult::kNotSent;

@@ -79,6 +79,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
                  1024) {
     dds::Topic* topic =
         bus.TopicOf(Traits::kTopic, dds::TypeSupport(new Type()));
+    // Another endpoint may have made the topic, and registered its own type,
+    // first. The registered one is that which counts refusals.
     type = bus->find_type(topic->get_type_name());
     const EndpointQos ours = QosFor<Message>(profile, bus.options().max_valves);
     // Enabled only after `reader` is set, because callbacks use it.
@@ -100,6 +102,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   }
 
   ~Impl() override {
+    // Closing comes first: the receiving thread may be waiting for room, with
+    // the library's locks held that deleting the reader needs.
     queue.Close();
     reader->set_listener(nullptr);
     if (!holds_receipt) {  // Otherwise nothing was rejected.
@@ -150,6 +154,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
         queue.PopAll(batch, handed == 0 ? std::min<std::chrono::milliseconds>(
                                               timeout, kMaxWait)
                                         : std::chrono::milliseconds(0));
+        // While the queue was full, the callback left messages in the library,
+        // which calls it again only when another one arrives.
         if (queue.Reopened()) {
           Drain(false);
         }
@@ -157,6 +163,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
           break;
         }
       }
+      // Before the handler runs, because it may throw: the next call goes on
+      // behind this message.
       const Item& item = batch[next++];
       ++handed;
       (item.ended ? ended : received).fetch_add(1, std::memory_order_relaxed);
@@ -174,6 +182,9 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
   // taking thread only with holds_receipt, and by the taking thread after it
   // made room. If both call it, the second one leaves the work to the first.
   void Drain(bool waits) noexcept {
+    // No request is lost: `pending` is set before the attempt to lock and read
+    // after the unlocking. If the attempt fails, the other thread is still to
+    // read it, and drains once more.
     pending.store(true);
     while (pending.load()) {
       const std::unique_lock lock(drain_mutex, std::try_to_lock);
@@ -189,6 +200,9 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
     dds::SampleInfo info;
     while (waits ? queue.WaitForRoom() : queue.HasRoom()) {
       if (reader->take_next_sample(&wire, &info) != return_code::RETCODE_OK) {
+        // Only now, because numbers that are still in the library look missing:
+        // after a backlog it returns messages valve by valve, not in the order
+        // of writing.
         const std::lock_guard lock(status_mutex);
         missing = gaps.missing();
         return;
@@ -208,6 +222,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
                       HashOf(info.publication_handle, 16),
                       HashOf(info.publication_handle, 12)};
     item.ended = !info.valid_data;
+    // Counted before it is decoded: what cannot be decoded was not lost on the
+    // way.
     gaps.Count(item.reception.writer_id,
                info.sample_identity.sequence_number().to64long(),
                item.reception.sent_ns);
@@ -217,6 +233,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
       return;
     }
     if (!item.ended && !keys.contains(info.instance_handle)) {
+      // Once forgotten, the end of an instance that sends no more is
+      // undecodable.
       if (keys.size() >= max_keys) {
         keys.clear();  // Bounds the memory if ids keep changing.
       }
@@ -278,6 +296,8 @@ struct Subscriber<Message>::Impl : dds::DataReaderListener {
 
   void on_sample_rejected(dds::DataReader* /*reader*/,
                           const dds::SampleRejectedStatus& status) override {
+    // Thousands a second may come under back-pressure: they are counted, never
+    // logged one by one.
     if (status.last_reason != dds::REJECTED_BY_INSTANCES_LIMIT) {
       Add(&SubscriberStatus::rejected_samples, status.total_count_change);
       return;
@@ -354,12 +374,16 @@ SubscriberStatus Subscriber<Message>::status() const {
   status.received = impl.received.load(std::memory_order_relaxed);
   status.ended = impl.ended.load(std::memory_order_relaxed);
   status.undecodable += refused_bytes;
-  // Messages rejected for other reasons are missing as well.
+  // Numbers that were never received include the messages that are counted
+  // above as rejected or refused. The larger figure counts: the library leaves
+  // out what a writer overwrote, the numbers what came before the first one
+  // received.
   const std::uint64_t explained = status.rejected_instances + refused_bytes;
   status.lost =
       std::max(impl.missing - std::min(impl.missing, explained), status.lost);
   status.waiting = impl.queue.size();
   status.matched = impl.matched.count();
+  // With an infinite lease the library reports no liveliness of writers.
   if (!impl.has_lease) {
     status.alive = status.matched;
   }

@@ -33,9 +33,12 @@ EpisodeNames::EpisodeNames(std::string valve_id,
 
 const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
                                   bool held) {
+  // A late sample must not date a change of the name.
   if (!OutOfOrder(engine.intake)) {
     stamp_ns_ = sample.stamp_ns;
   }
+  // The looks see the verdict of the engine, not the name that counts: their
+  // own answers would otherwise become what the observers say.
   auto due = looks_->Step(sample, engine);
   for (const Transition& transition : engine.Transitions()) {
     detection_ns_ = transition.detection_stamp_ns;
@@ -55,6 +58,10 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
   const bool inherited = inherited_ && engine.detected && !held;
   const FaultSet observed =
       held ? engine.isolated : looks_->Observed(*models_, engine.isolated);
+  // Usually nothing differs from the engine, and its verdict of 2.5 kB is not
+  // copied. Once the name has differed, the transitions of the engine no longer
+  // describe what was reported, so they are replaced until the episode ends
+  // (own_).
   if (!named && !inherited && !own_ && observed == engine.isolated) {
     faults_ = engine.isolated;
     layer_ = Layer::kObservers;
@@ -77,6 +84,7 @@ const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
   strengths_.clear();
   if (named) {
     Name(*answer, *named);
+    // An answer counts until the next one does, but is recorded once.
     if (std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
       look_ = RecordOf(*answer);
       RecordStrengths(*answer);
@@ -103,6 +111,7 @@ const simulator::LookAnswer* EpisodeNames::AnswerTo(const Verdict& engine,
   return answer;
 }
 
+// The rows, up to 27 kB, go to the worker; only what Enter() needs is kept.
 void EpisodeNames::RequestLook(simulator::LookTask task) {
   simulator::LookTask key;
   key.occasion = task.occasion;
@@ -113,17 +122,22 @@ void EpisodeNames::RequestLook(simulator::LookTask task) {
       {std::move(key), worker_->Submit(valve_id_, physics_, std::move(task))});
 }
 
+// No sample waits for a simulation: wait_for(0) only asks. LookBook compares
+// each look with the earlier ones; the worker takes the looks at an episode in
+// their order, but a routine look that was asked for before them may come after
+// them.
 void EpisodeNames::CollectAnswers() {
   using std::future_status;
-  constexpr std::chrono::seconds kNow{0};
-  while (!pending_looks_.empty() &&
-         pending_looks_.front().answer.wait_for(kNow) == future_status::ready) {
-    LookWorker::Answer answer = pending_looks_.front().answer.get();
-    if (answer) {
-      looks_->Enter(pending_looks_.front().task, std::move(*answer));
+  static constexpr std::chrono::seconds kNow{0};
+  std::erase_if(pending_looks_, [this](PendingLook& look) {
+    if (look.answer.wait_for(kNow) != future_status::ready) {
+      return false;
     }
-    pending_looks_.pop_front();
-  }
+    if (LookWorker::Answer answer = look.answer.get()) {
+      looks_->Enter(look.task, std::move(*answer));
+    }
+    return true;
+  });
 }
 
 void EpisodeNames::RequestGrowth() {
@@ -132,6 +146,7 @@ void EpisodeNames::RequestGrowth() {
   }
   if (auto task = looks_->GrowthTask(known_)) {
     const auto rows = static_cast<std::int64_t>(task->window.rows.size());
+    // The strength is fitted as constant over the rows.
     const std::int64_t middle_ns = task->stamp_ns - (rows - 1) * PeriodNs() / 2;
     pending_growth_.push_back(
         {middle_ns, look_ns_,
@@ -171,6 +186,8 @@ void EpisodeNames::RecordStrengths(const simulator::LookAnswer& answer) {
   const auto rows = static_cast<std::int64_t>(answer.simulated.size());
   const std::int64_t first_ns = answer.stamp_ns - (rows - 1) * PeriodNs();
   for (const simulator::Explanation& e : known_) {
+    // A growing fault has its strength at the end of the window. Another one
+    // has had it since it began, so the middle stands for it.
     const std::int64_t begins_ns =
         std::max(first_ns, detection_ns_ + e.start * PeriodNs());
     if (!answer.early) {
@@ -208,6 +225,7 @@ void EpisodeNames::Name(const simulator::LookAnswer& answer,
       set |= FaultSet{1} << bit;
     }
   }
+  // Without a name, either no hypothesis fits, or more than four faults do.
   const bool outside = answer.outcome == simulator::LookOutcome::kNoneFits;
   SetName(set, outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
 }
@@ -279,6 +297,9 @@ Transition EpisodeNames::End(Transition closed) {
   if (own_) {
     WriteName(closed);
   }
+  // ValveLooks learns of an end from verdicts, and this one is in none. Unlike
+  // those of std::async, the futures of promises do not block in their
+  // destructors.
   looks_.emplace(*physics_);
   suspects_ = false;
   pending_looks_.clear();
@@ -286,6 +307,9 @@ Transition EpisodeNames::End(Transition closed) {
   return closed;
 }
 
+// pending_looks_ stays: ValveLooks ignores answers to an episode that has
+// ended, and routine looks go on. Answers for growth carry no episode and would
+// be recorded with the next one.
 void EpisodeNames::Reset() {
   own_ = false;
   by_physics_ = false;

@@ -10,10 +10,16 @@ namespace fdi::monitor {
 namespace {
 
 constexpr double kResumeWindowS = 60.0;
+// After a silence of as many periods a valve is STALE.
 constexpr double kGapPeriods = 3.0;
 
 std::int64_t Ns(double seconds) {
   return std::llround(seconds * 1e9);
+}
+
+bool EndsEpisode(const Transition& transition) {
+  return transition.kind == TransitionKind::kCleared ||
+         transition.kind == TransitionKind::kClosed;
 }
 
 }  // namespace
@@ -40,6 +46,8 @@ void EpisodeTracker::Adopt(const FaultEvent& event) {
     return;
   }
   recovered_ = OpenEpisodeOf(event);
+  // The time within which it has to be detected again begins now, not with the
+  // first sample of this session.
   if (!same) {
     first_stamp_ns_ = std::max(first_stamp_ns_, accepted_stamp_ns_);
   }
@@ -51,10 +59,15 @@ void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
   if (OutOfOrder(verdict.intake)) {
     return;
   }
+  // TryRecovery() precedes the transitions, because a detection resumes what it
+  // has not closed. It follows RecordGap(), which needs to know whether any
+  // sample came before. The trace takes the sample before the transitions, so
+  // that what they write includes it.
   RecordGap(sample, verdict, *models, outlet);
   TryRecovery(sample, *models, outlet);
   const int channels = static_cast<int>(models->channels.size());
   const int faults = static_cast<int>(models->faults.size());
+  // Push() would restart the trace and lose what is not written yet.
   if (open_ && open_->tracing &&
       !trace_.Continues(sample, verdict, channels, faults)) {
     WriteTrace(false, outlet);
@@ -96,6 +109,7 @@ void EpisodeTracker::Take(const std::vector<StrengthPoint>& points,
 // A stretch without accepted samples is a gap.
 void EpisodeTracker::RecordGap(const Sample& sample, const Verdict& verdict,
                                const ModelSet& models, EpisodeOutlet& outlet) {
+  // The stamps of two sources are not compared.
   if (seen_ && sample.source_id != source_id_) {
     accepted_stamp_ns_ = 0;
   }
@@ -128,6 +142,7 @@ void EpisodeTracker::TryRecovery(const Sample& sample, const ModelSet& models,
   const double window =
       std::max(kResumeWindowS,
                2.0 * models.decision.settling_samples * models.sample_period_s);
+  // The bits of its faults mean nothing in another model set.
   if (recovered_->model_hash != models.content_hash) {
     CloseRecovered(EndReason::kModelChanged, sample.stamp_ns, outlet);
   } else if (recovered_->source_id != sample.source_id ||
@@ -145,6 +160,7 @@ void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
   event.source_id = episode.source_id;
   event.episode_id = episode.episode_id;
   event.transition.kind = TransitionKind::kClosed;
+  // stamp_ns is 0 if this session saw no sample.
   event.transition.stamp_ns = std::max(stamp_ns, episode.last_stamp_ns);
   event.transition.detection_stamp_ns = episode.detection_stamp_ns;
   event.transition.faults = episode.faults;
@@ -166,6 +182,7 @@ void EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
   open_ = Open{};
   open_->source_id = verdict.source_id;
   open_->trace_until_ns = transition.stamp_ns + Ns(options_.after_detection_s);
+  // Whatever rules a resumption out, TryRecovery() has already applied.
   if (recovered_) {
     open_->episode_id = recovered_->episode_id;
     open_->detection_stamp_ns = recovered_->detection_stamp_ns;
@@ -188,6 +205,7 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
   Transition recorded = transition;
   if (transition.kind == TransitionKind::kDetected) {
     Begin(transition, verdict, outlet);
+    // The earlier session has reported the detection.
     if (open_->resumed) {
       return;
     }
@@ -195,8 +213,7 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
   if (!open_) {
     return;
   }
-  const bool ends = transition.kind == TransitionKind::kCleared ||
-                    transition.kind == TransitionKind::kClosed;
+  const bool ends = EndsEpisode(transition);
   const bool keeps = KeepsName(transition, *models);
   if (transition.kind == TransitionKind::kIsolated) {
     open_->trace_until_ns =
@@ -206,6 +223,8 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
     return;
   }
   if (transition.kind == TransitionKind::kIsolated) {
+    // What is the first name to the engine, which may have restarted, need not
+    // be that of the episode.
     recorded.kind = open_->isolated ? TransitionKind::kReisolated
                                     : TransitionKind::kIsolated;
     open_->isolated = true;
@@ -214,6 +233,9 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
     recorded.faults = open_->faults;
   } else {
     open_->faults = transition.faults;
+    // The factors do not always concern this episode: where it is superseded,
+    // they are those of the next source, and where it ends without a name,
+    // those of a normal valve.
     if (transition.reason != EndReason::kSuperseded &&
         !(ends && transition.faults == 0)) {
       open_->candidates = CandidatesOf(*models, verdict, transition.faults);
@@ -238,8 +260,9 @@ bool EpisodeTracker::KeepsName(const Transition& transition,
   const FaultSet known = ~FindingsOf(models);
   const bool finding =
       transition.faults != 0 && (transition.faults & known) == 0;
-  open_->renamed = !finding;
-  return transition.faults == open_->faults ||
+  const bool nothing = transition.faults == 0 && EndsEpisode(transition);
+  open_->renamed = !finding && !nothing;
+  return transition.faults == open_->faults || nothing ||
          (finding && (open_->faults & known) != 0);
 }
 

@@ -15,6 +15,9 @@ namespace fdi::monitor {
 namespace {
 
 constexpr double kMinLiveHours = 1.0;  // A day needs this many.
+// Below this share of LIVE time, days are missing because the valve runs
+// outside the trained region and not because it has not been followed for long
+// enough.
 constexpr double kCoveredShare = 0.2;
 
 using Kind = HealthLimit::Kind;
@@ -32,6 +35,8 @@ constexpr std::array<std::string_view, 6> kAnswers{
 }
 
 std::string NumberText(double value) {
+  // Fixed notation of a double has at most 309 digits before the point and some
+  // 324 behind it, not both.
   char text[400];
   const auto end =
       std::to_chars(text, text + sizeof text, value, std::chars_format::fixed);
@@ -63,6 +68,7 @@ void SetName(std::string_view text, std::string_view name, bool percent,
   }
 }
 
+// Rounds down; the division of integers rounds towards zero.
 std::int64_t DayOf(const HealthHour& hour) {
   return hour.hour / 24 - (hour.hour % 24 < 0 ? 1 : 0);
 }
@@ -104,6 +110,9 @@ class Cells {
   std::map<std::pair<std::int64_t, int>, Cell> cells_;
 };
 
+// With r = y − ŷ, the sums give Σŷ = Σy − Σr. A deviation is the ratio of sums
+// 100 Σr / Σŷ, in which the quantum cancels. It is not a mean of ratios, which
+// samples with a small ŷ would dominate.
 void AddResiduals(const HealthHour& hour, const HealthLimit& limit,
                   Cells& cells) {
   for (std::size_t b = 0; b < hour.bins.size(); ++b) {
@@ -136,10 +145,19 @@ void AddStrengths(const HealthHour& hour, int fault, Cells& cells) {
 }
 
 // The a_b of m_db = a_b + slope t, weighted by samples.
+//
+// Minimises Σ_b Σ_d w_db (m_db − a_b − slope t_d)², with w_db the samples of
+// day d in bin b. ∂/∂a_b = 0 gives a_b = (Σ_d w m − slope Σ_d w t) / Σ_d w;
+// inserted into ∂/∂slope = 0 this gives the slope below, which compares days
+// only within their bin. A slope that cannot be determined, as on a single day,
+// is 0.
 std::map<int, double> Intercepts(const std::vector<Cell>& cells) {
   struct Bin {
     double w{0.0}, wt{0.0}, wm{0.0}, wtt{0.0}, wtm{0.0};
   };
+  // Days count from the first one. Counted since 1970, their squares are some
+  // 4e8, and S_tt below, a difference of sums of them, would lose seven digits
+  // over a month.
   std::map<int, Bin> bins;
   const auto origin = static_cast<double>(cells.front().day);
   for (const Cell& cell : cells) {
@@ -167,6 +185,9 @@ std::map<int, double> Intercepts(const std::vector<Cell>& cells) {
   return intercepts;
 }
 
+// Value of day d = Σ_b w_db (m_db − a_b) / Σ_b w_db + ā, where ā is the mean of
+// a_b over all samples. Expects cells in order of their days, as Cells has
+// them.
 std::vector<DailyValue> Adjusted(const std::vector<Cell>& cells) {
   std::vector<DailyValue> days;
   if (cells.empty()) {
@@ -216,6 +237,8 @@ std::vector<HealthHour> Comparable(std::span<const HealthHour> hours,
   if (hours.empty()) {
     return comparable;
   }
+  // A model hash of 0 means that none was assigned. Such hours at the end must
+  // not hide the set that judged before them.
   const auto last = std::find_if(
       hours.rbegin(), hours.rend(),
       [&](const HealthHour& h) { return any_models || h.model_hash != 0; });
@@ -277,6 +300,7 @@ HealthForecast Forecast(const HealthSeries& series, const HealthLimit& limit) {
       forecast.slope = total / forecast.days;
     }
     forecast.time = ToTotal(series.days, limit.value - total);
+    // A total that has passed its limit needs no trend for that answer.
     forecast.answer = total >= limit.value         ? Answer::kReached
                       : forecast.time              ? Answer::kTime
                       : forecast.days < kTrendDays ? Answer::kTooFew
@@ -294,6 +318,8 @@ HealthForecast Forecast(const HealthSeries& series, const HealthLimit& limit) {
   }
   forecast.now = line->At(line->last_day);
   forecast.slope = line->slope;
+  // The sign of the limit says from which side it is reached. That is why
+  // ParseHealthLimit() refuses 0.
   const bool reached = limit.value < 0.0 ? *forecast.now <= limit.value
                                          : *forecast.now >= limit.value;
   forecast.time = ToLimit(*line, limit.value, line->last_day);
@@ -306,6 +332,11 @@ HealthForecast Forecast(const HealthSeries& series, const HealthLimit& limit) {
 
 // Text form of limits and forecasts.
 
+//     limit  = name "=" number ["%"]
+//     name   = SIGNAL | FAULT | "travel" | "reversals"
+//     number = as std::from_chars() reads it, so without "+"; finite and not 0
+//
+// "%" is for signals only, totals are positive, and strengths within -1..1.
 HealthLimit ParseHealthLimit(std::string_view text) {
   const std::size_t sign = text.find('=');
   if (sign == std::string_view::npos) {

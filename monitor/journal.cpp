@@ -19,6 +19,8 @@ constexpr std::size_t kPointsPerCommit = 5'000;
 // Number of open episodes extended per commit; each takes half a millisecond.
 constexpr int kTracesPerCommit = 100;
 
+// How long Stop() waits for the subscribers' acknowledgements of the last
+// events. What they do not acknowledge is published again by the next session.
 constexpr std::chrono::milliseconds kLastDelivery{300};
 
 }  // namespace
@@ -66,6 +68,8 @@ void Journal::Stop() {
     unsent_changed_.notify_one();
   }
   errors.Try([this] { publisher_.Join(); });
+  // From here on this thread alone uses the queues and the history. What it
+  // cannot write is not tried again; the events among it count as lost.
   MarkDelivered(Clock::now(), kLastDelivery);
   WriteRecords();
   for (const Record& record : std::exchange(records_, {})) {
@@ -77,6 +81,18 @@ void Journal::Stop() {
   errors.Rethrow();
 }
 
+// The path of an event. One Pending is in two queues, because the two threads
+// advance independently; its stage connects them:
+//
+//     unsent_       until the publisher takes it: at its stage kCommitted or
+//                   kFailed, or at its deadline
+//     records_      until the history thread has committed it
+//     undelivered_  published, until acknowledged and old enough
+//     records_      as Sent, until the history has marked it
+//
+// If the commit comes after the deadline, the event is on the bus as not
+// persisted and in the history all the same. If the mark is lost, the next
+// session publishes the event once more, and subscribers drop the repeat.
 void Journal::OnEvent(FaultEvent event) {
   if (event.transition.kind == TransitionKind::kDetected) {
     counters_.Add(Counter::kEpisodes);
@@ -91,6 +107,7 @@ void Journal::OnEvent(FaultEvent event) {
   if (!kept) {
     counters_.Add(Counter::kEventsLost);
   }
+  // A history that fails would only delay the event until its deadline.
   if (!kept || degraded_) {
     SetStageLocked(*pending, false);
   }
@@ -106,6 +123,7 @@ void Journal::MarkPublished(const FaultEvent& event) {
 
 void Journal::OnEvidence(EpisodeTrace trace) {
   const std::lock_guard lock(mutex_);
+  // Points are bounded rather than traces, because memory grows with points.
   const std::size_t points = trace.trace.size();
   if (trace_points_ + points > options_.max_trace_points) {
     counters_.Add(Counter::kTraceDropped, points);
@@ -184,6 +202,8 @@ void Journal::Write() {
     bool last_attempt = false;
     {
       std::unique_lock lock(mutex_);
+      // Not has_work: what could not be written is still queued, so the thread
+      // would retry without a pause.
       if (degraded_) {
         work_.wait_for(lock, options_.retry_period,
                        [this] { return stopping_; });
@@ -220,6 +240,9 @@ bool Journal::WriteWaiting() {
     }
     {
       const std::lock_guard lock(mutex_);
+      // A commit is due even without evidence: it stores gaps and marks, which
+      // are only buffered, and the sign of life from which the next session
+      // dates a crash.
       const bool due = Clock::now() - last_commit_ >= options_.commit_period;
       const bool wanted = (stopping_ || degraded_) && !traces_.empty();
       if (!due && !wanted && trace_points_ < kPointsPerCommit) {
@@ -302,6 +325,8 @@ bool Journal::WriteBatch(const std::vector<const Record*>& batch) {
 }
 
 // A checkpoint that fails is merged into the next one.
+// It is taken out of the queue before the commit, because committing it twice
+// would count its time twice: the sink guarantees all or nothing.
 bool Journal::WriteCheckpoint() {
   Checkpoint checkpoint;
   {
@@ -313,6 +338,8 @@ bool Journal::WriteCheckpoint() {
     return true;
   }
   const std::lock_guard lock(mutex_);
+  // The failed one is the older one: of two accumulators of a valve the newer
+  // one is kept.
   checkpoint_ = Merged(std::move(checkpoint), std::move(checkpoint_));
   return false;
 }
@@ -340,6 +367,8 @@ bool Journal::WriteTraces() {
     if (late || !Attempt([&] { history_.AddTrace(*trace); })) {
       counters_.Add(Counter::kTraceDropped, trace->trace.size());
     }
+    // The commit of a batch includes what is buffered. Without this check an
+    // event would wait until up to kTracesPerCommit traces are packed.
     if (HasQueuedEvent()) {
       return WriteRecords();
     }
@@ -394,6 +423,8 @@ void Journal::Recovered() {
       {"", degraded_since_ns_, context_.utc_now_ns(), "persistence_degraded"});
 }
 
+// Waits for the oldest unsent event only, which keeps the order. Each deadline
+// runs from the arrival of its event, so the delays do not add up.
 void Journal::PublishAll() {
   std::unique_lock lock(mutex_);
   while (true) {
@@ -431,6 +462,8 @@ void Journal::MarkDelivered(Clock::time_point limit,
   std::unique_lock lock(mutex_);
   bool acknowledged = due();
   lock.unlock();
+  // Without the lock, because it may wait for subscribers. What is published
+  // meanwhile is newer than `limit` and therefore not marked.
   acknowledged = acknowledged && options_.acknowledged(patience);
   lock.lock();
   while (undelivered_.size() > options_.max_undelivered ||

@@ -13,6 +13,8 @@
 
 namespace fdi::monitor {
 
+// The thread is the last member, so it ends before the queues that it uses are
+// destroyed.
 LookWorker::~LookWorker() {
   stop_.request_stop();
 }
@@ -40,10 +42,15 @@ std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
   const bool naming = look.task.occasion == LookOccasion::kEpisode;
   const bool growth = look.task.occasion == LookOccasion::kGrowth;
   std::deque<Look>& waiting = naming ? waiting_ : growth ? growth_ : routine_;
+  // A newer look at a valve makes one that still waits pointless. Looks for
+  // growth are points of a curve, each of which counts.
   const auto same =
       growth ? waiting.end()
              : std::ranges::find(waiting, look.valve_id, &Look::valve_id);
   if (same != waiting.end()) {
+    // A promise that is destroyed without a value makes get() throw
+    // std::future_error in the diagnosis thread, so a look that is replaced is
+    // answered with nothing first.
     same->answer.set_value(std::nullopt);
     *same = std::move(look);
   } else if (waiting.size() < (naming ? capacity_ : kMaxRoutineLooks)) {
@@ -79,6 +86,8 @@ void LookWorker::TakeLooks() {
   const std::stop_token stop = stop_.get_token();
   std::unique_lock lock(mutex_);
   const auto due = [this] { return !First().empty(); };
+  // A wait that a stop ends returns due(), which is true while looks are
+  // waiting. Without the second condition a stop would take them all first.
   while (arrival_.wait(lock, stop, due) && !stop.stop_requested()) {
     std::deque<Look>& first = First();
     Look look = std::move(first.front());

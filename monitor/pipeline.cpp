@@ -14,9 +14,13 @@
 namespace fdi::monitor {
 namespace {
 
+// The bound of valve_id in idl/fdi_v1.idl.
 constexpr std::size_t kMaxIdLength = 64;
 constexpr std::size_t kRememberedRefusals = 65536;
 constexpr std::chrono::milliseconds kPollPeriod{250};
+// Under load Poll() comes only after thousands of samples, and a slow
+// subscriber of fdi/v1/DecisionBatch holds up each of them. A thread that gets
+// through them slowly is not stalled.
 constexpr std::uint64_t kBeatSamples = 64;
 
 // Indexed by Intake.
@@ -86,6 +90,8 @@ Pipeline::~Pipeline() {
 void Pipeline::Start(const std::vector<OpenEpisode>& open,
                      std::vector<Accumulator> accumulators,
                      std::vector<Accumulator> shadow_accumulators) {
+  // All reservations come before the first sample, so that unknown ids cannot
+  // take the slots of known valves.
   for (const std::string& id : resolver_->AssignedValves()) {
     Reserve(id);
   }
@@ -137,6 +143,8 @@ void Pipeline::Stop() {
   }
   FirstError errors;
   errors.Try([this] {
+    // Silence is counted up to now, then the evidence is flushed: the last
+    // checkpoint must be complete before the journal stops.
     CheckSilentValves(std::chrono::steady_clock::now());
     for (const std::unique_ptr<Valve>& valve : valves_) {
       valve->monitor.Flush(journal_);
@@ -171,6 +179,8 @@ Pipeline::Valve* Pipeline::Admit(std::string_view valve_id) {
     counters_.Add(Counter::kFilteredSamples);
     return nullptr;
   }
+  // Reserved slots stay free for known valves: with V valves, R of them and P
+  // places, an unknown valve needs V + R < P, a known one only V < P.
   const auto places = static_cast<std::size_t>(options_.max_valves);
   const bool is_known = reserved_.contains(valve_id);
   const std::size_t kept = is_known ? 0 : reserved_.size();
@@ -196,11 +206,16 @@ bool Pipeline::IsEvictable(const Valve& valve) const {
 
 // Evicts an unknown valve that is silent or, in favour of a known valve, the
 // one that has been silent longest. @returns whether a slot was freed.
+//
+// An unknown valve looks only at idle_, because anybody can send a new id with
+// every sample: a search through all valves would cost O(valves) for each of
+// them. For a known valve, one of a fixed list, the search is worth its cost.
 bool Pipeline::FreeSlot(bool for_known) {
   const TimePoint now = last_poll_;
   while (!idle_.empty()) {
     Valve* const valve = idle_.back();
     idle_.pop_back();
+    // idle_ is as old as the last Poll(): the valve may have sent since.
     if (IsEvictable(*valve) &&
         valve->monitor.Silence(now) >= options_.place_timeout) {
       Evict(*valve);
@@ -224,6 +239,8 @@ bool Pipeline::FreeSlot(bool for_known) {
 void Pipeline::Evict(Valve& valve) {
   const std::string id = valve.monitor.id();
   log_.Line(LogLevel::kDebug, "valve_forgotten valve=" + id);
+  // The valve is gone after this, so what it has gathered since the last
+  // checkpoint is stored now.
   Checkpoint checkpoint;
   valve.monitor.Flush(journal_);
   valve.monitor.TakeCheckpoint(checkpoint);
@@ -340,12 +357,16 @@ void Pipeline::OnSample(std::string_view valve_id, const Sample& sample,
   }
   Count(*valve, sample, outcome);
   const Verdict& verdict = outcome.verdict;
+  // A sample out of order did not affect the engine, so its verdict is that of
+  // an earlier sample, which is on the bus already.
   if (!OutOfOrder(verdict.intake)) {
     Publish(*valve, outcome);
     if (live_ != nullptr) {
       live_->Show(valve->monitor.id(), sample, outcome);
     }
   }
+  // Samples out of order are recorded, too: re-scoring a run must give the
+  // engine what it was given here.
   if (recorder_) {
     recorder_->Record({valve->monitor.id(), sample, verdict.intake,
                        verdict.initialised, outcome.model_swapped, false});
@@ -374,6 +395,8 @@ void Pipeline::OnStreamEnded(std::string_view valve_id, std::uint64_t writer) {
 void Pipeline::Adopt(FaultEvent event) {
   std::optional<EngineParts> parts;
   Resolve(event.valve_id, parts);
+  // The faults of an event are bits of its model set. With another set here
+  // they would mean other faults.
   if (!parts || parts->plan->models().content_hash != event.model_hash) {
     log_.Line(LogLevel::kInfo,
               "event_not_adopted valve=" + LogValue(event.valve_id) +
@@ -387,6 +410,9 @@ void Pipeline::Adopt(FaultEvent event) {
     found->second->monitor.Adopt(event);
     return;
   }
+  // Nothing of this valve was received here yet. Its episode is treated like
+  // one that the last session left open: its first samples continue it, or the
+  // recovery window closes it.
   const auto open = recovered_.find(event.valve_id);
   if (open != recovered_.end() && open->second.episode_id != event.episode_id) {
     return;
@@ -465,6 +491,8 @@ void Pipeline::Poll(TimePoint now) {
   if (decisions_.LastValuesDue()) {
     PublishLast();
   }
+  // What visits every valve runs four times a second and not at each call, of
+  // which there are ten a second or more.
   if (now - last_poll_ >= kPollPeriod) {
     last_poll_ = now;
     for (const std::unique_ptr<Valve>& valve : valves_) {
@@ -517,12 +545,16 @@ void Pipeline::CheckSilentValves(TimePoint now) {
   Checkpoint full;  // Of valves that are running out of rows.
   for (const std::unique_ptr<Valve>& valve : valves_) {
     ValveMonitor& monitor = valve->monitor;
+    // At kMaxBookRows a book opens no new day or hour. The other half is for
+    // the samples until the next call.
     if (monitor.book_rows() >= kMaxBookRows / 2) {
       monitor.TakeCheckpoint(full);
     }
     if (IsEvictable(*valve) && monitor.Silence(now) >= options_.place_timeout) {
       idle_.push_back(valve.get());
     }
+    // The order matters: CountStale() and CheckTimeout() act only on a valve
+    // that CheckStale() has labelled.
     if (monitor.CheckStale(now)) {
       counters_.Add(Counter::kStaleEvents);
       log_.Report(LogId::kStale, "valve_stale",
@@ -573,6 +605,7 @@ void Pipeline::UpdateCensus() {
                          : 0;
     census.near_bound += valve->drift_used >= kNearBound ? 1 : 0;
   }
+  // Counted without the lock: readers wait for the copy, not for all valves.
   const std::lock_guard lock(mutex_);
   census_ = census;
 }
@@ -616,6 +649,7 @@ void Pipeline::AdoptNextResolver() {
     Reserve(id);
   }
   std::uint64_t swapped = 0;
+  // plans_ has weak pointers only, and valves with the same set share a plan.
   std::vector<EngineParts> alive;  // Keeps each plan alive, adopted or not.
   for (const std::unique_ptr<Valve>& valve : valves_) {
     ValveMonitor& monitor = valve->monitor;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "diagnosis/fault_catalogue.h"
 #include "diagnosis/printable.h"
 #include "diagnosis/records/valve_glob.h"
 #include "diagnosis/time_units.h"
@@ -13,12 +14,18 @@ namespace {
 constexpr std::array<std::string_view, kShadowFitCount> kFitNames = {
     "compared", "unassigned", "same_set", "signals", "unit", "period"};
 
-// Bit n stands for fault number n, independent of the bit's place in the set.
+// Bit n stands for fault number n, and those from 32 on for the findings of the
+// floor, independent of their places in the set.
 std::uint64_t NumbersOf(const ModelSet& models, FaultSet faults) {
+  constexpr int kFirstNumber = 32;  // Of a finding.
+  static_assert(kLastFault < kFirstNumber);
   std::uint64_t numbers = 0;
   for (std::size_t bit = 0; faults != 0; ++bit, faults >>= 1U) {
     if ((faults & 1U) != 0) {
-      numbers |= std::uint64_t{1} << static_cast<unsigned>(models.faults[bit]);
+      const int fault = models.faults[bit];
+      const int number =
+          IsFinding(fault) ? kFirstNumber + fault - kFirstFinding : fault;
+      numbers |= std::uint64_t{1} << static_cast<unsigned>(number);
     }
   }
   return numbers;
@@ -85,6 +92,8 @@ void ShadowValve::SetFit(ShadowFit fit) {
 
 std::optional<ShadowOutcome> ShadowValve::Step(const Sample& sample,
                                                const ValveOutcome& active) {
+  // What the active engine ignored, the candidate does not get either, so that
+  // no difference comes from the input.
   if (OutOfOrder(active.verdict.intake)) {
     return std::nullopt;
   }
@@ -93,16 +102,23 @@ std::optional<ShadowOutcome> ShadowValve::Step(const Sample& sample,
     Close();
     return std::nullopt;
   }
+  // Only now, because an engine is the cost of a comparison: a valve that the
+  // candidate does not fit has none.
   if (!engine_) {
     engine_.emplace(parts_);
   }
+  // As for the active engine, accumulators belong to one source. Those of
+  // another one are dropped for good.
   if (saved_ && saved_->source_id == sample.source_id) {
     engine_->Restore(saved_->bytes);
   }
   saved_.reset();
+  // A stretch names the active set, so a new set begins a new stretch.
   if (active.model_swapped) {
     Close();
   }
+  // The active engine's episode is ended by the clock of the monitor. The
+  // candidate has no clock and measures the silence afterwards, by stamps.
   if (seen_ && sample.stamp_ns - stamp_ns_ > limits_.silence_ns) {
     engine_->EndEpisode(EndReason::kStaleTimeout);
   }
@@ -162,6 +178,9 @@ void ShadowValve::Extend(const Verdict& active) {
   open_->difference.to_ns = active.stamp_ns;
   ++open_->difference.samples;
   open_->changed = true;
+  // A stretch is counted once, when it is long enough, by the hour in which it
+  // began. The limit per hour keeps a candidate that flickers on one valve from
+  // filling the history.
   if (open_->counted || open_->difference.samples < limits_.min_samples) {
     return;
   }
@@ -192,6 +211,9 @@ void ShadowValve::TakeCheckpoint(Checkpoint& checkpoint) {
   for (ShadowDifference& difference : std::exchange(closed_, {})) {
     checkpoint.shadow.push_back(std::move(difference));
   }
+  // An open stretch is stored now and stored again as it grows: the later
+  // record replaces the earlier one, which has the same valve, source and first
+  // stamp.
   if (open_ && open_->recorded && std::exchange(open_->changed, false)) {
     checkpoint.shadow.push_back(open_->difference);
   }

@@ -41,6 +41,8 @@ ValveMonitor::ValveMonitor(const std::string& id,
 
 void ValveMonitor::Recover(const OpenEpisode& episode) {
   tracker_.Recover(episode);
+  // The tracker keeps a name until the engine isolates a fault. One by physics
+  // outranks the engine and has to last until a look answers.
   if (names_ && episode.layer == Layer::kPhysics &&
       episode.model_hash == models_->content_hash) {
     names_->SetInheritedName(episode.faults);
@@ -67,6 +69,8 @@ bool ValveMonitor::RestartsEngine(const Sample& sample) const {
 }
 
 bool ValveMonitor::WithinRateLimit(const Sample& sample, TimePoint received) {
+  // RecordPosition() takes the tokens, so only samples in order cost any:
+  // repeated and late ones restart nothing.
   if (!RestartsEngine(sample)) {
     restart_tokens_ =
         std::min(restart_tokens_ + kTokensPerSample, kMaxRestartTokens);
@@ -111,12 +115,15 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     return {unassigned_, nullptr, swapped, isolation_held_, 0};
   }
   RestoreOnce(sample.source_id);
+  // Before the engine: an episode that this sample opens has the old name only
+  // if the tracker still waits to resume one.
   if (names_ && !tracker_.recovering() && !engine_->episode_open()) {
     names_->SetInheritedName(std::nullopt);
   }
   const Verdict& engine = engine_->Step(sample);
   const Verdict& verdict =
       names_ ? names_->Step(sample, engine, isolation_held_) : engine;
+  // From the next sample on; the verdict on this one stands.
   engine_->Suspect(names_ && names_->suspects());
   answer_ = &verdict;
   if (CountsAsTime(verdict)) {
@@ -125,9 +132,13 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
                   verdict.intake == Intake::kAccepted);
     health_.Add(sample, verdict, models_.get(), period_s());
   }
+  // A superseded publisher that goes on sending must not end the stream of its
+  // successor.
   if (verdict.intake != Intake::kSuperseded) {
     writer_ = writer;
   }
+  // First the tracker, which opens the episode that looks and strengths belong
+  // to.
   tracker_.Step(sample, verdict, models_, outlet);
   if (names_) {
     tracker_.Take(names_->TakeLook(), outlet);
@@ -201,6 +212,7 @@ bool ValveMonitor::EndStream(std::uint64_t writer, EpisodeOutlet& outlet) {
 bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
                          EpisodeOutlet& outlet) {
   std::shared_ptr<const ModelSet> models = ModelsOf(parts);
+  // A hash of 0 identifies nothing: the set does not come from a store.
   if (models == models_ || (models && models_ && models->content_hash != 0 &&
                             models->content_hash == models_->content_hash)) {
     return false;
@@ -217,9 +229,12 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
     Close(EndReason::kModelChanged, outlet);
     engine_.reset();
   }
+  // The old set has to last until here: the end of the episode is recorded with
+  // it. answer_ may point into names_, which is replaced.
   models_ = std::move(models);
   answer_ = nullptr;
   strengths_ = {};
+  // By models_, which has to be the new set here.
   NameEpisodes();
   required_ = parts ? parts->plan->required() : SignalMask{0};
   swapped_ = true;
@@ -245,6 +260,7 @@ std::uint64_t ValveMonitor::CountStale(TimePoint now) {
     return 0;
   }
   const std::chrono::duration<double> counted(periods * period_s());
+  // Whole periods only, so that the remainder counts at the next call.
   stale_counted_ += std::chrono::duration_cast<TimePoint::duration>(counted);
   // Silence is measured by arrival, and dated by extending the last stamp.
   const std::chrono::nanoseconds since = stale_counted_ - received_;
@@ -262,6 +278,8 @@ void ValveMonitor::CheckTimeout(TimePoint now,
   }
 }
 
+// For a valve that sends, the time of its samples decides instead:
+// EpisodeTracker::TryRecovery().
 void ValveMonitor::ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet) {
   if (!seen_ || stale_ || !engine_) {
     tracker_.ExpireRecovery(now_ns, outlet);
@@ -273,6 +291,7 @@ void ValveMonitor::Close(EndReason reason, EpisodeOutlet& outlet) {
     return;
   }
   const std::optional<Transition> closed = engine_->EndEpisode(reason);
+  // It may be the verdict of names_, which still shows the episode.
   answer_ = nullptr;
   if (closed) {
     End(*closed, outlet);

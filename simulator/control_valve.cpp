@@ -27,6 +27,8 @@ void ValveDynamics::SetEffects(const FaultEffects& effects) {
   const ActuatorParameters& a = parameters_.actuator;
   const double gauge = a.supply_pressure_gauge_pa * effects.supply_factor;
   supply_pa_ = a.ambient_pressure_pa + (gauge < kMinSupplyGauge ? 0.0 : gauge);
+  // A stop that moves inwards takes the rod along. The actuator's position z
+  // stays as it is, because the stops of the rod do not limit it.
   rod_limit_ = effects.upper_stop_factor;
   rod_ = std::clamp(rod_, 0.0, rod_limit_);
 }
@@ -77,11 +79,22 @@ double ValveDynamics::PlayWidth() const {
   return width * (1.0 + effects_.play_slope * (1.0 - rod_));
 }
 
+// Backlash of width w between the actuator z and the rod y, then the rod's
+// stops:
+//
+//   y = clamp(y_before, z - w/2, z + w/2)
+//
+// y_before is rod_, which only Commit() and Align() move. Within a step, y is
+// therefore a function of z alone, whatever states the solver tries. There is
+// no root function for the moment when the play is taken up: it would be 0 at
+// the very restart that it causes, and CVODE would miss it there.
 double ValveDynamics::Rod(double z) const {
   const double half = 0.5 * PlayWidth();
   return std::clamp(std::clamp(rod_, z - half, z + half), 0.0, rod_limit_);
 }
 
+// The positioner sees the angle of the lever. The play of f15 is in series with
+// that of the rod and has a memory of its own.
 double ValveDynamics::Feedback(double rod) const {
   const double reading = LeverAngle(rod * effects_.position_reading_factor);
   const double half = 0.5 * effects_.feedback_play;
@@ -105,6 +118,9 @@ double ValveDynamics::ChamberPressureOf(const double* x) const {
       Rod(x[kActuatorState]) * parameters_.actuator.stroke_m);
 }
 
+// (15) with the air mass (1 + n) P0 V0 / (R T), solved for the charge n:
+//
+//   Pc = (1 + n) P0 V0 / (V0 + A y),   n = Pc (V0 + A y) / (P0 V0) - 1
 double ValveDynamics::ChargeFor(double pressure_pa, double z) const {
   const ActuatorParameters& a = parameters_.actuator;
   const double volume =
@@ -117,6 +133,12 @@ double ValveDynamics::OpeningForce(double t, double z) const {
   return OpeningForce(InputsAt(t), z);
 }
 
+// What the chamber has to balance at rest, from (14):
+//
+//   K (z + x0) + (P1m - P2) A0 / Km - m g,   P1m = max(P1, Pv)
+//
+// The spring acts on the actuator z; Km is that of the plug, which follows the
+// rod.
 double ValveDynamics::OpeningForce(const ProcessInputs& inputs,
                                    double z) const {
   const ActuatorParameters& a = parameters_.actuator;
@@ -145,8 +167,13 @@ double ValveDynamics::NetForce(const ProcessInputs& inputs,
          OpeningForce(inputs, x[kActuatorState]);
 }
 
-// de/dt for the derivative action; the rod moves only when the play is taken
-// up.
+// de/dt for the derivative action. With e = c2 - a, the angle a = 1/2 + (3/pi)
+// asin(s) of the lever, s = k y - 1/2 and the factor k on the reading,
+//
+//   de/dt = (c1 - c2) / tau - 3 k / (pi sqrt(1 - s^2)) dy/dt
+//
+// The bound on s keeps the slope finite at the ends of the lever. The rod moves
+// only when the play is taken up; the play of the feedback is neglected.
 double ValveDynamics::ErrorRate(const double* x) const {
   const double tau = parameters_.positioner.filter_time_s;
   const double rod = Rod(x[kActuatorState]);
@@ -175,7 +202,8 @@ double ValveDynamics::Signal(const double* x) const {
 }
 
 // Air flow through the relay into the chamber for the transducer output
-// `drive`.
+// `drive`; negative while venting. Both laws are 0 at drive = 0, so a change of
+// its sign is a kink and no jump: the solver keeps its history.
 double ValveDynamics::RelayFlow(double chamber_pa, double drive) const {
   const PositionerParameters& p = parameters_.positioner;
   const double ambient = parameters_.actuator.ambient_pressure_pa;
@@ -225,6 +253,8 @@ void ValveDynamics::Derivatives(double t, const double* x,
   dx[kSecondLagState] = (x[kFirstLagState] - x[kSecondLagState]) / tau;
   if (has_integral_) {
     const double error = x[kSecondLagState] - Feedback(Rod(x[kActuatorState]));
+    // Without this the integral would grow as long as a stop or a weak supply
+    // keeps the error up, and hold the rod there for as long again.
     const bool winds_up = std::abs(signal) >= 1.0 && error * signal > 0.0;
     dx[kIntegralState] =
         winds_up ? 0.0 : error / parameters_.positioner.integral_time_s;
@@ -233,6 +263,11 @@ void ValveDynamics::Derivatives(double t, const double* x,
 
 // Positive during the present motion; a zero ends it: a stop, standstill or
 // break-away. A constant 1 disables a root.
+//
+// CVODE ignores a root function that is 0 at a restart until it has left 0, and
+// the velocity is 0 when a motion begins from rest. AfterStep() therefore tests
+// the state, too. At a stop without friction the limit is 0: the valve leaves
+// the stop when the net force changes its sign.
 void ValveDynamics::Roots(double t, const double* x, double* g) const noexcept {
   const double friction = BreakAwayForce();
   switch (motion_) {
@@ -257,6 +292,9 @@ void ValveDynamics::Roots(double t, const double* x, double* g) const noexcept {
   }
 }
 
+// (12) for the trim and for the bypass in parallel, each choked by its own Km.
+// The internal leak (opening_offset) is added behind the characteristic, so it
+// passes flow even where the trim is shut.
 double FlowM3PerHour(const TrimParameters& trim, const FaultEffects& effects,
                      const ProcessInputs& effective, double rod,
                      double bypass_opening) {
@@ -336,6 +374,9 @@ double ControlValve::Impl::RestingPosition(double wanted,
   const auto needed = [&](double z) {
     return dynamics_.OpeningForce(0.0, z) / a.diaphragm_area_m2;
   };
+  // Where the bounded pressure does not suffice, bisection finds the position
+  // that it holds: unless the flow is reversed, the force of spring and flow
+  // grows with z. 60 halvings exhaust a double.
   gauge_pa = std::clamp(needed(wanted), 0.0, highest);
   if (needed(wanted) == gauge_pa) {
     return wanted;
@@ -355,6 +396,7 @@ void ControlValve::Impl::Settle(const ProcessInputs& inputs) {
   // The transducer's table with dead zone is 0 at this signal.
   const double rest_signal = p.transducer_dead_zone ? -0.04 : 0.0;
   const double command = std::clamp(inputs.command, 0.0, 1.0);
+  // Kp (CV - angle) = rest_signal, with the integral at 0.
   const double angle = std::clamp(command - rest_signal / p.gain, 0.0, 1.0);
   double gauge_pa = 0.0;
   // The opening force depends on the rod, and so on the play: align first.
@@ -414,6 +456,7 @@ bool ControlValve::Impl::AfterStep(StepResult result) {
   const bool reverses = (before == Motion::kRising && v <= 0.0) ||
                         (before == Motion::kFalling && v >= 0.0);
   if (hits_high || hits_low) {
+    // Exactly the stop: SelectMotion() compares z with it.
     z = hits_high ? dynamics_.HighStop() : dynamics_.LowStop();
   }
   if (hits_high || hits_low || reverses) {
@@ -427,6 +470,10 @@ bool ControlValve::Impl::AfterStep(StepResult result) {
   return ended || dynamics_.motion() != before;
 }
 
+// Commit() comes before AfterStep(), which selects the next motion by the
+// forces at the new rod, and again after it, because AfterStep() may have moved
+// z onto a stop. A motion that ends at t_stop leaves `continues_` false, and
+// the next call restarts.
 void ControlValve::Impl::Integrate(double t_stop) {
   if (!continues_) {
     SelectMotion();
@@ -450,9 +497,12 @@ void ControlValve::Impl::Integrate(double t_stop) {
 
 void ControlValve::Impl::Advance(double from_s, double to_s) {
   time_s_ = from_s;
+  // A sampled positioner need not be in step with the caller, as with 35 ms and
+  // 1 s: until_sampling_s_ carries the rest over to the next call.
   const double sampling_s = dynamics_.parameters().positioner.sampling_period_s;
   while (sampling_s > 0.0 && time_s_ < to_s) {
     if (until_sampling_s_ <= 0.0) {
+      // Signal() returns the held value as long as there is one.
       dynamics_.HoldSignal(std::nullopt);
       dynamics_.HoldSignal(dynamics_.Signal(x().data()));
       until_sampling_s_ += sampling_s;
@@ -485,6 +535,8 @@ void ControlValve::ColdStart() {
 
 void ControlValve::SetEffects(const FaultEffects& effects) {
   ValveDynamics& dynamics = impl_->dynamics_;
+  // The caller sets the effects after every interval. Equal ones must not cost
+  // the solver its history.
   if (effects == dynamics.effects()) {
     return;
   }
@@ -499,6 +551,7 @@ void ControlValve::SetCommandNoise(double noise) {
 
 void ControlValve::Advance(double duration_s, const ProcessInputs& from,
                            const ProcessInputs& to) {
+  // The command jumps, and time begins at 0 again.
   impl_->dynamics_.SetInputs(from, to, duration_s);
   impl_->continues_ = false;
   impl_->Advance(0.0, duration_s);

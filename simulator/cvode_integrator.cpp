@@ -37,6 +37,7 @@ using Matrix = std::unique_ptr<_generic_SUNMatrix, Deleter<SUNMatDestroy>>;
 using Solver = std::unique_ptr<_generic_SUNLinearSolver, Deleter<FreeSolver>>;
 using Memory = std::unique_ptr<void, Deleter<FreeMemory>>;
 
+// SUNDIALS returns errors below 0; above 0 is what happened, such as a root.
 void Check(int code, const char* operation) {
   if (code < 0) {
     throw CvodeError(operation, code);
@@ -61,6 +62,7 @@ Context MakeContext() {
   return Context(context);
 }
 
+// Called from C, which no exception may cross: OdeSystem is noexcept.
 int CallDerivatives(double t, N_Vector x, N_Vector dx, void* system) {
   static_cast<const OdeSystem*>(system)->Derivatives(t, N_VGetArrayPointer(x),
                                                      N_VGetArrayPointer(dx));
@@ -72,7 +74,8 @@ int CallRoots(double t, N_Vector x, double* g, void* system) {
   return 0;
 }
 
-// Stores CVODE's error message for the exception.
+// Stores CVODE's error message for the exception. Called from C, too; if there
+// is no memory, the message is empty.
 void CopyMessage(const char* text, void* message) {
   try {
     *static_cast<std::string*>(message) = text;
@@ -99,7 +102,8 @@ CvodeError::CvodeError(const std::string& operation, int code)
                          std::to_string(code)),
       code_(code) {}
 
-// Declared in the order of creation; destruction runs in reverse.
+// Declared in the order of creation; destruction runs in reverse. CVODE keeps
+// the addresses of the system and of message_, so an Impl stays where it is.
 class CvodeIntegrator::Impl {
  public:
   Impl(const OdeSystem& system, const CvodeOptions& options)
@@ -119,6 +123,8 @@ class CvodeIntegrator::Impl {
               options.absolute_tolerances.end(),
               N_VGetArrayPointer(tolerances_.get()));
     void* const m = memory_.get();
+    // First, because tolerances and linear solver use vectors that it
+    // allocates.
     Check(CVodeInit(m, CallDerivatives, 0.0, state_.get()), "CVodeInit");
     Check(CVodeSVtolerances(m, options.relative_tolerance, tolerances_.get()),
           "CVodeSVtolerances");
@@ -131,11 +137,15 @@ class CvodeIntegrator::Impl {
     Check(CVodeSetErrHandlerFn(m, KeepMessage, &message_),
           "CVodeSetErrHandlerFn");
 #else
+    // The handlers are a stack, all of which are called. Without this, the
+    // default one would print the message as well.
     Check(SUNContext_ClearErrHandlers(context_.get()),
           "SUNContext_ClearErrHandlers");
     Check(SUNContext_PushErrHandler(context_.get(), KeepMessage, &message_),
           "SUNContext_PushErrHandler");
 #endif
+    // A root function may be 0 at a restart, as the velocity is when a rod at
+    // rest breaks away. CVODE would warn of it.
     Check(CVodeSetNoInactiveRootWarn(m), "CVodeSetNoInactiveRootWarn");
     if (options.root_count > 0) {
       Check(CVodeRootInit(m, options.root_count, CallRoots), "CVodeRootInit");
@@ -151,7 +161,9 @@ class CvodeIntegrator::Impl {
 
   StepResult StepTowards(double t_stop) {
     void* const m = memory_.get();
-    // CVODE drops the stop time once it is reached, so it is set every time.
+    // In one-step mode the t_stop of CVode() gives only the direction; the stop
+    // time is what a step does not pass. CVODE drops it once it is reached, so
+    // it is set every time.
     Check(CVodeSetStopTime(m, t_stop), "CVodeSetStopTime");
     const int code = CVode(m, t_stop, state_.get(), &time_, CV_ONE_STEP);
     if (code < 0) {
@@ -167,6 +179,7 @@ class CvodeIntegrator::Impl {
     return steps_ + Current(CVodeGetNumSteps);
   }
   std::int64_t derivatives() const {
+    // CVODE counts those of the difference-quotient Jacobian apart.
     return derivatives_ + Current(CVodeGetNumRhsEvals) +
            Current(CVodeGetNumLinRhsEvals);
   }
@@ -201,6 +214,7 @@ class CvodeIntegrator::Impl {
   Vector tolerances_;
   Matrix matrix_;
   Solver solver_;
+  // Before memory_, whose error handler writes to it.
   std::string message_;
   Memory memory_;
   std::int64_t steps_{0};

@@ -16,6 +16,8 @@ namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
+// The valve takes commands of 0 to 100 %; noise, the sine and recorded rows
+// (accepted from -10 to 110 %) may lie beyond.
 ProcessInputs FromRow(const InputRow& row) {
   return {std::clamp(row.cv_pct, 0.0, 100.0) / 100.0, row.p1_kpa * 1e3,
           row.p2_kpa * 1e3, row.t1_degc};
@@ -27,6 +29,8 @@ class OperatingPoint final : public Excitation {
                  std::uint64_t seed)
       : config_(config),
         period_s_(period_s),
+        // A stream of the seed for each: to change one disturbance leaves the
+        // others as they were, number by number.
         cv_(config.cv_noise_pct, NormalSource(seed, 11)),
         p1_(config.p1_noise_kpa, NormalSource(seed, 12)),
         p2_(config.p2_noise_kpa, NormalSource(seed, 13)) {}
@@ -63,6 +67,8 @@ class Sine final : public Excitation {
   }
 
  private:
+  // Fixed numbers, because the benchmark's recordings were made with them
+  // (docs/model.md): they can only be compared under the same inputs.
   static ProcessInputs At(double t) {
     return FromRow({50.0 + 25.0 * std::sin(kTwoPi * 0.01 * t),
                     3500.0 + 175.0 * std::sin(kTwoPi * 0.1 * t),
@@ -86,6 +92,7 @@ class Recorded final : public Excitation {
     return FromRow(config_.rows[std::min(row_++, last)]);
   }
 
+  // Refers to the rows of this object and must not outlive it.
   InputFunction AsFunction() const override {
     return [this](double time_s) { return At(time_s / period_s_); };
   }
@@ -154,6 +161,7 @@ void ValidateOne(const RecordedExcitation& e) {
   }
 }
 
+// In the order of the alternatives of ExcitationConfig, whose index() selects.
 constexpr std::string_view kNames[] = {"operating-point", "sine", "level-loop",
                                        "csv"};
 

@@ -23,7 +23,8 @@ double Median(std::vector<double> values) {
 }
 
 // Standard deviation of a normal distribution with the same median absolute
-// deviation. Residuals of 0 are skipped: they mark rows that do not count.
+// deviation, which is 1 / 1.4826 of it. Residuals of 0 are skipped: they mark
+// rows that do not count.
 double RobustScale(const VectorXd& residuals) {
   std::vector<double> sizes;
   for (const double r : residuals) {
@@ -34,7 +35,12 @@ double RobustScale(const VectorXd& residuals) {
   return sizes.empty() ? 0.0 : 1.4826 * Median(std::move(sizes));
 }
 
-// Share of independent rows in a series with this lag-1 correlation.
+// Share of independent rows in a series whose correlation at lag k is q^k:
+//
+//   1 / (1 + 2 sum_(k>0) q^k) = (1 - q) / (1 + q)
+//
+// q is that at lag 1. A negative one counts as 0, so that a series never has
+// more independent rows than rows; 0.99 keeps the share above 0.
 double IndependentShare(const VectorXd& r) {
   const double power = r.squaredNorm();
   if (r.size() < 2 || power == 0.0) {
@@ -46,6 +52,8 @@ double IndependentShare(const VectorXd& r) {
   return (1.0 - bounded) / (1.0 + bounded);
 }
 
+// rho(u) = u^2 / 2 up to the corner c, and c (|u| - c / 2) beyond it. The
+// weight is rho'(u) / u.
 double HuberWeight(double u, double corner) {
   return std::abs(u) <= corner ? 1.0 : corner / std::abs(u);
 }
@@ -120,7 +128,15 @@ double Minimiser::Loss(const MatrixXd& r, const VectorXd& point) const {
          0.5 * off.squaredNorm();
 }
 
-// Computes information, scores and gradient of the data at the present point.
+// Computes information, scatter and gradient of the data at the present point.
+// With u = r / s, w its weight and J = du / d point,
+//
+//   information = sum w J J',  gradient = sum w u J,  scatter = sum_b g_b g_b'
+//
+// where g_b is the sum of w u J over block b of the rows. Within a block the
+// residuals may be correlated, and the scatter still has what that adds to the
+// variance of the gradient. J is a one-sided difference that stays within the
+// bounds.
 void Minimiser::Linearise() {
   const Index p = fit_.point.size();
   std::vector<VectorXd> points;
@@ -157,7 +173,9 @@ void Minimiser::Linearise() {
   }
 }
 
-// Entries at a bound stay there if the gradient points outwards.
+// Solves (H + damping diag(H)) step = -g, in which H and g include the prior.
+// The prior makes H positive definite even if the data do not determine an
+// entry. Entries at a bound stay there if descent leads outwards.
 VectorXd Minimiser::Step(double damping) const {
   const VectorXd precision = PriorPrecision();
   MatrixXd h = share_ * fit_.information;
@@ -203,10 +221,15 @@ RobustFit Minimiser::Run(const VectorXd& start) {
   present_ = residuals_({fit_.point}).front();
   bool improves = true;
   for (int i = 0; improves && i < options_.max_iterations; ++i) {
+    // The scale is fixed within an iteration: losses before and after a step
+    // are comparable only in the same units, and so are the slopes.
     Rescale();
     Linearise();
     improves = Improve();
   }
+  // Information and scatter stay those of the last linearisation, at most a
+  // step before the point: another one would take p evaluations of the
+  // residuals.
   Rescale();
   fit_.residuals = present_;
   return fit_;
@@ -226,6 +249,8 @@ RobustFit FitRobustly(const ResidualFunction& residuals, const VectorXd& start,
 
 VectorXd StandardDeviations(const RobustFit& fit, const PointBounds& bounds,
                             const std::vector<Index>& kept) {
+  // Leaving out rows and columns before the inversion takes the other entries
+  // as known.
   MatrixXd h = fit.information(kept, kept);
   MatrixXd middle = fit.scatter(kept, kept);
   const VectorXd precision = bounds.prior_sd(kept).array().square().inverse();

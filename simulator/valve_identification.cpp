@@ -68,7 +68,9 @@ using Answers = std::vector<std::vector<RecordAnswer>>;  // By segment.
 constexpr double kFine = 1.0;
 constexpr double kCoarse = 10.0;
 
-// Simulates all candidates on all segments with `threads` threads.
+// Simulates all candidates on all segments with `threads` threads. Each pair
+// has a place of its own for its answers, which need no lock and do not depend
+// on the number of threads.
 std::vector<Answers> Simulate(const std::vector<ValveCandidate>& candidates,
                               const std::vector<RecordSegment>& segments,
                               double tolerance_scale, int threads) {
@@ -84,6 +86,8 @@ std::vector<Answers> Simulate(const std::vector<ValveCandidate>& candidates,
                          segment.last, candidate.drive, tolerance_scale);
     }
   };
+  // Destroyed first: if work() throws here, these futures of std::async() wait
+  // for the threads before what they use is gone.
   std::vector<std::future<void>> helpers;
   for (int t = 1; t < threads; ++t) {
     helpers.push_back(std::async(std::launch::async, work));
@@ -97,7 +101,8 @@ std::vector<Answers> Simulate(const std::vector<ValveCandidate>& candidates,
 
 // Differences simulation - record: one row per instant, columns X [%] and, if
 // `has_flow`, F computed with `parameters`; the first `settle_rows` of every
-// segment are omitted.
+// segment are omitted. A value that was not measured has a difference of 0,
+// which RobustScale() and Compare() do not count.
 MatrixXd Residuals(const ValveParameters& parameters, const Answers& motion,
                    const std::vector<RecordSegment>& segments,
                    std::size_t settle_rows, bool has_flow) {
@@ -158,6 +163,7 @@ struct LineSums {
 
 // Flow over 100 sqrt(dP / rho), i.e. Kv f(X) [m3/h]; 0 if not usable.
 double EffectiveKv(const RecordRow& row, const InstrumentParameters& i) {
+  // A saturated transmitter gives only a bound of the flow.
   const double margin = 0.01 * (i.flow.high - i.flow.low);
   if (row.flow < i.flow.low + margin || row.flow > i.flow.high - margin) {
     return 0.0;
@@ -179,6 +185,7 @@ double EffectiveKv(const RecordRow& row, const InstrumentParameters& i) {
 
 std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
                                      bool has_flow) {
+  // The order counts: KeepIdentified() gives up the last ones first.
   using V = ValveParameters;
   std::vector<ValveUnknown> unknowns;
   const auto add = [&](const char* name, double& (*in)(V&), double factor,
@@ -270,11 +277,20 @@ TrimParameters RegressTrim(const std::vector<HealthyRecord>& records,
   TrimParameters trim = nominal.trim;
   const bool exponential =
       trim.characteristic == FlowCharacteristic::kExponential;
+  // Noise of F with the deviation sd is noise of ln F with sd / F, hence the
+  // weights F^2. For f = exp(-n X), y = ln(Kv f) is a straight line. With means
+  // so weighted,
+  //
+  //   n = (mean(X) mean(y) - mean(X y)) / var(X),
+  //   ln Kv = mean(y) + n mean(X).
+  //
+  // For f = 1 - X, y = ln(Kv f) - ln(1 - X) and n = 0.
   LineSums sums;
   for (const HealthyRecord& record : records) {
     for (const RecordRow& row : record.rows) {
       const double kv = EffectiveKv(row, nominal.instruments);
       const double x = 0.01 * row.x_pct;
+      // Beyond 0.975 the exponential falls linearly to 0 (Opening()).
       if (kv > 0.0 && x < 0.97) {
         const double shape = exponential ? 0.0 : std::log1p(-std::max(0.0, x));
         sums.Add(row.flow * row.flow, x, std::log(kv) - shape);
@@ -303,6 +319,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+// With this corner a fit to normal residuals has 95 % of the efficiency of
+// least squares.
 constexpr double kHuber = 1.345;   // Corner of the loss.
 constexpr double kAtBound = 1e-3;  // Of a search, in the logarithm.
 constexpr int kMaxIterations = 10;
@@ -345,6 +363,7 @@ void RequireUsable(const std::vector<HealthyRecord>& records,
     const std::vector<RecordRow>& rows = records[r].rows;
     for (std::size_t k = 0; k < rows.size(); ++k) {
       const InputRow& in = rows[k].input;
+      // One test for all: no sum with a NaN or an infinity is finite.
       double sum = in.cv_pct + in.p1_kpa + in.p2_kpa + in.t1_degc;
       sum += rows[k].x_pct + (options.has_flow ? rows[k].flow : 0.0);
       if (!std::isfinite(sum)) {
@@ -429,7 +448,8 @@ Hypothesis Identification::Start(const ValveParameters& variant,
 }
 
 // Chooses first how and when the command acts, then the relay. Of equally good
-// fits the first is kept: the nominal relay, a held command without delay.
+// fits the first is kept: the nominal relay, a held command without delay. That
+// takes 8 + 2 fits, all combinations would take 16.
 Hypothesis Identification::BestStart() const {
   std::vector<Hypothesis> drives;
   for (const int delay : {0, -1, 1, 2}) {
@@ -449,8 +469,10 @@ Hypothesis Identification::BestStart() const {
 RobustFit Identification::Fit(const Hypothesis& hypothesis,
                               const std::vector<RecordSegment>& segments,
                               int iterations, double tolerance_scale) const {
-  // Points that differ only in the trim share a simulation; the last single
-  // point is the present one of the fit.
+  // Points that differ only in the trim share a simulation, so that derivatives
+  // for Kv and the exponent cost none. The last single point is the present one
+  // of the fit, because Minimiser takes derivatives only where its last trial
+  // was accepted.
   std::vector<VectorXd> simulated;
   std::vector<Answers> motions;
   const auto residuals = [&](const std::vector<VectorXd>& points) {
@@ -533,6 +555,8 @@ void Identification::KeepIdentified(
     const PointBounds bounds = BoundsOf(hypothesis.unknowns);
     std::vector<Index> kept = AllOf(hypothesis.unknowns);
     changed = false;
+    // Downwards, so that i is the place in `kept` as well: only later ones have
+    // been erased. Each is judged with those that are left.
     for (std::size_t i = kept.size(); i-- > 0;) {
       const double sd = StandardDeviations(hypothesis.fit, bounds,
                                            kept)[static_cast<Index>(i)];
@@ -565,6 +589,8 @@ void Identification::AddStated(Hypothesis& hypothesis,
     const double sd =
         StandardDeviations(trial.fit, BoundsOf(trial.unknowns),
                            AllOf(trial.unknowns))[trial.point.size() - 1];
+    // One scale for both losses. Each with its own, they would hardly differ,
+    // because the scale follows the size of the residuals.
     const VectorXd& scale = trial.fit.scale;
     const double before =
         MeanHuberLoss(hypothesis.fit.residuals, scale, kHuber);

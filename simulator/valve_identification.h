@@ -62,7 +62,7 @@ std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
 std::vector<ValveParameters> RelayVariants(const ValveParameters& nominal);
 
 /// Bounds of `unknowns` as logarithms, with a prior around the nominal values
-/// that allows a factor of 1.5.
+/// whose deviation is a factor of 1.65.
 PointBounds BoundsOf(const std::vector<ValveUnknown>& unknowns);
 
 /// `parameters` with the unknowns set to exp(point).

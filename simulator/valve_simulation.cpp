@@ -19,7 +19,9 @@ namespace {
 
 constexpr double kForever = 1e10;
 
-// Value at `time_s`, which must lie within the points.
+// Value at `time_s`, which must lie within the points. With upper_bound(), the
+// last of equal times is the left neighbour: a step takes its later value, and
+// the difference of times below is never 0.
 double Interpolate(const std::vector<double>& t_s,
                    const std::vector<double>& values, double time_s) {
   const auto right = std::upper_bound(t_s.begin(), t_s.end(), time_s);
@@ -54,6 +56,8 @@ class Profile {
     }
     if (!config_.cv_pct.empty()) {
       const double cv = Interpolate(config_.t_s, config_.cv_pct, time_s);
+      // Drawn even where it is not used, so that the noise of later samples
+      // does not depend on whether the command is at an end.
       const double noise = cv_.Next();
       const bool at_end = cv <= 0.0 || cv >= 100.0;
       inputs.command =
@@ -103,6 +107,9 @@ class Profiled final : public Excitation {
 
   ProcessInputs Next(const FlowOfPressures& flow) override {
     const double time_s = static_cast<double>(sample_++) * period_s_;
+    // Hold() comes first, because a closed loop controls and advances within
+    // Next(). Next() is called even where profiles replace every input: the
+    // noise of the base goes on as it does without them.
     base_->Hold(std::ranges::any_of(profiles_, [time_s](const Profile& p) {
       return p.DrivesCommandAt(time_s);
     }));
@@ -194,6 +201,7 @@ constexpr double kNsPerS = 1e9;
 constexpr double kMinSegmentS = 1e-6;
 
 std::uint64_t SampleCount(const ValveSimulationConfig& config) {
+  // 1e-9 samples: a quotient rounded up must not add a sample.
   const double samples = std::ceil(config.duration_s / config.period_s - 1e-9);
   const auto count = static_cast<std::uint64_t>(samples);
   if (const auto* recorded =
@@ -229,6 +237,8 @@ void Validate(const ValveSimulationConfig& config) {
   for (const ModeStretch& stretch : config.modes) {
     Validate(stretch);
   }
+  // The solver evaluates continuous inputs at any time. Profiles and the other
+  // excitations draw noise sample by sample and have no value in between.
   if (config.continuous_inputs && !config.inputs.empty()) {
     throw ConfigError("continuous_inputs is set: expected no [[input]]");
   }
@@ -252,6 +262,8 @@ class ValveSimulation::Impl {
         count_(SampleCount(config)),
         excitation_(ExcitationOf(config)),
         input_function_(excitation_->AsFunction()),
+        // Streams of the seed: 1 and 2 here, 11 to 23 in the excitations, from
+        // 100 on in the profiles.
         noise_(config.seed, 1),
         positioner_noise_(config.seed, 2),
         valve_(config.parameters, config.tolerance_scale),
@@ -273,6 +285,8 @@ class ValveSimulation::Impl {
   std::vector<std::optional<double>> held_;  // Per schedule: its flatline.
 
  private:
+  // By way of whole nanoseconds: faults begin and end by the same time that the
+  // stamp states, however many samples there are.
   double TimeOf(std::uint64_t k) const {
     return static_cast<double>(static_cast<std::int64_t>(k) * period_ns_) /
            kNsPerS;
@@ -296,6 +310,9 @@ ProcessInputs ValveSimulation::Impl::NextInputs() {
   });
 }
 
+// The valve settles before the faults act: a fault from 0 s on meets a healthy
+// valve in equilibrium, as it does at any later time. A closed loop settles at
+// its initial inputs, because Next() asks for the flow at a position.
 void ValveSimulation::Impl::Start() {
   const bool open_loop = excitation_->is_open_loop();
   inputs_ = open_loop ? NextInputs() : excitation_->InitialInputs();
@@ -312,7 +329,8 @@ void ValveSimulation::Impl::Start() {
 }
 
 // One Advance() per interval of constant faults, with the last command and
-// pressures on the line from the reached ones to those of `target`.
+// pressures on the line from the reached ones to those of `target`. A
+// developing fault is constant within an interval: it grows sample by sample.
 void ValveSimulation::Impl::AdvanceAcrossFaults(double from_s, double to_s,
                                                 const ProcessInputs& target) {
   ProcessInputs here = inputs_;
@@ -346,6 +364,10 @@ void ValveSimulation::Impl::AdvanceAcrossFaults(double from_s, double to_s,
   reached_ = target;
 }
 
+// In open loop the inputs of sample k are known beforehand, and the pressures
+// run towards them. In a closed loop, they run towards those computed at sample
+// k - 1; the next ones follow from the flow at the position reached, so that
+// NextInputs() has to come after the integration.
 void ValveSimulation::Impl::AdvanceTo(std::uint64_t k) {
   if (config_.noise) {
     valve_.SetCommandNoise(
@@ -359,6 +381,11 @@ void ValveSimulation::Impl::AdvanceTo(std::uint64_t k) {
 }
 
 // `step` is a transmitter fault, as a share of its span.
+//
+// The range is applied before the noise, so that a saturated transmitter stays
+// noisy, and the step comes after the noise, so that |step| = 1 reads the
+// limit whatever the value (docs/model.md). Rounding is last: every reading
+// lies on the converter's grid.
 double ValveSimulation::Impl::Read(const Transmitter& transmitter, double value,
                                    double step) {
   value = std::clamp(value, transmitter.low, transmitter.high);
@@ -390,6 +417,9 @@ void ValveSimulation::Impl::HoldFlatlines(double time_s, Sample& sample) {
   }
 }
 
+// P1 and P2 are those that act on the plug at the stamp; CV is the command that
+// acts from the stamp on. Every Read() draws from the same stream of noise, so
+// their order is part of what a seed reproduces.
 Sample ValveSimulation::Impl::ReadAll(std::uint64_t k) {
   const InstrumentParameters& i = config_.parameters.instruments;
   const FaultEffects effects = EffectsAt(config_.faults, TimeOf(k));

@@ -38,6 +38,9 @@ StructureStep BestAddition(int num_candidates, const std::vector<int>& selected,
 
 }  // namespace
 
+// Greedy: n candidates and k accepted ones cost about n k calls of the
+// criterion, each of which fits a model, instead of 2^n. Comparisons are
+// written so that a NaN loses: it is never an improvement.
 StructureSearchResult SearchStructure(int num_candidates,
                                       const StructureCriterion& criterion,
                                       const StructureSearchOptions& options) {
@@ -141,6 +144,7 @@ TsModel FitRows(const ChannelPlan& plan,
                 const RegressionData& data, const Condition& condition,
                 const FitOptions& options,
                 std::optional<double> past_output = {}) {
+  // A rule has a slope for each regressor, and an intercept.
   const auto needed = static_cast<Eigen::Index>(options.rules.min_rules) *
                       static_cast<Eigen::Index>(regressors.size() + 1);
   if (data.y.size() < needed) {
@@ -159,6 +163,8 @@ TsModel FitRows(const ChannelPlan& plan,
   const auto validation_error = [&](const std::vector<TsRule>& rules) {
     const TsModel model =
         MakeModel(rules, data, regressors, plan.output, plan.parallel);
+    // The error in plain runs does not show whether a model forgets its past
+    // (docs/onboarding.md, 2). NaN: no stretch is long enough to tell.
     if (plan.from_any_past && IsFreeRunning(model)) {
       const double error = FreeRunError(model, condition.validation);
       if (!std::isnan(error)) {
@@ -180,6 +186,9 @@ TsModel FitRows(const ChannelPlan& plan,
 
 }  // namespace
 
+// sqrt(mean over pieces of (mean r²)²): one piece that goes wrong throughout
+// counts more than the same squared error spread over many. Without a piece the
+// mean is 0/0, the NaN that is promised.
 double FreeRunError(const TsModel& model,
                     const std::vector<Stretch>& stretches) {
   constexpr std::size_t kPiece = 40;
@@ -223,6 +232,8 @@ FitOptions FitOptionsOf(const ChannelPlan& plan, FitOptions options) {
   return options;
 }
 
+// Readings of a transmitter at its limit pile up at the largest; those of an
+// unlimited signal thin out towards it.
 double FindSaturation(const ChannelPlan& plan,
                       const std::vector<Condition>& conditions) {
   std::vector<double> readings;
@@ -256,6 +267,7 @@ std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
   for (const std::vector<Regressor>& pool : plan.pools) {
     const std::vector<Regressor> candidates =
         Available(pool, plan.antecedents, normal);
+    // The antecedents alone will do where no pool adds to them.
     if (candidates.empty()) {
       best = best.empty() && !pool.empty() ? plan.antecedents : best;
       continue;
@@ -267,6 +279,9 @@ std::vector<Regressor> ChooseRegressors(const ChannelPlan& plan,
       }
       return regressors;
     };
+    // The search fits many models and only ranks them: few rules, few rows
+    // and one start of the clustering. FitChannel() then fits the chosen
+    // structure in full.
     FitOptions trial = options;
     trial.rules.min_rules = options.search_rules;
     trial.rules.max_rules = options.search_rules;
@@ -327,12 +342,16 @@ TsModel FitFaultChannel(const ChannelPlan& plan, const TsModel& normal_model,
   TsModel own =
       FitRows(plan, regressors, fault_rows, condition, options, past_output);
   const double own_error = error(own);
+  // The simplest explanation first (docs/method.md, 3): the normal model, then
+  // one of both data, then one of the fault's own.
   if (error(normal_model) <= kReuseTolerance * own_error) {
     return normal_model;
   }
+  // A model on its own past, fitted to both data, may stay normal in a fault.
   if (IsFreeRunning(normal_model)) {
     return own;
   }
+  // No more normal rows than faulty ones, which they would outweigh.
   const RegressionData as_many =
       Thinned(normal_rows, static_cast<int>(fault_rows.y.size()));
   TsModel pooled = FitRows(plan, regressors, Joined(fault_rows, as_many),

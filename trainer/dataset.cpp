@@ -18,7 +18,7 @@ constexpr double kStep = 0.02;          // change of strength in one sample
 constexpr double kStrengthGrid = 0.05;  // conditions are this far apart
 constexpr std::array<double, 7> kBands{0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0};
 
-// Fault and strength in grid steps, -1000 for samples of no condition.
+// Fault and strength in grid steps; samples of no condition are not usable.
 struct Key {
   int fault{0};
   int steps{0};
@@ -69,6 +69,9 @@ Key DevelopingKey(const FaultTruth& truth, double full) {
 }
 
 // Condition of every sample; not usable right after a start or a step.
+// A sample belongs to a developing fault if the strength moved by less than a
+// step since the sample before, or does so to the next one; both ends of a ramp
+// are thus part of it.
 std::vector<Key> KeysOf(const TrainingRun& run, const DatasetOptions& options) {
   const std::size_t count = run.samples.size();
   const double full = FullStrength(run);
@@ -94,6 +97,7 @@ std::vector<Key> KeysOf(const TrainingRun& run, const DatasetOptions& options) {
   return keys;
 }
 
+// Stamps may jitter by half a period.
 bool IsNext(const Sample& before, const Sample& sample, double period_s) {
   const auto period_ns = std::llround(period_s * 1e9);
   return std::abs(sample.stamp_ns - before.stamp_ns - period_ns) <=
@@ -106,6 +110,8 @@ struct Pool {
   Condition condition;
 };
 
+// By fault and strength in grid steps. The order of the map is that of the
+// conditions: normal operation first, then faults by number and strength.
 using Pools = std::map<std::pair<int, int>, Pool>;
 
 void AddStretch(const TrainingRun& run, std::size_t begin, std::size_t end,
@@ -115,6 +121,8 @@ void AddStretch(const TrainingRun& run, std::size_t begin, std::size_t end,
   }
   Pool& pool = pools[{key.fault, key.steps}];
   pool.condition.fault = key.fault;
+  // One block at the end, not samples at random: neighbours are correlated, and
+  // validation would see copies of what was fitted.
   const auto validated = static_cast<std::size_t>(
       options.validation_share * static_cast<double>(end - begin));
   Stretch training{run.id, {}};
@@ -203,6 +211,8 @@ void CheckFaults(const std::vector<TrainingRun>& runs, const Pools& pools,
   for (const TrainingRun& run : runs) {
     for (const LabelledSample& sample : run.samples) {
       const int fault = TruthOf(sample).fault;
+      // -1000 is below every strength in grid steps, so that this is the first
+      // condition of the fault.
       const auto pool = pools.lower_bound({fault, -1000});
       if (pool == pools.end() || pool->first.first != fault) {
         throw DataError("run " + run.id + ": no stretch of " +

@@ -23,6 +23,8 @@ constexpr double kMinPosition = 0.0;  // ends of the position transmitter [%]
 constexpr double kMaxPosition = 100.0;
 
 // The plan of a normal model that runs on its own past.
+// The only pool holds the antecedents alone, so that ChooseRegressors() has
+// nothing to search.
 ChannelPlan OwnPastPlan(const ChannelPlan& plan,
                         const std::vector<Regressor>& regressors) {
   ChannelPlan own = plan;
@@ -41,6 +43,8 @@ TsModel FitPlan(const ChannelPlan& plan, const Condition& normal,
                     normal, FitOptionsOf(plan, options.fit), saturation);
 }
 
+// A reading at an end of its transmitter says only that the true value is there
+// or beyond.
 bool AtLimit(const TsModel& normal, double reading) {
   return reading >= normal.saturation ||
          (normal.output == Signal::kX &&
@@ -58,6 +62,13 @@ std::vector<std::vector<double>> PredictAll(
 
 // What the fault makes of a reading without the background of the valve;
 // readings at a limit stay.
+//
+//     F_i ŷ_0/F,   X_i − (X − ŷ_0),
+//
+// F and X the healthy readings, F_i and X_i those with the fault. A healthy
+// flow of 0 has no ratio, and the difference is taken. Without the background,
+// a reading at a limit would become an ordinary one, and the fit would no
+// longer know that the limit hides the value.
 double CleanReading(const TsModel& normal, double healthy, double predicted,
                     double faulty) {
   if (AtLimit(normal, faulty)) {
@@ -96,12 +107,15 @@ Condition Targets(const NormalChannel& channel,
               (base.empty() ? 0.0 : base[i][k]));
     }
     targets.training.push_back(std::move(stretch));
+    // WholeStretch() pairs training and validation parts by index.
     targets.validation.push_back({faulty[i].run_id, {}});
   }
   return targets;
 }
 
 // The rules of `inputs` without anything to say.
+// A difference is not a reading, so no limit of a transmitter applies to it.
+// Its output range is 0 alone; AdaptModel() widens it to what the targets need.
 TsModel ZeroEffect(TsModel inputs) {
   for (TsRule& rule : inputs.rules) {
     rule.intercept = 0.0;
@@ -132,6 +146,7 @@ Readings RunObserver(const NormalChannel& channel, const TsModel& model,
     for (auto k = static_cast<std::size_t>(settling);
          k < stretch.samples.size(); ++k) {
       const double reading = stretch.samples[k][channel.normal.output];
+      // The limit is that of ŷ_0: a difference has none of its own.
       const double r = Residual(channel.normal, reading, predictions[k]);
       if (!std::isnan(r)) {
         readings.residuals.push_back(r);
@@ -165,6 +180,11 @@ NormalChannel ChooseNormal(const ChannelPlan& plan, const Condition& normal,
   NormalChannel channel{
       plan, FitPlan(plan, normal, options, saturation), {}, false, {}};
   channel.inputs = channel.normal;
+  // A candidate has to beat the model of the inputs on plain validation error.
+  // Among those that do, the one that forgets its past best is taken: a model
+  // fitted one step ahead can rest for half a minute where no valve would, and
+  // its plain error over some hours does not show that (docs/onboarding.md,
+  // "How it works", 2). An error of NaN compares false and never wins.
   double least = std::numeric_limits<double>::infinity();
   for (const std::vector<Regressor>& regressors : plan.own_past) {
     const ChannelPlan own_plan = OwnPastPlan(plan, regressors);
@@ -200,12 +220,23 @@ ChannelObserver FitDifference(const NormalChannel& channel,
                               const FaultCondition& fault, int settling) {
   const Predictions base = BaseOf(channel, faulty);
   const Condition targets = Targets(channel, healthy, faulty, base, fault);
+  // A fault that moves a regressor (t1 moves T1, f1 the measured X of a flow
+  // model) has rows of its own; all others share one factorization.
   const AdaptedModel adapted = channel.adaptation->Serves(targets)
                                    ? channel.adaptation->Fit(targets)
                                    : AdaptModel(Base(channel), targets);
   Readings readings =
       RunObserver(channel, adapted.model, faulty, base, settling);
   const double sd = normal_observer.residual_sd;
+  // These residuals are too small, because ŷ_0 was fitted to the background
+  // that the readings carry, and δ_i to the readings. Background and error of
+  // δ_i are taken as independent, so that on new data
+  //
+  //     E[r²] = s_0² + E[ε²],
+  //
+  // s_0 the held-out deviation of ŷ_0, ε the error of δ_i on the folds left
+  // out. One factor brings the residuals there and keeps the shape of their
+  // distribution, which sets the corners of the membership.
   const double held_out = sd * sd + MeanSquare(adapted.residuals);
   const double widening = std::max(
       1.0,
@@ -225,8 +256,29 @@ namespace {
 constexpr double kNormalShare = 0.1;
 constexpr double kObserverShare = 0.75;
 
+// Stretches of about `most` samples in all, evenly spread.
+std::vector<Stretch> EvenShare(const std::vector<Stretch>& stretches,
+                               std::size_t most) {
+  const auto all = static_cast<std::size_t>(CountSamples(stretches));
+  std::vector<Stretch> chosen;
+  std::size_t passed = 0;
+  std::size_t taken = 0;
+  for (const Stretch& stretch : stretches) {
+    passed += stretch.samples.size();
+    if (taken * all < passed * most) {
+      chosen.push_back(stretch);
+      taken += stretch.samples.size();
+    }
+  }
+  return chosen;
+}
+
 // Blocks of 600 samples, evenly spread, where there are more than 3600 in all:
 // faults are exact, and more of the same tells nothing about them.
+// Faults are simulated over all of them, each at several strengths, so that
+// their length sets the cost. Blocks are contiguous, because lags and the
+// simulation need the course in time. Where gaps leave too few blocks, whole
+// stretches take their place.
 std::vector<Stretch> Excerpt(const std::vector<Stretch>& stretches) {
   constexpr std::size_t kBlock = 600;
   constexpr std::size_t kMaxSamples = 3600;
@@ -242,8 +294,11 @@ std::vector<Stretch> Excerpt(const std::vector<Stretch>& stretches) {
                         {begin, begin + static_cast<std::ptrdiff_t>(kBlock)}});
     }
   }
-  if (blocks.size() * kBlock <= kMaxSamples) {
-    return blocks.empty() ? stretches : blocks;
+  if (blocks.size() * kBlock == kMaxSamples) {
+    return blocks;
+  }
+  if (blocks.size() * kBlock < kMaxSamples) {
+    return EvenShare(stretches, kMaxSamples);
   }
   std::vector<Stretch> chosen;
   for (std::size_t i = 0; i < kMaxSamples / kBlock; ++i) {
@@ -310,6 +365,9 @@ Healthy FitHealthy(const std::vector<TrainingRun>& runs, double flow_limit,
       static_cast<int>(options.channels.size()), options.threads, [&](int c) {
         const auto i = static_cast<std::size_t>(c);
         const ChannelPlan& plan = options.channels[i];
+        // The limit comes from the range of the transmitter, not from readings
+        // as in FindSaturation(): a healthy flow may never reach the limit that
+        // a fault drives it to.
         healthy.channels[i] = FitNormalChannel(
             plan, healthy.normal, healthy.stretches, options,
             plan.saturates ? (1.0 - kLimitShare) * flow_limit : kNoSaturation);
@@ -321,6 +379,10 @@ Healthy FitHealthy(const std::vector<TrainingRun>& runs, double flow_limit,
 NormalResiduals CalibrateHealthy(const Healthy& healthy,
                                  const TrainingOptions& options,
                                  Observer& observer) {
+  // CrossValidate() takes regressors and numbers of rules from the observer, so
+  // that CalibrateOn() comes first. CalibrateNormal() then replaces
+  // memberships, deviations and correlation times by held-out ones; the figures
+  // (MSE, VAF) remain those of the validation stretches.
   std::vector<ChannelPlan> plans;
   for (std::size_t c = 0; c < healthy.channels.size(); ++c) {
     plans.push_back(healthy.channels[c].plan);
@@ -352,6 +414,8 @@ std::vector<Condition> FitFaults(const Healthy& healthy,
                                  const FaultSynthesis& synthesize,
                                  const TrainingOptions& options,
                                  Reporter& reporter, ModelSet& models) {
+  // A task writes the observer and the entry of `compared` of its own fault
+  // alone. All tasks read the normal observer, which is complete by now.
   std::vector<Condition> compared(faults.size() + 1);
   compared.front() = healthy.normal;
   std::atomic<int> done{0};
@@ -385,6 +449,9 @@ ModelSet TrainDifferenceSet(const std::vector<TrainingRun>& healthy,
   Require(faults.size() < kMaxObservers, "there are too many faults");
   Reporter reporter(progress);
   reporter.Report(0.0, "fitting the normal observer");
+  // Every step needs what earlier ones have set: FitFaults() the deviations of
+  // the normal observer, FindGroups() limits and interpolation errors,
+  // FitDriftLimits() the limits of the windows.
   const Healthy fitted = FitHealthy(healthy, flow_limit, options);
   ModelSet models = Describe(healthy, fitted.normal, faults, options);
   const NormalResiduals held_out =
@@ -435,6 +502,7 @@ double ShareWithin(const ValidityRegion& region,
 }
 
 // The normal models of the type, fitted anew.
+// Stretches and adaptations stay empty: no fault is simulated or fitted.
 Healthy RefitHealthy(const ModelSet& of_type,
                      const std::vector<TrainingRun>& runs,
                      const TrainingOptions& options) {
@@ -458,6 +526,13 @@ Healthy RefitHealthy(const ModelSet& of_type,
 }
 
 // What a fault adds to the normal model with the same antecedents.
+// With common weights w_k(x) it is again a Takagi-Sugeno model,
+//
+//     Σ_k w_k (a_kᵀx + b_k) − Σ_k w_k (a_0kᵀx + b_0k)
+//         = Σ_k w_k ((a_k − a_0k)ᵀx + b_k − b_0k);
+//
+// with different ones it is not, which is why IsTransferable() asks for the
+// same antecedents. Its output is within [min − max_0, max − min_0].
 TsModel Difference(TsModel fault, const TsModel& normal) {
   for (std::size_t i = 0; i < fault.rules.size(); ++i) {
     TsRule& rule = fault.rules[i];
@@ -473,6 +548,12 @@ TsModel Difference(TsModel fault, const TsModel& normal) {
   return fault;
 }
 
+// As in FitDifference(), the variance of a residual is that of the background
+// plus that of the error of δ_i. The type knows the latter as s_i² − s_0², to
+// which the background of this valve is added. That difference of two estimates
+// may be negative, hence the lower bound. Evidence is divided by the
+// correlation time, so that the longer one of fault and normal observer is the
+// cautious one.
 ChannelObserver Transfer(ChannelObserver fault, const ChannelObserver& of_type,
                          const ChannelObserver& normal) {
   if (!fault.difference) {

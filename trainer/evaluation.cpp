@@ -34,6 +34,8 @@ double Share(const std::vector<Indication>& all, Zone zone, Predicate holds) {
 }
 
 // First and last rising edge of `holds` in `zone`, as indices; −1 if none.
+// The sample before the zone counts, too: an alarm that stood when the fault
+// came is no edge, and so no detection of it.
 template <typename Predicate>
 std::pair<int, int> RisingEdges(const std::vector<Indication>& all, Zone zone,
                                 Predicate holds) {
@@ -74,6 +76,8 @@ void IndexFault(const std::vector<Indication>& all, Zone zone,
   result.detected = all[zone.last].detected && last_dt >= 0;
   for (std::size_t k = zone.first; k <= zone.last; ++k) {
     const std::vector<int>& set = all[k].isolated;
+    // In this order, a set of the same instant outlives the withdrawal of an
+    // earlier one.
     if (all[k].withdrawn) {
       result.final_set.clear();
     }
@@ -116,6 +120,7 @@ RunIndices ComputeIndices(const std::vector<Indication>& all,
   std::size_t from = count;
   std::size_t settled = count;
   std::size_t horizon = count - 1;
+  // Backwards, so that the first instant of each kind remains.
   for (std::size_t k = count; k-- > 0;) {
     from = all[k].truth.fault != 0 ? k : from;
     settled = all[k].settled ? k : settled;
@@ -132,7 +137,7 @@ RunIndices ComputeIndices(const std::vector<Indication>& all,
   const auto any_set = [](const Indication& i) { return !i.isolated.empty(); };
   const double t_from = from < count ? all[from].time_s : all.back().time_s;
   std::size_t on = settled;
-  while (on < from && all[on].time_s < t_from - kBeforeFault) {
+  while (from < count && on < from && all[on].time_s < t_from - kBeforeFault) {
     ++on;
   }
   if (on < from) {  // before the fault, or the whole run without one
@@ -174,6 +179,7 @@ std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
                             run.samples.front().sample.stamp_ns) *
         1e-9;
     indication.truth = labelled.truth.value_or(FaultTruth{});
+    // A ramp begins at strength 0, where the valve is still healthy.
     if (indication.truth.strength == 0.0) {
       indication.truth.fault = 0;
     }
@@ -181,6 +187,8 @@ std::vector<Indication> ScoreRun(const std::shared_ptr<const ModelSet>& models,
     indication.detected = verdict.detected;
     indication.isolated = FaultsIn(*models, verdict.isolated);
     all.push_back(std::move(indication));
+    // A detection takes several abnormal samples and carries the stamp of the
+    // first. The samples since then are already stored, hence the way back.
     for (const Transition& transition : verdict.Transitions()) {
       if (transition.kind != TransitionKind::kDetected) {
         continue;

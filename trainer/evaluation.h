@@ -33,9 +33,9 @@ struct RunIndices {
   double t_it_first{-1.0};  ///< The same of PID: the fault is in the set.
   double t_it{-1.0};
   double t_exact{-1.0};     ///< First instant at which the set is {fault}.
-  double r_fd{-1.0};        ///< Share of [t_on, t_from] with DD.
+  double r_fd{-1.0};        ///< Share of [t_on, t_from) with DD.
   double r_td{-1.0};        ///< Share of [t_from, t_hor] with DD.
-  double r_fi{-1.0};        ///< Share of [t_on, t_from] with a set isolated.
+  double r_fi{-1.0};        ///< Share of [t_on, t_from) with a set isolated.
   double r_ti{-1.0};        ///< Share of [t_from, t_hor] with PID.
   double r_mi{-1.0};        ///< Mean number of wrong faults in [t_on, t_hor].
   double fs_d{-1.0};        ///< |strength| at t_dt.
@@ -48,7 +48,8 @@ struct RunIndices {
 };
 
 /// Computes the indices. t_from is the first instant with a fault, t_on the
-/// later of the first settled instant and 600 s before t_from.
+/// later of the first settled instant and 600 s before t_from. Without a fault
+/// t_on is the first settled instant and t_from the end of the run.
 ///
 /// @param horizon_s t_hor from the start of the run [s]; 0 = the last instant.
 RunIndices ComputeIndices(const std::vector<Indication>& indications,

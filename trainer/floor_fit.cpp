@@ -48,6 +48,12 @@ double Command(const Stretch& stretch, std::size_t k, int delay) {
   return std::clamp(stretch.samples[at][Signal::kCv], 0.0, 100.0);
 }
 
+// Mean squared error of the rod, run freely from the first reading of every
+// stretch,
+//
+//   x ← x + clamp(s (u − x), −v_opening, v_closing),   u = CV `delay` before
+//
+// Errors are bounded, so that a few outliers do not choose the dynamics.
 double SquaredError(const std::vector<Stretch>& stretches,
                     const Answer& answer) {
   double sum = 0.0;
@@ -69,6 +75,10 @@ double SquaredError(const std::vector<Stretch>& stretches,
   return count > 0 ? sum / static_cast<double>(count) : 0.0;
 }
 
+// An exhaustive search: 3 · 7 · 7 · 7 = 1029 answers over at most 7200 samples.
+// The error is flat where a rate is never reached, and what is wanted is not
+// the minimum but the extent of all answers that are nearly as good. kMinError
+// keeps that extent open where the best answer is all but exact.
 void FitRod(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   std::vector<Answer> answers;
   for (int delay = 0; delay < kDelays; ++delay) {
@@ -98,7 +108,8 @@ void FitRod(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   floor.slow.rate *= kSlower;
 }
 
-// The largest value that `values` stay at or above for `length` in a row.
+// The largest value that `values` stay at or above for `length` in a row: a
+// limit from there on is never exceeded for so long.
 double Sustained(const std::vector<double>& values, int length) {
   double most = 0.0;
   const auto n = static_cast<std::ptrdiff_t>(length);
@@ -108,6 +119,8 @@ double Sustained(const std::vector<double>& values, int length) {
   return most;
 }
 
+// Runs the rods of Floor over the record. Both sides count separately, as they
+// do there: a deviation that changes its sign begins anew.
 void FitDeviation(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   double most = 0.0;
   double repeated = 0.0;  // travel of the slow rod while X repeats
@@ -162,10 +175,22 @@ void FitLevels(const std::vector<Stretch>& stretches, FloorLimits& floor) {
       }
     }
   }
+  // Without pressures, any constant does: the gain is fitted with it.
   floor.dp_level = count > 0.0 ? std::max(sum / count, 1.0) : 1.0;
 }
 
-// ln(F/√dP) = ln gain − n X/100, weighted with F².
+// F = g exp(−n X/100) √dP as a straight line in x = X/100,
+//
+//   ln(F/√dP) = ln g − n x,
+//   n = −cov(x, y)/var(x),   ln g = mean(y) + n mean(x)
+//
+// Noise of constant deviation σ in F is σ/F in ln F, hence the weights F².
+// Flows near the largest may be those of a saturated transmitter and are left
+// out. Where X hardly moves, the slope is noise, and the exponent stays at its
+// default.
+//
+// The factor solves the test F > c F(X − L/2, dP) + m F_high of Floor for the
+// largest c that the record reached for flow_samples in a row.
 void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   FitLevels(stretches, floor);
   double w = 0.0;
@@ -223,6 +248,8 @@ std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s) {
   if (!first.Has(Signal::kCv) || !first.Has(Signal::kX)) {
     return std::nullopt;
   }
+  // FitDeviation() runs the rod that FitRod() has found, FitFlow() allows for
+  // the deviation that FitDeviation() has found.
   FloorLimits floor;
   const auto samples = [&](double seconds) {
     return std::max(2, static_cast<int>(std::lround(seconds / period_s)));

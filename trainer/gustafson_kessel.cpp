@@ -94,6 +94,7 @@ void CheckArguments(const Eigen::Ref<const MatrixXd>& points,
 std::vector<Index> LexicographicOrder(const Eigen::Ref<const MatrixXd>& z) {
   std::vector<Index> order(static_cast<std::size_t>(z.rows()));
   std::iota(order.begin(), order.end(), Index{0});
+  // Equal rows are interchangeable, so the sort need not be stable.
   std::sort(order.begin(), order.end(), [&z](Index a, Index b) {
     for (Index j = 0; j < z.cols(); ++j) {
       if (z(a, j) != z(b, j)) {
@@ -106,6 +107,8 @@ std::vector<Index> LexicographicOrder(const Eigen::Ref<const MatrixXd>& z) {
 }
 
 // log det F of a matrix given by its eigenvalues.
+// A sum of logarithms neither underflows nor overflows where the product of the
+// eigenvalues would.
 double LogDeterminant(const VectorXd& eigenvalues) {
   return eigenvalues.array().log().sum();
 }
@@ -156,6 +159,9 @@ class Iteration {
       }
       const double change = UpdateMemberships();
       ++result.iterations;
+      // What random memberships lead to first is close to the trivial
+      // partition, where every μ is 1/c. That is a fixed point, and the first
+      // steps away from it can be smaller than the tolerance.
       result.converged = change < options_.tolerance &&
                          result.iterations >= options_.min_iterations;
     }
@@ -220,6 +226,12 @@ class Iteration {
 
   // Raises the small eigenvalues of F and returns upper triangular R with
   // RᵀR = A = det(F)^(1/n) F⁻¹.
+  //
+  //     F = QΛQᵀ,   S = (det(F)^(1/n) Λ⁻¹)^(1/2) Qᵀ,   SᵀS = A,
+  //
+  // and R is the triangular factor of S. A itself is never formed: as squares,
+  // distances cannot become negative by rounding, however flat the cluster is,
+  // and R needs half the products of S.
   MatrixXd NormInducingFactor(MatrixXd& f) const {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(f);
     const double floor =
@@ -253,6 +265,11 @@ class Iteration {
 
   // U from the distances; returns max|ΔU|. A point on a center has a distance
   // of 0: the floor gives it to that center, or evenly to those it lies on.
+  //
+  //     μₖᵢ = ρₖᵢ / Σⱼ ρₖⱼ,   ρₖᵢ = (minⱼ Dₖⱼ / Dₖᵢ)^(1/(m−1)) ≤ 1;
+  //
+  // relative to the nearest center the power cannot overflow. weights_ holds
+  // 1/Σⱼ ρₖⱼ, and Ratio(i) leaves ρᵢ in scratch_ for the assignment to U.
   double UpdateMemberships() {
     distances_ = distances_.max(kMinPositive);
     nearest_ = distances_.rowwise().minCoeff();
@@ -319,6 +336,8 @@ FuzzyPartition BestStart(const MatrixXd& z,
   for (int start = 0; start < options.num_starts; ++start) {
     const unsigned seed = options.seed + static_cast<unsigned>(start);
     const Index c = options.num_clusters;
+    // A single start is a random partition, because centers among the points
+    // cut thin parallel clusters across.
     FuzzyPartition next =
         iteration.Run(start % 2 == 1 ? DrawCenters(z, c, seed)
                                      : DrawMemberships(z.rows(), c, seed));
@@ -347,6 +366,8 @@ FuzzyPartition FitGustafsonKessel(const Eigen::Ref<const MatrixXd>& points,
   coarse.tolerance *= stride > 1 ? kCoarseTolerance : 1.0;
   FuzzyPartition best = BestStart(Thinned(sorted, stride), coarse);
   if (stride > 1) {
+    // The memberships are of other points, so Run() goes on from the centers
+    // and covariances.
     best = Iteration(sorted, options).Run(best);
   }
 
@@ -371,6 +392,9 @@ void PlaceByDistance(const std::vector<Index>& columns,
   const Eigen::LLT<MatrixXd> factor(covariance);
   Require(factor.info() == Eigen::Success,
           "the covariance of a cluster is not positive definite");
+  // F = GGᵀ gives F⁻¹ = G⁻ᵀG⁻¹, so that L = G⁻¹, lower triangular as
+  // TsRule::metric stores it. Regressors that are no antecedents get rows and
+  // columns of zeros; ascending columns keep L triangular.
   const MatrixXd inverse = factor.matrixL().solve(MatrixXd::Identity(m, m));
 
   const Index size = columns.back() + 1;

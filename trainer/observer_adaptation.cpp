@@ -24,6 +24,8 @@ using Eigen::VectorXd;
 
 constexpr std::size_t kPenaltyFolds = 4;
 constexpr int kMinFitRows = 20;
+// λ in rows: with |z| ≤ 1 it pulls a coefficient to 0 as strongly as λ rows
+// with full weight at the end of the range pull it to their targets.
 constexpr std::array<double, 5> kPenalties{0.03, 0.3, 3.0, 30.0, 300.0};
 constexpr double kSharedPenalty = 0.01;  // of what all rules have in common
 constexpr double kWorthAdapting = 0.98;  // of the normal model's error
@@ -37,6 +39,8 @@ struct Rows {
   std::vector<double> shares;  // strength over that of the condition
 };
 
+// Folds are blocks of consecutive rows of each stretch. Neighbouring rows are
+// correlated, and folds at random would test a model on copies of its own data.
 Rows CollectRows(const TsModel& normal, const Condition& condition) {
   Rows rows;
   std::vector<RegressionData> parts;
@@ -85,7 +89,12 @@ Scale ScaleOf(const TsModel& model) {
   return scale;
 }
 
-// Columns [w_1 z, w_1, w_2 z, ..., z, 1], those of a penalty below 1 scaled up.
+// Columns [w_1 z, w_1, w_2 z, ..., z, 1]. The last ones, of δ_0, are divided by
+// √0.01, so that with θ_0 = √0.01 δ_0 one ridge serves both penalties,
+//
+//     λ Σ_i |δ_i|² + 0.01 λ |δ_0|² = λ |θ|²;
+//
+// AddTo() undoes that.
 MatrixXd Design(const TsModel& model, const MatrixXd& x, const Scale& scale) {
   const MatrixXd weights = DegreesOfFulfilment(model.rules, x);
   const Index n = x.cols();
@@ -110,6 +119,9 @@ struct Systems {
   std::vector<Eigen::LLT<MatrixXd>> factors;  // per penalty: folds, then all
 };
 
+// Forming DᵀD costs N p² for N rows and p columns. It is done once for the rows
+// of each fold; sums of these serve the folds and the whole, and λ adds to the
+// diagonal alone, so that all 25 factors share the work.
 Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
   Systems systems;
   // Lower triangles; of the rows of each fold, then of those that it uses.
@@ -141,6 +153,7 @@ Systems Factorize(const MatrixXd& design, const std::vector<int>& folds) {
   }
   for (const double penalty : kPenalties) {
     for (const MatrixXd& gram : grams) {
+      // Eigen's LLT reads the lower triangle alone.
       MatrixXd regular = gram;
       regular.diagonal().array() += penalty;
       systems.factors.emplace_back(regular);
@@ -168,6 +181,9 @@ std::vector<double> Residuals(const TsModel& limits, const VectorXd& y,
   return residuals;
 }
 
+// θ back in the units of the regressors: with z_j = (x_j − m_j)/h_j,
+//
+//     δᵀ[z 1] = Σ_j (δ_j/h_j) x_j + δ_const − Σ_j (δ_j/h_j) m_j.
 void AddTo(TsModel& model, const VectorXd& theta, const Scale& scale) {
   const auto n = static_cast<Index>(model.regressors.size());
   const VectorXd shared = theta.tail(n + 1) / std::sqrt(kSharedPenalty);
@@ -241,6 +257,8 @@ struct Adaptation::Impl {
 };
 
 Target Adaptation::Impl::TargetOf(const VectorXd& y) const {
+  // Censored targets change with every round of Solve(), so that no scores can
+  // be prepared for them.
   Target target{y, y.maxCoeff() >= normal.saturation, {}};
   if (target.censored) {
     return target;
@@ -267,6 +285,14 @@ VectorXd Adaptation::Impl::Solve(const Target& target, std::size_t penalty,
   if (!target.censored) {
     return factor.solve(target.scores[fold]);
   }
+  // Readings at the limit hide the true value. The error there is one-sided and
+  // is minimized by alternating between
+  //
+  //     t_k = max(y_k, ŷ_k)   where y_k is at the limit, else y_k,
+  //     θ = argmin Σ_k (t_k − ŷ_k(θ))² + λ |θ|².
+  //
+  // Neither step raises the one-sided error with its ridge. The matrix stays
+  // the same, so that a round costs one solution of a factored system.
   const VectorXd& y = target.y;
   const double span = y.maxCoeff() - y.minCoeff();
   VectorXd predicted = Predicted(theta);
@@ -307,6 +333,8 @@ Adaptation& Adaptation::operator=(Adaptation&&) noexcept = default;
 
 bool Adaptation::Serves(const Condition& condition) const {
   const Rows rows = CollectRows(impl_->normal, condition);
+  // Exact equality is meant: a fault that leaves the regressors alone keeps
+  // their bits, any other one has a system of its own.
   return rows.data.x == impl_->x && rows.shares == impl_->shares;
 }
 
@@ -336,6 +364,7 @@ AdaptedModel Adaptation::Fit(const Condition& condition) const {
           impl_->Solve(target, *chosen, kPenaltyFolds, thetas.front()),
           impl_->scale);
   } else {
+    // Not the widened copy: nothing speaks for outputs beyond the usual ones.
     adapted.model = impl_->normal;
   }
   for (Index k = 0; k < y.size(); ++k) {

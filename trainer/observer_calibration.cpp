@@ -88,6 +88,10 @@ struct Fold {
 
 // Every kFolds-th stretch and the others; of few stretches block f of kFolds of
 // each, and the rest of it.
+// A block that is left out cuts the rest of its stretch in two, so that no lag
+// reaches across it. FitChannel() needs validation data to choose the kind of
+// consequents, which is the block itself; it is not parallel to the training
+// stretches, so WholeStretch() does not work on `rest`.
 Fold MakeFold(const Condition& normal, int fold) {
   Fold result;
   const bool whole_stretches = normal.training.size() / 2 >= kFolds;
@@ -134,6 +138,9 @@ NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
   const std::size_t channels = plans.size();
   std::vector<ResidualSeries> residuals(channels * kFolds);
   std::vector<ResidualSeries> commands(channels * kFolds);
+  // One task for each channel and fold, which writes its own two entries alone.
+  // Regressors and number of rules stay those of `chosen`, so that the
+  // residuals are those of a model of the same structure.
   ParallelFor(static_cast<int>(residuals.size()), threads, [&](int i) {
     const auto c = static_cast<std::size_t>(i / kFolds);
     const Fold fold = MakeFold(normal, i % kFolds);
@@ -197,6 +204,11 @@ ModelSet WithObservers(const ModelSet& models, const std::vector<int>& chosen) {
 
 // Squares of: neighbours' interpolation less the observer between them, and
 // how far the interpolation moved from the nearer neighbour.
+//
+//     e = ŷ_low + w (ŷ_high − ŷ_low) − ŷ_middle,
+//     w = (s_middle − s_low)/(s_high − s_low),
+//
+// s the strengths.
 std::vector<InterpolationSums> CompareWithNeighbours(
     const std::vector<Condition>& conditions, const ModelSet& models, int low,
     int middle, int high) {
@@ -237,6 +249,13 @@ std::vector<InterpolationSums> CompareWithNeighbours(
   return sums;
 }
 
+// κ of the observer in the middle, over n samples with errors e and moves m,
+//
+//     κ² = max(0, Σ e² − n (0.3 σ)²) / Σ m²,
+//
+// σ the deviation of its residual: an error well inside the noise does no harm.
+// The monitor takes κ times the move as the deviation of an interpolated
+// prediction (docs/method.md, 4).
 void SetInterpolationErrors(const std::vector<InterpolationSums>& sums,
                             Observer& observer) {
   for (std::size_t c = 0; c < sums.size(); ++c) {
@@ -300,6 +319,8 @@ void ScoreStretch(const Stretch& stretch,
   Verdict verdict;
   bank.Initialise(stretch.samples.front());
   ResidualWindows windows(models);
+  // The fault acts from the first sample on, so evidence is gathered as if it
+  // had been detected there.
   faults.Restart();
   const int start = models.decision.settling_samples;
   for (std::size_t k = 0; k < stretch.samples.size(); ++k) {
@@ -411,6 +432,8 @@ std::vector<WindowAverage> AverageWindows(
 }
 
 // The limit that a fault passes by most, and how far it may move then.
+// `ratio` compares all three kinds of limit: m/L for the mean m, and the ratio
+// of deviations for the energy. `bound` points into ModelSet::channels.
 struct Witness {
   double ratio{1.0};
   double* bound{nullptr};
@@ -421,6 +444,9 @@ struct Witness {
   }
 };
 
+// A mean m beyond its limit L is still found after the limits have followed by
+// b as long as m − b is beyond L. b = (m − L)/2 keeps half of the excess for
+// the detection; the same holds for the energy, in logarithms.
 void UpdateWitness(const std::vector<WindowAverage>& averages, ModelSet& models,
                    Witness& witness) {
   for (std::size_t c = 0; c < averages.size(); ++c) {
@@ -455,6 +481,8 @@ void FitDriftLimits(const std::vector<Condition>& conditions,
   const auto normal = std::make_shared<const ObserverPlan>(healthy);
   for (const int fault : models.faults) {
     for (const bool negative : {false, true}) {
+      // One limit that still finds the fault is enough: only the one that it
+      // exceeds by most is bounded, and the others may follow further.
       Witness witness;
       for (const int i : Chain(models, fault, negative)) {
         if (i > 0) {
@@ -493,6 +521,8 @@ void FindGroups(const std::vector<Condition>& conditions, int threads,
       by_fault[conditions[i].fault].Add(parts[i]);
     }
   }
+  // root[i] is the smallest index in the group of fault i. Groups merge
+  // transitively: where i looks like l and l like m, the three are one group.
   std::vector<std::size_t> root(models.faults.size());
   std::iota(root.begin(), root.end(), std::size_t{0});
   for (const auto& [fault, shares] : by_fault) {

@@ -57,10 +57,10 @@ NormalResiduals CrossValidate(const Condition& normal, const Observer& chosen,
 
 /// Sets ChannelObserver::interpolation_error of every observer between two of
 /// its fault (normal operation counts as strength 0): the root mean square
-/// error of interpolating it from its neighbours, less 0.3 deviations of its
-/// residual, per what the interpolation moves from the nearer one; within
-/// [0.02, 1]. The strongest observer takes over that of its neighbour; one
-/// without any neighbour of its fault keeps 0.5.
+/// error of interpolating it from its neighbours, from whose square that of 0.3
+/// deviations of its residual is taken, per what the interpolation moves from
+/// the nearer one; within [0.02, 1]. The strongest observer takes over that of
+/// its neighbour; one without any neighbour of its fault keeps 0.5.
 ///
 /// @param conditions parallel to models.observers.
 void FitInterpolationErrors(const std::vector<Condition>& conditions,

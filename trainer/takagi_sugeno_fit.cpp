@@ -64,6 +64,8 @@ MatrixXd DegreesOfFulfilment(const std::vector<TsRule>& rules,
     }
     ++i;
   }
+  // exp(e_i − max_j e_j): the strongest rule has 1, and the sum cannot vanish
+  // far from all rules.
   const ArrayXd largest = exponents.rowwise().maxCoeff();
   exponents = (exponents.colwise() - largest).exp();
   const ArrayXd sum = exponents.rowwise().sum();
@@ -98,6 +100,8 @@ using Eigen::VectorXd;
 constexpr double kRankTolerance = 1e-10;
 
 // Minimum-norm least squares of `a` θ = `b`.
+// The threshold has to be set before compute(), which already uses the rank for
+// the orthogonal factor on the right.
 VectorXd Solve(const MatrixXd& a, const VectorXd& b) {
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
   decomposition.setThreshold(kRankTolerance);
@@ -107,6 +111,12 @@ VectorXd Solve(const MatrixXd& a, const VectorXd& b) {
 
 // Rule i alone, in standardized columns Xs. Centering on the weighted means
 // takes the intercept out of the system: it is what the means leave.
+//
+//     b = ȳ − aᵀx̄,   a = argmin Σₖ wₖ (yₖ − ȳ − aᵀ(xₖ − x̄))² + ridge W |a|²
+//
+// with the weighted means x̄ and ȳ and the sum W of the weights. The ridge
+// stands as n rows √(ridge W) I below the data, so that the normal equations
+// are not needed, and leaves the intercept alone.
 void EstimateLocal(const MatrixXd& xs, const Eigen::Ref<const VectorXd>& y,
                    const Eigen::Ref<const VectorXd>& weights, double ridge,
                    Eigen::Ref<VectorXd> theta) {
@@ -144,6 +154,7 @@ MatrixXd EstimateGlobal(const MatrixXd& xs, const VectorXd& y,
     auto block = a.middleCols(i * (n + 1), n + 1);
     block.topRows(xs.rows()).leftCols(n) = weights.col(i).asDiagonal() * xs;
     block.topRows(xs.rows()).col(n) = weights.col(i);
+    // As in EstimateLocal(), the ridge leaves the intercept (column n) alone.
     if (extra > 0) {
       block.block(xs.rows() + i * n, 0, n, n)
           .diagonal()
@@ -184,6 +195,9 @@ Consequents EstimateConsequents(const Eigen::Ref<const MatrixXd>& x,
       EstimateLocal(xs, ys, weights.col(i), options.ridge, theta.col(i));
     }
   }
+  // Back to the units of X and y: a_j = θ_j/σ_j, b = θ_n + ȳ − aᵀx̄. In the
+  // global method every rule may take all of ȳ because the weights of a row sum
+  // to 1.
   Consequents result;
   result.slopes =
       theta.topRows(n).transpose().array().rowwise() / scale.array();
@@ -206,6 +220,9 @@ constexpr double kWorthNarrowing = 0.02;
 constexpr int kCensoredRounds = 6;
 
 // Fitted to y, and to what the prediction is where that is beyond the limit.
+// The true value at the limit is any beyond, so that the error there is
+// one-sided. It is approached by alternating between the targets max(y_k, ŷ_k)
+// and least squares; in the global method no round raises error plus ridge.
 Consequents EstimateCensored(const RegressionData& data,
                              const MatrixXd& weights,
                              const ConsequentOptions& options) {
@@ -243,6 +260,7 @@ double EstimateRules(const RegressionData& data,
                                  .cwiseMax(data.y.minCoeff())
                                  .cwiseMin(data.y.maxCoeff());
   const ArrayXd error = (data.y - predicted).array();
+  // Reading and prediction both at the limit cannot be compared (Residual()).
   const auto silent =
       data.y.array() >= data.saturation && predicted.array() >= data.saturation;
   return silent.select(0.0, error).square().mean();
@@ -307,6 +325,7 @@ std::vector<TakagiSugenoOptions> Variants(const RuleSelectionOptions& options,
     variants.push_back(variants[0]);
     variants[1].consequents.method = ConsequentMethod::kGlobal;
   }
+  // The order decides ties in Best(), since all of these have the same S(c).
   const std::size_t methods = variants.size();
   for (std::size_t i = 0; options.both_antecedents && i < methods; ++i) {
     variants[i].antecedent_kind = AntecedentKind::kProjected;
@@ -362,6 +381,8 @@ RuleSelection SelectRules(const RegressionData& data,
       const double error = validation
                                ? validation(rules.back())
                                : std::numeric_limits<double>::quiet_NaN();
+      // NaN compares false here and in Best(): it is never the least error, and
+      // never eligible where there is a validation.
       least = error < least ? error : least;
       selection.tried.push_back({count, variant.antecedent_kind,
                                  variant.consequents.method, validity, error});

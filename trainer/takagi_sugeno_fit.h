@@ -102,7 +102,7 @@ struct TakagiSugenoOptions {
 /// steps by one common factor while that lowers the training error by 2 %.
 ///
 /// Targets at the limit of a transmitter are replaced by the prediction where
-/// that is beyond, and the consequents estimated again, until both agree: least
+/// that is beyond, and the consequents estimated again, six times: about least
 /// squares with a one-sided error there.
 ///
 /// The same data and options give the same bits; scaling a column of X or

@@ -200,6 +200,8 @@ std::vector<WindowTrace> ComputeWindows(const ModelSet& models,
       windows.Push(instant.residuals,
                    sample.Has(Signal::kCv) ? sample[Signal::kCv] : kMissing);
     }
+    // `index` counts the windows within a channel: the traces are ordered by
+    // channel.
     std::size_t index = 0;
     for (std::size_t i = 0; i < traces.size(); ++i) {
       WindowTrace& out = traces[i];
@@ -208,6 +210,8 @@ std::vector<WindowTrace> ComputeWindows(const ModelSet& models,
       const ResidualWindow& command = windows.command(out.channel, index);
       const bool applies = live && Applies(*out.limits, window, command);
       const double upper = UpperLogRms(*out.limits, command);
+      // A window is shown wherever it has a value, and counts as beyond only
+      // where its limits apply, as in Detection.
       out.mean.push_back(live ? window.mean() : kMissing);
       out.deviation.push_back(live ? std::exp(window.log_rms()) : kMissing);
       out.upper_deviation.push_back(applies ? std::exp(upper) : kMissing);
@@ -225,6 +229,9 @@ std::vector<WindowTrace> ComputeWindows(const ModelSet& models,
 std::vector<Panel> WindowPanels(const EpisodeEvidence& evidence,
                                 const std::vector<TracePoint>& trace) {
   std::vector<Panel> panels;
+  // detected_ns is the stamp of the first abnormal sample. The detection took
+  // it and the n_d - 1 samples after it, all beyond the same limit
+  // (docs/method.md, (1)).
   const auto first = static_cast<std::size_t>(std::distance(
       trace.begin(),
       std::find_if(trace.begin(), trace.end(), [&](const auto& t) {
@@ -268,6 +275,7 @@ std::vector<Panel> WindowPanels(const EpisodeEvidence& evidence,
 std::vector<std::size_t> ByWeight(const Episode& episode,
                                   const std::vector<std::vector<double>>& d) {
   const auto greatest = [&](std::size_t f) {
+    // A factor is at most 1, so isolated faults rank before all others.
     double most = (episode.fault_bits >> f & 1U) != 0 ? 2.0 : 0.0;
     for (const double value : d[f]) {
       most = std::isfinite(value) && value > most ? value : most;
@@ -339,6 +347,8 @@ std::pair<std::string, const char*> MarkOf(const HistoryEntry& event) {
   return {event.kind == "RESUMED" ? "resumed" : "", ink::kGrey};
 }
 
+// An episode is dated back to its first abnormal sample ("start"). The engine
+// opens it some samples later ("detected").
 std::vector<Mark> Marks(const EpisodeEvidence& evidence) {
   const std::int64_t origin_ns = evidence.episode.detected_ns;
   std::vector<Mark> marks = {{0.0, "start", ink::kVermilion}};
@@ -376,6 +386,7 @@ std::vector<Band> Bands(const EpisodeEvidence& evidence,
     if (!goes_on) {
       bands.push_back({t_s, t_s, name, "#efefef"});
     }
+    // A quality holds until the next sample; the last one has none behind it.
     bands.back().to = i + 1 < trace.size()
                           ? SecondsFrom(trace[i + 1].sample.stamp_ns, origin_ns)
                           : t_s;
@@ -411,6 +422,7 @@ EpisodeEvidence LoadEvidence(storage::History& history, std::string_view id,
     filter.since_ns = evidence.trace.front().sample.stamp_ns;
     filter.until_ns = evidence.trace.back().sample.stamp_ns + 1;
     evidence.gaps = history.Gaps(filter);
+    // A gap without a valve is one of all valves.
     std::erase_if(evidence.gaps, [&episode](const DataGap& gap) {
       return !gap.valve_id.empty() && gap.valve_id != episode.valve_id;
     });
@@ -419,6 +431,9 @@ EpisodeEvidence LoadEvidence(storage::History& history, std::string_view id,
     try {
       ModelSet models =
           storage::ModelStore(models_path).Load(episode.model_set);
+      // NAME@VERSION does not identify a set across databases, and the
+      // thresholds of another set would explain the alarm wrongly. The content
+      // hash does.
       if (models.content_hash == episode.model_hash &&
           models.channels.size() == episode.channels.size()) {
         evidence.models = std::move(models);
@@ -434,6 +449,8 @@ Figure EpisodeFigure(const EpisodeEvidence& evidence,
                      const EpisodeFigureOptions& options) {
   const Episode& episode = evidence.episode;
   const std::vector<TracePoint> accepted = Accepted(evidence);
+  // Windows are computed from all accepted samples, because their memory
+  // reaches back beyond what is shown.
   std::vector<TracePoint> trace = accepted;
   std::erase_if(trace, [&](const TracePoint& instant) {
     const double t_s =

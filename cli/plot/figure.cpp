@@ -75,6 +75,7 @@ Range RangeOf(const Figure& figure) {
       include(series.x);
     }
   }
+  // gnuplot refuses an axis of no length, which a single point would give.
   return {range.from, std::max(range.to, range.from + 1e-3)};
 }
 
@@ -95,6 +96,8 @@ class PointWriter {
   // stays in place.
   void Write(std::size_t groups) {
     const std::size_t count = std::min(x_.size(), y_.size());
+    // `step` is rounded down and each group leaves two points at most, so a
+    // curve without breaks has at most about three times `groups` points.
     const std::size_t step = std::max<std::size_t>(1, count / groups);
     for (std::size_t i = 0; i < count; i += step) {
       const std::size_t end = std::min(i + step, count);
@@ -145,6 +148,14 @@ class PointWriter {
 // Writes one script: terminal, data blocks, then a multiplot with one plot per
 // panel. Positions are pixels from the top left; gnuplot needs fractions of the
 // picture from the bottom left.
+//
+//     script = terminal {block} frame {panel} "unset multiplot" "set output"
+//     block  = "$pNsM << EOD" LF {x " " y LF} "EOD" LF     panel N, series M
+//     panel  = shades margins axes "plot" item {"," item}
+//     item   = limit / block with style / "keyentry" note
+//
+// Text from outside (names of valves, faults, events) enters the script through
+// GnuplotText() only, because gnuplot can run commands.
 class ScriptWriter {
  public:
   ScriptWriter(const Figure& figure, Format format)
@@ -155,6 +166,8 @@ class ScriptWriter {
                              : TimeUnit{1.0, ""}) {}
 
   std::string Write(const std::filesystem::path& output) {
+    // First, because the rows of names decide the height of the picture, to
+    // which all other positions refer.
     PlaceMarks();
     Terminal(output);
     Data();
@@ -218,6 +231,7 @@ class ScriptWriter {
   }
 
   void Terminal(const std::filesystem::path& output) {
+    // noenhanced: otherwise the underscores of tags would start subscripts.
     out_ << "set encoding utf8\nset terminal "
          << (format_ == Format::kPng
                  ? "pngcairo noenhanced font 'DejaVu Sans,11' "
@@ -232,6 +246,8 @@ class ScriptWriter {
       const auto& series = figure_.panels[p].series;
       for (std::size_t s = 0; s < series.size(); ++s) {
         out_ << Block(p, s) << " << EOD\n";
+        // Bars are never thinned: gnuplot takes their width from the space
+        // between them.
         PointWriter(figure_, series[s], unit_.seconds, out_)
             .Write(series[s].shape == Shape::kBars
                        ? std::numeric_limits<std::size_t>::max()
@@ -331,6 +347,7 @@ class ScriptWriter {
            << ", graph 1 left top Left reverse samplen 2.2 spacing 1.15\n";
     }
     if (panel.range || strip) {
+      // A strip has no values that gnuplot could scale its axis to.
       const Range range = panel.range.value_or(Range{});
       out_ << "set yrange [" << GnuplotNumber(range.from) << ':'
            << GnuplotNumber(range.to) << "]\n";
@@ -366,6 +383,7 @@ class ScriptWriter {
       next() << Block(p, s) << " using 1:2 " << StyleOf(series) << " lc rgb '"
              << series.colour << "' " << TitleOf(series.title);
     }
+    // Without a plot command gnuplot would draw neither the axes nor the bands.
     if (panel.series.empty()) {
       next() << "NaN notitle";  // Axes only.
     }

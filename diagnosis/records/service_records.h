@@ -19,7 +19,7 @@ struct DataGap {
   std::string valve_id;
   std::int64_t from_ns{0};
   std::int64_t to_ns{0};
-  std::string reason;  ///< "monitor_down", "stream", "persistence_degraded".
+  std::string reason;  ///< "stream" and others: docs/data.md.
 };
 /// Samples of one valve on one day by quality.
 struct CoverageDay {

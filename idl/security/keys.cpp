@@ -150,6 +150,8 @@ void RequireDays(int days) {
   }
 }
 
+// These letters need no escape in PermissionsXml() or in a path. A leading '.'
+// marks a folder that MakeKey() has not finished.
 void RequireName(const std::string& name) {
   const auto accepted = [](char c) {
     return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' ||
@@ -241,6 +243,7 @@ Certificate MakeCertificate(EVP_PKEY* key, const std::string& name,
   X509* const certificate = made.get();
   Require(certificate != nullptr && X509_set_version(certificate, 2) == 1,
           "certificate");
+  // Random, so that the authority needs no list of the numbers it has given.
   std::array<unsigned char, 16> serial{};
   Require(getentropy(serial.data(), serial.size()) == 0, "random numbers");
   serial[0] &= 0x7FU;
@@ -264,6 +267,10 @@ Certificate MakeCertificate(EVP_PKEY* key, const std::string& name,
                                        : X509_get_subject_name(issuer)) == 1 &&
               X509_set_pubkey(certificate, key) == 1,
           "certificate");
+  // The order matters: "hash" needs the public key, "keyid" copies the subject
+  // key identifier of `parent`, which may be this certificate, and the
+  // signature covers all of it. The authority needs digitalSignature as well,
+  // because it signs the governance and the permissions.
   X509* const parent = issuer == nullptr ? certificate : issuer;
   AddExtension(
       certificate, parent, NID_basic_constraints,
@@ -303,6 +310,8 @@ std::string Sign(const std::string& document, X509* signer, EVP_PKEY* key) {
   const Bio in = MemoryOf(document);
   const Pkcs7 signature(PKCS7_sign(signer, key, nullptr, in.get(), kFlags));
   Require(signature != nullptr, "signature");
+  // PKCS7_sign() has read the document to its end, and SMIME_write_PKCS7()
+  // writes it in front of the signature: it is read from the beginning again.
   BIO_reset(in.get());
   const Bio out(BIO_new(BIO_s_mem()));
   Require(SMIME_write_PKCS7(out.get(), signature.get(), in.get(), kFlags) == 1,
@@ -427,7 +436,9 @@ std::string GovernanceXml() {
 )";
 }
 
-// The text between `before` and `after`; empty if there is none.
+// The text between `before` and `after`; empty if there is none. A search is
+// enough for documents of ours: the signature shows that they are as
+// PermissionsXml() wrote them.
 std::string Between(const std::string& text, const std::string& before,
                     const std::string& after) {
   const std::size_t begin = text.find(before);
@@ -446,6 +457,8 @@ void RequireAuthority(const fs::path& folder) {
   }
 }
 
+// The partitions of <publish>. Without it (the role reader) all are searched,
+// and those of <subscribe> are "*".
 std::string GatewayPartitions(const std::string& permissions) {
   std::string names;
   const std::string_view text =
@@ -464,6 +477,9 @@ std::string GatewayPartitions(const std::string& permissions) {
 
 // CheckKey() without validity periods.
 KeyInfo Examine(const fs::path& folder) {
+  // From the authority outwards, so that the first message names the cause: the
+  // certificate has to be the authority's, the key that of the certificate, the
+  // documents signed, and the permissions for this name.
   const Certificate authority = ReadCertificate(folder / kCaCertificate);
   const Certificate certificate = ReadCertificate(folder / kCertificate);
   const PrivateKey key = ReadKey(folder / kKey);
@@ -570,6 +586,10 @@ KeyInfo MakeKey(const fs::path& folder, const std::string& name, Role role,
   const Certificate certificate = MakeCertificate(
       key.get(), name, until, authority.get(), authority_key.get());
 
+  // A key is complete or not there, whenever this is interrupted: its files are
+  // written beside it and checked as a program will check them, then one call
+  // exchanges the folders, and the old key goes under the name of the new one.
+  // A folder that an interrupted call left is removed first.
   const fs::path fresh = folder / ("." + name + ".new");
   fs::remove_all(fresh);
   fs::create_directory(fresh);

@@ -22,7 +22,7 @@ namespace fdi::idl {
 /// Permissions of a key's holder on the bus.
 enum class Role {
   kGateway,  ///< Publish samples of valves.
-  kMonitor,  ///< Read samples; publish vectors, events, sets and status.
+  kMonitor,  ///< Read samples; publish all else (docs/security.md).
   kReader,   ///< Read all, publish nothing.
 };
 

@@ -68,6 +68,7 @@ int Reap(pid_t pid) {
 }
 
 // Kills the whole process group.
+// The child has not been reaped yet, so its pid cannot belong to anyone else.
 void Kill(pid_t pid) {
   kill(-pid, SIGKILL);
   Reap(pid);
@@ -77,6 +78,9 @@ void Kill(pid_t pid) {
 // output, no other open file, default signals, its own process group.
 class SpawnPlan {
  public:
+  // The child performs the file actions in this order: the input is duplicated
+  // before all above standard error is closed. Ignored signals outlive exec(),
+  // and the monitor ignores SIGXFSZ, so all are set to their defaults.
   explicit SpawnPlan(int input) {
     posix_spawn_file_actions_init(&files_);
     posix_spawn_file_actions_adddup2(&files_, input, STDIN_FILENO);
@@ -150,10 +154,14 @@ class ProgramDelivery : public EventDelivery {
     return Await(pid);
   }
 
+  // Nobody reads the descriptor: it stays readable and aborts later deliveries,
+  // too.
   void Interrupt() override { eventfd_write(stop_.get(), 1); }
 
  private:
   std::optional<std::string> Await(pid_t pid) const {
+    // A descriptor, because poll() awaits it together with stop_ and a timeout,
+    // which waitpid() cannot.
     // The header of glibc 2.36 declares pidfd_open() for C alone.
     const File process(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
     if (process.get() < 0) {
@@ -171,6 +179,8 @@ class ProgramDelivery : public EventDelivery {
       ready = poll(wanted, 2,
                    static_cast<int>(std::max<std::int64_t>(0, left.count())));
     } while (ready < 0 && errno == EINTR);
+    // A program that has ended counts by its status, even if the monitor stops
+    // now.
     const bool ended = ready > 0 && wanted[0].revents != 0;
     if (ended) {
       return StatusReason(Reap(pid));
@@ -229,6 +239,8 @@ class UrlDelivery : public EventDelivery {
 
   std::optional<std::string> Deliver(const std::string& json) override {
     httplib::Client client(server_);
+    // cpp-httplib applies each limit to one operation, so a server that sends
+    // its answer byte by byte can take longer in all.
     client.set_connection_timeout(limit_);
     client.set_read_timeout(limit_);
     client.set_write_timeout(limit_);
@@ -241,6 +253,8 @@ class UrlDelivery : public EventDelivery {
     }
     const httplib::Result answer = client.Post(path_, json, "application/json");
     {
+      // Interrupt() uses the pointer under the lock, so it never outlives
+      // `client`.
       const std::lock_guard lock(mutex_);
       client_ = nullptr;
     }
@@ -296,6 +310,8 @@ std::unique_ptr<EventDelivery> MakeEventDelivery(
   if (target.starts_with(kScheme)) {
     return DeliverToUrl(target, limit);
   }
+  // In the first word this is a URL of a scheme that is not spoken. In a later
+  // word it is an argument of the command, such as the address given to curl.
   if (target.find("://") != std::string::npos &&
       target.find("://") < target.find(' ')) {
     Refuse(target, "only http is spoken");

@@ -34,6 +34,9 @@ struct RunArguments {
 };
 
 // A flag with an optional value; TOML may give it as true or false.
+// In CLI11, default_str() of an option with expected(0, 1) is its value if it
+// is given bare (--record). If it is not given, its variable stays as it is,
+// here "off".
 std::string ParseRecord(const std::string& word) {
   if (word == "true" || word == "on") {
     return "on";
@@ -215,6 +218,8 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
   if (!options.http_names.empty() && !options.http && !options.console) {
     throw ConfigError("--allow-host needs --http or --console");
   }
+  // Before the service, so that a signal during its start requests an orderly
+  // stop.
   cli::StopSignals signals;
   const cli::Context limited{context.options, LimitLog(context.log),
                              context.software, context.command_line};
@@ -225,6 +230,8 @@ int Run(const RunArguments& arguments, const cli::Context& context) {
 }  // namespace
 
 void AddRunVerb(cli::Program& program) {
+  // CLI11 holds references to the variables and fills them when it parses,
+  // after this function has returned; the callback shares their ownership.
   auto arguments = std::make_shared<RunArguments>();
   CLI::App& run = program.AddVerb(
       "run", "Diagnose the valves on the bus until SIGINT or SIGTERM",

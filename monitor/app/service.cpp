@@ -29,12 +29,15 @@ namespace {
 using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
 
+// Without samples, Pipeline::Poll() runs as often as this.
 constexpr milliseconds kTakeTimeout{100};
 constexpr int kTakeLimit = 4096;  // Bounds a call of Take() under full load.
 // A pair must exchange states more often.
 constexpr milliseconds kPairTakeTimeout{20};
 constexpr int kPairTakeLimit = 256;
 constexpr milliseconds kTickPeriod{1000};
+// Each of these bounds one step of a stop. SIGTERM ends the monitor within 5 s,
+// also with a subscriber that does not read (docs/operations.md).
 constexpr milliseconds kHookPatience{1000};
 constexpr milliseconds kDrainLimit{1000};
 constexpr milliseconds kSubscriberPatience{1000};
@@ -120,6 +123,9 @@ std::string MonotonicMicroseconds() {
 
 }  // namespace
 
+// Members are initialised in the order in which they use each other. The
+// session in the history begins only after options and files have been read and
+// the lock keeps other monitors out.
 Service::Service(const ServiceOptions& options, const cli::Context& context)
     : options_(options),
       context_(context),
@@ -193,11 +199,14 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
 
 Service::~Service() = default;
 
-// The bus, preceded by console and event hook where they are enabled.
+// The bus, inside the event hook if there is one.
 EventSink& Service::EventsOut() {
   return outward_ ? static_cast<EventSink&>(*outward_) : events_;
 }
 
+// The event sinks are nested: console, pair, hook, bus, from the outside. The
+// console is outside the pair, so that the page of a standby shows all events;
+// the hook is inside, so that only the leader notifies.
 PipelineSinks Service::Sinks() {
   EventSink& events = pair_ ? *pair_ : EventsOut();
   return {pair_ ? static_cast<DecisionSink&>(*pair_) : decisions_,
@@ -206,6 +215,8 @@ PipelineSinks Service::Sinks() {
 }
 
 PipelineOptions Service::WithDelivery(PipelineOptions options) {
+  // A standby publishes nothing itself: its events are delivered once it has
+  // heard them from the leader.
   options.journal.acknowledged = [this](milliseconds patience) {
     return (!pair_ || pair_->AllEventsCovered()) &&
            events_.WaitForAcknowledged(patience);
@@ -262,6 +273,8 @@ void Service::ResendEvents() {
   }
 }
 
+// Causes that ended meanwhile are ended in the history, so this must precede
+// Pipeline::Start(), from which on the connection belongs to the journal.
 void Service::WatchCauses() {
   if (cause_groups_.empty()) {
     return;
@@ -336,6 +349,8 @@ void Service::Diagnose() {
       pair_->Tick(counters_[Counter::kReceived], pipeline_);
     }
   }
+  // Before the queue is drained: the standby takes over at once, without
+  // waiting for its patience to pass.
   if (pair_) {
     pair_->StepDown();
   }
@@ -359,6 +374,8 @@ void Service::Serve(cli::StopSignals& signals) {
   TimePoint next_tick = Clock::now();
   std::uint64_t limit_us = 0;
   if (sd_watchdog_enabled(0, &limit_us) > 0) {
+    // sd_watchdog_enabled() gives the limit after which the manager ends us;
+    // its manual recommends to notify at half of it.
     watchdog_.emplace(heartbeat_, std::chrono::microseconds(limit_us / 2),
                       next_tick);
   }
@@ -370,6 +387,8 @@ void Service::Serve(cli::StopSignals& signals) {
       next_tick = now + kTickPeriod;
     }
     const TimePoint wake = FeedWatchdog(next_tick);
+    // The cast truncates: without the added millisecond the last fraction of
+    // one would be spent in a busy loop.
     const cli::StopSignals::Event event = signals.WaitFor(
         std::chrono::duration_cast<milliseconds>(wake - Clock::now()) +
         milliseconds(1));
@@ -377,6 +396,8 @@ void Service::Serve(cli::StopSignals& signals) {
       return;
     }
     if (event == cli::StopSignals::Event::kReload) {
+      // Under Type=notify-reload the manager requires the time stamp, and takes
+      // the reload as finished at READY=1.
       Notify("RELOADING=1\nMONOTONIC_USEC=" + MonotonicMicroseconds());
       Reload("signal");
       if (console_) {
@@ -400,6 +421,8 @@ Service::TimePoint Service::FeedWatchdog(TimePoint next_tick) {
                                  : next_tick;
 }
 
+// A models.db that cannot be read now does not end the service: the models in
+// use stay, and the next tick looks again.
 void Service::Tick() {
   try {
     if (changes_.Changed()) {
@@ -536,6 +559,7 @@ void Service::Stop() {
   }
   errors.Try([this] { history_.EndSession(); });
   errors.Try([this] { PublishStatus(); });
+  // A subscriber that has not read until now is not given more time.
   if (!publication_stop_.stop_requested()) {
     decisions_.WaitForAcknowledged(kAcknowledgeLimit);
   }
@@ -554,6 +578,9 @@ void Service::Stop() {
 
 // Diagnoses, stores and publishes what was received.
 void Service::StopDiagnosis() {
+  // In this order: the diagnosis thread reads the limit once it sees stopping_.
+  // The pipeline stops after that thread has ended, because its calls come from
+  // there.
   drain_until_ = Clock::now() + kDrainLimit;
   stopping_ = true;
   samples_.Interrupt();

@@ -131,7 +131,7 @@ class Service {
   std::stop_source publication_stop_;  // Ends waits for slow subscribers.
   BusDecisionSink decisions_;
   BusEventSink events_;
-  std::unique_ptr<OutwardEvents> outward_;  // Null: no console, no event hook.
+  std::unique_ptr<OutwardEvents> outward_;  // Null: no event hook.
   idl::Publisher<idl::MonitorStatusMessage> status_topic_;
   idl::Subscriber<idl::ValveSampleMessage> samples_;
   Counters counters_;

@@ -166,6 +166,7 @@ void AddRefusals(const StatusFacts& facts, std::vector<Measure>& measures) {
   std::uint64_t refused_datagrams = 0;
   for (std::size_t i = 0; i < idl::kDatagramVerdictCount; ++i) {
     const auto verdict = static_cast<idl::DatagramVerdict>(i);
+    // Verdict 0 is kSound; all others are refusals.
     refused_datagrams += i == 0 ? 0 : facts.datagrams[i];
     measures.push_back({"", "fdi_dds_datagrams_total", kCounter,
                         "Datagrams by the check of their framing: sound, or "
@@ -184,6 +185,10 @@ void AddRefusals(const StatusFacts& facts, std::vector<Measure>& measures) {
 
 }  // namespace
 
+// The status on the bus has room for idl::kMaxCounters = 64 names, and a
+// monitor of a pair uses all of them. What is added here therefore gets a
+// family and no name. Values of one family are adjacent, and the page shows the
+// help of the first.
 // NOLINTNEXTLINE(readability-function-size): a table.
 std::vector<Measure> MeasuresOf(const StatusFacts& facts) {
   constexpr Type kCounter = Type::kCounter;
@@ -306,6 +311,8 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   }
   status.health =
       status.text.empty() ? idl::Health::kOk : idl::Health::kDegraded;
+  // Last, because FAILING outranks DEGRADED, whose reasons are kept in the
+  // text.
   if (!facts.stalled.empty()) {
     status.health = idl::Health::kFailing;
     status.text += (status.text.empty() ? "stalled: " : "; stalled: ") +
@@ -313,12 +320,19 @@ idl::MonitorStatusMessage StatusOf(const StatusFacts& facts) {
   }
   // The names of other monitors and of valves may be long.
   if (status.text.size() > idl::kMaxTextLength) {
-    status.text.resize(idl::kMaxTextLength);
+    std::size_t end = idl::kMaxTextLength;
+    while (end > 0 && (status.text[end] & 0xC0) == 0x80) {
+      --end;  // Within a character of UTF-8.
+    }
+    status.text.resize(end);
   }
   return status;
 }
 
 std::string MonitorName() {
+  // 47 bytes of the host, a colon and the pid fit the 64 bytes that the wire
+  // has for the name of a monitor. gethostname() need not terminate a name that
+  // it cuts: the last byte, which it is not given, remains 0.
   std::array<char, 48> host{};
   if (gethostname(host.data(), host.size() - 1) != 0) {
     host = {'?'};

@@ -28,6 +28,7 @@ std::string_view PlainAddress(std::string_view address) {
 
 // Whether a page of this server sent the request: browsers state the origin of
 // each POST, and scripts cannot forge it.
+// The HTTP server has checked Host before (HostAllowed()).
 bool IsSameOrigin(const httplib::Request& request) {
   const std::string origin = request.get_header_value("Origin");
   const std::string host = request.get_header_value("Host");
@@ -61,6 +62,8 @@ void Admission::Reload() {
 }
 
 void Admission::AddTo(httplib::Server& server, const std::string& cookie) {
+  // Without users there is no cookie that a browser would add by itself. The
+  // token comes in a header that a foreign page cannot fill in.
   if (!logins_) {
     return;
   }
@@ -80,6 +83,11 @@ void Admission::AddTo(httplib::Server& server, const std::string& cookie) {
   });
 }
 
+// The order of the checks: the header of a stranger is only logged, and the
+// request then counts as one without it. The origin is checked before the
+// exception for the login, because a foreign page could otherwise log its
+// visitor in under another name. Only POST changes anything, so GET needs no
+// origin.
 bool Admission::Admit(const httplib::Request& request,
                       httplib::Response& response) {
   if (!UserHeader(request).empty() && !FromProxy(request)) {
@@ -119,6 +127,8 @@ std::string Admission::UserHeader(const httplib::Request& request) const {
 
 // "a=1; NAME=SECRET; b=2"
 std::string Admission::SessionOf(const httplib::Request& request) const {
+  // The separator in front makes the first cookie look like the others: a
+  // cookie whose name only ends in ours is not found.
   const std::string cookies = "; " + request.get_header_value("Cookie");
   const std::size_t begin = cookies.find("; " + cookie_ + "=");
   if (begin == std::string::npos) {
@@ -142,6 +152,7 @@ std::function<bool()> Admission::AdmissionCheck(
   if (!logins_) {
     return [] { return true; };
   }
+  // By value: the function is called long after the request has gone.
   if (FromProxy(request)) {
     return [this, name = UserHeader(request)] {
       return logins_->OfName(name).has_value();
@@ -185,6 +196,8 @@ void Admission::LogIn(const httplib::Request& request,
     case Logins::Outcome::kAdmitted:
       break;
   }
+  // A browser that logs in again replaces its cookie. Its old session would be
+  // usable until it expires and take one of the places.
   logins_->LogOut(SessionOf(request));
   // Whether the browser uses https, which may end at a proxy.
   const bool secure =
@@ -223,6 +236,7 @@ bool Admission::Authorize(const httplib::Request& request,
     who = visitor->name;
     return true;
   }
+  // Reached without users, or if the session has ended since Admit().
   switch (token_.Check(request.get_header_value("Authorization"),
                        request.remote_addr)) {
     case Permission::kReadOnly:
@@ -248,6 +262,8 @@ bool Admission::Authorize(const httplib::Request& request,
   return true;
 }
 
+// `action`, and `reason` below, are string literals: the counts keep views of
+// them.
 void Admission::LogAction(const httplib::Request& request, const char* action,
                           const std::string& who, const std::string& subject) {
   const auto visitor = logins_ ? logins_->OfName(who) : std::nullopt;
@@ -270,6 +286,7 @@ void Admission::LogRefusal(const httplib::Request& request,
     const std::lock_guard lock(mutex_);
     ++counts_.refused[reason];
   }
+  // The limit is for lines only: every refusal has been counted.
   std::uint64_t not_shown = 0;
   if (!refusals_.Admit(reason, not_shown)) {
     return;

@@ -16,6 +16,7 @@ namespace {
 constexpr std::size_t kMarks = 64;
 constexpr std::size_t kGapsOfValve = 32;
 constexpr std::size_t kGapsWaiting = 256;
+// After as many periods a valve is STALE.
 constexpr double kGapPeriods = 3.0;
 constexpr std::size_t kEarlierSources = 3;
 constexpr std::int64_t kSparkStepNs = 1'000'000'000;
@@ -49,6 +50,9 @@ std::string IsolatedFaults(const FaultEvent& event) {
 // The trend is a sequence of packed traces: a Trace holds instants of one
 // source with the same signals, so a new source, or a signal that is added,
 // begins another one. pieces.back() is the trace that grows.
+//
+// Locks are taken in the order slots_mutex_, Slot::mutex, gaps_mutex_, and
+// slots_mutex_ is held only to find, add or remove a slot, or to visit all.
 struct LiveBoard::Slot {
   const ModelSet* models{nullptr};  // The diagnosis thread alone uses it.
 
@@ -88,6 +92,8 @@ struct LiveBoard::Slot {
     drift.assign(channels.begin(), channels.end());
     now.drift_used = std::numeric_limits<double>::quiet_NaN();
     for (const FollowedDrift& channel : drift) {
+      // std::fmax() returns the other argument if one is NaN, as before the
+      // first.
       now.drift_used = std::fmax(now.drift_used, channel.used());
     }
   }
@@ -101,6 +107,8 @@ struct LiveBoard::Slot {
       return;
     }
     spark_stamp_ns = verdict.stamp_ns;
+    // The count goes on beyond the size of the ring; the remainder is the
+    // place.
     spark[spark_count++ % kSparkPoints] =
         static_cast<float>(1.0 - verdict.normal_factor);
   }
@@ -117,6 +125,8 @@ struct LiveBoard::Slot {
 
   void Push(const Sample& sample, const Verdict& verdict, int channels,
             int faults) {
+    // A trace restarts where Continues() is false and would lose its instants,
+    // so the new one begins in a piece of its own.
     if (pieces.back().size() > 0 &&
         !pieces.back().Continues(sample, verdict, channels, faults)) {
       pieces.push_back(EmptyTrace());
@@ -149,6 +159,8 @@ struct LiveBoard::Slot {
     std::vector<TracePoint> points;
     std::size_t behind = instants();
     for (const monitor::Trace& piece : pieces) {
+      // `behind` counts the instants of the pieces after this one, which are
+      // newer; what they lack of `count` comes from here.
       behind -= piece.size();
       if (count > behind) {
         const auto some = piece.Unpack(count - behind);
@@ -169,6 +181,9 @@ std::shared_ptr<LiveBoard::Slot> LiveBoard::Find(
   return found == slots_.end() ? nullptr : found->second;
 }
 
+// For the thread that updates valves, which is also the only one to remove
+// them: the reference stays valid there. All others use Find(), whose pointer
+// keeps a slot that is removed meanwhile.
 LiveBoard::Slot& LiveBoard::At(const std::string& valve_id) {
   if (const auto slot = Find(valve_id)) {
     return *slot;
@@ -182,6 +197,7 @@ LiveBoard::Slot& LiveBoard::At(const std::string& valve_id) {
 std::shared_ptr<const ModelFacts> LiveBoard::Facts(const ModelSet& models) {
   std::weak_ptr<const ModelFacts>& known = facts_[models.content_hash];
   std::shared_ptr<const ModelFacts> facts = known.lock();
+  // Sets without a hash share the key 0 and cannot be told apart.
   if (!facts || models.content_hash == 0) {
     facts = FactsOf(models);
     known = facts;
@@ -210,6 +226,8 @@ void LiveBoard::Show(const std::string& valve_id, const Sample& sample,
   Slot& slot = At(valve_id);
   const std::lock_guard lock(slot.mutex);
   auto facts = slot.now.models;
+  // The pointer alone does not tell: a new set may be at the address of one
+  // that was freed.
   if (models != slot.models || outcome.model_swapped) {
     slot.models = models;
     facts = models != nullptr ? Facts(*models) : nullptr;
@@ -239,6 +257,7 @@ void LiveBoard::ShowLocked(Slot& slot, const Sample& sample,
     slot.ClearTrend();  // Residuals and factors mean other things.
     slot.ShowDrift({});
   }
+  // Before Describe(), which overwrites the stamp of the previous sample.
   RecordGap(slot, sample);
   slot.Describe(verdict);
   slot.AddSpark(verdict);

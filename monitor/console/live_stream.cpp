@@ -41,6 +41,7 @@ std::shared_ptr<LiveStream::Client> LiveStream::Admit(const std::string& valve,
     ++counts_.refused;
     return nullptr;
   }
+  // Under the lock until the end, so that no broadcast comes before the hello.
   ++counts_.admitted;
   clients_.push_back(
       std::make_shared<Client>(Client{valve, next_sample, {}, 0, false}));
@@ -60,6 +61,8 @@ void LiveStream::Push(Client& client, const Message& message) {
   }
   if (!client.queue.empty() &&
       client.bytes + message->size() > options_.max_bytes) {
+    // Ended, not skipped: a page that reconnects reads the whole state, but it
+    // could not notice that a change is missing.
     client.ended = true;
     client.queue.clear();
     ++counts_.dropped;
@@ -67,6 +70,8 @@ void LiveStream::Push(Client& client, const Message& message) {
     client.bytes += message->size();
     client.queue.push_back(message);
   }
+  // All, because streams and both threads wait for different conditions of the
+  // same variable: notify_one() could wake one whose condition does not hold.
   changed_.notify_all();
 }
 
@@ -104,6 +109,8 @@ StreamCounts LiveStream::counts() const {
 
 void LiveStream::Start(FeedParts parts) {
   parts_ = std::make_unique<FeedParts>(std::move(parts));
+  // Read here, so that a history that cannot be read ends the start. That of a
+  // plant may be away.
   if (!parts_->plant) {
     parts_->alarms.Refresh(parts_->utc_now_ns());  // The initial alarms.
   }
@@ -163,8 +170,8 @@ void LiveStream::Run() {
   }
 }
 
-// A history that is busy or unavailable is retried after 2, 4, 8, ... s. Each
-// reason is logged once.
+// A history that fails is retried after 4, 8, ... s, at most 60 s, and from 2 s
+// on if it has never answered. Each reason is logged once.
 void LiveStream::FollowAlarms() {
   milliseconds pause{0};
   std::string reason;
@@ -175,6 +182,7 @@ void LiveStream::FollowAlarms() {
       if (closed_) {
         return;
       }
+      // Before the read: a change that comes during it must cause another one.
       woken_ = false;
     }
     try {
@@ -197,6 +205,8 @@ void LiveStream::FollowAlarms() {
 }
 
 void LiveStream::Step(std::chrono::steady_clock::time_point now) {
+  // Also without clients: Run() does not wait while unstored_ has events and
+  // would spin.
   SendUnstored();
   if (counts().clients == 0) {
     return;
@@ -227,6 +237,8 @@ void LiveStream::SendUnstored() {
 }
 
 void LiveStream::SendSamples() {
+  // A copy, so that no client waits for the lock while samples become JSON. One
+  // that leaves meanwhile is kept by its pointer.
   std::vector<std::shared_ptr<Client>> clients;
   {
     const std::lock_guard lock(mutex_);
@@ -253,11 +265,19 @@ void LiveStream::SendSamples() {
 void LiveStream::SendTiles() {
   const auto alarms = parts_->alarms.ByValve();
   Json tiles = Json::array();
-  for (const ValveState& valve : parts_->board.Valves(false)) {
+  const std::vector<ValveState> valves = parts_->board.Valves(false);
+  for (const ValveState& valve : valves) {
     const std::pair now{valve.version, AlarmFor(*alarms, valve.id)};
+    // Versions are compared, so that JSON is made only for what has changed.
     if (std::exchange(sent_[valve.id], now) != now) {
       tiles.push_back(TileJson(valve, now.second, true));
     }
+  }
+  if (sent_.size() > valves.size()) {  // Some have left the board.
+    std::erase_if(sent_, [&](const auto& sent) {
+      return std::ranges::find(valves, sent.first, &ValveState::id) ==
+             valves.end();
+    });
   }
   if (!tiles.empty()) {
     Broadcast(StreamEvent("tiles", Dump({{"now_ms", Ms(parts_->utc_now_ns())},

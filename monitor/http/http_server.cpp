@@ -170,10 +170,14 @@ class AnswerStream : public httplib::Stream {
   bool AwaitClient() {
     const Clock::time_point begin = Clock::now();
     pollfd entry{socket_.handle(), POLLOUT, 0};
+    // In steps of 100 ms, so that the end of the server is noticed.
     const int ready = poll(&entry, 1, 100);
     const Clock::duration waited = Clock::now() - begin;
     waited_ += waited;
     paused_ += waited;
+    // Waiting for w bytes takes at most 5 s + w / (1 MB/s): a client may read a
+    // long answer at a mean rate of w / (5 s + w / (1 MB/s)), and none has to
+    // read faster than 1 MB/s.
     const milliseconds patience =
         ended_ ? kStopPatience
                : kAnswerPatience + milliseconds(written_ / kSlowestBytesPerMs);
@@ -240,7 +244,11 @@ std::string ToString(const HttpAddress& address) {
   return text.append(std::to_string(address.port));
 }
 
-// The library's routes behind one thread that reads all requests.
+// The library's routes behind one thread that reads all requests. A client has
+// one owner at a time, and needs no lock of its own:
+//
+//     accepting thread -> accepted_ -> listening thread -> waiting -> worker
+//                         (mutex_)     clients_            (mutex_)
 class HttpServer::Gate : public httplib::Server {
  public:
   explicit Gate(const HttpServerOptions& options) : options_(options) {
@@ -264,6 +272,7 @@ class HttpServer::Gate : public httplib::Server {
   Gate& operator=(const Gate&) = delete;
 
   void Start() {
+    // The library listens already; a second call only changes the backlog.
     ::listen(svr_sock_, kBacklog);
     threads_.emplace_back([this] { Listen(); });
     for (Lane& lane : lanes_) {
@@ -274,6 +283,10 @@ class HttpServer::Gate : public httplib::Server {
   }
 
   void End() {
+    // stop() alone does not end the library's loop while it waits for room in
+    // process_and_close_socket(); ended_ does. It is set under the lock: a
+    // thread between its check and its wait would miss the notification
+    // otherwise.
     stop();
     const std::lock_guard lock(mutex_);
     ended_ = true;
@@ -290,6 +303,8 @@ class HttpServer::Gate : public httplib::Server {
     if (!options_.tls) {
       return std::nullopt;
     }
+    // Read before the lock is taken. Sessions of the old context go on, because
+    // each holds a reference to it.
     auto tls = std::make_unique<const TlsContext>(*options_.tls);
     const std::lock_guard lock(mutex_);
     tls_ = std::move(tls);
@@ -307,6 +322,8 @@ class HttpServer::Gate : public httplib::Server {
   bool process_and_close_socket(socket_t socket) override {
     std::unique_lock lock(mutex_);
     Client client{Socket(socket, tls_.get()), Clock::now() + kRequestPatience};
+    // While the accepting thread waits, further connections stay in the backlog
+    // of the kernel instead of being dropped.
     changed_.wait(lock,
                   [this] { return ended_ || accepted_.size() < kMaxAccepted; });
     accepted_.push_back(std::move(client));
@@ -339,6 +356,8 @@ class HttpServer::Gate : public httplib::Server {
       std::array<char, 64> ignored{};
       while (read(wake_[0], ignored.data(), ignored.size()) > 0) {
       }
+      // entries[i] is that of the i-th client still: only this thread changes
+      // the list, and it takes accepted ones only at the beginning of a turn.
       std::size_t i = 1;
       clients_.remove_if([&](Client& client) {
         return !Serve(client, entries[i++].revents != 0);
@@ -374,6 +393,8 @@ class HttpServer::Gate : public httplib::Server {
   }
 
   bool Read(Client& client) {
+    // 4096 bytes a turn, so that a fast client does not hold up the others.
+    // More only if TLS has buffered them, which poll() does not report.
     do {
       std::array<char, 4096> part{};
       const ssize_t size = client.socket.Receive(part.data(), part.size());
@@ -408,6 +429,7 @@ class HttpServer::Gate : public httplib::Server {
       return false;
     }
     if (error == EPROTONOSUPPORT) {
+      // Answered without TLS, as the client speaks.
       client.socket.EndTls();
       return Refuse(client, kPlainHttp);
     }
@@ -449,6 +471,9 @@ class HttpServer::Gate : public httplib::Server {
         .append(refusal.status == 503 ? "Retry-After: 5\r\n" : "")
         .append("Connection: close\r\n\r\n")
         .append(body);
+    // Without waiting: this client had no answer before, so its buffer has
+    // room. In an unfinished handshake nothing can be sent, and the client is
+    // dropped. What others still send is discarded, without being decrypted.
     const ssize_t sent = client.socket.Send(answer.data(), answer.size());
     client.socket.EndTls();
     shutdown(client.socket.handle(), SHUT_WR);

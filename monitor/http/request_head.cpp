@@ -4,10 +4,23 @@
 #include <array>
 #include <cctype>
 #include <charconv>
+#include <utility>
 
 #include <arpa/inet.h>
 #include <unistd.h>
 
+// What is accepted leaves out the parts of RFC 9112 that the library, or a
+// proxy in front, may read differently than they are read here:
+//
+//     head   = method " " target " HTTP/1." text CRLF {header CRLF} CRLF
+//     method = "GET" | "HEAD" | "POST"
+//     target = path ["?" query] ["#" text]   path: begins with "/" once decoded
+//     header = name ":" blanks value blanks  name: no blanks, hence no folding
+//
+// A line ends with CRLF and has no control characters but the tab.
+// Content-Length occurs at most once, Host and the user's header at most once
+// with a value, and Transfer-Encoding never. The head that is passed on is
+// written anew, from what was understood.
 namespace fdi::monitor {
 namespace {
 
@@ -113,6 +126,8 @@ std::optional<Refusal> TakeRequestLine(std::string_view line,
   if (method != "GET" && method != "HEAD" && method != "POST") {
     return kMethod;
   }
+  // The library gets version 1.1 whatever the client says; the connection is
+  // closed after the answer in any case.
   head.path = *path;
   head.text.append(method).append(" ").append(Encoded(*path));
   head.text.append(query).append(" HTTP/1.1\r\n");
@@ -121,11 +136,14 @@ std::optional<Refusal> TakeRequestLine(std::string_view line,
 
 std::optional<Refusal> TakeLength(std::string_view value, std::size_t max_body,
                                   RequestHead& head) {
+  // from_chars() takes neither sign nor blanks, which RFC 9110 forbids as well.
   const auto [end, error] = std::from_chars(
       value.data(), value.data() + value.size(), head.body_size);
   if (error == std::errc::result_out_of_range) {
     return kBody;
   }
+  // head.text has what TakeHeader() wrote, so an earlier length is found
+  // however its name was spelt.
   if (error != std::errc{} || end != value.data() + value.size() ||
       head.text.find("\r\nContent-Length:") != std::string::npos) {
     return kMalformed;
@@ -159,13 +177,13 @@ std::optional<Refusal> TakeHeader(std::string_view line, std::size_t max_body,
     return refusal;
   }
   if (name == "host") {
-    if (!head.host.empty()) {
+    if (std::exchange(head.has_host, true)) {
       return kMalformed;
     }
     head.host = value;
     pass("Host", value);
   } else if (!user_header.empty() && name == Lower(user_header)) {
-    if (!head.user.empty()) {
+    if (std::exchange(head.has_user, true)) {
       return kMalformed;
     }
     head.user = value;
@@ -211,6 +229,8 @@ std::optional<Refusal> ParseRequestHead(std::string_view bytes,
                                         std::size_t max_body,
                                         std::optional<RequestHead>& head,
                                         std::string_view user_header) {
+  // The limits are checked before the ends that may never come: an endless line
+  // or head is refused once it is too long. (npos is larger than any size.)
   const std::size_t line_end = bytes.find("\r\n");
   if (std::min(line_end, bytes.size()) > kMaxTarget) {
     return kTarget;
@@ -243,6 +263,7 @@ std::optional<Refusal> ParseRequestHead(std::string_view bytes,
 }
 
 bool IsLoopback(std::string_view host) {
+  // A name may begin with "127.", too, such as 127.0.0.1.example.com.
   return host == "localhost" || host == "::1" ||
          (host.starts_with("127.") && IsAddress(std::string(host)));
 }

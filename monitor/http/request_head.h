@@ -13,11 +13,13 @@ namespace fdi::monitor {
 /// and repeats a file for each requested range. It is therefore given only the
 /// headers that our pages read.
 struct RequestHead {
-  std::string text;     ///< Request line and headers for the library.
-  std::string path;     ///< Decoded, without query.
-  std::string host;     ///< Header Host.
-  std::string user;     ///< Value of `user_header`, see ParseRequestHead().
-  std::size_t size{0};  ///< Size of the head as received [bytes].
+  std::string text;  ///< Request line and headers for the library.
+  std::string path;  ///< Decoded, without query.
+  std::string host;  ///< Header Host.
+  std::string user;  ///< Value of `user_header`, see ParseRequestHead().
+  bool has_host{false};
+  bool has_user{false};
+  std::size_t size{0};       ///< Size of the head as received [bytes].
   std::size_t body_size{0};  ///< Content-Length [bytes].
 };
 

@@ -60,6 +60,8 @@ int ReadSocket(BIO* bio, char* to, int size) {
   return static_cast<int>(count);
 }
 
+// OpenSSL flushes in the handshake and takes 0 for a failure; there is no
+// buffer.
 long ControlSocket(BIO* /*bio*/, int command, long /*number*/, void* /*data*/) {
   return command == BIO_CTRL_FLUSH ? 1 : 0;
 }
@@ -93,6 +95,8 @@ void TakeKey(SSL_CTX* context, const TlsFiles& files) {
   const std::filesystem::path& file = apart ? files.key : files.certificate;
   std::ifstream stream(file);
   const std::string content{std::istreambuf_iterator<char>(stream), {}};
+  // Searched before the mode of the file is checked: a certificate without a
+  // key may be readable by all, and the reason to be told is the missing key.
   if (!apart && content.find(" PRIVATE KEY-") == std::string::npos) {
     Refuse(option, file, "has no private key; give its file by --console-key");
   }
@@ -119,6 +123,7 @@ void TakeKey(SSL_CTX* context, const TlsFiles& files) {
 int CheckValidity(const X509* certificate, const std::filesystem::path& file) {
   int days = 0;
   int seconds = 0;
+  // Counted from now: days and seconds have the same sign, and days may be 0.
   ASN1_TIME_diff(&days, &seconds, nullptr, X509_get0_notAfter(certificate));
   if (days < 0 || seconds < 0) {
     Refuse("--console-tls", file, "the certificate has expired");
@@ -137,6 +142,7 @@ TlsSession::TlsSession(SSL_CTX* context, int socket)
   if (ssl_ == nullptr || bio == nullptr) {
     throw std::bad_alloc();
   }
+  // Takes one reference if both are the same BIO, so none is left to free.
   SSL_set_bio(ssl_.get(), bio, bio);
   SSL_set_accept_state(ssl_.get());
 }
@@ -175,6 +181,8 @@ ssize_t TlsSession::Result(int returned) {
     return returned;
   }
   switch (SSL_get_error(ssl_.get(), returned)) {
+    // Either call may have to wait for either direction: the first SSL_read()
+    // performs the handshake, which writes as well.
     case SSL_ERROR_WANT_READ:
       events_ = POLLIN;
       errno = EAGAIN;
@@ -205,8 +213,12 @@ TlsContext::TlsContext(const TlsFiles& files)
     throw std::bad_alloc();
   }
   SSL_CTX_set_min_proto_version(context, TLS1_2_VERSION);
+  // A client that renegotiates could make the server do handshakes without end,
+  // and make SSL_write() wait for input, while a worker polls for output only.
   SSL_CTX_set_options(context, SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION |
                                    SSL_OP_CIPHER_SERVER_PREFERENCE);
+  // Send() is like send(): it may take a part, and a repetition may come from
+  // another buffer. Idle sessions keep no buffers, some 34 kB each.
   SSL_CTX_set_mode(context, SSL_MODE_ENABLE_PARTIAL_WRITE |
                                 SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER |
                                 SSL_MODE_RELEASE_BUFFERS);
@@ -219,6 +231,8 @@ TlsContext::TlsContext(const TlsFiles& files)
     Refuse("--console-tls", files.certificate,
            "expected a certificate in PEM (" + Reason() + ")");
   }
+  // The key comes after the certificate, because OpenSSL compares it with the
+  // one that is there.
   days_left_ =
       CheckValidity(SSL_CTX_get0_certificate(context), files.certificate);
   TakeKey(context, files);

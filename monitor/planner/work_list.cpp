@@ -50,6 +50,8 @@ std::string SpanText(std::int64_t span_ns) {
 
 std::string FaultText(const FaultReason& reason, const WorkOptions& options) {
   std::string text = reason.words.name + ": ";
+  // A monitor's clock may be ahead of this one. Spans up to an earlier time
+  // than the newest evidence would be too short.
   const std::int64_t now_ns = std::max(options.now_ns, reason.last_ns);
   text += reason.ended_ns
               ? "ended " + SpanText(now_ns - *reason.ended_ns) + " ago"
@@ -127,6 +129,8 @@ struct Record {
   int right{0};
   int wrong{0};
 
+  // As if one label had confirmed the diagnosis before: without labels it is
+  // trusted fully, and a single wrong one halves the trust.
   double trust() const { return (right + 1.0) / (right + wrong + 1.0); }
 };
 
@@ -134,6 +138,8 @@ std::map<std::string, Record> RecordsOf(const std::vector<Episode>& episodes) {
   std::map<std::string, Record> records;
   for (const Episode& episode : episodes) {
     if (episode.label) {
+      // Counted by what was diagnosed, not by what the label says: the record
+      // is one of the diagnosis.
       Record& record = records[episode.fault.value_or("unknown")];
       const bool right =
           *episode.label == "true" || *episode.label == episode.fault;
@@ -156,6 +162,7 @@ void AddEpisode(const Episode& episode, const cli::FaultTexts& texts,
   place->strength = episode.strength;
   place->factor = episode.peak_factor;
   ++place->episodes;
+  // Episodes labelled false have been left out, so any label confirms.
   place->confirmed = place->confirmed || episode.label.has_value();
   place->episode_id = episode.episode_id;
   place->detected_ns = episode.detected_ns;
@@ -165,6 +172,9 @@ void AddEpisode(const Episode& episode, const cli::FaultTexts& texts,
 
 std::vector<Episode> EpisodesOf(storage::History& history,
                                 const WorkQuery& query) {
+  // Open episodes count however old they are. Those detected before the period
+  // come first, so that the whole list is in order of detection, on which
+  // AddEpisode() relies.
   storage::EpisodeFilter filter;
   filter.valve_glob = query.valve_glob;
   filter.until_ns = query.since_ns;
@@ -190,6 +200,8 @@ void AddHealth(const std::vector<HealthHour>& hours, const WorkQuery& query,
     return;
   }
   double live = 0.0;
+  // Travel and hours since the last work on the valve: earlier epochs belong to
+  // parts that are gone.
   for (const HealthHour& hour : hours) {
     if (hour.epoch == hours.back().epoch) {
       work.travel_strokes += static_cast<double>(hour.travel) *
@@ -286,6 +298,9 @@ double WeightOf(const FaultReason& reason, const WorkOptions& options) {
                      static_cast<double>(options.now_ns - *reason.ended_ns) /
                          kNsPerDay)
           : 0.0;
+  //     R = min(2, 1 + 0.1 (n − 1)),   U = 2^(−days/half life)
+  //
+  // An end ahead of now_ns counts as now.
   const double repetition = std::min(
       kMaxRepetition, 1.0 + kRepetition * std::max(0, reason.episodes - 1));
   return Points(reason.words.severity) * confidence *
@@ -313,6 +328,8 @@ std::vector<WorkRow> RankWork(std::vector<ValveWork> valves,
     if (score <= 0.0) {
       continue;
     }
+    // The first fault of a row is shown with its check, so the weightiest comes
+    // first.
     SortByWeight(work.faults, options);
     SortByWeight(work.trends, options);
     std::erase_if(work.trends, [&](const LimitTrend& reason) {
@@ -357,6 +374,8 @@ std::vector<WorkRow> ReadWorkList(storage::History& history,
       work.monitor = episode.monitor;
     }
   }
+  // Episodes labelled false count here although they are no reasons: they are
+  // what speaks against a diagnosis.
   const std::map<std::string, Record> records = RecordsOf(episodes);
   for (const std::string& valve : history.HealthValves(query.valve_glob)) {
     AddHealth(history.Health({valve, query.since_ns}), query, valves[valve]);
@@ -373,6 +392,7 @@ std::vector<WorkRow> ReadWorkList(storage::History& history,
         return reason.words.discipline.find(query.discipline) ==
                std::string::npos;
       });
+      // A limit belongs to no discipline.
       facts.trends.clear();
     }
     work.push_back(std::move(facts));

@@ -18,6 +18,7 @@ namespace fdi::simulator {
 namespace {
 
 constexpr const char* kStdin = "stdin";
+// Bounds the memory that input without line ends can take.
 constexpr std::size_t kMaxLine = 1U << 20U;
 
 void ThrowUnless(bool passing, const char* operation) {
@@ -48,6 +49,14 @@ void Restamper::Apply(Sample& sample) {
   sample.stamp_ns += *shift_ns_;
 }
 
+// Samples have to be one period apart, but lines arrive with jitter and in
+// bursts. The stamp therefore advances by whole periods,
+//
+//   stamp += max(1, round((now + shift - stamp) / period)) period
+//
+// A line that is late by less than half a period leaves no gap. The lines of a
+// burst get successive stamps, which may run ahead of the clock until it has
+// caught up; no stamp ever repeats.
 void Restamper::StampByClock(std::int64_t now_ns, std::int64_t period_ns,
                              Sample& sample) {
   sample.source_id = restamping_.source_id;
@@ -83,6 +92,13 @@ std::optional<FedSample> StoredFeed::Next() {
   return fed;
 }
 
+// The stream on stdin. Its first line that is not blank decides for all:
+//
+//   stream = { blank } ( json | csv )
+//   json   = { object | blank }     if it begins with '{'; JsonLineReader
+//   csv    = header { row | blank } otherwise; CsvReader
+//
+// A line ends with LF, with or without CR; the last one may lack it.
 StreamFeed::StreamFeed(int descriptor, cli::StopSignals& signals,
                        const StreamOptions& options, Restamping restamping,
                        LogSink log)
@@ -106,6 +122,9 @@ std::optional<FedSample> StreamFeed::Next() {
 }
 
 std::optional<std::string> StreamFeed::NextLine() {
+  // What was searched once is not searched again, and the unread rest moves to
+  // the front only before a read: a long line that comes in pieces, and many
+  // short ones in one piece, both take linear time.
   std::size_t searched = begin_;
   while (true) {
     const std::size_t end = buffer_.find('\n', searched);
@@ -131,6 +150,11 @@ std::optional<std::string> StreamFeed::NextLine() {
 }
 
 // Waits for input. @returns false if a stop was requested.
+//
+// read() alone would not do: the handlers are installed with SA_RESTART, so a
+// signal does not interrupt it, and one that came just before it would be
+// missed. poll() also waits for the descriptor of the signals, which stays
+// readable until the event has been taken.
 bool StreamFeed::Fill() {
   std::array<pollfd, 2> entries{
       {{descriptor_, POLLIN, 0}, {signals_.descriptor(), POLLIN, 0}}};
@@ -139,6 +163,8 @@ bool StreamFeed::Fill() {
       ThrowUnless(errno == EINTR, "poll of stdin");
       continue;
     }
+    // Any event of the input, a hang-up or an error included, is left to
+    // read(), which returns what is still in a closed pipe and then 0.
     if (entries[0].revents == 0) {
       signals_.WaitFor(std::chrono::milliseconds(0));  // Ignores a reload.
       continue;
@@ -169,6 +195,7 @@ std::optional<Sample> StreamFeed::TakeLine(const std::string& line) {
     if (!row) {
       return std::nullopt;
     }
+    // CsvReader leaves this check to its caller; JsonLineReader has its own.
     if (const std::string wrong = steps_.Take(row->t_s); !wrong.empty()) {
       csv_.Refuse(wrong);
     }

@@ -47,7 +47,8 @@ bool Has(const std::vector<Explanation>& faults, int fault) {
 }
 
 // Faults that the data do not tell apart, or only by what a healthy record
-// leaves open.
+// leaves open. Of two faults the third is 0, which must not match an
+// explanation by no fault.
 struct Likeness {
   std::array<int, 3> faults;
   bool (*holds)(const SecondLook& look, const Explanation& e, double nothing);
@@ -134,6 +135,8 @@ LookAnswer AnswerOf(const SecondLook& look, bool early) {
   const bool healthy =
       nothing <= std::max(kLookMargin, kMinGain * look.readings);
   const double most = healthy ? kMaxHealthyMisfit : kMaxMisfit;
+  // The misfit comes first: where even the best explanation does not follow the
+  // record, neither health nor a fault can be concluded from it.
   answer.outcome = look.misfit > most ? LookOutcome::kNoneFits
                    : healthy          ? LookOutcome::kNothing
                    : answer.faults.size() > kMaxNamedFaults
@@ -148,6 +151,8 @@ std::optional<LookAnswer> TakeLook(const ValvePhysics& physics,
   if (task.occasion == LookOccasion::kGrowth) {
     return TakeGrowthLook(physics, task, stop);
   }
+  // Routine looks come for every valve every five minutes. Where the valve is
+  // healthy, one simulation without a fault has to be enough.
   double without_fault = 0.0;
   if (task.occasion != LookOccasion::kEpisode) {
     without_fault = MisfitWithoutFault(physics, task.window);
@@ -215,7 +220,7 @@ EpisodeLooks::EpisodeLooks(const ValvePhysics& physics)
     : physics_(physics), period_ns_(PeriodOf(physics)) {}
 
 // One row a period; up to three missing ones are held, a longer gap begins
-// anew.
+// anew. So does another set of signals, because a window has one for all rows.
 void EpisodeLooks::AddRow(const Sample& sample) {
   constexpr std::int64_t kMaxHeldSteps = 3;
   const std::int64_t step =
@@ -227,6 +232,8 @@ void EpisodeLooks::AddRow(const Sample& sample) {
     rows_.clear();
   }
   signals_ = sample.present;
+  // The simulation needs all inputs. One that is not measured is taken as
+  // usual; it has no share in the cost of a fault.
   const auto value = [&](Signal signal, double otherwise) {
     return sample.Has(signal) ? sample[signal] : otherwise;
   };
@@ -317,6 +324,7 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
     if (transition.kind == TransitionKind::kDetected) {
       detection_ns_ = transition.detection_stamp_ns;
       by_routine_ = suspected;
+      // A suspected valve has a name already, that of the routine look.
       next_age_ns_ = suspected ? kLastAge : kEarlyAge;
     } else if (detection_ns_ && (transition.kind == TransitionKind::kCleared ||
                                  transition.kind == TransitionKind::kClosed)) {
@@ -324,16 +332,22 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
     }
   }
   if (detection_ns_ && sample.stamp_ns - *detection_ns_ >= next_age_ns_) {
+    // After a gap one look stands for all that it passed over. A look for which
+    // too little was measured is left out, not put off.
     while (sample.stamp_ns - *detection_ns_ >= next_age_ns_) {
       next_age_ns_ = AgeAfter(next_age_ns_);
     }
     due = Task();
   }
+  // If there are not more rows than were judged before, AddRow() has begun
+  // anew, and so does the count: all rows of a routine look have been judged.
   const bool judged = verdict.quality == Quality::kLive &&
                       (!detection_ns_ || suspected) &&
                       rows_.size() > std::min(judged_, kMaxRows - 1);
   judged_ = judged ? judged_ + 1 : 0;
   const std::int64_t slot = sample.stamp_ns / kRoutineNs;
+  // The exchange comes first in the condition, because slot_ has to follow
+  // every sample; otherwise a look would be due late in its slot.
   if (std::exchange(slot_, slot) != slot && judged_ >= kMaxRows && !due) {
     due = RoutineTask(suspected);
   }
@@ -341,6 +355,7 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
 }
 
 void LookBook::Enter(const LookTask& task, LookAnswer answer) {
+  // Only one episode is open at a time: what is not of this one is over.
   const auto others = std::erase_if(entries_, [&](const Entry& entry) {
     return entry.detection_stamp_ns != task.detection_stamp_ns;
   });
@@ -356,6 +371,8 @@ void LookBook::Enter(const LookTask& task, LookAnswer answer) {
       return;
     }
   }
+  // Comes last, because it changes the doubt: a look that was refused above
+  // leaves the doubt of the one before it.
   if (task.stamp_ns - task.detection_stamp_ns > kLastAge &&
       !AcceptsLate(answer)) {
     return;
@@ -366,6 +383,8 @@ void LookBook::Enter(const LookTask& task, LookAnswer answer) {
 }
 
 bool LookBook::AcceptsLate(const LookAnswer& answer) {
+  // Taken in any case: a look that gets here ends the doubt of the one before
+  // it.
   const auto doubt = std::exchange(doubt_, {});
   const auto named =
       std::find_if(entries_.rbegin(), entries_.rend(), [](const Entry& entry) {
@@ -415,6 +434,8 @@ void Suspicion::Dismiss() {
 }
 
 void Suspicion::Take(LookAnswer answer) {
+  // A look that merely names no fault does not end a suspicion. It takes a
+  // window that the valve follows without a fault.
   if (found_) {
     if (answer.without_fault <= kHealthyMisfit) {
       Dismiss();
@@ -443,6 +464,8 @@ void ObserversMemory::Step(std::int64_t detection_stamp_ns,
   }
   seen_ |= faults;
   faults_ = faults;
+  // last_ns_ still holds stamps of earlier episodes. It is read only for bits
+  // of seen_, which were written in this one.
   const std::int64_t age_ns = stamp_ns - detection_stamp_ns;
   for (FaultSet left = seen_; left != 0; left &= left - 1) {
     const auto bit = static_cast<std::size_t>(std::countr_zero(left));
@@ -461,6 +484,7 @@ ValveLooks::ValveLooks(const ValvePhysics& physics)
 
 std::optional<LookTask> ValveLooks::Step(const Sample& sample,
                                          const Verdict& verdict) {
+  // Answers count by the stamps of the samples, so this clock must not go back.
   if (!OutOfOrder(verdict.intake)) {
     stamp_ns_ = sample.stamp_ns;
   }
@@ -470,6 +494,8 @@ std::optional<LookTask> ValveLooks::Step(const Sample& sample,
   for (const Transition& transition : verdict.Transitions()) {
     detection_ns_ = transition.detection_stamp_ns;
     if (transition.kind == TransitionKind::kDetected && found != nullptr) {
+      // The routine look names the episode at once: its answer has waited for
+      // kRoutineDelayNs, longer than kLookDelayNs.
       LookTask task;
       task.stamp_ns = found->stamp_ns;
       task.detection_stamp_ns = detection_ns_;
@@ -479,6 +505,7 @@ std::optional<LookTask> ValveLooks::Step(const Sample& sample,
   if (open_) {
     memory_.Step(detection_ns_, stamp_ns_, verdict.isolated);
   }
+  // Not earlier: it may destroy what `found` points to.
   suspicion_.Advance(stamp_ns_);
   return due;
 }
@@ -520,6 +547,8 @@ FaultSet ValveLooks::Observed(const ModelSet& models, FaultSet isolated) const {
   return std::popcount(faults) > static_cast<int>(kMaxNamedFaults) ? 0 : faults;
 }
 
+// The entries are in the order in which the looks were answered, and the last
+// one whose delay is over counts.
 const LookAnswer* LookBook::At(std::int64_t detection_stamp_ns,
                                std::int64_t stamp_ns) const {
   const LookAnswer* answer = nullptr;

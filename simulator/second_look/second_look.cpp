@@ -21,6 +21,7 @@ namespace {
 using Trajectory = std::vector<RecordAnswer>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// An error e pulls a fit by e / (1 + e^2 / nu), which falls beyond sqrt(nu).
 constexpr double kFreedom = 6.0;       // nu
 constexpr double kEffectError = 0.05;  // kappa
 // 2 log-likelihood that a fault has to gain over none, for its free strength
@@ -74,6 +75,8 @@ class Looker {
         window_(window),
         rows_(static_cast<int>(window.rows.size())),
         detection_(static_cast<int>(window.detection)) {
+    // Before any fault: those of the flow alone are built on it, and the effect
+    // of every fault is the difference from it.
     healthy_ = Simulate(0, 0.0, {0, false});
     FindUsualInputs();
     command_cost_ = CommandCost();
@@ -199,8 +202,10 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
   config.continuous_inputs = physics_.drive.interpolated_command;
   config.noise = false;
   config.resolution = false;
+  // Half the time of 1, for an error of 0.02 % of X (record_fit.h).
   config.tolerance_scale = 10.0;
-  // The recorded pressures already have what f17 does to them.
+  // The recorded pressures already have what f17 does to them. A transmitter
+  // fault does not reach the valve, which InputAt() has given the usual value.
   if (fault != 0 && fault != 17 && !TransmitterOf(fault)) {
     FaultSchedule schedule;
     schedule.fault = fault;
@@ -219,7 +224,8 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
   return answers;
 }
 
-// X as in the healthy valve, the flow by (12).
+// X as in the healthy valve, the flow by (12), without a simulation. The
+// command needs no delay here: FlowReading() does not use it.
 Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
   Trajectory answers = healthy_;
   for (int k = course.start; k < rows_; ++k) {
@@ -233,7 +239,16 @@ Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
   return answers;
 }
 
-// The shift is found by reweighting.
+// With e and b in units of sd, a channel's share of Q is
+//
+//   1/tau [ sum_k (nu ln(1 + (e_k - b)^2 / (nu w_k)) + ln w_k) + p b^2 ]
+//
+// with p = tau sd^2 / s^2. Its derivative by b is 0 where
+//
+//   b = sum_k v_k e_k / (p + sum_k v_k),
+//   v_k = 1 / (w_k (1 + (e_k - b)^2 / (nu w_k))).
+//
+// The weights v depend on b, which is therefore found by reweighting from 0 on.
 ChannelFit Looker::FitChannel(const Trajectory& answers, bool flow,
                               double slow_sd) const {
   const Scatter& scatter = flow ? physics_.flow : physics_.x;
@@ -336,6 +351,8 @@ double Looker::InputCost(int fault, double strength, Course course,
     const double away = (mean - expected) / sd;
     cost += away * away;
   };
+  // Expected readings. f7 and f17 act as in fault_effects.cpp; a faulty
+  // transmitter is off by s times its span.
   add(Signal::kP1, &InputRow::p1_kpa, physics_.p1, i.pressure,
       [&](double usual, double s) {
         return fault == 17 && s < 0.0 ? usual * (1.0 + s)
@@ -364,6 +381,8 @@ double Looker::InputCost(int fault, double strength, Course course,
 // A flow transmitter that goes wrong moves no command, unless the loop reads
 // it. One that moved with the fault tells against it.
 double Looker::CommandCost() const {
+  // The gap is that of LoopObserver (valve_physics.cpp), which measures how far
+  // this difference usually is from 0.
   constexpr int kMinRowsBefore = 60;
   constexpr int kGap = 10;
   constexpr int kMinRowsAfter = 10;
@@ -419,8 +438,9 @@ std::vector<Hypothesis> Looker::Hypotheses() const {
   return hypotheses;
 }
 
-// Where a stop would be that X does not pass behind the detection, as a
-// strength of f1. Between two stops, one passed and one not, X is not linear.
+// The strength of f1 whose stop, X = 100 (1 - s) %, X does not pass in 98 % of
+// the rows behind the detection. Between two stops, one passed and one not, X
+// is not linear, so that the search by itself may miss the right one.
 double Looker::ObservedStop() const {
   std::vector<double> x;
   for (int k = detection_; k < rows_; ++k) {
@@ -444,7 +464,8 @@ void Looker::Try(Hypothesis& h, double strength) {
   h.simulated.emplace(strength, std::move(answers));
 }
 
-// Another course at the best strength; taken if it fits better.
+// Another course at the best strength; taken if it fits better. Strengths about
+// it are then simulated again, because the earlier ones had the old course.
 void Looker::TryCourse(Hypothesis& h, Course course) {
   if (course == h.course) {
     return;
@@ -466,7 +487,12 @@ Hypothesis Looker::PerforationLike(const Hypothesis& supply_drop,
   Hypothesis best{10, 1.0, course};
   for (const double supply : kSupplies) {
     Hypothesis other{10, 1.0, course, supply};
-    // The force that is left, A (1 - s) P, is about that of f16.
+    // Where the force that is left is that of f16,
+    //
+    //   A (1 - s) r P = A (1 - s16) P,   s = 1 - (1 - s16) / r
+    //
+    // with r P the supply pressure. f10 also leaks air, so strengths about this
+    // one are tried.
     const double alike = 1.0 - (1.0 - supply_drop.strength) / supply;
     for (const double share : {0.6, 0.75, 0.9, 1.0, 1.15}) {
       Try(other, std::clamp(share * alike, 0.02, 1.0));
@@ -482,7 +508,8 @@ Hypothesis Looker::PerforationLike(const Hypothesis& supply_drop,
 }
 
 // use(|strength|, answers) for strengths between the simulated ones, the
-// answers linear between theirs, from none on.
+// answers linear between theirs, from none on. std::lerp() is exact at 1, so
+// that a simulated strength is passed as the key that it has in `simulated`.
 template <typename Use>
 void Looker::Between(const Hypothesis& h, Use&& use) const {
   constexpr int kParts = 8;
@@ -503,7 +530,8 @@ void Looker::Between(const Hypothesis& h, Use&& use) const {
   }
 }
 
-// Simulates where the least cost is expected.
+// Simulates where the least cost is expected, never beyond the largest strength
+// that was simulated before.
 void Looker::Refine(Hypothesis& h) {
   double least = kInfinity;
   double where = h.strength;
@@ -525,8 +553,9 @@ void Looker::Refine(Hypothesis& h) {
   Try(h, where);
 }
 
-// The interval is where the cost is within 3.84 of the least, linear between
-// the strengths that it is known at.
+// The 95 % interval is where the cost is within 3.84 `scale` of the least; 3.84
+// is the 95 % quantile of chi-square for one free parameter. The cost is linear
+// between the strengths that it is known at.
 Explanation Looker::Explain(const Hypothesis& h, double scale) const {
   constexpr double kQuantile = 3.84;
   Explanation e{h.fault,    h.sign * h.strength,         h.strength,
@@ -540,6 +569,7 @@ Explanation Looker::Explain(const Hypothesis& h, double scale) const {
   Between(h, [&](double strength, const Trajectory& answers) {
     const double now_beyond = beyond(strength, answers);
     if (last_beyond <= 0.0 || now_beyond <= 0.0) {
+      // Used only if the signs differ, where the divisor is not 0.
       const double end =
           std::lerp(last, strength, last_beyond / (last_beyond - now_beyond));
       e.lowest = std::min(e.lowest, last_beyond <= 0.0 ? last : end);
@@ -560,6 +590,7 @@ ChannelFit Looker::FitWithoutFault() const {
   // A constant shift of one reading by some per cent: drift.
   constexpr double kDrift = 0.02;
   const InstrumentParameters& i = physics_.parameters.instruments;
+  // What a drift of one reading changes; the rest of the cost stays.
   const auto drifted = [&](bool flow, const Transmitter& transmitter,
                            const Scatter& scatter) {
     ChannelFit fit = FitChannel(healthy_, flow,
@@ -591,7 +622,8 @@ std::vector<Hypothesis> Looker::FitHypotheses(const std::stop_token& stop) {
     if (stop.stop_requested()) {
       return {};
     }
-    // Faults of the inputs are sought where an input is unusual.
+    // Faults of the inputs are sought where an input is unusual: one by three
+    // deviations, or several by less.
     if (ActsOnInputs(h.fault) && inputs < 9.0) {
       continue;
     }
@@ -607,6 +639,8 @@ std::vector<Hypothesis> Looker::FitHypotheses(const std::stop_token& stop) {
       }
     }
   }
+  // How many of the best get another simulation in each round; the number of
+  // simulations decides what a look costs.
   constexpr std::array<std::size_t, 8> kKept{12, 10, 7, 5, 5, 5, 5, 5};
   for (std::size_t round = 0; round < kKept.size(); ++round) {
     std::stable_sort(
@@ -621,6 +655,8 @@ std::vector<Hypothesis> Looker::FitHypotheses(const std::stop_token& stop) {
       if (h.simulated.empty()) {
         continue;
       }
+      // Not in the first round: a course is first tried at the best strength,
+      // which one refinement has to find first.
       if (round == 1) {
         for (const Course course :
              {Course{std::max(0, detection_ - 3), false},
@@ -652,6 +688,7 @@ SecondLook Looker::Run(const std::stop_token& stop) {
   look.best = faulty ? first.simulated.at(first.strength) : healthy_;
   look.readings = readings;
   look.misfit = (faulty ? ErrorsOf(look.best) : unmoved.errors) / readings;
+  // Where nothing fits well, little is told apart.
   const double scale = std::max(1.0, look.misfit);
   Explanation nothing;
   nothing.distance = (unmoved.cost - best) / scale;
@@ -670,6 +707,7 @@ SecondLook Looker::Run(const std::stop_token& stop) {
                    });
   if (faulty && first.fault == 16) {
     Hypothesis torn = PerforationLike(first, first.course);
+    // Hypotheses() always has f10, whatever is measured.
     const auto f10 = std::ranges::find(hypotheses, 10, &Hypothesis::fault);
     if (f10->course != first.course) {
       Hypothesis other = PerforationLike(first, f10->course);
@@ -698,6 +736,8 @@ StrengthLook Looker::EstimateStrengths(const std::vector<Explanation>& known,
     Try(h, 0.75 * about);
     double most = about;
     Try(h, most);
+    // Refine() does not go beyond the largest strength, so this one has to be
+    // worse than one below it, or 1.
     do {
       most = std::min(1.0, kFurther * most);
       Try(h, most);

@@ -85,7 +85,7 @@ StrengthLook EstimateStrengths(const ValvePhysics& physics,
                                const std::stop_token& stop = {});
 
 /// Misfit of the window without any fault, but for a constant shift of X or F:
-/// 0.7 to 1.1 of a healthy valve. A hundredth of the work of RunSecondLook().
+/// 0.6 to 1.2 of a healthy valve. A hundredth of the work of RunSecondLook().
 /// @throws CvodeError; std::invalid_argument as RunSecondLook().
 double MisfitWithoutFault(const ValvePhysics& physics,
                           const LookWindow& window);

@@ -49,12 +49,16 @@ std::vector<double> Bounded(std::vector<double> errors) {
 
 Scatter ScatterOf(std::vector<double> raw) {
   const std::vector<double> errors = Bounded(std::move(raw));
+  // Not 0, because the correlations are divided by it.
   double squares = 1e-18;
   for (const double error : errors) {
     squares += error * error;
   }
   Scatter scatter;
   scatter.sd = std::sqrt(squares / static_cast<double>(errors.size()));
+  // tau = 1 + 2 sum_k rho_k: the mean of n errors has the variance of that of
+  // n/tau independent ones. The sum ends at the first small rho_k, or the noise
+  // of all later ones would add up in it.
   constexpr double kUncorrelated = 0.05;
   for (std::size_t lag = 1; lag < kMinStretchRows / 2; ++lag) {
     double sum = 0.0;
@@ -108,7 +112,12 @@ InputBand BandOf(const std::vector<double>& input,
 }
 
 // What of a series its last values do not predict: the errors of an
-// autoregression, by Levinson's recursion.
+// autoregression, sum_i a_i y_(k-i) with a_0 = 1. Levinson's recursion raises
+// its order to m by
+//
+//   c = -sum_(i<m) a_i r_(m-i) / E,   a_i += c a_(m-i),   E *= 1 - c^2
+//
+// with r_i the sum of y_k y_(k-i) and E that of the squared errors.
 std::vector<double> Innovations(std::vector<double> series) {
   constexpr std::size_t kOrder = 5;
   const double mean = Mean(series);
@@ -122,6 +131,7 @@ std::vector<double> Innovations(std::vector<double> series) {
     }
   }
   std::array<double, kOrder + 1> a{1.0};  // sum_i a_i y_(k-i) is the error.
+  // Above 0 even for a command that never moves.
   double error = r[0] + 1e-12;
   for (std::size_t order = 1; order <= kOrder; ++order) {
     double sum = 0.0;
@@ -164,6 +174,8 @@ class LoopObserver {
     for (std::size_t k = 1; k < command.size(); ++k) {
       steps[k] = command[k] - command[k - 1];
     }
+    // Two series that are correlated in time seem correlated with each other by
+    // chance; their innovations do not (Haugh, J. Am. Stat. Assoc. 71, 1976).
     const std::vector<double> moved = Innovations(Bounded(steps));
     const std::vector<double> noise = Innovations(Bounded(unexplained));
     first_ = delay < 0 ? 1 : 0;
@@ -190,6 +202,8 @@ class LoopObserver {
     }
     habit.command_sd =
         std::sqrt(squares / static_cast<double>(changes_.size()));
+    // If neither series depends on the other, the sum of their products has the
+    // deviation sqrt(moved_ noise_ / count_).
     habit.reads_flow = std::ranges::any_of(cross_, [&](double cross) {
       return std::abs(cross) >
              kSignificant * std::sqrt(moved_ * noise_ / count_);
@@ -255,7 +269,15 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
   return physics;
 }
 
-// VisitFields(value, visit) calls visit(name, field) for each field.
+// VisitFields(value, visit) calls visit(name, field) for each field, in the
+// order in which a model set stores the physics:
+//
+//   physics = { path value }        a double, of switches and enumerations, too
+//   path    = field { "." field }   for example "parameters.actuator.stroke_m"
+//
+// PhysicsFrom() requires these paths in this order. A field that is added,
+// renamed or moved makes the stored sets unreadable; only the last ones, those
+// of `loop`, may be missing.
 namespace {
 
 #define FDI_VISIT(FIELD) visit(#FIELD, value.FIELD);
@@ -331,6 +353,10 @@ ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values) {
         values[next++].value);
   };
   VisitFields(physics, Numbers<decltype(use)>{"", use});
+  if (next < values.size()) {
+    throw DataError("the physics of the model set has " + values[next].name +
+                    ", which is unknown: onboard the valve anew");
+  }
   Validate(physics.parameters);
   return physics;
 }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 #include <sstream>
@@ -94,6 +95,8 @@ std::string UnitInName(Signal signal, std::string_view name) {
       close > open) {
     candidates.emplace_back(name.substr(open + 1, close - open - 1));
   }
+  // All candidates are tried, because only a unit of that signal is accepted:
+  // "F_t_h" gives "t/h".
   if (const std::size_t at = name.rfind(' '); at != std::string_view::npos) {
     candidates.emplace_back(name.substr(at + 1));
   }
@@ -103,6 +106,8 @@ std::string UnitInName(Signal signal, std::string_view name) {
     std::ranges::replace(candidates.back(), '_', '/');
   }
   for (const std::string& unit : candidates) {
+    // "1" is a unit of percentages, but at the end of a name it is a number of
+    // a loop.
     if (!unit.empty() && unit != "1" && cli::FindUnit(signal, unit)) {
       return unit;
     }
@@ -126,6 +131,9 @@ std::optional<Signal> SignalOfName(const std::string& name) {
     return std::ranges::any_of(
         words, [&](const char* w) { return plain.ends_with(w); });
   };
+  // The order settles names that hold several words: a "flow setpoint" is a
+  // setpoint, a "position output" a command, a "supply pressure" no P1. Letters
+  // of a tag come last, because words are more certain.
   if (Has(plain, {"setpoint", "set point"}) || ends({".sp", "_sp", " sp"})) {
     return Signal::kSp;
   }
@@ -172,6 +180,7 @@ std::optional<Signal> SignalOfName(const std::string& name) {
       return Signal::kT1;
     case 'f':
       return Signal::kF;
+    // Position is Z in ISA 5.1 and G in DIN 19227.
     case 'z':
     case 'g':
       return Signal::kX;
@@ -180,6 +189,9 @@ std::optional<Signal> SignalOfName(const std::string& name) {
   }
 }
 
+// Without a unit in the name, size decides: CV, X and SP up to 1.1 are
+// fractions, T1 between 250 and 450 is in K, and pressures are in Pa above 2e4,
+// in kPa above 100, else in bar. Of a flow, size tells nothing.
 void GuessUnit(SniffedColumn& column) {
   column.unit = UnitInName(*column.signal, column.name);
   if (!column.unit.empty()) {
@@ -208,6 +220,8 @@ void GuessUnit(SniffedColumn& column) {
 }
 
 // Correlation of b with a delayed by 0, 1 or 2 periods, the strongest.
+// The delays allow for the lag of the rod behind the command, and of the flow
+// behind the rod. The sign is kept, because the sense follows from it.
 double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
   std::map<double, double> at;
   for (std::size_t k = 0; k < a.values.size(); ++k) {
@@ -234,6 +248,7 @@ double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
 // Signals by name, at most one column each; then units and senses.
 void GuessSignals(std::vector<SniffedColumn>& columns) {
   for (SniffedColumn& column : columns) {
+    // A column that is mostly words is no reading, whatever its name says.
     if (column.values.empty() || column.words > column.values.size()) {
       continue;
     }
@@ -277,6 +292,10 @@ void GuessSignals(std::vector<SniffedColumn>& columns) {
   const auto cv = of(Signal::kCv);
   std::vector<SniffedColumn*> moving = of(Signal::kX);
   moving.insert(moving.end(), cv.begin(), cv.end());
+  // Only the first one, X if there is one, is compared with the flow. The
+  // others are compared with it: CV and X are alike but for the sense, so that
+  // correlation is strong where that with the flow may be weak. 0.3 is the
+  // limit of onboarding, too (docs/onboarding.md).
   for (SniffedColumn* column : moving) {
     const bool led = column != moving.front();
     const double r = led            ? Correlation(*column, *moving.front())
@@ -368,6 +387,8 @@ std::optional<std::size_t> FindTime(const std::vector<Cells>& rows,
   const Cells& header = rows.front();
   for (std::size_t c = 0; c < header.size(); ++c) {
     const std::string& cell = rows[1].size() > c ? rows[1][c] : header[c];
+    // `slashed` is any text that is a time in one of the two orders, whatever
+    // its column is called. A number is a time only under a name that says so.
     const bool slashed =
         cli::ScanTime(cell, cli::DateOrder::kDayFirst).has_value() ||
         cli::ScanTime(cell, cli::DateOrder::kMonthFirst).has_value();
@@ -419,6 +440,9 @@ void AddCell(const std::string& cell, double t_s, char decimal,
 void FindTags(const std::vector<Cells>& rows, const std::vector<double>& times,
               Sniffed& found) {
   std::vector<SniffedColumn>& columns = found.columns;
+  // Tags are words in every row, at least two of them, each in ten rows on
+  // average; beside them a long table has value, quality and perhaps one more
+  // column.
   const auto tag = std::ranges::find_if(columns, [&](const SniffedColumn& c) {
     return c.words == c.cells && c.texts.size() >= 2 && c.texts.size() < 500 &&
            c.texts.size() * 10 < c.cells && columns.size() <= 4;
@@ -444,9 +468,11 @@ void FindTags(const std::vector<Cells>& rows, const std::vector<double>& times,
   };
   const std::size_t tag_at = at(tall.tag);
   const std::size_t value_at = at(tall.value);
+  // From here on the columns are the tags, and GuessSignals() treats both kinds
+  // of tables alike.
   std::map<std::string, SniffedColumn> tags;
   for (std::size_t r = 1; r < rows.size(); ++r) {
-    if (rows[r].size() == header.size()) {
+    if (rows[r].size() == header.size() && !std::isnan(times[r])) {
       SniffedColumn& column = tags[rows[r][tag_at]];
       column.name = rows[r][tag_at];
       AddCell(rows[r][value_at], times[r], found.map.decimal, column);
@@ -471,6 +497,8 @@ double Rounded(double period_s) {
 
 // Period, jitter and gaps, and whether --resample would help.
 void JudgeTiming(Sniffed& found) {
+  // All stamps together, sorted: a long table has each instant once per tag and
+  // may be sorted by tag.
   std::vector<double> times = found.times_s;
   std::ranges::sort(times);
   times.erase(std::unique(times.begin(), times.end()), times.end());
@@ -484,6 +512,8 @@ void JudgeTiming(Sniffed& found) {
       const double step = column.times_s[k] - column.times_s[k - 1];
       odd += std::abs(step - usual) > 0.6 * usual ? 1U : 0U;
     }
+    // Readings stored by exception or swinging door come at odd steps. A tag
+    // with such steps in a fifth of its readings is taken as compressed.
     found.compressed = found.compressed || (found.map.long_table &&
                                             5 * odd > column.times_s.size());
   }
@@ -500,6 +530,9 @@ void JudgeTiming(Sniffed& found) {
   const bool jitter = found.jitter_s > 0.01 * found.period_s;
   double period = found.period_s;
   std::string age;
+  // A compressed tag may be silent for long while its value holds, hence ten
+  // minutes. Slow and short data are resampled to 1 s, because a record with
+  // fewer than 600 samples in a row cannot be onboarded (docs/import.md).
   if (found.compressed) {
     age = ":10min";
     period = std::max(period, 1.0);
@@ -529,7 +562,8 @@ Sniffed Sniff(const std::string& text, const std::string& source,
                     " holds times; expected 2026-11-20 14:56:11, seconds or "
                     "the like");
   }
-  std::vector<double> times(rows.size());
+  std::vector<double> times(rows.size(),
+                            std::numeric_limits<double>::quiet_NaN());
   TimeReader reader(found.map);
   const bool split = !found.map.clock_column.empty();
   for (std::size_t c = 0; c < header.size(); ++c) {
@@ -558,6 +592,8 @@ Sniffed Sniff(const std::string& text, const std::string& source,
     }
   }
   found.dated = reader.dated();
+  // In this order: tags become columns, columns get signals, and only columns
+  // with a signal count for the timing.
   FindTags(rows, times, found);
   GuessSignals(found.columns);
   JudgeTiming(found);

@@ -24,6 +24,8 @@ auto SqliteCall(std::string_view operation, Call&& call) {
   try {
     return std::forward<Call>(call)();
   } catch (const SQLite::Exception& error) {
+    // An error that SQLiteCpp raises itself, such as a wrong column index, has
+    // no extended code, which is then -1.
     const int extended = error.getExtendedErrorCode();
     throw SqliteError(
         extended > 0 ? extended : error.getErrorCode(),
@@ -81,7 +83,10 @@ std::filesystem::path FreeBackupName(const std::filesystem::path& path,
   return name;
 }
 
-// SQLiteCpp does not expose its statement handle, so it is found by its text.
+// SQLiteCpp does not expose its statement handle, so it is found by its text;
+// of several statements with that text, any gives the answer. SQLite counts
+// BEGIN and COMMIT as reading, so a Snapshot can step them, but BEGIN IMMEDIATE
+// as writing, so a Transaction executes it past this check.
 bool Writes(sqlite3* connection, const std::string& sql) {
   for (sqlite3_stmt* s = sqlite3_next_stmt(connection, nullptr); s != nullptr;
        s = sqlite3_next_stmt(connection, s)) {
@@ -128,6 +133,7 @@ SqliteError::SqliteError(int code, const std::string& message)
       code_(code) {}
 
 bool SqliteError::IsBusy() const {
+  // The low byte of an extended result code is its primary code.
   const int primary = code_ & 0xFF;
   return primary == SQLITE_BUSY || primary == SQLITE_LOCKED;
 }
@@ -179,6 +185,9 @@ int Database::CheckIdentity(const Schema& schema) {
   } catch (const SQLite::Exception& error) {
     Refuse(path_, error.what());
   }
+  // A program that was stopped before it had committed its first migration
+  // leaves an empty database. Tables, application_id and user_version are
+  // committed together, so there is nothing between empty and complete.
   const bool blank = id == 0 && version == 0 && objects == 0;
   if (blank && access_ == Access::kReader) {
     Refuse(path_,
@@ -200,6 +209,10 @@ int Database::CheckIdentity(const Schema& schema) {
 }
 
 void Database::Configure(const Schema& schema) {
+  // Within a transaction, SQLite ignores foreign_keys and refuses to change to
+  // WAL, so both are set before Migrate() begins one. With trusted_schema OFF,
+  // the views and triggers of a file from elsewhere cannot call functions that
+  // have side effects.
   Execute("PRAGMA foreign_keys = ON");
   Execute("PRAGMA trusted_schema = OFF");
   Execute("PRAGMA journal_size_limit = 67108864");
@@ -216,6 +229,9 @@ void Database::Configure(const Schema& schema) {
   if (mode != "wal") {
     Refuse(path_, "journal mode stays " + mode + ", WAL is needed");
   }
+  // An automatic checkpoint runs within COMMIT, at which time Transaction still
+  // holds the gate; an occasional writer leaves it to the recording service
+  // (docs/adr/0004-one-writer.md).
   if (access_ == Access::kOccasionalWriter) {
     Execute("PRAGMA wal_autocheckpoint = 0");
   } else {
@@ -226,11 +242,14 @@ void Database::Configure(const Schema& schema) {
 }
 
 void Database::Migrate(const Schema& schema, int from) {
-  // VACUUM INTO cannot run inside a transaction: the caller holds the gate.
+  // VACUUM INTO cannot run inside a transaction: the caller holds the gate, so
+  // that nobody writes between the copy and the migration.
   if (from > 0) {
     migration_backup_ = FreeBackupName(path_, from);
     BackupTo(*migration_backup_);
   }
+  // One transaction for all versions. application_id and user_version are in
+  // the header of the file and are rolled back with the rest.
   Execute("BEGIN IMMEDIATE");
   try {
     for (std::size_t v = static_cast<std::size_t>(from);
@@ -286,6 +305,8 @@ bool Database::Checkpoint() {
   const int code = sqlite3_wal_checkpoint_v2(
       handle, nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
   sqlite3_busy_timeout(handle, static_cast<int>(kWritePatience.count()));
+  // A reader still needs part of the log. SQLite has copied what it could; the
+  // log is truncated by a later call.
   if (code == SQLITE_BUSY) {
     return false;
   }
@@ -305,12 +326,16 @@ std::uintmax_t Database::FileBytes() const {
 }
 
 std::uintmax_t Database::UsedBytes() {
+  // After a deletion the file is as large as before; its free pages are reused.
+  // So limits on the size must count the pages in use.
   const std::int64_t pages =
       *QueryInt64("PRAGMA page_count") - *QueryInt64("PRAGMA freelist_count");
   return static_cast<std::uintmax_t>(pages * *QueryInt64("PRAGMA page_size"));
 }
 
 void Database::BackupTo(const std::filesystem::path& target) {
+  // This check comes first because a copy that fails half-way is removed below:
+  // that must not be somebody else's file.
   if (std::filesystem::exists(target)) {
     throw DataError("database " + path_.string() + ": backup " +
                     target.string() + " exists already");
@@ -332,6 +357,9 @@ void Database::BackupTo(const std::filesystem::path& target) {
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(target, ignored);
+    if (reader) {
+      Execute("PRAGMA query_only = ON");
+    }
     throw;
   }
 }
@@ -357,6 +385,8 @@ std::vector<std::string> Database::Check() {
       }
     }
   } catch (const SqliteError& error) {
+    // SQLite reports damage in two ways: as a row of quick_check, or as the
+    // error of the statement that meets it.
     if ((error.code() & 0xFF) != SQLITE_CORRUPT) {
       throw;
     }
@@ -489,6 +519,11 @@ Transaction::Transaction(Database& database) : database_(database) {
   if (database.gate_ == nullptr) {
     throw std::logic_error(database.path().string() + " is open read only");
   }
+  // Every writer takes the gate first, then SQLite's lock. IMMEDIATE takes that
+  // lock at the beginning: a transaction that first reads and then writes fails
+  // if another connection has committed in between, and no waiting cures that
+  // (SQLITE_BUSY_SNAPSHOT). Transactions of one connection do not nest: the
+  // gate would let the inner one in, and SQLite refuses it.
   if (!database.gate_->Enter(kWritePatience)) {
     throw SqliteError(SQLITE_BUSY, database.path().string() +
                                        ": another process keeps writing");
@@ -503,18 +538,25 @@ Transaction::Transaction(Database& database) : database_(database) {
 
 Transaction::~Transaction() {
   if (open_) {
+    // After some errors, e.g. a full disk, SQLite has rolled back by itself and
+    // refuses another ROLLBACK, which is harmless.
     database_.connection_->tryExec("ROLLBACK");
     database_.gate_->Leave();
   }
 }
 
 void Transaction::Commit() {
+  // COMMIT may checkpoint, so the gate is left after it. If it fails, the
+  // transaction is still open and the destructor rolls it back.
   database_.Execute("COMMIT");
   open_ = false;
   database_.gate_->Leave();
 }
 
 Snapshot::Snapshot(Database& database) : database_(database) {
+  // BEGIN takes no lock: the state that is seen is that of the first query in
+  // the scope. SQLite does not nest transactions, so a Snapshot cannot be
+  // opened within another one or within a Transaction.
   database.Prepare("BEGIN").Run();
 }
 

@@ -52,6 +52,9 @@ void AddLabel(const AlarmSpan& span, AlarmStatistics& statistics) {
 // series of at least `criteria.chattering_episodes` within the window.
 std::int64_t Chattering(const std::vector<std::int64_t>& stamps,
                         const AlarmCriteria& criteria) {
+  // With n = chattering_episodes, a series ends at an episode if the n episodes
+  // up to it lie within the window. Series overlap: `counted` keeps an episode
+  // from being counted once for each of them.
   const auto row = static_cast<std::size_t>(criteria.chattering_episodes);
   const std::int64_t window_ns = Nanoseconds(criteria.chattering_window_s);
   std::int64_t count = 0;
@@ -73,6 +76,8 @@ std::int64_t MaxCountWithin(const std::vector<std::int64_t>& stamps,
   std::size_t most = 0;
   std::size_t first = 0;
   for (std::size_t last = 0; last < stamps.size(); ++last) {
+    // The window is half-open: two alarms exactly one window apart are not in
+    // the same one.
     while (stamps[last] - stamps[first] >= window_ns) {
       ++first;
     }
@@ -127,6 +132,8 @@ AlarmState AlarmStateOf(const Episode& episode, bool shelved) {
 std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,
                             const std::vector<Shelf>& shelves,
                             std::int64_t now_ns) {
+  // Sorted by valve, so that each episode looks at the shelves of its valve
+  // only.
   std::multimap<std::string, const Shelf*> in_force;
   for (const Shelf& shelf : shelves) {
     if (IsActive(shelf, now_ns)) {
@@ -178,6 +185,8 @@ AlarmStatistics ComputeAlarmStatistics(const std::vector<AlarmSpan>& spans,
     if (end_ns < since_ns || span.detected_ns >= until_ns) {
       continue;
     }
+    // An episode detected before the period adds its time in alarm, but it is
+    // not counted as an episode of the period.
     const Stretch stretch{std::max(span.detected_ns, since_ns),
                           std::min(end_ns, until_ns)};
     ValveAlarms& valve = statistics.valves[span.valve_id];

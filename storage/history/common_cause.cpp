@@ -18,10 +18,13 @@ namespace sql = history_sql;
 namespace {
 
 constexpr std::array<std::string_view, 3> kChanges{"OPENED", "GROWN", "ENDED"};
-// An episode may be detected long before it isolates a fault of the group.
+// An episode may be detected long before it isolates a fault of the group. The
+// index of episode_fault is by detection: this bounds the part of it that is
+// searched for an isolation, so an episode isolated later than that is missed.
 constexpr std::int64_t kMaxIsolationNs = 86'400'000'000'000;
 
 bool GlobMatches(const std::string& glob, std::string_view text) {
+  // As in SQLite's GLOB, a backslash is an ordinary character.
   return fnmatch(glob.c_str(), std::string(text).c_str(), FNM_NOESCAPE) == 0;
 }
 
@@ -43,7 +46,10 @@ CommonCause ReadCause(Database& database, const std::string& cause_id) {
 }
 
 // The subset of `members`, which are ordered by isolation, that contains
-// `episode_id`, spans at most `within_ns` and has the most valves.
+// `episode_id`, spans at most `within_ns` and has the most valves. Windows that
+// begin at a member suffice, because any other window can be moved forward to
+// its first member without losing one. Of equally large ones, the earliest
+// wins.
 std::vector<CauseMember> LargestCluster(const std::vector<CauseMember>& members,
                                         std::int64_t within_ns,
                                         const std::string& episode_id) {
@@ -119,6 +125,8 @@ std::optional<CauseChange> CommonCauseBook::Join(
       known.end()) {
     return std::nullopt;
   }
+  // Members are ordered by isolation. The search begins with the first, because
+  // a transition may be recorded later than others that followed it.
   for (const CauseMember& member : Candidates(
            group, known.empty() ? 0 : known.front().isolated_ns, kEver)) {
     if (member.episode_id == episode_id) {
@@ -133,6 +141,8 @@ std::optional<CauseChange> CommonCauseBook::Join(
 std::optional<CauseChange> CommonCauseBook::Open(const CauseGroup& group,
                                                  const std::string& episode_id,
                                                  std::int64_t stamp_ns) {
+  // Every window of this length that contains `stamp_ns` is within these
+  // bounds.
   const auto crowd = LargestCluster(
       Candidates(group, stamp_ns - group.within_ns, stamp_ns + group.within_ns),
       group.within_ns, episode_id);
@@ -142,9 +152,13 @@ std::optional<CauseChange> CommonCauseBook::Open(const CauseGroup& group,
     valves.insert(member.valve_id);
     any_open = any_open || !member.ended_ns;
   }
+  // A cause whose episodes have all ended would get no further event that ends
+  // it.
   if (!any_open || std::ssize(valves) < group.min_valves) {
     return std::nullopt;
   }
+  // The id follows from the group and the isolation that completed the cause,
+  // so that a repeated call inserts nothing.
   const std::string cause_id =
       EpisodeIdText(EpisodeId(group.name, 0, crowd.back().isolated_ns));
   database_.Run(sql::insert_cause, cause_id, group.name,
@@ -200,6 +214,8 @@ std::vector<CauseChange> CommonCauseBook::EndFinished() {
 }
 
 std::vector<CauseChange> CommonCauseBook::EndIfFinished(Statement& causes) {
+  // Ids are collected first, because ending a cause changes the table that the
+  // query reads.
   std::vector<std::string> ids;
   while (causes.Step()) {
     ids.push_back(causes.Text(0));
@@ -213,6 +229,7 @@ std::vector<CauseChange> CommonCauseBook::EndIfFinished(Statement& causes) {
       last_ns = std::max(last_ns, member.ended_ns.value_or(0));
     }
     if (!open) {
+      // The cause ends with its last episode, whenever that is noticed.
       database_.Run(sql::end_cause, last_ns, cause_id);
       changes.push_back(
           {CauseChange::Kind::kEnded, ReadCause(database_, cause_id)});

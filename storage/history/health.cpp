@@ -41,6 +41,7 @@ void PutNumber(ByteWriter& out, std::int64_t value) {
 
 std::int64_t GetNumber(ByteReader& in) {
   std::uint64_t folded = 0;
+  // 64 bits are at most ten groups of 7; the tenth has one bit.
   for (unsigned shift = 0; shift < 64; shift += 7) {
     const auto byte = in.Get<std::uint8_t>();
     folded |= static_cast<std::uint64_t>(byte & 0x7F) << shift;
@@ -101,6 +102,7 @@ void GetBins(ByteReader& in, HealthHour& hour) {
 // Visits the fixed numbers of an hour in storage order.
 template <typename Hour, typename Visit>
 void ForEachNumber(Hour& hour, Visit visit) {
+  // live_ms is not among them: it is a column of its own.
   visit(hour.seen_ms);
   visit(hour.alarm_ms);
   visit(hour.open_ms);
@@ -170,6 +172,8 @@ void UnpackHealth(std::span<const std::byte> bytes, HealthHour& hour) {
   }
   GetBins(in, hour);
   while (const std::size_t fault = GetCount(in, kLastFinding, "fault")) {
+    // This is a statement of its own because the order in which the arguments
+    // of a call are evaluated is not specified.
     const std::int64_t samples = GetNumber(in);
     hour.AddStrength(static_cast<int>(fault), samples, GetNumber(in));
   }
@@ -197,6 +201,8 @@ void StoreHealth(Database& database, std::span<const HealthHour> hours) {
 }
 
 std::int64_t HourFrom(std::int64_t stamp_ns) {
+  // ⌈stamp / 1 h⌉: division rounds towards zero, which is already up for a
+  // negative stamp, whose remainder is not positive.
   return stamp_ns / kNsPerHour + (stamp_ns % kNsPerHour > 0 ? 1 : 0);
 }
 
@@ -221,6 +227,8 @@ std::vector<std::string> HealthValves(Database& database,
   Statement match = database.Prepare("SELECT ? GLOB ?");
   std::vector<std::string> valves;
   std::string last;
+  // Each step is one look into the primary key, so the costs grow with the
+  // number of valves, not with that of their hours.
   while (next.Bind(last).Step() && !next.IsNull(0)) {
     last = next.Text(0);
     if (match.Bind(last, glob).Step() && match.Bool(0)) {

@@ -43,6 +43,8 @@ std::string FaultOf(const EpisodeFilter& filter) {
                                 : filter.fault;
 }
 
+// A condition that always holds still mentions its parameter, here and in
+// FaultCondition(): see BindFilter().
 const char* ValveCondition(const EpisodeFilter& filter) {
   return filter.valve_glob == "*" ? "?1 = '*'"
          : IsExact(filter)        ? "e.valve_id = ?1"
@@ -90,6 +92,10 @@ std::string StateCondition(EpisodeState state) {
   return "";
 }
 
+// INDEXED BY is an error where the index cannot be used. The partial indexes
+// can be used only if the query repeats their condition: ended_ns IS NULL for
+// episode_open, acked_by IS NULL for episode_unacked. So the states of IsOpen()
+// and IsUnacked() must have that in StateCondition().
 const char* IndexFor(const EpisodeFilter& filter) {
   return IsExact(filter)            ? "episode_by_valve"
          : filter.fault == kUnknown ? "episode_by_fault"
@@ -102,6 +108,8 @@ const char* IndexFor(const EpisodeFilter& filter) {
 std::string NewestIds(const EpisodeFilter& filter) {
   const std::string valve_and_state =
       std::string(ValveCondition(filter)) + StateCondition(filter.state);
+  // episode_fault repeats detected_ns, so that the episodes of a fault can be
+  // walked by time, too.
   if (HasFaultFilter(filter) && !IsExact(filter)) {
     return std::string(sql::newest_of_fault) + " " + valve_and_state +
            " ORDER BY f.detected_ns DESC, e.valve_id DESC";
@@ -140,6 +148,8 @@ EpisodeCondition ConditionOf(const EpisodeFilter& filter) {
           FaultOf(filter)};
 }
 
+// The inner query walks an index, newest first, and stops at the limit; only
+// these episodes are read as a whole and put in order of time.
 std::string ListQuery(const EpisodeFilter& filter) {
   return std::string(sql::episodes) + " e.episode_id IN (" + NewestIds(filter) +
          " LIMIT ?6) ORDER BY e.detected_ns, e.valve_id";
@@ -242,6 +252,8 @@ std::vector<DataGap> HistoryReader::Gaps(const EpisodeFilter& filter) {
 }
 
 std::vector<CoverageTime> HistoryReader::Coverage(const EpisodeFilter& filter) {
+  // Coverage is stored by day: a day that is only partly in the window counts
+  // as a whole.
   Statement rows = database_.Prepare(sql::coverage);
   rows.Bind(filter.valve_glob, filter.since_ns / kNsPerDay,
             filter.until_ns / kNsPerDay);

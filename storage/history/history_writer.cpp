@@ -26,8 +26,11 @@ struct EnumText<TransitionKind> {
 namespace sql = history_sql;
 namespace {
 
+// The gap that a crash leaves in the record begins at the last heartbeat, hence
+// at most about this much too early.
 constexpr std::int64_t kAliveEveryNs = 10'000'000'000;
 
+// NaN would be bound as NULL, which the NOT NULL columns of an episode refuse.
 double Finite(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
@@ -80,6 +83,8 @@ Entry InsertEpisode(Database& database, const FaultEvent& event,
   for (const ChannelSpec& channel : models.channels) {
     channels.push_back(channel.name);
   }
+  // Every transition offers the row of its episode, so that one whose DETECTED
+  // was not stored has an episode, too; a row that exists stays as it is.
   database.Cached(sql::insert_episode)
       .Bind(entry.id, session_id, event.valve_id, event.source_id,
             t.detection_stamp_ns, Finite(t.factor), Finite(t.strength),
@@ -108,6 +113,9 @@ Entry EndOfStored(Database& database, const FaultEvent& event) {
 void StoreIsolation(Database& database, const Entry& entry) {
   const Transition& t = entry.transition;
   const std::string names = entry.IsolatedNames();
+  // The peak begins anew, because it is that of the set isolated last. Every
+  // fault that was ever isolated keeps its row in episode_fault; only those
+  // with held = 1 are in the present set.
   database.Cached(sql::set_isolated)
       .Bind(t.stamp_ns, names.empty() ? "unknown" : names, t.faults,
             Finite(t.factor), Finite(t.strength), LayerName(t.layer), entry.id)
@@ -133,6 +141,9 @@ bool StoreEvent(Database& database, const Entry& entry) {
             IsIsolation(t.kind) ? LayerName(t.layer) : std::string_view(),
             entry.id)
       .Run();
+  // Nothing else is changed unless the event is new, so that repeating it after
+  // an error does no harm. Triggers insert into `change` meanwhile; SQLite
+  // counts that neither in Changes() nor in LastInsertRowid().
   if (database.Changes() == 0) {
     return false;
   }
@@ -297,6 +308,7 @@ SessionStart HistoryWriter::BeginSession(std::int64_t now_ns,
                                          const std::string& config) {
   SessionStart start;
   Transaction transaction(database_);
+  // This is read before the next statement gives the dead session an end.
   start.died_ns = database_.QueryInt64(sql::last_sign_of_life);
   database_.Run(sql::end_dead_sessions);
   database_.Run(sql::insert_session, now_ns, software, config);
@@ -319,11 +331,14 @@ void HistoryWriter::EndSession(std::int64_t now_ns, bool clean) {
 // file when its next event is. Only a commit makes it forgotten, so that a
 // full disk costs nothing but time.
 void HistoryWriter::CommitBatch(const std::function<void()>& batch) {
+  // Transactions do not nest: a call from within a batch joins it.
   if (in_batch_) {
     batch();
     return;
   }
   in_batch_ = true;
+  // Until a transaction succeeds, Commit() tries again even if nothing is
+  // pending, which shows when the disk works again.
   failed_ = true;
   try {
     Transaction transaction(database_);
@@ -384,6 +399,9 @@ void HistoryWriter::StoreStrength(const StrengthPoint& point) {
 
 void HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {
   CommitBatch([&] {
+    // Coverage and health are added to what is stored. All of it is in one
+    // transaction, so that after an error the caller can merge this checkpoint
+    // into the next one.
     StoreCoverage(database_, checkpoint.coverage);
     StoreAccumulators(database_, "accumulator", checkpoint.accumulators);
     StoreHealth(database_, checkpoint.health);
@@ -413,6 +431,8 @@ void HistoryWriter::StorePending() {
         .Bind(gap.valve_id, gap.from_ns, gap.to_ns, gap.reason, session_id_)
         .Run();
   }
+  // A crash before this commit lets the event be sent again, so subscribers may
+  // receive it twice; it is never lost.
   for (const SentEvent& event : sent_) {
     database_.Cached(sql::delete_unsent)
         .Bind(EpisodeIdText(event.episode_id), event.kind, event.stamp_ns)

@@ -38,7 +38,7 @@ WHERE f.fault = ?4 AND f.held = 1
 -- name: holds_fault
 EXISTS (SELECT 1 FROM episode_fault f
   WHERE f.episode_id = e.episode_id AND f.fault = ?4 AND f.held = 1)
--- As Covers() and InForce() of alarm.h say.
+-- As Covers() and IsActive() of alarm.h say.
 -- name: is_shelved
 EXISTS (SELECT 1 FROM shelf s
   WHERE s.valve_id = e.valve_id AND s.until_ns > ?5 AND s.from_ns <= ?5

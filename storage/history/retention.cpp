@@ -88,6 +88,8 @@ class Pruner {
     const auto drop = [this, &dropped](const Candidate& item) {
       CountDeleted(item);
       dropped.insert(item.row);
+      // This is an estimate: `bytes` has the packed samples or evidence, but
+      // neither other columns nor indexes.
       result_.bytes_after -= std::min(result_.bytes_after, item.bytes);
     };
     std::for_each(old.begin(), old.end(), drop);
@@ -122,7 +124,9 @@ class Pruner {
         CountDeleted(item);
       }
       transaction.Commit();
-      // Earlier rows are deleted or protected.
+      // Earlier rows are deleted or protected: without this bound, each batch
+      // would pass all protected rows again. The next candidate may have the
+      // same stamp, which is therefore included.
       from_ns = batch.back().stamp_ns;
       result_.bytes_after = database_.UsedBytes();
       std::this_thread::sleep_for(limits_.pause);
@@ -155,6 +159,8 @@ std::uintmax_t CountHealth(Database& database, const std::string& valve,
 
 PruneResult PruneRuns(const std::filesystem::path& path,
                       const RetentionLimits& limits) {
+  // One run per transaction: its chunks, 144 for a day at 1 Hz, are deleted
+  // with it, and the recorder waits meanwhile.
   return Pruner(path,
                 {RunsSchema(), sql::run_candidates,
                  "DELETE FROM run WHERE run_id = ?", sql::protected_runs, 1},
@@ -180,6 +186,8 @@ PruneResult PruneHealth(const std::filesystem::path& path,
   PruneResult result;
   result.bytes_before = database.UsedBytes();
   std::uintmax_t gone = 0;
+  // Hour h lies between h and h + 1 hours since 1970: it has ended at the limit
+  // t if h + 1 ≤ t, that is, if h < ⌊t⌋.
   const std::int64_t hour =
       limits.before_ns ? *limits.before_ns / kNsPerHour : 0;
   for (const std::string& valve : HealthValves(database, "*")) {

@@ -27,7 +27,10 @@ namespace sql = history_sql;
 // integers (quality, state, isolated) or of doubles: see column_codec.h.
 namespace {
 
-// Upper bound of the size of the columns.
+// Upper bound of the size of the columns: one of doubles is at most two of
+// integers, each with 8 bytes per instant and fewer than 64 beside them. With
+// the limits that DecodeTrace() has checked it is below 2²⁷ and cannot
+// overflow.
 constexpr std::uint32_t MaxRawBytes(std::uint32_t count, std::uint32_t channels,
                                     std::uint32_t faults) {
   return 2 * (4 + channels + faults) * (8 * count + 64);
@@ -153,6 +156,7 @@ std::vector<TracePoint> DecodeTrace(const TraceChunk& chunk,
   }
   const std::vector<StoredSample> samples = DecodeChunk(chunk.samples, where);
   ByteReader header(chunk.vectors, where);
+  // Each count is limited, and `size` by them, before the columns take memory.
   const std::uint32_t count = header.GetCount(kMaxChunkSamples, "instants");
   const std::uint32_t channels = header.GetCount(kMaxChannels, "channels");
   const std::uint32_t faults = header.GetCount(kMaxFaults, "faults");
@@ -180,6 +184,8 @@ std::vector<TracePoint> DecodeTrace(const TraceChunk& chunk,
 double TraceWriter::Peak(const Buffer& buffer) {
   double peak = 0.0;
   for (const TracePoint& instant : buffer.instants) {
+    // The instants before the detection lead up to the episode, and those with
+    // another isolated set do not count for the peak of this one.
     if (instant.sample.stamp_ns < buffer.detected_ns ||
         instant.isolated != buffer.isolated) {
       continue;
@@ -209,12 +215,16 @@ TraceWriter::Buffer& TraceWriter::BufferOf(std::uint64_t episode_id) {
   buffer.faults = SplitNames(row.Text(1)).size();
   buffer.isolated = row.Uint64(2);
   buffer.detected_ns = row.Int64(3);
+  // The next chunk begins here even if the last one stored is not full: its
+  // instants are no longer in memory, so it cannot be extended.
   buffer.chunk = row.Int64(4);
   return buffers_.emplace(episode_id, std::move(buffer)).first->second;
 }
 
 bool TraceWriter::Append(std::uint64_t episode_id,
                          std::span<const TracePoint> instants) {
+  // All sizes are checked first, so that the instants are kept all or not at
+  // all.
   Buffer& buffer = BufferOf(episode_id);
   for (const TracePoint& instant : instants) {
     if (instant.residuals.size() != buffer.channels ||
@@ -269,6 +279,8 @@ void TraceWriter::StoreBuffer(std::uint64_t episode_id, const Buffer& buffer) {
   const std::string id = EpisodeIdText(episode_id);
   std::int64_t number = buffer.chunk;
   std::span<const TracePoint> rest(buffer.instants);
+  // Every commit writes the last chunk again, under its number, until it is
+  // full. That costs at most kTraceChunkInstants instants per episode.
   while (!rest.empty()) {
     const auto part =
         rest.first(std::min<std::size_t>(rest.size(), kTraceChunkInstants));
@@ -281,12 +293,16 @@ void TraceWriter::StoreBuffer(std::uint64_t episode_id, const Buffer& buffer) {
               chunk.vectors)
         .Run();
   }
+  // The peak in the file only rises here, because the instants of full chunks
+  // are no longer in the buffer.
   database_.Cached(sql::raise_peak).Bind(Peak(buffer), id).Run();
 }
 
 void TraceWriter::DiscardCommitted() {
   for (auto it = buffers_.begin(); it != buffers_.end();) {
     Buffer& buffer = it->second;
+    // The instants of the unfinished chunk stay, to be written again together
+    // with those that follow.
     const std::size_t full = buffer.instants.size() / kTraceChunkInstants;
     buffer.instants.erase(
         buffer.instants.begin(),

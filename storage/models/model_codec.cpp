@@ -21,13 +21,16 @@ namespace fdi::storage {
 // The bytes of a model set, little endian:
 //
 //   file    = "FDIM" format:uint32 length:uint64 payload crc:uint32
-//   payload = the fields of ModelSet in the order of Fields() below
+//   format  = 3, + 1 with physics, + 2 with a floor, + 4 with drift limits,
+//             + 8 with an interpolation allowance
+//   payload = the fields of ModelSet in the order of Fields() below, the floor
+//             last; then [physics: list] [drift: of each channel] [allowance]
 //
 // The CRC-32 covers all bytes before it. Encoding: a double as its 64 bits; int
 // as int32; int64 unchanged; bool and enumerations as uint8; a text as uint32
 // length and bytes; a list as uint32 count and its elements; a struct as its
-// fields. A new or moved field needs another kFormat. A set without a floor is
-// encoded as in format 3, so that older sets keep their bytes and hash.
+// fields. A new or moved field needs another kFormat. A part that is absent has
+// no bytes, so that older sets keep their bytes and hash.
 namespace {
 
 constexpr std::uint32_t kMagic = 0x4D494446;  // "FDIM"
@@ -221,6 +224,7 @@ class Encoder {
   void Field(bool value) { writer.Put(static_cast<std::uint8_t>(value)); }
   void Field(Signal value) { writer.Put(static_cast<std::uint8_t>(value)); }
   void Field(FlowUnit value) { writer.Put(static_cast<std::uint8_t>(value)); }
+  // No byte says whether there is a floor: the format does.
   void Field(const std::optional<FloorLimits>& floor) {
     if (floor) {
       Field(*floor);
@@ -245,6 +249,8 @@ class Encoder {
   template <typename Struct>
   requires std::is_aggregate_v<Struct>
   void Field(const Struct& value) { Fields(*this, value); }
+  // The limits are those of the decoder: nothing is stored that could not be
+  // read back.
   static void CheckSize(std::size_t size, std::uint32_t max) {
     Require(size <= max, "a model set holds more than its format can store");
   }
@@ -284,6 +290,7 @@ class Decoder {
   }
   template <typename Vector>
   void Field(const Limited<Vector>& limited) {
+    // A count beyond its limit is refused before memory is taken for it.
     limited.values.resize(reader_.GetCount(limited.max, "a count"));
     for (auto& value : limited.values) {
       Field(value);
@@ -311,6 +318,7 @@ bool FollowsDrift(const ModelSet& models) {
 }
 
 std::uint32_t Checksum(std::span<const std::byte> bytes) {
+  // crc32_z() takes a size_t; the length of crc32() has 32 bits only.
   return static_cast<std::uint32_t>(
       crc32_z(crc32(0, nullptr, 0),
               reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
@@ -361,6 +369,8 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
   if (bytes.size() < kFrame || reader.Get<std::uint32_t>() != kMagic) {
     throw DataError(std::string(where) + " is not a model set");
   }
+  // The CRC-32 is checked before the format, so that a damaged format number is
+  // not taken for that of a newer program.
   const std::size_t checked = bytes.size() - sizeof(std::uint32_t);
   ByteReader end(bytes.subspan(checked), where);
   if (end.Get<std::uint32_t>() != Checksum(bytes.first(checked))) {
@@ -392,6 +402,7 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
     decoder(models.decision.interpolation_allowance);
   }
   payload.ExpectEnd();
+  models.content_hash = ContentHash(models);  // Of what is stored.
   RenumberFindings(models);
   return models;
 }

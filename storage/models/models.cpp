@@ -62,6 +62,8 @@ std::vector<std::byte> ReadBytes(const std::filesystem::path& path) {
 }
 
 void InsertParts(Database& database, std::int64_t id, const ModelSet& models) {
+  // These rows only show in SQL what is in the bytes; Load() does not read
+  // them.
   Statement observer = database.Prepare(sql::insert_observer);
   Statement channel = database.Prepare(sql::insert_channel);
   for (std::size_t o = 0; o < models.observers.size(); ++o) {
@@ -128,6 +130,7 @@ Lineage ReadLineage(Database& database, std::int64_t model_set_id) {
     std::string fault;
     rows.Read(0, e.episode_id, e.valve_id, e.label, e.labelled_by,
               e.labelled_ns, fault, e.strength, e.run, e.samples);
+    // Fault 0 is stored as "normal", which is not the name of a fault.
     e.fault = ParseFault(fault).value_or(0);
   }
   return lineage;
@@ -178,7 +181,11 @@ ModelStore::ModelStore(const std::filesystem::path& path, Access access)
 ModelSet ModelStore::Save(const ModelSet& models, Activation activation,
                           const Lineage& lineage) {
   Validate(models);
-  ParseModelReference(models.name);
+  if (ParseModelReference(models.name).version) {
+    throw ConfigError("model set \"" + models.name +
+                      "\": expected a name without version; the store numbers "
+                      "the versions of a name itself");
+  }
   ModelSet saved = models;
   if (saved.created_ns == 0) {
     saved.created_ns = UtcNow();
@@ -191,6 +198,8 @@ ModelSet ModelStore::Save(const ModelSet& models, Activation activation,
       database_.QueryInt64(sql::newest_version, saved.name).value_or(0) + 1);
   const bool activate = activation == Activation::kAlways ||
                         !database_.QueryInt64(sql::active_version, saved.name);
+  // The version that was active goes first: a unique index admits one active
+  // version of a name.
   if (activate) {
     database_.Run(sql::deactivate, saved.name);
   }
@@ -221,7 +230,8 @@ ModelSet ModelStore::Load(const ModelReference& reference) {
   const std::vector<std::byte> bytes = row.Blob(3);
   ModelSet models = DecodeModelSet(bytes, where);
   models.version = row.Int(1);
-  models.content_hash = ContentHash(models);
+  // The CRC-32 finds damaged bytes. Hash and name also find intact bytes that
+  // belong to another row.
   if (HashHex(models.content_hash) != row.Text(2) ||
       models.name != row.Text(0)) {
     throw DataError(where + " is damaged: its content hash differs");
@@ -242,6 +252,10 @@ std::vector<ModelSummary> ModelStore::List() {
 
 ModelSummary ModelStore::Summary(const ModelReference& reference) {
   const Snapshot snapshot(database_);
+  return ReadSummaryOf(reference);
+}
+
+ModelSummary ModelStore::ReadSummaryOf(const ModelReference& reference) {
   Statement row = database_.Prepare(std::string(sql::summaries) +
                                     " WHERE m.model_set_id = ?");
   row.Bind(RequireId(reference)).Step();

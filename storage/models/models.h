@@ -270,6 +270,8 @@ class ModelStore {
  private:
   std::int64_t RequireId(const ModelReference& reference);
   void BumpGeneration();
+  /// Call within a transaction or a snapshot.
+  ModelSummary ReadSummaryOf(const ModelReference& reference);
   ValveEntry RequireEntry(std::string_view pattern);
   /// The entry of `pattern`, or a new one with the model set's requirements.
   ValveEntry EntryOrNew(std::string_view pattern,

@@ -56,6 +56,7 @@ constexpr std::array<std::string_view, 3> kStateNames = {"none", "provisional",
 constexpr std::array<std::string_view, 3> kKindNames = {"replaced", "repacked",
                                                         "recalibrated"};
 
+// Control characters are left out instead of escaped; UTF-8 stays as it is.
 std::string JsonText(std::string_view text) {
   std::string quoted = "\"";
   for (const char c : text) {
@@ -71,6 +72,8 @@ std::string JsonNumber(double value) {
   if (!std::isfinite(value)) {
     return "null";
   }
+  // to_chars gives the shortest digits that read back as the same double,
+  // whatever the locale.
   std::array<char, 32> digits{};
   const auto end =
       std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
@@ -142,17 +145,17 @@ std::vector<ValveEntry> ModelStore::Valves() {
 }
 
 void ModelStore::PutValve(const ValveEntry& entry) {
-  if (entry.pattern.empty() || !(entry.period_s > 0.0)) {
-    throw ConfigError("valve \"" + entry.pattern +
-                      "\": an id or glob and a positive sample period are "
-                      "needed");
-  }
   Transaction transaction(database_);
   StoreEntry(entry);
   transaction.Commit();
 }
 
 void ModelStore::StoreEntry(const ValveEntry& entry) {
+  if (entry.pattern.empty() || !(entry.period_s > 0.0)) {
+    throw ConfigError("valve \"" + entry.pattern +
+                      "\": an id or glob and a positive sample period are "
+                      "needed");
+  }
   if (entry.model_set) {
     RequireId(*entry.model_set);
   }
@@ -192,7 +195,7 @@ ValveEntry ModelStore::EntryOrNew(
   ValveEntry entry;
   entry.pattern = std::string(pattern);
   if (reference) {
-    const ModelSummary summary = Summary(*reference);
+    const ModelSummary summary = ReadSummaryOf(*reference);
     entry.flow_unit = summary.flow_unit;
     entry.period_s = summary.period_s;
   }
@@ -201,14 +204,19 @@ ValveEntry ModelStore::EntryOrNew(
 
 void ModelStore::AssignModelSet(
     std::string_view pattern, const std::optional<ModelReference>& reference) {
+  Transaction transaction(database_);
   ValveEntry entry = EntryOrNew(pattern, reference);
   if (entry.model_set != reference) {
     entry.baseline_epoch.reset();
   }
   entry.model_set = reference;
-  PutValve(entry);
+  StoreEntry(entry);
+  transaction.Commit();
 }
 
+// Entries match in the order of valve_entry_id, which an entry keeps when it is
+// replaced. The equality beside GLOB is for ids with brackets: as a glob,
+// "V[1]" matches "V1" but not itself.
 std::optional<ValveEntry> ModelStore::FindValve(std::string_view valve_id) {
   Statement row =
       database_.Prepare(Select("WHERE pattern = ?1 OR ?1 GLOB pattern"));
@@ -269,6 +277,7 @@ std::optional<ModelReference> ModelStore::TakeValve(
   const bool same =
       assigned && ours &&
       other.Summary(*assigned).content_hash == Summary(*ours).content_hash;
+  // The valve has this set here already, e.g. by an entry with a glob.
   if (same && !of_its_own) {
     return ours;
   }
@@ -276,6 +285,7 @@ std::optional<ModelReference> ModelStore::TakeValve(
     return std::nullopt;
   }
   const auto first = FindValve(valve_id);
+  // The entry of the valve would stand behind this one and never apply.
   if (!same && first && first->pattern != valve_id) {
     throw ConfigError("valve '" + valve_id + "': the entry '" + first->pattern +
                       "' in " + database_.path().string() +
@@ -286,6 +296,10 @@ std::optional<ModelReference> ModelStore::TakeValve(
   ValveEntry entry = theirs ? *theirs : other.EntryOrNew(valve_id, assigned);
   entry.pattern = valve_id;
   if (assigned) {
+    // The assignment names the version, because another version of that name
+    // may be active here. The set is stored in a transaction of its own, as
+    // transactions do not nest; if the program is stopped after that, a
+    // repeated call finds the set by its hash.
     entry.model_set = TakeModelSet(other, *assigned);
   }
   // Baselines and events are copied once, also if the call is repeated.
@@ -315,6 +329,9 @@ ChangeCounter::ChangeCounter(const std::filesystem::path& path)
       generation_(store_.Generation()) {}
 
 bool ChangeCounter::Changed() {
+  // data_version is read before the generation, here and in the constructor. A
+  // commit between the two then costs one needless look at the next call; in
+  // the other order it would never be noticed.
   const std::int64_t data_version = store_.database().DataVersion();
   if (data_version == data_version_) {
     return false;
@@ -347,6 +364,7 @@ ValveEventKind ParseValveEventKind(std::string_view name) {
 void ModelStore::SetBaseline(std::string_view pattern,
                              const BaselineRecord& record) {
   const ModelReference reference{record.model_set, record.version};
+  Transaction transaction(database_);
   ValveEntry entry = EntryOrNew(pattern, reference);
   if (record.epoch != entry.epoch) {
     throw ConfigError("baseline of " + entry.pattern + " is of epoch " +
@@ -356,7 +374,6 @@ void ModelStore::SetBaseline(std::string_view pattern,
   }
   entry.model_set = reference;
   entry.baseline_epoch = record.epoch;
-  Transaction transaction(database_);
   StoreEntry(entry);
   BaselineRecord stored = record;
   stored.created_ns = UtcNow();
@@ -381,12 +398,12 @@ std::vector<BaselineRecord> ModelStore::Baselines(std::string_view pattern) {
 
 ValveEntry ModelStore::AddValveEvent(std::string_view pattern,
                                      const ValveEvent& event) {
+  Transaction transaction(database_);
   ValveEntry entry = RequireEntry(pattern);
   // Without a baseline, the models are taken to be those of the epoch that
   // ends.
   entry.baseline_epoch = entry.baseline_epoch.value_or(entry.epoch);
   ++entry.epoch;
-  Transaction transaction(database_);
   StoreEntry(entry);
   ValveEvent stored = event;
   stored.epoch = entry.epoch;

@@ -113,6 +113,7 @@ PlantDatabase::PlantDatabase(const std::string& url, Unchecked)
     }
     Fail(PQerrorMessage(connection_.get()));
   }
+  // libpq writes notices to stderr otherwise.
   PQsetNoticeProcessor(
       connection_.get(), [](void*, const char*) {}, nullptr);
 }
@@ -152,6 +153,7 @@ PlantDatabase PlantDatabase::Init(const std::string& url) {
         "template0");
   }
   {
+    // PostgreSQL rolls back statements that define tables, too.
     PlantTransaction transaction(plant);
     std::int64_t version = 0;
     if (plant.Run(sql::is_there).Text(0, 0) == "t") {
@@ -171,6 +173,8 @@ PlantDatabase PlantDatabase::Init(const std::string& url) {
 
 PlantRows PlantDatabase::Run(std::string_view sql,
                              const Parameters& parameters) {
+  // Types are not given: PostgreSQL infers that of each parameter from where it
+  // stands, or from a cast ($1::bigint).
   std::vector<const char*> values;
   values.reserve(parameters.size());
   for (const auto& parameter : parameters) {
@@ -186,6 +190,7 @@ PlantRows PlantDatabase::Run(std::string_view sql,
 }
 
 void PlantDatabase::RunScript(std::string_view sql) {
+  // PQexecParams() would take one statement only.
   const PlantRows rows(PQexec(connection_.get(), std::string(sql).c_str()));
   if (!rows.good()) {
     Fail(PQerrorMessage(connection_.get()));
@@ -193,6 +198,7 @@ void PlantDatabase::RunScript(std::string_view sql) {
 }
 
 void PlantDatabase::Copy(const std::string& target, std::string_view bytes) {
+  // libpq takes an int for the length, and its buffer grows to hold a piece.
   constexpr std::size_t kPiece = 1 << 20;
   PGconn* c = connection_.get();
   RunScript("COPY " + target + " FROM STDIN (FORMAT binary)");
@@ -206,6 +212,8 @@ void PlantDatabase::Copy(const std::string& target, std::string_view bytes) {
   if (PQputCopyEnd(c, nullptr) != 1) {
     Fail(PQerrorMessage(c));
   }
+  // The connection takes no other command before all results are read, and its
+  // message is that of the last one: the reason is kept before.
   const bool good = PlantRows(PQgetResult(c)).good();
   const std::string reason = good ? "" : PQerrorMessage(c);
   while (PGresult* rest = PQgetResult(c)) {  // To its end, which is null.
@@ -271,6 +279,8 @@ PlantTransaction::~PlantTransaction() {
 }
 
 void PlantTransaction::Commit() {
+  // Of a transaction with a failed statement, COMMIT rolls back and reports
+  // success. The failed statement has thrown before it gets here.
   plant_.Run("COMMIT");
   open_ = false;
 }

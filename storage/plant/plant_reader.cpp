@@ -85,7 +85,9 @@ std::string Replaced(std::string text, std::string_view what,
   return text;
 }
 
-// The regular expression of a glob: * ? [...], all else as it is.
+// The regular expression of a glob: * ? [...], all else as it is. A backslash
+// makes a letter or digit special in PostgreSQL (\d, \m), and anything else
+// plain.
 std::string RegexOf(const std::string& glob) {
   std::string regex = "^";
   bool in_set = false;
@@ -123,10 +125,15 @@ PlantReader::PlantReader(const std::string& url, std::string monitor)
 // Runs `sql` with its {episodes}, the condition of the filter.
 PlantRows PlantReader::Query(std::string_view sql,
                              const EpisodeFilter& filter) {
+  // The condition is that of SQLite, with what the two write differently
+  // replaced in its text. No value is in that text: all of them are parameters.
   const EpisodeCondition condition = ConditionOf(filter);
   // The index of what is open goes by end_reason, the column of the view.
   const std::string open =
       Replaced(condition.sql, "e.ended_ns IS NULL", "e.end_reason IS NULL");
+  // The indices are on utc(), in whole milliseconds, hence <=; the condition
+  // has the exact times. PostgreSQL refuses a parameter whose type it cannot
+  // tell, so each one has to occur.
   const std::string episodes =
       Replaced(Replaced(open, "GLOB", "~"), "?", "$") +
       " AND utc(e.detected_ns) >= utc($2) AND utc(e.detected_ns) <= utc($3)"
@@ -183,6 +190,7 @@ Episode PlantReader::Show(std::string_view id) {
         (found.size() > 1 ? "' is not unique in " : "' is not in ") +
         plant_.name());
   }
+  // In the text of the statement, because it was made from the number.
   return ListWhere(" AND e.episode_id = '" + EpisodeIdText(*only) + "'", {})
       .at(0);
 }
@@ -277,6 +285,8 @@ std::vector<CoverageTime> PlantReader::Coverage(const EpisodeFilter& filter) {
 
 std::vector<Alarm> PlantReader::AlarmList(std::int64_t now_ns,
                                           std::int64_t limit) {
+  // Open ones first: the limit must not leave them out for newer ones that have
+  // ended.
   EpisodeFilter filter;
   filter.limit = limit;
   filter.state = EpisodeState::kOpen;

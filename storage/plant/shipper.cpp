@@ -29,6 +29,8 @@ struct Table {
   bool has_source{false};  ///< Has columns host and monitor.
 };
 
+// In this order: Merge() of a table with replaced_by reads the stage that the
+// parent's Merge() has filled in the same transaction.
 constexpr std::array kTables = {
     Table{"episode", 1, sql::episode, nullptr, true},
     Table{"episode_fault", 2, sql::episode_fault},
@@ -98,6 +100,8 @@ std::string AsUtf8(std::string text) {
   return text;
 }
 
+// Nothing is converted on the way: what SQLite holds as an integer has to be a
+// bigint in PostgreSQL, and a real a double precision.
 void PutRow(const Statement& row, std::string& out) {
   const int columns = row.ColumnCount();
   PutBigEndian(static_cast<std::uint16_t>(columns), out);
@@ -178,6 +182,8 @@ void ShortenLog(Database& history) {
       kLongLog) {
     return;
   }
+  // Of a thing only its last change counts, because its present state is
+  // shipped. Changes that are logged meanwhile make no other one needed again.
   std::vector<std::int64_t> repeated;
   Statement rows = history.Prepare(sql::repeated_changes);
   while (rows.Step()) {
@@ -217,6 +223,8 @@ Shipper::Shipper(const DataDirectory& data, const std::string& url,
       plant_(Connect(history_, url)),
       source_(source) {
   {
+    // A temporary table is not in the file, so it needs no lock for writing: a
+    // snapshot is the transaction that Step() asks for.
     const Snapshot snapshot(history_);
     history_.Run(sql::make_batch);
   }
@@ -237,7 +245,8 @@ Shipped Shipper::Ship() {
   return shipped;
 }
 
-// Begins anew if this is a new plant, or one that lost what it had.
+// Begins anew if this is a new plant, or one that lost what it had: its time is
+// before the one noted here, although it commits first.
 Shipper::Cursor Shipper::ReadCursor(std::int64_t shipped_ns_there) {
   Statement& row = history_.Cached(sql::ship_cursor);
   if (!row.Bind(plant_.plant_id()).Step() || row.Int64(1) > shipped_ns_there) {
@@ -254,7 +263,15 @@ Shipper::Cursor Shipper::ReadCursor(std::int64_t shipped_ns_there) {
   return cursor;
 }
 
-// Fills the table batch with what comes next, and moves the cursor behind it.
+// Fills the table batch with what comes next, and moves the cursor behind it:
+//
+//     copied_ns set:  episodes detected after copied_ns, then
+//                     days and hours of valves after copied_valve, then
+//                     gaps, shelves and sessions
+//     copied_ns null: changes after number
+//
+// What changes after it was copied has a number above the cursor's, which was
+// taken when the copy began.
 // @returns whether there is something.
 bool Shipper::TakeItems(Cursor& cursor) {
   history_.Run(sql::empty_batch);
@@ -322,6 +339,8 @@ bool Shipper::ShipBatch(Shipped& shipped) {
   for (const Batch& batch : batches) {
     Merge(batch, shipped);
   }
+  // It rises with every commit, even if the clock was set back: ReadCursor()
+  // takes an earlier time in PostgreSQL for a loss.
   cursor.shipped_ns = std::max(UtcNow(), there.Int64(0, 0) + 1);
   plant_.Run(sql::set_shipped,
              {monitor_id_, std::to_string(cursor.shipped_ns)});
@@ -349,6 +368,9 @@ void Shipper::ShipModels(Shipped& shipped) {
 // A temporary table for what COPY brings, with the columns of the table that it
 // is for. Evidence stays as it is there, too: packed twice it gets no smaller.
 void Shipper::MakeStage(const Batch& batch) {
+  // LIKE copies NOT NULL, so the columns that COPY does not bring have to go. A
+  // rollback takes the stage away but not its name in staged_: after an error a
+  // Shipper is not used again.
   const Table& table = *batch.table;
   const std::string name = table.name;
   if (!staged_.insert(name).second) {
@@ -361,23 +383,35 @@ void Shipper::MakeStage(const Batch& batch) {
       (table.has_source ? ", DROP COLUMN host, DROP COLUMN monitor" : ""));
 }
 
+// COPY cannot replace rows, hence the stage, and then
+//
+//     INSERT INTO fdi.TABLE AS t (columns, monitor_id)
+//     SELECT s.columns, $1 FROM stage_TABLE s
+//     ON CONFLICT (keys, monitor_id)
+//     DO UPDATE SET (others) = ROW (EXCLUDED.others)
+//     WHERE (t.others) IS DISTINCT FROM (EXCLUDED.others)
+//
+// A row that is the same already is neither written nor counted; IS DISTINCT
+// FROM, because NULL = NULL is not true. PostgreSQL refuses a statement that
+// updates a row twice: the batch names each thing once.
 void Shipper::Merge(const Batch& batch, Shipped& shipped) {
-  if (batch.rows == 0) {
-    return;
-  }
   const Table& table = *batch.table;
   const std::string name = table.name;
-  const std::string stage = "stage_" + name;
-  std::vector<std::string> columns = batch.columns;
-  MakeStage(batch);
-  plant_.Copy(stage + " (" + Listed(columns) + ")", batch.bytes);
-  if (table.replaced_by != nullptr) {
+  // Also where nothing takes the place of what is replaced.
+  if (table.replaced_by != nullptr && staged_.contains(table.replaced_by)) {
     plant_.Run("DELETE FROM fdi." + name + " USING stage_" + table.replaced_by +
                    " p WHERE " + name +
                    ".episode_id = p.episode_id AND "
                    "monitor_id = $1::bigint",
                {monitor_id_});
   }
+  if (batch.rows == 0) {
+    return;
+  }
+  const std::string stage = "stage_" + name;
+  std::vector<std::string> columns = batch.columns;
+  MakeStage(batch);
+  plant_.Copy(stage + " (" + Listed(columns) + ")", batch.bytes);
   std::string values = Listed(columns, "s.") + ", $1::bigint";
   PlantDatabase::Parameters parameters = {monitor_id_};
   const auto keys = columns.begin() + table.keys;

@@ -52,6 +52,13 @@ std::int64_t Unzigzag(std::uint64_t value) {
 
 /// Maps doubles to integers in the same order; −0 is one below +0.
 std::int64_t Ordered(double value) {
+  // A double is a sign and a magnitude m. Read as an integer, its bits are m if
+  // it is positive and min + m if it is negative; these become m and
+  //
+  //     −1 − m = min − ((min + m) + 1)   (modulo 2⁶⁴),
+  //
+  // so that neighbouring doubles have neighbouring integers and a difference
+  // counts units in the last place. Infinities and NaN need no exception.
   const auto bits = std::bit_cast<std::int64_t>(value);
   return bits < 0 ? WrapSubtract(std::numeric_limits<std::int64_t>::min(),
                                  WrapAdd(bits, 1))
@@ -113,6 +120,8 @@ bool StillFits(const ValuePredictor& hint, std::span<const double> values) {
 
 /// Greatest common divisor of two lengths with the given `tolerance`.
 double CommonStep(double a, double b, double tolerance) {
+  // Euclid's algorithm. Rounding can leave almost b, instead of 0, as the rest
+  // of a multiple of b.
   while (b > tolerance) {
     double rest = std::fmod(a, b);
     if (b - rest < tolerance) {
@@ -128,6 +137,8 @@ double CommonStep(double a, double b, double tolerance) {
 double GridStep(const std::vector<double>& sorted) {
   const double largest =
       std::max(std::abs(sorted.front()), std::abs(sorted.back()));
+  // Rounding moves a reading by some 1e-16 of its magnitude, far less than the
+  // tolerance; smaller gaps are between equal readings.
   const double tolerance = largest * 1e-12;
   std::vector<double> gaps;
   for (std::size_t i = 1; i < sorted.size(); ++i) {
@@ -143,6 +154,8 @@ double GridStep(const std::vector<double>& sorted) {
   for (std::size_t i = 1; i < std::min<std::size_t>(gaps.size(), 16); ++i) {
     step = CommonStep(gaps[i], step, tolerance);
   }
+  // For readings that are not on a grid, the common divisor shrinks until it is
+  // of the order of the tolerance.
   return step > 16.0 * tolerance ? step : 0.0;
 }
 
@@ -153,6 +166,10 @@ std::optional<ValuePredictor> BestGrid(std::span<const double> values,
   if (count == 0.0 || !(std::abs(count) < kMaxExact)) {
     return std::nullopt;
   }
+  // `step` has the rounding error of a difference of two readings. Measured
+  // over `count` steps, that error is divided by `count`. What remains is the
+  // rounding of q, which grows with n in a + q·n: so the two neighbours of q on
+  // either side are tried, too.
   double q = (far - origin) / count;
   q = std::nextafter(std::nextafter(q, 0.0), 0.0);
   std::optional<ValuePredictor> best;
@@ -179,6 +196,8 @@ std::optional<ValuePredictor> FindGrid(std::span<const double> values) {
       sorted.push_back(value);
     }
   }
+  // Fits() tolerates 1/16 of misfits: where more than that is left out, there
+  // is nothing to search for.
   if (sorted.size() < 8 || sorted.size() * 16 < values.size() * 15) {
     return std::nullopt;
   }
@@ -190,6 +209,8 @@ std::optional<ValuePredictor> FindGrid(std::span<const double> values) {
   const double low = sorted.front();
   const double high = sorted.back();
   const double far = std::abs(low) > std::abs(high) ? low : high;
+  // The grid may pass through zero, or only through the lowest reading, as that
+  // of a converter whose span begins elsewhere.
   const auto from_zero = BestGrid(values, 0.0, far, step);
   const auto from_low = BestGrid(values, low, high, step);
   if (from_zero && from_low) {
@@ -223,6 +244,8 @@ Residuals ResidualsOf(std::span<const std::int64_t> x, int order) {
   result.order = order;
   result.codes.reserve(x.size());
   if (order == 0) {
+    // The median has the smallest sum of distances and, unlike the mean, is not
+    // moved by a bad reading.
     std::vector<std::int64_t> sorted(x.begin(), x.end());
     const auto middle =
         sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
@@ -246,6 +269,9 @@ Residuals ResidualsOf(std::span<const std::int64_t> x, int order) {
 
 Residuals BestResiduals(std::span<const std::int64_t> x) {
   Residuals best = ResidualsOf(x, 0);
+  // The bit widths stand for the size after deflate, which is not known here
+  // because all columns of a chunk are deflated together. Order k needs more
+  // than k values; ReadIntegers() refuses anything else.
   for (int order = 1; order <= 2; ++order) {
     if (x.size() > static_cast<std::size_t>(order)) {
       Residuals other = ResidualsOf(x, order);
@@ -280,6 +306,11 @@ ValuePredictor ReadPredictor(ByteReader& reader, std::uint8_t kind) {
 
 double ValuePredictor::operator()(std::int64_t n) const {
   const auto x = static_cast<double>(n);
+  // n and 10^d are exact doubles, so the quotient is rounded once: it is the
+  // double nearest to the decimal number, the same that a parser makes of its
+  // text, and needs no correction. A product with 10^-d would be rounded twice.
+  // The grid needs -ffp-contract=off (cmake/FdiTargets.cmake): a fused
+  // multiply-add rounds once instead of twice and would change bits.
   return kind == kGrid ? origin + step * x
                        : x / kPowers[std::size_t{kind} - kDecimal];
 }
@@ -306,6 +337,7 @@ std::optional<ValuePredictor> FindPredictor(
   if (hint && StillFits(*hint, values)) {
     return hint;
   }
+  // The fewest decimals that fit give the smallest n.
   for (int d = 0; d <= ValuePredictor::kMaxDecimals; ++d) {
     const ValuePredictor decimal{
         static_cast<std::uint8_t>(ValuePredictor::kDecimal + d), 0.0, 1.0};
@@ -326,6 +358,8 @@ void WriteIntegers(ByteWriter& writer, std::span<const std::int64_t> values) {
   const Residuals residuals = BestResiduals(values);
   const std::uint64_t largest =
       *std::max_element(residuals.codes.begin(), residuals.codes.end());
+  // A straight line, such as a sequence number without losses, has second
+  // differences of 0: its width is 0 and it has no plane.
   const auto width = static_cast<int>((std::bit_width(largest) + 7) / 8);
   writer.Put(static_cast<std::uint8_t>(residuals.order + 1));
   for (const std::int64_t seed : residuals.seeds) {
@@ -349,6 +383,7 @@ std::vector<std::int64_t> ReadIntegers(ByteReader& reader, std::size_t count) {
     reader.Refuse("no column of integers is of form " + std::to_string(form));
   }
   std::array<std::int64_t, 2> seeds{};
+  // Order 0 has a seed, too: the median.
   for (std::size_t i = 0; i < std::max<std::size_t>(order, 1); ++i) {
     seeds[i] = reader.Get<std::int64_t>();
   }
@@ -382,6 +417,8 @@ void WriteDoubles(ByteWriter& writer, std::span<const double> values,
                   std::optional<ValuePredictor>* hint) {
   std::vector<std::int64_t> numbers(values.size());
   std::optional<ValuePredictor> predictor;
+  // Equal bits become a constant, whatever they are, and tell nothing about the
+  // next column: the hint stays.
   if (!AllEqual(values)) {
     predictor = FindPredictor(values, hint != nullptr ? *hint : std::nullopt);
     if (hint != nullptr) {
@@ -427,6 +464,7 @@ std::vector<double> ReadDoubles(ByteReader& reader, std::size_t count) {
 }
 
 std::uint32_t Crc32(std::span<const std::byte> bytes) {
+  // The length of crc32() has 32 bits only; that of crc32_z() is a size_t.
   return static_cast<std::uint32_t>(
       crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }

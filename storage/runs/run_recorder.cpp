@@ -15,6 +15,8 @@ namespace {
 // Marks the runs of crashed recorders as interrupted and compacts their tails.
 void Recover(Database& database, const RecorderLiveness& liveness,
              std::size_t chunk_samples) {
+  // Ids are collected before their rows are changed: SQLite does not define
+  // what a query returns from a table that is modified meanwhile.
   std::vector<std::int64_t> dead;
   Statement recorders = database.Prepare("SELECT recorder_id FROM recorder");
   while (recorders.Step()) {
@@ -30,6 +32,7 @@ void Recover(Database& database, const RecorderLiveness& liveness,
       left.emplace_back(runs.Int64(0), runs.Int64(1));
     }
     for (const auto& [run_id, samples] : left) {
+      // The tail holds the last samples of a run.
       const std::vector<StoredSample> tail = TakeTail(database, run_id);
       InsertChunks(database, run_id,
                    samples - static_cast<std::int64_t>(tail.size()), tail,
@@ -54,6 +57,9 @@ RunRecorder::RunRecorder(const std::filesystem::path& path,
   Recover(database_, liveness_, chunk_samples_);
   database_.Run(sql::insert_recorder, getpid(), UtcNow());
   recorder_id_ = database_.LastInsertRowid();
+  // The id is locked before the commit makes it visible, so nobody takes this
+  // recorder for dead. Ids are never given twice (AUTOINCREMENT), so a locked
+  // byte stands for one recorder.
   liveness_.Claim(recorder_id_);
   transaction.Commit();
 }
@@ -107,6 +113,8 @@ void RunRecorder::End(Key key) {
 }
 
 void RunRecorder::Touch(Key key, ActiveRun& active) {
+  // A run is listed once, however often it changes: a commit costs the number
+  // of runs with something to store, not that of all.
   if (!std::exchange(active.dirty, true)) {
     dirty_.push_back(key);
   }
@@ -140,6 +148,8 @@ void RunRecorder::Commit() {
 }
 
 std::int64_t RunRecorder::DropPending() {
+  // The runs stay dirty: rows and ends that a failed commit did not store are
+  // still due.
   for (const Key key : dirty_) {
     runs_.at(key).pending.clear();
   }
@@ -154,6 +164,8 @@ void RunRecorder::Close() {
   // In the order of Begin(), which is then the order of the rows.
   std::sort(dirty_.begin(), dirty_.end());
   Commit();
+  // The recorder's row goes last: if the commit above fails, the next recorder
+  // finds the runs through it and marks them as interrupted.
   if (recorder_id_ != 0) {
     Transaction transaction(database_);
     database_.Run(sql::delete_recorder, recorder_id_);
@@ -205,9 +217,12 @@ void RunRecorder::Compact(ActiveRun& active, Committed& after) {
   while (rest.size() >= after.threshold ||
          (active.end_asked && !rest.empty())) {
     const auto part = rest.first(std::min(rest.size(), chunk_samples_));
+    // After a commit that fails, the hints are ahead of the file. That is
+    // harmless, as FindPredictor() uses them only if they fit.
     InsertChunk(database_, after.run_id, first, part, &active.hints);
     first += static_cast<std::int64_t>(part.size());
     rest = rest.subspan(part.size());
+    // Only the first chunk is staggered.
     after.threshold = chunk_samples_;
   }
   if (!rest.empty()) {

@@ -20,10 +20,10 @@ struct RunRecorderOptions {
 };
 
 /// Records many runs at once through one connection. Append() only buffers;
-/// Commit(), which the caller calls every second, stores what is pending of all
-/// runs in one transaction: in the tail table, and as a chunk once there are
-/// enough samples. Committed samples survive kill -9: runs whose recorder died
-/// become `interrupted` when the next one opens the file. Destroying the
+/// Commit(), which the monitor calls every 0.75 s, stores what is pending of
+/// all runs in one transaction: in the tail table, and as a chunk once there
+/// are enough samples. Committed samples survive kill -9: runs whose recorder
+/// died become `interrupted` when the next one opens the file. Destroying the
 /// recorder drops what was not committed, as a crash would; see Close(). One
 /// thread at a time. Several recorders may share a file.
 class RunRecorder {

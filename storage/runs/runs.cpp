@@ -55,6 +55,9 @@ double ParseBound(std::string_view bound, double absent,
 std::int64_t StampAt(const RunInfo& info, double t_s) {
   constexpr auto kEarliest = std::numeric_limits<std::int64_t>::min();
   constexpr auto kLatest = std::numeric_limits<std::int64_t>::max();
+  // A selector without bounds has infinite ones, and a user may write any
+  // number: converting a double beyond the range of int64 is undefined, and so
+  // is a sum that overflows.
   const double offset = std::round(t_s * 1e9);
   if (!(std::abs(offset) < 4e18)) {
     return t_s < 0.0 ? kEarliest : kLatest;
@@ -68,6 +71,7 @@ std::int64_t StampAt(const RunInfo& info, double t_s) {
 }
 
 void ApplyLabels(StoredRun& run) {
+  // Labels come in the order in which they were given, so the last one wins.
   for (const RunLabel& label : run.info.labels) {
     const std::int64_t from = StampAt(run.info, label.from_s);
     const std::int64_t to = StampAt(run.info, label.to_s);
@@ -79,6 +83,7 @@ void ApplyLabels(StoredRun& run) {
   }
 }
 
+// As a recorder does by default (RunRecorderOptions::chunk_samples).
 constexpr std::size_t kImportChunk = 600;
 
 std::optional<double> BoundOf(double t_s) {
@@ -205,6 +210,10 @@ RunInfo RunStore::Info(std::string_view selector) {
 }
 
 RunInfo RunStore::Find(const RunSelector& selector) {
+  // The ids with a given prefix are a range of their index, because 'g' sorts
+  // behind every hex digit; a second row shows that the prefix is ambiguous.
+  // For `last`, the condition ?1 <> '' only mentions the parameter: SQLite
+  // refuses a value for one that is not in the text.
   const bool last = selector.id == kLastRun;
   Statement rows = database_->Prepare(
       std::string(sql::runs) +
@@ -229,6 +238,8 @@ StoredRun RunStore::Load(std::string_view text) {
   run.info = Find(run.selector);
   const std::int64_t from = StampAt(run.info, run.selector.from_s);
   const std::int64_t to = StampAt(run.info, run.selector.to_s);
+  // A recorder moves samples from tail to chunk, so both are read in one
+  // snapshot. The tail holds the newest samples and comes last.
   for (const std::string_view table : {"chunk", "tail"}) {
     LoadTable(table, from, to, run);
   }
@@ -254,6 +265,8 @@ RunInfo RunStore::ReadRun(const Statement& row) {
   for (int i = 0; i < kIntakeCount; ++i) {
     info.intake[static_cast<std::size_t>(i)] = row.Int64(kFirstIntake + i);
   }
+  // A recorder that was killed leaves its runs as `recording`; the next
+  // recorder marks them. Until then its released lock tells.
   if (info.state == RunState::kRecording &&
       !RecorderLiveness::IsAlive(database_->path(), recorder)) {
     info.state = RunState::kInterrupted;  // Not marked in the file yet.
@@ -277,6 +290,9 @@ void RunStore::LoadTable(std::string_view table, std::int64_t from,
   const std::string where = database_->path().string() + ": run " +
                             run.info.id + ", " + name + " of sample ";
   while (rows.Step()) {
+    // Rows are selected by their earliest and latest stamp, so they may hold
+    // samples beyond the bounds. Without a stretch, `to` is the largest
+    // possible stamp and belongs to the run.
     for (StoredSample& sample : ReadBundle(rows, where)) {
       const std::int64_t stamp = sample.sample.stamp_ns;
       if (stamp >= from && (stamp < to || !run.selector.IsStretch())) {
@@ -336,6 +352,8 @@ void RunStore::Delete(std::string_view text) {
   }
   Transaction transaction(*database_);
   const RunInfo info = Find(selector);
+  // Its recorder would fail at every commit, because its rows refer to a run
+  // that is gone.
   if (info.state == RunState::kRecording) {
     throw DataError("run " + info.id +
                     " is being recorded: end its recorder first");

@@ -42,6 +42,10 @@ struct Row {
 
 /// Upper bound of the inflated size of a chunk of `count` samples.
 std::size_t MaxInflated(std::size_t count) {
+  // A column of doubles is at most two of integers behind its kind, origin and
+  // step (17 bytes). A column of integers is at most its form, two seeds and
+  // the width (18 bytes), and 8 bytes for every sample. So 64 bytes beside the
+  // samples suffice for each.
   constexpr std::size_t kColumns = Row::kIntegers + 2 * Row::kDoubles;
   return kColumns * (8 * count + 64);
 }
@@ -252,6 +256,8 @@ Chunk EncodeChunk(std::span<const StoredSample> samples, ChunkCodec codec,
 std::vector<StoredSample> DecodeChunk(const Chunk& chunk,
                                       std::string_view where) {
   const ByteReader refuser({}, where);
+  // The checksum covers the count, but only a limit keeps bytes with a forged
+  // checksum from claiming any amount of memory.
   if (chunk.count == 0 || chunk.count > kMaxChunkSamples) {
     refuser.Refuse("it counts " + std::to_string(chunk.count) + " samples");
   }

@@ -348,6 +348,24 @@ TEST(CsvTest, QuotedCellsHoldSeparatorsQuotesAndLineBreaks) {
               HasSubstr("a quote is not closed"));
 }
 
+TEST(CsvTest, AByteOrderMarkDoesNotHideTheSeparator) {
+  CsvOptions options;
+  options.required = MaskOf(Signal::kX);
+  const CsvTable table = ReadCsv(
+      ToUtf8("\xEF\xBB\xBFsep=|\nt_s|CV_pct|X_pct\n0|1,5|2\n1|1|2\n", "input"),
+      options);
+  EXPECT_EQ(table.runs.at(0).samples.size(), 2U);
+}
+
+TEST(CsvTest, WhatIsSkippedTellsNothingAboutTheDecimalSign) {
+  CsvOptions options;
+  options.required = MaskOf(Signal::kX);
+  options.map.skip = 1;
+  const CsvTable table = ReadCsv(
+      "Plant 2;1.234,5;t\nt_s;CV_pct;X_pct\n0;1.5;2.25\n1;1.5;2.25\n", options);
+  EXPECT_DOUBLE_EQ(table.runs.at(0).samples.at(0).sample[Signal::kX], 2.25);
+}
+
 // Of a long table in UTF-16, with an hour that clocks show twice.
 TEST(CsvTest, TagsOfALongTableAreResampledAndWhatIsFilledIsMarked) {
   CsvOptions options;

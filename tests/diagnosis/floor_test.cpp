@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/valve_engine.h"
 #include "tests/diagnosis/linear_plant.h"
@@ -31,6 +32,19 @@ ModelSet FlooredPlant() {
   floor.flow_high = 60.0;
   AddFindings(models);
   return models;
+}
+
+// The bits of the findings are counted from the last fault.
+TEST(FloorTest, ASetHasAllItsFindingsOnce) {
+  ModelSet models = FlooredPlant();
+  EXPECT_NO_THROW(Validate(models));
+  const int last = models.faults.back();
+  models.faults.back() = *(models.faults.end() - 2);
+  EXPECT_THROW(Validate(models), DataError);
+  models.faults.pop_back();
+  EXPECT_THROW(Validate(models), DataError);
+  models.faults.push_back(last);
+  EXPECT_NO_THROW(Validate(models));
 }
 
 struct Valve {

@@ -55,6 +55,13 @@ TEST_F(QosTest, IncompatibleQosIsLoggedWithBothSides) {
   EXPECT_EQ(subscriber.status().matched, 0);
 }
 
+TEST_F(QosTest, AFileWithoutAnElementIsRefused) {
+  std::ofstream(path_) << "<?xml version=\"1.0\"?>\n<!-- nothing yet -->\n";
+  DdsOptions options = domain_.Options();
+  options.qos_file = path_;
+  EXPECT_THROW(Participant(options, log_here_.Sink()), ConfigError);
+}
+
 // The library's default would be ten valves again.
 TEST_F(QosTest, AFileAboutReliabilityLeavesTheLimitsAlone) {
   Participant here(domain_.Options(), log_here_.Sink());

@@ -59,6 +59,10 @@ TEST(RequestHeadTest, TheHeaderOfAProxyIsPassedOnIfItIsThereOnce) {
 
   ASSERT_TRUE(twice);
   EXPECT_EQ(twice->status, 400);
+  EXPECT_TRUE(
+      ParseRequestHead("GET / HTTP/1.1\r\nx-user:\r\nX-User: root\r\n"
+                       "\r\n",
+                       kBody, head, "X-User"));
 }
 
 TEST(RequestHeadTest, APathHasOneForm) {
@@ -106,8 +110,9 @@ TEST(RequestHeadTest, WhatIsNotHttpIsRefused) {
     EXPECT_EQ(StatusOf(std::string(line) + "\r\nHost: a\r\n\r\n"), 400) << line;
   }
   EXPECT_EQ(StatusOf("DELETE / HTTP/1.1\r\n\r\n"), 405);
-  for (const char* header : {"no colon", ": a", "a b: c", " a: folded",
-                             "a: \x01", "Host: a\r\nHost: b"}) {
+  for (const char* header :
+       {"no colon", ": a", "a b: c", " a: folded", "a: \x01",
+        "Host: a\r\nHost: b", "Host:\r\nHost: b"}) {
     EXPECT_EQ(StatusWith(header), 400) << header;
   }
   EXPECT_EQ(StatusOf("GET / HTTP/1.1\r\nHost: a\r\n"), 0);

@@ -230,10 +230,13 @@ TEST_F(ValveMonitorTest, ASupersededEpisodeBelongsToItsOwnSource) {
 TEST_F(ValveMonitorTest, TheEndOfTheStreamClosesTheEpisode) {
   Feed(0, 100);
   Feed(100, 120, kF7Offset);
+  Feed(PlantSample(110, kF7Offset));  // Late.
 
   EXPECT_TRUE(valve_.EndStream(kWriter, notebook_));
 
-  EXPECT_EQ(notebook_.events.back().transition.reason, EndReason::kStreamEnded);
+  const Transition& last = notebook_.events.back().transition;
+  EXPECT_EQ(last.reason, EndReason::kStreamEnded);
+  EXPECT_EQ(last.stamp_ns, PlantSample(119).stamp_ns);
   EXPECT_FALSE(valve_.episode_open());
 }
 
@@ -347,8 +350,13 @@ class ResumedNameTest : public ValveMonitorTest {
     ModelSet models = LinearModels();
     models.faults.push_back(kFirstFinding);
     models_ = std::make_shared<const ModelSet>(std::move(models));
+    Resume();
+  }
+
+  void Resume() {
     OpenEpisode episode = LeftOpen();
     episode.model_hash = models_->content_hash;
+    tracker_ = EpisodeTracker("V1", {});
     tracker_.Recover(episode);
     Engine(TransitionKind::kDetected, 0);
     Engine(TransitionKind::kIsolated, kFinding);
@@ -402,12 +410,15 @@ TEST_F(ResumedNameTest, EndsTheEpisodeIfNoneIsNamedAgain) {
 }
 
 TEST_F(ResumedNameTest, EndsTheEpisodeThatIsEndedFromOutside) {
-  Transition closed;
-  closed.kind = TransitionKind::kClosed;
-  closed.faults = kFinding;
-  tracker_.End(closed, models_, notebook_);
+  for (const FaultSet engine : {kFinding, FaultSet{0}}) {
+    Resume();
+    Transition closed;
+    closed.kind = TransitionKind::kClosed;
+    closed.faults = engine;
+    tracker_.End(closed, models_, notebook_);
+  }
 
-  EXPECT_THAT(Names(), ElementsAre(kF7));
+  EXPECT_THAT(Names(), ElementsAre(kF7, kF7));
 }
 
 TEST_F(ValveMonitorTest, ANormalMinuteAfterARestartClosesTheEpisodeUnknown) {

@@ -185,8 +185,11 @@ TEST(ValvePhysicsTest, IsReadBackAsItWasStored) {
   }
 }
 
-TEST(ValvePhysicsTest, RefusesAValueThatIsMissing) {
+TEST(ValvePhysicsTest, RefusesAValueThatIsMissingOrUnknown) {
   std::vector<PhysicalValue> values = ToValues(Physics());
+  values.push_back({"loop.unheard_of", 1.0});
+  EXPECT_THROW(PhysicsFrom(values), DataError);
+  values.pop_back();
   values.erase(values.end() - 3);
   EXPECT_THROW(PhysicsFrom(values), DataError);
 }

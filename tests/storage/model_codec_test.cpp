@@ -139,7 +139,9 @@ TEST(ModelCodecTest, FloorIsPartOfTheNewerFormatAlone) {
   for (int& fault : models.faults) {
     fault -= IsFinding(fault) ? kFirstFinding - 23 : 0;
   }
-  EXPECT_EQ(DecodeModelSet(EncodeModelSet(models), "test").faults, back.faults);
+  const ModelSet renumbered = DecodeModelSet(EncodeModelSet(models), "test");
+  EXPECT_EQ(renumbered.faults, back.faults);
+  EXPECT_EQ(renumbered.content_hash, ContentHash(models));  // As it was stored.
 }
 
 // Likewise sets of before a drift was followed.

@@ -109,6 +109,7 @@ TEST_F(ModelsTest, AnUnusableSetIsNotStored) {
   ModelSet models = RandomModelSet("a");
   models.observers[0].channels.clear();
   EXPECT_THROW(store_.Save(models), DataError);
+  EXPECT_THROW(store_.Save(RandomModelSet("a@2")), ConfigError);
   EXPECT_THAT(store_.List(), IsEmpty());
 }
 

@@ -148,6 +148,23 @@ void ExpectNamed(const std::shared_ptr<const ModelSet>& models,
   }
 }
 
+// Six records of 590 samples count beside one of 700.
+TEST(DifferenceObserversTest, ShortRecordsAreNotLeftOut) {
+  std::vector<TrainingRun> runs{HealthyRun(1, 700)};
+  for (unsigned seed = 2; seed <= 7; ++seed) {
+    runs.push_back(HealthyRun(seed, 590));
+  }
+  std::size_t samples = 0;
+  TrainDifferenceSet(
+      runs, {{19, 0.25}},
+      [&](const FaultCondition& fault, const Stretch& healthy) {
+        samples += healthy.samples.size();
+        return WithFault(fault, healthy);
+      },
+      100.0, TwoChannels());
+  EXPECT_GT(samples, 3000U);
+}
+
 TEST(DifferenceObserversTest, FaultsNeverSeenAreNamed) {
   ExpectNamed(std::make_shared<const ModelSet>(Trained()), HealthyRun);
 }

@@ -93,6 +93,14 @@ TEST(FaultSynthesizerTest, GivesBackTheSignalsThatTheValveHas) {
   }
 }
 
+TEST(FaultSynthesizerTest, StretchesThatBeginAtTheSameSampleMayDifferInLength) {
+  const FaultSynthesizer synthesize(Lublin());
+  const Stretch whole{"x", SimulateHealthy(Lublin(), 60.0, 3)};
+  const Stretch half{"x", {whole.samples.begin(), whole.samples.begin() + 30}};
+  EXPECT_EQ(synthesize({13, 0.25}, half).size(), 30U);
+  EXPECT_EQ(synthesize({13, 0.25}, whole).size(), whole.samples.size());
+}
+
 TEST(OnboardingFaultsTest, FaultsOfMissingTransmittersAreLeftOut) {
   const auto has = [](SignalMask signals, int fault) {
     const std::vector<FaultCondition> faults = OnboardingFaults(signals);

@@ -59,6 +59,13 @@ LinearModel FitLinear(std::string name, Signal output,
                     " samples of normal operation do not suffice for " +
                     std::to_string(data.x.cols()) + " regressors");
   }
+  // Of columns scaled to mean 0 and deviation 1,
+  //
+  //     a' = (XᵀX/N + 1e-6 I)⁻¹ Xᵀy/N,   a_j = a'_j/σ_j,   b = ȳ − aᵀx̄.
+  //
+  // The trace of XᵀX/N is at most n, the number of regressors, so that the
+  // ridge bounds the condition to about n 1e6 and normal equations are safe. A
+  // column that does not move is 0 and gets no slope.
   const double rows = static_cast<double>(data.x.rows());
   const Eigen::RowVectorXd mean = data.x.colwise().mean();
   Eigen::MatrixXd x = data.x.rowwise() - mean;
@@ -174,6 +181,8 @@ int Cusum::Step(double residual) {
   return up_ >= down_ ? 1 : -1;
 }
 
+// Without the upper bound of Cusum::Step(), which needs the limit that is
+// sought.
 double CusumLimit(const std::vector<std::vector<double>>& series, double rate) {
   std::vector<double> sums;
   for (const std::vector<double>& residuals : series) {
@@ -223,6 +232,7 @@ Indication BaselineDetector::Step(const Sample& sample) {
   indication.settled = ++samples_ > baseline_->options.settling_samples;
   for (std::size_t i = 0; i < tests_.size(); ++i) {
     const std::optional<double> residual = predictors_[i].Step(sample);
+    // Without a residual, the test keeps its sums and the sign that it showed.
     if (residual && indication.settled) {
       signature_[i] = tests_[i].Step(*residual);
     }
@@ -289,6 +299,7 @@ std::vector<double> FitLimits(const std::vector<LinearModel>& models,
         series.push_back(StandardResiduals(model, stretch));
       }
     }
+    // The tests share the rate: the rates of their false alarms add up at most.
     limits.push_back(CusumLimit(
         series, rate_per_sample / static_cast<double>(models.size())));
   }

@@ -30,6 +30,7 @@ enum OrderColumn : std::size_t { kOrderValve, kOrderTime, kOrderFound };
 
 std::int64_t TimeOf(const CsvRows& rows, std::size_t row) {
   const std::string& cell = rows.Cell(row, kOrderTime);
+  //     time = seconds on the axis of the records / RFC 3339
   if (cell.find_first_not_of("0123456789.") == std::string::npos) {
     return std::llround(rows.Number(row, kOrderTime) * 1e9);
   }
@@ -105,6 +106,8 @@ class Follower {
       : models_(*models), engine_(models), record_(record) {}
 
   void Take(Sample sample) {
+    // One source throughout: the engine restarts its observers for a new one,
+    // and its state shall pass from file to file.
     sample.source_id = 1;
     sample.seq = seq_++;
     const Verdict& verdict = engine_.Step(sample);
@@ -126,6 +129,8 @@ class Follower {
   bool has_samples() const { return seq_ > 0; }
 
  private:
+  // Every other transition belongs to the episode opened last: a valve has one
+  // at a time, and the engine begins without any.
   void Take(const Transition& transition) {
     if (transition.kind == TransitionKind::kDetected) {
       record_.episodes.push_back(
@@ -134,6 +139,7 @@ class Follower {
     }
     PastEpisode& episode = record_.episodes.back();
     episode.ended_ns = transition.stamp_ns;
+    // A transition without faults does not take back what was said.
     if (transition.faults != 0) {
       episode.said = FaultsIn(models_, transition.faults);
     }
@@ -187,6 +193,10 @@ int RankOf(OrderOutcome outcome) {
 
 // Whether `order` may be the answer to `episode`: it was open at some time
 // within the horizon before the order, and began after `begin_ns`.
+//
+//     begin < detected ≤ order,   order − min(ended, order) ≤ horizon
+//
+// An episode still open at the order has distance 0.
 bool Precedes(const PastEpisode& episode, const WorkOrder& order,
               std::int64_t begin_ns, std::int64_t horizon_ns) {
   return episode.detected_ns > begin_ns &&
@@ -198,6 +208,8 @@ bool Precedes(const PastEpisode& episode, const WorkOrder& order,
 JudgedOrder Judge(const WorkOrder& order, const PastRecord* record,
                   std::int64_t previous_ns, std::int64_t horizon_ns) {
   JudgedOrder judged{order, OrderOutcome::kNoData, {}, -1, 0.0, 0.0};
+  // Silence counts only if the record reaches into the time before this order
+  // that the horizon and the order before leave.
   const std::int64_t begin_ns =
       std::max(previous_ns, order.time_ns - horizon_ns);
   if (record == nullptr || record->first_ns > order.time_ns ||
@@ -211,6 +223,7 @@ JudgedOrder Judge(const WorkOrder& order, const PastRecord* record,
       continue;
     }
     const OrderOutcome outcome = OutcomeOf(order.found, episode.said);
+    // Episodes are in order of detection, so the first match gives the lead.
     if (judged.first_ns < 0) {
       judged.first_ns = episode.detected_ns;
       judged.lead_s = Seconds(order.time_ns - episode.detected_ns);
@@ -219,6 +232,7 @@ JudgedOrder Judge(const WorkOrder& order, const PastRecord* record,
                                  episode.detected_ns);
     const bool first = judged.outcome == OrderOutcome::kMissed ||
                        judged.outcome == OrderOutcome::kSilent;
+    // Of equally good answers the last one is reported, nearest to the order.
     if (first || RankOf(outcome) <= RankOf(judged.outcome)) {
       judged.outcome = outcome;
       judged.said = episode.said;
@@ -231,6 +245,8 @@ JudgedOrder Judge(const WorkOrder& order, const PastRecord* record,
 void SortEpisode(const PastEpisode& episode, const PastRecord& record,
                  const std::vector<WorkOrder>& orders, std::int64_t horizon_ns,
                  BackTest& result) {
+  // Until when an order would be known: the records end there, and an order
+  // after them shows that the list goes on.
   std::int64_t known_until_ns = record.last_ns;
   bool followed = false;
   for (const WorkOrder& order : orders) {
@@ -238,6 +254,8 @@ void SortEpisode(const PastEpisode& episode, const PastRecord& record,
       continue;
     }
     known_until_ns = std::max(known_until_ns, order.time_ns);
+    // The orders of a valve are sorted by time: the first one that follows is
+    // the answer.
     if (!followed && Precedes(episode, order, kNever, horizon_ns)) {
       followed = true;
       if (order.found != 0) {
@@ -293,6 +311,8 @@ std::string SaidText(const Json& row) {
 
 // A date, or seconds if the axis of the records is not UTC.
 cli::Column TimeColumn(const char* heading, const char* key, bool utc) {
+  // An axis of seconds from 0 would have to be three years long to be taken for
+  // dates.
   constexpr double kFirstDate = 1e8;  // 1973
   return {.heading = heading,
           .key = key,
@@ -386,6 +406,7 @@ std::vector<ValveFiles> FindHistory(const std::string& pattern,
   }
   std::vector<ValveFiles> valves;
   for (auto& [name, files] : by_valve) {
+    // By date, then by name. Files without a date come before all others.
     std::sort(files.begin(), files.end(), [](const path& a, const path& b) {
       return std::pair(StartInName(a), a) < std::pair(StartInName(b), b);
     });
@@ -445,6 +466,8 @@ BackTest JudgeHistory(const std::vector<PastRecord>& records,
     const auto record = std::find_if(
         records.begin(), records.end(),
         [&](const PastRecord& r) { return r.valve == order.valve; });
+    // The orders are sorted by valve and time (ReadWorkOrders), so the one
+    // before is the neighbour.
     const bool has_previous = i > 0 && orders[i - 1].valve == order.valve;
     result.orders.push_back(
         Judge(order, record == records.end() ? nullptr : &*record,

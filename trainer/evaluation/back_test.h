@@ -72,7 +72,7 @@ struct PastRecord {
 ///
 /// @param begin_file Called with the name of a file before it is read.
 /// @throws DataError naming the file if it lacks a signal of the model set or
-///   has its flow in another unit, or begins before the end of the file before.
+///   begins before the end of the file before.
 PastRecord FollowHistory(
     const ValveFiles& files, const std::shared_ptr<const ModelSet>& models,
     const cli::CsvOptions& csv,

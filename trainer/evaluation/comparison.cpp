@@ -28,6 +28,8 @@ struct Merit {
   double (*of)(const EvaluatedRun&);
 };
 
+// Merits are compared within one run only. Their scales therefore need not
+// agree between runs, nor between a run with a fault and one without.
 double IfFaulty(const EvaluatedRun& run, double merit) {
   return run.indices.fault != 0 ? merit : kNone;
 }
@@ -39,6 +41,8 @@ double IfReached(double delay_s) {
 
 // Share of time in alarm before the fault, or alarms of a run without one.
 double FalseAlarms(const EvaluatedRun& run) {
+  // An index of −1 has no meaning for the run (docs/evaluation.md). Before a
+  // fault without LIVE samples there was no false alarm.
   return run.indices.fault != 0 ? std::max(run.indices.r_fd, 0.0)
                                 : run.indices.episodes;
 }
@@ -98,6 +102,7 @@ std::vector<ComparedMeasure> MeasuresOf(const Comparison& comparison) {
   for (const Merit& merit : kMerits) {
     std::vector<double> differences;
     for (std::size_t r = 0; r < comparison.runs_of_a.size(); ++r) {
+      // Without a truth nothing says which of two answers is the better one.
       if (comparison.runs_of_a[r].has_truth) {
         differences.push_back(merit.of(comparison.runs_of_b[r]) -
                               merit.of(comparison.runs_of_a[r]));
@@ -121,6 +126,7 @@ std::string JudgementOf(const ComparedMeasure& measure, const std::string& a,
     return "too few runs differ (" + std::to_string(test.decided()) +
            ", needed are " + std::to_string(kMinDecidedPairs) + ")";
   }
+  // p is not corrected for the number of figures (docs/learning.md, 3).
   const double p = PValue(test);
   const std::string value =
       p < 1e-4 ? " (p < 0.0001)" : " (p = " + cli::FormatNumber(p, 4) + ")";

@@ -159,6 +159,7 @@ cli::Report LeaveOneOut(const ModelSet& models, std::vector<ScoredRun> runs,
   const Detector detector = LeaveOneOutDetector(models);
   const std::vector<EvaluatedRun> scored = Evaluate(detector, runs, settings);
   std::map<int, std::vector<EvaluatedRun>> by_fault;
+  // Evaluate() keeps the order of the runs.
   for (std::size_t r = 0; r < runs.size(); ++r) {
     by_fault[FaultOf(runs[r].run)].push_back(scored[r]);
   }
@@ -200,6 +201,8 @@ SeedStudy StudySeeds(
     SeedCounts& repetition = study.repetitions.emplace_back();
     for (const EvaluatedRun& run : runs) {
       const RunIndices& indices = run.indices;
+      // An r_fd of −1 has no meaning for the run, and −1 remains if no run has
+      // one.
       study.max_r_fd = std::max(study.max_r_fd, indices.r_fd);
       if (indices.fault == 0) {
         study.fault_free_episodes += indices.episodes;
@@ -213,6 +216,8 @@ SeedStudy StudySeeds(
         ++counts->runs;
         counts->detected += indices.detected;
         counts->contained += indices.d_acc > 0.0;
+        // d_acc is 1/n for a set of n faults, so that the comparison with 1 is
+        // exact.
         counts->exact += indices.d_acc == 1.0;
       }
     }
@@ -234,6 +239,8 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
         selection.campaign,
         first + static_cast<std::uint64_t>(s) * SeedStep(count)));
   }
+  // Each task writes only its own element, which exists already, so the results
+  // need no lock and do not depend on the order in which the tasks end.
   std::vector<std::vector<EvaluatedRun>> results(
       scenarios.size(), std::vector<EvaluatedRun>(count));
   const cli::StopSignals signals;
@@ -242,6 +249,8 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
   int done = 0;
   const int total = static_cast<int>(scenarios.size() * count);
   ParallelFor(total, 0, [&](int i) {
+    // Checked before each run, because ParallelFor() waits for the runs that
+    // have begun.
     if (signals.stop_requested()) {
       throw Interrupted("interrupted");
     }

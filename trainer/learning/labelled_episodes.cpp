@@ -74,6 +74,8 @@ int FaultMeant(const storage::Episode& episode) {
     return RequireFault(*episode.label);
   }
   const std::vector<int> isolated = IsolatedIn(episode);
+  // The name may also be a finding of the floor, which is no fault to learn
+  // (0).
   if (isolated.size() != 1 || isolated.front() == 0) {
     throw Refusal(
         "label true says which fault only if exactly one was isolated, here " +
@@ -138,6 +140,8 @@ double EstimateStrength(const std::shared_ptr<const ModelSet>& models,
   const auto f = static_cast<std::size_t>(index);
   std::vector<double> strengths;
   std::vector<double> factors;
+  // A stored episode tells the strength of what was isolated only, so the
+  // engine is run again.
   Rescore(models, run, [&](const Sample& sample, const Verdict& verdict) {
     if (verdict.detected && sample.stamp_ns >= detected_ns) {
       strengths.push_back(verdict.strengths[f]);
@@ -149,6 +153,8 @@ double EstimateStrength(const std::shared_ptr<const ModelSet>& models,
   }
   const double strength = LaterMedian(strengths);
   const double factor = LaterMedian(factors);
+  // T/2 is also where the engine stops counting a fault as a possible
+  // explanation (docs/method.md, 16).
   const double least = 0.5 * models->decision.isolation_threshold;
   if (factor < least || strength == 0.0) {
     throw Refusal(set + " gives " + FaultName(fault) + " a factor of " +
@@ -202,6 +208,7 @@ LabelledEpisode LabelReader::Read(const storage::Episode& episode) {
   meaning.episode_id = episode.episode_id;
   meaning.valve_id = episode.valve_id;
   meaning.label = *episode.label;
+  // Events are ordered, so the label that was given last remains.
   for (const storage::HistoryEntry& event : history_.Events(episode.id)) {
     if (event.kind == "LABEL") {
       meaning.labelled_by = event.who;
@@ -209,6 +216,8 @@ LabelledEpisode LabelReader::Read(const storage::Episode& episode) {
     }
   }
   try {
+    // In this order: the strength can only be estimated from samples that suit
+    // the engine of the parent.
     meaning.fault = FaultMeant(episode);
     const EpisodeSamples all = LoadSamples(episode, SpanAround(episode));
     result.data = all.where;
@@ -234,6 +243,9 @@ LabelReader::TimeSpan LabelReader::SpanAround(const storage::Episode& episode) {
   earlier.until_ns = episode.detected_ns;
   for (const storage::Episode& other : history_.List(earlier)) {
     if (other.id != episode.id && other.detected_ns < episode.detected_ns) {
+      // An earlier episode was not normal operation, unless it is labelled so
+      // itself, and then it teaches its own samples. Of one without an end only
+      // the detection is known.
       span.from_ns = std::max(span.from_ns,
                               other.ended_ns.value_or(other.detected_ns) + 1);
     }
@@ -260,6 +272,7 @@ LabelReader::EpisodeSamples LabelReader::LoadSamples(
   row.valve_id = episode.valve_id;
   row.source_id = episode.source_id;
   row.flow_unit = episode.flow_unit;
+  // A trace does not say its period. The median step is not disturbed by gaps.
   row.period_s = PeriodOf(best.run.samples);
   if (!std::filesystem::exists(runs_)) {
     return best;
@@ -278,6 +291,7 @@ LabelReader::EpisodeSamples LabelReader::LoadSamples(
     try {
       storage::StoredRun run = store.Load(selector);
       span.Restrict(run.samples);
+      // `>=`: of equal numbers the recorded run is preferred to the trace.
       if (!run.samples.empty() &&
           run.samples.size() >= best.run.samples.size()) {
         best = {std::move(run), selector};
@@ -306,6 +320,7 @@ void LabelReader::RequireSuited(const storage::StoredRun& run) const {
                   ", " + set + " is for " +
                   std::string(FlowUnitName(parent_->flow_unit)));
   }
+  // The signals of the first sample stand for the run.
   const SignalMask missing =
       RequiredSignals(*parent_) &
       static_cast<SignalMask>(~run.samples.front().sample.present);
@@ -320,6 +335,8 @@ void LabelReader::RequireSuited(const storage::StoredRun& run) const {
 
 double LabelReader::StrengthOf(const storage::Episode& episode, int fault,
                                const storage::StoredRun& run) const {
+  // What the user says comes first, then what was estimated live for this very
+  // fault, and only then an estimate of the engine.
   for (const auto& [id, strength] : strengths_) {
     if (episode.episode_id.starts_with(id)) {
       return strength;
@@ -341,6 +358,8 @@ double LabelReader::StrengthOf(const storage::Episode& episode, int fault,
 std::vector<LabelledSample> LabelReader::TakeSamples(
     const storage::StoredRun& run, const storage::Episode& episode,
     const FaultTruth& truth) const {
+  // A false alarm teaches all samples, with those before it. A fault teaches
+  // those from the detection on only: since when it acted is not known.
   TimeSpan span;
   if (truth.fault != 0) {
     span.from_ns = episode.detected_ns;
@@ -361,6 +380,8 @@ std::vector<LabelledSample> LabelReader::TakeSamples(
     }
   }
   TrainingRun usable = ToTrainingRun(part, false);
+  // One piece has to be long enough. Training cuts at gaps and drops the
+  // settling after each, so many short pieces add up to nothing.
   std::size_t longest = 0;
   for (const Stretch& piece : SplitAtGaps(usable)) {
     longest = std::max(longest, piece.samples.size());

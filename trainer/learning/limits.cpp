@@ -31,6 +31,7 @@ template <typename Models, typename Visitor>
 void VisitLimits(Models& models, Visitor visit) {
   for (std::size_t c = 0; c < models.channels.size(); ++c) {
     auto& channel = models.channels[c];
+    // A null pointer to a window that is const if the models are.
     decltype(&channel.windows[0]) none = nullptr;
     visit(c, none, LimitKind::kLower, channel.lower_threshold);
     visit(c, none, LimitKind::kUpper, channel.upper_threshold);
@@ -43,6 +44,9 @@ void VisitLimits(Models& models, Visitor visit) {
 }
 
 // The least of the last n_d values.
+// A detection takes n_d samples in a row beyond a limit, so it is the least of
+// their shares that counts. The zeros at the start keep fewer samples from
+// counting.
 class Sustained {
  public:
   explicit Sustained(int samples)
@@ -111,6 +115,8 @@ class LimitUse {
 double LimitUse::ShareOf(std::size_t c, const WindowLimits* limits,
                          std::size_t i, double residual) const {
   const ChannelSpec& channel = models_->channels[c];
+  // A lower limit is negative, so that a share is positive on its side of zero
+  // and exceeds 1 beyond it, as for an upper one.
   if (limits == nullptr) {
     return residual / (kinds_[i] == LimitKind::kLower
                            ? channel.lower_threshold
@@ -128,6 +134,8 @@ double LimitUse::ShareOf(std::size_t c, const WindowLimits* limits,
     case LimitKind::kUpperMean:
       return window.mean() / limits->upper_mean;
     default:
+      // The limit depends on the motion of CV (docs/method.md, 14), so the
+      // share is that of the limit at this motion.
       return std::exp(window.log_rms() - UpperLogRms(*limits, command));
   }
 }
@@ -198,6 +206,7 @@ bool CoversCommands(const ModelSet& parent, const ModelSet& fitted) {
       const SignalRange& now = fitted.channels[c].windows[w].command;
       const double both = std::min(before.maximum, now.maximum) -
                           std::max(before.minimum, now.minimum);
+      // Without CV the range of a window is unbounded and asks for nothing.
       if (std::isfinite(before.maximum - before.minimum) &&
           both < kCommandsCovered * (before.maximum - before.minimum)) {
         return false;
@@ -220,9 +229,13 @@ void WidenCommands(const ModelSet& fitted, ModelSet& models) {
 
 // What a limit becomes that was passed by `share`: wider.
 double Loosened(LimitKind kind, double before, double fitted, double share) {
+  // share = e^(log rms − limit) at the peak, so limit + ln share is the log rms
+  // seen there, less what the motion of CV explains.
   if (kind == LimitKind::kDeviation) {
     return before + std::log(share) + kSeenLogRms;
   }
+  // share = seen/limit. The fitted limit holds only if it lies beyond what was
+  // seen.
   const double seen = std::abs(share * before);
   const double most = kSeenMean * seen;
   return std::copysign(
@@ -233,6 +246,8 @@ double Loosened(LimitKind kind, double before, double fitted, double share) {
 // Takes the closer one of two limits that hold for the data.
 void Tighten(LimitKind kind, const WindowLimits* fitted_window, double fitted,
              WindowLimits* window, double& limit) {
+  // The slope and the usual motion of CV belong to the limit on a deviation:
+  // the tail was fitted to what is left above their line.
   if (kind == LimitKind::kDeviation && fitted < limit) {
     window->activity_slope = fitted_window->activity_slope;
     window->log_activity = fitted_window->log_activity;
@@ -254,6 +269,9 @@ ModelSet Combine(const ModelSet& parent, const ModelSet& fitted,
   std::size_t i = 0;
   VisitLimits(models, [&](std::size_t, WindowLimits* window, LimitKind kind,
                           double& limit) {
+    // A limit that was passed becomes wider whatever the amount of data,
+    // because one alarm of a healthy valve proves it too close. Closer limits
+    // take as much evidence as the old ones rest on.
     if (peaks[i].share > 1.0) {
       limit = Loosened(kind, limit, asked[i].second, peaks[i].share);
     } else if (tighten) {
@@ -266,6 +284,13 @@ ModelSet Combine(const ModelSet& parent, const ModelSet& fitted,
 
 // A bound that leaves half of what a fault passes its limit by.
 double AdaptBound(double bound, double before, double after) {
+  // A fault whose window mean is m passes the limit L by m − L, and the bound
+  // on drift is at most half of that (FitDriftLimits). With a new limit L′,
+  //
+  //     bound′ = (m − L′)/2 = bound + (L − L′)/2,
+  //
+  // for which m need not be known. The bound on the scale is the same in
+  // logarithms.
   return std::clamp(bound + 0.5 * (before - after), 0.0,
                     kMaxDriftFactor * after);
 }
@@ -276,6 +301,8 @@ void SetDrift(const ModelSet& parent, ModelSet& models) {
     if (before.windows.empty() || before.drift == DriftLimits{}) {
       continue;
     }
+    // The drift is followed by the longest window alone
+    // (Detection::AdaptLimits).
     const WindowLimits& from = before.windows.back();
     const WindowLimits& to = models.channels[c].windows.back();
     DriftLimits& drift = models.channels[c].drift;
@@ -357,6 +384,8 @@ NewLimits SetLimits(const ModelSet& parent, const HealthyResiduals& data) {
   result.fitted =
       result.hours >= parent.threshold_hours && CoversCommands(parent, fitted);
   result.models = Combine(parent, fitted, PeaksOf(parent, data), result.fitted);
+  // All limits were now judged by these data, too, and apply at their commands
+  // as well.
   if (result.fitted) {
     WidenCommands(fitted, result.models);
     result.models.threshold_hours = fitted.threshold_hours;
@@ -373,6 +402,9 @@ void RequireHealthy(const ModelSet& first, const ModelSet& parent,
   const std::vector<Limit> now = LimitsOf(parent);
   std::size_t worst = 0;
   double most = 0.0;
+  // share · now is what was seen; it is measured by the limits of onboarding.
+  // By those of the parent, limits could be widened again and again, each time
+  // by a little.
   for (std::size_t i = 0; i < limits.size(); ++i) {
     const double times = peaks[i].share * now[i].value / limits[i].value;
     if (peaks[i].share > 1.0 && times > most) {
@@ -394,6 +426,13 @@ void RequireHealthy(const ModelSet& first, const ModelSet& parent,
       "ID@from:to), or label its episode false if the valve was healthy");
 }
 
+// On a valve that follows its normal model exactly, fault i alone makes the
+// residual
+//
+//     r = y − ŷ_0 = ŷ_i − ŷ_0.
+//
+// Whether it passes a limit is asked of both sets in one run of the bank,
+// because they have the same observers.
 std::vector<Visibility> CompareVisibility(const ModelSet& before,
                                           const ModelSet& after,
                                           const std::vector<Sample>& samples) {
@@ -425,7 +464,8 @@ std::vector<Visibility> CompareVisibility(const ModelSet& before,
       }
     }
   }
-  // By rising strength: from where on the fault is always seen.
+  // From the largest strength down, as long as the fault is seen. A smaller
+  // strength that is seen by chance below one that is not does not count.
   std::map<std::pair<int, bool>, std::vector<std::size_t>> directions;
   for (std::size_t i = 1; i < observers; ++i) {
     const Observer& observer = before.observers[i];

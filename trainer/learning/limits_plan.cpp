@@ -18,6 +18,7 @@
 namespace fdi::trainer {
 namespace {
 
+// A fault acts on the residuals before an alarm tells of it.
 constexpr std::int64_t kBeforeEpisodeNs = 10 * kNsPerMinute;
 constexpr const char* kOnboarded = "onboard";
 // Under this key the lineage of a set that was made here tells from what.
@@ -63,6 +64,8 @@ std::shared_ptr<const ModelSet> AssignedSet(const std::string& valve,
   return models;
 }
 
+// Older sets have no settings, and an empty text is no JSON. Without exceptions
+// parse() then returns a value that contains nothing.
 bool HasLearnedLimits(const storage::Lineage& lineage) {
   return nlohmann::json::parse(lineage.settings, nullptr, false)
       .contains(kLimits);
@@ -70,6 +73,7 @@ bool HasLearnedLimits(const storage::Lineage& lineage) {
 
 // The set of onboarding, whose observers those made here have.
 ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store) {
+  // Each set made here names its predecessor; the chain ends at onboarding.
   ModelSet first = models;
   storage::Lineage lineage = store.LineageOf({first.name, first.version});
   while (HasLearnedLimits(lineage) && lineage.parent) {
@@ -101,6 +105,8 @@ std::vector<TimeSpan> ExcludedSpans(
                    labels.parent->sample_period_s * 1e9);
   std::vector<TimeSpan> spans;
   for (const storage::Episode& episode : episodes) {
+    // Of an episode that is read, just its own samples are left out of the
+    // runs, which may hold them as well: they must not count twice.
     const auto read = std::ranges::find(
         labels.learnt, episode.episode_id,
         [](const LabelledEpisode& e) { return e.meaning.episode_id; });
@@ -108,6 +114,7 @@ std::vector<TimeSpan> ExcludedSpans(
       spans.push_back({read->samples.front().sample.stamp_ns,
                        read->samples.back().sample.stamp_ns});
     } else {
+      // Nothing after the detection of an open episode is known to be healthy.
       spans.push_back({episode.detected_ns - kBeforeEpisodeNs,
                        episode.ended_ns
                            ? *episode.ended_ns + clearing_ns
@@ -241,6 +248,8 @@ void SetLimitsOf(LimitsPlan& plan, const ModelSet& first,
         " s belong to episodes that are not labelled false): record them with "
         "fdi-monitor run --record, or name them with --runs or --file");
   }
+  // Before the evidence of false alarms is added: a person has called those
+  // samples healthy, so they may reach as far as they do.
   RequireHealthy(first, parent, PeaksOf(parent, plan.healthy));
   HealthyResiduals all = plan.healthy;
   for (const storage::StoredRun& run : evidence) {
@@ -301,6 +310,9 @@ LimitsPlan MakeLimitsPlan(LimitsRequest request,
     ReadEpisodes(episodes, history, directory.runs(), plan.since_ns,
                  plan.labels);
   }
+  // The episodes come before the runs, because what is read of them is left out
+  // there; the runs of the parent come before its evidence, because
+  // EvidenceOf() takes only episodes whose label still holds.
   ReadRuns(request, directory.runs(),
            RunReader(plan, ExcludedSpans(episodes, plan.labels)),
            plan.since_ns);
@@ -319,6 +331,8 @@ ModelSet StoreLimits(LimitsPlan& plan, const std::string& valve,
                      const std::string& software, std::int64_t created_ns) {
   storage::ModelStore store(directory.models(),
                             storage::Access::kOccasionalWriter);
+  // The evidence is stored before the set that names its runs: a crash in
+  // between leaves runs that no set names, not a set whose runs do not exist.
   if (!plan.labels.learnt.empty()) {
     StoreEvidence(plan.labels, directory, software);
   }
@@ -336,6 +350,9 @@ ModelSet StoreLimits(LimitsPlan& plan, const std::string& valve,
                                        {"runs", plan.runs}}}})
                          .dump();
   models = store.Save(models, storage::Activation::kAlways, lineage);
+  // AssignModelSet() alone would leave an onboarded valve without a baseline.
+  // Only limits are new, so the record of the onboarding is repeated for the
+  // new set.
   const auto entry = store.FindValve(valve);
   const std::vector<storage::BaselineRecord> baselines = store.Baselines(valve);
   if (entry && entry->pattern == valve && !baselines.empty() &&

@@ -13,6 +13,8 @@
 namespace fdi::trainer {
 namespace {
 
+// With all signals these make 126 conditions; a model set has room for 127
+// beside its normal observer (kMaxObservers).
 constexpr std::array kStrengths{0.1, 0.25, 0.5, 0.75, 1.0};
 constexpr std::array kSignedStrengths{0.1, 0.25, 0.5, 0.75};
 // Of the span: faults of transmitters are steps.
@@ -37,6 +39,8 @@ std::vector<FaultCondition> OnboardingFaults(SignalMask signals,
   };
   std::vector<FaultCondition> faults;
   for (int fault = 1; fault <= kLastFault; ++fault) {
+    // f14 shows in no basic signal. f19 is a fault of the flow transmitter, but
+    // not one of those that TransmitterOf() knows.
     if (fault == 14 || (fault == 19 && !measured(Signal::kF))) {
       continue;
     }
@@ -50,6 +54,8 @@ std::vector<FaultCondition> OnboardingFaults(SignalMask signals,
       Add(fault, kStrengths, false, faults);
     }
   }
+  // The search from the back finds the last faults first. 0.1 is the same
+  // literal in all lists, so that it compares exactly.
   while (faults.size() > most) {
     const auto weakest =
         std::find_if(faults.rbegin(), faults.rend(), [](const auto& f) {
@@ -80,6 +86,9 @@ std::vector<Sample> Run(const simulator::ValveSimulationConfig& config) {
   return samples;
 }
 
+// F F_i/F_0, which is free of what the simulated Kv is off by. Where the
+// simulated healthy flow is close to 0, the ratio would amplify any error, and
+// F + F_i − F_0 takes its place.
 double FaultyFlow(const Transmitter& transmitter, double reading,
                   double healthy, double faulty) {
   const double least = kMinRatioFlow * (transmitter.high - transmitter.low);
@@ -107,6 +116,8 @@ std::vector<Sample> FaultSynthesizer::Simulate(
     const FaultCondition& fault, const std::vector<Sample>& inputs) const {
   simulator::RecordedExcitation excitation;
   const auto last = static_cast<std::ptrdiff_t>(inputs.size()) - 1;
+  // Row k gets the command stamped `delay` rows before it, or the nearest that
+  // exists. The delay is negative where a plant stamps a command after it acts.
   for (std::ptrdiff_t k = 0; k <= last; ++k) {
     excitation.rows.push_back(
         InputsOf(inputs[static_cast<std::size_t>(k)], type_.levels));
@@ -122,6 +133,8 @@ std::vector<Sample> FaultSynthesizer::Simulate(
           ? 1e-9 * static_cast<double>(inputs[1].stamp_ns - inputs[0].stamp_ns)
           : 1.0;
   config.duration_s = config.period_s * static_cast<double>(inputs.size());
+  // Only the difference of two simulations is used; the recorded readings have
+  // noise and resolution of their own.
   config.noise = false;
   config.resolution = false;
   config.tolerance_scale = 10.0;  // X to 0.02 %, in half the time.
@@ -134,8 +147,12 @@ std::vector<Sample> FaultSynthesizer::Simulate(
   return Run(config);
 }
 
+// One simulation for all faults of a stretch. The lock is not held while it
+// runs: two threads may simulate the same stretch, with equal results, of which
+// the first is kept.
 std::vector<Sample> FaultSynthesizer::Healthy(const Stretch& stretch) const {
-  const std::pair key{stretch.run_id, stretch.samples.front().stamp_ns};
+  const std::tuple key{stretch.run_id, stretch.samples.front().stamp_ns,
+                       stretch.samples.size()};
   {
     const std::scoped_lock lock(mutex_);
     const auto found = healthy_.find(key);
@@ -155,6 +172,7 @@ std::vector<Sample> FaultSynthesizer::BehindRod(
   simulator::ApplyFault(fault.fault, fault.strength, effects);
   const simulator::InstrumentParameters& i = type_.parameters.instruments;
   for (Sample& sample : samples) {
+    // The fault of a transmitter of T1, P1 or P2 leaves the flow as it is.
     if (!TransmitterOf(fault.fault)) {
       sample.Set(Signal::kF, FlowReading(type_.parameters, effects,
                                          InputsOf(sample, type_.levels),
@@ -176,6 +194,8 @@ std::vector<Sample> FaultSynthesizer::BehindRod(
 std::vector<Sample> FaultSynthesizer::operator()(const FaultCondition& fault,
                                                  const Stretch& healthy) const {
   const std::vector<Sample> without = Healthy(healthy);
+  // A fault that leaves the rod needs no simulation of its own: X is that of
+  // the healthy valve, and the rest is algebra.
   const std::vector<Sample> with = fault.fault == 0 ? without
                                    : simulator::LeavesRod(fault.fault)
                                        ? BehindRod(fault, without)

@@ -4,7 +4,7 @@
 #include <map>
 #include <mutex>
 #include <string>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 #include "diagnosis/model_set.h"
@@ -30,8 +30,8 @@ struct ValveType {
 
 /// Faults that onboarding prepares observers for, each at several strengths, by
 /// fault. Those of transmitters that are not among `signals` are left out, and
-/// f14, which the basic signals never show. Of more than `most` the weakest are
-/// left out, of the last faults first.
+/// f14, which the basic signals never show. Of more than `most` those of 0.1
+/// are left out, of the last faults first.
 std::vector<FaultCondition> OnboardingFaults(SignalMask signals,
                                              std::size_t most = kMaxObservers -
                                                                 1);
@@ -72,8 +72,10 @@ class FaultSynthesizer {
 
   ValveType type_;
   mutable std::mutex mutex_;
-  mutable std::map<std::pair<std::string, std::int64_t>, std::vector<Sample>>
-      healthy_;  // by run and first stamp
+  // By run, first stamp and length.
+  mutable std::map<std::tuple<std::string, std::int64_t, std::size_t>,
+                   std::vector<Sample>>
+      healthy_;
 };
 
 /// A healthy valve of the type, simulated for `duration_s` in the feedwater

@@ -55,7 +55,8 @@ bool Isolated(const RunIndices& indices) {
          Contains(set, indices.fault);
 }
 
-// By rising |strength|: from where on `holds` does not fail any more.
+// `runs` ascend by |strength|. The walk begins at the strongest and ends at the
+// first that fails: what holds below a strength that fails does not count.
 template <typename Predicate>
 std::optional<double> Smallest(const std::vector<RunIndices>& runs,
                                Predicate holds) {
@@ -89,7 +90,9 @@ FaultCoverage Summarise(std::vector<RunIndices> runs) {
   return coverage;
 }
 
-// Faults with a value in `more` and none in `less`.
+// Faults with a value in `more` and none in `less`. Both directions of a fault
+// stand one after the other in a table, so that a look at the last one found
+// avoids duplicates.
 template <typename Member>
 std::vector<int> Gained(const CoverageTable& less, const CoverageTable& more,
                         Member member) {
@@ -127,6 +130,8 @@ CoverageTable AssessCoverage(std::shared_ptr<const ModelSet> models,
   table.signals = healthy.samples.front().present;
   table.seconds = models->sample_period_s *
                   static_cast<double>(stretch.samples.size() - kLeadIn);
+  // Every turn takes out the runs of one fault in one direction. The order of
+  // `faults` is kept, on which Gained() relies.
   while (!runs.empty()) {
     const auto others = std::stable_partition(
         runs.begin(), runs.end(), [first = runs.front()](const RunIndices& r) {
@@ -251,6 +256,8 @@ std::vector<TrainingRun> WithoutStops(std::vector<TrainingRun> runs) {
     return runs;
   }
   for (TrainingRun& run : runs) {
+    // A run that does not begin at a stop keeps its first minute. The predicate
+    // keeps this state outside of itself, because erase_if() copies it.
     double since_s = kAfterS;
     std::erase_if(run.samples, [&](const LabelledSample& labelled) {
       since_s = at_stop(labelled) ? 0.0 : since_s + run.period_s;
@@ -370,6 +377,9 @@ std::vector<PhysicalValue> Physics(const ValveType& type,
       records));
 }
 
+// sqrt(E[y²] − E[y]²), the error of the mean as a model; for X, y is X − CV and
+// its mean counts as an error, because the model is X = CV. Rounding may take
+// the difference of a nearly constant reading below 0.
 double NaiveError(const std::vector<TrainingRun>& runs, Signal output) {
   double sum = 0.0;
   double squares = 0.0;
@@ -413,10 +423,14 @@ TrainingOptions TrainingOf(const OnboardingOptions& options,
   training.false_alarms_per_hour = options.false_alarms_per_hour;
   training.software = options.software;
   training.created_ns = options.created_ns;
+  // Records of a plant have no truth. Those whose truth has a fault were
+  // refused by RequireHealthy().
   training.dataset.assume_normal = true;
   return training;
 }
 
+// std::function copies what it is given, and the synthesizer has a mutex: hence
+// std::ref().
 CoverageTable AssessSubset(const ValveType& type, const TrainingRun& full,
                            SignalMask signals, const OnboardingOptions& options,
                            const Progress& progress) {
@@ -445,7 +459,7 @@ simulator::RecordFit Compare(const std::vector<TrainingRun>& runs,
       records, {}, [](const auto& record) { return record.rows.size(); });
   return simulator::FitToRecord(
       type.parameters, longest.rows, kSettling, longest.rows.size(),
-      {runs.front().period_s, type.interpolated_command});
+      {runs.front().period_s, type.interpolated_command, type.command_delay});
 }
 
 double Hours(const std::vector<TrainingRun>& runs) {
@@ -458,6 +472,16 @@ double Hours(const std::vector<TrainingRun>& runs) {
 
 }  // namespace
 
+// What is refused is refused before the work that it would spoil:
+//
+//   RequireHealthy   the record as given, and once more without its stops,
+//                    which may have cut its longest stretch short
+//   CheckRecords     units and sense, before anything is fitted to them
+//   InUnit           the flow range of the type in the unit of the record,
+//                    before simulated and measured flows are compared
+//   CheckFit         the physics, before faults are simulated by it
+//
+// The hours reported are those of the record as given.
 Onboarding Onboard(const std::vector<TrainingRun>& all,
                    const OnboardingOptions& options, const Progress& progress) {
   RequireHealthy(all);
@@ -515,6 +539,9 @@ CoverageTable AssessType(const ValveType& type, SignalMask signals,
                          const Progress& progress) {
   constexpr double kSeconds = 1800.0;
   const TrainingRun full = SimulateHealthyRun(type, kSeconds);
+  // All tables rest on one simulated run and differ by the signals alone. Each
+  // gain is that of a single transmitter; what two of them together would show
+  // is not asked.
   std::vector<Signal> missing;
   for (const Signal signal :
        {Signal::kF, Signal::kP1, Signal::kP2, Signal::kT1}) {
