@@ -218,16 +218,14 @@ void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
   if (transition.kind == TransitionKind::kIsolated) {
     open_->trace_until_ns =
         transition.stamp_ns + Ns(options_.after_isolation_s);
-  }
-  if (keeps && !ends) {
-    return;
-  }
-  if (transition.kind == TransitionKind::kIsolated) {
     // What is the first name to the engine, which may have restarted, need not
     // be that of the episode.
     recorded.kind = open_->isolated ? TransitionKind::kReisolated
                                     : TransitionKind::kIsolated;
     open_->isolated = true;
+  }
+  if (keeps && !ends) {
+    return;
   }
   if (keeps) {
     recorded.faults = open_->faults;

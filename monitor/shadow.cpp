@@ -1,5 +1,6 @@
 #include "monitor/shadow.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -14,18 +15,16 @@ namespace {
 constexpr std::array<std::string_view, kShadowFitCount> kFitNames = {
     "compared", "unassigned", "same_set", "signals", "unit", "period"};
 
-// Bit n stands for fault number n, and those from 32 on for the findings of the
-// floor, independent of their places in the set.
+// Bit n stands for the n-th of kFaultsAndFindings, whatever its place in the
+// set.
 std::uint64_t NumbersOf(const ModelSet& models, FaultSet faults) {
-  constexpr int kFirstNumber = 32;  // Of a finding.
-  static_assert(kLastFault < kFirstNumber);
+  static_assert(kFaultsAndFindings.size() <= 64);
   std::uint64_t numbers = 0;
   for (std::size_t bit = 0; faults != 0; ++bit, faults >>= 1U) {
     if ((faults & 1U) != 0) {
-      const int fault = models.faults[bit];
-      const int number =
-          IsFinding(fault) ? kFirstNumber + fault - kFirstFinding : fault;
-      numbers |= std::uint64_t{1} << static_cast<unsigned>(number);
+      numbers |= std::uint64_t{1}
+                 << (std::ranges::find(kFaultsAndFindings, models.faults[bit]) -
+                     kFaultsAndFindings.begin());
     }
   }
   return numbers;

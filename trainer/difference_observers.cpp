@@ -294,18 +294,8 @@ std::vector<Stretch> Excerpt(const std::vector<Stretch>& stretches) {
                         {begin, begin + static_cast<std::ptrdiff_t>(kBlock)}});
     }
   }
-  if (blocks.size() * kBlock == kMaxSamples) {
-    return blocks;
-  }
-  if (blocks.size() * kBlock < kMaxSamples) {
-    return EvenShare(stretches, kMaxSamples);
-  }
-  std::vector<Stretch> chosen;
-  for (std::size_t i = 0; i < kMaxSamples / kBlock; ++i) {
-    chosen.push_back(
-        std::move(blocks[i * blocks.size() * kBlock / kMaxSamples]));
-  }
-  return chosen;
+  return EvenShare(blocks.size() * kBlock >= kMaxSamples ? blocks : stretches,
+                   kMaxSamples);
 }
 
 std::vector<Stretch> Synthesize(const FaultCondition& fault,

@@ -135,9 +135,10 @@ RunIndices ComputeIndices(const std::vector<Indication>& all,
   }
   const auto is_detected = [](const Indication& i) { return i.detected; };
   const auto any_set = [](const Indication& i) { return !i.isolated.empty(); };
-  const double t_from = from < count ? all[from].time_s : all.back().time_s;
+  const double t_on =
+      from < count ? all[from].time_s - kBeforeFault : all.front().time_s;
   std::size_t on = settled;
-  while (from < count && on < from && all[on].time_s < t_from - kBeforeFault) {
+  while (on < from && all[on].time_s < t_on) {
     ++on;
   }
   if (on < from) {  // before the fault, or the whole run without one

@@ -357,9 +357,6 @@ void Database::BackupTo(const std::filesystem::path& target) {
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove(target, ignored);
-    if (reader) {
-      Execute("PRAGMA query_only = ON");
-    }
     throw;
   }
 }

@@ -16,8 +16,8 @@ namespace fdi::storage {
 /// exclude version and content_hash, which are assigned when the set is stored.
 std::vector<std::byte> EncodeModelSet(const ModelSet& models);
 
-/// The inverse, bit for bit. Checks only the form; Validate() checks the
-/// content.
+/// The inverse, bit for bit; content_hash is that of what was stored. Checks
+/// only the form; Validate() checks the content.
 /// @param where the bytes come from, for the message.
 /// @throws DataError naming `where` and the reason: CRC, another format
 ///   version, a count beyond its limit, bytes missing or left over.

@@ -60,8 +60,7 @@ TEST(RequestHeadTest, TheHeaderOfAProxyIsPassedOnIfItIsThereOnce) {
   ASSERT_TRUE(twice);
   EXPECT_EQ(twice->status, 400);
   EXPECT_TRUE(
-      ParseRequestHead("GET / HTTP/1.1\r\nx-user:\r\nX-User: root\r\n"
-                       "\r\n",
+      ParseRequestHead("GET / HTTP/1.1\r\nx-user:\r\nX-User: root\r\n\r\n",
                        kBody, head, "X-User"));
 }
 
