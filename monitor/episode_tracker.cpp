@@ -268,7 +268,7 @@ bool EpisodeTracker::KeepsName(const Transition& transition,
 // once none of the known ones does. Normal samples say nothing of that.
 void EpisodeTracker::FollowUnknown(const Verdict& verdict,
                                    const ModelSet& models) {
-  if (!open_ || verdict.state != State::kDetected ||
+  if (!open_ || open_->faults != 0 || verdict.state != State::kDetected ||
       verdict.normal_factor >= models.decision.isolation_threshold) {
     return;
   }

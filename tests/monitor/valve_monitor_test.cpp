@@ -368,6 +368,8 @@ class ResumedNameTest : public ValveMonitorTest {
     verdict.stamp_ns = sample.stamp_ns;
     verdict.source_id = sample.source_id;
     verdict.detected = true;
+    verdict.state = faults == 0 ? State::kDetected : State::kIsolated;
+    verdict.fault_factors[0] = 1.0;  // f1 could explain it, too.
     verdict.transition_count = 1;
     verdict.transitions[0].kind = kind;
     verdict.transitions[0].stamp_ns = sample.stamp_ns;
@@ -416,6 +418,9 @@ TEST_F(ResumedNameTest, EndsTheEpisodeThatIsEndedFromOutside) {
     closed.kind = TransitionKind::kClosed;
     closed.faults = engine;
     tracker_.End(closed, models_, notebook_);
+    const FaultCandidate& first = notebook_.events.back().candidates.at(0);
+    EXPECT_EQ(first.fault, 7);
+    EXPECT_TRUE(first.isolated);
   }
 
   EXPECT_THAT(Names(), ElementsAre(kF7, kF7));
