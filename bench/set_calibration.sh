@@ -2,8 +2,9 @@
 # How often the final set holds the fault: 20 faults at strengths between those
 # of the observers, in the level loop of valves whose Kv, positioner gain,
 # viscous friction or supply is 15 % off the data sheet that onboarding starts
-# from. Each valve is onboarded on two healthy hours of its own. Prints a line
-# for each valve and one for all; the answers go to FDI_RUNS, if that is set.
+# from; by name also valves that differ in kind. Each valve is onboarded on two
+# healthy hours of its own. Prints a line for each valve and one for all; the
+# answers go to FDI_RUNS, if that is set.
 #
 #     bench/set_calibration.sh build/release/bin [SEED [VALVE...]]
 set -euo pipefail
@@ -21,7 +22,11 @@ declare -A valves=(
   [friction-15]=actuator.damping_n_s_m=1275
   [friction+15]=actuator.damping_n_s_m=1725
   [supply-15]=actuator.supply_pressure_gauge_pa=510e3
-  [supply+15]=actuator.supply_pressure_gauge_pa=690e3)
+  [supply+15]=actuator.supply_pressure_gauge_pa=690e3
+  [coulomb150]=actuator.coulomb_friction_n=150
+  [coulomb500]=actuator.coulomb_friction_n=500
+  [plug-40]=actuator.plug_area_m2=1.178e-3
+  [integral30]=positioner.integral_time_s=30)
 [ ${#names[@]} -gt 0 ] || names=(nominal {Kv,gain,supply,friction}{-,+}15)
 faults=(f1=.6 f2=.35 f2=.85 f3=.4 f3=.9 f4=.6 f5=.85 f6=.35 f7=.6 f10=.4
   f11=.85 f12=.65 f13=.2 f13=-.4 f15=.35 f16=.6 f17=.35 f18=.35 f19=.2 f19=-.35)

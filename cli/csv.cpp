@@ -131,6 +131,29 @@ bool IsNoReading(std::string_view cell) {
   return cell.empty() || IsOneOf(cell, kWords);
 }
 
+// Told apart by name and size:
+//
+//     t_s           elapsed seconds
+//     6e8 .. 4e9    seconds since 1970, 1989 to 2096
+//     3e4 .. 7e4    days of a spreadsheet, 1982 to 2091
+//     else          elapsed seconds
+//
+// A whole number between 3e4 and 7e4 is rather a count of seconds than a
+// midnight, and so is any number in a column whose name ends in that unit.
+TimeForm TimeFormOf(std::string_view name, double first) {
+  if (SameName(name, kTimeColumn)) {
+    return TimeForm::kElapsed;
+  }
+  if (first > 6e8 && first < 4e9) {
+    return TimeForm::kUnix;
+  }
+  const bool in_seconds =
+      name.ends_with("_s") || name.ends_with("[s]") || name.ends_with("(s)");
+  return first > 3e4 && first < 7e4 && first != std::floor(first) && !in_seconds
+             ? TimeForm::kSerial
+             : TimeForm::kElapsed;
+}
+
 // With the period T and the step d of two samples, |d - T| < T/2 is accepted:
 // the nearest instant of the grid is then unambiguous. A longer step is a gap,
 // which only `split_gaps_` allows. A step that is too short is never a gap.
@@ -587,16 +610,7 @@ FaultTruth CsvReader::Truth() const {
   return {fault, strength};
 }
 
-// A first cell that is a number may be on any of three axes, told apart by name
-// and size:
-//
-//     t_s           elapsed seconds
-//     3e4 .. 7e4    days of a spreadsheet, 1982 to 2091
-//     6e8 .. 4e9    seconds since 1970, 1989 to 2096
-//     else          elapsed seconds
-//
-// A whole number between 3e4 and 7e4 is rather a count of seconds than a
-// midnight. What rests on size alone is noted for the user.
+// What rests on a guess is noted for the user.
 void CsvReader::FindTimeForm(const std::string& cell) {
   const ColumnMap& map = options_.map;
   time_form_ = map.time_form;
@@ -608,20 +622,21 @@ void CsvReader::FindTimeForm(const std::string& cell) {
       ParseNumber(cell, map.decimal == '\0' ? '.' : map.decimal);
   if (!number) {
     time_form_ = TimeForm::kText;
-  } else if (SameName(name, kTimeColumn)) {
-    time_form_ = TimeForm::kElapsed;
-  } else if (*number > 3e4 && *number < 7e4 && *number != std::floor(*number)) {
-    time_form_ = TimeForm::kSerial;
+    return;
+  }
+  time_form_ = TimeFormOf(name, *number);
+  if (SameName(name, kTimeColumn)) {
+    return;
+  }
+  if (time_form_ == TimeForm::kSerial) {
     notes_.push_back("column " + name +
                      " taken as days of a spreadsheet (guessed; unit = "
                      "\"serial\" under [time] confirms it)");
-  } else if (*number > 6e8 && *number < 4e9) {
-    time_form_ = TimeForm::kUnix;
+  } else if (time_form_ == TimeForm::kUnix) {
     notes_.push_back("column " + name +
                      " taken as seconds since 1970 (guessed; unit = \"unix\" "
                      "under [time] confirms it)");
   } else {
-    time_form_ = TimeForm::kElapsed;
     notes_.push_back("column " + name +
                      " taken as seconds (guessed; unit = \"s\" under [time] "
                      "confirms it)");

@@ -271,6 +271,9 @@ ColumnMap WithSigns(std::string_view text, ColumnMap map,
 /// Whether a cell means "no reading": empty, NaN, Bad, #N/A, ...
 bool IsNoReading(std::string_view cell);
 
+/// The form of a time column, by its name and its first cell, a number.
+TimeForm TimeFormOf(std::string_view name, double first);
+
 /// Writes the CSV contract's columns for the signals that occur; mode if it is
 /// not AUTO throughout; fault and fault_strength if the truth is known. Numbers
 /// round-trip bit for bit. t_s counts from `start_ns`. The cell of a missing

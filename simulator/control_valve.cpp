@@ -231,7 +231,7 @@ void ValveDynamics::Derivatives(double t, const double* x,
   const double tau = parameters_.positioner.filter_time_s;
   const double signal = Signal(x);
   const ProcessInputs inputs = InputsAt(t);
-  if (motion_ == Motion::kHeld) {
+  if (motion_ == Motion::kHeld || motion_ == Motion::kStuck) {
     dx[kActuatorState] = 0.0;
     dx[kVelocityState] = 0.0;
   } else {
@@ -289,6 +289,9 @@ void ValveDynamics::Roots(double t, const double* x, double* g) const noexcept {
       g[1] = x[kActuatorState] > LowStop() ? friction + force : 1.0;
       break;
     }
+    case Motion::kStuck:
+      g[0] = g[1] = 1.0;
+      break;
   }
 }
 
@@ -474,21 +477,43 @@ bool ControlValve::Impl::AfterStep(StepResult result) {
 // forces at the new rod, and again after it, because AfterStep() may have moved
 // z onto a stop. A motion that ends at t_stop leaves `continues_` false, and
 // the next call restarts.
+//
+// Where 2 % of the friction are less than the errors of the integration, the
+// rod may start and stop again and again in no time. It then rests for a while.
 void ControlValve::Impl::Integrate(double t_stop) {
+  constexpr int kMaxStarts = 10;
+  constexpr double kNoTime = 1e-6;
+  constexpr double kRest = 0.01;
+  int starts = 0;
+  double started = time_s_;
+  double rests_until = t_stop;
   if (!continues_) {
     SelectMotion();
     integrator_.Restart(time_s_);
   }
   while (time_s_ < t_stop) {
-    const StepResult result = integrator_.StepTowards(t_stop);
+    const bool rests = dynamics_.motion() == Motion::kStuck;
+    const double target = rests ? std::min(rests_until, t_stop) : t_stop;
+    const StepResult result = integrator_.StepTowards(target);
     time_s_ = integrator_.time();
     dynamics_.Commit(x().data());
     continues_ = !AfterStep(result);
+    if (rests && result == StepResult::kStopTime) {
+      SelectMotion();
+      continues_ = false;
+    }
     if (!continues_ && time_s_ < t_stop) {
+      starts = time_s_ - started < kNoTime ? starts + 1 : 0;
+      started = time_s_;
+      if (starts == kMaxStarts && dynamics_.BreakAwayForce() > 0.0) {
+        x()[kVelocityState] = 0.0;
+        dynamics_.set_motion(Motion::kStuck);
+        rests_until = time_s_ + kRest;
+      }
       dynamics_.Commit(x().data());
       integrator_.Restart(time_s_);
     }
-    if (result == StepResult::kStopTime) {
+    if (result == StepResult::kStopTime && target == t_stop) {
       break;
     }
   }

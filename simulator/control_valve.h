@@ -22,8 +22,8 @@ enum ValveStateIndex : std::size_t {
 };
 
 /// State of motion. Without Coulomb friction the mass is free or held at a
-/// stop; with it, rising, falling or held.
-enum class Motion { kFree, kRising, kFalling, kHeld };
+/// stop; with it, rising, falling, held, or stuck: held whatever the force.
+enum class Motion { kFree, kRising, kFalling, kHeld, kStuck };
 
 /// Right-hand side of equations (13)-(17) for one state of motion and constant
 /// fault effects. Inputs are either smooth in time, or a held command with

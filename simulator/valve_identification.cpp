@@ -6,6 +6,7 @@
 #include <future>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include "diagnosis/error.h"
 #include "simulator/require_range.h"
@@ -17,6 +18,8 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+
+constexpr const char* kFriction = "actuator.coulomb_friction_n";
 
 double CommandTravel(const RecordSegment& segment) {
   double travel = 0.0;
@@ -238,6 +241,18 @@ std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
   return unknowns;
 }
 
+ValveUnknown FrictionUnknown(const ValveParameters& nominal) {
+  const auto in = [](ValveParameters& v) -> double& {
+    return v.actuator.coulomb_friction_n;
+  };
+  if (nominal.actuator.coulomb_friction_n > 0.0) {
+    return Unknown(kFriction, in, nominal, 5.0, 1e-3, 1e5);
+  }
+  const double range_n =
+      nominal.actuator.spring_rate_n_m * nominal.actuator.stroke_m;
+  return {kFriction, in, 0.0, 0.005 * range_n, 0.5 * range_n, false};
+}
+
 std::vector<ValveParameters> RelayVariants(const ValveParameters& nominal) {
   ValveParameters other = nominal;
   const bool orifice = nominal.positioner.relay == AirRelay::kOrifice;
@@ -258,7 +273,10 @@ PointBounds BoundsOf(const std::vector<ValveUnknown>& unknowns) {
     bounds.lower[i] = std::log(unknown.lower);
     bounds.upper[i] = std::log(unknown.upper);
     bounds.prior_mean[i] =
-        std::log(std::clamp(unknown.nominal, unknown.lower, unknown.upper));
+        unknown.nominal > 0.0
+            ? std::log(
+                  std::clamp(unknown.nominal, unknown.lower, unknown.upper))
+            : 0.5 * (bounds.lower[i] + bounds.upper[i]);
   }
   return bounds;
 }
@@ -380,7 +398,21 @@ struct Hypothesis {
   std::vector<ValveUnknown> unknowns;
   VectorXd point;
   RobustFit fit;
+  std::vector<FittedParameter> rejected;
 };
+
+// A parameter at a bound of its search compensates for something missing in the
+// model, and whether it lowers the loss enough then depends on the last digit
+// of the readings.
+bool Inside(const ValveUnknown& unknown, double point) {
+  return point > std::log(unknown.lower) + kAtBound &&
+         point < std::log(unknown.upper) - kAtBound;
+}
+
+bool HasFriction(const Hypothesis& hypothesis) {
+  return std::ranges::find(hypothesis.unknowns, kFriction,
+                           &ValveUnknown::name) != hypothesis.unknowns.end();
+}
 
 class Identification {
  public:
@@ -399,17 +431,22 @@ class Identification {
  private:
   std::vector<ValveUnknown> Unknowns(const ValveParameters& base,
                                      bool stated) const;
-  Hypothesis Start(const ValveParameters& variant,
-                   const RecordDrive& drive) const;
+  Hypothesis Start(const ValveParameters& variant, const RecordDrive& drive,
+                   bool friction) const;
   Hypothesis BestStart() const;
+  Hypothesis BestRelay(const Hypothesis& hypothesis) const;
+  std::optional<Hypothesis> WithFriction(const Hypothesis& without) const;
+  bool Gains(const Hypothesis& trial, const Hypothesis& hypothesis) const;
   RobustFit Fit(const Hypothesis& hypothesis,
                 const std::vector<RecordSegment>& segments, int iterations,
                 double tolerance_scale) const;
   Hypothesis Best(std::vector<Hypothesis> hypotheses) const;
-  void KeepIdentified(Hypothesis& hypothesis,
-                      std::vector<FittedParameter>& rejected) const;
-  void AddStated(Hypothesis& hypothesis,
-                 std::vector<FittedParameter>& rejected) const;
+  void KeepIdentified(Hypothesis& hypothesis) const;
+  void AddStated(Hypothesis& hypothesis) const;
+  void Refine(Hypothesis& hypothesis) const {
+    KeepIdentified(hypothesis);
+    AddStated(hypothesis);
+  }
   std::vector<RecordFit> Compare(
       const std::vector<ValveCandidate>& candidates) const;
   ValveCandidate Candidate(const Hypothesis& h, const VectorXd& point) const {
@@ -431,12 +468,17 @@ std::vector<ValveUnknown> Identification::Unknowns(const ValveParameters& base,
 }
 
 Hypothesis Identification::Start(const ValveParameters& variant,
-                                 const RecordDrive& drive) const {
+                                 const RecordDrive& drive,
+                                 bool friction) const {
   ValveParameters start = variant;
   if (options_.has_flow) {
     start.trim = RegressTrim(records_, nominal_);
   }
-  Hypothesis h{{variant, drive}, Unknowns(variant, /*stated=*/false), {}, {}};
+  Hypothesis h{
+      {variant, drive}, Unknowns(variant, /*stated=*/false), {}, {}, {}};
+  if (friction) {
+    h.unknowns.push_back(FrictionUnknown(variant));
+  }
   h.point = BoundsOf(h.unknowns).prior_mean;
   for (std::size_t i = 0; i < h.unknowns.size(); ++i) {
     const double value = h.unknowns[i].in(start);
@@ -451,19 +493,40 @@ Hypothesis Identification::Start(const ValveParameters& variant,
 // fits the first is kept: the nominal relay, a held command without delay. That
 // takes 8 + 2 fits, all combinations would take 16.
 Hypothesis Identification::BestStart() const {
+  const bool friction = nominal_.actuator.coulomb_friction_n > 0.0;
   std::vector<Hypothesis> drives;
   for (const int delay : {0, -1, 1, 2}) {
     for (const bool interpolated : {false, true}) {
       drives.push_back(
-          Start(nominal_, {options_.period_s, interpolated, delay}));
+          Start(nominal_, {options_.period_s, interpolated, delay}, friction));
     }
   }
-  const RecordDrive drive = Best(std::move(drives)).base.drive;
+  return BestRelay(Best(std::move(drives)));
+}
+
+Hypothesis Identification::BestRelay(const Hypothesis& hypothesis) const {
   std::vector<Hypothesis> relays;
   for (const ValveParameters& variant : RelayVariants(nominal_)) {
-    relays.push_back(Start(variant, drive));
+    relays.push_back(
+        Start(variant, hypothesis.base.drive, HasFriction(hypothesis)));
   }
   return Best(std::move(relays));
+}
+
+// Friction delays the rod, so that without it a later command may have been
+// found: the delay is chosen again, from this and the one before.
+std::optional<Hypothesis> Identification::WithFriction(
+    const Hypothesis& without) const {
+  const int latest = without.base.drive.command_delay;
+  std::vector<Hypothesis> rods{without};
+  for (const int delay : {latest, std::max(-1, latest - 1)}) {
+    for (const bool interpolated : {false, true}) {
+      rods.push_back(
+          Start(nominal_, {options_.period_s, interpolated, delay}, true));
+    }
+  }
+  const Hypothesis best = Best(std::move(rods));
+  return HasFriction(best) ? std::optional(BestRelay(best)) : std::nullopt;
 }
 
 RobustFit Identification::Fit(const Hypothesis& hypothesis,
@@ -534,10 +597,13 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
         Residuals(candidates[i].parameters, motions[i], segments_,
                   static_cast<std::size_t>(options_.settle_rows), false)
             .norm();
-    // A lag of the valve resembles a delay of part of a sample.
-    const bool same_delay = hypotheses[i].base.drive.command_delay ==
-                            hypotheses[best].base.drive.command_delay;
-    if (loss < (same_delay ? 0.99 : 0.9) * least) {
+    // A lag of the valve resembles a delay of part of a sample, and so does
+    // friction.
+    const bool alike =
+        hypotheses[i].base.drive.command_delay ==
+            hypotheses[best].base.drive.command_delay &&
+        HasFriction(hypotheses[i]) == HasFriction(hypotheses[best]);
+    if (loss < (alike ? 0.99 : 0.9) * least) {
       least = loss;
       best = i;
     }
@@ -547,8 +613,7 @@ Hypothesis Identification::Best(std::vector<Hypothesis> hypotheses) const {
 
 // Fits; resets parameters that the records do not determine to nominal, the
 // last of the list first, and fits the others again.
-void Identification::KeepIdentified(
-    Hypothesis& hypothesis, std::vector<FittedParameter>& rejected) const {
+void Identification::KeepIdentified(Hypothesis& hypothesis) const {
   for (bool changed = true; changed && !hypothesis.unknowns.empty();) {
     hypothesis.fit = Fit(hypothesis, segments_, kMaxIterations, kFine);
     hypothesis.point = hypothesis.fit.point;
@@ -561,7 +626,7 @@ void Identification::KeepIdentified(
       const double sd = StandardDeviations(hypothesis.fit, bounds,
                                            kept)[static_cast<Index>(i)];
       if (sd > options_.identified_sd) {
-        rejected.push_back(Rejected(hypothesis.unknowns[i], sd));
+        hypothesis.rejected.push_back(Rejected(hypothesis.unknowns[i], sd));
         const auto at = static_cast<std::ptrdiff_t>(i);
         kept.erase(kept.begin() + at);
         hypothesis.unknowns.erase(hypothesis.unknowns.begin() + at);
@@ -572,12 +637,18 @@ void Identification::KeepIdentified(
   }
 }
 
-// Tries each stated parameter in addition to those kept. One that reaches a
-// bound of its search compensates for something missing in the model, and
-// whether it lowers the loss enough then depends on the last digit of the
-// readings.
-void Identification::AddStated(Hypothesis& hypothesis,
-                               std::vector<FittedParameter>& rejected) const {
+// One scale for both losses. Each with its own, they would hardly differ,
+// because the scale follows the size of the residuals.
+bool Identification::Gains(const Hypothesis& trial,
+                           const Hypothesis& hypothesis) const {
+  const VectorXd& scale = trial.fit.scale;
+  return MeanHuberLoss(trial.fit.residuals, scale, kHuber) <
+         (1.0 - options_.least_gain) *
+             MeanHuberLoss(hypothesis.fit.residuals, scale, kHuber);
+}
+
+// Tries each stated parameter in addition to those kept.
+void Identification::AddStated(Hypothesis& hypothesis) const {
   for (const ValveUnknown& unknown :
        Unknowns(hypothesis.base.parameters, /*stated=*/true)) {
     Hypothesis trial = hypothesis;
@@ -589,21 +660,12 @@ void Identification::AddStated(Hypothesis& hypothesis,
     const double sd =
         StandardDeviations(trial.fit, BoundsOf(trial.unknowns),
                            AllOf(trial.unknowns))[trial.point.size() - 1];
-    // One scale for both losses. Each with its own, they would hardly differ,
-    // because the scale follows the size of the residuals.
-    const VectorXd& scale = trial.fit.scale;
-    const double before =
-        MeanHuberLoss(hypothesis.fit.residuals, scale, kHuber);
-    const double after = MeanHuberLoss(trial.fit.residuals, scale, kHuber);
-    const double value = trial.point[trial.point.size() - 1];
-    const PointBounds bounds = BoundsOf({unknown});
-    const bool inside = value > bounds.lower[0] + kAtBound &&
-                        value < bounds.upper[0] - kAtBound;
-    if (sd <= options_.identified_sd && inside &&
-        after < (1.0 - options_.least_gain) * before) {
+    if (sd <= options_.identified_sd &&
+        Inside(unknown, trial.point[trial.point.size() - 1]) &&
+        Gains(trial, hypothesis)) {
       hypothesis = std::move(trial);
     } else {
-      rejected.push_back(Rejected(unknown, sd));
+      hypothesis.rejected.push_back(Rejected(unknown, sd));
     }
   }
 }
@@ -650,9 +712,20 @@ std::vector<RecordFit> Identification::Compare(
 
 ValveFit Identification::Run() {
   Hypothesis best = BestStart();
-  std::vector<FittedParameter> rejected;
-  KeepIdentified(best, rejected);
-  AddStated(best, rejected);
+  std::optional<Hypothesis> rough = WithFriction(best);
+  Refine(best);
+  if (rough) {
+    // Only now, because play that has been fitted acts like friction.
+    Refine(*rough);
+    const std::vector<ValveUnknown>& fitted = rough->unknowns;
+    const auto friction =
+        std::ranges::find(fitted, kFriction, &ValveUnknown::name);
+    if (friction != fitted.end() &&
+        Inside(*friction, rough->point[friction - fitted.begin()]) &&
+        Gains(*rough, best)) {
+      best = *std::move(rough);
+    }
+  }
   const ValveCandidate candidate = Candidate(best, best.point);
   const VectorXd sd = StandardDeviations(best.fit, BoundsOf(best.unknowns),
                                          AllOf(best.unknowns));
@@ -663,7 +736,8 @@ ValveFit Identification::Run() {
     result.values.push_back({u.name, std::exp(best.point[at]), u.nominal,
                              u.lower, u.upper, sd[at], true});
   }
-  result.values.insert(result.values.end(), rejected.begin(), rejected.end());
+  result.values.insert(result.values.end(), best.rejected.begin(),
+                       best.rejected.end());
   result.parameters = candidate.parameters;
   result.interpolated_command = candidate.drive.interpolated_command;
   result.command_delay = candidate.drive.command_delay;

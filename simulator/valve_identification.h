@@ -57,6 +57,11 @@ struct ValveUnknown {
 std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
                                      bool has_flow);
 
+/// Coulomb friction; a nominal valve without has none to be fitted unless that
+/// follows the record clearly better. Then it is 0.5 to 50 % of what the spring
+/// changes over the stroke.
+ValveUnknown FrictionUnknown(const ValveParameters& nominal);
+
 /// The possible air relays: the nominal one, then the other of (16) and the
 /// benchmark's square root with the transducer's dead zone.
 std::vector<ValveParameters> RelayVariants(const ValveParameters& nominal);
@@ -128,9 +133,10 @@ struct ValveFit {
 /// and F, with a mild prior at the nominal values (robust_least_squares.h).
 /// Parameters with an uncertainty above `identified_sd` are reset to their
 /// nominal values and the others are fitted again; gain, play and supply are
-/// tried last, one after the other. Coulomb friction stays nominal: in closed
-/// loop its dead band resembles that of the play. Without flow Kv and exponent
-/// stay nominal. Deterministic, independent of the number of threads.
+/// tried last, one after the other. Then the same with Coulomb friction, which
+/// is kept if it lowers the loss by `least_gain`: its dead band resembles that
+/// of the play. Without flow Kv and exponent stay nominal. Deterministic,
+/// independent of the number of threads.
 ///
 /// @throws DataError if no record has 180 rows or a value is not finite.
 /// @throws ConfigError if `nominal`, `options` or an input is out of range.

@@ -75,9 +75,15 @@ struct Freer {
     Free(object);
   }
 };
+// OpenSSL's is a macro.
+void FreeStack(STACK_OF(X509) * stack) {
+  sk_X509_free(stack);
+}
 using Bio = std::unique_ptr<BIO, Freer<BIO_free_all>>;
 using PrivateKey = std::unique_ptr<EVP_PKEY, Freer<EVP_PKEY_free>>;
 using Certificate = std::unique_ptr<X509, Freer<X509_free>>;
+// Without the certificates themselves.
+using Certificates = std::unique_ptr<STACK_OF(X509), Freer<FreeStack>>;
 using Pkcs7 = std::unique_ptr<PKCS7, Freer<PKCS7_free>>;
 using Store = std::unique_ptr<X509_STORE, Freer<X509_STORE_free>>;
 using StoreContext =
@@ -126,14 +132,21 @@ std::string Read(const fs::path& file) {
   return text;
 }
 
-// Creates the file with its final mode, so it is never open to others.
+// Creates the file with its final mode, so it is never open to others. It gets
+// its name once it is complete, and replaces none.
 void Write(const fs::path& file, std::string_view text, mode_t mode) {
+  if (fs::exists(file)) {
+    throw DataError(file.string() + ": exists");
+  }
+  const fs::path fresh = file.string() + ".new";
+  fs::remove(fresh);  // An interrupted call may have left it.
   const int handle =
-      open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+      open(fresh.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
   const bool written = handle >= 0 &&
                        write(handle, text.data(), text.size()) ==
                            static_cast<ssize_t>(text.size()) &&
-                       fsync(handle) == 0;
+                       fsync(handle) == 0 &&
+                       rename(fresh.c_str(), file.c_str()) == 0;
   const std::string reason = std::generic_category().message(errno);
   if (handle >= 0) {
     close(handle);
@@ -278,6 +291,13 @@ Certificate MakeCertificate(EVP_PKEY* key, const std::string& name,
   AddExtension(certificate, parent, NID_key_usage,
                issuer == nullptr ? "critical,keyCertSign,digitalSignature"
                                  : "critical,digitalSignature,keyAgreement");
+  if (issuer != nullptr) {
+    // Fast DDS 2.9.1 accepts permissions that any certificate of the authority
+    // has signed, even the holder's own, unless it is for other purposes than
+    // documents (CVE-2023-24010).
+    AddExtension(certificate, parent, NID_ext_key_usage,
+                 "clientAuth,serverAuth");
+  }
   AddExtension(certificate, parent, NID_subject_key_identifier, "hash");
   AddExtension(certificate, parent, NID_authority_key_identifier, "keyid");
   Require(X509_sign(certificate, issuer_key, EVP_sha256()) > 0, "signature");
@@ -329,7 +349,8 @@ Store StoreOf(X509* authority) {
   return store;
 }
 
-// Verifies the signature. @returns the document.
+// Verifies that `authority` itself has signed, and not the holder of a key that
+// it has signed. @returns the document.
 std::string ReadSigned(const fs::path& file, X509* authority) {
   const std::string text = Read(file);
   const Bio in = MemoryOf(text);
@@ -340,10 +361,12 @@ std::string ReadSigned(const fs::path& file, X509* authority) {
     Refuse(file,
            "is no document that an authority has signed (" + Reason() + ")");
   }
-  const Store store = StoreOf(authority);
+  const Certificates signers(sk_X509_new_null());
+  Require(signers != nullptr && sk_X509_push(signers.get(), authority) == 1,
+          "verification");
   const Bio out(BIO_new(BIO_s_mem()));
-  if (PKCS7_verify(signature.get(), nullptr, store.get(), content, out.get(),
-                   PKCS7_TEXT) != 1) {
+  if (PKCS7_verify(signature.get(), signers.get(), nullptr, content, out.get(),
+                   PKCS7_TEXT | PKCS7_NOINTERN | PKCS7_NOVERIFY) != 1) {
     Refuse(file, "its signature does not hold (" + Reason() +
                      "): it was changed, or another authority has signed it. "
                      "Remove the folder of the key, and make it anew with "
@@ -541,7 +564,7 @@ std::optional<Role> ParseRole(std::string_view name) {
 
 void MakeAuthority(const fs::path& folder, int days) {
   RequireDays(days);
-  if (fs::exists(folder / kCaCertificate) || fs::exists(folder / kCaKey)) {
+  if (fs::exists(folder / kCaCertificate)) {
     throw ConfigError(folder.string() +
                       " has an authority already; keys of another one would "
                       "not know those it has made. Choose another folder");
@@ -551,15 +574,19 @@ void MakeAuthority(const fs::path& folder, int days) {
   if (error) {
     throw DataError(folder.string() + ": cannot be made: " + error.message());
   }
-  const PrivateKey key = NewKey();
+  // The certificate is written last: without it there is no authority. A key
+  // without a certificate is that of an interrupted call, which is completed.
+  // It is not replaced, because a certificate may exist elsewhere.
+  if (!fs::exists(folder / kCaKey)) {
+    Write(folder / kCaKey, Pem(NewKey().get()), 0600);
+  }
+  const PrivateKey key = ReadKey(folder / kCaKey);
   const Certificate certificate =
       MakeCertificate(key.get(), "fdi authority", NowSeconds() + days * kDay,
                       nullptr, key.get());
-  // The certificate is written last: without it there is no authority.
   fs::remove(folder / kGovernance);
   Write(folder / kGovernance,
         Sign(GovernanceXml(), certificate.get(), key.get()), 0644);
-  Write(folder / kCaKey, Pem(key.get()), 0600);
   Write(folder / kCaCertificate, Pem(certificate.get()), 0644);
 }
 

@@ -42,7 +42,8 @@ struct KeyInfo {
   std::int64_t until_ns{0};  ///< UTC; the earlier end of key and authority.
 };
 
-/// Creates the authority in `folder`, which is created as well.
+/// Creates the authority in `folder`, which is created as well, or completes
+/// the one of an interrupted call.
 /// @param days 1..36500: period of validity.
 /// @throws ConfigError if an authority exists, or `days` is out of range.
 /// @throws DataError if a file cannot be written.

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include <httplib.h>
@@ -25,6 +26,8 @@ extern char** environ;
 
 namespace fdi::monitor {
 namespace {
+
+constexpr const char* kStops = "the monitor stops";
 
 class File {
  public:
@@ -186,7 +189,7 @@ class ProgramDelivery : public EventDelivery {
       return StatusReason(Reap(pid));
     }
     Kill(pid);
-    return ready > 0 ? "the monitor stops"
+    return ready > 0 ? kStops
                      : "killed after " + std::to_string(limit_.count()) + " ms";
   }
 
@@ -231,56 +234,84 @@ std::vector<std::string> SplitWords(const std::string& text) {
   return words;
 }
 
+// @returns why the server did not accept the text, or nothing on success.
+std::optional<std::string> Post(const std::string& server,
+                                const std::string& path,
+                                const std::string& json,
+                                std::chrono::milliseconds limit) {
+  httplib::Client client(server);
+  // cpp-httplib applies each limit to one operation, so a server that sends
+  // its answer byte by byte can take longer in all.
+  client.set_connection_timeout(limit);
+  client.set_read_timeout(limit);
+  client.set_write_timeout(limit);
+  const httplib::Result answer = client.Post(path, json, "application/json");
+  if (!answer) {
+    return httplib::to_string(answer.error());
+  }
+  return answer->status / 100 == 2
+             ? std::nullopt
+             : std::optional("HTTP status " + std::to_string(answer->status));
+}
+
 class UrlDelivery : public EventDelivery {
  public:
   UrlDelivery(std::string server, std::string path,
               std::chrono::milliseconds limit)
       : server_(std::move(server)), path_(std::move(path)), limit_(limit) {}
 
+  // The request has a thread of its own, which a stop leaves behind: neither
+  // the lookup of the host's name nor cpp-httplib's connect() can be aborted.
+  // That thread uses nothing but its copies, until the process ends.
   std::optional<std::string> Deliver(const std::string& json) override {
-    httplib::Client client(server_);
-    // cpp-httplib applies each limit to one operation, so a server that sends
-    // its answer byte by byte can take longer in all.
-    client.set_connection_timeout(limit_);
-    client.set_read_timeout(limit_);
-    client.set_write_timeout(limit_);
-    {
-      const std::lock_guard lock(mutex_);
-      if (stopped_) {
-        return "the monitor stops";
+    std::unique_lock lock(request_->mutex);
+    if (request_->stopped) {
+      return kStops;
+    }
+    request_->ended = false;
+    std::thread thread([request = request_, server = server_, path = path_,
+                        limit = limit_, json] {
+      std::optional<std::string> failure;
+      try {
+        failure = Post(server, path, json, limit);
+      } catch (const std::exception& error) {
+        failure = error.what();
       }
-      client_ = &client;
+      const std::lock_guard guard(request->mutex);
+      request->failure = std::move(failure);
+      request->ended = true;
+      request->changed.notify_all();
+    });
+    request_->changed.wait(
+        lock, [this] { return request_->ended || request_->stopped; });
+    if (!request_->ended) {
+      thread.detach();
+      return kStops;
     }
-    const httplib::Result answer = client.Post(path_, json, "application/json");
-    {
-      // Interrupt() uses the pointer under the lock, so it never outlives
-      // `client`.
-      const std::lock_guard lock(mutex_);
-      client_ = nullptr;
-    }
-    if (!answer) {
-      return httplib::to_string(answer.error());
-    }
-    return answer->status / 100 == 2
-               ? std::nullopt
-               : std::optional("HTTP status " + std::to_string(answer->status));
+    lock.unlock();
+    thread.join();
+    return request_->failure;
   }
 
   void Interrupt() override {
-    const std::lock_guard lock(mutex_);
-    stopped_ = true;
-    if (client_ != nullptr) {
-      client_->stop();
-    }
+    const std::lock_guard lock(request_->mutex);
+    request_->stopped = true;
+    request_->changed.notify_all();
   }
 
  private:
+  struct Request {
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool stopped{false};
+    bool ended{false};
+    std::optional<std::string> failure;
+  };
+
   std::string server_;  // http://HOST[:PORT]
   std::string path_;
   std::chrono::milliseconds limit_;
-  std::mutex mutex_;
-  bool stopped_{false};
-  httplib::Client* client_{nullptr};  // The request in progress, or null.
+  std::shared_ptr<Request> request_{std::make_shared<Request>()};
 };
 
 }  // namespace

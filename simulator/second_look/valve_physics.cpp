@@ -47,7 +47,11 @@ std::vector<double> Bounded(std::vector<double> errors) {
   return errors;
 }
 
-Scatter ScatterOf(std::vector<double> raw) {
+// Of the readings in `rows` rows.
+Scatter ScatterOf(std::vector<double> raw, std::size_t rows) {
+  if (raw.empty()) {
+    return {};
+  }
   const std::vector<double> errors = Bounded(std::move(raw));
   // Not 0, because the correlations are divided by it.
   double squares = 1e-18;
@@ -60,6 +64,9 @@ Scatter ScatterOf(std::vector<double> raw) {
   // n/tau independent ones. The sum ends at the first small rho_k, or the noise
   // of all later ones would add up in it.
   constexpr double kUncorrelated = 0.05;
+  // The lags are counted in readings, tau in rows.
+  const double step =
+      static_cast<double>(rows) / static_cast<double>(errors.size());
   for (std::size_t lag = 1; lag < kMinStretchRows / 2; ++lag) {
     double sum = 0.0;
     for (std::size_t k = lag; k < errors.size(); ++k) {
@@ -68,10 +75,10 @@ Scatter ScatterOf(std::vector<double> raw) {
     if (sum < kUncorrelated * squares) {
       break;
     }
-    scatter.correlation_time += 2.0 * sum / squares;
+    scatter.correlation_time += step * 2.0 * sum / squares;
   }
   const std::size_t pieces =
-      std::max<std::size_t>(1, errors.size() / kSlowRows);
+      std::clamp<std::size_t>(rows / kSlowRows, 1, errors.size());
   double means = 0.0;
   for (std::size_t i = 0; i < pieces; ++i) {
     const auto at = [&](std::size_t j) {
@@ -248,8 +255,14 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
     for (std::size_t k = kSettleRows; k < rows.size(); ++k) {
       command.push_back(rows[k].input.cv_pct);
       unexplained.push_back(rows[k].flow - answers[k].flow);
-      x.push_back(rows[k].x_pct - answers[k].x_pct);
-      flow.push_back(rows[k].flow - answers[k].flow);
+      // As in the second look, which divides by the scatter: what is filled in
+      // does not count.
+      if (rows[k].x_measured) {
+        x.push_back(rows[k].x_pct - answers[k].x_pct);
+      }
+      if (rows[k].flow_measured) {
+        flow.push_back(rows[k].flow - answers[k].flow);
+      }
       level.push_back(rows[k].flow);
       p1.push_back(rows[k].input.p1_kpa);
       p2.push_back(rows[k].input.p2_kpa);
@@ -257,11 +270,11 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
     }
     loop.Add(command, unexplained, drive.command_delay);
   }
-  if (x.empty()) {
+  if (level.empty()) {
     throw DataError("healthy records: expected one of at least 180 rows");
   }
-  ValvePhysics physics{parameters, drive, ScatterOf(std::move(x)),
-                       ScatterOf(std::move(flow)), Mean(level)};
+  ValvePhysics physics{parameters, drive, ScatterOf(std::move(x), level.size()),
+                       ScatterOf(std::move(flow), level.size()), Mean(level)};
   physics.p1 = BandOf(p1, level);
   physics.p2 = BandOf(p2, level);
   physics.t1 = BandOf(t1, level);

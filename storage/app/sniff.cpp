@@ -322,10 +322,12 @@ class TimeReader {
       : map_(map), clock_(map.zone) {}
   std::optional<double> Read(const std::string& cell) {
     if (const auto number = cli::ParseNumber(cell, map_.decimal)) {
-      // Spreadsheet day numbers become seconds; the importer detects the format
-      // itself.
-      const bool serial =
-          *number > 3e4 && *number < 7e4 && *number != std::floor(*number);
+      // Spreadsheet day numbers become seconds. As in the importer, the first
+      // row decides.
+      if (form_ == cli::TimeForm::kFindOut) {
+        form_ = cli::TimeFormOf(map_.time_column, *number);
+      }
+      const bool serial = form_ == cli::TimeForm::kSerial;
       dated_ = dated_ || serial;
       return serial ? *number * 86400.0 : *number;
     }
@@ -344,6 +346,7 @@ class TimeReader {
   const cli::ColumnMap& map_;
   cli::LocalClock clock_;
   std::int64_t last_ns_{0};
+  cli::TimeForm form_{cli::TimeForm::kFindOut};
   bool dated_{false};
 };
 

@@ -131,7 +131,14 @@ Lineage ReadLineage(Database& database, std::int64_t model_set_id) {
     rows.Read(0, e.episode_id, e.valve_id, e.label, e.labelled_by,
               e.labelled_ns, fault, e.strength, e.run, e.samples);
     // Fault 0 is stored as "normal", which is not the name of a fault.
-    e.fault = ParseFault(fault).value_or(0);
+    if (fault != FaultName(0)) {
+      const std::optional<int> known = ParseFault(fault);
+      if (!known) {
+        throw DataError("training episode " + e.episode_id +
+                        ": no fault is called " + fault);
+      }
+      e.fault = *known;
+    }
   }
   return lineage;
 }

@@ -185,6 +185,7 @@ class ModelStore {
                 const Lineage& lineage = {});
 
   /// The origin of a set; empty if unknown.
+  /// @throws DataError naming a fault that this program does not know.
   Lineage LineageOf(const ModelReference& reference);
 
   /// Loads "NAME" (the active version) or "NAME@VERSION".

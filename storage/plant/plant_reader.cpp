@@ -85,21 +85,29 @@ std::string Replaced(std::string text, std::string_view what,
   return text;
 }
 
-// The regular expression of a glob: * ? [...], all else as it is. A backslash
-// makes a letter or digit special in PostgreSQL (\d, \m), and anything else
-// plain.
+// The regular expression of a glob of SQLite: * ? [...] [^...], all else as it
+// is. A backslash makes a letter or digit special in PostgreSQL (\d, \m), and
+// anything else plain, also in a set, where it is needed for \ [ ].
 std::string RegexOf(const std::string& glob) {
   std::string regex = "^";
-  bool in_set = false;
-  for (const char c : glob) {
-    if (in_set) {
-      regex += c;
-      in_set = c != ']';
-    } else if (c == '*' || c == '?') {
+  for (std::size_t at = 0; at < glob.size(); ++at) {
+    const char c = glob[at];
+    if (c == '*' || c == '?') {
       regex += c == '*' ? ".*" : ".";
     } else if (c == '[') {
-      regex += c;
-      in_set = true;
+      // A ] does not end the set that it begins.
+      const std::size_t first = at + (glob[at + 1] == '^' ? 2 : 1);
+      const std::size_t end = glob.find(']', first + 1);
+      if (end == std::string::npos) {
+        return "$.";  // A set without an end matches nothing.
+      }
+      regex += glob.substr(at, first - at);
+      for (at = first; at < end; ++at) {
+        const bool special =
+            glob[at] == '\\' || glob[at] == '[' || glob[at] == ']';
+        regex += (special ? "\\" : "") + std::string(1, glob[at]);
+      }
+      regex += ']';
     } else {
       regex += (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' ||
                         (static_cast<unsigned char>(c) & 0x80U) != 0
@@ -285,22 +293,32 @@ std::vector<CoverageTime> PlantReader::Coverage(const EpisodeFilter& filter) {
 
 std::vector<Alarm> PlantReader::AlarmList(std::int64_t now_ns,
                                           std::int64_t limit) {
+  // Both of a pair have an episode, so `limit` of them may take twice as many
+  // rows.
+  EpisodeFilter filter;
+  filter.limit = 2 * limit;
+  std::vector<Episode> episodes;
+  std::set<std::uint64_t> seen;
+  const auto by_time = [](const Episode& e) {
+    return std::tie(e.detected_ns, e.valve_id);
+  };
+  const auto add_newest = [&](std::vector<Episode> rows) {
+    std::ranges::stable_sort(rows, std::greater{}, by_time);
+    for (Episode& row : rows) {
+      if (std::ssize(episodes) < limit && seen.insert(row.id).second) {
+        episodes.push_back(std::move(row));
+      }
+    }
+  };
   // Open ones first: the limit must not leave them out for newer ones that have
   // ended.
-  EpisodeFilter filter;
-  filter.limit = limit;
   filter.state = EpisodeState::kOpen;
-  std::vector<Episode> episodes = List(filter);
-  filter.limit -= static_cast<std::int64_t>(episodes.size());
-  if (filter.limit > 0) {
+  add_newest(List(filter));
+  if (std::ssize(episodes) < limit) {
     filter.state = EpisodeState::kUnacked;
-    std::ranges::move(ListWhere(" AND e.end_reason IS NOT NULL", filter),
-                      std::back_inserter(episodes));
+    add_newest(ListWhere(" AND e.end_reason IS NOT NULL", filter));
   }
-  std::set<std::uint64_t> seen;  // The other one of a pair has it, too.
-  std::erase_if(episodes,
-                [&](const Episode& e) { return !seen.insert(e.id).second; });
-  std::ranges::stable_sort(episodes, std::greater{}, &Episode::detected_ns);
+  std::ranges::stable_sort(episodes, std::greater{}, by_time);
   return Alarms(std::move(episodes), now_ns);
 }
 

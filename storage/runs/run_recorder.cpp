@@ -71,9 +71,9 @@ RunRecorder::Key RunRecorder::Begin(const NewRun& run) {
   active.id = NewRunId();
   active.run = run;
   // Staggered, so that many valves that start together do not fill their chunks
-  // in the same commit.
+  // in the same commit. At least 1: a chunk is never empty.
   active.committed.threshold =
-      chunk_samples_ / 2 + key * 37 % (chunk_samples_ / 2 + 1);
+      (chunk_samples_ + 1) / 2 + key * 37 % (chunk_samples_ / 2 + 1);
   Touch(key, active);
   return key;
 }

@@ -77,6 +77,17 @@ TEST(CsvTest, ColumnsAreFoundByNameInAnyOrderAndCase) {
   EXPECT_FALSE(run.samples[1].truth);
 }
 
+TEST(CsvTest, NameAndSizeOfTheFirstCellTellTheFormOfTimes) {
+  EXPECT_EQ(TimeFormOf("t_s", 1.7e9), TimeForm::kElapsed);
+  EXPECT_EQ(TimeFormOf("Time", 46027.4), TimeForm::kSerial);
+  EXPECT_EQ(TimeFormOf("Time", 30000.0), TimeForm::kElapsed);
+  EXPECT_EQ(TimeFormOf("Time", 1.7e9), TimeForm::kUnix);
+  for (const char* name : {"time_s", "Time [s]", "Zeit (s)"}) {
+    EXPECT_EQ(TimeFormOf(name, 30000.5), TimeForm::kElapsed) << name;
+    EXPECT_EQ(TimeFormOf(name, 1.7e9), TimeForm::kUnix) << name;
+  }
+}
+
 TEST(CsvTest, TruthNeedsAStrengthOtherThanZero) {
   const CsvTable by_number = Read(
       "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h,fault_no,fault_strength\n"

@@ -2,9 +2,13 @@
 
 #include <fstream>
 #include <functional>
+#include <memory>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <openssl/pem.h>
+#include <openssl/pkcs7.h>
+#include <openssl/x509v3.h>
 
 #include "diagnosis/error.h"
 #include "tests/storage/temporary_directory.h"
@@ -22,6 +26,11 @@ std::int64_t NowNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::system_clock::now().time_since_epoch())
       .count();
+}
+
+std::string Slurp(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 class KeysTest : public testing::Test {
@@ -78,13 +87,9 @@ TEST_F(KeysTest, OnlyTheOwnerReadsPrivateKeys) {
 }
 
 TEST_F(KeysTest, ARenewedKeyIsAnotherOneAndLeavesNothingBehind) {
-  const auto bytes = [this] {
-    std::ifstream stream(key_ / "key.pem");
-    return std::string(std::istreambuf_iterator<char>(stream), {});
-  };
-  const std::string before = bytes();
+  const std::string before = Slurp(key_ / "key.pem");
   MakeKey(folder_, "monitor-1", Role::kMonitor, 20, true);
-  EXPECT_NE(bytes(), before);
+  EXPECT_NE(Slurp(key_ / "key.pem"), before);
   EXPECT_EQ(Refusal(key_, NowNs() + 15 * kDayNs), "");
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_)) {
     EXPECT_NE(entry.path().filename().string().front(), '.');
@@ -100,6 +105,30 @@ TEST_F(KeysTest, WhatIsThereIsNotReplacedUnasked) {
   EXPECT_THROW(MakeKey(directory_.path(), "a", Role::kReader, 10, false),
                ConfigError);
   EXPECT_EQ(Refusal(key_), "");
+}
+
+// An interrupted call leaves the files that it has written, and half of the
+// next one beside its place.
+TEST_F(KeysTest, AnInterruptedAuthorityIsCompleted) {
+  const std::vector<std::string> files{"ca.key", "governance.p7s", "ca.pem"};
+  for (std::size_t written = 0; written < files.size(); ++written) {
+    const fs::path folder = directory_.path() / std::to_string(written);
+    fs::create_directory(folder);
+    for (std::size_t i = 0; i < written; ++i) {
+      fs::copy(folder_ / files[i], folder);
+    }
+    std::ofstream(folder / (files[written] + ".new")) << "-----BEGIN";
+
+    MakeAuthority(folder, 100);
+    MakeKey(folder, "monitor-1", Role::kMonitor, 10, false);
+    EXPECT_EQ(Refusal(folder / "monitor-1"), "") << written;
+    EXPECT_EQ(Slurp(folder / "ca.key") == Slurp(folder_ / "ca.key"),
+              written > 0);
+    EXPECT_THROW(MakeAuthority(folder, 100), ConfigError);
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+      EXPECT_NE(entry.path().extension(), ".new");
+    }
+  }
 }
 
 TEST_F(KeysTest, NamesAndDaysAreWithinTheirRange) {
@@ -160,8 +189,7 @@ TEST_F(KeysTest, EachFileThatIsDamagedIsNamed) {
 // The text in clear of a signed document with `from` replaced by `to`.
 void Forge(const fs::path& file, const std::string& from,
            const std::string& to) {
-  std::ifstream stream(file, std::ios::binary);
-  std::string text(std::istreambuf_iterator<char>(stream), {});
+  std::string text = Slurp(file);
   const std::size_t at = text.find(from);
   ASSERT_NE(at, std::string::npos);
   text.replace(at, from.size(), to);
@@ -213,6 +241,80 @@ TEST_F(KeysTest, FilesOfAnotherKeyOrAuthorityAreRefused) {
                     fs::perms::owner_read | fs::perms::owner_write);
     EXPECT_THAT(Refusal(mixed), HasSubstr(each.told));
   }
+}
+
+struct Freer {
+  void operator()(BIO* bio) const { BIO_free_all(bio); }
+  void operator()(X509* certificate) const { X509_free(certificate); }
+  void operator()(EVP_PKEY* key) const { EVP_PKEY_free(key); }
+  void operator()(PKCS7* signature) const { PKCS7_free(signature); }
+  void operator()(X509_STORE* store) const { X509_STORE_free(store); }
+};
+template <typename T>
+using Owned = std::unique_ptr<T, Freer>;
+
+Owned<BIO> Open(const fs::path& file, const char* mode = "r") {
+  return Owned<BIO>(BIO_new_file(file.c_str(), mode));
+}
+Owned<X509> CertificateIn(const fs::path& file) {
+  return Owned<X509>(
+      PEM_read_bio_X509(Open(file).get(), nullptr, nullptr, nullptr));
+}
+Owned<EVP_PKEY> KeyIn(const fs::path& file) {
+  return Owned<EVP_PKEY>(
+      PEM_read_bio_PrivateKey(Open(file).get(), nullptr, nullptr, nullptr));
+}
+
+// Replaces the permissions of a key by some that its holder has signed.
+void SignOwnPermissions(const fs::path& folder) {
+  constexpr int kFlags = PKCS7_DETACHED | PKCS7_TEXT;
+  const std::string text = Slurp(folder / "permissions.p7s");
+  const std::size_t begin = text.find("<?xml");
+  const std::string document =
+      text.substr(begin, text.find("</dds>") + 7 - begin);
+  const Owned<BIO> in(
+      BIO_new_mem_buf(document.data(), static_cast<int>(document.size())));
+  const Owned<PKCS7> signature(
+      PKCS7_sign(CertificateIn(folder / "cert.pem").get(),
+                 KeyIn(folder / "key.pem").get(), nullptr, in.get(), kFlags));
+  ASSERT_NE(signature, nullptr);
+  BIO_reset(in.get());
+  SMIME_write_PKCS7(Open(folder / "permissions.p7s", "w").get(),
+                    signature.get(), in.get(), kFlags);
+}
+
+// As Fast DDS 2.9.1 verifies the permissions of a participant.
+bool FastDdsAccepts(const fs::path& folder) {
+  const Owned<X509_STORE> store(X509_STORE_new());
+  X509_STORE_add_cert(store.get(), CertificateIn(folder / "ca.pem").get());
+  BIO* content = nullptr;
+  const Owned<PKCS7> signature(
+      SMIME_read_PKCS7(Open(folder / "permissions.p7s").get(), &content));
+  const Owned<BIO> owned(content);
+  return PKCS7_verify(signature.get(), nullptr, store.get(), content, nullptr,
+                      PKCS7_TEXT) == 1;
+}
+
+TEST_F(KeysTest, AKeyCannotGrantItselfPermissions) {
+  EXPECT_TRUE(FastDdsAccepts(key_));
+  SignOwnPermissions(key_);
+  EXPECT_FALSE(FastDdsAccepts(key_));
+}
+
+// Certificates without a purpose, as earlier versions made them, can sign.
+TEST_F(KeysTest, PermissionsThatAKeyHasGrantedItselfAreRefused) {
+  const Owned<X509> certificate = CertificateIn(key_ / "cert.pem");
+  X509_EXTENSION_free(X509_delete_ext(
+      certificate.get(),
+      X509_get_ext_by_NID(certificate.get(), NID_ext_key_usage, -1)));
+  X509_sign(certificate.get(), KeyIn(folder_ / "ca.key").get(), EVP_sha256());
+  PEM_write_bio_X509(Open(key_ / "cert.pem", "w").get(), certificate.get());
+  EXPECT_EQ(Refusal(key_), "");
+
+  SignOwnPermissions(key_);
+  EXPECT_TRUE(FastDdsAccepts(key_));
+  EXPECT_THAT(Refusal(key_),
+              HasSubstr("permissions.p7s: its signature does not hold"));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "simulator/random.h"
 #include "simulator/valve_equations.h"
 
 namespace fdi::simulator {
@@ -153,6 +154,29 @@ TEST(ControlValveTest, FrictionHoldsTheRodInsideItsBand) {
   }
   EXPECT_GT(held, 100);
   EXPECT_LT(held, 5900);
+}
+
+// Of so little friction 2 % are below the error of the integration: the rod
+// would start and stop for ever.
+TEST(ControlValveTest, HardlyAnyFrictionIsLikeNone) {
+  for (const double scale : {1.0, 10.0}) {
+    ValveParameters rough = ParameterSet("lublin-actuator-3");
+    ControlValve without(rough, scale);
+    rough.actuator.coulomb_friction_n = 0.2;
+    ControlValve with(rough, scale);
+    without.Settle(InputsAt(0.5));
+    with.Settle(InputsAt(0.5));
+    NormalSource noise(1, 2);
+    double command = 0.5;
+    for (int i = 0; i < 600; ++i) {
+      const ProcessInputs from = InputsAt(command);
+      command = 0.5 + 0.05 * noise();
+      const ProcessInputs to = InputsAt(command);
+      without.Advance(1.0, from, to);
+      with.Advance(1.0, from, to);
+      ASSERT_NEAR(with.state().rod, without.state().rod, 5e-3) << i;
+    }
+  }
 }
 
 TEST(ControlValveTest, FrictionDelaysTheRodBehindItsCommand) {

@@ -203,6 +203,23 @@ TEST(ValvePhysicsTest, KnowsNothingOfTheLoopWhereItIsOfBefore) {
   EXPECT_TRUE(PhysicsFrom(values).loop.reads_flow);
 }
 
+TEST(ValvePhysicsTest, FilledInReadingsDoNotCountInTheScatter) {
+  std::vector<RecordRow> rows = Recording(1200, 1, {});
+  for (std::size_t k = 0; k < rows.size(); k += k % 3 + 1) {
+    RecordRow& row = rows[k];
+    row.x_pct += 15.0;
+    row.flow *= 1.5;
+    row.x_measured = row.flow_measured = false;
+  }
+  const ValvePhysics physics =
+      DescribeValve(ParameterSet("lublin-actuator-3"), {}, {rows});
+  EXPECT_NEAR(physics.x.sd, Physics().x.sd, 0.1 * Physics().x.sd);
+  EXPECT_NEAR(physics.flow.sd, Physics().flow.sd, 0.1 * Physics().flow.sd);
+  // In rows, not in readings.
+  EXPECT_NEAR(physics.x.correlation_time, Physics().x.correlation_time,
+              0.5 * Physics().x.correlation_time);
+}
+
 // Of a controller that reads F, its noise moves the command in the next row.
 LoopHabit HabitOf(double gain) {
   NormalSource noise(5, 1);

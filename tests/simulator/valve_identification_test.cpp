@@ -99,6 +99,7 @@ TEST_P(RecoveryTest, RecoversTheParametersOfASimulatedValve) {
   EXPECT_EQ(fit.interpolated_command, interpolated);
   EXPECT_EQ(fit.command_delay, 0);
   EXPECT_EQ(fit.parameters.positioner.relay, AirRelay::kCompressible);
+  EXPECT_EQ(fit.parameters.actuator.coulomb_friction_n, 0.0);
   ExpectRecovered(fit, "trim.kv_m3_h", truth.trim.kv_m3_h, 0.05);
   ExpectRecovered(fit, "trim.exponent", truth.trim.exponent, 0.05);
   ExpectRecovered(fit, "positioner.filling_cv", truth.positioner.filling_cv,
@@ -168,17 +169,32 @@ TEST(ValveIdentificationTest, LeavesAStatedValueThatDoesNotFit) {
   ExpectRecovered(fit, "positioner.gain", 40.0, 0.1);
 }
 
-TEST(ValveIdentificationTest, LeavesAStatedValueAloneThatRunsToABound) {
+// Without friction, the fit follows X three times worse, with a later command.
+TEST(ValveIdentificationTest, FindsFrictionInsteadOfALaterCommand) {
   const ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");
   ValveParameters truth = nominal;
-  truth.actuator.supply_pressure_gauge_pa *= 3.0;
-  truth.actuator.play_fraction *= 8.0;  // Searched up to 5.0.
+  truth.actuator.coulomb_friction_n = 150.0;
+  const HealthyRecord record = Recording(truth, 800, 6);
+  const ValveFit fit = FitValve({record}, nominal);
+  EXPECT_EQ(fit.command_delay, 0);
+  ExpectRecovered(fit, "actuator.coulomb_friction_n", 150.0, 0.1);
+  EXPECT_LE(fit.fitted.x_rmse_pct,
+            1.1 * FitToRecord(truth, record.rows, 60, 800).x_rmse_pct);
+}
+
+TEST(ValveIdentificationTest, LeavesAStatedValueAloneThatRunsToABound) {
+  ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");
+  nominal.actuator.coulomb_friction_n = 50.0;  // Not a choice then.
+  ValveParameters truth = nominal;
+  truth.positioner.gain /= 8.0;  // Searched down to 1/5.
+  truth.instruments.pressure.noise_sd = 0.0;
   ValveFitOptions options;
   options.least_gain = 0.0;
+  options.identified_sd = 1.0;
   const ValveFit fit = FitValve({Recording(truth, 400, 3)}, nominal, options);
-  const FittedParameter& play = Named(fit, "actuator.play_fraction");
-  EXPECT_FALSE(play.identified);
-  EXPECT_EQ(play.value, play.nominal);
+  const FittedParameter& gain = Named(fit, "positioner.gain");
+  EXPECT_FALSE(gain.identified);
+  EXPECT_EQ(gain.value, gain.nominal);
 }
 
 TEST(ValveIdentificationTest, NamesWhatItCannotUse) {

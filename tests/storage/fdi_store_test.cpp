@@ -49,6 +49,17 @@ TEST_F(FdiStoreTest, SniffTakesTheUnitThatTheNameOfAColumnEndsWith) {
   EXPECT_EQ((*flow)["unit"], "t/h");
 }
 
+TEST_F(FdiStoreTest, SniffDoesNotTakeSecondsForDaysOfASpreadsheet) {
+  const std::string row = ",40.5,3500,2500,130,41,22\n";
+  Write("t.csv", header_ + "30000.5" + row + "30001.5" + row + "30002.5" + row);
+  Write("late.csv", "Time" + header_.substr(3) + "29999.5" + row + "30000" +
+                        row + "30000.5" + row + "30001" + row);
+
+  EXPECT_EQ(StoreJson("runs sniff t.csv")["period_s"], 1.0);
+  // As in the importer, the first row decides for all.
+  EXPECT_EQ(StoreJson("runs sniff late.csv")["period_s"], 0.5);
+}
+
 TEST_F(FdiStoreTest, CsvWithoutAColumnIsRefusedAndNothingIsStored) {
   Write("a.csv", "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,F_t_h\n0,1,2,3,4,5\n");
 

@@ -167,6 +167,26 @@ TEST_F(ModelsTest, DamagedBytesAreReportedWithTheirPlace) {
               HasSubstr("content hash differs"));
 }
 
+TEST_F(ModelsTest, AFaultThatIsNotKnownIsNotTakenForNormalOperation) {
+  Lineage lineage;
+  lineage.episodes = {
+      {"00c0ffee12345678", "LV-1", "f1", "anna", 2, 1, 0.5, "0123456789ab", 9},
+      {"00c0ffee12345679", "LV-1", "false", "anna", 2, 0, 0.0, "", 9}};
+  store_.Save(RandomModelSet("pump"), Activation::kAlways, lineage);
+  EXPECT_EQ(store_.LineageOf({"pump", 1}).episodes, lineage.episodes);
+
+  Transaction transaction(store_.database());
+  store_.database().Run(
+      "UPDATE training_episode SET fault = 'f99' WHERE fault = 'f1'");
+  transaction.Commit();
+
+  EXPECT_THAT(MessageOf<DataError>([&] {
+                store_.LineageOf({"pump", 1});
+              }),
+              AllOf(HasSubstr("00c0ffee12345678"),
+                    HasSubstr("no fault is called f99")));
+}
+
 TEST_F(ModelsTest, AnExportedFileImportsElsewhereWithTheSameHash) {
   const ModelSet saved = store_.Save(RandomModelSet("pump"));
   const auto path = directory_.path() / "pump.fdimodel";

@@ -49,6 +49,19 @@ TEST_F(RunRecorderTest, RecordedSamplesReadBackInOrderThroughTailAndChunks) {
   EXPECT_EQ(run.info.state, RunState::kComplete);
 }
 
+TEST_F(RunRecorderTest, ChunksOfOneSampleWaitForTheFirstOne) {
+  RunRecorder recorder(file_, {1});
+  const auto key = recorder.Begin(RunOf("V1"));
+  const std::string id = recorder.Id(key);
+  recorder.Commit();
+  recorder.Append(key, SampleAt(0));
+  recorder.Append(key, SampleAt(1));
+  recorder.Close();
+
+  EXPECT_THAT(Positions(id), SizeIs(2));
+  EXPECT_EQ(Query("SELECT max(count) FROM chunk"), 1);
+}
+
 TEST_F(RunRecorderTest, CountersTellWhatBecameOfTheSamples) {
   RunRecorder recorder(file_);
   const auto key = recorder.Begin(RunOf("V1"));

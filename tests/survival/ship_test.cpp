@@ -3,6 +3,7 @@
 #include <chrono>
 #include <random>
 #include <regex>
+#include <set>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -643,6 +644,39 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
               HasSubstr("Nothing to do."));
 }
 
+// Sets in particular, where globs and regular expressions differ.
+TEST_F(ShipTest, APatternMatchesTheSameValvesInBothHistories) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  {
+    HistoryWriter writer(path);
+    for (const char* valve :
+         {"a", "b", "d", "5", "]", "[", "\\", ":", "!", "^", "-", "V[1]"}) {
+      writer.Record(
+          Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve),
+          kDetected);
+    }
+  }
+  ASSERT_EQ(Ship("a").code, 0);
+
+  HistoryReader here(path);
+  PlantReader there(Url());
+  for (const char* glob :
+       {"?", "[a-c]", "[^a]", "[!a]", "[]a]", "[^]a]", "[[]", "[[:]", "[\\d]",
+        "[a^]", "[a-]", "V[[]?[]]", "[ab", "["}) {
+    EpisodeFilter filter;
+    filter.valve_glob = glob;
+    const auto valves = [&filter](auto& reader) {
+      std::set<std::string> found;
+      for (const Episode& episode : reader.List(filter)) {
+        found.insert(episode.valve_id);
+      }
+      return found;
+    };
+    EXPECT_EQ(valves(there), valves(here)) << glob;
+  }
+}
+
 // Both of a pair have an episode and an hour: there is one in the work list,
 // and one alarm. The fuller hour counts.
 TEST_F(ShipTest, WhatAPairSawCountsOnce) {
@@ -676,6 +710,37 @@ TEST_F(ShipTest, WhatAPairSawCountsOnce) {
       .CommitCheckpoint(HoursOfHealth("V1"));
   ASSERT_EQ(Ship("a").code, 0);
   EXPECT_NE(reader.Version(), before);
+}
+
+// Both of a pair have each episode: the limit counts it once. Open episodes
+// come first.
+TEST_F(ShipTest, TheAlarmsOfAPairAreUpToTheLimit) {
+  Init();
+  for (const char* monitor : {"a", "b"}) {
+    HistoryWriter writer(Folder(monitor) / "history.db");
+    for (const char* valve : {"V1", "V2", "V3"}) {
+      writer.Record(
+          Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve),
+          kDetected);
+    }
+    for (const char* valve : {"V4", "V5", "V6"}) {
+      RecordEpisode(writer, 2, valve);
+    }
+    ASSERT_EQ(Ship(monitor).code, 0);
+  }
+
+  PlantReader reader(Url());
+  const auto valves = [&reader](std::int64_t limit) {
+    std::vector<std::string> ids;
+    for (const Alarm& alarm : reader.AlarmList(kDetected, limit)) {
+      ids.push_back(alarm.episode.valve_id);
+    }
+    return ids;
+  };
+  using testing::UnorderedElementsAre;
+  EXPECT_THAT(valves(2), UnorderedElementsAre("V2", "V3"));
+  EXPECT_THAT(valves(4), UnorderedElementsAre("V1", "V2", "V3", "V6"));
+  EXPECT_EQ(valves(7).size(), 6U);
 }
 
 // Each query of the dashboard, with Grafana's macros written out.

@@ -80,6 +80,18 @@ TEST(BackTestTest, EpisodeIsFalseOnceTheHorizonPassedWithoutAFault) {
   EXPECT_EQ(test.undecided[0].detected_ns, 190 * kDay);
 }
 
+// The first look may have overlooked it.
+TEST(BackTestTest,
+     AFaultFoundAtTheSecondOrderWithinTheHorizonProvesTheEpisode) {
+  const PastRecord record = Record({Episode(10, 11, {6})});
+  EXPECT_THAT(JudgeHistory({record}, {Order(15, 0), Order(40, 6)}, kHorizonS)
+                  .false_episodes,
+              IsEmpty());
+  EXPECT_EQ(JudgeHistory({record}, {Order(15, 0), Order(42, 6)}, kHorizonS)
+                .false_episodes.size(),
+            1U);
+}
+
 TEST(BackTestTest, OrdersOfOtherValvesProveNothing) {
   const BackTest test = JudgeHistory({Record({Episode(80, 82, {6})})},
                                      {{"B", 90 * kDay, 6}}, kHorizonS);

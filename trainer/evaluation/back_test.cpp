@@ -254,9 +254,8 @@ void SortEpisode(const PastEpisode& episode, const PastRecord& record,
       continue;
     }
     known_until_ns = std::max(known_until_ns, order.time_ns);
-    // The orders of a valve are sorted by time: the first one that follows is
-    // the answer.
-    if (!followed && Precedes(episode, order, kNever, horizon_ns)) {
+    // What an order did not find, a later one within the horizon may have.
+    if (Precedes(episode, order, kNever, horizon_ns)) {
       followed = true;
       if (order.found != 0) {
         return;
