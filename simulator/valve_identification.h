@@ -57,9 +57,8 @@ struct ValveUnknown {
 std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
                                      bool has_flow);
 
-/// Coulomb friction; a nominal valve without has none to be fitted unless that
-/// follows the record clearly better. Then it is 0.5 to 50 % of what the spring
-/// changes over the stroke.
+/// Coulomb friction. Where the nominal valve has none, it is searched between
+/// 0.5 and 50 % of what the spring changes over the stroke.
 ValveUnknown FrictionUnknown(const ValveParameters& nominal);
 
 /// The possible air relays: the nominal one, then the other of (16) and the
