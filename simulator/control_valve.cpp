@@ -231,7 +231,7 @@ void ValveDynamics::Derivatives(double t, const double* x,
   const double tau = parameters_.positioner.filter_time_s;
   const double signal = Signal(x);
   const ProcessInputs inputs = InputsAt(t);
-  if (motion_ == Motion::kHeld || motion_ == Motion::kStuck) {
+  if (motion_ == Motion::kHeld || motion_ == Motion::kResting) {
     dx[kActuatorState] = 0.0;
     dx[kVelocityState] = 0.0;
   } else {
@@ -289,7 +289,7 @@ void ValveDynamics::Roots(double t, const double* x, double* g) const noexcept {
       g[1] = x[kActuatorState] > LowStop() ? friction + force : 1.0;
       break;
     }
-    case Motion::kStuck:
+    case Motion::kResting:
       g[0] = g[1] = 1.0;
       break;
   }
@@ -492,7 +492,7 @@ void ControlValve::Impl::Integrate(double t_stop) {
     integrator_.Restart(time_s_);
   }
   while (time_s_ < t_stop) {
-    const bool rests = dynamics_.motion() == Motion::kStuck;
+    const bool rests = dynamics_.motion() == Motion::kResting;
     const double target = rests ? std::min(rests_until, t_stop) : t_stop;
     const StepResult result = integrator_.StepTowards(target);
     time_s_ = integrator_.time();
@@ -507,7 +507,7 @@ void ControlValve::Impl::Integrate(double t_stop) {
       started = time_s_;
       if (starts == kMaxStarts && dynamics_.BreakAwayForce() > 0.0) {
         x()[kVelocityState] = 0.0;
-        dynamics_.set_motion(Motion::kStuck);
+        dynamics_.set_motion(Motion::kResting);
         rests_until = time_s_ + kRest;
       }
       dynamics_.Commit(x().data());

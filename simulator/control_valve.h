@@ -22,8 +22,9 @@ enum ValveStateIndex : std::size_t {
 };
 
 /// State of motion. Without Coulomb friction the mass is free or held at a
-/// stop; with it, rising, falling, held, or stuck: held whatever the force.
-enum class Motion { kFree, kRising, kFalling, kHeld, kStuck };
+/// stop; with it, rising, falling, held, or resting: held for a while whatever
+/// the force.
+enum class Motion { kFree, kRising, kFalling, kHeld, kResting };
 
 /// Right-hand side of equations (13)-(17) for one state of motion and constant
 /// fault effects. Inputs are either smooth in time, or a held command with

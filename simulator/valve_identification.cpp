@@ -21,6 +21,34 @@ using Eigen::MatrixXd;
 
 constexpr const char* kFriction = "actuator.coulomb_friction_n";
 
+// Rows [first, last) of a record that outlives it.
+struct RecordSegment {
+  const std::vector<RecordRow>* rows;
+  std::size_t first;
+  std::size_t last;
+
+  std::size_t size() const { return last - first; }
+};
+
+// A candidate model of the valve.
+struct ValveCandidate {
+  ValveParameters parameters;
+  RecordDrive drive;
+};
+
+// A physical parameter that a healthy record may determine. The logarithm of
+// its value is fitted.
+struct ValveUnknown {
+  std::string name;  // Its field, as Validate() names it.
+  double& (*in)(ValveParameters& parameters);
+  double nominal;
+  double lower;  // > 0.
+  double upper;
+  // Stated in a data sheet and poorly determined by a record: noise in the
+  // recorded pressures alone can favour a wrong value.
+  bool stated;
+};
+
 double CommandTravel(const RecordSegment& segment) {
   double travel = 0.0;
   for (std::size_t k = segment.first + 1; k < segment.last; ++k) {
@@ -30,8 +58,9 @@ double CommandTravel(const RecordSegment& segment) {
   return travel;
 }
 
-}  // namespace
-
+// Cuts the records into equal segments of at most 600 rows and selects those
+// with the most travel of the command, liveliest first, at most `max_rows` in
+// total but at least one segment. Segments below 180 rows are not used.
 std::vector<RecordSegment> LiveliestSegments(
     const std::vector<HealthyRecord>& records, std::size_t max_rows) {
   constexpr std::size_t kMaxPieceRows = 600;
@@ -61,8 +90,6 @@ std::vector<RecordSegment> LiveliestSegments(
   segments.resize(taken);
   return segments;
 }
-
-namespace {
 
 using Answers = std::vector<std::vector<RecordAnswer>>;  // By segment.
 
@@ -184,8 +211,10 @@ double EffectiveKv(const RecordRow& row, const InstrumentParameters& i) {
   return row.flow * to_m3 / Flow(1.0, 1.0, drop, medium.density_kg_m3);
 }
 
-}  // namespace
-
+// The unknowns of `nominal` with its air relay, best determined first: Kv and
+// exponent (only with flow), coefficients of the air relay, filter time of the
+// positioner; then the stated ones: gain of the positioner, play, supply
+// pressure.
 std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
                                      bool has_flow) {
   // The order counts: KeepIdentified() gives up the last ones first.
@@ -241,6 +270,8 @@ std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
   return unknowns;
 }
 
+// Coulomb friction. Where the nominal valve has none, it is searched between
+// 0.5 and 50 % of what the spring changes over the stroke.
 ValveUnknown FrictionUnknown(const ValveParameters& nominal) {
   const auto in = [](ValveParameters& v) -> double& {
     return v.actuator.coulomb_friction_n;
@@ -253,6 +284,8 @@ ValveUnknown FrictionUnknown(const ValveParameters& nominal) {
   return {kFriction, in, 0.0, 0.005 * range_n, 0.5 * range_n, false};
 }
 
+// The possible air relays: the nominal one, then the other of (16) and the
+// benchmark's square root with the transducer's dead zone.
 std::vector<ValveParameters> RelayVariants(const ValveParameters& nominal) {
   ValveParameters other = nominal;
   const bool orifice = nominal.positioner.relay == AirRelay::kOrifice;
@@ -262,6 +295,8 @@ std::vector<ValveParameters> RelayVariants(const ValveParameters& nominal) {
   return {nominal, other};
 }
 
+// Bounds of `unknowns` as logarithms, with a prior around the nominal values
+// whose deviation is a factor of 1.65.
 PointBounds BoundsOf(const std::vector<ValveUnknown>& unknowns) {
   constexpr double kPriorSd = 0.5;
   const auto count = static_cast<Eigen::Index>(unknowns.size());
@@ -281,6 +316,7 @@ PointBounds BoundsOf(const std::vector<ValveUnknown>& unknowns) {
   return bounds;
 }
 
+// `parameters` with the unknowns set to exp(point).
 ValveParameters WithUnknowns(ValveParameters parameters,
                              const std::vector<ValveUnknown>& unknowns,
                              const Eigen::VectorXd& point) {
@@ -289,6 +325,8 @@ ValveParameters WithUnknowns(ValveParameters parameters,
   }
   return parameters;
 }
+
+}  // namespace
 
 TrimParameters RegressTrim(const std::vector<HealthyRecord>& records,
                            const ValveParameters& nominal) {
@@ -414,6 +452,13 @@ bool HasFriction(const Hypothesis& hypothesis) {
                            &ValveUnknown::name) != hypothesis.unknowns.end();
 }
 
+bool FrictionInside(const Hypothesis& hypothesis) {
+  const auto& unknowns = hypothesis.unknowns;
+  const auto at = std::ranges::find(unknowns, kFriction, &ValveUnknown::name);
+  return at != unknowns.end() &&
+         Inside(*at, hypothesis.point[at - unknowns.begin()]);
+}
+
 class Identification {
  public:
   Identification(const std::vector<HealthyRecord>& records,
@@ -513,6 +558,7 @@ Hypothesis Identification::BestRelay(const Hypothesis& hypothesis) const {
   return Best(std::move(relays));
 }
 
+// The best start with friction, if it follows X better than the one without.
 // Friction delays the rod, so that without it a later command may have been
 // found: the delay is chosen again, from this and the one before.
 std::optional<Hypothesis> Identification::WithFriction(
@@ -715,14 +761,9 @@ ValveFit Identification::Run() {
   std::optional<Hypothesis> rough = WithFriction(best);
   Refine(best);
   if (rough) {
-    // Only now, because play that has been fitted acts like friction.
+    // Compared only now, because play that has been fitted acts like friction.
     Refine(*rough);
-    const std::vector<ValveUnknown>& fitted = rough->unknowns;
-    const auto friction =
-        std::ranges::find(fitted, kFriction, &ValveUnknown::name);
-    if (friction != fitted.end() &&
-        Inside(*friction, rough->point[friction - fitted.begin()]) &&
-        Gains(*rough, best)) {
+    if (FrictionInside(*rough) && Gains(*rough, best)) {
       best = *std::move(rough);
     }
   }

@@ -3,10 +3,7 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "simulator/record_fit.h"
-#include "simulator/robust_least_squares.h"
 #include "simulator/valve_parameters.h"
 
 namespace fdi::simulator {
@@ -15,64 +12,6 @@ namespace fdi::simulator {
 struct HealthyRecord {
   std::vector<RecordRow> rows;
 };
-
-/// Rows [first, last) of a record that outlives it.
-struct RecordSegment {
-  const std::vector<RecordRow>* rows;
-  std::size_t first;
-  std::size_t last;
-
-  std::size_t size() const { return last - first; }
-};
-
-/// Cuts the records into equal segments of at most 600 rows and selects those
-/// with the most travel of the command, liveliest first, at most `max_rows` in
-/// total but at least one segment. Segments below 180 rows are not used.
-std::vector<RecordSegment> LiveliestSegments(
-    const std::vector<HealthyRecord>& records, std::size_t max_rows);
-
-/// A candidate model of the valve.
-struct ValveCandidate {
-  ValveParameters parameters;
-  RecordDrive drive;
-};
-
-/// A physical parameter that a healthy record may determine. The logarithm of
-/// its value is fitted.
-struct ValveUnknown {
-  std::string name;  ///< Its field, as Validate() names it.
-  double& (*in)(ValveParameters& parameters);
-  double nominal;
-  double lower;  ///< > 0.
-  double upper;
-  /// Stated in a data sheet and poorly determined by a record: noise in the
-  /// recorded pressures alone can favour a wrong value.
-  bool stated;
-};
-
-/// The unknowns of `nominal` with its air relay, best determined first: Kv and
-/// exponent (only with flow), coefficients of the air relay, filter time of the
-/// positioner; then the stated ones: gain of the positioner, play, supply
-/// pressure.
-std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
-                                     bool has_flow);
-
-/// Coulomb friction. Where the nominal valve has none, it is searched between
-/// 0.5 and 50 % of what the spring changes over the stroke.
-ValveUnknown FrictionUnknown(const ValveParameters& nominal);
-
-/// The possible air relays: the nominal one, then the other of (16) and the
-/// benchmark's square root with the transducer's dead zone.
-std::vector<ValveParameters> RelayVariants(const ValveParameters& nominal);
-
-/// Bounds of `unknowns` as logarithms, with a prior around the nominal values
-/// whose deviation is a factor of 1.65.
-PointBounds BoundsOf(const std::vector<ValveUnknown>& unknowns);
-
-/// `parameters` with the unknowns set to exp(point).
-ValveParameters WithUnknowns(ValveParameters parameters,
-                             const std::vector<ValveUnknown>& unknowns,
-                             const Eigen::VectorXd& point);
 
 /// Kv and exponent directly from the rows, by (12) with the measured X:
 ///

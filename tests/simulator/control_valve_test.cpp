@@ -160,10 +160,10 @@ TEST(ControlValveTest, FrictionHoldsTheRodInsideItsBand) {
 // would start and stop for ever.
 TEST(ControlValveTest, HardlyAnyFrictionIsLikeNone) {
   for (const double scale : {1.0, 10.0}) {
-    ValveParameters rough = ParameterSet("lublin-actuator-3");
-    ControlValve without(rough, scale);
-    rough.actuator.coulomb_friction_n = 0.2;
-    ControlValve with(rough, scale);
+    ValveParameters valve = ParameterSet("lublin-actuator-3");
+    ControlValve without(valve, scale);
+    valve.actuator.coulomb_friction_n = 0.2;
+    ControlValve with(valve, scale);
     without.Settle(InputsAt(0.5));
     with.Settle(InputsAt(0.5));
     NormalSource noise(1, 2);
