@@ -102,5 +102,16 @@ TEST_F(AppCompareTest, WhatIsMissingIsNamed) {
   EXPECT_THAT(outcome.err, HasSubstr("three"));
 }
 
+TEST_F(AppCompareTest, FlowInAnotherUnitIsConvertedAsEvaluateDoes) {
+  std::string csv = "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h\n";
+  for (int k = 0; k < 100; ++k) {
+    csv += std::to_string(k) + ",70,3500,2600,100,70,17\n";
+  }
+  Write("t_h.csv", csv);
+  const Outcome outcome = Run("compare one two --file t_h.csv");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("flow_converted"));
+}
+
 }  // namespace
 }  // namespace fdi::trainer

@@ -79,6 +79,8 @@ TEST_F(AppVerdictsTest, BadVerdictsAreRefusedWithTheirLine) {
               HasSubstr("time.csv:3: t_s does not rise"));
   Write("column.csv", "t_s,alarm\n0,0\n");
   EXPECT_THAT(Score("column.csv").err, HasSubstr("column detected is missing"));
+  Write("blank.csv", "\n\nt_s,alarm\n0,0\n");
+  EXPECT_THAT(Score("blank.csv").err, HasSubstr("blank.csv:3: column"));
   EXPECT_EQ(Score("none.csv").code, 5);
   EXPECT_EQ(Score("short.csv,name.csv").code, 2);
   EXPECT_EQ(Run("evaluate --model-set q --file run.csv --verdicts v.csv").code,
@@ -150,7 +152,31 @@ TEST_F(AppReducedTest, BaselinesAreFittedToTheTrainingRunsOfTheCampaign) {
   EXPECT_EQ(Run(call + "pca").code, 2);
   EXPECT_EQ(Run(call + "arx-cusum --model-set two").code, 2);
   Write("bare.toml", Quick() + "[[validation]]\nsimulate = {}\n");
-  EXPECT_NE(Run("evaluate --campaign bare.toml --baseline arx-cusum").code, 0);
+  const Outcome bare =
+      Run("evaluate --campaign bare.toml --baseline arx-cusum");
+  EXPECT_EQ(bare.code, 2);
+  EXPECT_THAT(bare.err, AllOf(HasSubstr("bare.toml"), HasSubstr("[[run]]")));
+}
+
+TEST_F(AppReducedTest, BaselineJudgesItsOwnUnitAndPeriodAlone) {
+  const auto table = [](int period_s) {
+    std::string csv = "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h\n";
+    for (int k = 0; k < 100; ++k) {
+      csv += std::to_string(k * period_s) + ",70,3500,2600,100,70,17\n";
+    }
+    return csv;
+  };
+  Write("t_h.csv", table(1));
+  Write("slow.csv", table(2));
+  const std::string call =
+      "evaluate --campaign two.toml --baseline arx-cusum --file ";
+  const Outcome unit = Run(call + "t_h.csv");
+  EXPECT_EQ(unit.code, 0) << unit.err;
+  EXPECT_THAT(unit.err, HasSubstr("flow_converted"));
+  const Outcome slow = Run(call + "slow.csv");
+  EXPECT_EQ(slow.code, 3);
+  EXPECT_THAT(slow.err, AllOf(HasSubstr("slow.csv has a sample period of 2"),
+                              HasSubstr("arx-cusum was fitted for 1")));
 }
 
 TEST_F(AppReducedTest, SeedsAreRepetitionsThatStoreNothing) {
@@ -165,6 +191,14 @@ TEST_F(AppReducedTest, SeedsAreRepetitionsThatStoreNothing) {
   EXPECT_EQ(std::filesystem::file_size(Path("data") / "runs.db"), before);
   EXPECT_EQ(study, RunJson(call + "--seeds 3"));
   EXPECT_THAT(Run(call + "--seeds 1").out, HasSubstr("per seed"));
+  // This valve reads its flow in t/h, that of the set in m3/h.
+  Write("t_h.toml",
+        "[scenario]\nparameters = \"lublin-actuator-3\"\nduration_s = 300\n"
+        "[[validation]]\nsimulate = {}\nfaults = [\"f19:abrupt@200\"]\n");
+  EXPECT_EQ(
+      RunJson(
+          "evaluate --model-set two --campaign t_h.toml --seeds 2")["seeds"],
+      2);
 
   EXPECT_EQ(Run("evaluate --model-set two --seeds 3").code, 2);
   EXPECT_EQ(Run(call + "--seeds 3 --leave-one-out").code, 2);

@@ -25,9 +25,10 @@ cli::Report CompareSets(const CompareOptions& options,
   storage::ModelStore store(directory.models());
   const auto a = std::make_shared<const ModelSet>(store.Load(options.a));
   const auto b = std::make_shared<const ModelSet>(store.Load(options.b));
+  // Sets of two flow units have no run in common: scoring refuses that of b.
   const auto runs = LoadScoredRuns(options.selection,
                                    RequiredSignals(*a) | RequiredSignals(*b),
-                                   std::nullopt, context);
+                                   a->flow_unit, context);
   return ComparisonReport(Compare(a, b, runs, {options.assume_normal}),
                           options.all);
 }

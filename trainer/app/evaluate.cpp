@@ -89,8 +89,12 @@ std::vector<TrainingRun> TrainingRuns(const EvaluateOptions& options,
           "what to fit the baseline to: --train-runs ID,..., --train-file "
           "FILE.csv or a --campaign with [[run]]");
     }
-    stored = LoadCampaignRuns(LoadCampaign(options.selection.campaign).runs,
-                              context);
+    const Campaign campaign = LoadCampaign(options.selection.campaign);
+    if (campaign.runs.empty()) {
+      throw ConfigError(options.selection.campaign.string() +
+                        ": there is no [[run]] to fit the baseline to");
+    }
+    stored = LoadCampaignRuns(campaign.runs, context);
   }
   if (!options.train_runs.empty()) {
     const storage::DataDirectory directory{context.options.data_dir};
@@ -181,10 +185,11 @@ cli::Report EvaluateBaseline(const EvaluateOptions& options,
   const std::vector<TrainingRun> training = TrainingRuns(options, context);
   DatasetOptions dataset;
   dataset.assume_normal = options.assume_normal;
-  return EvaluateRuns(options, context,
-                      FittedBaseline(FitBaseline(
-                          options.baseline, BuildConditions(training, dataset),
-                          training.front().period_s, {})));
+  Detector detector = FittedBaseline(
+      FitBaseline(options.baseline, BuildConditions(training, dataset),
+                  training.front().period_s, {}));
+  detector.flow_unit = training.front().flow_unit;
+  return EvaluateRuns(options, context, detector);
 }
 
 cli::Report EvaluateHistory(const EvaluateOptions& options,

@@ -367,6 +367,7 @@ Baseline FitBaseline(std::string_view name,
           "the first condition must be normal operation");
   Baseline baseline;
   baseline.name = name;
+  baseline.period_s = period_s;
   baseline.options = options;
   baseline.models = FitModels(arx, conditions.front());
   baseline.limits =

@@ -121,6 +121,7 @@ using Signature = std::vector<int>;
 /// signatures that each fault was seen with.
 struct Baseline {
   std::string name;
+  double period_s{1.0};  ///< Of the samples that it was fitted to.
   BaselineOptions options;
   std::vector<LinearModel> models;
   std::vector<double> limits;  ///< Of the tests, one per model.

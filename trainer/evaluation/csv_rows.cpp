@@ -23,7 +23,7 @@ CsvRows::CsvRows(const std::filesystem::path& path,
       continue;
     }
     if (width_ == 0) {
-      TakeHeader(cells, required.size());
+      TakeHeader(cells, required.size(), number);
       continue;
     }
     if (cells.size() != width_) {
@@ -46,7 +46,7 @@ CsvRows::CsvRows(const std::filesystem::path& path,
 }
 
 void CsvRows::TakeHeader(const std::vector<std::string>& cells,
-                         std::size_t required) {
+                         std::size_t required, std::int64_t line) {
   width_ = cells.size();
   for (std::size_t c = 0; c < columns_.size(); ++c) {
     std::ptrdiff_t found = -1;
@@ -55,12 +55,12 @@ void CsvRows::TakeHeader(const std::vector<std::string>& cells,
         continue;
       }
       if (found >= 0) {
-        RefuseLine(1, "column " + columns_[c] + " is there twice");
+        RefuseLine(line, "column " + columns_[c] + " is there twice");
       }
       found = static_cast<std::ptrdiff_t>(i);
     }
     if (found < 0 && c < required) {
-      RefuseLine(1, "column " + columns_[c] + " is missing");
+      RefuseLine(line, "column " + columns_[c] + " is missing");
     }
     positions_.push_back(found);
   }

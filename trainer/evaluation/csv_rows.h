@@ -30,7 +30,8 @@ class CsvRows {
   [[noreturn]] void Refuse(std::size_t row, const std::string& reason) const;
 
  private:
-  void TakeHeader(const std::vector<std::string>& cells, std::size_t required);
+  void TakeHeader(const std::vector<std::string>& cells, std::size_t required,
+                  std::int64_t line);
   [[noreturn]] void RefuseLine(std::int64_t line,
                                const std::string& reason) const;
 

@@ -110,9 +110,16 @@ Answer FollowEngine(const std::shared_ptr<const ModelSet>& models,
 }
 
 Answer FollowBaseline(const Baseline& baseline, const storage::StoredRun& run) {
+  const double period_s = run.info.run.period_s;
+  if (std::abs(period_s - baseline.period_s) > 1e-6 * baseline.period_s) {
+    throw DataError("run " + RunName(run) + " has a sample period of " +
+                    std::to_string(period_s) + " s, baseline " + baseline.name +
+                    " was fitted for " + std::to_string(baseline.period_s) +
+                    " s");
+  }
   BaselineDetector detector(baseline);
   std::vector<Indication> all;
-  const std::int64_t period_ns = std::llround(run.info.run.period_s * 1e9);
+  const std::int64_t period_ns = std::llround(period_s * 1e9);
   std::int64_t start_ns = 0;
   std::int64_t last_ns = 0;
   for (const storage::StoredSample& stored : run.samples) {

@@ -43,7 +43,8 @@ Detector EngineDetector(const std::shared_ptr<const ModelSet>& models);
 Detector LeaveOneOutDetector(const ModelSet& models);
 
 /// A fitted baseline. It begins anew after a gap, and after a sample that the
-/// engine would not have accepted either.
+/// engine would not have accepted either. @throws DataError from `follow`
+/// naming the run if its sample period is another one.
 Detector FittedBaseline(Baseline baseline);
 
 /// Another detector, which wrote one CSV file for each run with the columns

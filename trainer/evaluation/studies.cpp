@@ -10,6 +10,7 @@
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/campaign/campaign_runs.h"
+#include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/evaluation/evaluation_report.h"
 #include "trainer/parallel_for.h"
@@ -259,9 +260,13 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
     const CampaignRun& run = scenarios[s][r];
     // A run is simulated where it is scored, so that only as many are in
     // memory as there are threads.
-    results[s][r] = Evaluate(
-        detector, {SimulateRun(std::get<SimulatedRun>(run.source)),
-                   RunLabel(run), run.horizon_s, static_cast<std::size_t>(i)});
+    storage::StoredRun simulated =
+        SimulateRun(std::get<SimulatedRun>(run.source));
+    ConvertFlow(simulated,
+                detector.flow_unit.value_or(simulated.info.run.flow_unit), {});
+    results[s][r] =
+        Evaluate(detector, {std::move(simulated), RunLabel(run), run.horizon_s,
+                            static_cast<std::size_t>(i)});
     const std::scoped_lock lock(mutex);
     progress.Update(static_cast<double>(++done) / total, RunLabel(run));
   });
