@@ -181,6 +181,29 @@ TEST_F(AppTrainTest, ImportedFileIsReadOnceAndStretchesAreKept) {
   EXPECT_EQ(shown["training_runs"][0], Runs()[0].id + "@10:290");
 }
 
+TEST_F(AppTrainTest, StretchesOfOneSimulationAreOfOneRun) {
+  const std::string one = "[[run]]\nsimulate = {duration_s = 900, seed = 3}\n";
+  Write("c.toml", Quick() + one + "to_s = 400\n" + one + "from_s = 500\n");
+  RunJson("train --campaign c.toml");
+  ASSERT_THAT(Runs(), SizeIs(1));
+  EXPECT_THAT(RunJson("show quick")["training_runs"],
+              ElementsAre(Runs()[0].id + "@:400", Runs()[0].id + "@500:"));
+}
+
+TEST_F(AppTrainTest, LastRunIsThatBeforeTheCampaignStoredOthers) {
+  Write("a.toml", Quick() + "[[run]]\nsimulate = {duration_s = 900}\n");
+  RunJson("train --campaign a.toml");
+  const std::string last = Runs()[0].id;
+  Write("b.toml", Quick() +
+                      "[[run]]\nrun = \"last\"\n"
+                      "[[run]]\nsimulate = {duration_s = 800}\n");
+  RunJson("train --campaign b.toml --activate");
+  const json runs = RunJson("show quick")["training_runs"];
+  ASSERT_THAT(runs, SizeIs(2));
+  EXPECT_EQ(runs[0], last);
+  EXPECT_NE(runs[1], last);
+}
+
 TEST_F(AppTrainTest, UnknownKeyIsRefusedWithFileLineAndWhatIsAccepted) {
   const Outcome outcome =
       TrainText("name = \"x\"\n[decision]\nisolation_treshold = 0.7\n");

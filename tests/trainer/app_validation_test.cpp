@@ -101,6 +101,12 @@ TEST_F(AppValidationTest, MissingVariableOrFileIsNamed) {
   const Outcome files = Run("train --campaign c.toml");
   EXPECT_EQ(files.code, 2);
   EXPECT_THAT(files.err, HasSubstr("none_*.csv"));
+  // The value is taken as it is, whatever it holds.
+  ::setenv("FDI_TEST_ITSELF", "${FDI_TEST_ITSELF}", 1);
+  Write("c.toml", Quick() + "[[run]]\nimport = \"${FDI_TEST_ITSELF}.csv\"\n");
+  const Outcome itself = Run("train --campaign c.toml");
+  EXPECT_EQ(itself.code, 5);
+  EXPECT_THAT(itself.err, HasSubstr("${FDI_TEST_ITSELF}.csv"));
 }
 
 }  // namespace

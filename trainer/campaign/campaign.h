@@ -67,8 +67,7 @@ std::string RunLabel(const CampaignRun& run);
 ///     strengths = [0.05, 0.5, 1]              # ... at each strength
 ///     [[run]]
 ///     import = "plant.csv"            # relative to the campaign file; may
-///     hold
-///                                     # ${VARIABLE}, and * in the file's name
+///                                     # hold ${VARIABLE}, and * in its name
 ///     valve = "LC51_03"
 ///     from_s = 60
 ///     to_s = 1500

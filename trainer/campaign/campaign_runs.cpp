@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <map>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 #include "cli/csv.h"
 #include "cli/progress.h"
@@ -124,6 +126,9 @@ class Collector {
     if (!missing_.empty()) {
       SimulateMissing();
     }
+    for (const auto& [i, first] : repeated_) {
+      ids_[i] = ids_[first];
+    }
     for (std::size_t i = 0; i < ids_.size(); ++i) {
       result_.selectors.push_back(SelectorOf(ids_[i], runs_[i].stretch));
     }
@@ -131,17 +136,21 @@ class Collector {
   }
 
  private:
+  // In full: once others are stored, `last` means another run.
   void Find(const RecordedRun& run) {
-    store_->Info(run.selector);
-    ids_[at_] = run.selector;
+    ids_[at_] = SelectorOf(store_->Info(run.selector).id,
+                           storage::ParseRunSelector(run.selector));
   }
 
   void Find(const ImportedRun& run) {
+    const std::string scenario = ScenarioOf(run);
+    if (IsRepeated(scenario + '\n' + run.valve_id)) {
+      return;
+    }
     cli::CsvOptions csv;
     csv.start_ns = options_.start_ns;
     cli::CsvTable table = cli::ReadCsvFile(run.file, csv);
     const SampleSeries& content = table.runs.front();
-    const std::string scenario = ScenarioOf(run);
     const bool found = Reuse([&](const RunInfo& info) {
       if (info.run.origin != RunOrigin::kImported ||
           info.run.scenario != scenario || info.run.valve_id != run.valve_id ||
@@ -162,6 +171,9 @@ class Collector {
 
   void Find(const SimulatedRun& run) {
     const std::string scenario = simulator::ScenarioText(run.scenario);
+    if (IsRepeated(scenario + std::to_string(run.scenario.config.seed))) {
+      return;
+    }
     // Another version of the simulator may give other samples, so only runs of
     // the same software count. A label would override their truth.
     const bool found = Reuse([&](const RunInfo& info) {
@@ -175,6 +187,17 @@ class Collector {
     if (!found) {
       missing_.push_back(at_);
     }
+  }
+
+  // Several runs of a campaign may be stretches of one file or simulation,
+  // which is stored once. `content` tells one from another.
+  bool IsRepeated(const std::string& content) {
+    const auto [first, added] = first_.emplace(content, at_);
+    if (!added) {
+      repeated_.emplace_back(at_, first->second);
+      ++result_.reused;
+    }
+    return !added;
   }
 
   // Takes the first known run that matches, if there is one.
@@ -254,6 +277,9 @@ class Collector {
   std::size_t at_{0};             // The run that is looked for.
   std::vector<std::pair<std::size_t, cli::CsvTable>> files_;  // To import.
   std::vector<std::size_t> missing_;                          // To simulate.
+  std::map<std::string, std::size_t>
+      first_;  // Run of the campaign, by content.
+  std::vector<std::pair<std::size_t, std::size_t>> repeated_;  // Of which.
   CollectedRuns result_;
 };
 

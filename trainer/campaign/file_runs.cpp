@@ -15,8 +15,8 @@ using std::filesystem::path;
 
 // Replaces every ${NAME} by the environment variable of that name.
 std::string WithVariables(std::string text) {
-  for (std::size_t begin = text.find("${"); begin != std::string::npos;
-       begin = text.find("${")) {
+  std::size_t begin = 0;
+  while ((begin = text.find("${", begin)) != std::string::npos) {
     const std::size_t end = text.find('}', begin);
     if (end == std::string::npos) {
       throw ConfigError("'" + text + "' lacks a } behind ${");
@@ -28,6 +28,7 @@ std::string WithVariables(std::string text) {
                         text + "' needs it");
     }
     text.replace(begin, end - begin + 1, value);
+    begin += std::string_view(value).size();  // It may hold a ${ of its own.
   }
   return text;
 }
