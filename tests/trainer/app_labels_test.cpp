@@ -5,11 +5,13 @@
 
 #include <gmock/gmock.h>
 
+#include "diagnosis/error.h"
 #include "storage/history/history_editor.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "tests/trainer/app_fixture.h"
 #include "tests/trainer/recorded_episodes.h"
+#include "trainer/learning/label_plan.h"
 
 namespace fdi::trainer {
 namespace {
@@ -22,6 +24,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 using testing::SizeIs;
+using testing::UnorderedElementsAre;
 
 // The set knows f19 at 0.5 alone. What is scored begins normal; the fault acts
 // from 600 s on.
@@ -274,6 +277,56 @@ TEST_F(AppLabelsTest, RelabelledEpisodeReplacesWhatItTaught) {
   EXPECT_THAT(shown["training_runs"], SizeIs(3));
   EXPECT_THAT(shown["training_runs"],
               Not(Contains(second["lineage"]["episodes"][0]["run"])));
+}
+
+// What a label taught goes with it, though nothing takes its place.
+TEST_F(AppLabelsTest, RelabelledEpisodeThatIsRefusedForgetsWhatItTaught) {
+  const std::string id = Episode(RunWith("f1"), "f1");
+  const json second = RunJson("train --from-labels --strength " + id + "=0.5");
+  Label(id, "true");  // And no fault was isolated.
+
+  const json third =
+      RunJson("train --from-labels --parent quick@2 --skip-refused");
+
+  EXPECT_THAT(third["lineage"]["episodes"], IsEmpty());
+  EXPECT_THAT(RunJson("show quick@3")["training_runs"],
+              Not(Contains(second["lineage"]["episodes"][0]["run"])));
+}
+
+TEST_F(AppLabelsTest, StrengthIsOfOneEpisode) {
+  Episode(RunWith("f1"), "f1");
+  Episode(RunWith("f19"), "true");
+  LabelRequest request;
+  request.strengths[""] = 0.5;  // As both ids begin.
+  EXPECT_THROW(MakeLabelPlan(request, {Path("data")}), NotFoundError);
+}
+
+TEST_F(AppLabelsTest, RunsOfTheRequestAreNamedInFull) {
+  Episode(RunWith("f19"), "true");
+  const std::string parent =
+      RunJson("show quick")["training_runs"][0].get<std::string>();
+  const std::string last =
+      RunJson("train --from-labels --dry-run --runs last")["runs"][2]
+          .get<std::string>();
+  EXPECT_EQ(Runs().Info("last").id, last);
+
+  const json set =
+      RunJson("train --from-labels --runs last," + parent.substr(0, 11));
+
+  EXPECT_EQ(set["version"], 2);
+  EXPECT_THAT(RunJson("show quick@2")["training_runs"],
+              UnorderedElementsAre(
+                  parent, testing::_, last,
+                  set["lineage"]["episodes"][0]["run"].get<std::string>()));
+}
+
+TEST_F(AppLabelsTest, TransmitterThatFailsAtFirstIsNotAMissingSignal) {
+  storage::StoredRun run = RunWith("f19");
+  Runs(storage::Access::kOccasionalWriter).Delete(run.info.id);
+  run.samples.front().sample.present = kBasicSignals & ~MaskOf(Signal::kX);
+  Episode(run, "true");
+  const json episode = RunJson("train --from-labels --dry-run")["episodes"][0];
+  EXPECT_TRUE(episode["refused"].is_null()) << episode;
 }
 
 TEST_F(AppLabelsTest, SameLabelsGiveTheSameHash) {

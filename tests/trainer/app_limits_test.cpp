@@ -30,6 +30,7 @@ using nlohmann::json;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 constexpr std::int64_t kMadeNs = 1'700'000'000 * kNsPerSecond;
@@ -250,6 +251,37 @@ TEST_F(AppLimitsTest, AnEpisodeThatIsNotLabelledFalseIsLeftOut) {
     EXPECT_EQ(limit["after"], limit["before"]);
   }
   EXPECT_EQ(Run("show LV1@2").code, 5);
+}
+
+// As a shell pattern, "LV[1]" matches LV1 and not itself.
+TEST_F(AppLimitsTest, AnEpisodeOfAValveWithBracketsIsLeftOut) {
+  storage::ModelStore(Models(), storage::Access::kOccasionalWriter)
+      .SetBaseline("LV[1]", {0, "LV1", 1, 2.0, {{"kv", 118.0}}, {}});
+  storage::StoredRun run = PlantRun(3600, 5, kMadeNs + kNsPerHour, Shift);
+  run.info.run.valve_id = "LV[1]";
+  Record(run);
+  ASSERT_THAT(RecordEpisodes(History(), parent_, run), SizeIs(1));
+
+  const json set = RunJson("limits --valve 'LV[1]'");
+
+  EXPECT_TRUE(set["version"].is_null());
+  ASSERT_THAT(set["left_out"], Not(IsEmpty()));
+  EXPECT_EQ(set["left_out"][0]["reason"], "episodes");
+}
+
+TEST_F(AppLimitsTest, AFileNeedsTheSignalsOfTheValveAlone) {
+  std::string csv = "t_s,CV_pct,X_pct,F_m3_h\n";
+  for (const storage::StoredSample& stored : PlantRun(3600, 2, 0).samples) {
+    const Sample& sample = stored.sample;
+    csv += std::to_string(sample.stamp_ns / kNsPerSecond);
+    for (const Signal signal : {Signal::kCv, Signal::kX, Signal::kF}) {
+      csv += ',' + std::to_string(sample[signal]);
+    }
+    csv += '\n';
+  }
+  Write("hour.csv", csv);
+  const json set = RunJson("limits --valve LV1 --file hour.csv --dry-run");
+  EXPECT_NEAR(set["hours"].get<double>(), 1.0, 0.05);
 }
 
 // The samples of the episode are kept as a run of their own.

@@ -247,7 +247,10 @@ cli::Report Run(const LimitsOptions& options, const cli::Context& context) {
   if (!options.since.empty()) {
     request.since_ns = cli::TimeWindow{options.since, ""}.since_ns(context);
   }
+  // What else the set reads is asked of its channels: not every valve has it.
   const cli::CsvOptions csv{.map = options.table.Read(context.options.utc),
+                            .required = static_cast<SignalMask>(
+                                MaskOf(Signal::kCv) | MaskOf(Signal::kX)),
                             .log = context.log};
   for (const std::string& file : options.files) {
     request.files.push_back(ReadRunFile(file, csv));

@@ -9,19 +9,6 @@
 namespace fdi::trainer {
 namespace {
 
-// The signals that most accepted samples have: a transmitter that failed for a
-// while costs those samples, not the signal.
-SignalMask UsualSignals(const storage::StoredRun& run) {
-  std::map<SignalMask, std::int64_t> counts;
-  for (const storage::StoredSample& stored : run.samples) {
-    counts[stored.sample.present] += stored.intake == Intake::kAccepted;
-  }
-  const auto most = std::max_element(
-      counts.begin(), counts.end(),
-      [](const auto& a, const auto& b) { return a.second < b.second; });
-  return most == counts.end() ? SignalMask{0} : most->first;
-}
-
 // Observers are fitted to a loop under control, so what an operator drives by
 // hand is left out as are bad and implausible readings.
 bool IsUsable(const Sample& sample, SignalMask signals) {
@@ -90,6 +77,17 @@ double DurationOf(const storage::StoredRun& run) {
   return static_cast<double>(last->sample.stamp_ns - first->sample.stamp_ns) *
              1e-9 +
          run.info.run.period_s;
+}
+
+SignalMask UsualSignals(const storage::StoredRun& run) {
+  std::map<SignalMask, std::int64_t> counts;
+  for (const storage::StoredSample& stored : run.samples) {
+    counts[stored.sample.present] += stored.intake == Intake::kAccepted;
+  }
+  const auto most = std::max_element(
+      counts.begin(), counts.end(),
+      [](const auto& a, const auto& b) { return a.second < b.second; });
+  return most == counts.end() ? SignalMask{0} : most->first;
 }
 
 TrainingRun ToTrainingRun(const storage::StoredRun& run, bool assume_normal) {

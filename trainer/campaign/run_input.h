@@ -25,6 +25,10 @@ int FaultOf(const storage::StoredRun& run);
 /// From the first to the last sample and one period more [s].
 double DurationOf(const storage::StoredRun& run);
 
+/// The signals that most accepted samples have: a transmitter that failed for a
+/// while costs those samples, not the signal.
+SignalMask UsualSignals(const storage::StoredRun& run);
+
 /// The samples of a stored run that may be trained on: accepted in their time,
 /// mode AUTO, finite, of good quality, within what a transmitter reads, and
 /// with the signals that most samples of the run have. Of a run with truth, the

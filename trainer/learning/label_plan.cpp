@@ -10,6 +10,7 @@
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/campaign_fields.h"
+#include "trainer/campaign/run_input.h"
 
 namespace fdi::trainer {
 namespace {
@@ -59,12 +60,17 @@ std::vector<storage::Episode> FindLabelled(storage::HistoryReader& history,
                         " in that time: see fdi-store history label");
   }
   for (const auto& [id, strength] : request.strengths) {
-    if (std::none_of(episodes.begin(), episodes.end(),
-                     [&id = id](const storage::Episode& episode) {
-                       return episode.episode_id.starts_with(id);
-                     })) {
-      throw NotFoundError("--strength " + id +
-                          ": no labelled episode begins like that");
+    const auto matches =
+        std::count_if(episodes.begin(), episodes.end(),
+                      [&id = id](const storage::Episode& episode) {
+                        return episode.episode_id.starts_with(id);
+                      });
+    if (matches != 1) {
+      throw NotFoundError("--strength " + id + ": " +
+                          (matches == 0 ? "no labelled episode begins"
+                                        : std::to_string(matches) +
+                                              " labelled episodes begin") +
+                          " like that");
     }
   }
   return episodes;
@@ -89,24 +95,30 @@ bool Contains(const std::vector<std::string>& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
-// The label that was learnt from the same episode, or null.
-const TrainingEpisode* SameEpisode(const std::vector<LabelledEpisode>& learnt,
+// What the label of an episode says now that the parent has learnt from, or
+// null.
+const LabelledEpisode* SameEpisode(const std::vector<LabelledEpisode>& read,
                                    const TrainingEpisode& before) {
-  for (const LabelledEpisode& now : learnt) {
-    if (now.meaning.episode_id == before.episode_id) {
-      return &now.meaning;
-    }
-  }
-  return nullptr;
+  const auto now =
+      std::find_if(read.begin(), read.end(), [&](const LabelledEpisode& e) {
+        return e.meaning.episode_id == before.episode_id;
+      });
+  return now == read.end() ? nullptr : &*now;
 }
 
 void PlanRuns(const LabelRequest& request, const std::filesystem::path& file,
               LabelPlan& plan) {
   std::set<std::string> replaced;
   for (const TrainingEpisode& before : plan.lineage.episodes) {
-    if (SameEpisode(plan.learnt, before) != nullptr) {
+    // What another label taught is forgotten even if the new one teaches
+    // nothing. Under the same label the evidence outlives the trace.
+    const LabelledEpisode* refused = SameEpisode(plan.refused, before);
+    const bool withdrawn =
+        refused != nullptr && refused->meaning.label != before.label;
+    if (withdrawn || SameEpisode(plan.learnt, before) != nullptr) {
       replaced.insert(before.run);
     }
+    plan.has_news = plan.has_news || withdrawn;
   }
   storage::RunStore store(file);
   for (const std::string& run : plan.parent->training_runs) {
@@ -120,8 +132,11 @@ void PlanRuns(const LabelRequest& request, const std::filesystem::path& file,
       plan.missing.push_back(run);
     }
   }
-  for (const std::string& run : request.runs) {
-    store.Info(run);
+  for (const std::string& selector : request.runs) {
+    // In full, as the parent names its runs. `last` would mean another run once
+    // the evidence of the labels is stored.
+    const std::string run = SelectorOf(store.Info(selector).id,
+                                       storage::ParseRunSelector(selector));
     if (!Contains(plan.runs, run)) {
       plan.runs.push_back(run);
     }

@@ -191,6 +191,15 @@ std::string NameOf(const ModelSet& models) {
   return storage::ToString({models.name, models.version});
 }
 
+std::string GlobOf(const std::string& valve_id) {
+  std::string glob;
+  for (const char c : valve_id) {
+    const bool special = c == '*' || c == '?' || c == '[';
+    glob += special ? std::string{'[', c, ']'} : std::string(1, c);
+  }
+  return glob;
+}
+
 LabelReader::LabelReader(storage::HistoryReader& history,
                          std::filesystem::path runs,
                          std::shared_ptr<const ModelSet> parent,
@@ -239,7 +248,7 @@ LabelReader::TimeSpan LabelReader::SpanAround(const storage::Episode& episode) {
   TimeSpan span;
   span.from_ns = episode.detected_ns - kLeadInNs;
   storage::EpisodeFilter earlier;
-  earlier.valve_glob = episode.valve_id;
+  earlier.valve_glob = GlobOf(episode.valve_id);
   earlier.until_ns = episode.detected_ns;
   for (const storage::Episode& other : history_.List(earlier)) {
     if (other.id != episode.id && other.detected_ns < episode.detected_ns) {
@@ -279,7 +288,7 @@ LabelReader::EpisodeSamples LabelReader::LoadSamples(
   }
   storage::RunStore store(runs_);
   storage::RunFilter filter;
-  filter.valve_glob = episode.valve_id;
+  filter.valve_glob = GlobOf(episode.valve_id);
   for (const storage::RunInfo& info : store.List(filter)) {
     // Imported runs are evidence of earlier trainings, not recordings.
     if (info.run.source_id != episode.source_id ||
@@ -320,10 +329,8 @@ void LabelReader::RequireSuited(const storage::StoredRun& run) const {
                   ", " + set + " is for " +
                   std::string(FlowUnitName(parent_->flow_unit)));
   }
-  // The signals of the first sample stand for the run.
   const SignalMask missing =
-      RequiredSignals(*parent_) &
-      static_cast<SignalMask>(~run.samples.front().sample.present);
+      RequiredSignals(*parent_) & static_cast<SignalMask>(~UsualSignals(run));
   for (std::size_t i = 0; i < kSignalCount; ++i) {
     const auto signal = static_cast<Signal>(i);
     if ((missing & MaskOf(signal)) != 0) {

@@ -89,12 +89,8 @@ ModelSet FirstSet(const ModelSet& models, storage::ModelStore& store) {
 std::vector<storage::Episode> EpisodesOf(const std::string& valve,
                                          storage::HistoryReader& history) {
   storage::EpisodeFilter filter;
-  filter.valve_glob = valve;
-  std::vector<storage::Episode> episodes = history.List(filter);
-  std::erase_if(episodes, [&](const storage::Episode& episode) {
-    return episode.valve_id != valve;
-  });
-  return episodes;
+  filter.valve_glob = GlobOf(valve);
+  return history.List(filter);
 }
 
 // The time that is not known to be healthy, or that is read with an episode.
