@@ -229,7 +229,6 @@ void CheckFaults(const std::vector<TrainingRun>& runs, const Pools& pools,
 void CheckRuns(const std::vector<TrainingRun>& runs,
                const DatasetOptions& options) {
   Require(!runs.empty(), "no run was given");
-  const TrainingRun& first = runs.front();
   for (const TrainingRun& run : runs) {
     if (run.samples.empty()) {
       throw DataError("run " + run.id + " has no sample");
@@ -238,6 +237,29 @@ void CheckRuns(const std::vector<TrainingRun>& runs,
       throw DataError("run " + run.id +
                       " carries no truth: label it, or say --assume-normal");
     }
+  }
+  RequireAlike(runs);
+  CheckSignals(runs);
+}
+
+// " CV P1"
+std::string NamesOf(SignalMask signals) {
+  std::string names;
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    if ((signals & MaskOf(signal)) != 0) {
+      names.append(" ").append(SignalName(signal));
+    }
+  }
+  return names;
+}
+
+}  // namespace
+
+void RequireAlike(const std::vector<TrainingRun>& runs) {
+  const TrainingRun& first = runs.front();
+  const SignalMask signals = first.samples.front().sample.present;
+  for (const TrainingRun& run : runs) {
     if (run.period_s != first.period_s) {
       throw DataError("run " + run.id + " has a sample period of " +
                       std::to_string(run.period_s) + " s, run " + first.id +
@@ -249,16 +271,14 @@ void CheckRuns(const std::vector<TrainingRun>& runs,
                       first.id + " in " +
                       std::string(FlowUnitName(first.flow_unit)));
     }
-    if (run.samples.front().sample.present !=
-        first.samples.front().sample.present) {
+    const SignalMask own = run.samples.front().sample.present;
+    if (own != signals) {
       throw DataError("run " + run.id + " has other signals than run " +
-                      first.id);
+                      first.id + ":" + NamesOf(own) + " instead of" +
+                      NamesOf(signals));
     }
   }
-  CheckSignals(runs);
 }
-
-}  // namespace
 
 std::vector<Condition> BuildConditions(const std::vector<TrainingRun>& runs,
                                        const DatasetOptions& options) {

@@ -51,6 +51,10 @@ struct DatasetOptions {
 std::vector<Condition> BuildConditions(const std::vector<TrainingRun>& runs,
                                        const DatasetOptions& options = {});
 
+/// @param runs with samples.
+/// @throws DataError naming two that differ in period, flow unit or signals.
+void RequireAlike(const std::vector<TrainingRun>& runs);
+
 /// The run cut wherever its samples are not one period apart.
 std::vector<Stretch> SplitAtGaps(const TrainingRun& run);
 

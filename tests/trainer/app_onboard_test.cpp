@@ -60,5 +60,21 @@ TEST_F(OnboardProgramTest, UnknownTypesAndSignalsAreNamed) {
   EXPECT_NE(blind.err.find("no signal X"), std::string::npos) << blind.err;
 }
 
+// Otherwise the work would be lost, or the set stored without its valve.
+TEST_F(OnboardProgramTest, NamesAreCheckedBeforeTheRecordIsRead) {
+  const Outcome set = Run("onboard --valve V --name a@2 --file none.csv");
+  EXPECT_EQ(set.code, 2);
+  EXPECT_NE(set.err.find("--name a@2: expected"), std::string::npos) << set.err;
+  const Outcome valve = Run("onboard --valve 'FV 1' --file none.csv");
+  EXPECT_EQ(valve.code, 2);
+  EXPECT_NE(valve.err.find("--name FV 1: expected"), std::string::npos)
+      << valve.err;
+  const Outcome type =
+      Run("onboard --valve V --save-type 'a type' --file none.csv");
+  EXPECT_EQ(type.code, 2);
+  EXPECT_NE(type.err.find("--save-type a type: expected"), std::string::npos)
+      << type.err;
+}
+
 }  // namespace
 }  // namespace fdi::trainer

@@ -240,5 +240,45 @@ TEST(OnboardTest, RefusesWhatIsNotHealthyData) {
   EXPECT_THROW(Onboard({without_x}, options), DataError);
 }
 
+// Before the physics are fitted to what is not one record.
+TEST(OnboardTest, RefusesRunsThatDifferAndSaysByWhat) {
+  OnboardingOptions options;
+  options.name = "x";
+  options.type = Lublin();
+  options.fit = false;
+  const TrainingRun run = RunOf(Strange(700.0));
+  const auto refusal = [&](const TrainingRun& other) -> std::string {
+    try {
+      Onboard({run, other}, options);
+    } catch (const DataError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  TrainingRun blind = run;
+  blind.id = "blind";
+  for (LabelledSample& labelled : blind.samples) {
+    labelled.sample.present = kBasicSignals & ~MaskOf(Signal::kX);
+  }
+  EXPECT_EQ(refusal(blind),
+            "run blind has other signals than run strange: CV P1 P2 T1 F "
+            "instead of CV P1 P2 T1 X F");
+  TrainingRun slow = run;
+  slow.period_s = 2.0;
+  EXPECT_NE(refusal(slow).find("a sample period of 2"), std::string::npos);
+}
+
+TEST(OnboardTest, RunWithoutSamplesIsLeftOutWhereverTheValveWorks) {
+  const TrainingRun at_work = RunOf(Strange(700.0));
+  TrainingRun shut = at_work;
+  for (LabelledSample& labelled : shut.samples) {
+    labelled.sample.Set(Signal::kX, 100.0);
+  }
+  TrainingRun empty = at_work;
+  empty.samples.clear();
+  EXPECT_EQ(WithoutStops({empty, at_work}).size(), 1U);
+  EXPECT_EQ(WithoutStops({empty, shut}).size(), 1U);
+}
+
 }  // namespace
 }  // namespace fdi::trainer

@@ -4,8 +4,10 @@
 #include <map>
 #include <sstream>
 
+#include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/models/model_codec.h"
+#include "storage/models/models.h"
 #include "trainer/rule_text.h"
 #include "trainer/statistics.h"
 
@@ -119,6 +121,19 @@ std::string WindowsText(const ModelSet& models) {
 }
 
 }  // namespace
+
+void RequireStorable(const std::string& name, const std::string& option) {
+  try {
+    if (!storage::ParseModelReference(name).version) {
+      return;
+    }
+  } catch (const ConfigError&) {
+    // Refused likewise.
+  }
+  throw ConfigError(option + " " + name +
+                    ": expected letters, digits, . _ -, at most 64, and no "
+                    "version, which is given when it is stored");
+}
 
 std::string FaultsText(const std::vector<int>& faults) {
   return faults.empty() ? "none" : FaultList(faults, ", ");

@@ -8,6 +8,10 @@
 
 namespace fdi::trainer {
 
+/// @throws ConfigError naming the option unless a model set or a type can be
+///   stored under `name`: before the work, not after it.
+void RequireStorable(const std::string& name, const std::string& option);
+
 /// "f3|f6, f1|f10"; "none" if there is no group.
 std::string GroupsText(const ModelSet& models);
 /// "f8, f14"; "none".

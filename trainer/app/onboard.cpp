@@ -401,6 +401,11 @@ Progress Reporting(cli::Progress& bar, const cli::StopSignals& signals) {
 
 cli::Report OnboardValve(const OnboardOptions& options,
                          const cli::Context& context) {
+  const std::string name = options.name.empty() ? options.valve : options.name;
+  RequireStorable(name, "--name");
+  if (!options.save_type.empty()) {
+    RequireStorable(options.save_type, "--save-type");
+  }
   const storage::DataDirectory directory{context.options.data_dir};
   const std::vector<TrainingRun> runs = LoadRuns(options, context);
   storage::EnsureExists(directory);
@@ -408,7 +413,7 @@ cli::Report OnboardValve(const OnboardOptions& options,
                             storage::Access::kOccasionalWriter);
   const FoundType found = FindType(options.type, store);
   OnboardingOptions settings;
-  settings.name = options.name.empty() ? options.valve : options.name;
+  settings.name = name;
   settings.type = found.type;
   settings.fit = options.fit && !found.stored;
   settings.of_type = SetOf(found, store);

@@ -62,10 +62,7 @@ void Override(const TrainOptions& options, TrainingOptions& training) {
   if (training.name.empty()) {
     throw ConfigError("the model set needs a name: --name NAME");
   }
-  if (storage::ParseModelReference(training.name).version) {
-    throw ConfigError("--name " + training.name +
-                      ": the version is given when it is stored");
-  }
+  RequireStorable(training.name, "--name");
 }
 
 // `train --runs` is a campaign in memory.

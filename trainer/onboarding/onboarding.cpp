@@ -252,7 +252,9 @@ std::vector<TrainingRun> WithoutStops(std::vector<TrainingRun> runs) {
     stops += static_cast<double>(std::ranges::count_if(run.samples, at_stop));
     samples += static_cast<double>(run.samples.size());
   }
+  const auto is_empty = [](const auto& run) { return run.samples.empty(); };
   if (stops > kMaxStopShare * samples) {
+    std::erase_if(runs, is_empty);
     return runs;
   }
   for (TrainingRun& run : runs) {
@@ -264,7 +266,7 @@ std::vector<TrainingRun> WithoutStops(std::vector<TrainingRun> runs) {
       return since_s < kAfterS;
     });
   }
-  std::erase_if(runs, [](const auto& run) { return run.samples.empty(); });
+  std::erase_if(runs, is_empty);
   return runs;
 }
 
@@ -476,6 +478,7 @@ double Hours(const std::vector<TrainingRun>& runs) {
 //
 //   RequireHealthy   the record as given, and once more without its stops,
 //                    which may have cut its longest stretch short
+//   RequireAlike     runs that cannot be of one valve as it is measured now
 //   CheckRecords     units and sense, before anything is fitted to them
 //   InUnit           the flow range of the type in the unit of the record,
 //                    before simulated and measured flows are compared
@@ -487,6 +490,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   RequireHealthy(all);
   const std::vector<TrainingRun> runs = WithoutStops(all);
   RequireHealthy(runs);
+  RequireAlike(runs);
   const SignalMask signals =
       runs.front().samples.front().sample.present & kBasicSignals;
   TrainingOptions training = TrainingOf(options, signals);
