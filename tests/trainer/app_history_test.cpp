@@ -104,6 +104,10 @@ TEST_F(AppHistoryTest, WhatCannotBeUsedIsNamedWithItsExitCode) {
   const Outcome time = Run(Call());
   EXPECT_EQ(time.code, 3);
   EXPECT_THAT(time.err, HasSubstr("orders.csv:2"));
+  WriteOrders("LV-1,1772323200000,f19\n");  // ms
+  const Outcome late = Run(Call());
+  EXPECT_EQ(late.code, 3);
+  EXPECT_THAT(late.err, AllOf(HasSubstr("orders.csv:2"), HasSubstr("9e9 s")));
   WriteOrders("LV-1,2026-03-01,rust\n");
   EXPECT_THAT(Run(Call()).err, HasSubstr("'rust' is neither nothing nor"));
   WriteOrders("LV-1,2026-03-01,f19\n");
@@ -116,6 +120,12 @@ TEST_F(AppHistoryTest, WhatCannotBeUsedIsNamedWithItsExitCode) {
   EXPECT_EQ(overlap.code, 3);
   EXPECT_THAT(overlap.err, AllOf(HasSubstr("c_2026-03-01T0001.csv"),
                                  HasSubstr("2026-03-01T00:07:29Z")));
+
+  WriteFile("plant/LV-1/pump_1234-56-78.csv", 0, 100);
+  const Outcome date = Run(Call());
+  EXPECT_EQ(date.code, 3);
+  EXPECT_THAT(date.err, AllOf(HasSubstr("pump_1234-56-78.csv"),
+                              HasSubstr("1234-56-78, does not exist")));
 }
 
 }  // namespace

@@ -32,7 +32,14 @@ std::int64_t TimeOf(const CsvRows& rows, std::size_t row) {
   const std::string& cell = rows.Cell(row, kOrderTime);
   //     time = seconds on the axis of the records / RFC 3339
   if (cell.find_first_not_of("0123456789.") == std::string::npos) {
-    return std::llround(rows.Number(row, kOrderTime) * 1e9);
+    constexpr double kMost = 9e9;  // s; the stamps of samples end there.
+    const double seconds = rows.Number(row, kOrderTime);
+    if (seconds > kMost) {
+      rows.Refuse(row, "time " + cell +
+                           " is not in 0..9e9 s; expected seconds, or a date "
+                           "such as 2026-03-01T14:00:00Z");
+    }
+    return std::llround(seconds * 1e9);
   }
   try {
     return cli::ParseTime(cell, true);
@@ -92,7 +99,12 @@ std::optional<std::int64_t> StartInName(const path& file) {
     time = match[1].str() + "T" + match[2].str() + ":" + match[3].str() + ":" +
            (match[4].matched ? match[4].str() : "00") + "Z";
   }
-  return cli::ParseTime(time, true);
+  try {
+    return cli::ParseTime(time, true);
+  } catch (const ConfigError&) {
+    throw DataError(file.string() + ": the date in its name, " +
+                    match[0].str() + ", does not exist");
+  }
 }
 
 // Episodes.
