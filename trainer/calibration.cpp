@@ -5,12 +5,14 @@
 #include <numbers>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "diagnosis/error.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/residual_windows.h"
 #include "diagnosis/student.h"
+#include "trainer/rule_text.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer {
@@ -21,6 +23,7 @@ constexpr double kShrinkage = 50.0;
 constexpr double kUpperBound = 1.645;  // 95 % of a normal distribution
 constexpr double kMinShape = -0.1;
 constexpr double kMaxShape = 0.3;
+constexpr double kMaxRate = 0.01;  // per sample; below is no tail any more
 
 double Quantile(std::vector<double> values, double q) {
   const auto at =
@@ -72,7 +75,7 @@ void FitPareto(const std::vector<double>& maxima, TailThreshold& tail) {
 TailThreshold FitTail(std::span<const double> series, double rate,
                       int separation) {
   Require(series.size() >= 100, "a tail needs at least 100 values");
-  Require(rate > 0.0 && rate <= 0.01, "the rate must be in (0, 0.01]");
+  Require(rate > 0.0 && rate <= kMaxRate, "the rate must be in (0, 0.01]");
   Require(separation >= 1, "the separation must be at least 1 sample");
   TailThreshold tail;
   tail.base = Quantile({series.begin(), series.end()}, kTailQuantile);
@@ -416,6 +419,13 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
   }
   const double share = rate_per_hour * models.sample_period_s /
                        (3600.0 * static_cast<double>(tests));
+  if (share > kMaxRate) {
+    throw ConfigError("false alarms per hour are " + Digits(rate_per_hour, 4) +
+                      ", accepted are up to " +
+                      Digits(rate_per_hour * kMaxRate / share, 4) + " for " +
+                      std::to_string(tests) + " tests and a sample period of " +
+                      Digits(models.sample_period_s, 4) + " s");
+  }
   const auto block =
       static_cast<std::size_t>(std::max(2.0, kBlockS / models.sample_period_s));
   const double day = 24.0 * rate_per_hour / static_cast<double>(tests);
@@ -429,6 +439,13 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
     const auto level = [&](double sign) {
       const std::vector<double> series =
           Sustained(joined, sign, models.decision.detection_samples);
+      if (series.size() < kMinValues) {
+        throw DataError("channel " + channel.name +
+                        ": normal operation has detection_samples residuals "
+                        "in a row " +
+                        std::to_string(series.size()) + " times, needed are " +
+                        std::to_string(kMinValues));
+      }
       const double floor = 1e-6 + std::sqrt(Variance(joined));
       return std::max(floor, FitTail(series, share, separation).level) + slow;
     };

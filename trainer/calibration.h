@@ -85,6 +85,8 @@ double SlowAllowance(const ResidualSeries& residuals, std::size_t block,
 /// @param residuals by channel.
 /// @param windows lengths N by channel [samples].
 /// @param commands CV at the samples of the residuals; empty: no slopes.
+/// @throws ConfigError if `rate_per_hour` is above 0.01 per sample and test,
+///   DataError naming the channel if it has fewer than 100 residuals.
 void FitThresholds(const std::vector<ResidualSeries>& residuals,
                    const std::vector<std::vector<int>>& windows,
                    double rate_per_hour, ModelSet& models,

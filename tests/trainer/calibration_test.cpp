@@ -1,6 +1,8 @@
 #include "trainer/calibration.h"
 
 #include <cmath>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -136,6 +138,24 @@ TEST(SlowAllowanceTest, NarrowsWithHours) {
 // What the thresholds of a channel X with a window allow for another day.
 double Slow(const ResidualSeries& residuals) {
   return SlowAllowance(residuals, 600, 0.2, 24.0 * 1e-3 / 5.0);
+}
+
+TEST(ThresholdsTest, RatesAndRecordsWithoutATailAreNamed) {
+  ModelSet models;
+  models.channels = {{"X", Signal::kX, -1.0, 1.0}};
+  const auto refusal = [&](std::size_t samples, double rate) -> std::string {
+    try {
+      FitThresholds({{GaussianSeries(samples, 7)}}, {{}}, rate, models);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  // 0.01 a sample of 1 s, for each of two sides.
+  EXPECT_EQ(refusal(1000, 71.0), "");
+  EXPECT_NE(refusal(1000, 73.0).find("accepted are up to 72"),
+            std::string::npos);
+  EXPECT_EQ(refusal(90, 1e-3).find("channel X: "), 0U);
 }
 
 TEST(ThresholdsTest, ConsecutiveSamplesAllowALowerThreshold) {
