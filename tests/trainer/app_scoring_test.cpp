@@ -115,6 +115,19 @@ TEST_F(AppReducedTest, SetWithoutAFaultAnswersAsIfNeverToldOfIt) {
   EXPECT_THAT(Read("out.txt"), HasSubstr("two@1 without f1"));
 }
 
+// A week without samples is no week without an alarm.
+TEST_F(AppReducedTest, GapsAreNoHoursWithoutFault) {
+  std::string csv = "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h\n";
+  for (int k = 0; k < 360; ++k) {
+    csv +=
+        std::to_string(k < 180 ? k : k + 604800) + ",70,3500,2600,100,70,17\n";
+  }
+  Write("gap.csv", csv);
+  const json summary = RunJson(
+      "evaluate --model-set two --file gap.csv --assume-normal")["summary"];
+  EXPECT_NEAR(summary["fault_free_hours"].get<double>(), 0.1, 1e-9);
+}
+
 TEST_F(AppReducedTest, FaultLeftOutIsUnknownOrWronglyNamed) {
   const json result =
       RunJson("evaluate --model-set two --campaign two.toml --leave-one-out");

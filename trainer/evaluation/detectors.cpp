@@ -312,7 +312,8 @@ EvaluatedRun Evaluate(const Detector& detector, const ScoredRun& run,
   result.indices = ComputeIndices(answer.indications, run.horizon_s);
   result.indices.run_id = run.name;
   result.has_truth = settings.assume_normal || HasTruth(run.run);
-  result.duration_s = DurationOf(run.run);
+  result.duration_s = run.run.info.run.period_s *
+                      static_cast<double>(answer.indications.size());
   result.seconds = answer.seconds;
   for (const Indication& indication : answer.indications) {
     if (!indication.isolated.empty() || indication.withdrawn) {
