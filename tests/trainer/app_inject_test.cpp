@@ -46,6 +46,14 @@ TEST_F(AppInjectTest, FileComesOutWithTheFaultAndItsTruth) {
   EXPECT_FALSE(std::filesystem::exists(Path("data")));
 }
 
+TEST_F(AppInjectTest, NothingIsWrittenOfWhatCannotBeStored) {
+  const Outcome outcome =
+      Run("inject --file healthy.csv --fault f19:abrupt@200 -o f.csv --store");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--valve ID"));
+  EXPECT_FALSE(std::filesystem::exists(Path("f.csv")));
+}
+
 TEST_F(AppInjectTest, StoredRunNamesItsSourceAndCanBeCut) {
   const std::string first = RunJson(
       "inject --file healthy.csv --valve LV-1 --fault "

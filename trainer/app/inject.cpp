@@ -84,9 +84,6 @@ std::string Store(const InjectedRun& injected, const InjectOptions& options,
   const storage::DataDirectory directory{context.options.data_dir};
   storage::NewRun row = injected.run.info.run;
   row.valve_id = options.valve.empty() ? row.valve_id : options.valve;
-  if (row.valve_id.empty()) {
-    throw ConfigError("a stored run belongs to a valve: --valve ID");
-  }
   // A file whose times have no date becomes a record that starts now.
   const std::int64_t shift =
       row.start_ns != 0 ? 0 : cli::NowNs() / kNsPerSecond * kNsPerSecond;
@@ -149,6 +146,10 @@ cli::Report ReportOf(const InjectedRun& injected, const std::string& id,
 
 cli::Report Inject(const InjectOptions& options, const cli::Context& context) {
   const FaultInjection injection = InjectionOf(options);
+  const bool store = options.output.empty() || options.store;
+  if (store && !options.file.empty() && options.valve.empty()) {
+    throw ConfigError("a stored run belongs to a valve: --valve ID");
+  }
   if (options.file.empty() && options.table.given()) {
     throw ConfigError("--map, --zone and --resample are of --file");
   }
@@ -158,7 +159,6 @@ cli::Report Inject(const InjectOptions& options, const cli::Context& context) {
   if (!options.output.empty()) {
     Write(injected, options.output);
   }
-  const bool store = options.output.empty() || options.store;
   return ReportOf(injected,
                   store ? Store(injected, options, context) : std::string(),
                   options.output.string());
