@@ -95,17 +95,10 @@ std::vector<TrainingRun> TrainingRuns(const EvaluateOptions& options,
                         ": there is no [[run]] to fit the baseline to");
     }
     stored = LoadCampaignRuns(campaign.runs, context);
-  }
-  if (!options.train_runs.empty()) {
-    const storage::DataDirectory directory{context.options.data_dir};
-    storage::RunStore store(directory.runs());
-    for (const std::string& selector : options.train_runs) {
-      stored.push_back(store.Load(selector));
-    }
-  }
-  for (const std::string& file : options.train_files) {
-    stored.push_back(
-        ReadRunFile(file, options.selection.ForFiles(kBasicSignals, context)));
+  } else {
+    stored = LoadRunsAndFiles(
+        options.train_runs, options.train_files, {context.options.data_dir},
+        options.selection.ForFiles(kBasicSignals, context));
   }
   std::vector<TrainingRun> runs;
   for (const storage::StoredRun& run : stored) {

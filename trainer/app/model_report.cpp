@@ -8,6 +8,7 @@
 #include "diagnosis/fault_catalogue.h"
 #include "storage/models/model_codec.h"
 #include "storage/models/models.h"
+#include "trainer/evaluation/evaluated_run.h"
 #include "trainer/rule_text.h"
 #include "trainer/statistics.h"
 
@@ -17,14 +18,6 @@ namespace {
 using cli::Align;
 using cli::FormatNumber;
 using cli::Json;
-
-std::string FaultList(const std::vector<int>& faults, const char* separator) {
-  std::string text;
-  for (const int fault : faults) {
-    text += (text.empty() ? "" : separator) + FaultName(fault);
-  }
-  return text;
-}
 
 Json RegressorsJson(const TsModel& model) {
   Json regressors = Json::array();
@@ -133,18 +126,6 @@ void RequireStorable(const std::string& name, const std::string& option) {
   throw ConfigError(option + " " + name +
                     ": expected letters, digits, . _ -, at most 64, and no "
                     "version, which is given when it is stored");
-}
-
-std::string FaultsText(const std::vector<int>& faults) {
-  return faults.empty() ? "none" : FaultList(faults, ", ");
-}
-
-std::string GroupsText(const ModelSet& models) {
-  std::string text;
-  for (const std::vector<int>& group : models.groups) {
-    text += (text.empty() ? "" : ", ") + FaultList(group, "|");
-  }
-  return text.empty() ? "none" : text;
 }
 
 cli::Json FaultsJson(const std::vector<int>& faults) {

@@ -12,10 +12,6 @@ namespace fdi::trainer {
 ///   stored under `name`: before the work, not after it.
 void RequireStorable(const std::string& name, const std::string& option);
 
-/// "f3|f6, f1|f10"; "none" if there is no group.
-std::string GroupsText(const ModelSet& models);
-/// "f8, f14"; "none".
-std::string FaultsText(const std::vector<int>& faults);
 /// What is known about false alarms: the rate that the limits are set for, the
 /// hours that were seen, and what these alone bound.
 std::string AlarmRateText(const ModelSet& models);

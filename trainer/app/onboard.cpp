@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -28,6 +27,7 @@
 #include "trainer/campaign/campaign_runs.h"
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
+#include "trainer/evaluation/evaluated_run.h"
 #include "trainer/learning/labelled_episodes.h"
 #include "trainer/onboarding/onboarding.h"
 #include "trainer/rule_text.h"
@@ -314,14 +314,6 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
   if (options.runs.empty() && options.files.empty()) {
     throw ConfigError("healthy data are needed: --runs ID,... or --file CSV");
   }
-  std::vector<storage::StoredRun> stored;
-  if (!options.runs.empty()) {
-    const storage::DataDirectory directory{context.options.data_dir};
-    storage::RunStore store(directory.runs());
-    for (const std::string& selector : options.runs) {
-      stored.push_back(store.Load(selector));
-    }
-  }
   if (options.files.empty() && options.table.given()) {
     throw ConfigError("--map, --zone and --resample are of --file");
   }
@@ -329,9 +321,8 @@ std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
                       .log = context.log};
   csv.required =
       static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kX));
-  for (const std::string& file : options.files) {
-    stored.push_back(ReadRunFile(file, csv));
-  }
+  std::vector<storage::StoredRun> stored = LoadRunsAndFiles(
+      options.runs, options.files, {context.options.data_dir}, csv);
   std::vector<TrainingRun> runs;
   for (storage::StoredRun& run : stored) {
     ConvertFlow(run, stored.front().info.run.flow_unit, context.log);

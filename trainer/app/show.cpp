@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <set>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -28,6 +27,7 @@
 #include "trainer/app/verbs.h"
 #include "trainer/campaign/campaign_fields.h"
 #include "trainer/campaign/run_input.h"
+#include "trainer/evaluation/evaluated_run.h"
 #include "trainer/learning/labelled_episodes.h"
 #include "trainer/regression.h"
 #include "trainer/rule_text.h"

@@ -131,6 +131,22 @@ storage::StoredRun ReadRunFile(const std::string& text, cli::CsvOptions csv) {
   return run;
 }
 
+std::vector<storage::StoredRun> LoadRunsAndFiles(
+    const std::vector<std::string>& runs, const std::vector<std::string>& files,
+    const storage::DataDirectory& directory, const cli::CsvOptions& csv) {
+  std::vector<storage::StoredRun> loaded;
+  if (!runs.empty()) {
+    storage::RunStore store(directory.runs());
+    for (const std::string& selector : runs) {
+      loaded.push_back(store.Load(selector));
+    }
+  }
+  for (const std::string& file : files) {
+    loaded.push_back(ReadRunFile(file, csv));
+  }
+  return loaded;
+}
+
 void ConvertFlow(storage::StoredRun& run, FlowUnit unit, const LogSink& log) {
   if (run.info.run.flow_unit == unit) {
     return;

@@ -1,12 +1,12 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/csv.h"
 #include "diagnosis/sample.h"
+#include "storage/database/data_directory.h"
 #include "storage/runs/runs.h"
 
 namespace fdi::trainer {
@@ -28,6 +28,12 @@ std::vector<std::filesystem::path> MatchingFiles(
 /// @throws NotFoundError if there is no such file or no sample in the stretch.
 /// @throws ConfigError if the stretch is none; DataError as ReadCsvFile().
 storage::StoredRun ReadRunFile(const std::string& text, cli::CsvOptions csv);
+
+/// Stored runs, ID or ID@from:to, then files as ReadRunFile() reads them.
+/// @throws as RunStore::Load() and ReadRunFile().
+std::vector<storage::StoredRun> LoadRunsAndFiles(
+    const std::vector<std::string>& runs, const std::vector<std::string>& files,
+    const storage::DataDirectory& directory, const cli::CsvOptions& csv);
 
 /// Brings the flow of a run to `unit` by the density of water at T1.
 void ConvertFlow(storage::StoredRun& run, FlowUnit unit, const LogSink& log);

@@ -1,7 +1,6 @@
 #include "trainer/evaluation/comparison.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <sstream>
 #include <utility>

@@ -9,6 +9,14 @@
 namespace fdi::trainer {
 namespace {
 
+std::string Listed(const std::vector<int>& faults, const char* separator) {
+  std::string text;
+  for (const int fault : faults) {
+    text += (text.empty() ? "" : separator) + FaultName(fault);
+  }
+  return text;
+}
+
 std::size_t IndexIn(const std::set<FaultGroup>& sorted,
                     const FaultGroup& group) {
   return static_cast<std::size_t>(
@@ -27,12 +35,19 @@ FaultGroup GroupOf(int fault, const std::vector<FaultGroup>& groups) {
 }
 
 std::string SetText(const std::vector<int>& set) {
+  return Listed(set, "|");
+}
+
+std::string GroupsText(const ModelSet& models) {
   std::string text;
-  for (const int fault : set) {
-    text += text.empty() ? "" : "|";
-    text += FaultName(fault);
+  for (const FaultGroup& group : models.groups) {
+    text += (text.empty() ? "" : ", ") + SetText(group);
   }
-  return text;
+  return text.empty() ? "none" : text;
+}
+
+std::string FaultsText(const std::vector<int>& faults) {
+  return faults.empty() ? "none" : Listed(faults, ", ");
 }
 
 bool IsDetected(const EvaluatedRun& run) {

@@ -14,7 +14,7 @@ namespace fdi::trainer {
 struct EvaluatedRun {
   RunIndices indices;
   bool has_truth{true};
-  double duration_s{0.0};
+  double duration_s{0.0};     ///< Of its samples: gaps do not count.
   std::vector<int> last_set;  ///< Last set isolated in the whole run.
   /// Seconds by quality; empty where a detector gives none.
   std::optional<std::array<double, kQualityCount>> seconds{};
@@ -28,6 +28,10 @@ FaultGroup GroupOf(int fault, const std::vector<FaultGroup>& groups);
 
 /// "f3|f6"; empty for the empty set.
 std::string SetText(const std::vector<int>& set);
+/// "f3|f6, f1|f10"; "none" if there is no group.
+std::string GroupsText(const ModelSet& models);
+/// "f8, f14"; "none".
+std::string FaultsText(const std::vector<int>& faults);
 
 /// DD at the horizon under a fault, an episode at all without one.
 bool IsDetected(const EvaluatedRun& run);

@@ -1,5 +1,6 @@
 #include "trainer/evaluation/evaluation_report.h"
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <sstream>

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <array>
-#include <filesystem>
 #include <ostream>
 #include <string>
 #include <vector>

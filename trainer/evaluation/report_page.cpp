@@ -500,13 +500,6 @@ std::string ReportPage::Html(const std::vector<EvaluatedRun>& runs,
                              const std::string& command_line) const {
   const std::string set =
       HtmlText(models_.name + "@" + std::to_string(models_.version));
-  const auto list = [](const auto& items, const auto& text_of) {
-    std::string text;
-    for (const auto& item : items) {
-      text += (text.empty() ? "" : ", ") + text_of(item);
-    }
-    return text.empty() ? "none" : text;
-  };
   std::string sections;
   for (std::size_t r = 0; r < runs.size(); ++r) {
     sections += "<h3 id=\"" + RunAnchor(r) + "\">" +
@@ -523,8 +516,8 @@ std::string ReportPage::Html(const std::vector<EvaluatedRun>& runs,
          HtmlText(LeadText(FiguresOf(runs, models_.groups))) +
          "</p>\n<p class=\"note\">Model set " + set + ", hash " +
          storage::HashHex(models_.content_hash) +
-         "; not told apart: " + list(models_.groups, SetText) +
-         "; undetectable: " + list(models_.undetectable, FaultName) +
+         "; not told apart: " + GroupsText(models_) +
+         "; undetectable: " + FaultsText(models_.undetectable) +
          ".<br>Scored by " + HtmlText(software) + ": <code>" +
          HtmlText(command_line) + "</code></p>\n<h2>By fault</h2>\n" +
          FiguresTable(models_.groups, runs, false) +

@@ -55,6 +55,10 @@ std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
     name = name.empty() ? RunName(run) : std::move(name);
     runs.push_back({std::move(run), std::move(name), horizon_s, runs.size()});
   };
+  // Before the campaign stores runs of its own, one of which would be `last`.
+  std::vector<storage::StoredRun> given = LoadRunsAndFiles(
+      selection.runs, selection.files, {context.options.data_dir},
+      selection.ForFiles(required, context));
   if (!selection.campaign.empty()) {
     const std::vector<CampaignRun> validation =
         ValidationRuns(selection.campaign, selection.seed_offset);
@@ -65,15 +69,8 @@ std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
           validation[i].horizon_s);
     }
   }
-  if (!selection.runs.empty()) {
-    const storage::DataDirectory directory{context.options.data_dir};
-    storage::RunStore store(directory.runs());
-    for (const std::string& selector : selection.runs) {
-      add(store.Load(selector));
-    }
-  }
-  for (const std::string& file : selection.files) {
-    add(ReadRunFile(file, selection.ForFiles(required, context)));
+  for (storage::StoredRun& run : given) {
+    add(std::move(run));
   }
   return runs;
 }

@@ -1,7 +1,6 @@
 #include "trainer/onboarding/onboarding.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <thread>
