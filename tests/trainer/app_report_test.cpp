@@ -186,6 +186,26 @@ TEST_F(AppReportTest, ReportStandsAloneAndShowsEveryRun) {
   EXPECT_EQ(Count(page, "<table"), Count(page, "</table>"));
 }
 
+// All traces end at 899 of 900 s, whose x is 889.12. Those of a run whose first
+// samples are rejected ended earlier, beside the mark of the fault.
+TEST_F(AppReportTest, TracesBeginWhereTheRunDoes) {
+  std::vector<LabelledSample> samples = FaultySamples();
+  WriteFile("a.csv", samples);
+  for (std::size_t k = 0; k < 200; ++k) {
+    samples[k].sample.Set(Signal::kX, 5000.0);
+  }
+  WriteFile("b.csv", samples);
+  const auto ends = [&](const std::string& name) {
+    EXPECT_EQ(Run("evaluate --model-set quick --file " + name +
+                  ".csv --report " + name)
+                  .code,
+              0);
+    return Count(Read(name + "/index.html"), "889.12,");
+  };
+  EXPECT_GE(ends("a"), 4U);
+  EXPECT_GE(ends("b"), 4U);
+}
+
 TEST_F(AppReportTest, DayLongRunStaysWithinItsBytes) {
   WriteFile("long.csv", FaultySamples(96));  // 86400 samples
   ASSERT_EQ(

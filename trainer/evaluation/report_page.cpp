@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <functional>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -262,11 +263,15 @@ class ReportPage::RunPicture {
         peaks_(models.faults.size(), 0.0) {}
 
   void Add(const Verdict& verdict) {
+    if (OutOfOrder(verdict.intake)) {
+      return;
+    }
+    // That of the indications, of which rejected samples have one, too.
+    first_stamp_ns_ = first_stamp_ns_.value_or(verdict.stamp_ns);
     if (verdict.intake != Intake::kAccepted) {
       return;
     }
-    first_stamp_ns_ = time_s_.empty() ? verdict.stamp_ns : first_stamp_ns_;
-    time_s_.push_back(static_cast<double>(verdict.stamp_ns - first_stamp_ns_) *
+    time_s_.push_back(static_cast<double>(verdict.stamp_ns - *first_stamp_ns_) *
                       1e-9);
     settling_.push_back(verdict.quality == Quality::kSettling);
     for (std::size_t c = 0; c < residuals_.size(); ++c) {
@@ -458,7 +463,7 @@ class ReportPage::RunPicture {
 
   const ModelSet& models_;
   double duration_s_;
-  std::int64_t first_stamp_ns_{0};
+  std::optional<std::int64_t> first_stamp_ns_;  // t = 0
   std::vector<double> time_s_;  // Of the accepted samples, as all that follow.
   std::vector<bool> settling_;
   std::vector<std::vector<double>> residuals_;  // By channel [its unit].
