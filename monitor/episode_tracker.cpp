@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "diagnosis/model_set.h"
@@ -72,6 +73,11 @@ void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
       !trace_.Continues(sample, verdict, channels, faults)) {
     WriteTrace(false, outlet);
   }
+  // before_s bounds what precedes a detection. Of an open episode nothing may
+  // be dropped before it is written, which takes points_per_write samples.
+  trace_.set_span_ns(open_ && open_->tracing
+                         ? std::numeric_limits<std::int64_t>::max()
+                         : Ns(options_.before_s));
   trace_.Push(sample, verdict, channels, faults);
   source_id_ = sample.source_id;
   seq_ = sample.seq;

@@ -38,6 +38,7 @@ class Trace {
   /// Moves the content out and leaves the trace empty.
   Trace Take();
 
+  void set_span_ns(std::int64_t span_ns) { span_ns_ = span_ns; }
   std::size_t size() const { return size_; }
   std::size_t bytes() const;
 

@@ -201,6 +201,26 @@ TEST_F(ValveMonitorTest, EvidenceRunsFromBeforeDetectionToTheEndWithoutHoles) {
             notebook_.events.back().transition.stamp_ns);
 }
 
+// Less is kept from before than waits to be written.
+TEST_F(ValveMonitorTest, EvidenceAfterADetectionIsWholeHoweverLittleIsKept) {
+  TraceOptions options;
+  options.before_s = 3.0;
+  ValveMonitor valve("V1", EngineParts(SharedLinearModels()), options);
+  for (std::uint64_t k = 0; k < 200; ++k) {
+    const double offset = k < 100 || k >= 150 ? 0.0 : kF7Offset;
+    valve.Step(PlantSample(k, offset), kWriter, now_, notebook_);
+  }
+
+  ASSERT_TRUE(notebook_.complete);
+  const std::int64_t detected = notebook_.events.front().transition.stamp_ns;
+  const auto& evidence = notebook_.evidence;
+  EXPECT_EQ(detected - evidence.front().second.sample.stamp_ns, 3'000'000'000);
+  for (std::size_t k = 1; k < evidence.size(); ++k) {
+    EXPECT_EQ(evidence[k].second.sample.seq,
+              evidence[k - 1].second.sample.seq + 1);
+  }
+}
+
 TEST_F(ValveMonitorTest, EvidenceEndsTenMinutesAfterIsolation) {
   Feed(0, 100);
   Feed(100, 1500, kF7Offset);
