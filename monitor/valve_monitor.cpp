@@ -94,7 +94,7 @@ void ValveMonitor::RecordPosition(const Sample& sample) {
 
 ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
                                 TimePoint received, EpisodeOutlet& outlet) {
-  const bool first = !std::exchange(seen_, true);
+  seen_ = true;
   received_ = received;
   stale_counted_ = received;
   stale_ = false;
@@ -102,10 +102,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   const bool swapped = std::exchange(swapped_, false);
   if (!engine_) {
     writer_ = writer;
-    if (!first && sample.stamp_ns > unassigned_.stamp_ns) {
-      unassigned_interval_ns_ = std::clamp(
-          sample.stamp_ns - unassigned_.stamp_ns, kMinPeriodNs, kMaxPeriodNs);
-    }
+    MeasurePeriod(sample.stamp_ns);
     unassigned_.stamp_ns = sample.stamp_ns;
     unassigned_.source_id = sample.source_id;
     unassigned_.seq = sample.seq;
@@ -146,6 +143,18 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   FollowStrengths(verdict, outlet);
   const auto missing = static_cast<SignalMask>(required_ & ~sample.present);
   return {verdict, models_.get(), swapped, isolation_held_, missing};
+}
+
+// The shorter one of the last two intervals: a gap is no period.
+void ValveMonitor::MeasurePeriod(std::int64_t stamp_ns) {
+  if (unassigned_.stamp_ns == 0 || stamp_ns <= unassigned_.stamp_ns) {
+    return;
+  }
+  const std::int64_t interval_ns =
+      std::clamp(stamp_ns - unassigned_.stamp_ns, kMinPeriodNs, kMaxPeriodNs);
+  unassigned_period_ns_ =
+      std::min(interval_ns, unassigned_interval_ns_.value_or(interval_ns));
+  unassigned_interval_ns_ = interval_ns;
 }
 
 void ValveMonitor::FollowStrengths(const Verdict& verdict,
@@ -195,7 +204,7 @@ void ValveMonitor::ReadDrift(std::vector<FollowedDrift>& drift) const {
 
 double ValveMonitor::period_s() const {
   return models_ ? models_->sample_period_s
-                 : static_cast<double>(unassigned_interval_ns_) / 1e9;
+                 : static_cast<double>(unassigned_period_ns_) / 1e9;
 }
 
 bool ValveMonitor::EndStream(std::uint64_t writer, EpisodeOutlet& outlet) {
@@ -228,6 +237,10 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
   } else {
     Close(EndReason::kModelChanged, outlet);
     engine_.reset();
+    // The period is measured anew, beginning with that of the old set.
+    unassigned_period_ns_ = std::llround(period_s() * 1e9);
+    unassigned_interval_ns_.reset();
+    unassigned_.stamp_ns = 0;
   }
   // The old set has to last until here: the end of the episode is recorded with
   // it. answer_ may point into names_, which is replaced.

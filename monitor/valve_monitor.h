@@ -113,6 +113,7 @@ class ValveMonitor {
 
   bool RestartsEngine(const Sample& sample) const;
   void RecordPosition(const Sample& sample);
+  void MeasurePeriod(std::int64_t stamp_ns);
   void Close(EndReason reason, EpisodeOutlet& outlet);
   void End(const Transition& closed, EpisodeOutlet& outlet);
   void NameEpisodes();
@@ -136,7 +137,9 @@ class ValveMonitor {
   std::uint64_t source_id_{0};
   std::int64_t stamp_ns_{0};
   bool isolation_held_{false};
-  std::int64_t unassigned_interval_ns_{1'000'000'000};
+  // Without a model set: the period of the samples, and the last interval.
+  std::int64_t unassigned_period_ns_{1'000'000'000};
+  std::optional<std::int64_t> unassigned_interval_ns_;
   double restart_tokens_{kMaxRestartTokens};  // Restarts left
   TimePoint tokens_at_;                       // as of this time.
   std::uint32_t epoch_{0};                    // Of the last sample in order.

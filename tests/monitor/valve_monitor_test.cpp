@@ -332,6 +332,27 @@ TEST_F(ValveMonitorTest, WithoutAModelSetAValveIsListedAndNotDiagnosed) {
   EXPECT_NE(bare.Step(PlantSample(6), 1, now_, notebook_).models, nullptr);
 }
 
+// Neither the time since 1970 nor a gap is the period of its samples.
+TEST_F(ValveMonitorTest, WithoutAModelSetASampleStandsForOnePeriod) {
+  const auto seen_ms = [this] {
+    Checkpoint checkpoint;
+    valve_.TakeCheckpoint(checkpoint);
+    std::int64_t sum = 0;
+    for (const HealthHour& hour : checkpoint.health) {
+      sum += hour.seen_ms;
+    }
+    return sum;
+  };
+  Feed(0, 10);
+  ASSERT_EQ(seen_ms(), 10'000);
+
+  ASSERT_TRUE(valve_.Adopt(std::nullopt, notebook_));
+  Feed(10, 20);
+  EXPECT_EQ(seen_ms(), 10'000);
+  Feed(1000, 1010);
+  EXPECT_EQ(seen_ms(), 10'000);
+}
+
 TEST_F(ValveMonitorTest, AnOpenEpisodeGoesOnUnderItsIdAfterARestart) {
   valve_.Recover(LeftOpen());
   Feed(150, 200, kF7Offset);  // f7 acts from the first sample on.
