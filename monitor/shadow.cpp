@@ -247,6 +247,7 @@ ShadowValve* ShadowBank::Add(const std::string& valve_id) {
 }
 
 void ShadowBank::Remove(const ShadowValve* valve) {
+  --counts_.valves[static_cast<std::size_t>(valve->fit())];
   std::erase_if(valves_,
                 [valve](const auto& each) { return each.get() == valve; });
 }

@@ -203,6 +203,15 @@ TEST_F(ShadowTest, ActiveSetIsNotComparedWithItself) {
   EXPECT_EQ(Valves(ShadowFit::kSameSet), 1);
 }
 
+TEST_F(ShadowTest, ValveThatIsRemovedIsNotCounted) {
+  Use(CandidateModels());
+  Feed(0, 30);
+  ASSERT_EQ(Valves(ShadowFit::kCompared), 1);
+
+  bank_->Remove(valve_);
+  EXPECT_EQ(Valves(ShadowFit::kCompared), 0);
+}
+
 TEST_F(ShadowTest, AccumulatorsOfAnotherCandidateCountForNothing) {
   Use(CandidateModels());
   Feed(0, 100);
