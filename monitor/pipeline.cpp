@@ -249,6 +249,10 @@ void Pipeline::Evict(Valve& valve) {
     shadow_->Remove(valve.shadow);
   }
   journal_.Commit(std::move(checkpoint));
+  if (recorder_) {
+    // Its run ends: the recorder keeps the state of each open run.
+    recorder_->Record({id, {}, {}, false, false, true});
+  }
   if (live_ != nullptr) {
     live_->Remove(id);
   }

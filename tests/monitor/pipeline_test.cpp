@@ -102,6 +102,23 @@ TEST_F(PipelineTest, KnownValvesHaveAPlaceAndSilentStrangersGiveTheirsUp) {
   EXPECT_EQ(bus_.decisions.size(), 3U);
 }
 
+// Else the recorder would keep an open run of every id that was ever heard.
+TEST_F(PipelineTest, TheRunOfAnEvictedValveEnds) {
+  options_.max_valves = 1;
+  FakeRuns runs;
+  Start(&runs);
+  const auto start = std::chrono::steady_clock::now();
+  for (int v = 0; v < 3; ++v) {
+    const auto now = start + std::chrono::seconds(70 * v);
+    pipeline_->Poll(now);
+    pipeline_->OnSample(ValveName(v), PlantSample(0), 1, now);
+  }
+  pipeline_->Stop();
+
+  EXPECT_EQ(runs.stored.size(), 3U);
+  EXPECT_EQ(runs.ends, 2);
+}
+
 // Stamps that jump, and epochs that flip, with every sample.
 TEST_F(PipelineTest, WhatMakesADiagnosisBeginAnewIsLimited) {
   Start();
