@@ -649,6 +649,10 @@ void Pipeline::AdoptNextResolver() {
     }
     resolver_ = std::exchange(next_resolver_, nullptr);
   }
+  // A slot stays reserved for what is assigned now or was left open.
+  std::erase_if(reserved_, [this](const std::string& id) {
+    return !recovered_.contains(id) && !accumulators_.contains(id);
+  });
   for (const std::string& id : resolver_->AssignedValves()) {
     Reserve(id);
   }

@@ -102,6 +102,20 @@ TEST_F(PipelineTest, KnownValvesHaveAPlaceAndSilentStrangersGiveTheirsUp) {
   EXPECT_EQ(bus_.decisions.size(), 3U);
 }
 
+TEST_F(PipelineTest, AValveThatIsNoLongerAssignedHasNoPlaceReserved) {
+  options_.max_valves = 1;
+  assigned_ = {"K1"};
+  Start();
+  Feed("S1", 0, 1);
+  ASSERT_EQ(counters_[Counter::kRefusedSamples], 1U);
+
+  pipeline_->Reassign(std::make_shared<FixedResolver>(models_));
+  pipeline_->Poll();
+  Feed("S1", 1, 2);
+  EXPECT_EQ(counters_[Counter::kRefusedSamples], 1U);
+  EXPECT_THAT(pipeline_->valve_names(), testing::ElementsAre("S1"));
+}
+
 // Else the recorder would keep an open run of every id that was ever heard.
 TEST_F(PipelineTest, TheRunOfAnEvictedValveEnds) {
   options_.max_valves = 1;
