@@ -199,9 +199,11 @@ void Pipeline::Reserve(const std::string& valve_id) {
   }
 }
 
-// Only unknown valves without an open episode can be evicted.
+// Only unknown valves without an episode, open or to be resumed, can be
+// evicted.
 bool Pipeline::IsEvictable(const Valve& valve) const {
-  return !valve.known && !valve.monitor.episode_open();
+  return !valve.known && !valve.monitor.episode_open() &&
+         !valve.monitor.recovering();
 }
 
 // Evicts an unknown valve that is silent or, in favour of a known valve, the

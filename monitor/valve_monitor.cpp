@@ -285,7 +285,7 @@ std::uint64_t ValveMonitor::CountStale(TimePoint now) {
 void ValveMonitor::CheckTimeout(TimePoint now,
                                 std::chrono::milliseconds timeout,
                                 EpisodeOutlet& outlet) {
-  if (stale_ && now - received_ > timeout) {
+  if ((stale_ || ended_) && now - received_ > timeout) {
     Close(EndReason::kStaleTimeout, outlet);
     tracker_.AbandonRecovery(EndReason::kStaleTimeout, outlet);
   }

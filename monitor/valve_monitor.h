@@ -104,6 +104,8 @@ class ValveMonitor {
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
   bool episode_open() const { return engine_ && engine_->episode_open(); }
+  /// An episode of an earlier session or another monitor may go on here.
+  bool recovering() const { return tracker_.recovering(); }
   /// How far its limits have followed a drift, by channel of models().
   void ReadDrift(std::vector<FollowedDrift>& drift) const;
   std::size_t trace_bytes() const { return tracker_.trace_bytes(); }
