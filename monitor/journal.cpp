@@ -419,8 +419,10 @@ void Journal::FailWaitingEvents() {
 void Journal::Recovered() {
   degraded_ = false;
   log_.Line(LogLevel::kInfo, "persistence_recovered");
-  OnGap(
-      {"", degraded_since_ns_, context_.utc_now_ns(), "persistence_degraded"});
+  const std::int64_t now_ns = context_.utc_now_ns();
+  // The clock may have been set back since.
+  OnGap({"", std::min(degraded_since_ns_, now_ns), now_ns,
+         "persistence_degraded"});
 }
 
 // Waits for the oldest unsent event only, which keeps the order. Each deadline

@@ -1,5 +1,6 @@
 #include "monitor/recorder.h"
 
+#include <algorithm>
 #include <exception>
 #include <string>
 #include <utility>
@@ -128,6 +129,8 @@ void Recorder::CountDropped(std::uint64_t samples) {
   if (!missing_) {
     missing_ = DataGap{"", now_ns, now_ns, "record_dropped"};
   }
+  // The clock may have been set back since the last one.
+  missing_->from_ns = std::min(missing_->from_ns, now_ns);
   missing_->to_ns = now_ns;
   missing_more_ = true;
 }

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "storage/history/history_database.h"
+#include "storage/history/history_reader.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -20,7 +21,7 @@ class HistoryStoreTest : public testing::Test {
  protected:
   HistoryStore Open() {
     return HistoryStore(
-        path_, "test", "", [] { return kStart; },
+        path_, "test", "", [this] { return now_ns_; },
         [this](LogLevel level, std::string_view line) {
           if (level == LogLevel::kError) {
             errors_.emplace_back(line);
@@ -54,6 +55,7 @@ class HistoryStoreTest : public testing::Test {
 
   storage::TemporaryDirectory directory_;
   const std::filesystem::path path_ = directory_.path() / "history.db";
+  std::int64_t now_ns_{kStart};
   std::vector<std::string> errors_;
 };
 
@@ -94,6 +96,17 @@ TEST_F(HistoryStoreTest, AnEventThatWasSentAgainIsNotSentOnceMore) {
   }
 
   EXPECT_TRUE(Open().UnsentEvents().empty());
+}
+
+TEST_F(HistoryStoreTest, AnOutageEndsNoEarlierThanItBeginsIfTheClockIsSetBack) {
+  Open();  // It ends without EndSession().
+  now_ns_ -= 3'600'000'000'000;
+  Open();
+
+  const auto gaps = storage::HistoryReader(path_).Gaps();
+  ASSERT_EQ(gaps.size(), 1U);
+  EXPECT_EQ(gaps[0].from_ns, now_ns_);
+  EXPECT_EQ(gaps[0].to_ns, now_ns_);
 }
 
 }  // namespace

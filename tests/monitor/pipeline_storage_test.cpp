@@ -1,3 +1,4 @@
+#include <atomic>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -150,6 +151,30 @@ TEST_F(PipelineStorageTest, ABrokenHistoryStopsNothingAndIsMadeGoodLater) {
   ASSERT_EQ(history_.recorded.size(), 2U);
   for (const auto& [key, count] : history_.recorded) {
     EXPECT_EQ(count, 1);
+  }
+}
+
+TEST_F(PipelineStorageTest, GapsEndNoEarlierThanTheyBeginIfTheClockIsSetBack) {
+  std::atomic<std::int64_t> now_ns{1'000'000};
+  context_.utc_now_ns = [&now_ns] { return --now_ns; };
+  options_.recorder.max_pending = 100;
+  history_.broken = true;
+  FakeRuns runs;
+  runs.broken = true;
+  Start(&runs);
+  OfferEpisode("V1");
+  ASSERT_TRUE(AwaitEvents(2));
+  history_.notice.Apply([&] { history_.broken = false; });
+  ASSERT_TRUE(history_.notice.Await([&] { return history_.gaps.size() == 1; }));
+  Feed("V1", 80, 350);
+  ASSERT_TRUE(history_.notice.Await(
+      [&] { return counters_[Counter::kRecordDropped] == 300; }));
+  runs.notice.Apply([&] { runs.broken = false; });
+  ASSERT_TRUE(history_.notice.Await([&] { return history_.gaps.size() == 2; }));
+  pipeline_->Stop();
+
+  for (const DataGap& gap : history_.gaps) {
+    EXPECT_LE(gap.from_ns, gap.to_ns) << gap.reason;
   }
 }
 
