@@ -153,8 +153,7 @@ bool Pair::LastValuesDue() {
   return decisions_.LastValuesDue() || lacks;
 }
 
-// Called by the journal's publisher thread, and at the start by the main
-// thread.
+// Called by the journal's publisher thread.
 bool Pair::Publish(const FaultEvent& event, bool persisted) {
   const std::lock_guard lock(mutex_);
   FaultEvent own = event;
@@ -162,18 +161,25 @@ bool Pair::Publish(const FaultEvent& event, bool persisted) {
   if (held_events_.empty() && Leads()) {
     return !MarkPublishedLocked(own) || events_.Publish(event, persisted);
   }
-  const auto same = [&](const HeldEvent& held) {
-    return Same(held.event, event);
-  };
-  std::erase_if(unmatched_events_, same);
+  HoldLocked(std::move(own), false);
+  return true;
+}
+
+void Pair::Resend(const FaultEvent& event) {
+  const std::lock_guard lock(mutex_);
+  HoldLocked(event, true);
+}
+
+void Pair::HoldLocked(FaultEvent event, bool resent) {
+  std::erase_if(unmatched_events_,
+                [&](const HeldEvent& held) { return Same(held.event, event); });
   if (IsPublishedLocked(event)) {
-    return true;
+    return;
   }
   if (held_events_.size() >= kMaxHeldEvents) {
     held_events_.pop_front();
   }
-  held_events_.push_back({Clock::now(), std::move(own)});
-  return true;
+  held_events_.push_back({Clock::now(), std::move(event), resent});
 }
 
 bool Pair::IsPublishedLocked(const FaultEvent& event) const {
@@ -337,7 +343,8 @@ void Pair::PublishHeld() {
   const std::lock_guard lock(mutex_);
   for (const HeldEvent& held : std::exchange(held_events_, {})) {
     if (MarkPublishedLocked(held.event)) {
-      events_.Publish(held.event, held.event.persisted);
+      EventSink& out = held.resent ? bus_ : events_;
+      out.Publish(held.event, held.event.persisted);
     }
   }
 }

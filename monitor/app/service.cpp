@@ -266,7 +266,10 @@ void Service::Start() {
 // Publishes what an earlier session committed but may not have sent.
 void Service::ResendEvents() {
   for (const FaultEvent& event : history_.UnsentEvents()) {
-    if (pair_ ? pair_->Publish(event, true) : events_.Publish(event, true)) {
+    if (pair_) {
+      pair_->Resend(event);
+    }
+    if (pair_ || events_.Publish(event, true)) {
       pipeline_.MarkPublished(event);
       counters_.Add(Counter::kEventsResent);
     }

@@ -1,5 +1,6 @@
 // A pair of monitors on loopback whose leader is killed, stopped and ended.
 #include <csignal>
+#include <fstream>
 #include <functional>
 #include <memory>
 
@@ -22,6 +23,18 @@ using Clock = std::chrono::steady_clock;
 constexpr int kValves = 50;
 constexpr std::size_t kFaulty = 5;
 
+bool Await(const std::function<bool()>& condition,
+           milliseconds patience = milliseconds(30'000)) {
+  const auto end = Clock::now() + patience;
+  while (!condition()) {
+    if (Clock::now() > end) {
+      return false;
+    }
+    std::this_thread::sleep_for(milliseconds(10));
+  }
+  return true;
+}
+
 class PairTest : public testing::Test {
  protected:
   static constexpr int kRanks = 2;
@@ -40,18 +53,6 @@ class PairTest : public testing::Test {
         std::to_string(i + 1)});
     ASSERT_TRUE(monitors_[i]->AwaitLine("monitor_ready"))
         << monitors_[i]->errors();
-  }
-
-  static bool Await(const std::function<bool()>& condition,
-                    milliseconds patience = milliseconds(30'000)) {
-    const auto end = Clock::now() + patience;
-    while (!condition()) {
-      if (Clock::now() > end) {
-        return false;
-      }
-      std::this_thread::sleep_for(milliseconds(10));
-    }
-    return true;
   }
 
   /// Waits until both are ready. @returns which one leads.
@@ -149,6 +150,42 @@ TEST_F(PairTest, ALeaderThatHangsIsReplacedAndSaysNothingWhenItGoesOn) {
     EXPECT_NE(Leader(), leader);
   }
   ExpectWhole();
+}
+
+// The bus gets what may not have been heard; a hook is notified once.
+TEST(PairRestartTest, AMonitorThatWasKilledNotifiesOfNothingTwice) {
+  const idl::TestDomain domain;
+  const storage::TemporaryDirectory data;
+  StorePairModels(data.path());
+  const std::string notes = (data.path() / "notes").string();
+  const auto start = [&] {
+    return std::make_unique<ChildProcess>(std::vector<std::string>{
+        FDI_MONITOR_PROGRAM, "--data", data.path().string(), "--domain",
+        std::to_string(domain.id()), "run", "--pair", "test", "--rank", "1",
+        "--on-event", "dd status=none oflag=append conv=notrunc of=" + notes});
+  };
+  PairPlant plant(domain.Options(), 1, 1, milliseconds(20));
+  const auto detections = [&notes] {
+    std::ifstream file(notes);
+    std::ptrdiff_t count = 0;
+    for (std::string line; std::getline(file, line);) {
+      count += line.find("\"DETECTED\"") != std::string::npos ? 1 : 0;
+    }
+    return count;
+  };
+  auto monitor = start();
+  ASSERT_TRUE(Await([&] { return plant.Leaders().size() == 1; }));
+  plant.SetFaulty(true);
+  ASSERT_TRUE(Await([&] { return detections() == 1; })) << monitor->errors();
+  monitor->Signal(SIGKILL);
+  ASSERT_TRUE(monitor->AwaitExit());
+
+  monitor = start();
+  ASSERT_TRUE(Await([&] { return plant.Count().repeats > 0; }))
+      << monitor->errors();
+  monitor->Signal(SIGTERM);
+  ASSERT_EQ(monitor->AwaitExit(), 0);
+  EXPECT_EQ(detections(), 1);
 }
 
 // Whichever of the two an operator uses, and though the other one be away.
