@@ -1,6 +1,7 @@
 #include "monitor/app/event_hook.h"
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 #include "cli/json_text.h"
@@ -141,7 +142,12 @@ void EventHook::Run() {
     waiting_.pop_front();
     busy_ = true;
     lock.unlock();
-    const std::optional<std::string> failure = delivery_->Deliver(text);
+    std::optional<std::string> failure;
+    try {
+      failure = delivery_->Deliver(text);
+    } catch (const std::exception& error) {  // Out of threads or memory.
+      failure = error.what();
+    }
     lock.lock();
     busy_ = false;
     RecordResult(failure);

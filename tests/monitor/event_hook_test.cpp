@@ -41,6 +41,9 @@ class FakeDelivery : public EventDelivery {
     got.push_back(cli::Json::parse(json));
     changed.notify_all();
     changed.wait(lock, [this] { return open; });
+    if (got.size() <= throwing) {
+      throw std::runtime_error("no thread");
+    }
     return failure;
   }
   void Interrupt() override { Open(); }
@@ -59,6 +62,7 @@ class FakeDelivery : public EventDelivery {
   std::condition_variable changed;
   std::vector<cli::Json> got;
   bool open{true};
+  std::size_t throwing{0};  // So many deliveries first.
   std::optional<std::string> failure;
 };
 
@@ -335,6 +339,17 @@ TEST_F(EventHookTest, FailuresAreCountedAndLogged) {
   hook_->Stop(seconds(10));
   EXPECT_EQ(hook_->counts().failed, 1u);
   EXPECT_THAT(log_, HasSubstr("event_hook_failed reason=\"no such luck\""));
+}
+
+TEST_F(EventHookTest, ADeliveryThatThrowsFailsAndTheNextOneIsMade) {
+  fake_->throwing = 1;
+  Start();
+  hook_->Notify({{"i", 1}});
+  hook_->Notify({{"i", 2}});
+  hook_->Stop(seconds(10));
+  EXPECT_EQ(hook_->counts().failed, 1u);
+  EXPECT_EQ(hook_->counts().delivered, 1u);
+  EXPECT_THAT(log_, HasSubstr("event_hook_failed reason=\"no thread\""));
 }
 
 TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
