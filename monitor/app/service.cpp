@@ -286,7 +286,8 @@ void Service::WatchCauses() {
                "cause_groups groups=" + std::to_string(cause_groups_.size()));
   history_.WatchCauses(std::move(cause_groups_),
                        [this](const storage::CauseChange& change) {
-                         if (outward_) {
+                         // Both of a pair find the cause; the leader notifies.
+                         if (outward_ && (!pair_ || pair_->status().leads)) {
                            outward_->hook().Notify(CauseJson(change));
                          }
                        });

@@ -152,42 +152,6 @@ TEST_F(PairTest, ALeaderThatHangsIsReplacedAndSaysNothingWhenItGoesOn) {
   ExpectWhole();
 }
 
-// The bus gets what may not have been heard; a hook is notified once.
-TEST(PairRestartTest, AMonitorThatWasKilledNotifiesOfNothingTwice) {
-  const idl::TestDomain domain;
-  const storage::TemporaryDirectory data;
-  StorePairModels(data.path());
-  const std::string notes = (data.path() / "notes").string();
-  const auto start = [&] {
-    return std::make_unique<ChildProcess>(std::vector<std::string>{
-        FDI_MONITOR_PROGRAM, "--data", data.path().string(), "--domain",
-        std::to_string(domain.id()), "run", "--pair", "test", "--rank", "1",
-        "--on-event", "dd status=none oflag=append conv=notrunc of=" + notes});
-  };
-  PairPlant plant(domain.Options(), 1, 1, milliseconds(20));
-  const auto detections = [&notes] {
-    std::ifstream file(notes);
-    std::ptrdiff_t count = 0;
-    for (std::string line; std::getline(file, line);) {
-      count += line.find("\"DETECTED\"") != std::string::npos ? 1 : 0;
-    }
-    return count;
-  };
-  auto monitor = start();
-  ASSERT_TRUE(Await([&] { return plant.Leaders().size() == 1; }));
-  plant.SetFaulty(true);
-  ASSERT_TRUE(Await([&] { return detections() == 1; })) << monitor->errors();
-  monitor->Signal(SIGKILL);
-  ASSERT_TRUE(monitor->AwaitExit());
-
-  monitor = start();
-  ASSERT_TRUE(Await([&] { return plant.Count().repeats > 0; }))
-      << monitor->errors();
-  monitor->Signal(SIGTERM);
-  ASSERT_EQ(monitor->AwaitExit(), 0);
-  EXPECT_EQ(detections(), 1);
-}
-
 // Whichever of the two an operator uses, and though the other one be away.
 TEST_F(PairTest, WhatOperatorsDoReachesBoth) {
   BeginEpisodes();
@@ -238,6 +202,80 @@ TEST_F(PairTest, IsUpgradedOneAfterTheOtherWithoutAMissingEpisode) {
   }
   Leader();
   ExpectWhole();
+}
+
+// Monitors of a pair that notify of events, and of causes that all valves
+// share.
+class PairHookTest : public testing::Test {
+ protected:
+  static constexpr int kHookValves = 3;
+
+  PairHookTest() {
+    for (const storage::TemporaryDirectory& data : data_) {
+      StorePairModels(data.path());
+      std::ofstream(data.path() / "groups.toml")
+          << "[[group]]\nname = 'all'\nvalves = ['V*']\nfaults = ['f7']\n"
+             "min_valves = 2\n";
+    }
+  }
+
+  std::unique_ptr<ChildProcess> Start(int i) const {
+    return std::make_unique<ChildProcess>(std::vector<std::string>{
+        FDI_MONITOR_PROGRAM, "--data", data_[i].path().string(), "--domain",
+        std::to_string(domain_.id()), "run", "--pair", "test", "--rank",
+        std::to_string(i + 1), "--on-event",
+        "dd status=none oflag=append conv=notrunc of=" + Notes().string()});
+  }
+  static void Stop(ChildProcess& monitor) {
+    monitor.Signal(SIGTERM);
+    EXPECT_EQ(monitor.AwaitExit(), 0) << monitor.errors();
+  }
+  // How many notifications of this kind came, of both monitors.
+  int Count(const std::string& kind) const {
+    std::ifstream file(Notes());
+    int count = 0;
+    for (std::string line; std::getline(file, line);) {
+      count += line.find('"' + kind + '"') != std::string::npos ? 1 : 0;
+    }
+    return count;
+  }
+  std::filesystem::path Notes() const { return data_[0].path() / "notes"; }
+
+  const idl::TestDomain domain_;
+  const storage::TemporaryDirectory data_[2];
+  PairPlant plant_{domain_.Options(), kHookValves, kHookValves,
+                   milliseconds(20)};
+};
+
+// The bus gets once more what may not have been heard, the hook does not.
+TEST_F(PairHookTest, AMonitorThatWasKilledNotifiesOfNoEventTwice) {
+  auto monitor = Start(0);
+  ASSERT_TRUE(Await([&] { return plant_.Leaders().size() == 1; }));
+  plant_.SetFaulty(true);
+  ASSERT_TRUE(Await([&] { return Count("DETECTED") == kHookValves; }))
+      << monitor->errors();
+  monitor->Signal(SIGKILL);
+  ASSERT_TRUE(monitor->AwaitExit());
+
+  monitor = Start(0);
+  ASSERT_TRUE(Await([&] { return plant_.Count().repeats >= kHookValves; }))
+      << monitor->errors();
+  Stop(*monitor);
+  EXPECT_EQ(Count("DETECTED"), kHookValves);
+}
+
+TEST_F(PairHookTest, OnlyTheLeaderNotifiesOfACommonCause) {
+  const auto first = Start(0);
+  const auto second = Start(1);
+  ASSERT_TRUE(Await([&] { return plant_.Settled(); }));
+  plant_.SetFaulty(true);
+  for (ChildProcess* monitor : {first.get(), second.get()}) {
+    ASSERT_TRUE(monitor->AwaitLine("common_cause kind=OPENED"))
+        << monitor->errors();
+  }
+  Stop(*first);
+  Stop(*second);
+  EXPECT_EQ(Count("COMMON_CAUSE_OPENED"), 1);
 }
 
 }  // namespace
