@@ -400,7 +400,7 @@ bool Journal::Attempt(const std::function<void()>& call) {
     const std::string reason = error.what();
     log_.Report(
         LogId::kPersistence, "persistence_degraded",
-        [&reason] { return "reason=\"" + reason + "\""; }, LogLevel::kError);
+        [&reason] { return "reason=" + LogValue(reason); }, LogLevel::kError);
     return false;
   }
 }
@@ -500,7 +500,7 @@ void Journal::Publish(const PendingEvent& pending, bool persisted) {
   } else {
     counters_.Add(Counter::kEventsUnsent);
     log_.Report(LogId::kUnsent, "publication_failed", [&] {
-      return "topic=FaultEvent " + fields() + " reason=\"" + reason + "\"";
+      return "topic=FaultEvent " + fields() + " reason=" + LogValue(reason);
     });
   }
 }

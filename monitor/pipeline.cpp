@@ -240,7 +240,7 @@ bool Pipeline::FreeSlot(bool for_known) {
 
 void Pipeline::Evict(Valve& valve) {
   const std::string id = valve.monitor.id();
-  log_.Line(LogLevel::kDebug, "valve_forgotten valve=" + id);
+  log_.Line(LogLevel::kDebug, "valve_forgotten valve=" + LogValue(id));
   // The valve is gone after this, so what it has gathered since the last
   // checkpoint is stored now.
   Checkpoint checkpoint;
@@ -348,7 +348,7 @@ void Pipeline::OnSample(std::string_view valve_id, const Sample& sample,
   if (!valve->monitor.WithinRateLimit(sample, received)) {
     counters_.Add(Counter::kOverShare);
     log_.Report(LogId::kOverShare, "sample_rejected", [valve] {
-      return "reason=over_share valve=" + valve->monitor.id();
+      return "reason=over_share valve=" + LogValue(valve->monitor.id());
     });
     return;
   }

@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "diagnosis/printable.h"
+
 namespace fdi::monitor {
 namespace {
 
@@ -162,7 +164,7 @@ void Recorder::Fail(const char* reason) {
   const std::string text = reason;
   context_.log.Report(
       LogId::kRecordFailed, "record_failed",
-      [&text] { return "reason=\"" + text + "\""; }, LogLevel::kError);
+      [&text] { return "reason=" + LogValue(text); }, LogLevel::kError);
 }
 
 }  // namespace fdi::monitor

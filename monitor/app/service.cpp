@@ -18,6 +18,7 @@
 #include <systemd/sd-daemon.h>
 
 #include "cli/time_text.h"
+#include "diagnosis/printable.h"
 #include "diagnosis/records/partitions.h"
 #include "monitor/app/cause_groups.h"
 #include "monitor/app/shadow.h"
@@ -435,7 +436,7 @@ void Service::Tick() {
   } catch (const std::exception& error) {
     const std::string reason = error.what();
     log_.Report(LogId::kModelFailure, "models_unreadable",
-                [&reason] { return "reason=\"" + reason + "\""; });
+                [&reason] { return "reason=" + LogValue(reason); });
   }
   shares_.Tick([this] { return pipeline_.valve_names(); });
   ReportLoss();
@@ -464,9 +465,8 @@ void Service::Reload(const char* cause) {
     pipeline_.Reassign(std::move(next));
   } catch (const std::exception& error) {
     counters_.Add(Counter::kModelFailures);
-    log_.Line(LogLevel::kError,
-              LogLine(LogId::kModelFailure, "reload_failed",
-                      "reason=\"" + std::string(error.what()) + "\""));
+    log_.Line(LogLevel::kError, LogLine(LogId::kModelFailure, "reload_failed",
+                                        "reason=" + LogValue(error.what())));
   }
 }
 

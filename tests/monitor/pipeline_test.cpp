@@ -168,7 +168,7 @@ TEST_F(PipelineTest, WhatMakesADiagnosisBeginAnewIsLimited) {
     Sample sample = PlantSample(k);
     sample.stamp_ns += (k % 2 == 0 ? 1 : -1) * static_cast<std::int64_t>(k) *
                        86'400'000'000'000;
-    pipeline_->OnSample("J1", sample, 1, now);
+    pipeline_->OnSample("J 1", sample, 1, now);
     sample = PlantSample(k);
     sample.epoch = static_cast<std::uint32_t>(k);
     pipeline_->OnSample("E1", sample, 1, now);
@@ -184,7 +184,7 @@ TEST_F(PipelineTest, WhatMakesADiagnosisBeginAnewIsLimited) {
   EXPECT_LE(history_.checkpoint_sum.coverage.size(), 202U);
   EXPECT_LE(history_.checkpoint_sum.health.size(), 402U);
   EXPECT_THAT(lines_, testing::Contains(testing::HasSubstr(
-                          "sample_rejected id=M117 reason=over_share")));
+                          "id=M117 reason=over_share valve=\"J 1\"")));
 }
 
 TEST_F(PipelineTest, AModelSetThatCannotBeHadLeavesTheValveUnassigned) {
