@@ -1,6 +1,5 @@
 #include "monitor/checkpoint.h"
 
-#include <algorithm>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -36,13 +35,13 @@ void Merge(std::vector<T>& older, std::vector<T> newer, KeyOf key_of,
   }
 }
 
-void Merge(std::vector<Accumulator>& older, std::vector<Accumulator> newer) {
-  Merge(
-      older, std::move(newer), [](const Accumulator& a) { return a.valve_id; },
-      [](Accumulator& old, Accumulator& fresh) {
-        old = std::move(fresh);
-        return true;
-      });
+// Of two records with the same key the newer one is kept.
+template <typename T, typename KeyOf>
+void Replace(std::vector<T>& older, std::vector<T> newer, KeyOf key_of) {
+  Merge(older, std::move(newer), key_of, [](T& old, T& fresh) {
+    old = std::move(fresh);
+    return true;
+  });
 }
 
 }  // namespace
@@ -70,23 +69,13 @@ Checkpoint Merged(Checkpoint older, Checkpoint newer) {
         old.Add(fresh);
         return true;
       });
-  Merge(older.accumulators, std::move(newer.accumulators));
-  Merge(older.shadow_accumulators, std::move(newer.shadow_accumulators));
-  older.shadow = Merged(std::move(older.shadow), std::move(newer.shadow));
-  return older;
-}
-
-std::vector<ShadowDifference> Merged(std::vector<ShadowDifference> older,
-                                     std::vector<ShadowDifference> newer) {
-  Merge(
-      older, std::move(newer),
-      [](const ShadowDifference& d) {
-        return std::tuple(d.valve_id, d.source_id, d.from_ns, d.candidate_hash);
-      },
-      [](ShadowDifference& old, ShadowDifference& fresh) {
-        old = std::move(fresh);
-        return true;
-      });
+  const auto valve_of = [](const Accumulator& a) { return a.valve_id; };
+  Replace(older.accumulators, std::move(newer.accumulators), valve_of);
+  Replace(older.shadow_accumulators, std::move(newer.shadow_accumulators),
+          valve_of);
+  Replace(older.shadow, std::move(newer.shadow), [](const ShadowDifference& d) {
+    return std::tuple(d.valve_id, d.source_id, d.from_ns, d.candidate_hash);
+  });
   return older;
 }
 

@@ -14,14 +14,8 @@ namespace fdi::monitor {
 
 /// Merges `newer` into `older`: time and health add up, accumulators and
 /// stretches that grew are replaced. Keeps at most 100 000 records of each
-/// kind.
+/// kind; more come while the disk is full.
 Checkpoint Merged(Checkpoint older, Checkpoint newer);
-
-/// Appends `newer` to `older`; of two records of the same stretch the newer one
-/// is kept. Records beyond 100 000, which occur while the disk is full, are
-/// dropped: they are not evidence.
-std::vector<ShadowDifference> Merged(std::vector<ShadowDifference> older,
-                                     std::vector<ShadowDifference> newer);
 
 /// The most days or hours that a valve accumulates between checkpoints.
 inline constexpr std::size_t kMaxBookRows = 256;

@@ -1,6 +1,5 @@
 #include "monitor/pair_election.h"
 
-#include <algorithm>
 #include <tuple>
 #include <utility>
 

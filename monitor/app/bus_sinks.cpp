@@ -1,7 +1,6 @@
 #include "monitor/app/bus_sinks.h"
 
 #include <algorithm>
-#include <exception>
 #include <utility>
 
 #include "cli/logging.h"

@@ -1,7 +1,5 @@
 #include "monitor/app/cause_groups.h"
 
-#include <algorithm>
-#include <cmath>
 #include <set>
 
 #include "cli/time_text.h"

@@ -3,7 +3,6 @@
 #include <cctype>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>

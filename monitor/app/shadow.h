@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "monitor/shadow.h"
 #include "storage/models/models.h"

@@ -4,7 +4,6 @@
 #include <memory>
 #include <set>
 #include <string>
-#include <type_traits>
 
 #include <CLI/CLI.hpp>
 

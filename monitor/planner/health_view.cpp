@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "cli/time_text.h"
 #include "diagnosis/fault_catalogue.h"

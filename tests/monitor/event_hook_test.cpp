@@ -5,6 +5,7 @@
 #include <future>
 #include <iomanip>
 #include <sstream>
+#include <stdexcept>
 
 #include <arpa/inet.h>
 #include <fcntl.h>

@@ -118,9 +118,13 @@ TEST_F(ShadowTest, OpenStretchGrowsUnderItsKeyAndIsGivenOnceMore) {
   EXPECT_GT(second[0].samples, first[0].samples);
   EXPECT_THAT(Take(), IsEmpty());
   EXPECT_EQ(bank_->counts().recorded, 1U);
-  const auto merged = Merged(first, second);
-  ASSERT_THAT(merged, SizeIs(1));
-  EXPECT_EQ(merged[0].samples, second[0].samples);
+  Checkpoint older;
+  Checkpoint newer;
+  older.shadow = first;
+  newer.shadow = second;
+  const Checkpoint merged = Merged(older, newer);
+  ASSERT_THAT(merged.shadow, SizeIs(1));
+  EXPECT_EQ(merged.shadow[0].samples, second[0].samples);
 }
 
 TEST_F(ShadowTest, SameFaultsUnderOtherNumbersInTheSetAgree) {
