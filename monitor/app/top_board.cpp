@@ -290,8 +290,8 @@ std::string TopScreen(const TopBoard& board, TopView& view,
   std::string text = Printable(Title(board, view, report.document)) + "\n\n";
   const std::size_t room =
       std::max<std::size_t>(1, height - std::min(height, kOtherLines));
-  const std::size_t first =
-      std::min(view.first, rows.size() - std::min(rows.size(), room));
+  view.first = std::min(view.first, rows.size() - std::min(rows.size(), room));
+  const std::size_t first = view.first;
   const std::size_t below =
       rows.size() - first - std::min(room, rows.size() - first);
   rows.resize(rows.size() - below);

@@ -80,7 +80,8 @@ struct TopView {
   bool utc{false};
 };
 
-/// Renders a whole screen: `height` lines, none wider than style.width.
+/// Renders a whole screen: `height` lines, none wider than style.width. The
+/// view is scrolled no further than to the last row.
 std::string TopScreen(const TopBoard& board, TopView& view,
                       const cli::TextStyle& style, std::size_t height,
                       TopBoard::Clock::time_point now);

@@ -221,6 +221,7 @@ TEST_F(TopTest, WhatDoesNotFitIsCountedAndScrolledTo) {
   view.first = 100;
 
   EXPECT_THAT(Screen(view, 200, 8), HasSubstr("calm"));
+  EXPECT_EQ(view.first, 2U);  // The next key up shows the row above.
 }
 
 TEST_F(TopTest, FaultsAreCalledByTheirNames) {
