@@ -9,11 +9,12 @@
 
 namespace fdi::monitor {
 
-HistoryStore::HistoryStore(const std::filesystem::path& path,
-                           const std::string& software,
-                           const std::string& config, Clock utc_now_ns,
+HistoryStore::HistoryStore(const std::filesystem::path& path, Clock utc_now_ns,
                            LogSink log)
-    : writer_(path), utc_now_ns_(std::move(utc_now_ns)), log_(std::move(log)) {
+    : writer_(path), utc_now_ns_(std::move(utc_now_ns)), log_(std::move(log)) {}
+
+void HistoryStore::BeginSession(const std::string& software,
+                                const std::string& config) {
   const std::int64_t now_ns = utc_now_ns_();
   const storage::SessionStart start =
       writer_.BeginSession(now_ns, software, config);

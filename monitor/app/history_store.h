@@ -22,12 +22,13 @@ class HistoryStore : public HistorySink {
  public:
   using Clock = std::function<std::int64_t()>;  ///< UTC now [ns]
 
-  /// Opens the file and begins a session. If the previous session crashed, its
-  /// outage is recorded as a gap of all valves.
-  /// @throws DataError, storage::SqliteError
-  HistoryStore(const std::filesystem::path& path, const std::string& software,
-               const std::string& config, Clock utc_now_ns, LogSink log);
+  /// Opens the file. @throws DataError, storage::SqliteError
+  HistoryStore(const std::filesystem::path& path, Clock utc_now_ns,
+               LogSink log);
 
+  /// If the previous session crashed, its outage is recorded as a gap of all
+  /// valves. Call before recording anything.
+  void BeginSession(const std::string& software, const std::string& config);
   /// Episodes that earlier sessions left open. Call before recording anything.
   std::vector<OpenEpisode> OpenEpisodes();
   /// The accumulators as of the last checkpoint.

@@ -125,8 +125,8 @@ std::string MonotonicMicroseconds() {
 }  // namespace
 
 // Members are initialised in the order in which they use each other. The
-// session in the history begins only after options and files have been read and
-// the lock keeps other monitors out.
+// session in the history begins only in Start(), so that an error in options or
+// files leaves no trace.
 Service::Service(const ServiceOptions& options, const cli::Context& context)
     : options_(options),
       context_(context),
@@ -157,8 +157,7 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
           data_.models(), options.model_set,
           [this](const ModelSet& models) { AnnounceModels(models); })),
       model_sets_(assignment_->loaded()),
-      history_(data_.history(), context.software, context.command_line,
-               cli::NowNs, context.log),
+      history_(data_.history(), cli::NowNs, context.log),
       runs_(options.recording == Recording::kOff
                 ? nullptr
                 : std::make_unique<RunStore>(data_.runs(), context.software)),
@@ -245,6 +244,7 @@ int Service::Run(cli::StopSignals& signals) {
 }
 
 void Service::Start() {
+  history_.BeginSession(context_.software, context_.command_line);
   ResendEvents();
   WatchCauses();
   if (outward_) {

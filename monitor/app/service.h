@@ -115,7 +115,6 @@ class Service {
   std::unique_ptr<console::Console> console_;  // Null: no console.
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
-  // Read before a session begins, so that an error in them leaves no trace.
   PipelineOptions pipeline_options_;
   std::vector<storage::CauseGroup> cause_groups_;
   std::unique_ptr<EventDelivery> delivery_;  // Null: no event hook.

@@ -38,9 +38,10 @@ class CauseGroupsTest : public testing::Test {
   void Open() {
     store_.reset();
     store_.emplace(
-        directory_.path() / "history.db", "test", "",
+        directory_.path() / "history.db",
         [] { return kStart + 1000 * kSecond; },
         [](LogLevel, std::string_view) {});
+    store_->BeginSession("test", "");
     store_->WatchCauses(
         ReadCauseGroups(Write("[[group]]\nname = 'header'\n"
                               "valves = ['A-*']\nfaults = ['f7']\n"

@@ -21,7 +21,7 @@ class HistoryStoreTest : public testing::Test {
  protected:
   HistoryStore Open() {
     return HistoryStore(
-        path_, "test", "", [this] { return now_ns_; },
+        path_, [this] { return now_ns_; },
         [this](LogLevel level, std::string_view line) {
           if (level == LogLevel::kError) {
             errors_.emplace_back(line);
@@ -99,9 +99,9 @@ TEST_F(HistoryStoreTest, AnEventThatWasSentAgainIsNotSentOnceMore) {
 }
 
 TEST_F(HistoryStoreTest, AnOutageEndsNoEarlierThanItBeginsIfTheClockIsSetBack) {
-  Open();  // It ends without EndSession().
+  Open().BeginSession("test", "");  // It ends without EndSession().
   now_ns_ -= 3'600'000'000'000;
-  Open();
+  Open().BeginSession("test", "");
 
   const auto gaps = storage::HistoryReader(path_).Gaps();
   ASSERT_EQ(gaps.size(), 1U);

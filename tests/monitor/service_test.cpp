@@ -15,6 +15,7 @@
 #include "cli/time_text.h"
 #include "diagnosis/error.h"
 #include "storage/history/history_database.h"
+#include "storage/history/history_reader.h"
 #include "storage/models/models.h"
 #include "tests/idl/test_domain.h"
 #include "tests/monitor/fake_sinks.h"
@@ -82,9 +83,20 @@ TEST_F(ServiceTest, AnErrorWhileServingStillEndsTheSessionInOrder) {
 
   EXPECT_EQ(Count("monitor_stopping"), 1U);
   EXPECT_EQ(Count("monitor_stopped"), 1U);
-  const HistoryStore next(global_.data_dir / "history.db", "test", "",
-                          cli::NowNs, context.log);
+  HistoryStore(global_.data_dir / "history.db", cli::NowNs, context.log)
+      .BeginSession("test", "");
   EXPECT_THAT(lines_, Not(Contains(StartsWith("session_died"))));
+}
+
+// The next start would take its session for one that died.
+TEST_F(ServiceTest, AnErrorInTheOptionsLeavesNoTraceInTheHistory) {
+  ServiceOptions options;
+  options.valves = std::string(300, 'V');
+
+  EXPECT_THROW(Service(options, Context()), ConfigError);
+
+  storage::HistoryReader history(global_.data_dir / "history.db");
+  EXPECT_TRUE(history.Sessions().empty());
 }
 
 // Twice, as the first participant may leave threads of the library behind.
