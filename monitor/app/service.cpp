@@ -92,12 +92,19 @@ std::filesystem::path LockOf(const storage::DataDirectory& data) {
   return path += ".lock";
 }
 
+constexpr int kMaxSlots = 100'000;  // See idl::DdsOptions.
+
 // The reader never frees the slot of a valve while its publisher is alive, so
 // it needs more slots than the pipeline, which does free them.
 int IntakeValves(int max_valves) {
   constexpr int kSpareSlots = 60'000;
-  constexpr int kMaxSlots = 100'000;  // See idl::DdsOptions.
   return std::min(max_valves + kSpareSlots, kMaxSlots);
+}
+
+// A writer whose history is full forgets the oldest vector, which may be the
+// last one of a silent valve. With a slot to spare it never is.
+int WriterValves(int max_valves) {
+  return std::min(max_valves + 1, kMaxSlots);
 }
 
 std::vector<std::string> Partitions(const ServiceOptions& options) {
@@ -146,8 +153,9 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
               ? nullptr
               : MakeEventDelivery(options.on_event,
                                   Milliseconds(options.on_event_timeout_s))),
-      participant_(DdsOptionsOf(context.options, options.max_valves),
-                   context.log, "fdi-monitor"),
+      participant_(
+          DdsOptionsOf(context.options, WriterValves(options.max_valves)),
+          context.log, "fdi-monitor"),
       intake_participant_(
           DdsOptionsOf(context.options, IntakeValves(options.max_valves)),
           context.log, "fdi-monitor intake"),

@@ -48,5 +48,25 @@ TEST_F(LateListenerTest, GetsTheLastVectorOfEveryValveOnceThenAll) {
   EXPECT_TRUE(heard["V2"].empty());
 }
 
+// As many valves as the monitor takes, the first of which falls silent.
+TEST_F(LateListenerTest, GetsTheLastVectorOfASilentValveOfAFullMonitor) {
+  const auto monitor = StartMonitor({"--max-valves", "2"});
+  idl::Participant here(participant_->options());
+  const idl::Subscriber<idl::DecisionMessage> early(here);
+  ASSERT_TRUE(Await([this] { return counters_["dds_decision_readers"] > 1; }));
+  for (const char* valve : {"V1", "V2"}) {
+    for (std::uint64_t k = 0; k < 40; ++k) {
+      Publish(PlantSample(k), valve);
+    }
+  }
+  ASSERT_TRUE(AwaitVectors(80));
+
+  idl::Subscriber<idl::DecisionMessage> late(here);
+  ASSERT_TRUE(late.WaitForWriters(1, kMonitorPatience));
+  auto heard = Heard(late);
+  EXPECT_EQ(heard["V1"], std::vector<std::uint64_t>{39});
+  EXPECT_EQ(heard["V2"], std::vector<std::uint64_t>{39});
+}
+
 }  // namespace
 }  // namespace fdi::monitor
