@@ -43,7 +43,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
 
   Impl(Participant& participant, const PublisherOptions& options)
       : bus(participant.impl()),
-        lossless(options.profile == Profile::kLossless) {
+        lossless(options.profile == Profile::kLossless),
+        replaces(options.replaces) {
     const EndpointQos ours = QosFor<Message>(
         options.profile,
         options.valves > 0 ? options.valves : bus.options().max_valves);
@@ -85,14 +86,40 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   // beyond the limit.
   const dds::InstanceHandle_t* InstanceOf(const Message& message) {
     auto found = instances.find(KeyOf(message));
-    if (found != instances.end()) {
-      return &found->second;
+    if (found == instances.end()) {
+      dds::InstanceHandle_t handle = writer->register_instance(&wire);
+      if (!handle.isDefined() && replaces) {
+        UnregisterOldest();
+        Traits::Encode(message, wire);
+        handle = writer->register_instance(&wire);
+      }
+      if (!handle.isDefined()) {
+        return nullptr;
+      }
+      found = instances.emplace(KeyOf(message), Instance{handle, 0}).first;
     }
-    const dds::InstanceHandle_t handle = writer->register_instance(&wire);
-    if (!handle.isDefined()) {
-      return nullptr;
+    found->second.last_write = ++writes;
+    return &found->second.handle;
+  }
+
+  // Ends the instance that was written longest ago. The library frees its place
+  // once all readers have acknowledged that; until then no other one is ended.
+  void UnregisterOldest() {
+    limit = std::max(limit, instances.size());
+    if (instances.size() < limit) {
+      return;
     }
-    return &instances.emplace(KeyOf(message), handle).first->second;
+    const auto oldest = std::ranges::min_element(
+        instances, {}, [](const auto& each) { return each.second.last_write; });
+    Message ended;
+    KeyOf(ended) = oldest->first;
+    Traits::EncodeKey(ended, wire);
+    const ReturnCode code =
+        writer->unregister_instance(&wire, oldest->second.handle);
+    if (!IsFull(code)) {
+      Check(code, std::string("unregister_instance on ") + Traits::kTopic);
+      instances.erase(oldest);
+    }
   }
 
   // Retries `send` until the history has room. @returns false on timeout or
@@ -135,6 +162,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
 
   Participant::Impl& bus;
   const bool lossless;
+  const bool replaces;
   std::unique_ptr<dds::Publisher, std::function<void(dds::Publisher*)>>
       publisher;
   dds::DataWriter* writer{nullptr};
@@ -148,7 +176,13 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   // Held while Write() waits for room, because `wire` has to keep its message
   // until the library accepts it: all threads that write wait together.
   std::mutex mutex;  // Guards what follows.
-  std::map<Key<Message>, dds::InstanceHandle_t, std::less<>> instances;
+  struct Instance {
+    dds::InstanceHandle_t handle;
+    std::uint64_t last_write;
+  };
+  std::map<Key<Message>, Instance, std::less<>> instances;
+  std::size_t limit{0};  // Of instances, as far as it has been reached.
+  std::uint64_t writes{0};
   typename Traits::Wire wire;
 };
 
@@ -192,7 +226,7 @@ void Publisher<Message>::Dispose(const Message& message) {
   }
   Impl::Traits::EncodeKey(message, impl.wire);
   const auto send = [&] {
-    return impl.writer->dispose(&impl.wire, found->second);
+    return impl.writer->dispose(&impl.wire, found->second.handle);
   };
   if (!impl.Retry(send, "dispose", {}, Clock::now() + kDisposeTimeout)) {
     throw TransportError("dispose: the readers are behind",

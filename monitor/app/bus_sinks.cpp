@@ -1,6 +1,8 @@
 #include "monitor/app/bus_sinks.h"
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 #include <utility>
 
 #include "cli/logging.h"
@@ -13,6 +15,7 @@ namespace {
 // A UDP datagram holds at most 64 kB, part of which goes to the security
 // header.
 constexpr std::size_t kMaxBatchBytes = 48'000;
+constexpr std::chrono::milliseconds kPlacePatience{200};
 
 // Upper bound of the CDR size of one vector.
 std::size_t BytesOf(const idl::DecisionMessage& message) {
@@ -39,7 +42,7 @@ BusDecisionSink::BusDecisionSink(idl::Participant& participant,
                                  const std::string& batches_of,
                                  std::stop_token stop,
                                  const std::vector<std::string>& partitions)
-    : live_(participant, {idl::Profile::kLive, 0, partitions}),
+    : live_(participant, {idl::Profile::kLive, 0, partitions, true}),
       stop_(std::move(stop)) {
   if (!batches_of.empty()) {
     batches_.emplace(participant,
@@ -144,7 +147,7 @@ idl::PublisherStatus BusDecisionSink::status() const {
 
 BusEventSink::BusEventSink(idl::Participant& participant, LogSink log,
                            const std::vector<std::string>& partitions)
-    : publisher_(participant, {idl::Profile::kLive, 0, partitions}),
+    : publisher_(participant, {idl::Profile::kLive, 0, partitions, true}),
       log_(std::move(log)) {}
 
 bool BusEventSink::Publish(const FaultEvent& event, bool persisted) {
@@ -166,7 +169,16 @@ bool BusEventSink::Send(const FaultEvent& message) {
               {"episode", storage::EpisodeIdText(message.episode_id)},
               {"persisted", message.persisted ? "true" : "false"}}));
   }
-  return publisher_.Write(message) == idl::WriteResult::kSent;
+  // The place of a valve that is gone becomes free once all subscribers have
+  // acknowledged its end.
+  const auto end = std::chrono::steady_clock::now() + kPlacePatience;
+  idl::WriteResult result = publisher_.Write(message);
+  while (result == idl::WriteResult::kTooManyValves &&
+         std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    result = publisher_.Write(message);
+  }
+  return result == idl::WriteResult::kSent;
 }
 
 }  // namespace fdi::monitor

@@ -81,6 +81,17 @@ TEST_F(DeliveryTest, APublisherRefusesValvesBeyondItsNumber) {
   EXPECT_EQ(publisher.status().written, 3U);
 }
 
+TEST_F(DeliveryTest, APublisherThatReplacesGivesUpTheValveWrittenLongestAgo) {
+  Participant participant(domain_.Options(), log_.Sink());
+  Publisher<DecisionMessage> publisher(participant,
+                                       {Profile::kLive, 2, {}, true});
+
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(publisher.Write(DecisionOf(ValveName(i), 0)), WriteResult::kSent);
+  }
+  EXPECT_EQ(publisher.status().refused, 0U);
+}
+
 TEST_F(DeliveryTest, ALateJoinerHasTheLastDecisionOfEveryValve) {
   constexpr int kValves = 300;
   Participant here(domain_.Options(), log_.Sink());
