@@ -1,16 +1,40 @@
 #pragma once
 
-#include <string>
+#include <optional>
 #include <string_view>
-
-#include <fnmatch.h>
 
 namespace fdi {
 
-/// Whether `text` matches the shell pattern `glob`: * ? [...]; no escapes.
-inline bool GlobMatches(const std::string& glob, std::string_view text) {
-  return glob == "*" ||
-         fnmatch(glob.c_str(), std::string(text).c_str(), FNM_NOESCAPE) == 0;
+/// Whether `text` matches the shell pattern `glob`: * ? [abc] [a-z] [!abc]
+/// [^abc]; no escapes. ? and sets match a character of UTF-8. A ] that begins a
+/// set is a member of it; a set without an end matches nothing. The databases
+/// use this for GLOB, too.
+bool GlobMatches(std::string_view glob, std::string_view text);
+
+/// Removes the first character of UTF-8 from a text that is not empty.
+std::string_view TakeCharacter(std::string_view& text);
+
+/// Removes the rest of a set behind its [ from the front of `glob`, and calls
+/// visit(low, high) for each range of characters in it.
+/// @returns whether the set is negated; nothing if it has no end.
+template <typename Visit>
+std::optional<bool> TakeGlobSet(std::string_view& glob, Visit visit) {
+  const bool negated = glob.starts_with('!') || glob.starts_with('^');
+  glob.remove_prefix(negated ? 1 : 0);
+  for (bool first = true; !glob.empty(); first = false) {
+    if (glob.front() == ']' && !first) {
+      glob.remove_prefix(1);
+      return negated;
+    }
+    const std::string_view low = TakeCharacter(glob);
+    std::string_view high = low;
+    if (glob.size() > 1 && glob[0] == '-' && glob[1] != ']') {
+      glob.remove_prefix(1);
+      high = TakeCharacter(glob);
+    }
+    visit(low, high);
+  }
+  return std::nullopt;
 }
 
 }  // namespace fdi

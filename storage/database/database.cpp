@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "diagnosis/error.h"
+#include "diagnosis/records/valve_glob.h"
 #include "storage/database/data_directory.h"
 #include "storage/database/locks.h"
 
@@ -59,14 +60,27 @@ void CheckReachable(const std::filesystem::path& path, Access access) {
   }
 }
 
+// `text GLOB pattern`. SQLite's own differs in sets: only ^ negates them.
+void Glob(sqlite3_context* context, int /*count*/, sqlite3_value** values) {
+  const auto text = [values](int index) -> std::string_view {
+    const auto* bytes =
+        reinterpret_cast<const char*>(sqlite3_value_text(values[index]));
+    return {bytes == nullptr ? "" : bytes,
+            static_cast<std::size_t>(sqlite3_value_bytes(values[index]))};
+  };
+  sqlite3_result_int(context, GlobMatches(text(0), text(1)) ? 1 : 0);
+}
+
 std::unique_ptr<SQLite::Database> Connect(const std::filesystem::path& path,
                                           Access access) {
   const int flags = access == Access::kReader
                         ? SQLite::OPEN_READONLY
                         : SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
   try {
-    return std::make_unique<SQLite::Database>(
+    auto connection = std::make_unique<SQLite::Database>(
         path.string(), flags, static_cast<int>(kWritePatience.count()));
+    connection->createFunction("glob", 2, true, nullptr, Glob);
+    return connection;
   } catch (const SQLite::Exception& error) {
     Refuse(path, error.what());
   }

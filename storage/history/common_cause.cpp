@@ -4,9 +4,8 @@
 #include <array>
 #include <set>
 
-#include <fnmatch.h>
-
 #include "diagnosis/error.h"
+#include "diagnosis/records/valve_glob.h"
 #include "diagnosis/verdict.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
@@ -22,11 +21,6 @@ constexpr std::array<std::string_view, 3> kChanges{"OPENED", "GROWN", "ENDED"};
 // index of episode_fault is by detection: this bounds the part of it that is
 // searched for an isolation, so an episode isolated later than that is missed.
 constexpr std::int64_t kMaxIsolationNs = 86'400'000'000'000;
-
-bool GlobMatches(const std::string& glob, std::string_view text) {
-  // As in SQLite's GLOB, a backslash is an ordinary character.
-  return fnmatch(glob.c_str(), std::string(text).c_str(), FNM_NOESCAPE) == 0;
-}
 
 std::vector<CauseMember> ReadMembers(Database& database,
                                      const std::string& cause_id) {

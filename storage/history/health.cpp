@@ -4,6 +4,7 @@
 
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/model_set.h"
+#include "diagnosis/records/valve_glob.h"
 #include "diagnosis/time_units.h"
 #include "storage/database/bytes.h"
 #include "storage/history/sql.h"
@@ -224,14 +225,13 @@ std::vector<HealthHour> ReadHealth(Database& database,
 std::vector<std::string> HealthValves(Database& database,
                                       const std::string& glob) {
   Statement next = database.Prepare(sql::next_health_valve);
-  Statement match = database.Prepare("SELECT ? GLOB ?");
   std::vector<std::string> valves;
   std::string last;
   // Each step is one look into the primary key, so the costs grow with the
   // number of valves, not with that of their hours.
   while (next.Bind(last).Step() && !next.IsNull(0)) {
     last = next.Text(0);
-    if (match.Bind(last, glob).Step() && match.Bool(0)) {
+    if (GlobMatches(glob, last)) {
       valves.push_back(last);
     }
   }

@@ -37,7 +37,7 @@ std::uint64_t ResolveEpisode(Database& database, std::string_view id) {
         !prefix.empty() &&
         prefix.find_first_not_of("0123456789abcdef") == std::string::npos;
     Statement matching = database.Prepare(sql::episodes_by_prefix);
-    matching.Bind(prefix + "*");
+    matching.Bind(prefix);
     while (is_hex && matching.Step()) {
       found.push_back(matching.Text(0));
     }

@@ -16,7 +16,8 @@ WHERE
 -- name: newest_episode
 SELECT episode_id FROM episode ORDER BY detected_ns DESC, rowid DESC LIMIT 1
 -- name: episodes_by_prefix
-SELECT episode_id FROM episode WHERE episode_id GLOB ? LIMIT 2
+SELECT episode_id FROM episode
+WHERE episode_id >= ?1 AND episode_id < ?1 || 'g' LIMIT 2
 -- name: alarm_list
 e.episode_id IN (
   SELECT episode_id FROM (

@@ -50,6 +50,15 @@ class DatabaseTest : public ::testing::Test {
   std::filesystem::path file_{directory_.path() / "test.db"};
 };
 
+// In SQLite's own, ! is a member of the set.
+TEST_F(DatabaseTest, GlobIsTheOneOfTheMonitor) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  EXPECT_EQ(database.QueryInt64("SELECT 'b' GLOB '[!a]'"), 1);
+  EXPECT_EQ(database.QueryInt64("SELECT 'a' GLOB '[!a]'"), 0);
+  EXPECT_EQ(database.QueryInt64("SELECT 'a' GLOB '[^a]'"), 0);
+  EXPECT_EQ(database.QueryInt64("SELECT 'FV-101' GLOB 'FV-1*'"), 1);
+}
+
 TEST_F(DatabaseTest, EveryTypeReadsBackAsItWasBound) {
   Database database(file_, SchemaOf(1), Access::kWriter);
   const std::vector<std::byte> blob{std::byte{0}, std::byte{255}};
