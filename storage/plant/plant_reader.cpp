@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/records/valve_glob.h"
 #include "storage/database/record.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/trace.h"
@@ -85,35 +86,38 @@ std::string Replaced(std::string text, std::string_view what,
   return text;
 }
 
-// The regular expression of a glob of SQLite: * ? [...] [^...], all else as it
-// is. A backslash makes a letter or digit special in PostgreSQL (\d, \m), and
-// anything else plain, also in a set, where it is needed for \ [ ].
-std::string RegexOf(const std::string& glob) {
+// A character in a regular expression. A backslash makes a letter or digit
+// special in PostgreSQL (\d, \m), and anything else plain, also in a set.
+std::string Plain(std::string_view character) {
+  const auto first = static_cast<unsigned char>(character.front());
+  const bool is_plain =
+      std::isalnum(first) != 0 || first == '_' || (first & 0x80U) != 0;
+  return (is_plain ? "" : "\\") + std::string(character);
+}
+
+// The regular expression that matches what GlobMatches() does. PostgreSQL
+// refuses empty sets and ranges, and ranges that share an end (a-c-e).
+std::string RegexOf(std::string_view glob) {
+  const std::string nothing = "$.";
   std::string regex = "^";
-  for (std::size_t at = 0; at < glob.size(); ++at) {
-    const char c = glob[at];
-    if (c == '*' || c == '?') {
-      regex += c == '*' ? ".*" : ".";
-    } else if (c == '[') {
-      // A ] does not end the set that it begins.
-      const std::size_t first = at + (glob[at + 1] == '^' ? 2 : 1);
-      const std::size_t end = glob.find(']', first + 1);
-      if (end == std::string::npos) {
-        return "$.";  // A set without an end matches nothing.
+  while (!glob.empty()) {
+    const std::string_view character = TakeCharacter(glob);
+    if (character == "*" || character == "?") {
+      regex += character == "*" ? ".*" : ".";
+    } else if (character == "[") {
+      std::string members;
+      const auto negated =
+          TakeGlobSet(glob, [&](std::string_view low, std::string_view high) {
+            if (low <= high) {
+              members += Plain(low) + (low == high ? "" : '-' + Plain(high));
+            }
+          });
+      if (!negated || (members.empty() && !*negated)) {
+        return nothing;
       }
-      regex += glob.substr(at, first - at);
-      for (at = first; at < end; ++at) {
-        const bool special =
-            glob[at] == '\\' || glob[at] == '[' || glob[at] == ']';
-        regex += (special ? "\\" : "") + std::string(1, glob[at]);
-      }
-      regex += ']';
+      regex += members.empty() ? "." : (*negated ? "[^" : "[") + members + ']';
     } else {
-      regex += (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' ||
-                        (static_cast<unsigned char>(c) & 0x80U) != 0
-                    ? ""
-                    : "\\") +
-               std::string(1, c);
+      regex += Plain(character);
     }
   }
   return regex + "$";
@@ -130,7 +134,7 @@ PlantReader::PlantReader(const std::string& url, std::string monitor)
   plant_.Run("SET search_path = fdi, pg_catalog");
 }
 
-// Runs `sql` with its {episodes}, the condition of the filter.
+// Runs `sql` with its {episodes} or {valve}, the condition of the filter.
 PlantRows PlantReader::Query(std::string_view sql,
                              const EpisodeFilter& filter) {
   // The condition is that of SQLite, with what the two write differently
@@ -146,8 +150,13 @@ PlantRows PlantReader::Query(std::string_view sql,
       Replaced(Replaced(open, "GLOB", "~"), "?", "$") +
       " AND utc(e.detected_ns) >= utc($2) AND utc(e.detected_ns) <= utc($3)"
       " AND $5::bigint IS NOT NULL AND ($6 = '' OR e.monitor = $6)";
+  // Of tables without episodes.
+  const std::string valve = IsGlob(filter.valve_glob)
+                                ? "valve_id ~ $1"
+                                : "($1 = '*' OR valve_id = $1)";
   return plant_.Run(
-      Replaced(std::string(sql), "{episodes}", episodes),
+      Replaced(Replaced(std::string(sql), "{episodes}", episodes), "{valve}",
+               valve),
       {IsGlob(filter.valve_glob) ? RegexOf(filter.valve_glob)
                                  : filter.valve_glob,
        std::to_string(filter.since_ns), std::to_string(filter.until_ns),

@@ -207,7 +207,8 @@ DELETE FROM fdi.health_hour WHERE hour < $1::bigint / 3600000000000
 -- ---- The plant's history as fdi-store history shows it, with the schema fdi
 -- ---- in the search path. Parameters: $1 valve, $2 since, $3 until, $4 fault,
 -- ---- $5 now, $6 monitor; all of them occur in each statement. {episodes} is
--- ---- the condition of the filter, {columns} are those of the record.
+-- ---- the condition of the filter, {valve} that of its valve, {columns} are those
+-- ---- of the record.
 -- name: plant_list
 SELECT * FROM (
   SELECT e.episode_id, e.valve_id, rfc3339(e.detected_ns) AS detected_utc,
@@ -246,14 +247,14 @@ WHERE {episodes} AND (e.ended_ns IS NULL OR e.ended_ns >= {since})
 ORDER BY e.detected_ns, e.valve_id
 -- name: plant_gaps
 SELECT {columns} FROM data_gap JOIN monitor m USING (monitor_id)
-WHERE (valve_id IS NULL OR $1 = '*' OR valve_id ~ $1)
+WHERE (valve_id IS NULL OR {valve})
   AND to_ns >= $2 AND from_ns < $3 AND ($4 = '' OR true)
   AND $5::bigint IS NOT NULL AND ($6 = '' OR m.monitor = $6)
 ORDER BY from_ns, valve_id
 -- name: plant_coverage
 SELECT valve_id, quality, sum(samples)::bigint, sum(seconds) / 3600
 FROM coverage_day JOIN monitor m USING (monitor_id)
-WHERE ($1 = '*' OR valve_id ~ $1)
+WHERE {valve}
   AND day >= $2::bigint / 86400000000000
   AND day <= $3::bigint / 86400000000000 AND ($4 = '' OR true)
   AND $5::bigint IS NOT NULL AND ($6 = '' OR m.monitor = $6)

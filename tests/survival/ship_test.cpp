@@ -651,8 +651,8 @@ TEST_F(ShipTest, APatternMatchesTheSameValvesInBothHistories) {
   const auto path = Folder("a") / "history.db";
   {
     HistoryWriter writer(path);
-    for (const char* valve :
-         {"a", "b", "d", "5", "]", "[", "\\", ":", "!", "^", "-", "V[1]"}) {
+    for (const char* valve : {"a", "b", "d", "5", "]", "[", "\\", ":", "!", "^",
+                              "-", "V[1]", "\u00e4"}) {
       writer.Record(
           Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve),
           kDetected);
@@ -663,8 +663,9 @@ TEST_F(ShipTest, APatternMatchesTheSameValvesInBothHistories) {
   HistoryReader here(path);
   PlantReader there(Url());
   for (const char* glob :
-       {"?", "[a-c]", "[^a]", "[!a]", "[]a]", "[^]a]", "[[]", "[[:]", "[\\d]",
-        "[a^]", "[a-]", "V[[]?[]]", "[ab", "["}) {
+       {"?",     "[a-c]",  "[^a]",   "[!a]",    "[]a]",     "[^]a]",    "[[]",
+        "[[:]",  "[\\d]",  "[a^]",   "[a-]",    "V[[]?[]]", "[ab",      "[",
+        "[c-a]", "[!c-a]", "[c-a^]", "[a-c-e]", "[]-a]",    "[!\u00e4]"}) {
     EpisodeFilter filter;
     filter.valve_glob = glob;
     const auto valves = [&filter](auto& reader) {
@@ -675,6 +676,27 @@ TEST_F(ShipTest, APatternMatchesTheSameValvesInBothHistories) {
       return found;
     };
     EXPECT_EQ(valves(there), valves(here)) << glob;
+  }
+}
+
+TEST_F(ShipTest, TheHoursOfAValveAreNotThoseOfAnother) {
+  Init();
+  Checkpoint checkpoint;
+  for (const char* valve : {"V1", "V10", "20.FIC(1"}) {
+    checkpoint.coverage.push_back(Coverage(3600));
+    checkpoint.coverage.back().valve_id = valve;
+  }
+  HistoryWriter(Folder("a") / "history.db").CommitCheckpoint(checkpoint);
+  ASSERT_EQ(Ship("a").code, 0);
+
+  PlantReader there(Url());
+  for (const char* valve : {"V1", "20.FIC(1"}) {
+    EpisodeFilter filter;
+    filter.valve_glob = valve;
+    const auto hours = there.Coverage(filter);
+    ASSERT_EQ(hours.size(), 1U) << valve;
+    EXPECT_EQ(hours[0].valve_id, valve);
+    EXPECT_TRUE(there.Gaps(filter).empty());
   }
 }
 
