@@ -255,8 +255,7 @@ std::vector<CoverageTime> HistoryReader::Coverage(const EpisodeFilter& filter) {
   // Coverage is stored by day: a day that is only partly in the window counts
   // as a whole.
   Statement rows = database_.Prepare(sql::coverage);
-  rows.Bind(filter.valve_glob, filter.since_ns / kNsPerDay,
-            filter.until_ns / kNsPerDay);
+  rows.Bind(filter.valve_glob, filter.since_ns / kNsPerDay, filter.until_ns);
   return ReadRecords<CoverageTime>(rows);
 }
 

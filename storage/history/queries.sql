@@ -232,7 +232,8 @@ ON CONFLICT (valve_id, day, quality) DO UPDATE SET
   samples = samples + excluded.samples, seconds = seconds + excluded.seconds
 -- name: coverage
 SELECT valve_id, quality, sum(samples), sum(seconds) / 3600.0
-FROM coverage_day WHERE valve_id GLOB ?1 AND day >= ?2 AND day <= ?3
+FROM coverage_day
+WHERE valve_id GLOB ?1 AND day >= ?2 AND day * 86400000000000 < ?3
 GROUP BY valve_id, quality ORDER BY valve_id, sum(seconds) DESC
 -- name: health_hour
 SELECT live_ms, bytes FROM health_hour
@@ -354,11 +355,23 @@ SELECT count(*) FROM episode e WHERE NOT (
     SELECT key FROM change
     WHERE number > (SELECT min(number) FROM ship_cursor)
       AND item IN ('episode', 'trace', 'look', 'strength')))
+-- Hours of a valve ?1 before ?2 that every plant has, and how many it has not.
 -- name: old_health
-SELECT count(*), min(hour), max(hour), sum(length(bytes))
-FROM health_hour WHERE valve_id = ? AND hour < ?
+SELECT count(*), min(hour), max(hour), sum(length(bytes)), (
+  SELECT count(*) FROM health_hour WHERE valve_id = ?1 AND hour < ?2) - count(*)
+FROM health_hour WHERE valve_id = ?1 AND hour < ?2
+  AND NOT EXISTS (SELECT 1 FROM ship_cursor WHERE copied_valve < ?1)
+  AND hour NOT IN (
+    SELECT part FROM change
+    WHERE number > (SELECT min(number) FROM ship_cursor)
+      AND item = 'hour' AND key = ?1)
 -- name: delete_old_health
-DELETE FROM health_hour WHERE valve_id = ? AND hour < ?
+DELETE FROM health_hour WHERE valve_id = ?1 AND hour < ?2
+  AND NOT EXISTS (SELECT 1 FROM ship_cursor WHERE copied_valve < ?1)
+  AND hour NOT IN (
+    SELECT part FROM change
+    WHERE number > (SELECT min(number) FROM ship_cursor)
+      AND item = 'hour' AND key = ?1)
 -- name: old_shadow
 SELECT count(*), min(from_ns), max(from_ns) FROM shadow_difference
 WHERE to_ns < ?

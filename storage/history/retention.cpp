@@ -140,11 +140,14 @@ class Pruner {
   PruneResult result_;
 };
 
-// Adds the hours older than `hour` to `result`. @returns their bytes.
+// Adds the hours older than `hour` to `result`. @returns the bytes of those
+// that may go.
 std::uintmax_t CountHealth(Database& database, const std::string& valve,
                            std::int64_t hour, PruneResult& result) {
   Statement row = database.Prepare(sql::old_health);
-  if (!row.Bind(valve, hour).Step() || row.Int64(0) == 0) {
+  row.Bind(valve, hour).Step();
+  result.kept += row.Int64(4);
+  if (row.Int64(0) == 0) {
     return 0;
   }
   result.deleted += row.Int64(0);

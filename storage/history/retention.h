@@ -44,7 +44,8 @@ PruneResult PruneHistory(const std::filesystem::path& path,
                          const RetentionLimits& limits);
 
 /// Deletes hours of health of history.db that ended before limits.before_ns;
-/// there is no size limit. Short transactions of one valve each.
+/// there is no size limit. Protected: hours not yet in a plant history. Short
+/// transactions of one valve each.
 PruneResult PruneHealth(const std::filesystem::path& path,
                         const RetentionLimits& limits);
 

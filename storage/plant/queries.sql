@@ -256,7 +256,7 @@ SELECT valve_id, quality, sum(samples)::bigint, sum(seconds) / 3600
 FROM coverage_day JOIN monitor m USING (monitor_id)
 WHERE {valve}
   AND day >= $2::bigint / 86400000000000
-  AND day <= $3::bigint / 86400000000000 AND ($4 = '' OR true)
+  AND day * 86400000000000 < $3 AND ($4 = '' OR true)
   AND $5::bigint IS NOT NULL AND ($6 = '' OR m.monitor = $6)
 GROUP BY valve_id, quality ORDER BY valve_id, sum(seconds) DESC
 -- name: plant_newest

@@ -149,6 +149,36 @@ TEST_F(HealthRowsTest, PruningTakesWhatIsOldAndNothingElse) {
   EXPECT_EQ(Stored().front().hour, 4);
 }
 
+// The plant has V1 up to a change of its hour 1, and nothing of V2 yet.
+TEST_F(HealthRowsTest, PruningKeepsWhatAPlantHasNot) {
+  {
+    Transaction transaction(writer_.database());
+    writer_.database().Run(
+        "INSERT INTO ship_cursor VALUES ('p', 8, 0, 0, 'V1')");
+    transaction.Commit();
+  }
+  Checkpoint checkpoint;
+  for (std::int64_t hour = 0; hour < 4; ++hour) {
+    checkpoint.health.push_back(Typical("V1", hour, 1, random_));
+    checkpoint.health.push_back(Typical("V2", hour, 1, random_));
+  }
+  writer_.CommitCheckpoint(checkpoint);  // Changes 1 to 8.
+  checkpoint.health = {Typical("V1", 1, 1, random_)};
+  writer_.CommitCheckpoint(checkpoint);
+
+  RetentionLimits limits;
+  limits.before_ns = 4 * kHourNs;
+  limits.pause = {};
+  const PruneResult result =
+      PruneHealth(directory_.path() / "history.db", limits);
+
+  EXPECT_EQ(result.deleted, 3);
+  EXPECT_EQ(result.kept, 5);
+  ASSERT_EQ(Stored().size(), 1u);
+  EXPECT_EQ(Stored().front().hour, 1);
+  EXPECT_EQ(Stored("V2").size(), 4u);
+}
+
 // 300 valves for a year in 0.4 GB are 152 bytes for an hour of a valve, pages
 // and all. Fills a file as a monitor does: hour by hour, all valves.
 TEST_F(HealthRowsTest, AnHourOfAValveTakesLessThan152Bytes) {
