@@ -1,5 +1,6 @@
 #include "storage/history/history_writer.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <utility>
@@ -310,6 +311,9 @@ SessionStart HistoryWriter::BeginSession(std::int64_t now_ns,
   Transaction transaction(database_);
   // This is read before the next statement gives the dead session an end.
   start.died_ns = database_.QueryInt64(sql::last_sign_of_life);
+  if (start.died_ns) {
+    start.died_ns = std::min(*start.died_ns, now_ns);
+  }
   database_.Run(sql::end_dead_sessions);
   database_.Run(sql::insert_session, now_ns, software, config);
   start.session_id = database_.LastInsertRowid();
@@ -451,7 +455,9 @@ bool HistoryWriter::HasPending() const {
 }
 
 void HistoryWriter::Commit(std::int64_t now_ns) {
-  const bool alive = session_id_ && now_ns - alive_ns_ >= kAliveEveryNs;
+  // A clock that was set back has no sign of life of its own yet.
+  const bool alive = session_id_ && (now_ns - alive_ns_ >= kAliveEveryNs ||
+                                     now_ns < alive_ns_);
   if (!HasPending() && !alive && !failed_) {
     return;
   }

@@ -20,7 +20,8 @@ namespace fdi::storage {
 /// Result of BeginSession().
 struct SessionStart {
   std::int64_t session_id{0};
-  /// Last heartbeat of a previous session that crashed, if there was one.
+  /// Last heartbeat of a previous session that crashed, if there was one; the
+  /// present time if the clock has been set back since.
   std::optional<std::int64_t> died_ns;
 };
 

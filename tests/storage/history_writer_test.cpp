@@ -147,6 +147,21 @@ TEST_F(HistoryWriterTest, SessionThatDidNotEndIsFoundAtItsLastSignOfLife) {
   EXPECT_EQ(Sql("SELECT group_concat(clean) FROM monitor_session"), "0,1");
 }
 
+// A gap from a sign of life in the future would end before it begins.
+TEST_F(HistoryWriterTest, AClockThatIsSetBackHasSignsOfLife) {
+  const std::int64_t earlier = kDetected - 3600 * kSecond;
+  {
+    HistoryWriter writer(path_);
+    writer.BeginSession(kDetected, "v", "");
+    writer.Commit(earlier);
+    EXPECT_EQ(Sql("SELECT alive_ns FROM monitor_session"),
+              std::to_string(earlier));
+  }
+  HistoryWriter writer(path_);
+  EXPECT_EQ(writer.BeginSession(earlier - kSecond, "v", "").died_ns,
+            earlier - kSecond);
+}
+
 TEST_F(HistoryWriterTest, EpisodeOfADeadMonitorCanBeClosedOnce) {
   { HistoryWriter(path_).Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected); }
   HistoryWriter writer(path_);
@@ -317,6 +332,11 @@ TEST_F(HistoryWriterTest, TimeAddsUpByDayAndQuality) {
   EXPECT_DOUBLE_EQ(times[1].hours, 0.5);
   filter.valve_glob = "X*";
   EXPECT_TRUE(reader.Coverage(filter).empty());
+  EpisodeFilter before;  // The day that begins where the filter ends.
+  before.until_ns = 20'001 * 86'400 * kSecond;
+  times = reader.Coverage(before);
+  ASSERT_EQ(times.size(), 2U);
+  EXPECT_DOUBLE_EQ(times[0].hours, 2.0);
   EXPECT_EQ(Sql("SELECT day_utc FROM coverage_hours LIMIT 1"), "2024-10-04");
 }
 
