@@ -280,6 +280,12 @@ void Database::Migrate(const Schema& schema, int from) {
     version_ = version;
   } catch (...) {
     connection_->tryExec("ROLLBACK");
+    // The file is as before, and a service tries again and again: each attempt
+    // would leave a copy of it.
+    if (migration_backup_) {
+      std::error_code ignored;
+      std::filesystem::remove(*migration_backup_, ignored);
+    }
     throw;
   }
 }

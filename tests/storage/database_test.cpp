@@ -140,6 +140,7 @@ TEST_F(DatabaseTest, FailedMigrationLeavesTheOldVersion) {
   broken.migrations.push_back("DELETE FROM t; SELECT nothing FROM nowhere;");
 
   EXPECT_THROW(Database(file_, broken, Access::kWriter), SqliteError);
+  EXPECT_FALSE(std::filesystem::exists(file_.string() + ".v1.backup"));
   Database after(file_, SchemaOf(1), Access::kWriter);
   EXPECT_EQ(after.QueryInt64("SELECT id FROM t"), 4);
 }
