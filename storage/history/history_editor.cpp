@@ -44,10 +44,24 @@ OperatorNote Checked(const OperatorNote& note) {
 }
 
 // Actions from versions without an origin take the monitor's name.
+std::string OriginOf(const OperatorAction& action, const std::string& origin) {
+  return origin.empty() ? action.monitor : origin;
+}
+
 OperatorNote NoteOf(const OperatorAction& action) {
-  return Checked({action.who, action.comment,
-                  action.origin.empty() ? action.monitor : action.origin,
+  return Checked({action.who, action.comment, OriginOf(action, action.origin),
                   action.stamp_ns});
+}
+
+void CheckShelfTime(std::int64_t from_ns, std::int64_t until_ns) {
+  // Unsigned, because those of an action from the bus may be any numbers.
+  if (until_ns <= from_ns || static_cast<std::uint64_t>(until_ns) -
+                                     static_cast<std::uint64_t>(from_ns) >
+                                 std::uint64_t{kMaxShelfNs}) {
+    throw ConfigError(
+        "an alarm is shelved until a time after now, and for "
+        "90 days at most");
+  }
 }
 
 std::string CheckedLabel(std::string_view label) {
@@ -178,6 +192,7 @@ bool HistoryEditor::AdoptNote(const OperatorAction& action) {
 bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
   const OperatorNote note = NoteOf(action);
   RequireLength(action.valve_id, "valve", 1, kMaxValveIdLength);
+  CheckShelfTime(action.stamp_ns, action.until_ns);
   const std::optional<std::string> fault =
       action.value.empty() ? std::nullopt
                            : std::optional(CheckedFaults(action.value));
@@ -197,7 +212,8 @@ bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
       action.ended_ns != 0 && !ReadShelf(database_, *shelf_id).ended_ns;
   if (ended) {
     const OperatorNote end =
-        Checked({action.ended_by, "", action.ended_origin, action.ended_ns});
+        Checked({action.ended_by, "", OriginOf(action, action.ended_origin),
+                 action.ended_ns});
     database_.Run(sql::end_shelf, end.now_ns, end.who, end.origin, *shelf_id);
   }
   transaction.Commit();
@@ -214,11 +230,7 @@ Shelf HistoryEditor::Shelve(std::string_view valve_id,
   shelf.fault = fault ? std::optional(CheckedFaults(*fault)) : std::nullopt;
   shelf.from_ns = checked.now_ns;
   shelf.until_ns = until_ns;
-  if (until_ns <= shelf.from_ns || until_ns - shelf.from_ns > kMaxShelfNs) {
-    throw ConfigError(
-        "an alarm is shelved until a time after now, and for "
-        "90 days at most");
-  }
+  CheckShelfTime(shelf.from_ns, until_ns);
   shelf.who = checked.who;
   shelf.comment = checked.comment;
   shelf.origin = checked.origin;

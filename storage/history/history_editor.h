@@ -65,7 +65,8 @@ class HistoryEditor {
   /// whatever the order of arrival: the earliest acknowledgement and the latest
   /// label are shown.
   /// @returns false if it is already recorded.
-  /// @throws NotFoundError if its episode does not exist.
+  /// @throws NotFoundError if its episode does not exist; ConfigError if it
+  ///   says what no action of this class would.
   bool Adopt(const OperatorAction& action);
 
  private:

@@ -1,5 +1,7 @@
 #include "storage/history/history_editor.h"
 
+#include <limits>
+
 #include <gmock/gmock.h>
 
 #include "diagnosis/error.h"
@@ -250,6 +252,28 @@ TEST_F(HistoryEditorTest, AdoptsANoteWithoutAnOrigin) {
   EXPECT_TRUE(editor_.Adopt(action));
   ASSERT_EQ(Notes("LV-1").size(), 1U);
   EXPECT_EQ(Notes("LV-1")[0].origin, "host:1");
+}
+
+TEST_F(HistoryEditorTest, AdoptsShelvesOfAtMostNinetyDays) {
+  OperatorAction action;
+  action.monitor = "host:1";
+  action.kind = OperatorActionKind::kShelve;
+  action.valve_id = "LV-9";
+  action.who = "anna";
+  action.stamp_ns = now_;
+  for (const std::int64_t until_ns :
+       {now_, now_ - 1, now_ + kMaxShelfNs + 1,
+        std::numeric_limits<std::int64_t>::max()}) {
+    action.until_ns = until_ns;
+    EXPECT_THROW(editor_.Adopt(action), ConfigError) << until_ns;
+  }
+  action.until_ns = now_ + kMaxShelfNs;
+  action.ended_ns = now_ + kSecond;
+  action.ended_by = "jan";
+  EXPECT_TRUE(editor_.Adopt(action));
+  const std::vector<Shelf> shelves = HistoryReader(path_).Shelves();
+  ASSERT_EQ(shelves.size(), 1U);
+  EXPECT_EQ(shelves[0].ended_origin, "host:1");
 }
 
 }  // namespace
