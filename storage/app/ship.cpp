@@ -69,6 +69,10 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
 [[noreturn]] void ShipForEver(const ShipOptions& options,
                               const Context& context) {
   const std::chrono::nanoseconds every(cli::ParseDuration(options.every));
+  if (every.count() == 0) {
+    throw ConfigError("--every is '" + options.every +
+                      "', accepted are intervals above 0: 10s, 1min, ...");
+  }
   std::optional<Shipper> shipper;
   std::set<std::string> said;
   auto pause = every;

@@ -1,7 +1,9 @@
 // fdi-store runs sniff: analyses an exported file and proposes a tag map.
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 #include <set>
@@ -606,7 +608,14 @@ Sniffed Sniff(const std::string& text, const std::string& source,
 std::string TomlText(const std::string& text) {
   std::string quoted = "\"";
   for (const char c : text) {
-    quoted += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) {
+      std::array<char, 8> code{};  // A name may have several lines.
+      std::snprintf(code.data(), code.size(), "\\u%04X", c);
+      quoted += code.data();
+    } else {
+      quoted +=
+          c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+    }
   }
   return quoted + '"';
 }

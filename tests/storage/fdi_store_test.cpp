@@ -60,6 +60,20 @@ TEST_F(FdiStoreTest, SniffDoesNotTakeSecondsForDaysOfASpreadsheet) {
   EXPECT_EQ(StoreJson("runs sniff late.csv")["period_s"], 0.5);
 }
 
+TEST_F(FdiStoreTest, TheMapOfSniffTakesNamesOfSeveralLines) {
+  std::string rows;
+  for (int i = 0; i < 30; ++i) {
+    rows += std::to_string(i) + "," + std::to_string(20 + i % 7) + "," +
+            std::to_string(50 - i % 7) + "\n";
+  }
+  Write("lines.csv", "t_s,CV_pct,\"Flow\n[m3/h]\"\n" + rows);
+
+  StoreJson("runs sniff lines.csv --map-output lines.toml");
+  const json imported = StoreJson(
+      "runs import lines.csv --valve V1 --map lines.toml --signals CV,F");
+  EXPECT_EQ(imported["samples"], 30);
+}
+
 TEST_F(FdiStoreTest, CsvWithoutAColumnIsRefusedAndNothingIsStored) {
   Write("a.csv", "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,F_t_h\n0,1,2,3,4,5\n");
 
