@@ -105,7 +105,9 @@ Report Statistics(const HistoryOptions& options, const Context& context) {
   const std::vector<CoverageTime> coverage = history->Coverage(filter);
   double gaps_s = 0.0;
   for (const DataGap& gap : gaps) {
-    gaps_s += static_cast<double>(gap.to_ns - gap.from_ns) * 1e-9;
+    const std::int64_t from_ns = std::max(gap.from_ns, filter.since_ns);
+    const std::int64_t to_ns = std::min(gap.to_ns, filter.until_ns);
+    gaps_s += std::max(0.0, static_cast<double>(to_ns - from_ns) * 1e-9);
   }
   Report report;
   report.document["statistics"] = Rows(history->Statistics(filter), AnswerJson);

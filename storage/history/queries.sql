@@ -253,7 +253,7 @@ SELECT min(valve_id) FROM health_hour WHERE valve_id > ?
 -- ---- Shadow.
 -- name: shadow_differences
 FROM shadow_difference
-WHERE valve_id GLOB ?1 AND from_ns >= ?2 AND from_ns <= ?3
+WHERE valve_id GLOB ?1 AND from_ns >= ?2 AND from_ns < ?3
   AND (?4 = '' OR candidate_set = ?4
        OR substr(candidate_set, 1, length(?4) + 1) = ?4 || '@')
 ORDER BY from_ns DESC, difference_id DESC LIMIT ?5

@@ -74,6 +74,21 @@ TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
   EXPECT_EQ(Store("history label last perhaps").code, 2);
 }
 
+TEST_F(FdiStoreHistoryTest, OfAGapOnlyThePartInTheTimeCounts) {
+  {
+    HistoryWriter writer(path_);
+    writer.AddGap({"", kDetected - 86'400 * kSecond,
+                   kDetected + 86'400 * kSecond, "monitor_down"});
+    writer.Commit(kDetected);
+  }
+  EXPECT_EQ(StoreJson("history stats")["gaps_s"], 172'800.0);
+  const json minute = StoreJson(
+      "history stats --since 2026-11-20T14:56:00Z "
+      "--until 2026-11-20T14:57:00Z");
+  EXPECT_EQ(minute["gaps"], 1);
+  EXPECT_EQ(minute["gaps_s"], 60.0);
+}
+
 TEST_F(FdiStoreHistoryTest, AGrowingFaultSaysWhenItWillBeFull) {
   {
     HistoryWriter writer(path_);

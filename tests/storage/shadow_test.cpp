@@ -85,6 +85,8 @@ TEST_F(ShadowTest, FiltersAreValveCandidateTimeAndNumber) {
   EXPECT_THAT(valves({.candidate = "demo@5"}), IsEmpty());
   EXPECT_THAT(valves({.since_ns = kDetected + 150 * kSecond}),
               ElementsAre("PV-2", "LV-3"));
+  EXPECT_THAT(valves({.until_ns = kDetected + 200 * kSecond}),
+              ElementsAre("LV-1"));
   EXPECT_THAT(valves({.limit = 1}), ElementsAre("LV-3"));
 }
 
