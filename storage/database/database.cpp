@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <SQLiteCpp/SQLiteCpp.h>
+#include <fcntl.h>
 #include <sqlite3.h>
 #include <unistd.h>
 
@@ -354,12 +355,17 @@ std::uintmax_t Database::UsedBytes() {
 }
 
 void Database::BackupTo(const std::filesystem::path& target) {
-  // This check comes first because a copy that fails half-way is removed below:
-  // that must not be somebody else's file.
-  if (std::filesystem::exists(target)) {
-    throw DataError("database " + path_.string() + ": backup " +
-                    target.string() + " exists already");
+  // VACUUM INTO takes an empty file. It is created here, and only here: a copy
+  // that fails half-way is removed below, and must not be somebody else's.
+  const int file =
+      open(target.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  if (file < 0) {
+    Refuse(path_, "backup " + target.string() +
+                      (errno == EEXIST ? " exists already"
+                                       : std::string(" cannot be made: ") +
+                                             std::strerror(errno)));
   }
+  close(file);
   // VACUUM INTO counts as a write: a reader's query_only is lifted for it.
   const bool reader = access_ == Access::kReader;
   try {

@@ -260,7 +260,8 @@ class Database {
   /// Bytes of the pages in use; free pages are reused before the file grows.
   std::uintmax_t UsedBytes();
 
-  /// A consistent copy (VACUUM INTO). @throws DataError if `target` exists.
+  /// A consistent copy (VACUUM INTO). @throws DataError if `target` exists or
+  ///   cannot be made.
   void BackupTo(const std::filesystem::path& target);
   /// quick_check, foreign_key_check and Schema::checks: one line per finding,
   /// empty if sound.
