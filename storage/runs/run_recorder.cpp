@@ -32,11 +32,15 @@ void Recover(Database& database, const RecorderLiveness& liveness,
       left.emplace_back(runs.Int64(0), runs.Int64(1));
     }
     for (const auto& [run_id, samples] : left) {
-      // The tail holds the last samples of a run.
-      const std::vector<StoredSample> tail = TakeTail(database, run_id);
-      InsertChunks(database, run_id,
-                   samples - static_cast<std::int64_t>(tail.size()), tail,
-                   chunk_samples);
+      try {
+        // The tail holds the last samples of a run.
+        const std::vector<StoredSample> tail = TakeTail(database, run_id);
+        InsertChunks(database, run_id,
+                     samples - static_cast<std::int64_t>(tail.size()), tail,
+                     chunk_samples);
+      } catch (const DataError&) {
+        // A damaged tail stays as it is: whoever reads the run is told.
+      }
       SetState(database, run_id, RunState::kInterrupted);
     }
     database.Run(sql::delete_recorder, recorder);

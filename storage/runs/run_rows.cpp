@@ -164,10 +164,15 @@ std::vector<StoredSample> TakeTail(Database& database, std::int64_t run_id) {
   std::vector<StoredSample> samples;
   Statement& rows = database.Cached(sql::tail_of_run);
   rows.Bind(run_id);
-  while (rows.Step()) {
-    const auto part =
-        ReadBundle(rows, database.path().string() + ": tail row of sample ");
-    samples.insert(samples.end(), part.begin(), part.end());
+  try {
+    while (rows.Step()) {
+      const auto part =
+          ReadBundle(rows, database.path().string() + ": tail row of sample ");
+      samples.insert(samples.end(), part.begin(), part.end());
+    }
+  } catch (...) {
+    rows.Reset();
+    throw;
   }
   rows.Reset();
   database.Cached(sql::delete_tail).Bind(run_id).Run();

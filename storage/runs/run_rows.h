@@ -74,6 +74,7 @@ void InsertChunks(Database& database, std::int64_t run_id, std::int64_t first,
                   std::span<const StoredSample> samples,
                   std::size_t chunk_samples);
 /// Removes the tail rows. @returns their samples in order.
+/// @throws DataError if one is damaged; none is removed then.
 std::vector<StoredSample> TakeTail(Database& database, std::int64_t run_id);
 
 /// Decodes the samples of a row with columns count, codec, crc, bytes, first.

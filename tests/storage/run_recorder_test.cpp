@@ -114,6 +114,31 @@ TEST_F(RunRecorderTest, WhatWasCommittedSurvivesARecorderThatDied) {
   EXPECT_EQ(Query("SELECT count(*) FROM run WHERE state = 'interrupted'"), 1);
 }
 
+TEST_F(RunRecorderTest, ADamagedTailDoesNotStopTheNextRecorder) {
+  std::vector<std::string> ids;
+  {
+    RunRecorder recorder(file_);
+    for (const char* valve : {"V1", "V2"}) {
+      const auto key = recorder.Begin(RunOf(valve));
+      ids.push_back(recorder.Id(key));
+      recorder.Append(key, SampleAt(0));
+    }
+    recorder.Commit();
+  }
+  {
+    RunStore store(file_, Access::kOccasionalWriter);
+    Transaction transaction(store.database());
+    store.database().Run("UPDATE tail SET crc = crc + 1 WHERE run_id = 1");
+    transaction.Commit();
+  }
+  RunRecorder next(file_);
+  EXPECT_EQ(Query("SELECT count(*) FROM run WHERE state = 'interrupted'"), 2);
+  EXPECT_THAT(Positions(ids[1]), SizeIs(1));
+  EXPECT_THAT(MessageOf<DataError>([&] { Positions(ids[0]); }),
+              HasSubstr(ids[0]));
+  EXPECT_TRUE(next.database().Checkpoint());
+}
+
 TEST_F(RunRecorderTest, KillingTheRecorderLosesNothingCommitted) {
   int pipe_ends[2];
   ASSERT_EQ(pipe(pipe_ends), 0);
