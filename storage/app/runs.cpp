@@ -279,8 +279,7 @@ Report Delete(const std::vector<std::string>& ids, const Context& context) {
   Report report;
   report.document["deleted"] = Json::array();
   for (const std::string& id : ids) {
-    const std::string full = store.Info(id).id;
-    store.Delete(full);
+    const std::string full = store.Delete(id);
     report.document["deleted"].push_back(full);
     report.Line(full + " deleted");
   }

@@ -195,7 +195,7 @@ std::vector<RunInfo> RunStore::List(const RunFilter& filter) {
   const Snapshot snapshot(*database_);
   Statement rows = database_->Prepare(
       std::string(sql::runs) +
-      " valve_id GLOB ? AND start_ns >= ? AND start_ns <= ?"
+      " valve_id GLOB ? AND start_ns >= ? AND start_ns < ?"
       " AND (?4 IS NULL OR origin = ?4) ORDER BY start_ns, run_id");
   rows.Bind(filter.valve_glob, filter.since_ns, filter.until_ns, filter.origin);
   std::vector<RunInfo> infos;
@@ -344,7 +344,7 @@ int RunStore::RemoveLabels(std::string_view text) {
   return removed;
 }
 
-void RunStore::Delete(std::string_view text) {
+std::string RunStore::Delete(std::string_view text) {
   const RunSelector selector = ParseRunSelector(text);
   if (selector.IsStretch()) {
     throw ConfigError("run " + std::string(text) +
@@ -360,6 +360,7 @@ void RunStore::Delete(std::string_view text) {
   }
   database_->Run("DELETE FROM run WHERE run_id = ?", info.row_id);
   transaction.Commit();
+  return info.id;
 }
 
 }  // namespace fdi::storage

@@ -138,7 +138,8 @@ class RunStore {
   void Label(std::string_view selector, int fault, double strength);
   /// @returns how many labels the run had.
   int RemoveLabels(std::string_view selector);
-  void Delete(std::string_view selector);
+  /// @returns the id of the run. @throws ConfigError for a stretch.
+  std::string Delete(std::string_view selector);
 
   Database& database() { return *database_; }
 

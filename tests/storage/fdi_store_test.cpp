@@ -236,6 +236,8 @@ TEST_F(FdiStoreTest, LabelsAreShownAndRemoved) {
 
   EXPECT_EQ(Store("runs label " + id + " --remove").code, 0);
   EXPECT_THAT(StoreJson("runs show " + id)["labels"], IsEmpty());
+  EXPECT_EQ(Store("runs delete " + id + "@0:2").code, 2);
+  EXPECT_EQ(StoreJson("runs list")["runs"].size(), 1U);
   EXPECT_EQ(Store("runs delete " + id).code, 0);
   EXPECT_THAT(StoreJson("runs list")["runs"], IsEmpty());
 }

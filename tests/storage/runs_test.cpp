@@ -181,7 +181,7 @@ TEST_F(RunsTest, ListSelectsByValveOriginAndTime) {
   filter = {};
   filter.since_ns = kStart + kSecond;
   EXPECT_EQ(store.List(filter).at(0).run.valve_id, "FV-2");
-  filter.until_ns = kStart + 99 * kSecond;
+  filter.until_ns = kStart + 100 * kSecond;
   EXPECT_THAT(store.List(filter), IsEmpty());
 }
 
