@@ -30,8 +30,13 @@ inline std::size_t LetterSize(std::string_view text, std::size_t place) {
       return 0;
     }
   }
-  const bool control = first == 0xc2 && byte(1) < 0xa0;
-  return control || first > 0xf4 ? 0 : size;
+  // C1, longer forms than needed, surrogates, beyond U+10FFFF.
+  const unsigned second = byte(1);
+  const bool bad =
+      (first == 0xc2 && second < 0xa0) || (first == 0xe0 && second < 0xa0) ||
+      (first == 0xed && second >= 0xa0) || (first == 0xf0 && second < 0x90) ||
+      (first == 0xf4 && second >= 0x90) || first > 0xf4;
+  return bad ? 0 : size;
 }
 
 inline bool IsPrintable(std::string_view text) {

@@ -98,7 +98,7 @@ struct MonitorStatusMessage {
   std::vector<std::pair<std::string, std::uint64_t>> counters;
 };
 
-/// @throws DataError unless `id` has 1..64 bytes and no NUL.
+/// @throws DataError unless `id` has 1..64 bytes, all of printable UTF-8.
 void ValidateId(std::string_view id);
 
 /// Adds the array sizes of `models` to a verdict. @throws as ValidateId().

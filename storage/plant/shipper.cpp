@@ -5,6 +5,7 @@
 #include <bit>
 #include <optional>
 
+#include "diagnosis/printable.h"
 #include "storage/history/history_database.h"
 #include "storage/models/models.h"
 #include "storage/plant/sql.h"
@@ -69,39 +70,11 @@ void PutBytes(std::string_view bytes, std::string& out) {
   out += bytes;
 }
 
-// PostgreSQL refuses text that is not UTF-8, or has a zero. SQLite takes any:
-// a comment in another encoding must not stop everything behind it.
-std::string AsUtf8(std::string text) {
-  for (std::size_t i = 0; i < text.size();) {
-    const auto at = [&](std::size_t k) {
-      return k < text.size() ? static_cast<unsigned char>(text[k]) : 0U;
-    };
-    const unsigned first = at(i);
-    const std::size_t length = first >= 0x01 && first < 0x80   ? 1
-                               : first >= 0xC2 && first < 0xE0 ? 2
-                               : first >= 0xE0 && first < 0xF0 ? 3
-                               : first >= 0xF0 && first < 0xF5 ? 4
-                                                               : 0;
-    bool good = length > 0;
-    for (std::size_t k = 1; k < length; ++k) {
-      good = good && (at(i + k) & 0xC0U) == 0x80U;
-    }
-    // Overlong forms, surrogates, beyond U+10FFFF.
-    const unsigned second = at(i + 1);
-    good = good && !(first == 0xE0 && second < 0xA0) &&
-           !(first == 0xED && second >= 0xA0) &&
-           !(first == 0xF0 && second < 0x90) &&
-           !(first == 0xF4 && second >= 0x90);
-    if (!good) {
-      text[i] = '?';
-    }
-    i += good ? length : 1;
-  }
-  return text;
-}
-
 // Nothing is converted on the way: what SQLite holds as an integer has to be a
-// bigint in PostgreSQL, and a real a double precision.
+// bigint in PostgreSQL, and a real a double precision. PostgreSQL refuses text
+// that is not UTF-8, or has a zero, while SQLite takes any: a comment in
+// another encoding must not stop everything behind it, and two ids must stay
+// two.
 void PutRow(const Statement& row, std::string& out) {
   const int columns = row.ColumnCount();
   PutBigEndian(static_cast<std::uint16_t>(columns), out);
@@ -116,7 +89,7 @@ void PutRow(const Statement& row, std::string& out) {
         PutBigEndian(std::bit_cast<std::uint64_t>(row.Double(c)), out);
         break;
       case ColumnType::kText:
-        PutBytes(AsUtf8(row.Text(c)), out);
+        PutBytes(Printable(row.Text(c)), out);
         break;
       case ColumnType::kBlob: {
         const std::vector<std::byte> blob = row.Blob(c);

@@ -129,6 +129,11 @@ TEST(PrintableTest, OnlyLettersReachATerminal) {
   EXPECT_EQ(Printable("a\nb\x1b", "\n"), "a\nb\\x1b");
   EXPECT_FALSE(IsPrintable(kHostile));
   EXPECT_TRUE(IsPrintable("\u00b5"));
+  // ESC in a longer form, a surrogate, a longer form, beyond U+10FFFF.
+  for (const char* text : {"\xe0\x80\x9b", "\xed\xa0\x80", "\xf0\x82\x82\xac",
+                           "\xf4\x90\x80\x80"}) {
+    EXPECT_FALSE(IsPrintable(text)) << Printable(text);
+  }
 }
 
 TEST(LogSinkTest, NoTextMakesALineOrCommandsTheTerminal) {

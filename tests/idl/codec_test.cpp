@@ -291,8 +291,8 @@ TEST(CodecTest, AnIdWithControlCharactersIsNeitherSentNorDecoded) {
   ValveSampleMessage message;
   wire.valve_id() = "V-\u00b5 1";
   EXPECT_TRUE(Codec<ValveSampleMessage>::Decode(wire, message));
-  for (const char* id :
-       {"V\n2026 error", "V\x1b[2J", "V\x07", "V\x7f", "V\xc2\x9b", "V\xff"}) {
+  for (const char* id : {"V\n2026 error", "V\x1b[2J", "V\x07", "V\x7f",
+                         "V\xc2\x9b", "V\xff", "V\xed\xa0\x80"}) {
     wire.valve_id() = id;
     EXPECT_FALSE(Codec<ValveSampleMessage>::Decode(wire, message)) << id;
     ValveSampleMessage own = SomeSample();

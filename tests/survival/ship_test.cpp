@@ -218,7 +218,7 @@ TEST_F(ShipTest, WhatChangesIsShippedAgain) {
   ASSERT_EQ(Ship("a").code, 0);
   EXPECT_EQ(PlantRowsOf("SELECT comment FROM fdi.episode_event "
                         "WHERE kind = 'ACK' ORDER BY stamp_ns"),
-            (std::vector<std::string>{"|Tell the shift", "|Gr??e"}));
+            (std::vector<std::string>{"|Tell the shift", "|Gr\\xfc\\xdfe"}));
 }
 
 // The log of changes costs nothing where it serves nobody.
@@ -698,6 +698,12 @@ TEST_F(ShipTest, TheHoursOfAValveAreNotThoseOfAnother) {
     EXPECT_EQ(hours[0].valve_id, valve);
     EXPECT_TRUE(there.Gaps(filter).empty());
   }
+
+  checkpoint.coverage.resize(2);  // Changes of one batch, in Latin-1.
+  checkpoint.coverage[0].valve_id = "V\xfc";
+  checkpoint.coverage[1].valve_id = "V\xdf";
+  HistoryWriter(Folder("a") / "history.db").CommitCheckpoint(checkpoint);
+  EXPECT_EQ(Ship("a").code, 0);
 }
 
 // Both of a pair have an episode and an hour: there is one in the work list,
