@@ -25,18 +25,6 @@ void ValidateId(std::string_view id) {
   }
 }
 
-DecisionMessage MakeDecision(std::string valve_id, const ModelSet& models,
-                             const Verdict& verdict) {
-  DecisionMessage message;
-  message.valve_id = std::move(valve_id);
-  message.model_hash = models.content_hash;
-  message.channel_count = static_cast<int>(models.channels.size());
-  message.fault_count = static_cast<int>(models.faults.size());
-  message.observer_count = static_cast<int>(models.observers.size());
-  message.verdict = verdict;
-  return message;
-}
-
 ModelSetInfoMessage Describe(const ModelSet& models) {
   ModelSetInfoMessage info;
   info.model_set = models.name;

@@ -101,10 +101,6 @@ struct MonitorStatusMessage {
 /// @throws DataError unless `id` has 1..64 bytes, all of printable UTF-8.
 void ValidateId(std::string_view id);
 
-/// Adds the array sizes of `models` to a verdict. @throws as ValidateId().
-DecisionMessage MakeDecision(std::string valve_id, const ModelSet& models,
-                             const Verdict& verdict);
-
 ModelSetInfoMessage Describe(const ModelSet& models);
 
 }  // namespace fdi::idl

@@ -122,7 +122,6 @@ class Statement {
   bool IsNull(int column) const;
   std::int64_t Int64(int column) const;
   int Int(int column) const { return static_cast<int>(Int64(column)); }
-  bool Bool(int column) const { return Int64(column) != 0; }
   std::uint64_t Uint64(int column) const {
     return static_cast<std::uint64_t>(Int64(column));
   }

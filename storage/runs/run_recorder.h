@@ -62,8 +62,6 @@ class RunRecorder {
   std::int64_t pending() const { return pending_; }
   /// Samples committed.
   std::int64_t recorded() const { return recorded_; }
-  /// Runs that have not ended, or whose end is not committed.
-  std::size_t active_runs() const { return runs_.size(); }
   Database& database() { return database_; }
 
  private:

@@ -118,7 +118,12 @@ void WriteMessage(char kind, const Message& message) {
 void WriteMessages() {
   const fdi::ModelSet models = fdi::monitor::LinearModels();
   WriteMessage<fdi::idl::ValveSampleMessage>(0, {"V1", PlantSample(7)});
-  WriteMessage(1, fdi::idl::MakeDecision("V1", models, {}));
+  fdi::idl::DecisionMessage decision;
+  decision.valve_id = "V1";
+  decision.channel_count = static_cast<int>(models.channels.size());
+  decision.fault_count = static_cast<int>(models.faults.size());
+  decision.observer_count = static_cast<int>(models.observers.size());
+  WriteMessage(1, decision);
   fdi::FaultEvent event;
   event.valve_id = "V1";
   event.model_set = "linear";
@@ -130,9 +135,7 @@ void WriteMessages() {
   status.counters = {{"received", 12}};
   WriteMessage(4, status);
   WriteMessage<fdi::idl::DecisionBatchMessage>(
-      5, {"host:1",
-          {fdi::idl::MakeDecision("V1", models, {}),
-           fdi::idl::MakeDecision("V2", models, {})}});
+      5, {"host:1", {decision, decision}});
   WriteMessage(6, fdi::OperatorAction{"host:1", fdi::OperatorActionKind::kAck,
                                       7, "", "", 8, "anna", "seen", "console"});
   WriteMessage(7, fdi::MonitorShare{"host:1", "plant", "FV-*", "hall-1"});

@@ -27,20 +27,6 @@ TEST(WireTest, IdsOfOneTo64BytesAreAccepted) {
   EXPECT_THROW(ValidateId(std::string("a\0b", 3)), DataError);
 }
 
-TEST(WireTest, DecisionCarriesTheSizesOfTheModelSet) {
-  Verdict verdict;
-  verdict.seq = 12;
-
-  const DecisionMessage message = MakeDecision("V1", ThreeFaults(), verdict);
-
-  EXPECT_EQ(message.valve_id, "V1");
-  EXPECT_EQ(message.model_hash, 0xABCDU);
-  EXPECT_EQ(message.channel_count, 2);
-  EXPECT_EQ(message.fault_count, 3);
-  EXPECT_EQ(message.observer_count, 4);
-  EXPECT_EQ(message.verdict.seq, 12U);
-}
-
 // Half of T = 0.8 makes a candidate; a member of the isolated set always is.
 TEST(WireTest, CandidatesAreTheIsolatedAndTheLikelyLargestFirst) {
   Verdict verdict;

@@ -135,7 +135,7 @@ TEST_F(ModelsTest, SummaryViewAndTablesTellWhatIsInTheSet) {
   EXPECT_LE(row.Double(6), 12.25);
   EXPECT_EQ(row.Double(7), 9.5);
   EXPECT_EQ(row.Double(8), 3.5);
-  EXPECT_TRUE(row.Bool(9));
+  EXPECT_EQ(row.Int(9), 1);
   Statement channel = database.Prepare(
       "SELECT regressors, rules, mse FROM channel"
       " WHERE observer = 1 AND name = 'F'");

@@ -209,10 +209,9 @@ TEST_F(RunRecorderTest, NothingIsHeldOfARunWhoseEndIsCommitted) {
     const auto key = recorder.Begin(RunOf("V1"));
     recorder.Append(key, SampleAt(day));
     recorder.End(key);
-    EXPECT_EQ(recorder.active_runs(), 1U);
+    EXPECT_NO_THROW(recorder.Id(key));
     recorder.Commit();
 
-    EXPECT_EQ(recorder.active_runs(), 0U);
     EXPECT_THROW(recorder.Id(key), std::invalid_argument);
     EXPECT_NO_THROW(recorder.End(key));  // Again: a no-op.
   }

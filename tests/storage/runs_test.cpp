@@ -201,7 +201,7 @@ TEST_F(RunsTest, SummaryViewAnswersWithReadableTimes) {
   EXPECT_EQ(row.Text(7), "m3/h");
   EXPECT_EQ(row.Text(8), "imported");
   EXPECT_EQ(row.Text(9), "complete");
-  EXPECT_FALSE(row.Bool(10));
+  EXPECT_EQ(row.Int(10), 0);
   EXPECT_GT(row.Int(11), 0);
 }
 
