@@ -198,6 +198,15 @@ int Database::CheckIdentity(const Schema& schema) {
     objects = connection_->execAndGet("SELECT count(*) FROM sqlite_schema")
                   .getInt64();
   } catch (const SQLite::Exception& error) {
+    const int code = error.getErrorCode();
+    if (access_ == Access::kReader &&
+        (code == SQLITE_READONLY || code == SQLITE_CANTOPEN)) {
+      Refuse(path_, "reading needs " + path_.filename().string() +
+                        "-shm beside it, which cannot be written (" +
+                        error.what() +
+                        "): read it as a user who may write to its folder, or "
+                        "read a copy that fdi-store backup has made");
+    }
     Refuse(path_, error.what());
   }
   // A program that was stopped before it had committed its first migration

@@ -111,12 +111,15 @@ TEST_F(DatabaseStressTest, ACorruptPageIsAFindingOrARefusalAndStaysAsItIs) {
   EXPECT_EQ(std::filesystem::file_size(data_.history()), bytes);
 }
 
-// In a child process that is not root.
-TEST_F(DatabaseStressTest, AFolderThatCannotBeWrittenIsRefusedByName) {
+// Opens in a child process that is not root and may not write to `folder`.
+// @returns 0 if that throws a DataError with both texts.
+template <typename Open>
+int OpenUnwritable(const std::filesystem::path& folder, Open open,
+                   const std::string& file, const char* reason) {
   using std::filesystem::perms;
-  std::filesystem::permissions(directory_.path(),
-                               perms::owner_read | perms::owner_exec |
-                                   perms::others_read | perms::others_exec);
+  std::filesystem::permissions(folder, perms::owner_read | perms::owner_exec |
+                                           perms::others_read |
+                                           perms::others_exec);
   const pid_t child = fork();
   if (child == 0) {
     constexpr uid_t kNobody = 65534;
@@ -124,23 +127,40 @@ TEST_F(DatabaseStressTest, AFolderThatCannotBeWrittenIsRefusedByName) {
       _exit(2);
     }
     try {
-      const RunRecorder recorder(data_.runs());
+      open();
     } catch (const DataError& error) {
       const std::string_view text = error.what();
-      _exit(text.find(data_.runs().string()) != text.npos &&
-                    text.find("Permission denied") != text.npos
-                ? 0
-                : 3);
+      _exit(text.find(file) != text.npos && text.find(reason) != text.npos ? 0
+                                                                           : 3);
     }
     _exit(1);
   }
-  int status = 0;
-  ASSERT_EQ(waitpid(child, &status, 0), child);
-  std::filesystem::permissions(directory_.path(), perms::owner_all);
+  int status = -1;
+  waitpid(child, &status, 0);
+  std::filesystem::permissions(folder, perms::owner_all);
+  return status;
+}
 
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+TEST_F(DatabaseStressTest, AFolderThatCannotBeWrittenIsRefusedByName) {
+  EXPECT_EQ(OpenUnwritable(
+                directory_.path(),
+                [this] { const RunRecorder recorder(data_.runs()); },
+                data_.runs().string(), "Permission denied"),
+            0);
   EXPECT_FALSE(std::filesystem::exists(data_.runs()));
+}
+
+// What SQLite needs beside the file goes with the last who has it open.
+TEST_F(DatabaseStressTest, AReaderWhoMayNotWriteIsToldWhatToDo) {
+  { const HistoryWriter writer(data_.history()); }
+  EXPECT_EQ(OpenUnwritable(
+                directory_.path(),
+                [this] {
+                  const Database reader(data_.history(), HistorySchema(),
+                                        Access::kReader);
+                },
+                data_.history().string(), "fdi-store backup"),
+            0);
 }
 
 }  // namespace
