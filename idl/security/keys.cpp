@@ -638,6 +638,16 @@ KeyInfo MakeKey(const fs::path& folder, const std::string& name, Role role,
   return info;
 }
 
+KeyInfo RenewKey(const fs::path& folder, const std::string& name, int days) {
+  RequireName(name);
+  RequireAuthority(folder);
+  if (!fs::exists(folder / name)) {
+    throw NotFoundError("no key '" + name + "' in " + folder.string());
+  }
+  const KeyInfo key = Examine(folder / name);
+  return MakeKey(folder, name, key.role, days, true, key.partitions);
+}
+
 std::vector<KeyInfo> ListKeys(const fs::path& folder) {
   RequireAuthority(folder);
   std::vector<KeyInfo> keys;

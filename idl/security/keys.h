@@ -62,6 +62,12 @@ KeyInfo MakeKey(const std::filesystem::path& folder, const std::string& name,
                 Role role, int days, bool replace,
                 const std::string& partitions = {});
 
+/// Replaces the key by a new one with the same role and partitions; whether it
+/// has expired, or another key is damaged, does not matter.
+/// @throws NotFoundError if it does not exist; as MakeKey() and CheckKey().
+KeyInfo RenewKey(const std::filesystem::path& folder, const std::string& name,
+                 int days);
+
 /// The keys in `folder`, by name. @throws as CheckKey(), regardless of periods.
 std::vector<KeyInfo> ListKeys(const std::filesystem::path& folder);
 

@@ -74,14 +74,8 @@ Report AddKey(const KeyOptions& options, const Context&) {
 }
 
 Report Renew(const KeyOptions& options, const Context&) {
-  const std::vector<idl::KeyInfo> keys = idl::ListKeys(options.folder);
-  const auto key = std::ranges::find(keys, options.name, &idl::KeyInfo::name);
-  if (key == keys.end()) {
-    throw NotFoundError("no key '" + options.name + "' in " + options.folder);
-  }
   return ShowKeys(Json::array(
-      {KeyJson(idl::MakeKey(options.folder, options.name, key->role,
-                            options.days, true, key->partitions))}));
+      {KeyJson(idl::RenewKey(options.folder, options.name, options.days))}));
 }
 
 Report ListKeys(const KeyOptions& options, const Context&) {

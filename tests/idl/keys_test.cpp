@@ -96,6 +96,17 @@ TEST_F(KeysTest, ARenewedKeyIsAnotherOneAndLeavesNothingBehind) {
   }
 }
 
+TEST_F(KeysTest, AKeyIsRenewedWhateverIsBesideIt) {
+  MakeKey(folder_, "gateway-1", Role::kGateway, 10, false, "hall-1,hall-2");
+  fs::remove(key_ / "key.pem");
+  fs::create_directory(folder_ / "lost+found");
+
+  const KeyInfo key = RenewKey(folder_, "gateway-1", 20);
+  EXPECT_EQ(key.role, Role::kGateway);
+  EXPECT_EQ(key.partitions, "hall-1,hall-2");
+  EXPECT_THROW(RenewKey(folder_, "gateway-2", 20), NotFoundError);
+}
+
 TEST_F(KeysTest, WhatIsThereIsNotReplacedUnasked) {
   EXPECT_THROW(MakeAuthority(folder_, 100), ConfigError);
   EXPECT_THROW(MakeKey(folder_, "monitor-1", Role::kReader, 10, false),
