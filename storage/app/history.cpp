@@ -38,28 +38,6 @@ std::string After(std::int64_t from_ns, std::optional<std::int64_t> to_ns) {
   return to_ns ? cli::FormatDuration(*to_ns - from_ns) : "-";
 }
 
-// What the text output shows beside the columns of fault_history.
-struct EpisodeText {
-  AlarmState state;  // Shelved, or else the episode's.
-  std::string fault_name;
-  std::string isolated_after;
-  std::string lasted;
-};
-using EpisodeTexts = std::map<std::string, EpisodeText>;  // By episode_id.
-
-EpisodeTexts TextsOf(const std::vector<Alarm>& alarms, const Context& context) {
-  const cli::FaultTexts words = cli::LoadFaultTexts(context.options);
-  EpisodeTexts texts;
-  for (const Alarm& alarm : alarms) {
-    const Episode& e = alarm.episode;
-    texts[e.episode_id] = {
-        alarm.shelf ? AlarmState::kShelved : alarm.state,
-        e.fault ? words.Words(*e.fault, e.strength).name : "-",
-        After(e.detected_ns, e.isolated_ns), After(e.detected_ns, e.ended_ns)};
-  }
-  return texts;
-}
-
 // Rows of the plant history also have host and monitor.
 Json ListedJson(const Episode& e) {
   Json row = EpisodeJson(e);
@@ -67,6 +45,34 @@ Json ListedJson(const Episode& e) {
     row.update({{"host", e.host}, {"monitor", e.monitor}});
   }
   return row;
+}
+
+// Both monitors of a pair have a row of an episode.
+std::string RowKey(const Json& row) {
+  return row["episode_id"].get<std::string>() + ' ' + row.value("host", "") +
+         ' ' + row.value("monitor", "");
+}
+
+// What the text output shows beside the columns of fault_history.
+struct EpisodeText {
+  AlarmState state;  // Shelved, or else the episode's.
+  std::string fault_name;
+  std::string isolated_after;
+  std::string lasted;
+};
+using EpisodeTexts = std::map<std::string, EpisodeText>;  // By RowKey().
+
+EpisodeTexts TextsOf(const std::vector<Alarm>& alarms, const Context& context) {
+  const cli::FaultTexts words = cli::LoadFaultTexts(context.options);
+  EpisodeTexts texts;
+  for (const Alarm& alarm : alarms) {
+    const Episode& e = alarm.episode;
+    texts[RowKey(ListedJson(e))] = {
+        alarm.shelf ? AlarmState::kShelved : alarm.state,
+        e.fault ? words.Words(*e.fault, e.strength).name : "-",
+        After(e.detected_ns, e.isolated_ns), After(e.detected_ns, e.ended_ns)};
+  }
+  return texts;
 }
 
 Report ListEpisodes(const HistoryOptions& options, const Context& context) {
@@ -82,7 +88,7 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
   const auto texts = std::make_shared<const EpisodeTexts>(
       TextsOf(history->Alarms(std::move(episodes), cli::NowNs()), context));
   const auto of = [texts](const Json& row) -> const EpisodeText& {
-    return texts->at(row["episode_id"]);
+    return texts->at(RowKey(row));
   };
   Column alarm = TextColumn("alarm", [of](const Json& row) {
     return std::string(AlarmStateName(of(row).state));
