@@ -352,7 +352,7 @@ Report Move(const MoveOptions& options, const Context& context) {
                     {"shelves", moved.shelves}});
   }
   for (const std::string& valve : valves) {
-    RemoveProgress(history, valve);
+    RemoveProgress(history, valve, cli::NowNs());
     const auto entry = models.FindValve(valve);
     if (entry && entry->pattern == valve) {
       models.RemoveValve(valve);

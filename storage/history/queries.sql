@@ -463,6 +463,11 @@ INSERT OR IGNORE INTO episode_strength
 SELECT s.* FROM source.episode_strength s
   JOIN source.episode e USING (episode_id)
 WHERE e.valve_id = ? AND e.ended_ns IS NULL
+-- Of a valve ?1 that left at ?2, for its plant: rows that are gone tell nothing.
+-- name: log_moved_episodes
+INSERT INTO change (item, key, part)
+SELECT 'moved', episode_id, ?2 FROM episode
+WHERE valve_id = ?1 AND ended_ns IS NULL AND EXISTS (SELECT 1 FROM ship_cursor)
 -- name: copy_shelves
 INSERT INTO shelf (valve_id, fault, from_ns, until_ns, who, comment, origin)
 SELECT valve_id, fault, from_ns, until_ns, who, comment, origin

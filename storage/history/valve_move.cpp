@@ -64,8 +64,10 @@ MovedHistory CopyProgress(Database& target, const std::filesystem::path& source,
   return moved;
 }
 
-void RemoveProgress(Database& source, const std::string& valve_id) {
+void RemoveProgress(Database& source, const std::string& valve_id,
+                    std::int64_t now_ns) {
   Transaction transaction(source);
+  source.Run(sql::log_moved_episodes, valve_id, now_ns);
   source.Run("DELETE FROM accumulator WHERE valve_id = ?", valve_id);
   source.Run("DELETE FROM shadow_accumulator WHERE valve_id = ?", valve_id);
   source.Run("DELETE FROM episode WHERE valve_id = ? AND ended_ns IS NULL",

@@ -28,7 +28,9 @@ MovedHistory CopyProgress(Database& target, const std::filesystem::path& source,
                           const std::string& valve_id, std::int64_t now_ns);
 
 /// Deletes what CopyProgress() copied, except shelves, which expire by
-/// themselves. No monitor may be running on `source`.
-void RemoveProgress(Database& source, const std::string& valve_id);
+/// themselves. In a plant history the open episodes end as superseded at
+/// `now_ns`. No monitor may be running on `source`.
+void RemoveProgress(Database& source, const std::string& valve_id,
+                    std::int64_t now_ns);
 
 }  // namespace fdi::storage

@@ -118,6 +118,9 @@ WHERE c.item = 'shelf'
 SELECT s.session_id, s.start_ns, s.alive_ns, s.stop_ns, s.clean, s.software
 FROM batch c CROSS JOIN monitor_session s ON s.session_id = c.part
 WHERE c.item = 'session'
+-- Episodes that went to another monitor with their valve, and when.
+-- name: moved
+SELECT key, part FROM batch WHERE item = 'moved'
 -- name: history_id
 SELECT history_id FROM history_identity
 -- name: repeated_changes
@@ -165,6 +168,12 @@ SET host = EXCLUDED.host, monitor = EXCLUDED.monitor
 RETURNING monitor_id
 -- name: lock_monitor
 SELECT shipped_ns FROM fdi.monitor WHERE monitor_id = $1 FOR UPDATE
+-- Nobody can acknowledge it where it was.
+-- name: end_moved
+UPDATE fdi.episode SET ended_ns = $3, end_reason = 'superseded',
+  fault = coalesce(fault, 'unknown'), acked_ns = coalesce(acked_ns, $3),
+  acked_by = coalesce(acked_by, 'fdi-store valves move')
+WHERE monitor_id = $1 AND episode_id = $2 AND ended_ns IS NULL
 -- name: set_shipped
 UPDATE fdi.monitor SET shipped_ns = $2 WHERE monitor_id = $1
 

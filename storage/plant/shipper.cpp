@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <optional>
+#include <utility>
 
 #include "diagnosis/printable.h"
 #include "storage/history/history_database.h"
@@ -300,14 +301,24 @@ bool Shipper::ShipBatch(Shipped& shipped) {
   Cursor cursor = ReadCursor(there.Int64(0, 0));
   bool found = false;
   std::vector<Batch> batches;
+  std::vector<std::pair<std::string, std::string>> moved;
   {
     const Snapshot snapshot(history_);
     found = TakeItems(cursor);
+    Statement& rows = history_.Cached(sql::moved);
+    while (rows.Step()) {
+      moved.emplace_back(rows.Text(0), rows.Text(1));
+    }
+    rows.Reset();
     for (const Table& table : kTables) {
       if (found) {
         batches.emplace_back(table, history_.Cached(table.rows));
       }
     }
+  }
+  // First, because an episode may have come back since.
+  for (const auto& [episode, at_ns] : moved) {
+    plant_.Run(sql::end_moved, {monitor_id_, episode, at_ns});
   }
   for (const Batch& batch : batches) {
     Merge(batch, shipped);

@@ -11,6 +11,7 @@
 
 #include "storage/history/history_reader.h"
 #include "storage/history/retention.h"
+#include "storage/history/valve_move.h"
 #include "storage/plant/plant_reader.h"
 #include "tests/storage/many_episodes.h"
 #include "tests/survival/plant_fixture.h"
@@ -704,6 +705,42 @@ TEST_F(ShipTest, TheHoursOfAValveAreNotThoseOfAnother) {
   checkpoint.coverage[1].valve_id = "V\xdf";
   HistoryWriter(Folder("a") / "history.db").CommitCheckpoint(checkpoint);
   EXPECT_EQ(Ship("a").code, 0);
+}
+
+// The history that it leaves has no row of it that could end.
+TEST_F(ShipTest, AnEpisodeThatMovesEndsWhereItWas) {
+  Init();
+  const auto here = Folder("a") / "history.db";
+  const auto there = Folder("b") / "history.db";
+  HistoryWriter(here).Record(Event(TransitionKind::kDetected, 0, 0, 0.3),
+                             kDetected);
+  ASSERT_EQ(Ship("a").code, 0);
+  const auto move = [&](const auto& from, const auto& to, int second) {
+    Database source(from, HistorySchema(), Access::kOccasionalWriter);
+    Database target(to, HistorySchema(), Access::kOccasionalWriter);
+    CopyProgress(target, from, "LV-1", kDetected);
+    RemoveProgress(source, "LV-1", kDetected + second * kSecond);
+  };
+  move(here, there, 60);
+  ASSERT_EQ(Ship("a").code, 0);
+  ASSERT_EQ(Ship("b").code, 0);
+
+  PlantReader reader(Url());
+  auto episodes = reader.List({});
+  ASSERT_EQ(episodes.size(), 2U);
+  EXPECT_EQ(episodes[0].end_reason, "superseded");
+  EXPECT_EQ(episodes[0].ended_ns, kDetected + 60 * kSecond);
+  EXPECT_EQ(AlarmStateOf(episodes[0]), AlarmState::kNormal);
+  EXPECT_EQ(episodes[1].end_reason, std::nullopt);
+  EXPECT_THAT(Store("history list --from '" + Url() + "'").out,
+              AllOf(HasSubstr("NORMAL"), HasSubstr("UNACK")));
+
+  move(there, here, 90);
+  ASSERT_EQ(Ship("a").code, 0);
+  ASSERT_EQ(Ship("b").code, 0);
+  episodes = reader.List({});
+  EXPECT_EQ(episodes[0].end_reason, std::nullopt);
+  EXPECT_EQ(episodes[1].end_reason, "superseded");
 }
 
 // Both of a pair have an episode and an hour: there is one in the work list,
