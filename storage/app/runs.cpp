@@ -10,6 +10,7 @@
 #include "cli/text_table.h"
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/printable.h"
 #include "diagnosis/time_units.h"
 #include "storage/app/verbs.h"
 
@@ -171,7 +172,19 @@ std::uint64_t RandomSource() {
   return (std::uint64_t{device()} << 32U) | device();
 }
 
+// As on the bus, where a run may be replayed.
+void CheckValve(const std::string& valve) {
+  constexpr std::size_t kMaxValveIdLength = 64;
+  if (valve.empty() || valve.size() > kMaxValveIdLength ||
+      !IsPrintable(valve)) {
+    throw ConfigError("--valve is '" + Printable(valve) +
+                      "', accepted are 1 to 64 bytes without control "
+                      "characters, in UTF-8");
+  }
+}
+
 Report ImportRuns(const RunImportOptions& options, const Context& context) {
+  CheckValve(options.valve);
   const std::int64_t start_ns =
       options.start.empty()
           ? cli::NowNs() / kNsPerSecond * kNsPerSecond

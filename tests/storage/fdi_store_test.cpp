@@ -74,6 +74,14 @@ TEST_F(FdiStoreTest, TheMapOfSniffTakesNamesOfSeveralLines) {
   EXPECT_EQ(imported["samples"], 30);
 }
 
+TEST_F(FdiStoreTest, AValveThatNoSampleCanHaveIsRefused) {
+  Write("a.csv", header_ + Rows(5));
+  for (const std::string& valve :
+       {std::string("''"), std::string(65, 'V'), std::string("'V\n1'")}) {
+    EXPECT_EQ(Store("runs import a.csv --valve " + valve).code, 2) << valve;
+  }
+}
+
 TEST_F(FdiStoreTest, CsvWithoutAColumnIsRefusedAndNothingIsStored) {
   Write("a.csv", "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,F_t_h\n0,1,2,3,4,5\n");
 
