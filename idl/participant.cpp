@@ -51,7 +51,7 @@ constexpr std::uint32_t kSendBufferBytes = 4U << 20U;
 // Shared memory is slow with the library's default of 512 kB.
 constexpr std::uint32_t kSegmentBytes = 64U << 20U;
 constexpr std::uint32_t kPortQueueCapacity = 8192;
-// Bounds remote endpoints per topic, and participants without a key.
+// Bounds topics, remote endpoints per topic, and participants without a key.
 constexpr std::size_t kMaxRemembered = 64;
 
 std::vector<std::string> Addresses(const std::string& interfaces) {
@@ -450,6 +450,11 @@ void Participant::Impl::ReportIncompatible(const std::string& topic,
 
 void Participant::Impl::StorePolicies(const RemoteKey& key, PolicyTexts texts) {
   const std::lock_guard lock(remotes_mutex_);
+  // Ours are few; others may use any number of names, also like ours.
+  if (!key.first.starts_with("fdi/v1/") ||
+      (remotes_.size() >= kMaxRemembered && !remotes_.contains(key))) {
+    return;
+  }
   std::deque<PolicyTexts>& known = remotes_[key];
   known.push_front(std::move(texts));
   if (known.size() > kMaxRemembered) {
