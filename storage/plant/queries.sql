@@ -273,7 +273,7 @@ SELECT episode_id FROM episode WHERE $1 = '' OR monitor = $1
 ORDER BY utc(detected_ns) DESC LIMIT 1
 -- name: plant_by_prefix
 SELECT DISTINCT episode_id FROM episode
-WHERE episode_id >= $1 AND episode_id < $1 || 'g'
+WHERE $1 <> '' AND episode_id >= lower($1) AND episode_id < lower($1) || 'g'
   AND ($2 = '' OR monitor = $2) LIMIT 2
 -- Of one episode: $1 is its id, $2 the monitor.
 -- name: of_episode

@@ -1,5 +1,7 @@
 // fdi-store ship against a real server: what is there is what is here, whoever
 // was killed in between.
+#include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <random>
 #include <regex>
@@ -732,6 +734,12 @@ TEST_F(ShipTest, AnEpisodeThatMovesEndsWhereItWas) {
   EXPECT_EQ(episodes[0].ended_ns, kDetected + 60 * kSecond);
   EXPECT_EQ(AlarmStateOf(episodes[0]), AlarmState::kNormal);
   EXPECT_EQ(episodes[1].end_reason, std::nullopt);
+  std::string id = EpisodeIdText(Id());
+  std::ranges::transform(id, id.begin(), [](char c) {
+    return static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  });
+  EXPECT_EQ(reader.Show(id).id, Id());
+  EXPECT_THROW(reader.Show(""), NotFoundError);
   EXPECT_THAT(Store("history list --from '" + Url() + "'").out,
               AllOf(HasSubstr("NORMAL"), HasSubstr("UNACK")));
 
