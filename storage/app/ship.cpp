@@ -1,9 +1,12 @@
 // fdi-store ship: copies the history to the plant history in PostgreSQL.
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <set>
 #include <thread>
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "cli/logging.h"
@@ -64,6 +67,15 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
                       "nothing was new");
 }
 
+// A history that was restored from a backup is another file of that name.
+std::pair<dev_t, ino_t> FileId(const std::filesystem::path& file) {
+  struct stat facts {};
+  if (stat(file.c_str(), &facts) != 0) {
+    throw DataError("database " + file.string() + ": " + std::strerror(errno));
+  }
+  return {facts.st_dev, facts.st_ino};
+}
+
 // Reports each reason once until shipping works again; pauses double up to five
 // minutes. No cleanup is needed on a signal: a kill loses nothing.
 [[noreturn]] void ShipForEver(const ShipOptions& options,
@@ -73,15 +85,19 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
     throw ConfigError("--every is '" + options.every +
                       "', accepted are intervals above 0: 10s, 1min, ...");
   }
+  const DataDirectory data = DataOf(context);
   std::optional<Shipper> shipper;
+  std::pair<dev_t, ino_t> shipped;
   std::set<std::string> said;
   auto pause = every;
   while (true) {
     std::string failure;
     try {
-      if (!shipper) {
-        shipper.emplace(DataOf(context), options.url,
+      const auto file = FileId(data.history());
+      if (!shipper || file != shipped) {
+        shipper.emplace(data, options.url,
                         ShipSource{options.host, options.monitor});
+        shipped = file;
       }
       shipper->Ship();
     } catch (const DataError& error) {

@@ -403,6 +403,29 @@ TEST_F(ShipTest, WhatIsWrongIsSaidOnce) {
   ExpectEqual("a");
 }
 
+TEST_F(ShipTest, AHistoryThatIsRestoredIsShippedOn) {
+  Init();
+  const auto path = Folder("a") / "history.db";
+  RecordEpisode(*std::make_unique<HistoryWriter>(path), 0b01);
+  const pid_t shipper = Spawn(ShipCommand("a", "20ms"), Log());
+  const auto wait_for = [&](const std::string& episodes) {
+    WaitUntil([&] {
+      return PlantRowsOf("SELECT count(*) FROM fdi.episode").front() ==
+             "|" + episodes;
+    });
+  };
+  wait_for("1");
+  const auto backup = Folder("a") / "backup.db";
+  Database(path, HistorySchema(), Access::kReader).BackupTo(backup);
+  for (const char* rest : {"-wal", "-shm"}) {
+    std::filesystem::remove(path.string() + rest);
+  }
+  std::filesystem::rename(backup, path);
+  RecordEpisode(*std::make_unique<HistoryWriter>(path), 0b01, "LV-2");
+  wait_for("2");
+  Stop(shipper);
+}
+
 TEST_F(ShipTest, RefusalsHaveAReasonAndCode3) {
   HistoryWriter writer(Folder("a") / "history.db");
   RecordEpisode(writer, 0b01);
