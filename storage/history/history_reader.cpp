@@ -7,9 +7,7 @@
 #include "diagnosis/time_units.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
-#include "storage/history/look.h"
 #include "storage/history/sql.h"
-#include "storage/history/strength.h"
 #include "storage/history/trace.h"
 
 namespace fdi::storage {
@@ -210,14 +208,6 @@ std::vector<HistoryEntry> HistoryReader::Events(std::uint64_t episode_id) {
     event.episode_id = episode_id;
   }
   return events;
-}
-
-std::optional<EpisodeLook> HistoryReader::Look(std::uint64_t episode_id) {
-  return ReadLook(database_, episode_id);
-}
-
-std::vector<StrengthPoint> HistoryReader::Strengths(std::uint64_t episode_id) {
-  return ReadStrengths(database_, episode_id);
 }
 
 std::vector<TracePoint> HistoryReader::Trace(std::uint64_t episode_id) {

@@ -11,10 +11,8 @@
 #include "storage/history/episode.h"
 #include "storage/history/health.h"
 #include "storage/history/history_database.h"
-#include "storage/history/look.h"
 #include "storage/history/shadow.h"
 #include "storage/history/sql.h"
-#include "storage/history/strength.h"
 
 namespace fdi::storage {
 
@@ -391,14 +389,6 @@ void HistoryWriter::Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
     }
     database_.Cached(sql::insert_resumed).Bind(id, stamp_ns, now_ns).Run();
   });
-}
-
-void HistoryWriter::StoreLook(const EpisodeLook& look) {
-  CommitBatch([&] { storage::StoreLook(database_, look); });
-}
-
-void HistoryWriter::StoreStrength(const StrengthPoint& point) {
-  CommitBatch([&] { storage::StoreStrength(database_, point); });
 }
 
 void HistoryWriter::CommitCheckpoint(const Checkpoint& checkpoint) {

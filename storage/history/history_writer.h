@@ -75,7 +75,8 @@ class HistoryWriter {
   /// @throws NotFoundError
   void StoreLook(const EpisodeLook& look);
 
-  /// Stores how strong a fault of the episode was. @throws NotFoundError
+  /// Stores how strong a fault of the episode was, instead of what was known of
+  /// the same fault at the same stamp. @throws NotFoundError
   void StoreStrength(const StrengthPoint& point);
 
   /// Buffers instants of an episode in order of arrival: those before detection

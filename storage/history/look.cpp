@@ -1,49 +1,52 @@
-#include "storage/history/look.h"
-
+// Second looks, as HistoryWriter stores and HistoryReader returns them.
 #include <string>
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/history/episode.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/history_writer.h"
 #include "storage/history/sql.h"
 
 namespace fdi::storage {
 namespace sql = history_sql;
 
-void StoreLook(Database& database, const EpisodeLook& look) {
+void HistoryWriter::StoreLook(const EpisodeLook& look) {
   const std::string id = EpisodeIdText(look.episode_id);
-  if (!database.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?", id)) {
-    throw NotFoundError("no episode " + id);
-  }
-  database.Cached(sql::delete_look).Bind(id).Run();
-  database.Cached(sql::insert_look)
-      .Bind(id, look.first_ns, look.period_ns, look.misfit)
-      .Run();
-  int rank = 0;
-  for (const LookFault& f : look.faults) {
-    database.Cached(sql::insert_look_fault)
-        .Bind(id, ++rank, FaultName(f.fault), f.strength, f.lowest, f.highest,
-              f.begins_ns, f.growing)
+  CommitBatch([&] {
+    if (!database_.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?",
+                              id)) {
+      throw NotFoundError("no episode " + id);
+    }
+    database_.Cached(sql::delete_look).Bind(id).Run();
+    database_.Cached(sql::insert_look)
+        .Bind(id, look.first_ns, look.period_ns, look.misfit)
         .Run();
-  }
-  for (std::size_t row = 0; row < look.x_pct.size(); ++row) {
-    database.Cached(sql::insert_look_row)
-        .Bind(id, row, look.x_pct[row], look.flow[row])
-        .Run();
-  }
+    int rank = 0;
+    for (const LookFault& f : look.faults) {
+      database_.Cached(sql::insert_look_fault)
+          .Bind(id, ++rank, FaultName(f.fault), f.strength, f.lowest, f.highest,
+                f.begins_ns, f.growing)
+          .Run();
+    }
+    for (std::size_t row = 0; row < look.x_pct.size(); ++row) {
+      database_.Cached(sql::insert_look_row)
+          .Bind(id, row, look.x_pct[row], look.flow[row])
+          .Run();
+    }
+  });
 }
 
-std::optional<EpisodeLook> ReadLook(Database& database,
-                                    std::uint64_t episode_id) {
+std::optional<EpisodeLook> HistoryReader::Look(std::uint64_t episode_id) {
   const std::string id = EpisodeIdText(episode_id);
-  Statement header = database.Prepare(sql::look);
+  Statement header = database_.Prepare(sql::look);
   if (!header.Bind(id).Step()) {
     return std::nullopt;
   }
   EpisodeLook look;
   look.episode_id = episode_id;
   header.Read(0, look.first_ns, look.period_ns, look.misfit);
-  Statement faults = database.Prepare(sql::look_faults);
+  Statement faults = database_.Prepare(sql::look_faults);
   faults.Bind(id);
   while (faults.Step()) {
     LookFault& f = look.faults.emplace_back();
@@ -55,7 +58,7 @@ std::optional<EpisodeLook> ReadLook(Database& database,
     f.fault = *fault;
     faults.Read(1, f.strength, f.lowest, f.highest, f.begins_ns, f.growing);
   }
-  Statement rows = database.Prepare(sql::look_rows);
+  Statement rows = database_.Prepare(sql::look_rows);
   rows.Bind(id);
   while (rows.Step()) {
     look.x_pct.push_back(rows.Double(0));

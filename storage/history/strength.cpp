@@ -4,27 +4,30 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
-#include "storage/database/record.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/history_writer.h"
 #include "storage/history/sql.h"
 
 namespace fdi::storage {
 namespace sql = history_sql;
 
-void StoreStrength(Database& database, const StrengthPoint& point) {
+void HistoryWriter::StoreStrength(const StrengthPoint& point) {
   const std::string id = EpisodeIdText(point.episode_id);
-  if (!database.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?", id)) {
-    throw NotFoundError("no episode " + id);
-  }
-  database.Cached(sql::insert_strength)
-      .Bind(id, FaultName(point.fault), point.stamp_ns, point.strength,
-            point.lowest, point.highest, LayerName(point.layer))
-      .Run();
+  CommitBatch([&] {
+    if (!database_.QueryInt64("SELECT 1 FROM episode WHERE episode_id = ?",
+                              id)) {
+      throw NotFoundError("no episode " + id);
+    }
+    database_.Cached(sql::insert_strength)
+        .Bind(id, FaultName(point.fault), point.stamp_ns, point.strength,
+              point.lowest, point.highest, LayerName(point.layer))
+        .Run();
+  });
 }
 
-std::vector<StrengthPoint> ReadStrengths(Database& database,
-                                         std::uint64_t episode_id) {
+std::vector<StrengthPoint> HistoryReader::Strengths(std::uint64_t episode_id) {
   const std::string id = EpisodeIdText(episode_id);
-  Statement rows = database.Prepare(sql::strengths);
+  Statement rows = database_.Prepare(sql::strengths);
   rows.Bind(id);
   std::vector<StrengthPoint> points;
   while (rows.Step()) {
