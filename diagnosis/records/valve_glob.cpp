@@ -44,6 +44,9 @@ bool GlobMatches(std::string_view glob, std::string_view text) {
   while (!glob.empty() || !text.empty()) {
     if (glob.starts_with('*')) {
       glob.remove_prefix(1);
+      if (glob.empty()) {
+        return true;
+      }
       star = {glob, text};
     } else if (glob.empty() || text.empty() || !TakeMatch(glob, text)) {
       if (!star || star->second.empty()) {
