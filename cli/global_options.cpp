@@ -10,7 +10,6 @@
 #include <CLI/CLI.hpp>
 #include <toml++/toml.h>
 
-#include "diagnosis/error.h"
 #include "diagnosis/suggestion.h"
 #include "fdi_version_config.h"
 
@@ -20,7 +19,7 @@ namespace {
 [[noreturn]] void Refuse(const toml::node& node, const std::string& message) {
   std::ostringstream text;
   text << "line " << node.source().begin.line << ": " << message;
-  throw fdi::ConfigError(text.str());
+  throw CLI::ConfigError(text.str());
 }
 
 // CLI11 converts values from text, as on the command line.
@@ -103,21 +102,23 @@ void Collect(const CLI::App& app, const toml::table& table,
   }
 }
 
-// Inserts an option's value with the type that its text suggests.
+// Inserts an option's value with the type that its text suggests, if TextOf()
+// gives that text back: "007" and "1e3" may be names.
 void Insert(toml::table& table, const std::string& key,
             const std::string& text) {
-  std::int64_t integer = 0;
-  double number = 0.0;
-  const char* end = text.data() + text.size();
+  const auto insert_as = [&](auto number) {
+    const char* const end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, number);
+    const bool same = error == std::errc() && stop == end &&
+                      TextOf(toml::value(number), key) == text;
+    if (same) {
+      table.insert_or_assign(key, number);
+    }
+    return same;
+  };
   if (text == "true" || text == "false") {
     table.insert_or_assign(key, text == "true");
-  } else if (auto r = std::from_chars(text.data(), end, integer);
-             r.ec == std::errc() && r.ptr == end) {
-    table.insert_or_assign(key, integer);
-  } else if (auto r2 = std::from_chars(text.data(), end, number);
-             r2.ec == std::errc() && r2.ptr == end) {
-    table.insert_or_assign(key, number);
-  } else {
+  } else if (!insert_as(std::int64_t{0}) && !insert_as(0.0)) {
     table.insert_or_assign(key, text);
   }
 }
@@ -166,7 +167,8 @@ class TomlConfig : public CLI::Config {
   // @param root whose options and verbs the file may contain; outlives this.
   explicit TomlConfig(const CLI::App& root) : root_(root) {}
 
-  // @throws ConfigError naming line and key: invalid TOML, an unknown key, a
+  // @throws CLI::ConfigError naming line and key: invalid TOML, an unknown key,
+  // a
   //   value that is neither text, number nor flag.
   std::vector<CLI::ConfigItem> from_config(std::istream& in) const override;
   // Unused, because its app cannot be queried for defaults; see
@@ -191,7 +193,7 @@ std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& in) const {
     std::ostringstream message;
     message << "line " << error.source().begin.line << ", column "
             << error.source().begin.column << ": " << error.description();
-    throw fdi::ConfigError(message.str());
+    throw CLI::ConfigError(message.str());
   }
 }
 

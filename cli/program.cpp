@@ -225,10 +225,6 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
   if (!std::exchange(help_prepared_, true)) {
     PrepareHelp(*app_);
   }
-  const auto in_config = [this] {
-    const auto* option = app_->get_config_ptr();
-    return "--config " + (option->count() > 0 ? option->results().front() : "");
-  };
   try {
     app_->parse(argc, argv);
   } catch (const PrintConfigRequest&) {
@@ -239,14 +235,13 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
   } catch (const CLI::Success& request) {
     return app_->exit(request);  // Prints --help or --version.
   } catch (const CLI::ConfigError& error) {
-    throw fdi::ConfigError(in_config() + ": " + error.what());
+    const auto* option = app_->get_config_ptr();
+    throw fdi::ConfigError(
+        "--config " + (option->count() > 0 ? option->results().front() : "") +
+        ": " + error.what());
   } catch (const CLI::ParseError& error) {
     throw fdi::ConfigError(Explain(*app_, error) + " (see " + app_->get_name() +
                            " --help)");
-  } catch (const fdi::ConfigError& error) {
-    // Thrown by our config reader: the options themselves throw
-    // CLI::ParseError.
-    throw fdi::ConfigError(in_config() + ": " + error.what());
   }
   return RunVerb(argc, argv);
 }

@@ -186,9 +186,14 @@ double SecondsOf(const std::string& text) {
   double seconds = 0.0;
   const char* end = text.data() + text.size();
   const auto [rest, error] = std::from_chars(text.data(), end, seconds);
-  return error == std::errc() && rest == end
-             ? seconds
-             : static_cast<double>(cli::ParseDuration(text)) / 1e9;
+  if (error == std::errc() && rest == end) {
+    return seconds;
+  }
+  try {
+    return static_cast<double>(cli::ParseDuration(text)) / 1e9;
+  } catch (const ConfigError& wrong) {
+    throw ConfigError(std::string("--duration: ") + wrong.what());
+  }
 }
 
 void AddScenarioOptions(CLI::App& verb, RunOptions& options) {

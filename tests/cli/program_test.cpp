@@ -10,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cli/time_text.h"
 #include "diagnosis/error.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -74,6 +75,9 @@ Outcome RunProgram(std::vector<const char*> arguments,
                   "who is there at that time")
       ->check(CLI::ExistingFile)
       ->type_name("FILE.txt");
+  greet.add_option_function<std::string>(
+      "--within", [](const std::string& text) { ParseDuration(text); },
+      "How soon");
   CLI::App& store = program.AddGroup("store", "Doors");
   program.AddVerb(store, "open", "Opens", [](const Context&) { return 1; });
   program.MapError<BusError>(kExitTransport);
@@ -291,6 +295,24 @@ TEST_F(ProgramConfigTest, PrintedConfigReadsBackAsTheSameConfig) {
   const Outcome again =
       RunProgram({"greet", "--config", path_.c_str(), "--print-config"});
   EXPECT_EQ(again.out, printed.out);
+}
+
+TEST_F(ProgramConfigTest, PrintedConfigKeepsTextThatLooksLikeANumber) {
+  for (const char* name : {"007", "1e3", "0x10", "1.50", "-0", "inf", "12"}) {
+    const Outcome printed =
+        RunProgram({"greet", "--who", name, "--print-config"});
+
+    const Outcome read = RunProgram({"greet", "--config", Write(printed.out)});
+
+    EXPECT_EQ(read.who, name) << printed.out;
+  }
+}
+
+TEST_F(ProgramConfigTest, ConfigIsBlamedOnlyForWhatStandsInIt) {
+  const Outcome outcome = RunProgram({"greet", "--within", "5x"});
+
+  EXPECT_EQ(outcome.code, kExitUsage);
+  EXPECT_THAT(outcome.err, StartsWith("prog: error: '5x' is not a duration"));
 }
 
 TEST(ProgramTest, ExamplesStandBelowTheHelpOfTheirVerb) {
