@@ -13,7 +13,6 @@
 namespace fdi::console {
 namespace {
 
-constexpr std::int64_t kNsPerMs = 1'000'000;
 constexpr std::int64_t kLastMs = 9'000'000'000'000;  // year 2255
 
 // Lower-cases a name for the middle of a sentence: "flow transmitter ...", but

@@ -137,6 +137,7 @@ std::optional<std::string> Parameter(const httplib::Request& request,
 std::int64_t IntegerParameter(const httplib::Request& request, const char* name,
                               std::int64_t otherwise, std::int64_t minimum,
                               std::int64_t maximum);
+inline constexpr std::int64_t kNsPerMs = 1'000'000;
 /// Milliseconds since 1970, converted to ns. @throws ConfigError
 std::int64_t TimeParameter(const httplib::Request& request, const char* name,
                            std::int64_t otherwise_ns);

@@ -49,7 +49,9 @@ storage::EpisodeFilter FilterOf(const Api& api,
 }
 
 // Newest first. The next page continues below the oldest row of the previous
-// one, given as before_ms.
+// one, given as before_ms. Valves that one cause disturbs are often detected at
+// the same instant, so a page has all episodes of its last millisecond, even if
+// they are more than `limit`.
 Json History(const Api& api, const httplib::Request& request) {
   storage::EpisodeFilter filter = FilterOf(api, request);
   const std::int64_t limit =
@@ -57,14 +59,20 @@ Json History(const Api& api, const httplib::Request& request) {
   filter.until_ns = std::min(
       filter.until_ns, TimeParameter(request, "before_ms",
                                      std::numeric_limits<std::int64_t>::max()));
-  filter.limit = limit + 1;
+  filter.limit = limit;
   const auto reader = api.History();
   std::vector<storage::Episode> episodes = reader->List(filter);
-  std::reverse(episodes.begin(), episodes.end());
-  const bool more = static_cast<std::int64_t>(episodes.size()) > limit;
-  if (more) {
-    episodes.pop_back();
+  bool more = false;
+  if (std::ssize(episodes) == limit) {
+    storage::EpisodeFilter older = filter;
+    older.until_ns = episodes.front().detected_ns / kNsPerMs * kNsPerMs;
+    older.limit = 1;
+    more = !reader->List(older).empty();
+    filter.since_ns = std::max(filter.since_ns, older.until_ns);
+    filter.limit = 0;
+    episodes = reader->List(filter);
   }
+  std::reverse(episodes.begin(), episodes.end());
   return {{"episodes",
            AlarmsJson(reader->Alarms(std::move(episodes), filter.now_ns),
                       api.texts)},

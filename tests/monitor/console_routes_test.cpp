@@ -190,6 +190,29 @@ TEST_F(ConsoleRoutesTest, HistoryIsPagedNewestFirst) {
   EXPECT_EQ(statistics["per_day"][0]["episodes"], 3);
 }
 
+TEST_F(ConsoleRoutesTest, PagesLoseNoEpisodeOfTheSameInstant) {
+  RecordLater("A", 0.0);
+  RecordLater("B", 100.0);
+  RecordLater("C", 100.0002);
+  RecordLater("D", 100.0002);
+  RecordLater("E", 200.0);
+  Start();
+
+  std::string valves;
+  std::string query = "/api/v1/history?limit=2";
+  for (bool more = true; more;) {
+    const Json page = Get(query);
+    for (const Json& row : page["episodes"]) {
+      valves += row["valve"];
+    }
+    query = "/api/v1/history?limit=2&before_ms=" +
+            page["episodes"].back()["detected_ms"].dump();
+    more = page["more"];
+  }
+
+  EXPECT_EQ(valves, "EDCBA");
+}
+
 TEST_F(ConsoleRoutesTest, ItsEndEndsStreamsAndThreads) {
   Start();
   std::jthread listener([this] {
