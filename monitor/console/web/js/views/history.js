@@ -35,6 +35,7 @@ const kSaved = ['episode', 'valve', 'fault', 'name', 'state', 'isa',
 class History extends View {
   title = 'History';
   #rows = [];
+  #asked = 0;  // Only the last question is answered.
   #inputs;
   #body = h('tbody', {role: 'rowgroup'});
   #found = h('p', {class: 'note', role: 'status'});
@@ -136,13 +137,15 @@ class History extends View {
 
   async #fetchRows(older) {
     const {valve, fault, state} = this.#inputs;
+    const question = ++this.#asked;
+    const late = () => this.gone || question !== this.#asked;
     try {
       const {episodes, more} = await get('/history', {
         ...this.#time(), valve: valve.value.trim(), fault: fault.value,
         state: state.value, limit: kPage,
         before_ms: older ? this.#rows.at(-1)?.detected_ms : null,
       });
-      if (this.gone) return;
+      if (late()) return;
       this.#rows.push(...episodes);
       this.#body.append(...episodes.map((row) => bodyRow(kColumns, row)));
       this.#more.hidden = !more;
@@ -150,7 +153,7 @@ class History extends View {
         'No episode fits the question.' :
         `${this.#rows.length}${more ? ' newest' : ''}`);
     } catch (error) {
-      setText(this.#found, error.message);
+      if (!late()) setText(this.#found, error.message);
     }
   }
 }

@@ -147,9 +147,9 @@ class Plant extends View {
   }
 
   #changed(ids) {
+    if (ids === null) this.#ranks.clear();
     if (ids === null || ids.some((id) => !this.#ranks.has(id))) {
       this.#ids = [...store.tiles.keys()].sort(compareNames);
-      this.#ranks.clear();
     }
     for (const id of ids ?? this.#ids) {
       const [group, priority] = rankOf(store.tiles.get(id));

@@ -7,7 +7,7 @@ import {dateText, durationText} from '../format.js';
 import {dataTable, timeCell, valveLink} from './table.js';
 
 const kDayMs = 86400000;
-const kMaxDays = 120;
+const kMaxDays = 120;  // In a chart.
 const kTopRows = 10;
 
 /** Days without an alarm are days, too. */
@@ -15,8 +15,7 @@ function everyDay(perDay, {since_ms: since, until_ms: until}) {
   const known = new Map(perDay.map((day) => [day.day, day]));
   const end = until ?? Date.now();
   const days = [];
-  const first = Math.max(since, end - kMaxDays * kDayMs);
-  for (let ms = first - first % kDayMs; ms < end; ms += kDayMs) {
+  for (let ms = since - since % kDayMs; ms < end; ms += kDayMs) {
     const name = new Date(ms).toISOString().slice(0, 10);
     days.push(known.get(name) ?? {day: name, episodes: 0, alarm_s: 0});
   }
@@ -82,14 +81,15 @@ function keyFigures(figures, days) {
 
 export function statisticsSection(figures, time) {
   const days = everyDay(figures.per_day, time);
+  const drawn = days.slice(-kMaxDays);
   return h('section', {'aria-label': 'Statistics'},
       h('h2', {}, `${dateText(time.since_ms)} to ` +
         (time.until_ms ? dateText(time.until_ms) : 'now')),
       keyFigures(figures, days),
       h('div', {class: 'figures'},
-          barChart('Episodes per day', '', days.map((day) =>
+          barChart('Episodes per day', '', drawn.map((day) =>
             ({name: day.day, value: day.episodes})), true),
-          barChart('Time in alarm per day [h]', 'h', days.map((day) =>
+          barChart('Time in alarm per day [h]', 'h', drawn.map((day) =>
             ({name: day.day, value: day.alarm_s / 3600}))),
           valveTable(figures.valves), faultTable(figures.faults)),
       h('p', {class: 'hint'}, 'Days are UTC. Chattering: episodes that came ' +

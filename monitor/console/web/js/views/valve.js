@@ -261,7 +261,7 @@ class ValvePage extends View {
     const tile = store.tiles.get(this.id);
     replace(this.#state, stateLine(tile));
     const row = tile?.episode ? store.alarms.get(tile.episode) : null;
-    const key = JSON.stringify([row, store.status?.write]);
+    const key = JSON.stringify([row, tile?.faults, store.status?.write]);
     if (key === this.#shownState) return;
     this.#shownState = key;
     replace(this.#actions, row ? actionButtons(row) : null);

@@ -1,0 +1,195 @@
+// Views of the page over canned answers: cases that a real monitor gives only
+// at the right moment.
+
+import assert from 'node:assert/strict';
+import {once} from 'node:events';
+import {readFile} from 'node:fs/promises';
+import {createServer} from 'node:http';
+import {after, before, test} from 'node:test';
+
+import {launch, open} from './browser.mjs';
+import {until} from './programs.mjs';
+
+const kWeb = new URL('../../monitor/console/web/', import.meta.url);
+const kTypes = {html: 'text/html', js: 'text/javascript', css: 'text/css',
+  svg: 'image/svg+xml'};
+const kNowMs = Date.now();
+const kDayMs = 86400000;
+
+/** A monitor of canned `answers`, by path; `asked` are its last requests. */
+class Monitor {
+  answers = {};
+  asked = [];
+  #streams = new Set();
+  #server = createServer((...exchange) => this.#answer(...exchange));
+
+  async start() {
+    this.#server.listen(0, '127.0.0.1');
+    await once(this.#server, 'listening');
+    return `http://127.0.0.1:${this.#server.address().port}`;
+  }
+
+  stop() {
+    this.#server.close();
+    this.#server.closeAllConnections();
+  }
+
+  /** Forgets everything; `valves` and `alarms` are there at the start. */
+  reset(valves = [], alarms = []) {
+    this.asked = [];
+    this.answers = {
+      status: {now_ms: kNowMs, started_ms: kNowMs, instance: '1', health: 'OK',
+        software: '0', pair: null, plant: null, write: false, user: null,
+        role: null, session: false, model_sets: []},
+      faults: {faults: [{fault: 'f19', name: 'Flow transmitter wrong',
+        check: 'Compare it.', severity: [{from: 0, level: 'high'}]}]},
+      valves: {valves}, alarms: {alarms}, worklist: {rows: []},
+    };
+  }
+
+  async push(type, data) {
+    await until(() => this.#streams.size > 0, 'a stream');
+    for (const stream of this.#streams) {
+      stream.write(`event: ${type}\ndata: ${JSON.stringify(data)}\n\n`);
+    }
+  }
+
+  async #answer({url}, response) {
+    const {pathname, search} = new URL(url, 'http://localhost');
+    if (!pathname.startsWith('/api/v1/')) return this.#file(pathname, response);
+    const path = pathname.slice('/api/v1/'.length);
+    if (path === 'stream') return this.#stream(response);
+    this.asked.push(path + search);
+    const found = this.answers[path];
+    const answer = typeof found === 'function' ? await found(search) : found;
+    response.writeHead(answer ? 200 : 404).end(
+        JSON.stringify(answer ?? {error: 'not there'}));
+  }
+
+  #stream(response) {
+    response.writeHead(200, {'Content-Type': 'text/event-stream'});
+    response.write('event: hello\ndata: ' +
+      `{"now_ms": ${kNowMs}, "instance": "1"}\n\n`);
+    this.#streams.add(response);
+    response.once('close', () => this.#streams.delete(response));
+  }
+
+  async #file(path, response) {
+    const name = path === '/' ? 'index.html' : path.slice(1)
+        .replace(/^uplot/, 'vendor/uplot');
+    try {
+      const bytes = await readFile(new URL(name, kWeb));
+      response.writeHead(200,
+          {'Content-Type': kTypes[name.split('.').at(-1)]}).end(bytes);
+    } catch {
+      response.writeHead(404).end();
+    }
+  }
+}
+
+function tile(id, state, faults = [], more = {}) {
+  return {id, state, faults, quality: 'LIVE', reasons: '', missing: [],
+    factor: faults.length > 0 ? 0.9 : null, strength: null, d0: 1,
+    drift_used: null, stamp_ms: kNowMs, since_ms: null, episode: null,
+    model_set: 'm@1', shelved_until_ms: null, unacked: false, spark: [],
+    ...more};
+}
+
+function alarm(episode, valve, fault, more = {}) {
+  return {episode, valve, fault, layer: null, state: 'ISOLATED', isa: 'UNACK',
+    shelved: null, detected_ms: kNowMs, isolated_ms: null, cleared_ms: null,
+    ended_ms: null, end_reason: null, peak_factor: 0.9, strength: 0.5,
+    label: null, acked_by: null, acked_ms: null, model_set: 'm@1',
+    severity: 'high', discipline: 'instrument', namur: 'failure', name: fault,
+    check: '', ...more};
+}
+
+const monitor = new Monitor();
+let browser;
+let address;
+
+before(async () => {
+  [browser, address] = await Promise.all([launch(), monitor.start()]);
+});
+
+after(async () => {
+  await browser?.close();
+  monitor.stop();
+});
+
+test('a new valve leaves the worst ones first', async () => {
+  monitor.reset([tile('A', 'NORMAL'), tile('C', 'NORMAL'),
+    tile('Z', 'ISOLATED', ['f19'])]);
+  const page = await open(browser, address, '#/');
+  await page.locator('.tile').first().waitFor();
+
+  await monitor.push('tiles', {tiles: [tile('B', 'NORMAL')]});
+  await page.locator('.tile', {hasText: 'B'}).waitFor();
+  await monitor.push('tiles', {tiles: [tile('C', 'DETECTED')]});
+
+  await until(async () => (await page.locator('.tile .tile-id')
+      .allTextContents()).join('') === 'ZCAB', 'Z, C, A, B', 5000);
+  await page.context().close();
+});
+
+test('what to check appears with the name of the fault', async () => {
+  const episode = '0000000000000001';
+  monitor.reset([tile('V', 'DETECTED', [], {episode})],
+      [alarm(episode, 'V', null, {state: 'DETECTED'})]);
+  const page = await open(browser, address, '#/valve/V');
+  const state = page.locator('.state-line');
+  await state.getByText('fault detected').waitFor();
+
+  // The alarm is pushed at once, the tile with the next second.
+  await monitor.push('alarm', alarm(episode, 'V', 'f19'));
+  await monitor.push('tiles', {tiles: [tile('V', 'ISOLATED', ['f19'],
+      {episode})]});
+  await state.getByText('fault isolated').waitFor();
+
+  assert.match(await page.locator('.checks').textContent(), /Compare it/);
+  await page.context().close();
+});
+
+test('older episodes that are asked for twice come once', async () => {
+  monitor.reset();
+  monitor.answers.statistics = {per_day: [], valves: [], faults: [],
+    labelled: {true: 0, false: 0, none: 0}, most_in_10_min: 0, gaps: []};
+  let answerOlder;
+  const older = new Promise((resolve) => answerOlder = resolve);
+  const row = (n) => alarm(`000000000000000${n}`, `V${n}`, 'f19',
+      {detected_ms: kNowMs - n});
+  monitor.answers.history = (search) => search.includes('before_ms') ?
+    older.then(() => ({episodes: [row(2)], more: false})) :
+    {episodes: [row(1)], more: true};
+  const page = await open(browser, address, '#/history');
+
+  const more = page.getByRole('button', {name: 'Older ones'});
+  await more.click();
+  await more.click();
+  await until(() => monitor.asked.filter((each) =>
+    each.includes('before_ms')).length === 2, 'both requests');
+  answerOlder();
+  await page.getByRole('link', {name: 'V2'}).waitFor();
+  await more.waitFor({state: 'hidden'});
+
+  assert.equal(await page.locator('tbody tr', {hasText: 'V2'}).count(), 1);
+  await page.context().close();
+});
+
+test('the figures of a year count all its episodes', async () => {
+  monitor.reset();
+  const day = (ms) => new Date(ms).toISOString().slice(0, 10);
+  monitor.answers.history = {episodes: [], more: false};
+  monitor.answers.statistics = {
+    per_day: [{day: day(kNowMs - 300 * kDayMs), episodes: 5, alarm_s: 60},
+      {day: day(kNowMs), episodes: 2, alarm_s: 60}],
+    valves: [], faults: [], labelled: {true: 0, false: 0, none: 7},
+    most_in_10_min: 1, gaps: []};
+  const page = await open(browser, address,
+      `#/history?since=${kNowMs - 365 * kDayMs}`);
+
+  const episodes = page.locator('.facts div', {hasText: /^Episodes/});
+
+  assert.equal(await episodes.locator('dd').first().textContent(), '7');
+  await page.context().close();
+});
