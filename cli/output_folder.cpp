@@ -49,26 +49,39 @@ void WriteOutput(const std::filesystem::path& path,
     write(std::cout);
     return;
   }
-  // Atomic: readers see either the old file or the complete new one.
-  std::filesystem::path part = path;
-  part += ".part";
-  std::ofstream file(part, std::ios::binary | std::ios::trunc);
   std::error_code error;
+  // Atomic: readers see either the old file or the complete new one. A pipe or
+  // a device must not be replaced, and a link stays one.
+  const bool replaces = !std::filesystem::is_other(path, error);
+  const std::filesystem::path target =
+      replaces && std::filesystem::is_symlink(path, error) &&
+              std::filesystem::exists(path, error)
+          ? std::filesystem::canonical(path)
+          : path;
+  std::filesystem::path part = target;
+  part += replaces ? ".part" : "";
+  const auto discard = [&] {
+    if (replaces) {
+      std::filesystem::remove(part, error);
+    }
+  };
+  std::ofstream file(part, std::ios::binary | std::ios::trunc);
+  error.clear();
   try {
     if (file) {
       write(file);
       file.close();
     }
   } catch (...) {
-    std::filesystem::remove(part, error);
+    discard();
     throw;
   }
-  if (file) {
-    std::filesystem::rename(part, path, error);
+  if (file && replaces) {
+    std::filesystem::rename(part, target, error);
   }
   if (!file || error) {
     const std::string reason = error ? error.message() : std::strerror(errno);
-    std::filesystem::remove(part, error);
+    discard();
     throw DataError("cannot write " + path.string() + ": " + reason);
   }
 }

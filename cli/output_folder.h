@@ -13,7 +13,8 @@ namespace fdi::cli {
 void EnsureFolder(const std::filesystem::path& folder);
 
 /// Has `write` write the file `path`, or stdout for "-". The file is replaced
-/// atomically, so a failure leaves no partial file.
+/// atomically, so a failure leaves no partial file; a pipe or a device is
+/// written to.
 /// @throws DataError naming the file.
 void WriteOutput(const std::filesystem::path& path,
                  const std::function<void(std::ostream&)>& write);
