@@ -11,6 +11,7 @@
 
 #include <crypt.h>
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -73,6 +74,26 @@ std::pair<std::string, User> ParseLine(const std::string& line) {
       ": cannot be written: " + std::generic_category().message(errno));
 }
 
+// Keeps other commands out for its lifetime. The file itself is replaced, so
+// the lock is that of its folder.
+class FolderLock {
+ public:
+  explicit FolderLock(const std::filesystem::path& file)
+      : folder_(open((file.parent_path() / ".").c_str(),
+                     O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    if (folder_ < 0) {
+      RefuseWrite(file);
+    }
+    flock(folder_, LOCK_EX);  // Without effect where there are no locks.
+  }
+  ~FolderLock() { close(folder_); }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int folder_;
+};
+
 // Replaces the file atomically, keeping owner, group and mode; a new file is
 // readable by us alone.
 void Replace(const std::filesystem::path& path, std::string_view text) {
@@ -134,12 +155,16 @@ Users LoadUsers(const std::filesystem::path& path) {
   return users;
 }
 
-void StoreUser(const std::filesystem::path& path, const std::string& name,
+void StoreUser(const std::filesystem::path& file, const std::string& name,
                const std::optional<User>& user) {
   if (!IsName(name)) {
     throw ConfigError(
         "NAME: expected 1..64 letters, digits, '.', '_', '-', '@'");
   }
+  // A link stays one.
+  const std::filesystem::path path =
+      std::filesystem::exists(file) ? std::filesystem::canonical(file) : file;
+  const FolderLock lock(path);
   std::istringstream old;
   if (std::filesystem::exists(path)) {
     LoadUsers(path);  // Reports errors before anything is changed.

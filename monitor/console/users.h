@@ -38,10 +38,10 @@ Users LoadUsers(const std::filesystem::path& path);
 
 /// Adds or replaces the line of a user, or removes it if `user` is empty. The
 /// file is replaced atomically, and created with mode 0600; its other lines,
-/// owner and group are kept.
+/// owner and group are kept. Programs that do this at once wait for each other.
 /// @throws ConfigError if the name is invalid, or as LoadUsers(); NotFoundError
 ///   if there is no such user to remove; DataError.
-void StoreUser(const std::filesystem::path& path, const std::string& name,
+void StoreUser(const std::filesystem::path& file, const std::string& name,
                const std::optional<User>& user);
 
 /// yescrypt at the cost that libxcrypt prefers, with a random salt.

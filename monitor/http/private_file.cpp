@@ -23,11 +23,15 @@ std::string ReadPrivateFile(const std::filesystem::path& path,
   // O_NONBLOCK: opening a pipe must not wait.
   const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   struct stat facts {};
-  std::string text(kMaxSize, '\0');
+  std::string text(kMaxSize + 1, '\0');
   ssize_t size = -1;
   if (file >= 0 && fstat(file, &facts) == 0) {
     errno = EINVAL;
     size = S_ISREG(facts.st_mode) ? read(file, text.data(), text.size()) : -1;
+  }
+  if (size > static_cast<ssize_t>(kMaxSize)) {
+    errno = EFBIG;
+    size = -1;
   }
   const std::string reason = std::generic_category().message(errno);
   if (file >= 0) {

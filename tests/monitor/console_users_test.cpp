@@ -1,6 +1,8 @@
 // The file of users, their passwords, and who is logged in.
 #include <fstream>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -60,6 +62,35 @@ TEST_F(UsersFileTest, AUserIsAddedChangedAndRemoved) {
   EXPECT_THROW(StoreUser(file_, "anna", std::nullopt), NotFoundError);
   EXPECT_THROW(StoreUser(file_, "a:engineer", User{}), ConfigError);
   EXPECT_THROW(StoreUser(file_, "a\nb", User{}), ConfigError);
+}
+
+TEST_F(UsersFileTest, ChangesAtOnceAllStay) {
+  std::vector<std::jthread> commands;
+  for (int i = 0; i < 20; ++i) {
+    commands.emplace_back(
+        [this, i] { StoreUser(file_, "u" + std::to_string(i), User{}); });
+  }
+  commands.clear();
+
+  EXPECT_EQ(LoadUsers(file_).size(), 20U);
+}
+
+TEST_F(UsersFileTest, LinkToItStaysOne) {
+  const auto link = directory_.path() / "link";
+  std::filesystem::create_symlink(file_, link);
+  Write("bo:view:*\n");
+
+  StoreUser(link, "anna", User{});
+
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(LoadUsers(file_).size(), 2U);
+}
+
+TEST_F(UsersFileTest, OneThatIsTooLongIsNotReadInPart) {
+  Write(std::string(2 << 20, '#'));
+
+  EXPECT_THAT(storage::MessageOf<DataError>([this] { LoadUsers(file_); }),
+              HasSubstr("cannot be read: File too large"));
 }
 
 TEST_F(UsersFileTest, ItsModeAndItsOtherLinesStay) {
