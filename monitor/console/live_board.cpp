@@ -258,6 +258,9 @@ void LiveBoard::ShowLocked(Slot& slot, const Sample& sample,
     slot.ShowDrift({});
   }
   // Before Describe(), which overwrites the stamp of the previous sample.
+  if (sample.stamp_ns < slot.now.stamp_ns) {
+    slot.ClearTrend();  // A new source with another clock: time must ascend.
+  }
   RecordGap(slot, sample);
   slot.Describe(verdict);
   slot.AddSpark(verdict);

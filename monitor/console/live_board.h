@@ -69,7 +69,7 @@ std::string IsolatedFaults(const FaultEvent& event);
 /// 900 instants, packed. That is 91 kB a valve for six signals, two channels
 /// and five faults, 116 kB for nineteen: 232 MB for 2000 valves. After a change
 /// of the source it is up to three times as much until the new source has sent
-/// as many instants.
+/// as many instants. A source whose stamps are earlier begins the trend anew.
 ///
 /// Thread safe. The diagnosis takes two locks per sample, which readers hold
 /// for microseconds: no reader does more than copy under them.

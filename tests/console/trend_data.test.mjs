@@ -50,6 +50,14 @@ test('what both have is there once', () => {
   assert.deepEqual(data.columns.t, seconds(0, 71));
 });
 
+test('samples that come again are told from a clock that was set back', () => {
+  const data = new TrendData();
+  data.load(trend(seconds(30, 60)), false);
+
+  assert.ok(!data.goesBack([{t_ms: 58000}, {t_ms: 59000}, {t_ms: 60000}]));
+  assert.ok(data.goesBack([{t_ms: 60000}, {t_ms: 20000}]));
+});
+
 test('another model set begins anew', () => {
   const data = new TrendData();
   data.load(trend(seconds(0, 60)), false);

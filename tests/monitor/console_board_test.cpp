@@ -68,6 +68,17 @@ TEST_F(LiveBoardTest, ANewSourceGoesOnWithTheTrend) {
   EXPECT_TRUE(board_.TakeGaps().empty());
 }
 
+TEST_F(LiveBoardTest, ASourceWithEarlierStampsBeginsTheTrendAnew) {
+  Show(1000, 1100);
+  const std::uint64_t next = board_.Trend("V1", 0).value().next;
+
+  Show(500, 510, 0.0, 2);
+
+  EXPECT_EQ(board_.Trend("V1").value().points.size(), 10U);
+  EXPECT_EQ(board_.Since("V1", next).value().points.size(), 10U);
+  EXPECT_TRUE(board_.TakeGaps().empty());
+}
+
 TEST_F(LiveBoardTest, SourcesThatComeAndGoDoNotGrowTheTrend) {
   for (std::uint64_t source = 1; source <= 50; ++source) {
     Show(source * 100, source * 100 + 90, 0.0, source);

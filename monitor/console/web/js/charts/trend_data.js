@@ -92,6 +92,12 @@ export class TrendData {
     this.columns = fresh;
   }
 
+  /** Whether there are instants before the last one that it does not have. */
+  goesBack(samples) {
+    return samples.some(({t_ms: t}) =>
+      t < this.lastMs && !this.columns.t.includes(t));
+  }
+
   /** Appends what is newer than the last. */
   append(samples) {
     if (!this.columns) return;

@@ -214,6 +214,10 @@ class ValvePage extends View {
       this.#queue.push(...own);
       return;
     }
+    if (this.#data.goesBack(own)) {
+      this.#load(false);  // A source with earlier stamps: the trend is anew.
+      return;
+    }
     this.#markTransitions(own);
     this.#data.append(own);
     this.#timeline.update();
