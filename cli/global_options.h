@@ -21,9 +21,8 @@ struct GlobalOptions {
   /// a killed peer blocks the next one for seconds.
   std::string transport{"udp"};
   std::string partition;  ///< --partition NAME[,NAME] of samples, or empty
-  std::filesystem::path qos_file;     ///< --qos FILE.xml, or empty
-  std::filesystem::path security;     ///< --security DIR, or empty
-  std::filesystem::path config_file;  ///< --config FILE.toml, or empty
+  std::filesystem::path qos_file;  ///< --qos FILE.xml, or empty
+  std::filesystem::path security;  ///< --security DIR, or empty
   /// --fault-catalogue FILE.toml, or empty; see FaultTexts.
   std::filesystem::path fault_catalogue;
   LogLevel log_level{LogLevel::kInfo};

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <ostream>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
@@ -9,10 +9,9 @@ namespace fdi::cli {
 /// Keys keep their insertion order.
 using Json = nlohmann::ordered_json;
 
-/// One object and a newline. NaN and infinity become null, invalid UTF-8 the
-/// replacement character.
-inline void PrintJson(std::ostream& out, const Json& object) {
-  out << object.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
-}
+/// JSON as text, on one line if `indent` is negative. NaN and infinity become
+/// null, invalid UTF-8 the replacement character; control characters that JSON
+/// allows (DEL, C1) are escaped, too.
+std::string JsonText(const Json& json, int indent = -1);
 
 }  // namespace fdi::cli

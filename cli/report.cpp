@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "cli/csv_cells.h"
-#include "cli/json_text.h"
 #include "cli/time_text.h"
 #include "diagnosis/printable.h"
 #include "diagnosis/time_units.h"

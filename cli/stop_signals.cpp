@@ -78,11 +78,6 @@ bool StopSignals::stop_requested() const noexcept {
   return g_stop;
 }
 
-void StopSignals::RequestStop() noexcept {
-  g_stop = true;
-  Wake();
-}
-
 StopSignals::Event StopSignals::WaitFor(std::chrono::milliseconds timeout) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;
   while (true) {

@@ -19,8 +19,6 @@ class StopSignals {
 
   /// Cheap; thread safe.
   bool stop_requested() const noexcept;
-  /// Same effect as SIGTERM; thread safe.
-  void RequestStop() noexcept;
   /// Waits for a signal. Returns kStop from the first stop on, and kReload once
   /// per SIGHUP (signals in quick succession count once).
   Event WaitFor(std::chrono::milliseconds timeout);

@@ -1,30 +1,20 @@
 #include "cli/models/lineage_text.h"
 
-#include <cstdio>
-
 #include "cli/text_table.h"
 #include "cli/time_text.h"
 #include "diagnosis/fault_catalogue.h"
+#include "storage/models/model_codec.h"
 
 namespace fdi::cli {
-namespace {
-
-std::string HashText(std::uint64_t hash) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx",
-                static_cast<unsigned long long>(hash));
-  return text;
-}
-
-}  // namespace
 
 Json LineageJson(const storage::Lineage& lineage) {
   Json json;
   json["parent"] = Json();
   if (lineage.parent) {
-    json["parent"] = {{"model_set", lineage.parent->name},
-                      {"version", lineage.parent->version},
-                      {"content_hash", HashText(lineage.parent->content_hash)}};
+    json["parent"] = {
+        {"model_set", lineage.parent->name},
+        {"version", lineage.parent->version},
+        {"content_hash", storage::HashHex(lineage.parent->content_hash)}};
   }
   const Json settings = Json::parse(lineage.settings, nullptr, false);
   json["settings"] = settings.is_discarded() ? Json() : settings;
@@ -50,7 +40,7 @@ std::string ParentText(const storage::Lineage& lineage) {
   }
   std::string text = lineage.parent->name + "@" +
                      std::to_string(lineage.parent->version) + ", hash " +
-                     HashText(lineage.parent->content_hash);
+                     storage::HashHex(lineage.parent->content_hash);
   const Json settings = Json::parse(lineage.settings, nullptr, false);
   if (settings.contains("limits")) {
     text += ", with limits from " +

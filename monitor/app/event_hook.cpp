@@ -4,7 +4,6 @@
 #include <exception>
 #include <utility>
 
-#include "cli/json_text.h"
 #include "cli/logging.h"
 #include "cli/time_text.h"
 #include "diagnosis/fault_catalogue.h"

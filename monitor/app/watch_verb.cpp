@@ -7,7 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "cli/json_text.h"
+#include "cli/json_output.h"
 #include "cli/program.h"
 #include "cli/stop_signals.h"
 #include "monitor/app/verbs.h"
@@ -55,7 +55,7 @@ void PrintCounts(const WatchCounts& counts, std::uint64_t lost, bool json) {
       {"valves", counts.valves.size()},       {"monitor_status", counts.status},
       {"model_sets", counts.models},          {"lost", lost}};
   if (json) {
-    cli::PrintJson(std::cout, object);
+    std::cout << cli::JsonText(object, 2) << '\n';
     return;
   }
   for (const auto& [name, value] : object.items()) {

@@ -76,7 +76,7 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   for (const Alarm& alarm : alarms) {
     const std::string& id = alarm.episode.episode_id;
     Json row = AlarmJson(alarm, texts_);
-    rows[id] = Dump(row);
+    rows[id] = JsonText(row);
     const auto known = rows_.find(id);
     if (known == rows_.end() || known->second != rows[id]) {
       changed.push_back(std::move(row));

@@ -111,7 +111,7 @@ Json PlantJson(const Api& api) {
 }
 
 void SendJson(httplib::Response& response, const Json& json) {
-  response.set_content(Dump(json), "application/json");
+  response.set_content(JsonText(json), "application/json");
 }
 
 void SendError(httplib::Response& response, int status,

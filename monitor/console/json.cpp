@@ -5,7 +5,6 @@
 #include <cmath>
 #include <string_view>
 
-#include "cli/json_text.h"
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi::console {
@@ -95,10 +94,6 @@ std::string_view StateOf(const storage::Episode& episode) {
 }
 
 }  // namespace
-
-std::string Dump(const Json& json) {
-  return cli::JsonText(json);
-}
 
 Json Ms(std::int64_t stamp_ns) {
   return stamp_ns / 1'000'000;

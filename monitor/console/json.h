@@ -14,9 +14,7 @@
 namespace fdi::console {
 
 using cli::Json;
-
-/// Compact; invalid UTF-8 becomes the replacement character.
-std::string Dump(const Json& json);
+using cli::JsonText;
 
 /// ns to ms since 1970.
 Json Ms(std::int64_t stamp_ns);

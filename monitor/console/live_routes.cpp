@@ -146,8 +146,8 @@ void Stream(const Api& api, const httplib::Request& request,
   const auto trend = api.board.Trend(valve, 0);
   const auto client = api.stream.Admit(
       valve, trend ? trend->next : 0,
-      StreamEvent("hello", Dump({{"now_ms", Ms(api.sources.utc_now_ns())},
-                                 {"instance", api.instance}})));
+      StreamEvent("hello", JsonText({{"now_ms", Ms(api.sources.utc_now_ns())},
+                                     {"instance", api.instance}})));
   if (!client) {
     response.set_header("Retry-After", "5");
     SendError(response, 503, "all places for live streams are taken");

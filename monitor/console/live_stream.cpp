@@ -187,7 +187,7 @@ void LiveStream::FollowAlarms() {
     }
     try {
       for (const Json& row : parts_->alarms.Refresh(parts_->utc_now_ns())) {
-        Broadcast(StreamEvent("alarm", Dump(row)));
+        Broadcast(StreamEvent("alarm", JsonText(row)));
       }
       pause = kAlarmPeriod;
       if (!std::exchange(reason, "").empty()) {
@@ -213,13 +213,13 @@ void LiveStream::Step(std::chrono::steady_clock::time_point now) {
   }
   SendSamples();
   for (const DataGap& gap : parts_->board.TakeGaps()) {
-    Broadcast(StreamEvent("gap", Dump(GapJson(gap))));
+    Broadcast(StreamEvent("gap", JsonText(GapJson(gap))));
   }
   if (now >= next_tiles_) {
     next_tiles_ = now + kTilePeriod;
     SendTiles();
     if (parts_->plant) {
-      Broadcast(StreamEvent("plant", Dump(parts_->plant())));
+      Broadcast(StreamEvent("plant", JsonText(parts_->plant())));
     }
   }
 }
@@ -231,8 +231,8 @@ void LiveStream::SendUnstored() {
     unstored.swap(unstored_);
   }
   for (const FaultEvent& event : unstored) {
-    Broadcast(
-        StreamEvent("alarm", Dump(AlarmJson(AlarmOf(event), parts_->texts))));
+    Broadcast(StreamEvent("alarm",
+                          JsonText(AlarmJson(AlarmOf(event), parts_->texts))));
   }
 }
 
@@ -255,7 +255,7 @@ void LiveStream::SendSamples() {
       samples.push_back(SampleJson(client->valve, point));
     }
     if (!samples.empty()) {
-      const Message message = StreamEvent("sample", Dump(samples));
+      const Message message = StreamEvent("sample", JsonText(samples));
       const std::lock_guard lock(mutex_);
       Push(*client, message);
     }
@@ -280,8 +280,9 @@ void LiveStream::SendTiles() {
     });
   }
   if (!tiles.empty()) {
-    Broadcast(StreamEvent("tiles", Dump({{"now_ms", Ms(parts_->utc_now_ns())},
-                                         {"tiles", std::move(tiles)}})));
+    Broadcast(
+        StreamEvent("tiles", JsonText({{"now_ms", Ms(parts_->utc_now_ns())},
+                                       {"tiles", std::move(tiles)}})));
   }
 }
 

@@ -51,7 +51,7 @@ TEST(StopSignalsTest, StopBehindAReloadIsNotLost) {
   StopSignals signals;
 
   std::raise(SIGHUP);
-  signals.RequestStop();
+  std::raise(SIGTERM);
 
   EXPECT_EQ(signals.WaitFor(10s), Event::kStop);
 }

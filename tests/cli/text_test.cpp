@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/json_text.h"
+#include "cli/json_output.h"
 #include "cli/logging.h"
 #include "cli/text_table.h"
 #include "cli/toml_reader.h"

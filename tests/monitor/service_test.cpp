@@ -141,7 +141,7 @@ TEST_F(ServiceTest, EveryReloadThatFailsIsALineOfTheLog) {
       EXPECT_TRUE(notice_.Await(
           [&] { return Count("reload_failed id=M112") >= reload; }));
     }
-    signals.RequestStop();
+    kill(getpid(), SIGTERM);
   });
 
   EXPECT_EQ(service.Run(signals), 0);
