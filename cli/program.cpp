@@ -1,6 +1,7 @@
 #include "cli/program.h"
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -113,6 +114,28 @@ std::string Explain(const CLI::App& root, const CLI::ParseError& error) {
   return error.what();
 }
 
+// The ranges of CLI11 accept NaN, which is neither below nor above a limit.
+// Call before PrepareHelp(), which takes the checks out of the types.
+void RefuseNan(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    const std::string type = option->get_type_name();
+    if (type.find("FLOAT") == std::string::npos &&
+        type.find("POSITIVE") == std::string::npos &&
+        type.find("NONNEGATIVE") == std::string::npos) {
+      continue;
+    }
+    option->check([](const std::string& text) {
+      double value = 0.0;
+      const bool is_nan =
+          CLI::detail::lexical_cast(text, value) && std::isnan(value);
+      return is_nan ? text + " is no number" : std::string();
+    });
+  }
+  for (CLI::App* verb : app.get_subcommands({})) {
+    RefuseNan(*verb);
+  }
+}
+
 // Scripts and logs rely on one line per error.
 std::string OneLine(std::string text) {
   while (!text.empty() && text.back() == '\n') {
@@ -223,6 +246,7 @@ int Program::Run(int argc, const char* const* argv) noexcept {
 
 int Program::ParseAndRun(int argc, const char* const* argv) {
   if (!std::exchange(help_prepared_, true)) {
+    RefuseNan(*app_);
     PrepareHelp(*app_);
   }
   try {

@@ -35,6 +35,7 @@ struct Outcome {
   std::string who;
   std::string mood{"none"};
   double gain{0.0};
+  double size{1.0};
   std::string place;
   std::string file;
   int times{1};
@@ -59,6 +60,9 @@ Outcome RunProgram(std::vector<const char*> arguments,
       });
   greet.add_option("--who", outcome.who, "Whom");
   greet.add_option("--gain", outcome.gain, "Gain");
+  greet.add_option("--size", outcome.size, "Size")
+      ->check(CLI::Range(0.5, 2.0))
+      ->type_name("M");
   greet.add_option("--mood", outcome.mood, "Mood")
       ->expected(0, 1)
       ->default_str("good")
@@ -100,6 +104,18 @@ TEST(ProgramTest, GlobalOptionsAreAcceptedBeforeAndAfterTheVerb) {
   EXPECT_EQ(after.code, kExitOk);
   EXPECT_EQ(after.options.domain, 7);
   EXPECT_TRUE(after.options.json);
+}
+
+TEST(ProgramTest, NumbersAreNumbers) {
+  for (const char* option : {"--gain", "--size"}) {
+    const Outcome outcome = RunProgram({"greet", option, "nan"});
+
+    EXPECT_EQ(outcome.code, kExitUsage);
+    EXPECT_THAT(outcome.err,
+                HasSubstr(std::string(option) + ": nan is no number"));
+  }
+  EXPECT_EQ(RunProgram({"greet", "--size", "0.75"}).size, 0.75);
+  EXPECT_EQ(RunProgram({"greet", "--who", "nan"}).who, "nan");
 }
 
 TEST(ProgramTest, ValueOfAFlagStandsBehindABlankOrAnEqualsSign) {
