@@ -189,6 +189,7 @@ void AddReplayVerb(cli::Program& program) {
                   "step; 1 s for JSON lines without t_s, which are stamped "
                   "on arrival)")
       ->check(CLI::Range(1e-3, 3600.0))
+      ->default_str("")
       ->type_name("S");
 }
 

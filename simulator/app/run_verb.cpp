@@ -18,6 +18,9 @@
 namespace fdi::simulator {
 namespace {
 
+// A scenario in TOML has signed integers.
+constexpr std::uint64_t kMaxSeed = std::numeric_limits<std::int64_t>::max();
+
 struct RunOptions {
   std::string valve;
   std::filesystem::path scenario;
@@ -86,6 +89,13 @@ std::vector<Scenario> Scenarios(const RunOptions& options) {
                       std::to_string(options.valves));
   }
   const Scenario base = BaseScenario(options);
+  const auto others = static_cast<std::uint64_t>(options.valves) - 1;
+  if (base.config.seed > kMaxSeed - others) {
+    throw ConfigError("--valves " + std::to_string(options.valves) +
+                      ": seeds that count up from " +
+                      std::to_string(base.config.seed) + " exceed " +
+                      std::to_string(kMaxSeed));
+  }
   std::vector<Scenario> scenarios(static_cast<std::size_t>(options.valves),
                                   base);
   for (int i = 0; i < options.valves; ++i) {
@@ -230,9 +240,8 @@ void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
       ->allow_extra_args(false);
   verb.add_flag("--cold-start", options.cold_start,
                 "Start at X = 0 with the actuator vented, not in equilibrium");
-  constexpr std::int64_t kMaxInt64 = std::numeric_limits<std::int64_t>::max();
   verb.add_option("--seed", options.seed, "Seed (default: 1)")
-      ->check(CLI::Range(std::int64_t{0}, kMaxInt64))
+      ->check(CLI::Range(std::uint64_t{0}, kMaxSeed))
       ->type_name("N");
   verb.add_option("--valves", options.valves,
                   "Number of valves, named ID-1, ID-2, ...; their seeds "
