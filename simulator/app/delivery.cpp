@@ -97,7 +97,9 @@ cli::Json RowOf(const FedValve& valve) {
   row["valve_id"] = valve.valve_id;
   row["source_id"] = source_id;
   row["samples"] = valve.samples;
-  row["start_utc"] = cli::FormatTime(valve.first_stamp_ns, true);
+  row["start_utc"] =
+      valve.samples > 0 ? cli::Json(cli::FormatTime(valve.first_stamp_ns, true))
+                        : cli::Json();
   row["duration_s"] =
       static_cast<double>(valve.last_stamp_ns - valve.first_stamp_ns) / 1e9;
   if (valve.seed) {

@@ -184,7 +184,8 @@ bool StreamFeed::Fill() {
 
 std::optional<Sample> StreamFeed::TakeLine(const std::string& line) {
   if (!is_json_) {
-    const std::size_t first = line.find_first_not_of(" \t\r");
+    // Blanks, and the byte order mark that some shells write into a pipe.
+    const std::size_t first = line.find_first_not_of(" \t\r\xEF\xBB\xBF");
     if (first != std::string::npos) {
       is_json_ = line[first] == '{';
     }

@@ -94,6 +94,27 @@ TEST_F(AppStdinTest, AGapMayBeTheFirstStepIfThePeriodIsGiven) {
   EXPECT_EQ(reader.Samples("G").size(), 4U);
 }
 
+TEST_F(AppStdinTest, AByteOrderMarkMayPrecedeJson) {
+  Process process(With({"replay", "--csv", "-", "--valve", "J", "--wait-reader",
+                        "0", "--json"}));
+
+  process.Send("\xEF\xBB\xBF{\"CV_pct\": 1, \"X_pct\": 1}\n");
+  process.CloseInput();
+
+  const Ended ended = process.Wait();
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  EXPECT_THAT(ended.out, HasSubstr("\"samples\": 1"));
+}
+
+TEST_F(AppStdinTest, WithoutSamplesThereIsNoStart) {
+  Process process(With({"replay", "--csv", "-", "--valve", "E", "--wait-reader",
+                        "0", "--json"}));
+
+  process.CloseInput();
+
+  EXPECT_THAT(process.Wait().out, HasSubstr("\"start_utc\": null"));
+}
+
 TEST_F(AppStdinTest, ABadLineOnStdinEndsTheStreamBehindTheGoodOnes) {
   Reader reader(domain_);
   Process process(
