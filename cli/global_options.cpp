@@ -73,9 +73,9 @@ void Collect(const CLI::App& app, const toml::table& table,
   }
   for (const auto& [toml_key, node] : table) {
     const std::string key(toml_key.str());
+    const auto verbs = app.get_subcommands(
+        [&key](const CLI::App* verb) { return verb->get_name() == key; });
     if (const toml::table* inner = node.as_table()) {
-      const auto verbs = app.get_subcommands(
-          [&key](const CLI::App* verb) { return verb->get_name() == key; });
       if (verbs.empty()) {
         RefuseUnknown(app, node, path, key);
       }
@@ -85,6 +85,9 @@ void Collect(const CLI::App& app, const toml::table& table,
       continue;
     }
     const CLI::Option* option = app.get_option_no_throw("--" + key);
+    if (option == nullptr && !verbs.empty()) {
+      Refuse(node, key + " is a verb: expected a table [" + path + key + "]");
+    }
     if (option == nullptr || !IsKey(*option)) {
       RefuseUnknown(app, node, path, key);
     }

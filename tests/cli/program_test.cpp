@@ -283,6 +283,15 @@ TEST_F(ProgramConfigTest, UnknownKeyIsRefusedByName) {
                                       "you mean 'greet.who'?")));
 }
 
+TEST_F(ProgramConfigTest, VerbIsATable) {
+  const Outcome outcome =
+      RunProgram({"greet", "--config", Write("greet = 5\n")});
+
+  EXPECT_EQ(outcome.code, kExitUsage);
+  EXPECT_THAT(outcome.err,
+              HasSubstr("line 1: greet is a verb: expected a table [greet]"));
+}
+
 TEST_F(ProgramConfigTest, SyntaxErrorNamesFileAndLine) {
   const Outcome outcome =
       RunProgram({"greet", "--config", Write("domain = 3\n\nx =")});
