@@ -21,11 +21,13 @@ namespace {
 /// std::regex recurses with the length of its input.
 constexpr std::size_t kMaxTimeLength = 64;
 
+constexpr const char* kTimeForms =
+    "2026-11-20, 2026-11-20T14:56, 2026-11-20T14:56:11.5 and these with Z or "
+    "an offset such as +01:00";
+
 [[noreturn]] void RefuseTime(std::string_view text) {
-  throw ConfigError("'" + std::string(text) +
-                    "' is not a time; accepted are 2026-11-20, "
-                    "2026-11-20T14:56, 2026-11-20T14:56:11.5 and these with Z "
-                    "or an offset such as +01:00");
+  throw ConfigError("'" + std::string(text) + "' is not a time; accepted are " +
+                    kTimeForms);
 }
 
 // A cursor over the text of a time.
@@ -393,7 +395,15 @@ std::int64_t ParseTimeOrAgo(std::string_view text, bool utc,
   if (text == "now") {
     return now_ns;
   }
-  return IsDuration(text) ? now_ns - ParseDuration(text) : ParseTime(text, utc);
+  try {
+    return IsDuration(text) ? now_ns - ParseDuration(text)
+                            : ParseTime(text, utc);
+  } catch (const ConfigError&) {
+    throw ConfigError("'" + std::string(text) + "' is no time; accepted are " +
+                      kTimeForms +
+                      ", a time before now such as 90s, 2h, 1h30m or 7d, up to "
+                      "100 years, and now");
+  }
 }
 
 std::int64_t ParseDuration(std::string_view text) {

@@ -59,6 +59,7 @@ class LocalClock {
 std::int64_t ParseTime(std::string_view text, bool utc);
 
 /// Parses a time, a duration ("2h") before `now_ns`, or "now".
+/// @throws ConfigError naming the accepted forms.
 std::int64_t ParseTimeOrAgo(std::string_view text, bool utc,
                             std::int64_t now_ns);
 

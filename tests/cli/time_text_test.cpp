@@ -4,9 +4,11 @@
 #include <ctime>
 #include <limits>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "diagnosis/error.h"
+#include "tests/storage/message_of.h"
 
 namespace fdi::cli {
 namespace {
@@ -91,6 +93,17 @@ TEST_F(TimeTextTest, AgoIsADurationBeforeNow) {
   EXPECT_EQ(ParseTimeOrAgo("2h", true, kStampNs), kStampNs - 7'200'000'000'000);
   EXPECT_EQ(ParseTimeOrAgo("now", true, kStampNs), kStampNs);
   EXPECT_EQ(ParseTimeOrAgo("2026-11-20T14:56:11Z", true, 0), kStampNs);
+}
+
+TEST_F(TimeTextTest, WhatIsNeitherTimeNorAgoIsToldBoth) {
+  for (const char* text : {"yesterday", "-5", "2026-13-01", "5x", ""}) {
+    EXPECT_THAT(
+        storage::MessageOf<ConfigError>(
+            [text] { ParseTimeOrAgo(text, true, kStampNs); }),
+        testing::AllOf(testing::StartsWith("'" + std::string(text) + "'"),
+                       testing::HasSubstr("2026-11-20T14:56"),
+                       testing::HasSubstr("2h")));
+  }
 }
 
 TEST_F(TimeTextTest, DurationsForPeopleCarryTwoUnitsAtMost) {
