@@ -100,17 +100,24 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   for (const storage::Shelf& shelf : shelves) {
     earliest_shelf_end_ns_ = std::min(earliest_shelf_end_ns_, shelf.until_ns);
   }
-  auto by_valve = std::make_shared<ByValveMap>(ByValveOf(alarms, shelves));
+  ByValveMap stored = ByValveOf(alarms, shelves);
   const std::lock_guard lock(mutex_);
   rows_ = std::move(rows);
+  stored_ = std::move(stored);
   std::erase_if(unstored_, [this](const auto& item) {
     return rows_.contains(item.first);
   });
+  Combine();
+  return changed;
+}
+
+// What the history has and what was heard. Call with the mutex locked.
+void AlarmBook::Combine() {
+  auto by_valve = std::make_shared<ByValveMap>(stored_);
   for (const auto& [id, alarm] : unstored_) {
     AddTo((*by_valve)[alarm.episode.valve_id], alarm);
   }
   by_valve_ = std::move(by_valve);
-  return changed;
 }
 
 std::shared_ptr<const AlarmBook::ByValveMap> AlarmBook::ByValve() const {
@@ -125,16 +132,12 @@ bool AlarmBook::OnEvent(const FaultEvent& event) {
   if (rows_.contains(id)) {
     return false;
   }
-  auto by_valve = std::make_shared<ByValveMap>(*by_valve_);
-  ValveAlarm& valve = (*by_valve)[event.valve_id];
   if (alarm.episode.ended_ns) {
     unstored_.erase(id);
-    valve = {};
   } else {
     unstored_[id] = alarm;
-    AddTo(valve, alarm);
   }
-  by_valve_ = std::move(by_valve);
+  Combine();
   return true;
 }
 

@@ -53,6 +53,7 @@ class AlarmBook {
 
  private:
   std::vector<Json> Read(storage::History& history, std::int64_t now_ns);
+  void Combine();
 
   OpenHistory open_;
   const cli::FaultTexts& texts_;
@@ -65,6 +66,7 @@ class AlarmBook {
   std::optional<HistoryAway> away_;
   std::map<std::string, std::string> rows_;  // By episode, as last returned.
   std::map<std::string, storage::Alarm> unstored_;  // By episode.
+  ByValveMap stored_;  // As by_valve_, without unstored_.
   std::shared_ptr<const ByValveMap> by_valve_{std::make_shared<ByValveMap>()};
 };
 

@@ -104,11 +104,24 @@ TEST_F(AlarmBookTest, WhatWasHeardIsAnAlarmUntilTheHistoryHasIt) {
   EXPECT_TRUE(book_.ByValve()->at("W").unacked);
 
   EXPECT_TRUE(book_.OnEvent(event(TransitionKind::kClosed, "W")));
-  EXPECT_EQ(book_.ByValve()->at("W"), ValveAlarm{});
+  EXPECT_EQ(AlarmFor(*book_.ByValve(), "W"), ValveAlarm{});
   Begin("V");
   EXPECT_EQ(book_.Refresh(kDetected).size(), 1U);
   EXPECT_TRUE(book_.UnstoredAlarms().empty());
   EXPECT_FALSE(book_.OnEvent(event(TransitionKind::kIsolated, "V")));
+}
+
+TEST_F(AlarmBookTest, TheEndOfWhatWasHeardLeavesWhatTheHistoryHas) {
+  const std::int64_t until_ns = kDetected + 600 * kSecond;
+  storage::HistoryEditor(path_).Shelve("V", std::nullopt, until_ns,
+                                       By("anna", kDetected));
+  book_.Refresh(kDetected + kSecond);
+  for (const auto kind : {TransitionKind::kDetected, TransitionKind::kClosed}) {
+    book_.OnEvent(Event(kind, 0, 0, 0.3, EndReason::kNone, "V"));
+
+    EXPECT_EQ(book_.ByValve()->at("V").shelved_until_ns, until_ns);
+  }
+  EXPECT_FALSE(book_.ByValve()->at("V").unacked);
 }
 
 TEST_F(AlarmBookTest, TellsWhenAShelfRunsOut) {
