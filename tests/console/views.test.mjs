@@ -176,6 +176,33 @@ test('older episodes that are asked for twice come once', async () => {
   await page.context().close();
 });
 
+test('what is acknowledged is not acknowledged again by a second attempt',
+    async () => {
+      const rows = [1, 2].map((n) => alarm(`000000000000000${n}`, `V${n}`,
+          'f19', {detected_ms: kNowMs - n}));
+      monitor.reset([], rows);
+      Object.assign(monitor.answers.status,
+          {write: true, user: 'anna', role: 'acknowledge'});
+      const ack = (n) => `episodes/${rows[n].episode}/ack`;
+      monitor.answers[ack(0)] = {...rows[0], isa: 'ACKED'};
+      const page = await open(browser, address, '#/alarms');
+      await page.getByLabel('Select V1').click();
+      await page.getByLabel('Select V2').click();
+      await page.getByRole('button', {name: 'Acknowledge 2 selected'}).click();
+      const send = page.getByRole('dialog')
+          .getByRole('button', {name: 'Acknowledge'});
+
+      await send.click();
+      await page.getByRole('dialog').getByText('not there').waitFor();
+      monitor.answers[ack(1)] = {...rows[1], isa: 'ACKED'};
+      await send.click();
+      await page.getByRole('dialog').waitFor({state: 'detached'});
+
+      const asked = monitor.asked.filter((each) => each.endsWith('/ack'));
+      assert.deepEqual(asked, [ack(0), ack(1), ack(1)]);
+      await page.context().close();
+    });
+
 test('the figures of a year count all its episodes', async () => {
   monitor.reset();
   const day = (ms) => new Date(ms).toISOString().slice(0, 10);

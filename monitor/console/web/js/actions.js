@@ -66,13 +66,15 @@ function describe(rows) {
 }
 
 export function acknowledge(rows) {
+  const done = new Set();  // Of an attempt that failed on the way.
   return ask({
     title: 'Acknowledge', verb: 'Acknowledge', subject: describe(rows),
     fields: [],
     send: async (body) => {
-      for (const row of rows) {
-        store.applyAlarm(
-            await post(path('episodes', row.episode, 'ack'), body));
+      for (const {episode} of rows) {
+        if (done.has(episode)) continue;
+        store.applyAlarm(await post(path('episodes', episode, 'ack'), body));
+        done.add(episode);
       }
     },
   });
