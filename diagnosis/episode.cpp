@@ -218,14 +218,10 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
     isolation_.Restart();
     begun_ = true;
   }
-  if (begun_) {
-    if (findings.settled) {
-      faults_.Update(bank);
-    }
-    faults_.ApplyEvidence(verdict);
-  } else {
-    std::ranges::fill(verdict.fault_factors, 0.0);
+  if (begun_ && findings.settled) {
+    faults_.Update(bank);
   }
+  ApplyEvidence(verdict);
   // Stuck transmitters set every factor, so the floor sets its own after them.
   // The detection follows both, because its transition carries the factors of
   // this sample.
@@ -261,7 +257,16 @@ void Episode::Step(const Sample& sample, const ObserverBank& bank,
 }
 
 void Episode::Hold(Verdict& verdict) const {
-  faults_.ApplyEvidence(verdict);
+  ApplyEvidence(verdict);
+}
+
+// Before the gathering has begun, the evidence is that of an earlier episode.
+void Episode::ApplyEvidence(Verdict& verdict) const {
+  if (begun_) {
+    faults_.ApplyEvidence(verdict);
+  } else {
+    std::ranges::fill(verdict.fault_factors, 0.0);
+  }
 }
 
 Transition Episode::Close(EndReason reason, std::int64_t stamp_ns,
@@ -282,7 +287,6 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
   detection_stamp_ns_ = stamp_ns;
   age_ = 0;
   without_fault_ = 0;
-  contender_ = 0;
   contender_run_ = 0;
   Emit(TransitionKind::kDetected, detection_stamp_ns_, verdict);
 }
@@ -349,7 +353,11 @@ void Episode::Isolate(Verdict& verdict) {
   // no longer looks normal.
   isolation_.Push(FactorsFrom(threshold, verdict));
   FaultSet supported = isolation_.Supported();
-  if (isolation_held_ || supported == 0 || verdict.normal_factor >= threshold) {
+  if (isolation_held_ || verdict.normal_factor >= threshold) {
+    contender_run_ = 0;
+    return;
+  }
+  if (supported == 0) {
     return;
   }
   supported = WithGroups(supported, verdict);
@@ -365,19 +373,22 @@ void Episode::Isolate(Verdict& verdict) {
       verdict.state = State::kIsolated;
       verdict.isolated = supported;
       verdict.unknown = Unknown::kNone;
-      contender_ = 0;
+      contender_run_ = 0;
       Emit(first ? TransitionKind::kIsolated : TransitionKind::kReisolated,
            verdict.stamp_ns, verdict);
     }
     return;
   }
-  // A different set must persist before it replaces the isolated one.
+  // A different set must persist before it replaces the isolated one. Samples
+  // that support no set, as by noise on one factor, count neither way.
   contender_run_ = supported == contender_ ? contender_run_ + 1 : 1;
   contender_ = supported;
   if (supported != verdict.isolated &&
       contender_run_ >= models_->decision.reisolation_samples) {
     verdict.isolated = supported;
     verdict.state = supported != 0 ? State::kIsolated : State::kDetected;
+    // More than four faults explain it, so it is not outside what is known.
+    verdict.unknown = supported != 0 ? Unknown::kNone : Unknown::kTooEarly;
     Emit(TransitionKind::kReisolated, verdict.stamp_ns, verdict);
   }
 }

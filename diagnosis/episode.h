@@ -141,6 +141,7 @@ class Episode {
   void HoldIsolation(bool hold) { isolation_held_ = hold; }
 
  private:
+  void ApplyEvidence(Verdict& verdict) const;
   void Open(std::int64_t stamp_ns, Verdict& verdict);
   void Isolate(Verdict& verdict);
   void NameFloor(Verdict& verdict);
@@ -165,7 +166,7 @@ class Episode {
   int age_{0};             // samples since the detection
   int without_fault_{0};   // samples since some factor reached T/2
   FaultSet contender_{0};  // candidate to replace the isolated set
-  int contender_run_{0};
+  int contender_run_{0};   // samples that supported it and no other since
 };
 
 }  // namespace fdi

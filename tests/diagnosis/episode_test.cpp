@@ -1,0 +1,128 @@
+#include "diagnosis/episode.h"
+
+#include <memory>
+#include <optional>
+
+#include <gtest/gtest.h>
+
+#include "tests/diagnosis/linear_plant.h"
+
+namespace fdi {
+namespace {
+
+using testing::LinearPlant;
+using testing::PlantSample;
+
+// An episode of a valve that reads as in normal operation, with factors set by
+// hand: stuck transmitters are certain, so that their faults have the factor 1
+// and all others 0.
+class EpisodeTest : public ::testing::Test {
+ protected:
+  void Use(const ModelSet& models) {
+    plan_ = std::make_shared<const ObserverPlan>(models);
+    bank_.emplace(plan_);
+    bank_->Initialise(PlantSample(0));
+    episode_.emplace(std::make_shared<const FaultPlan>(plan_));
+  }
+
+  Findings Next() {
+    Sample sample = PlantSample(++k_);
+    bank_->Step(sample);
+    verdict_.stamp_ns = sample.stamp_ns;
+    verdict_.transition_count = 0;
+    episode_->Score(*bank_, verdict_);
+    Findings findings;
+    findings.abnormal = true;
+    findings.detected = sample.stamp_ns;
+    return findings;
+  }
+
+  // @returns the last transition of `samples` samples, if there is one.
+  std::optional<Transition> Explained(FaultSet faults, int samples) {
+    std::optional<Transition> last;
+    for (int i = 0; i < samples; ++i) {
+      Findings findings = Next();
+      findings.stuck = faults;
+      episode_->Step(PlantSample(k_), *bank_, findings, verdict_);
+      if (verdict_.transition_count > 0) {
+        last = verdict_.Transitions().back();
+      }
+    }
+    return last;
+  }
+
+  std::shared_ptr<const ObserverPlan> plan_;
+  std::optional<ObserverBank> bank_;
+  std::optional<Episode> episode_;
+  std::uint64_t k_{0};
+  Verdict verdict_;
+};
+
+constexpr FaultSet kF1 = 0b001;
+constexpr FaultSet kF3 = 0b010;
+constexpr FaultSet kF6 = 0b100;
+
+TEST_F(EpisodeTest, AnotherSetHasToHoldWithoutTheValveLookingNormal) {
+  ModelSet models = LinearPlant();
+  models.decision.isolation_samples = 10;
+  models.decision.reisolation_samples = 20;
+  Use(models);
+  Explained(kF6, 10);
+  ASSERT_EQ(verdict_.isolated, kF6);
+  Explained(kF3, 9);  // The last of these is the first that supports f3.
+  Explained(kF3, 15);
+  ASSERT_EQ(verdict_.isolated, kF6);
+  Explained(0, 1);
+  ASSERT_EQ(verdict_.normal_factor, 1.0);
+  EXPECT_FALSE(Explained(kF3, 19));
+  EXPECT_EQ(verdict_.isolated, kF6);
+  const auto other = Explained(kF3, 1);
+  ASSERT_TRUE(other);
+  EXPECT_EQ(other->kind, TransitionKind::kReisolated);
+  EXPECT_EQ(other->faults, kF3);
+}
+
+TEST_F(EpisodeTest, ANameThatIsGivenUpSaysWhy) {
+  ModelSet models = LinearPlant();
+  models.observers.resize(1);
+  models.faults.clear();
+  for (int fault = 1; fault <= 6; ++fault) {
+    models.observers.push_back(testing::F6(1.0));
+    models.observers.back().fault = fault;
+    models.faults.push_back(fault);
+  }
+  models.floor.emplace();
+  AddFindings(models);
+  Use(models);
+  Explained(kF1, 20);
+  ASSERT_EQ(verdict_.isolated, kF1);
+  const auto given_up = Explained(0b111111, 50);
+  ASSERT_TRUE(given_up);
+  EXPECT_EQ(given_up->kind, TransitionKind::kReisolated);
+  EXPECT_EQ(given_up->faults, 0U);
+  EXPECT_EQ(given_up->unknown, Unknown::kTooEarly);
+  EXPECT_EQ(verdict_.unknown, Unknown::kTooEarly);
+}
+
+// The floor opens the episode, and the valve is not judged any more before the
+// observers have settled.
+TEST_F(EpisodeTest, NothingExplainsItBeforeEvidenceIsGathered) {
+  ModelSet models = LinearPlant();
+  models.floor.emplace();
+  AddFindings(models);
+  Use(models);
+  Findings findings = Next();
+  findings.settled = false;
+  findings.floor = FindingsOf(models) & ~(FindingsOf(models) - 1);
+  episode_->Step(PlantSample(k_), *bank_, findings, verdict_);
+  ASSERT_EQ(verdict_.state, State::kIsolated);
+  Next();
+  verdict_.fault_factors[2] = 1.0;
+  episode_->Hold(verdict_);
+  for (std::size_t i = 0; i < models.faults.size(); ++i) {
+    EXPECT_EQ(verdict_.fault_factors[i], 0.0) << i;
+  }
+}
+
+}  // namespace
+}  // namespace fdi
