@@ -9,6 +9,7 @@
 
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/time_units.h"
+#include "simulator/fault_effects.h"
 
 namespace fdi::simulator {
 namespace {
@@ -233,19 +234,23 @@ void EpisodeLooks::AddRow(const Sample& sample) {
   }
   signals_ = sample.present;
   // The simulation needs all inputs. One that is not measured is taken as
-  // usual; it has no share in the cost of a fault.
-  const auto value = [&](Signal signal, double otherwise) {
-    return sample.Has(signal) ? sample[signal] : otherwise;
+  // usual; it has no share in the cost of a fault. A transmitter that fails may
+  // read less than the simulation takes, or more.
+  const auto value = [&](Signal signal, double usual, double most) {
+    return sample.Has(signal) ? std::clamp(sample[signal], 0.0, most) : usual;
   };
+  constexpr double kMaxPressureKpa = 2e4;
   const SignalMask uncertain = sample.uncertain();
-  const RecordRow row{
-      {sample[Signal::kCv], value(Signal::kP1, physics_.p1.mean),
-       value(Signal::kP2, physics_.p2.mean),
-       value(Signal::kT1, physics_.t1.mean)},
-      sample[Signal::kX],
-      value(Signal::kF, 0.0),
-      (uncertain & MaskOf(Signal::kX)) == 0,
-      (uncertain & MaskOf(Signal::kF)) == 0};
+  // A command is needed as much as a position, to compare that with.
+  const bool follows = sample.Has(Signal::kCv) && sample.Has(Signal::kX);
+  const RecordRow row{{sample[Signal::kCv],
+                       value(Signal::kP1, physics_.p1.mean, kMaxPressureKpa),
+                       value(Signal::kP2, physics_.p2.mean, kMaxPressureKpa),
+                       value(Signal::kT1, physics_.t1.mean, kMaxTemperatureC)},
+                      sample[Signal::kX],
+                      sample.Has(Signal::kF) ? sample[Signal::kF] : 0.0,
+                      follows && (uncertain & MaskOf(Signal::kX)) == 0,
+                      (uncertain & MaskOf(Signal::kF)) == 0};
   for (std::int64_t held = 1; !rows_.empty() && held < step; ++held) {
     rows_.push_back({rows_.back().stamp_ns + period_ns_, rows_.back().row});
     rows_.back().row.x_measured = rows_.back().row.flow_measured = false;
@@ -315,11 +320,8 @@ std::optional<LookTask> EpisodeLooks::GrowthTask(
 std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
                                            const Verdict& verdict,
                                            bool suspected) {
-  if (verdict.intake != Intake::kAccepted) {
-    return std::nullopt;
-  }
-  AddRow(sample);
-  std::optional<LookTask> due;
+  // Of any sample: the first one of a new source ends the episode even if it is
+  // rejected.
   for (const Transition& transition : verdict.Transitions()) {
     if (transition.kind == TransitionKind::kDetected) {
       detection_ns_ = transition.detection_stamp_ns;
@@ -331,6 +333,11 @@ std::optional<LookTask> EpisodeLooks::Step(const Sample& sample,
       detection_ns_.reset();
     }
   }
+  if (verdict.intake != Intake::kAccepted) {
+    return std::nullopt;
+  }
+  AddRow(sample);
+  std::optional<LookTask> due;
   if (detection_ns_ && sample.stamp_ns - *detection_ns_ >= next_age_ns_) {
     // After a gap one look stands for all that it passed over. A look for which
     // too little was measured is left out, not put off.
@@ -421,6 +428,11 @@ void Suspicion::Enter(std::int64_t stamp_ns, LookAnswer answer) {
 }
 
 void Suspicion::Advance(std::int64_t stamp_ns) {
+  // Where time has stepped back, they would hold up all others until it is
+  // their time again.
+  std::erase_if(waiting_, [stamp_ns](const auto& waiting) {
+    return waiting.second.stamp_ns > stamp_ns;
+  });
   while (!waiting_.empty() && waiting_.front().first <= stamp_ns) {
     LookAnswer answer = std::move(waiting_.front().second);
     waiting_.pop_front();
@@ -548,13 +560,14 @@ FaultSet ValveLooks::Observed(const ModelSet& models, FaultSet isolated) const {
 }
 
 // The entries are in the order in which the looks were answered, and the last
-// one whose delay is over counts.
+// one whose delay is over counts. So does one that comes from a later time:
+// then time has stepped back.
 const LookAnswer* LookBook::At(std::int64_t detection_stamp_ns,
                                std::int64_t stamp_ns) const {
   const LookAnswer* answer = nullptr;
   for (const Entry& entry : entries_) {
     if (entry.detection_stamp_ns == detection_stamp_ns &&
-        entry.from_ns <= stamp_ns) {
+        (entry.from_ns <= stamp_ns || entry.answer.stamp_ns > stamp_ns)) {
       answer = &entry.answer;
     }
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -399,6 +400,67 @@ TEST(EpisodeLooksTest, KnowsWhatWasMeasured) {
   EXPECT_TRUE(tasks[0].window.rows[1].x_measured);
 }
 
+// Without X or the command there is nothing that the physics could explain.
+TEST(EpisodeLooksTest, TakesNoLookWithoutPositionOrCommand) {
+  for (const Signal missing : {Signal::kX, Signal::kCv}) {
+    EpisodeLooks looks(Physics());
+    for (int k = 0; k < 1000; ++k) {
+      Sample sample;
+      sample.stamp_ns = k * kSecond;
+      SetReadings({{60.0, 3555.0, 2615.0, 100.7}, 60.0, 10.0}, sample);
+      sample.present =
+          static_cast<SignalMask>(kBasicSignals & ~MaskOf(missing));
+      Verdict verdict;
+      verdict.quality = Quality::kLive;
+      EXPECT_FALSE(looks.Step(sample, verdict)) << SignalName(missing) << k;
+    }
+  }
+}
+
+// The simulation takes no such inputs and would throw.
+TEST(EpisodeLooksTest, TransmittersThatFailLowDoNotEndALook) {
+  EpisodeLooks looks(Physics());
+  std::optional<LookTask> task;
+  for (int k = 0; k < 1000 && !task; ++k) {
+    Sample sample;
+    sample.stamp_ns = k * kSecond;
+    SetReadings({{60.0, -90.0, -0.5, k % 2 == 0 ? -40.0 : 390.0}, 60.0, 10.0},
+                sample);
+    Verdict verdict;
+    verdict.quality = Quality::kLive;
+    task = looks.Step(sample, verdict);
+  }
+  ASSERT_TRUE(task);
+  EXPECT_GT(MisfitWithoutFault(Physics(), task->window), kHealthyMisfit);
+}
+
+// Its first sample is rejected, but ends the episode of the source before.
+TEST(EpisodeLooksTest, ANewSourceEndsTheLooksAtTheEpisodeBefore) {
+  EpisodeLooks looks(Physics());
+  std::vector<LookTask> tasks;
+  for (int k = 0; k < 1000; ++k) {
+    Sample sample;
+    sample.stamp_ns = k * kSecond;
+    SetReadings({{60.0, 3555.0, 2615.0, 100.7}, 60.0, 10.0}, sample);
+    Verdict verdict;
+    verdict.quality = Quality::kLive;
+    if (k == 100 || k == 130) {
+      verdict.transitions[0] = {
+          k == 100 ? TransitionKind::kDetected : TransitionKind::kClosed,
+          sample.stamp_ns, 100 * kSecond};
+      verdict.transition_count = 1;
+    }
+    verdict.intake = k == 130 ? Intake::kRange : Intake::kAccepted;
+    if (auto task = looks.Step(sample, verdict)) {
+      tasks.push_back(std::move(*task));
+    }
+  }
+  ASSERT_EQ(tasks.size(), 3U);
+  EXPECT_EQ(tasks[0].stamp_ns, 120 * kSecond);
+  EXPECT_EQ(tasks[1].occasion, LookOccasion::kRoutine);
+  EXPECT_EQ(tasks[1].stamp_ns, 600 * kSecond);
+}
+
 TEST(LookAnswerTest, AnEarlyOneHasAWiderSetAndDoesNotOverruleObservers) {
   const SecondLook look = Looked({{19, 0.0}, {3, 31.0}, {0, 535.0}});
   EXPECT_EQ(NamesOf(AnswerOf(look), false), std::vector{19});
@@ -639,6 +701,28 @@ TEST(SuspicionTest, TakesTwoLooksInARowThatNameTheSameFault) {
   EXPECT_EQ(after(named(3)), (std::pair(false, true)));
   EXPECT_EQ(after(named(12)), (std::pair(true, true)));
   EXPECT_EQ(after(healthy), (std::pair(true, false)));
+}
+
+// The clock is set back by an hour, just after a look.
+TEST(SuspicionTest, WhatComesFromALaterTimeHoldsUpNothing) {
+  LookAnswer named = AnswerOf(Looked({{13, 0.0}, {0, 900.0}}));
+  named.without_fault = 3.0;
+  Suspicion suspicion;
+  suspicion.Enter(5000 * kSecond, named);
+  suspicion.Advance(5010 * kSecond);
+  for (const std::int64_t k : {1500, 1800}) {
+    suspicion.Enter(k * kSecond, named);
+    suspicion.Advance(k * kSecond + kRoutineDelayNs);
+    EXPECT_EQ(suspicion.found() != nullptr, k == 1800);
+  }
+
+  LookBook book;
+  LookTask task;
+  task.stamp_ns = 5000 * kSecond;
+  book.Enter(task, named);
+  EXPECT_EQ(book.At(0, 5009 * kSecond), nullptr);
+  EXPECT_NE(book.At(0, 5010 * kSecond), nullptr);
+  EXPECT_NE(book.At(0, 1411 * kSecond), nullptr);
 }
 
 }  // namespace
