@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <span>
 #include <utility>
 
 #include "diagnosis/error.h"
@@ -91,6 +90,8 @@ class Looker {
   bool Measures(Signal signal) const {
     return (window_.signals & MaskOf(signal)) != 0;
   }
+  // Rows that do not count, because the simulation starts at rest.
+  int Settling() const { return std::min(10, detection_ / 2); }
   double StrengthAt(int row, double strength, Course course) const;
   void FindUsualInputs();
   InputRow InputAt(int row, int fault, double strength) const;
@@ -252,10 +253,9 @@ Trajectory Looker::FlowOnly(int fault, double strength, Course course) const {
 ChannelFit Looker::FitChannel(const Trajectory& answers, bool flow,
                               double slow_sd) const {
   const Scatter& scatter = flow ? physics_.flow : physics_.x;
-  const int settle = std::min(10, detection_ / 2);  // It starts at rest.
   std::vector<double> errors;
   std::vector<double> widths;  // w
-  for (int k = settle; k < rows_; ++k) {
+  for (int k = Settling(); k < rows_; ++k) {
     const auto at = static_cast<std::size_t>(k);
     const RecordRow& row = window_.rows[at];
     if (!(flow ? row.flow_measured : row.x_measured)) {
@@ -311,7 +311,8 @@ double Looker::ErrorsOf(const Trajectory& answers) const {
 double Looker::Readings() const {
   const bool has_flow = Measures(Signal::kF);
   double readings = 0.0;
-  for (const RecordRow& row : std::span(window_.rows).subspan(10)) {
+  for (int k = Settling(); k < rows_; ++k) {
+    const RecordRow& row = window_.rows[static_cast<std::size_t>(k)];
     readings += row.x_measured ? 1.0 / physics_.x.correlation_time : 0.0;
     readings += has_flow && row.flow_measured
                     ? 1.0 / physics_.flow.correlation_time

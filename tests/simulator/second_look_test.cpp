@@ -149,6 +149,27 @@ TEST(SecondLookTest, TakesAConstantShiftOfXForDrift) {
             LookOutcome::kNothing);
 }
 
+// Every reading is off by the healthy deviation, to either side in turn. The
+// misfit is that of one reading, however many there are.
+TEST(SecondLookTest, MisfitDoesNotDependOnTheLengthOfTheWindow) {
+  for (const std::size_t count : {20U, 400U}) {
+    std::vector<RecordRow> rows(count, {{60.0, 3555.0, 2615.0, 100.7}, 0, 0});
+    const auto answers =
+        SimulateRecord(Physics().parameters, rows, 0, count, Physics().drive);
+    for (std::size_t k = 0; k < count; ++k) {
+      const double sign = k % 2 == 0 ? 1.0 : -1.0;
+      rows[k].x_pct = answers[k].x_pct + sign * Physics().x.sd;
+      rows[k].flow = answers[k].flow + sign * Physics().flow.sd;
+    }
+    for (const std::size_t detection : {0U, 4U, 8U}) {
+      EXPECT_NEAR(
+          MisfitWithoutFault(Physics(), {rows, detection, kBasicSignals}),
+          6.0 * std::log1p(1.0 / 6.0), 0.01)
+          << count << ' ' << detection;
+    }
+  }
+}
+
 TEST(SecondLookTest, WhatIsNotMeasuredSaysNothing) {
   for (const bool marked : {false, true}) {
     LookWindow window = Window({Abrupt(19, 0.25)});
