@@ -71,17 +71,27 @@ RecordFit FitToRecord(const ValveParameters& parameters,
           "rows to compare must lie inside the record");
   const auto answers = SimulateRecord(parameters, record, 0, last, drive);
   RecordFit fit;
+  double x_count = 0.0;
+  double flow_count = 0.0;
   for (std::size_t k = first; k < last; ++k) {
     const double x_error = answers[k].x_pct - record[k].x_pct;
     const double flow_error = answers[k].flow - record[k].flow;
-    fit.x_rmse_pct += x_error * x_error;
-    fit.flow_rmse += flow_error * flow_error;
-    fit.x_bias_pct += x_error;
-    fit.flow_bias += flow_error;
+    if (record[k].x_measured) {
+      fit.x_rmse_pct += x_error * x_error;
+      fit.x_bias_pct += x_error;
+      ++x_count;
+    }
+    if (record[k].flow_measured) {
+      fit.flow_rmse += flow_error * flow_error;
+      fit.flow_bias += flow_error;
+      ++flow_count;
+    }
   }
-  const auto count = static_cast<double>(last - first);
-  return {std::sqrt(fit.x_rmse_pct / count), std::sqrt(fit.flow_rmse / count),
-          fit.x_bias_pct / count, fit.flow_bias / count};
+  x_count = std::max(1.0, x_count);
+  flow_count = std::max(1.0, flow_count);
+  return {std::sqrt(fit.x_rmse_pct / x_count),
+          std::sqrt(fit.flow_rmse / flow_count), fit.x_bias_pct / x_count,
+          fit.flow_bias / flow_count};
 }
 
 }  // namespace fdi::simulator

@@ -67,7 +67,8 @@ double FlowReading(const ValveParameters& parameters,
                    const FaultEffects& effects, const InputRow& input,
                    double x_pct);
 
-/// Drives the valve with all rows and compares X and F over [first, last).
+/// Drives the valve with all rows and compares what was measured of X and F
+/// over [first, last).
 /// @throws as SimulateRecord().
 RecordFit FitToRecord(const ValveParameters& parameters,
                       const std::vector<RecordRow>& record, std::size_t first,

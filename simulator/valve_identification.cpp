@@ -193,6 +193,9 @@ struct LineSums {
 
 // Flow over 100 sqrt(dP / rho), i.e. Kv f(X) [m3/h]; 0 if not usable.
 double EffectiveKv(const RecordRow& row, const InstrumentParameters& i) {
+  if (!row.x_measured || !row.flow_measured) {
+    return 0.0;
+  }
   // A saturated transmitter gives only a bound of the flow.
   const double margin = 0.01 * (i.flow.high - i.flow.low);
   if (row.flow < i.flow.low + margin || row.flow > i.flow.high - margin) {

@@ -18,8 +18,9 @@ struct HealthyRecord {
 ///   ln(F / (100 sqrt(dP / rho))) = ln Kv - n X
 ///
 /// by least squares weighted with F^2, dP limited by choking. Rows at an end of
-/// the flow range or without pressure drop are omitted; the result is `nominal`
-/// if less than 30 remain, and keeps the nominal exponent if X hardly moves.
+/// the flow range, without pressure drop or with a filled-in X or F are
+/// omitted; the result is `nominal` if less than 30 remain, and keeps the
+/// nominal exponent if X hardly moves.
 TrimParameters RegressTrim(const std::vector<HealthyRecord>& records,
                            const ValveParameters& nominal);
 

@@ -166,16 +166,20 @@ std::vector<double> Innovations(std::vector<double> series) {
 // a controller that reads it.
 class LoopObserver {
  public:
-  // `unexplained`: measured minus simulated flow. A command that acts before
-  // its stamp (delay < 0) shows in F of the same row.
+  // `unexplained`: measured minus simulated flow, in the rows `measured`. A
+  // command that acts before its stamp (delay < 0) shows in F of the same row.
   void Add(const std::vector<double>& command,
-           const std::vector<double>& unexplained, int delay) {
+           const std::vector<double>& unexplained,
+           const std::vector<std::size_t>& measured, int delay) {
     for (std::size_t k = kBefore; k + kGap + kAfter < command.size(); k += 10) {
       const auto at = [&](std::size_t row) {
         return command.begin() + static_cast<std::ptrdiff_t>(row);
       };
       changes_.push_back(Mean({at(k + kGap), at(k + kGap + kAfter)}) -
                          Mean({at(k - kBefore), at(k)}));
+    }
+    if (unexplained.empty()) {
+      return;
     }
     std::vector<double> steps(command.size());
     for (std::size_t k = 1; k < command.size(); ++k) {
@@ -187,12 +191,20 @@ class LoopObserver {
     const std::vector<double> noise = Innovations(Bounded(unexplained));
     first_ = delay < 0 ? 1 : 0;
     for (std::size_t k = 0; k + kLags < moved.size(); ++k) {
-      for (std::size_t lag = first_; lag < kLags; ++lag) {
-        cross_[lag] += moved[k + lag] * noise[k];
-      }
       moved_ += moved[k] * moved[k];
-      noise_ += noise[k] * noise[k];
       ++count_;
+    }
+    // What is filled in between two readings has no noise of its own.
+    for (std::size_t j = 0; j < noise.size(); ++j) {
+      const std::size_t k = measured[j];
+      if (k + kLags >= moved.size()) {
+        break;
+      }
+      for (std::size_t lag = first_; lag < kLags; ++lag) {
+        cross_[lag] += moved[k + lag] * noise[j];
+      }
+      noise_ += noise[j] * noise[j];
+      ++readings_;
     }
   }
 
@@ -200,7 +212,7 @@ class LoopObserver {
     constexpr double kMinRows = 1800.0;
     constexpr double kSignificant = 4.0;
     LoopHabit habit;
-    if (changes_.empty() || count_ < kMinRows || moved_ <= 0.0) {
+    if (changes_.empty() || readings_ < kMinRows || moved_ <= 0.0) {
       return habit;
     }
     double squares = 0.0;
@@ -230,6 +242,7 @@ class LoopObserver {
   double moved_{0.0};
   double noise_{0.0};
   double count_{0.0};
+  double readings_{0.0};
 };
 
 }  // namespace
@@ -252,9 +265,9 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
         SimulateRecord(parameters, rows, 0, rows.size(), drive);
     std::vector<double> command;
     std::vector<double> unexplained;
+    std::vector<std::size_t> measured;
     for (std::size_t k = kSettleRows; k < rows.size(); ++k) {
       command.push_back(rows[k].input.cv_pct);
-      unexplained.push_back(rows[k].flow - answers[k].flow);
       // As in the second look, which divides by the scatter: what is filled in
       // does not count.
       if (rows[k].x_measured) {
@@ -262,13 +275,15 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
       }
       if (rows[k].flow_measured) {
         flow.push_back(rows[k].flow - answers[k].flow);
+        unexplained.push_back(flow.back());
+        measured.push_back(k - kSettleRows);
       }
       level.push_back(rows[k].flow);
       p1.push_back(rows[k].input.p1_kpa);
       p2.push_back(rows[k].input.p2_kpa);
       t1.push_back(rows[k].input.t1_degc);
     }
-    loop.Add(command, unexplained, drive.command_delay);
+    loop.Add(command, unexplained, measured, drive.command_delay);
   }
   if (level.empty()) {
     throw DataError("healthy records: expected one of at least 180 rows");

@@ -70,6 +70,15 @@ TEST(ValveUnknownsTest, TheTrimFollowsFromPositionAndFlowAlone) {
       RegressTrim({record}, ParameterSet("lublin-actuator-3"));
   EXPECT_NEAR(trim.kv_m3_h, 80.0, 0.01);
   EXPECT_NEAR(trim.exponent, 4.2, 1e-4);
+  // What is filled in does not count, of X or of F.
+  for (int k = 0; k < 40; ++k) {
+    record.rows.push_back(record.rows[static_cast<std::size_t>(k)]);
+    RecordRow& row = record.rows.back();
+    (k % 2 == 0 ? row.x_pct : row.flow) *= 1.1;
+    (k % 2 == 0 ? row.x_measured : row.flow_measured) = false;
+  }
+  EXPECT_EQ(RegressTrim({record}, ParameterSet("lublin-actuator-3")).kv_m3_h,
+            trim.kv_m3_h);
   record.rows.resize(10);
   EXPECT_EQ(RegressTrim({record}, truth).kv_m3_h, 80.0);
 }

@@ -243,7 +243,8 @@ TEST(ValvePhysicsTest, FilledInReadingsDoNotCountInTheScatter) {
 }
 
 // Of a controller that reads F, its noise moves the command in the next row.
-LoopHabit HabitOf(double gain) {
+// The record has every `hold`-th reading of F.
+LoopHabit HabitOf(double gain, int hold = 1) {
   NormalSource noise(5, 1);
   RecordedExcitation excitation;
   std::vector<double> in_flow;
@@ -265,6 +266,10 @@ LoopHabit HabitOf(double gain) {
         {{s[Signal::kCv], s[Signal::kP1], s[Signal::kP2], s[Signal::kT1]},
          s[Signal::kX],
          s[Signal::kF] + in_flow[static_cast<std::size_t>(k)]});
+    if (k % hold != 0) {
+      rows.back().flow = rows[rows.size() - 2].flow;
+      rows.back().flow_measured = false;
+    }
   }
   return DescribeValve(ParameterSet("lublin-actuator-3"), {}, {rows}).loop;
 }
@@ -275,6 +280,11 @@ TEST(ValvePhysicsTest, SeesAControllerThatReadsTheFlow) {
   EXPECT_TRUE(HabitOf(0.2).reads_flow);
   EXPECT_GT(HabitOf(0.0).command_sd, 1.0);
   EXPECT_TRUE(Physics().loop.reads_flow);  // Of so few rows not known.
+}
+
+// Of too few readings it is not known, however many rows are filled in.
+TEST(ValvePhysicsTest, DoesNotMissItBetweenFilledInReadingsOfTheFlow) {
+  EXPECT_TRUE(HabitOf(1.0, 5).reads_flow);
 }
 
 TEST(SecondLookTest, ACommandThatMovedTellsAgainstTheFlowTransmitter) {

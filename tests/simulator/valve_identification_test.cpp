@@ -182,6 +182,22 @@ TEST(ValveIdentificationTest, FindsFrictionInsteadOfALaterCommand) {
             1.1 * FitToRecord(truth, record.rows, 60, 800).x_rmse_pct);
 }
 
+TEST(RecordFitTest, FilledInReadingsDoNotCount) {
+  const ValveParameters truth = ParameterSet("lublin-actuator-3-refit");
+  HealthyRecord record = Recording(truth, 300, 3);
+  const RecordFit whole = FitToRecord(truth, record.rows, 60, 300);
+  for (std::size_t k = 0; k < record.rows.size(); k += k % 3 + 1) {
+    RecordRow& row = record.rows[k];
+    row.x_pct += 15.0;
+    row.flow *= 1.5;
+    row.x_measured = row.flow_measured = false;
+  }
+  const RecordFit rest = FitToRecord(truth, record.rows, 60, 300);
+  EXPECT_NEAR(rest.x_rmse_pct, whole.x_rmse_pct, 0.3 * whole.x_rmse_pct);
+  EXPECT_NEAR(rest.flow_rmse, whole.flow_rmse, 0.3 * whole.flow_rmse);
+  EXPECT_LT(std::abs(rest.x_bias_pct), whole.x_rmse_pct);
+}
+
 TEST(ValveIdentificationTest, LeavesAStatedValueAloneThatRunsToABound) {
   ValveParameters nominal = ParameterSet("lublin-actuator-3-refit");
   nominal.actuator.coulomb_friction_n = 50.0;  // Not a choice then.
