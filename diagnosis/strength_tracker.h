@@ -25,9 +25,11 @@ namespace fdi {
 ///     L ← λ L − ½ Σ_c (ν²/S + ln S) / τ_c,
 ///
 /// with τ_c (FaultPlan) common to all faults: log-likelihoods differ long
-/// before single residuals do. A reading at the transmitter's limit has no
-/// density: it costs ν²/S if the prediction is below the limit, and nothing if
-/// it is beyond; earlier evidence of the channel is held. Each observer gathers
+/// before single residuals do. During the search at the start of an episode λ
+/// is 1, unlike in ObserverEvidence: with λ < 1 there, more of the benchmark's
+/// sets keep a look-alike. A reading at the transmitter's limit has no density:
+/// it costs ν²/S if the prediction is below the limit, and nothing if it is
+/// beyond; earlier evidence of the channel is held. Each observer gathers
 /// evidence for its own strength in the same way (ObserverEvidence); the fault
 /// has that of the best, so that interpolation cannot degrade a trained
 /// strength.
