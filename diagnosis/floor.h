@@ -70,8 +70,6 @@ class Floor {
   std::optional<std::int64_t> stamp_ns() const;
   /// How far a finding is from its model, as a signed share of the span.
   double size(std::size_t finding) const { return tests_[finding].size; }
-  /// Fault index of the first finding; the others follow.
-  std::size_t first() const { return first_; }
   static constexpr std::size_t kTests = 5;
 
  private:
@@ -100,7 +98,7 @@ class Floor {
   void PushFlow(const Sample& sample);
 
   const FloorLimits* limits_;  // null: no floor
-  std::size_t first_;
+  std::size_t first_;          // fault index of the first finding
   std::optional<RodBand> rod_;
   bool follows_{false};
   std::array<Test, kTests> tests_{};

@@ -14,8 +14,6 @@
 namespace fdi {
 namespace {
 
-// A rule fires if its exponent is above log(1e-8).
-constexpr double kCoveredExponent = -18.420680743952367;
 // A rule below 4e-18 of the strongest does not change a double sum.
 constexpr double kFiringExponent = -40.0;
 
@@ -195,7 +193,6 @@ void ComputeFiring(const TsModel& model, const double* x, FiringRules& firing) {
     firing.weights[i] /= sum;
   }
   firing.count = static_cast<int>(fired);
-  firing.covered = largest >= kCoveredExponent;
 }
 
 double Blend(const TsModel& model, const double* x, const FiringRules& firing) {
@@ -208,10 +205,10 @@ double Blend(const TsModel& model, const double* x, const FiringRules& firing) {
   return std::clamp(value, model.output_min, model.output_max);
 }
 
-TsPrediction Evaluate(const TsModel& model, const double* x) {
+double Evaluate(const TsModel& model, const double* x) {
   FiringRules firing;
   ComputeFiring(model, x, firing);
-  return {Blend(model, x, firing), firing.covered};
+  return Blend(model, x, firing);
 }
 
 // Exact comparison suffices: a model that is adapted from the normal one keeps

@@ -75,21 +75,15 @@ struct TsModel {
   std::vector<TsRule> rules;
 };
 
-struct TsPrediction {
-  double value{0.0};
-  bool covered{true};  ///< False if every β_i < 1e-8: the nearest rule is used.
-};
-
 /// ŷ for the regressor values `x` (model.regressors.size() of them). The
 /// exponents of a rule are summed first, for one exp per rule; the largest is
 /// factored out, so that far from all rules the nearest one determines ŷ. Does
 /// not allocate.
-TsPrediction Evaluate(const TsModel& model, const double* x);
+double Evaluate(const TsModel& model, const double* x);
 
 /// The weights β_i / Σ β_i of the rules that fire at one x.
 struct FiringRules {
   int count{0};
-  bool covered{true};                     ///< As in TsPrediction.
   std::array<int, kMaxRules> rules;       ///< Their indices; `count` are set.
   std::array<double, kMaxRules> weights;  ///< Sum to 1.
 };

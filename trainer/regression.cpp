@@ -109,8 +109,8 @@ std::vector<double> RunPredictions(const TsModel& model, const Stretch& stretch,
                    : stretch.samples[k - lag][regressor.signal];
       }
     }
-    predictions[k] = std::clamp(Evaluate(model, x.data()).value,
-                                model.output_min, model.output_max);
+    predictions[k] = std::clamp(Evaluate(model, x.data()), model.output_min,
+                                model.output_max);
   }
   return predictions;
 }

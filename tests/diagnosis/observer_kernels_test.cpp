@@ -199,13 +199,13 @@ class Reference {
       inside.push_back(std::clamp(x[j], channel.model.regressor_min[j],
                                   channel.model.regressor_max[j]));
     }
-    const double own = Evaluate(channel.model, x.data()).value;
+    const double own = Evaluate(channel.model, x.data());
     const double base = channel.difference ? past_[0][c].back() : 0.0;
     past_[o][c].push_back(base + own);
     extrapolation_.resize(models_.observers.size() * models_.channels.size());
     extrapolation_[o * models_.channels.size() + c] =
         (channel.difference ? extrapolation_[c] : 0.0) +
-        std::abs(own - Evaluate(channel.model, inside.data()).value);
+        std::abs(own - Evaluate(channel.model, inside.data()));
   }
 
   const ModelSet& models_;

@@ -165,8 +165,8 @@ TEST(ModelCodecTest, PredictionsAreTheSameAfterReadingBack) {
   for (int i = 0; i < 100; ++i) {
     const double x[2] = {0.01 * i, 1.0 / (1.0 + i)};
     for (std::size_t o = 0; o < models.observers.size(); ++o) {
-      EXPECT_EQ(Evaluate(models.observers[o].channels[0].model, x).value,
-                Evaluate(back.observers[o].channels[0].model, x).value);
+      EXPECT_EQ(Evaluate(models.observers[o].channels[0].model, x),
+                Evaluate(back.observers[o].channels[0].model, x));
     }
   }
 }

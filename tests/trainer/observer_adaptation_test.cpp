@@ -56,7 +56,7 @@ Condition Fault(double gain, double from, double to, double limit = 1e9) {
 }
 
 double At(const TsModel& model, double x) {
-  return Evaluate(model, &x).value;
+  return Evaluate(model, &x);
 }
 
 TEST(AdaptModelTest, FindsAnotherGain) {

@@ -111,7 +111,7 @@ TEST_P(AntecedentKindTest, PredictAndEvaluateAgree) {
   const VectorXd predicted = Predict(model.rules, data.x);
   for (Index k = 0; k < 300; ++k) {
     const VectorXd x = data.x.row(k);
-    EXPECT_NEAR(Evaluate(model, x.data()).value, predicted(k), 1e-9);
+    EXPECT_NEAR(Evaluate(model, x.data()), predicted(k), 1e-9);
   }
 }
 
