@@ -153,7 +153,7 @@ class CvodeIntegrator::Impl {
   }
 
   void Restart(double t) {
-    RetireCounters();
+    steps_ = steps();  // CVodeReInit() sets CVODE's counter to 0.
     Check(CVodeReInit(memory_.get(), t, state_.get()), "CVodeReInit");
     time_ = t;
     ++restarts_;
@@ -176,12 +176,9 @@ class CvodeIntegrator::Impl {
   }
 
   std::int64_t steps() const {
-    return steps_ + Current(CVodeGetNumSteps);
-  }
-  std::int64_t derivatives() const {
-    // CVODE counts those of the difference-quotient Jacobian apart.
-    return derivatives_ + Current(CVodeGetNumRhsEvals) +
-           Current(CVodeGetNumLinRhsEvals);
+    long count = 0;
+    Check(CVodeGetNumSteps(memory_.get(), &count), "CVodeGetNumSteps");
+    return steps_ + count;
   }
 
   double time_{0.0};
@@ -196,18 +193,6 @@ class CvodeIntegrator::Impl {
     return Owned<Vector>(N_VNew_Serial(size_, context_.get()), "N_VNew_Serial");
   }
 
-  std::int64_t Current(int (*get)(void*, long*)) const {
-    long count = 0;
-    Check(get(memory_.get(), &count), "CVodeGetNum...");
-    return count;
-  }
-
-  // CVodeReInit() sets CVODE's counters to 0.
-  void RetireCounters() {
-    steps_ = steps();
-    derivatives_ = derivatives();
-  }
-
   sunindextype size_;
   Context context_;
   Vector state_;
@@ -218,7 +203,6 @@ class CvodeIntegrator::Impl {
   std::string message_;
   Memory memory_;
   std::int64_t steps_{0};
-  std::int64_t derivatives_{0};
 };
 
 CvodeIntegrator::CvodeIntegrator(const OdeSystem& system,
@@ -249,9 +233,6 @@ std::span<const double> CvodeIntegrator::state() const {
 }
 std::int64_t CvodeIntegrator::step_count() const {
   return impl_->steps();
-}
-std::int64_t CvodeIntegrator::derivative_count() const {
-  return impl_->derivatives();
 }
 std::int64_t CvodeIntegrator::restart_count() const {
   return impl_->restarts_;

@@ -59,7 +59,6 @@ class CvodeIntegrator {
   std::span<double> state();
   std::span<const double> state() const;
   std::int64_t step_count() const;
-  std::int64_t derivative_count() const;
   std::int64_t restart_count() const;
 
  private:

@@ -488,8 +488,7 @@ LabelledSample ValveSimulation::Step() {
 
 SimulationStatistics ValveSimulation::statistics() const {
   const CvodeIntegrator& integrator = impl_->valve_.integrator();
-  return {integrator.step_count(), integrator.derivative_count(),
-          integrator.restart_count()};
+  return {integrator.step_count(), integrator.restart_count()};
 }
 
 }  // namespace fdi::simulator

@@ -84,7 +84,6 @@ void Validate(const ValveSimulationConfig& config);
 /// The integrator's work so far.
 struct SimulationStatistics {
   std::int64_t solver_steps{0};
-  std::int64_t derivative_calls{0};
   std::int64_t restarts{0};
 };
 

@@ -128,7 +128,6 @@ class Looker {
   InputRow usual_{};  // Mean inputs before the detection, or in onboarding.
   double command_cost_{0.0};  // Of f19.
   Trajectory healthy_;
-  std::int64_t simulated_{0};
 };
 
 double Looker::StrengthAt(int row, double strength, Course course) const {
@@ -188,7 +187,6 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
   if (ActsOnFlowAlone(fault)) {
     return FlowOnly(fault, strength, course);
   }
-  simulated_ += rows_;
   ValveSimulationConfig config;
   RecordedExcitation excitation;
   for (int k = 0; k < rows_; ++k) {
@@ -717,7 +715,6 @@ SecondLook Looker::Run(const std::stop_token& stop) {
     look.perforation = Explain(torn, scale);
     look.perforation->distance = (torn.cost + kFaultPenalty - best) / scale;
   }
-  look.simulated_rows = simulated_;
   return look;
 }
 

@@ -42,7 +42,6 @@ struct SecondLook {
   /// ones; far above 1 where none fits.
   double misfit{0.0};
   double readings{0.0};  ///< Of X and F that count as independent.
-  std::int64_t simulated_rows{0};
   /// The valve's answer under the best explanation, one per row.
   std::vector<RecordAnswer> best;
 };
