@@ -136,6 +136,17 @@ std::string AcceptedBy(const std::string& description) {
   return "";
 }
 
+// CLI11 words the bounds of a refused number as "0.000000 to 3600.000000", and
+// of NonNegativeNumber with 309 digits.
+void SayWhatIsAccepted(CLI::Validator& check, const std::string& accepted) {
+  check.operation([original = check, accepted](std::string& text) {
+    const std::string given = text;
+    return original(text).empty()
+               ? ""
+               : "'" + given + "' is not accepted; expected " + accepted;
+  });
+}
+
 // CLI11 shows validators within the value's name, "N:INT in [0 - 232]". They
 // are removed from it, so that a name may contain a colon, and what they accept
 // becomes the name itself or a remark. @returns the remark.
@@ -147,6 +158,7 @@ std::string TakeChecks(CLI::Option& option) {
       check->name(kMustExist);
     } else if (const auto text = AcceptedBy(description); !text.empty()) {
       accepted = text;
+      SayWhatIsAccepted(*check, text);
     }
     check->description("");
   }

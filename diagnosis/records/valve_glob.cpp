@@ -37,6 +37,15 @@ std::string_view TakeCharacter(std::string_view& text) {
   return character;
 }
 
+std::string GlobOf(std::string_view valve_id) {
+  std::string glob;
+  for (const char c : valve_id) {
+    const bool special = c == '*' || c == '?' || c == '[';
+    glob += special ? std::string{'[', c, ']'} : std::string(1, c);
+  }
+  return glob;
+}
+
 bool GlobMatches(std::string_view glob, std::string_view text) {
   // The pattern behind the last *, and the text that it was compared with. If
   // it does not match there, it is tried one character later.

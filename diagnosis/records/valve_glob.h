@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace fdi {
@@ -10,6 +11,10 @@ namespace fdi {
 /// set is a member of it; a set without an end matches nothing. The databases
 /// use this for GLOB, too.
 bool GlobMatches(std::string_view glob, std::string_view text);
+
+/// The pattern that the id of this valve alone matches: "V[1]" as a pattern
+/// matches "V1" and not itself.
+std::string GlobOf(std::string_view valve_id);
 
 /// Removes the first character of UTF-8 from a text that is not empty.
 std::string_view TakeCharacter(std::string_view& text);

@@ -1,6 +1,5 @@
 #include "monitor/app/history_store.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "cli/logging.h"
@@ -19,12 +18,10 @@ void HistoryStore::BeginSession(const std::string& software,
   const storage::SessionStart start =
       writer_.BeginSession(now_ns, software, config);
   if (start.died_ns) {
-    // The clock may have been set back since.
-    const std::int64_t died_ns = std::min(*start.died_ns, now_ns);
     log_(LogLevel::kWarning,
          "session_died outage_s=" +
-             std::to_string((now_ns - died_ns) / 1'000'000'000));
-    writer_.AddGap({"", died_ns, now_ns, "monitor_down"});
+             std::to_string((now_ns - *start.died_ns) / 1'000'000'000));
+    writer_.AddGap({"", *start.died_ns, now_ns, "monitor_down"});
     writer_.Commit(now_ns);
   }
 }

@@ -183,6 +183,7 @@ void AddPairOptions(CLI::App& run, PairOptions& pair) {
   run.add_option("--rank", pair.rank,
                  "Of this monitor in the pair; when both may lead, 1 does "
                  "before 2")
+      ->default_str("")
       ->type_name("1..9")
       ->needs(name);
   run.add_option("--pair-patience", pair.patience_s,

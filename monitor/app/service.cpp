@@ -37,6 +37,7 @@ constexpr int kTakeLimit = 4096;  // Bounds a call of Take() under full load.
 constexpr milliseconds kPairTakeTimeout{20};
 constexpr int kPairTakeLimit = 256;
 constexpr milliseconds kTickPeriod{1000};
+constexpr milliseconds kReloadRetry{5000};
 // Each of these bounds one step of a stop. SIGTERM ends the monitor within 5 s,
 // also with a subscriber that does not read (docs/operations.md).
 constexpr milliseconds kHookPatience{1000};
@@ -435,11 +436,15 @@ Service::TimePoint Service::FeedWatchdog(TimePoint next_tick) {
 }
 
 // A models.db that cannot be read now does not end the service: the models in
-// use stay, and the next tick looks again.
+// use stay, and it is read again later, because nobody would change it again.
 void Service::Tick() {
   try {
     if (changes_.Changed()) {
       Reload("models_changed");
+    } else if (retry_reload_at_ && Clock::now() >= *retry_reload_at_) {
+      *retry_reload_at_ = Clock::now() + kReloadRetry;
+      LoadModels();
+      context_.log(LogLevel::kInfo, "models_reload cause=retry");
     }
   } catch (const std::exception& error) {
     const std::string reason = error.what();
@@ -461,21 +466,27 @@ void Service::Tick() {
 void Service::Reload(const char* cause) {
   context_.log(LogLevel::kInfo, std::string("models_reload cause=") + cause);
   try {
-    auto next = std::make_shared<const ModelAssignment>(
-        data_.models(), options_.model_set,
-        [this](const ModelSet& models) { AnnounceModels(models); });
-    // Loads the sets here, so that the diagnosis thread need not.
-    for (const std::string& valve : pipeline_.valve_names()) {
-      next->ModelsFor(valve);
-    }
-    assignment_ = next;
-    model_sets_ = next->loaded();
-    pipeline_.Reassign(std::move(next));
+    LoadModels();
   } catch (const std::exception& error) {
+    retry_reload_at_ = Clock::now() + kReloadRetry;
     counters_.Add(Counter::kModelFailures);
     log_.Line(LogLevel::kError, LogLine(LogId::kModelFailure, "reload_failed",
                                         "reason=" + LogValue(error.what())));
   }
+}
+
+void Service::LoadModels() {
+  auto next = std::make_shared<const ModelAssignment>(
+      data_.models(), options_.model_set,
+      [this](const ModelSet& models) { AnnounceModels(models); });
+  // Loads the sets here, so that the diagnosis thread need not.
+  for (const std::string& valve : pipeline_.valve_names()) {
+    next->ModelsFor(valve);
+  }
+  assignment_ = next;
+  model_sets_ = next->loaded();
+  pipeline_.Reassign(std::move(next));
+  retry_reload_at_.reset();
 }
 
 StatusFacts Service::Facts() const {

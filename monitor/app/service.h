@@ -98,6 +98,7 @@ class Service {
   void Serve(cli::StopSignals& signals);
   void Tick();
   void Reload(const char* cause);
+  void LoadModels();
   TimePoint FeedWatchdog(TimePoint next_tick);
 
   StatusFacts Facts() const;
@@ -145,6 +146,7 @@ class Service {
   std::int64_t started_ns_;
   std::uint64_t reported_loss_{0};
   TimePoint last_status_line_;
+  std::optional<TimePoint> retry_reload_at_;  // After a reload that failed.
   std::atomic<bool> stopping_{false};
   std::atomic<TimePoint> drain_until_{TimePoint{}};
   Worker diagnosis_;

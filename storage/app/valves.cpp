@@ -141,7 +141,7 @@ std::vector<CoverageTime> CoverageOf(const std::string& valve_id,
     return {};
   }
   EpisodeFilter filter;
-  filter.valve_glob = valve_id;
+  filter.valve_glob = GlobOf(valve_id);
   return HistoryReader(path).Coverage(filter);
 }
 

@@ -118,6 +118,13 @@ TEST(ProgramTest, NumbersAreNumbers) {
   EXPECT_EQ(RunProgram({"greet", "--who", "nan"}).who, "nan");
 }
 
+TEST(ProgramTest, ErrorOfAValueSaysWhatIsAccepted) {
+  EXPECT_THAT(RunProgram({"greet", "--size", "1e9"}).err,
+              HasSubstr("--size: '1e9' is not accepted; expected 0.5..2"));
+  EXPECT_THAT(RunProgram({"greet", "--at", "3:c"}).err,
+              HasSubstr("--at: '3:c' is not accepted; expected 1:a|2:b"));
+}
+
 TEST(ProgramTest, ValueOfAFlagStandsBehindABlankOrAnEqualsSign) {
   EXPECT_EQ(RunProgram({"greet"}).mood, "none");
   EXPECT_EQ(RunProgram({"greet", "--mood"}).mood, "good");

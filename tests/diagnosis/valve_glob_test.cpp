@@ -57,5 +57,12 @@ TEST(GlobMatchesTest, ManyStarsTakeNoTime) {
   EXPECT_FALSE(GlobMatches(glob + "b", std::string(255, 'a')));
 }
 
+TEST(GlobOfTest, MatchesTheIdAlone) {
+  for (const std::string id : {"V[1]", "V*", "V?", "V]", "[!a]", "FV-101"}) {
+    EXPECT_TRUE(GlobMatches(GlobOf(id), id)) << id;
+    EXPECT_FALSE(GlobMatches(GlobOf(id), "V1")) << id;
+  }
+}
+
 }  // namespace
 }  // namespace fdi

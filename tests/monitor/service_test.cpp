@@ -149,5 +149,28 @@ TEST_F(ServiceTest, EveryReloadThatFailsIsALineOfTheLog) {
   driver.join();
 }
 
+// What was changed is not changed again because it could not be read once.
+TEST_F(ServiceTest, AReloadThatFailedIsTriedAgain) {
+  const cli::Context context = Context();
+  cli::StopSignals signals;
+  Service service({}, context);
+  const std::filesystem::path models = global_.data_dir / "models.db";
+  Execute(models, storage::ModelsSchema(), "ALTER TABLE valve RENAME TO away");
+  std::thread driver([&] {
+    kill(getpid(), SIGHUP);
+    EXPECT_TRUE(
+        notice_.Await([&] { return Count("reload_failed id=M112") == 1; }));
+    Execute(models, storage::ModelsSchema(),
+            "ALTER TABLE away RENAME TO valve");
+    EXPECT_TRUE(
+        notice_.Await([&] { return Count("models_reload cause=retry") == 1; }));
+    kill(getpid(), SIGTERM);
+  });
+
+  EXPECT_EQ(service.Run(signals), 0);
+
+  driver.join();
+}
+
 }  // namespace
 }  // namespace fdi::monitor

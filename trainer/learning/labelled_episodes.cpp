@@ -8,6 +8,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/records/valve_glob.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/run_input.h"
@@ -189,15 +190,6 @@ std::string SelectorOf(const storage::RunInfo& info, std::int64_t from_ns,
 
 std::string NameOf(const ModelSet& models) {
   return storage::ToString({models.name, models.version});
-}
-
-std::string GlobOf(const std::string& valve_id) {
-  std::string glob;
-  for (const char c : valve_id) {
-    const bool special = c == '*' || c == '?' || c == '[';
-    glob += special ? std::string{'[', c, ']'} : std::string(1, c);
-  }
-  return glob;
 }
 
 LabelReader::LabelReader(storage::HistoryReader& history,

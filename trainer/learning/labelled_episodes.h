@@ -17,10 +17,6 @@ namespace fdi::trainer {
 /// "NAME@VERSION"
 std::string NameOf(const ModelSet& models);
 
-/// The shell pattern that the id of this valve alone matches: "V[1]" as a
-/// pattern matches "V1" and not itself.
-std::string GlobOf(const std::string& valve_id);
-
 /// Strengths of faults by the beginning of an episode id, as the user gave
 /// them; they win over estimates.
 using GivenStrengths = std::map<std::string, double>;

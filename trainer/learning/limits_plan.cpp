@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "diagnosis/error.h"
+#include "diagnosis/records/valve_glob.h"
 #include "diagnosis/time_units.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
