@@ -75,11 +75,12 @@ std::vector<int> FirstFindings(const std::function<Valve(int)>& history,
                                int samples = 200) {
   const ModelSet models = FlooredPlant();
   Floor floor(models);
+  const std::size_t offset = models.faults.size() - Floor::kTests;
   std::vector<int> first(Floor::kTests, -1);
   for (int k = 0; k < samples; ++k) {
     floor.Push(At(k, history(k)));
     for (std::size_t i = 0; i < Floor::kTests; ++i) {
-      const bool found = (floor.findings() >> (floor.first() + i) & 1U) != 0;
+      const bool found = (floor.findings() >> (offset + i) & 1U) != 0;
       first[i] = first[i] < 0 && found ? k : first[i];
     }
   }
