@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include <gmock/gmock.h>
+#include <grp.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -123,7 +124,8 @@ int OpenUnwritable(const std::filesystem::path& folder, Open open,
   const pid_t child = fork();
   if (child == 0) {
     constexpr uid_t kNobody = 65534;
-    if (geteuid() == 0 && setuid(kNobody) != 0) {
+    if (geteuid() == 0 && (setgroups(0, nullptr) != 0 || setgid(kNobody) != 0 ||
+                           setuid(kNobody) != 0)) {
       _exit(2);
     }
     try {
@@ -153,6 +155,9 @@ TEST_F(DatabaseStressTest, AFolderThatCannotBeWrittenIsRefusedByName) {
 // What SQLite needs beside the file goes with the last who has it open.
 TEST_F(DatabaseStressTest, AReaderWhoMayNotWriteIsToldWhatToDo) {
   { const HistoryWriter writer(data_.history()); }
+  std::filesystem::permissions(data_.history(),
+                               std::filesystem::perms::others_read,
+                               std::filesystem::perm_options::add);
   EXPECT_EQ(OpenUnwritable(
                 directory_.path(),
                 [this] {

@@ -86,7 +86,7 @@ TEST_F(FdiStoreHistoryTest, OfAGapOnlyThePartInTheTimeCounts) {
       "history stats --since 2026-11-20T14:56:00Z "
       "--until 2026-11-20T14:57:00Z");
   EXPECT_EQ(minute["gaps"], 1);
-  EXPECT_EQ(minute["gaps_s"], 60.0);
+  EXPECT_DOUBLE_EQ(minute["gaps_s"], 60.0);
 }
 
 TEST_F(FdiStoreHistoryTest, AGrowingFaultSaysWhenItWillBeFull) {
