@@ -168,10 +168,11 @@ SET host = EXCLUDED.host, monitor = EXCLUDED.monitor
 RETURNING monitor_id
 -- name: lock_monitor
 SELECT shipped_ns FROM fdi.monitor WHERE monitor_id = $1 FOR UPDATE
--- Nobody can acknowledge it where it was.
+-- Nobody can acknowledge it where it was. Its stamps may be ahead of the clock.
 -- name: end_moved
-UPDATE fdi.episode SET ended_ns = $3, end_reason = 'superseded',
-  fault = coalesce(fault, 'unknown'), acked_ns = coalesce(acked_ns, $3),
+UPDATE fdi.episode SET ended_ns = greatest($3, detected_ns),
+  end_reason = 'superseded', fault = coalesce(fault, 'unknown'),
+  acked_ns = coalesce(acked_ns, $3),
   acked_by = coalesce(acked_by, 'fdi-store valves move')
 WHERE monitor_id = $1 AND episode_id = $2 AND ended_ns IS NULL
 -- name: set_shipped

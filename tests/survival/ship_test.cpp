@@ -766,12 +766,13 @@ TEST_F(ShipTest, AnEpisodeThatMovesEndsWhereItWas) {
   EXPECT_THAT(Store("history list --from '" + Url() + "'").out,
               AllOf(HasSubstr("NORMAL"), HasSubstr("UNACK")));
 
-  move(there, here, 90);
+  move(there, here, -90);  // Its stamps are ahead of the clock.
   ASSERT_EQ(Ship("a").code, 0);
   ASSERT_EQ(Ship("b").code, 0);
   episodes = reader.List({});
   EXPECT_EQ(episodes[0].end_reason, std::nullopt);
   EXPECT_EQ(episodes[1].end_reason, "superseded");
+  EXPECT_EQ(episodes[1].ended_ns, kDetected);
 }
 
 // Both of a pair have an episode and an hour: there is one in the work list,
