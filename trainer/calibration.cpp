@@ -23,7 +23,7 @@ constexpr double kShrinkage = 50.0;
 constexpr double kUpperBound = 1.645;  // 95 % of a normal distribution
 constexpr double kMinShape = -0.1;
 constexpr double kMaxShape = 0.3;
-constexpr double kMaxRate = 0.01;  // per sample; below is no tail any more
+constexpr double kMaxRate = 0.01;  // per sample; more is no tail any more
 
 double Quantile(std::vector<double> values, double q) {
   const auto at =
@@ -440,11 +440,12 @@ void FitThresholds(const std::vector<ResidualSeries>& residuals,
       const std::vector<double> series =
           Sustained(joined, sign, models.decision.detection_samples);
       if (series.size() < kMinValues) {
-        throw DataError("channel " + channel.name +
-                        ": normal operation has detection_samples residuals "
-                        "in a row " +
-                        std::to_string(series.size()) + " times, needed are " +
-                        std::to_string(kMinValues));
+        throw DataError(
+            "channel " + channel.name + ": normal operation has " +
+            std::to_string(series.size()) + " stretches of " +
+            std::to_string(models.decision.detection_samples) +
+            " residuals (detection_samples), limits need at least " +
+            std::to_string(kMinValues));
       }
       const double floor = 1e-6 + std::sqrt(Variance(joined));
       return std::max(floor, FitTail(series, share, separation).level) + slow;

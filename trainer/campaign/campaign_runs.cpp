@@ -277,9 +277,9 @@ class Collector {
   std::size_t at_{0};             // The run that is looked for.
   std::vector<std::pair<std::size_t, cli::CsvTable>> files_;  // To import.
   std::vector<std::size_t> missing_;                          // To simulate.
-  std::map<std::string, std::size_t>
-      first_;  // Run of the campaign, by content.
-  std::vector<std::pair<std::size_t, std::size_t>> repeated_;  // Of which.
+  std::map<std::string, std::size_t> first_;  // The first run, by content.
+  // A later run, and the first one of the same content.
+  std::vector<std::pair<std::size_t, std::size_t>> repeated_;
   CollectedRuns result_;
 };
 

@@ -477,7 +477,7 @@ double Hours(const std::vector<TrainingRun>& runs) {
 //
 //   RequireHealthy   the record as given, and once more without its stops,
 //                    which may have cut its longest stretch short
-//   RequireAlike     runs that cannot be of one valve as it is measured now
+//   RequireAlike     runs that differ in period, flow unit or signals
 //   CheckRecords     units and sense, before anything is fitted to them
 //   InUnit           the flow range of the type in the unit of the record,
 //                    before simulated and measured flows are compared
