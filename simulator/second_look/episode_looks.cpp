@@ -496,7 +496,8 @@ ValveLooks::ValveLooks(const ValvePhysics& physics)
 
 std::optional<LookTask> ValveLooks::Step(const Sample& sample,
                                          const Verdict& verdict) {
-  // Answers count by the stamps of the samples, so this clock must not go back.
+  // Answers count by the stamps of the samples: late ones must not set this
+  // clock back.
   if (!OutOfOrder(verdict.intake)) {
     stamp_ns_ = sample.stamp_ns;
   }
