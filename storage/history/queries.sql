@@ -355,7 +355,7 @@ SELECT count(*) FROM episode e WHERE NOT (
     SELECT key FROM change
     WHERE number > (SELECT min(number) FROM ship_cursor)
       AND item IN ('episode', 'trace', 'look', 'strength')))
--- Hours of a valve ?1 before ?2 that every plant has, and how many it has not.
+-- Hours of a valve ?1 before ?2 that every plant has, and the number of others.
 -- name: old_health
 SELECT count(*), min(hour), max(hour), sum(length(bytes)), (
   SELECT count(*) FROM health_hour WHERE valve_id = ?1 AND hour < ?2) - count(*)
