@@ -443,6 +443,7 @@ void Service::Tick() {
       Reload("models_changed");
     } else if (retry_reload_at_ && Clock::now() >= *retry_reload_at_) {
       *retry_reload_at_ = Clock::now() + kReloadRetry;
+      ReadModels({});  // Announces nothing, as it may fail for ever.
       LoadModels();
       context_.log(LogLevel::kInfo, "models_reload cause=retry");
     }
@@ -475,14 +476,20 @@ void Service::Reload(const char* cause) {
   }
 }
 
-void Service::LoadModels() {
+std::shared_ptr<const ModelAssignment> Service::ReadModels(
+    ModelAssignment::Announce announce) const {
   auto next = std::make_shared<const ModelAssignment>(
-      data_.models(), options_.model_set,
-      [this](const ModelSet& models) { AnnounceModels(models); });
+      data_.models(), options_.model_set, std::move(announce));
   // Loads the sets here, so that the diagnosis thread need not.
   for (const std::string& valve : pipeline_.valve_names()) {
     next->ModelsFor(valve);
   }
+  return next;
+}
+
+void Service::LoadModels() {
+  auto next =
+      ReadModels([this](const ModelSet& models) { AnnounceModels(models); });
   assignment_ = next;
   model_sets_ = next->loaded();
   pipeline_.Reassign(std::move(next));

@@ -98,6 +98,8 @@ class Service {
   void Serve(cli::StopSignals& signals);
   void Tick();
   void Reload(const char* cause);
+  std::shared_ptr<const ModelAssignment> ReadModels(
+      ModelAssignment::Announce announce) const;
   void LoadModels();
   TimePoint FeedWatchdog(TimePoint next_tick);
 

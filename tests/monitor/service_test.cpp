@@ -19,6 +19,7 @@
 #include "storage/models/models.h"
 #include "tests/idl/test_domain.h"
 #include "tests/monitor/fake_sinks.h"
+#include "tests/monitor/linear_models.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::monitor {
@@ -150,18 +151,32 @@ TEST_F(ServiceTest, EveryReloadThatFailsIsALineOfTheLog) {
 }
 
 // What was changed is not changed again because it could not be read once.
+// Meanwhile nobody is told every few seconds of sets that are not in use.
 TEST_F(ServiceTest, AReloadThatFailedIsTriedAgain) {
+  const std::filesystem::path models = global_.data_dir / "models.db";
+  std::filesystem::create_directory(global_.data_dir);
+  {
+    storage::ModelStore store(models, storage::Access::kOccasionalWriter);
+    for (const char* name : {"first", "second"}) {
+      ModelSet set = LinearModels();
+      set.name = name;
+      store.Save(set);
+      store.AssignModelSet(name, storage::ModelReference{name, 1});
+    }
+  }
   const cli::Context context = Context();
   cli::StopSignals signals;
   Service service({}, context);
-  const std::filesystem::path models = global_.data_dir / "models.db";
-  Execute(models, storage::ModelsSchema(), "ALTER TABLE valve RENAME TO away");
+  const auto rename = [&](const std::string& from, const std::string& to) {
+    Execute(
+        models, storage::ModelsSchema(),
+        "UPDATE model_set SET name = '" + to + "' WHERE name = '" + from + "'");
+  };
+  rename("second", "away");
   std::thread driver([&] {
     kill(getpid(), SIGHUP);
-    EXPECT_TRUE(
-        notice_.Await([&] { return Count("reload_failed id=M112") == 1; }));
-    Execute(models, storage::ModelsSchema(),
-            "ALTER TABLE away RENAME TO valve");
+    EXPECT_TRUE(notice_.Await([&] { return Count("models_unreadable") == 1; }));
+    rename("away", "second");
     EXPECT_TRUE(
         notice_.Await([&] { return Count("models_reload cause=retry") == 1; }));
     kill(getpid(), SIGTERM);
@@ -170,6 +185,9 @@ TEST_F(ServiceTest, AReloadThatFailedIsTriedAgain) {
   EXPECT_EQ(service.Run(signals), 0);
 
   driver.join();
+  EXPECT_EQ(Count("reload_failed id=M112"), 1U);
+  // At the start, by the reload and by the second retry.
+  EXPECT_EQ(Count("models_loaded model_set=first@1"), 3U);
 }
 
 }  // namespace
