@@ -2,6 +2,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <utility>
 
 #include "diagnosis/error.h"
 #include "storage/database/record.h"
@@ -336,11 +337,10 @@ bool ChangeCounter::Changed() {
   if (data_version == data_version_) {
     return false;
   }
-  data_version_ = data_version;
   const std::int64_t generation = store_.Generation();
-  const bool changed = generation != generation_;
-  generation_ = generation;
-  return changed;
+  // Only now: if the generation could not be read, the next call looks again.
+  data_version_ = data_version;
+  return std::exchange(generation_, generation) != generation;
 }
 
 std::string_view BaselineStateName(BaselineState state) {
