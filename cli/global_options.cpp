@@ -170,9 +170,8 @@ class TomlConfig : public CLI::Config {
   // @param root whose options and verbs the file may contain; outlives this.
   explicit TomlConfig(const CLI::App& root) : root_(root) {}
 
-  // @throws CLI::ConfigError naming line and key: invalid TOML, an unknown key,
-  // a
-  //   value that is neither text, number nor flag.
+  // @throws CLI::ConfigError naming line and key: invalid TOML, an unknown
+  //   key, a value that is neither text, number nor flag.
   std::vector<CLI::ConfigItem> from_config(std::istream& in) const override;
   // Unused, because its app cannot be queried for defaults; see
   // EffectiveToml().

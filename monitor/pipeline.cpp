@@ -559,8 +559,8 @@ void Pipeline::CheckSilentValves(TimePoint now) {
     if (IsEvictable(*valve) && monitor.Silence(now) >= options_.place_timeout) {
       idle_.push_back(valve.get());
     }
-    // The order matters: CountStale() and CheckTimeout() act only on a valve
-    // that CheckStale() has labelled.
+    // The order matters: CountStale() acts only on a valve that CheckStale()
+    // has labelled, CheckTimeout() on such a one or if its stream has ended.
     if (monitor.CheckStale(now)) {
       counters_.Add(Counter::kStaleEvents);
       log_.Report(LogId::kStale, "valve_stale",
