@@ -70,6 +70,10 @@ class Publisher {
   /// Disposes the instance of `message` (for a valve: no more samples will
   /// follow). Only the key of `message` is used. Ignored if never written.
   void Dispose(const Message& message);
+  /// Gives up the instance of `message`: it is disposed of, later readers get
+  /// nothing of it, and its place is free once all readers have acknowledged
+  /// that. Only the key of `message` is used. Ignored if never written.
+  void Unregister(const Message& message);
 
   /// @returns whether at least `count` readers were matched in time.
   bool WaitForReaders(int count, std::chrono::milliseconds timeout) const;

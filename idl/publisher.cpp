@@ -102,8 +102,8 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
     return &found->second.handle;
   }
 
-  // Ends the instance that was written longest ago. The library frees its place
-  // once all readers have acknowledged that; until then no other one is ended.
+  // Ends the instance that was written longest ago; no other one until its
+  // place is free.
   void UnregisterOldest() {
     limit = std::max(limit, instances.size());
     if (instances.size() < limit) {
@@ -113,12 +113,21 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
         instances, {}, [](const auto& each) { return each.second.last_write; });
     Message ended;
     KeyOf(ended) = oldest->first;
+    Unregister(ended);
+  }
+
+  // The library frees the place once all readers have acknowledged the end.
+  void Unregister(const Message& ended) {
+    const auto found = instances.find(KeyOf(ended));
+    if (found == instances.end()) {
+      return;
+    }
     Traits::EncodeKey(ended, wire);
     const ReturnCode code =
-        writer->unregister_instance(&wire, oldest->second.handle);
+        writer->unregister_instance(&wire, found->second.handle);
     if (!IsFull(code)) {
       Check(code, std::string("unregister_instance on ") + Traits::kTopic);
-      instances.erase(oldest);
+      instances.erase(found);
     }
   }
 
@@ -232,6 +241,12 @@ void Publisher<Message>::Dispose(const Message& message) {
     throw TransportError("dispose: the readers are behind",
                          NumberOf(return_code::RETCODE_TIMEOUT));
   }
+}
+
+template <typename Message>
+void Publisher<Message>::Unregister(const Message& message) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->Unregister(message);
 }
 
 template <typename Message>

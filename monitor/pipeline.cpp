@@ -255,6 +255,7 @@ void Pipeline::Evict(Valve& valve) {
     // Its run ends: the recorder keeps the state of each open run.
     recorder_->Record({id, {}, {}, false, false, true});
   }
+  decisions_.Remove(id);
   if (live_ != nullptr) {
     live_->Remove(id);
   }

@@ -74,6 +74,8 @@ class DecisionSink {
   virtual void PublishLast(const std::string& /*valve_id*/,
                            const ModelSet* /*models*/,
                            const Verdict& /*verdict*/) {}
+  /// The valve has given up its place: later subscribers get nothing of it.
+  virtual void Remove(const std::string& /*valve_id*/) {}
 };
 
 /// Takes fault events to the bus. Publishing thread of the journal.

@@ -128,6 +128,11 @@ void BusDecisionSink::PublishLast(const std::string& valve_id,
   live_.Write(message_);
 }
 
+void BusDecisionSink::Remove(const std::string& valve_id) {
+  message_.valve_id = valve_id;
+  live_.Unregister(message_);
+}
+
 bool BusDecisionSink::WaitForAcknowledged(std::chrono::milliseconds timeout) {
   return live_.WaitForAcknowledged(timeout) &&
          (!batches_ || batches_->WaitForAcknowledged(timeout));

@@ -32,6 +32,7 @@ class BusDecisionSink : public DecisionSink {
   bool LastValuesDue() override;
   void PublishLast(const std::string& valve_id, const ModelSet* models,
                    const Verdict& verdict) override;
+  void Remove(const std::string& valve_id) override;
 
   /// Fills the message that Publish() sends.
   static void Fill(const std::string& valve_id, const ModelSet* models,

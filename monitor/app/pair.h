@@ -57,6 +57,9 @@ class Pair : public DecisionSink, public EventSink {
                    const Verdict& verdict) override {
     decisions_.PublishLast(valve_id, models, verdict);
   }
+  void Remove(const std::string& valve_id) override {
+    decisions_.Remove(valve_id);
+  }
   bool Publish(const FaultEvent& event, bool persisted) override;
   /// As Publish(), with an event of an earlier session: it goes to the bus
   /// alone, because its session may have notified others of it. Before the

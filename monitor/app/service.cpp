@@ -103,9 +103,11 @@ int IntakeValves(int max_valves) {
 }
 
 // A writer whose history is full forgets the oldest vector, which may be the
-// last one of a silent valve. With a slot to spare it never is.
+// last one of a silent valve. With slots to spare it never is, also while the
+// subscribers have not yet acknowledged the end of valves that are gone.
 int WriterValves(int max_valves) {
-  return std::min(max_valves + 1, kMaxSlots);
+  constexpr int kSpareSlots = 64;
+  return std::min(max_valves + kSpareSlots, kMaxSlots);
 }
 
 std::vector<std::string> Partitions(const ServiceOptions& options) {

@@ -1,6 +1,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <set>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -90,6 +91,31 @@ TEST_F(DeliveryTest, APublisherThatReplacesGivesUpTheValveWrittenLongestAgo) {
     EXPECT_EQ(publisher.Write(DecisionOf(ValveName(i), 0)), WriteResult::kSent);
   }
   EXPECT_EQ(publisher.status().refused, 0U);
+}
+
+// The place of a valve that is gone is used again, not that of a silent one.
+TEST_F(DeliveryTest, AnUnregisteredValveGivesItsPlaceToANewOne) {
+  Participant here(domain_.Options(), log_.Sink());
+  Participant there(domain_.Options(), log_.Sink());
+  Publisher<DecisionMessage> publisher(there, {Profile::kLive, 3, {}, true});
+  EXPECT_EQ(publisher.Write(DecisionOf("silent", 0)), WriteResult::kSent);
+  for (int i = 0; i < 5; ++i) {
+    const DecisionMessage gone = DecisionOf(ValveName(i), 0);
+    EXPECT_EQ(publisher.Write(gone), WriteResult::kSent);
+    publisher.Unregister(gone);
+    publisher.Unregister(gone);
+  }
+  EXPECT_EQ(publisher.Write(DecisionOf("new", 0)), WriteResult::kSent);
+
+  Subscriber<DecisionMessage> late(here);
+  std::set<std::string> seen;
+  const Handlers<DecisionMessage> handlers{
+      [&](const DecisionMessage& message, const Reception&) {
+        seen.insert(message.valve_id);
+      },
+      nullptr};
+  TakeUntil(late, handlers, [&] { return seen.size() == 2; });
+  EXPECT_EQ(seen, (std::set<std::string>{"silent", "new"}));
 }
 
 TEST_F(DeliveryTest, ALateJoinerHasTheLastDecisionOfEveryValve) {

@@ -91,10 +91,14 @@ class FakeBus : public DecisionSink, public EventSink {
     });
     return true;
   }
+  void Remove(const std::string& valve_id) override {
+    notice.Apply([&] { removed.push_back(valve_id); });
+  }
 
   Notice notice;
   bool held{false};
   std::vector<Decision> decisions;
+  std::vector<std::string> removed;
   std::vector<std::pair<TransitionKind, bool>> events;
   std::vector<std::chrono::steady_clock::time_point> event_times;
 };

@@ -142,8 +142,8 @@ TEST_F(PipelineTest, AnAdoptedEpisodeKeepsThePlaceOfItsValveUntilItEnds) {
   EXPECT_EQ((history_.recorded.count({42, TransitionKind::kClosed})), 1U);
 }
 
-// Else the recorder would keep an open run of every id that was ever heard.
-TEST_F(PipelineTest, TheRunOfAnEvictedValveEnds) {
+// Else recorder and bus would keep something of every id that was ever heard.
+TEST_F(PipelineTest, TheRunOfAnEvictedValveEndsAndItsLastVectorGoes) {
   options_.max_valves = 1;
   FakeRuns runs;
   Start(&runs);
@@ -157,6 +157,7 @@ TEST_F(PipelineTest, TheRunOfAnEvictedValveEnds) {
 
   EXPECT_EQ(runs.stored.size(), 3U);
   EXPECT_EQ(runs.ends, 2);
+  EXPECT_THAT(bus_.removed, testing::ElementsAre(ValveName(0), ValveName(1)));
 }
 
 // Stamps that jump, and epochs that flip, with every sample.
