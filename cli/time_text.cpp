@@ -399,8 +399,8 @@ std::int64_t ParseTimeOrAgo(std::string_view text, bool utc,
     return IsDuration(text) ? now_ns - ParseDuration(text)
                             : ParseTime(text, utc);
   } catch (const ConfigError&) {
-    throw ConfigError("'" + std::string(text) + "' is no time; accepted are " +
-                      kTimeForms +
+    throw ConfigError("'" + std::string(text) +
+                      "' is not a time; accepted are " + kTimeForms +
                       ", a time before now such as 90s, 2h, 1h30m or 7d, up to "
                       "100 years, and now");
   }
