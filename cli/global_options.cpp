@@ -1,5 +1,6 @@
 #include "cli/global_options.h"
 
+#include <algorithm>
 #include <charconv>
 #include <map>
 #include <memory>
@@ -126,14 +127,23 @@ void Insert(toml::table& table, const std::string& key,
   }
 }
 
+// If its default were read back, it would exclude other options or need one
+// that is not given.
+bool BindsOthers(const CLI::Option& option) {
+  const auto needed = option.get_needs();
+  return !option.get_excludes().empty() ||
+         std::any_of(needed.begin(), needed.end(),
+                     [](const auto* other) { return other->count() == 0; });
+}
+
 toml::table Effective(CLI::App& app) {
   toml::table table;
   for (CLI::Option* option : app.get_options()) {
     if (!IsKey(*option) || option == app.get_help_ptr()) {
       continue;
     }
-    if (option->count() == 0 && !option->get_excludes().empty()) {
-      continue;  // When read back, its default would exclude the others.
+    if (option->count() == 0 && BindsOthers(*option)) {
+      continue;
     }
     const std::string& key = option->get_lnames().front();
     const bool flag = option->get_expected_max() == 0;
@@ -148,11 +158,13 @@ toml::table Effective(CLI::App& app) {
       }
       table.insert_or_assign(key, std::move(list));
     } else if (option->count() > 0) {
-      Insert(table, key, option->results().front());
+      const std::string& text = option->results().front();
+      // The result of --no-KEY is what it turns off: false.
+      Insert(table, key, flag ? option->get_flag_value(key, text) : text);
     } else if (flag) {
       table.insert_or_assign(key, false);
     } else if (const std::string text = option->get_default_str();
-               !text.empty() && text != "\"\"") {
+               !text.empty() && text != "\"\"" && text != "[]") {
       const bool quoted = text.size() > 1 && text.front() == '"';
       Insert(table, key, quoted ? text.substr(1, text.size() - 2) : text);
     }

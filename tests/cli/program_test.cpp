@@ -39,6 +39,9 @@ struct Outcome {
   std::string place;
   std::string file;
   int times{1};
+  std::vector<std::string> friends;
+  double patience{2.5};
+  bool echo{true};
 };
 
 // A program with `greet` and `store open`; `greet` runs `action`.
@@ -79,6 +82,9 @@ Outcome RunProgram(std::vector<const char*> arguments,
                   "who is there at that time")
       ->check(CLI::ExistingFile)
       ->type_name("FILE.txt");
+  greet.add_option("--friend", outcome.friends, "Whom else");
+  greet.add_option("--patience", outcome.patience, "How long")->needs("--file");
+  greet.add_flag("!--no-echo", outcome.echo, "Do not wait for an echo");
   greet.add_option_function<std::string>(
       "--within", [](const std::string& text) { ParseDuration(text); },
       "How soon");
@@ -327,6 +333,26 @@ TEST_F(ProgramConfigTest, PrintedConfigReadsBackAsTheSameConfig) {
   const Outcome again =
       RunProgram({"greet", "--config", path_.c_str(), "--print-config"});
   EXPECT_EQ(again.out, printed.out);
+}
+
+TEST_F(ProgramConfigTest, PrintedDefaultsReadBack) {
+  const Outcome printed = RunProgram({"greet", "--print-config"});
+
+  const Outcome read = RunProgram({"greet", "--config", Write(printed.out)});
+
+  EXPECT_EQ(read.code, kExitOk) << read.err << printed.out;
+  EXPECT_THAT(read.friends, IsEmpty());
+  EXPECT_TRUE(read.echo);
+  EXPECT_EQ(
+      RunProgram({"greet", "--config", path_.c_str(), "--print-config"}).out,
+      printed.out);
+}
+
+TEST_F(ProgramConfigTest, PrintedNegationIsTrueWhereItIsGiven) {
+  const Outcome printed = RunProgram({"greet", "--no-echo", "--print-config"});
+  EXPECT_THAT(printed.out, HasSubstr("no-echo = true"));
+
+  EXPECT_FALSE(RunProgram({"greet", "--config", Write(printed.out)}).echo);
 }
 
 TEST_F(ProgramConfigTest, PrintedConfigKeepsTextThatLooksLikeANumber) {
