@@ -138,7 +138,7 @@ void WarnIfUnknown(const std::string& valve, HistoryReader& reader,
   if (!known.contains(valve)) {
     const auto meant = Suggest(valve, {known.begin(), known.end()});
     context.log(LogLevel::kWarning,
-                "shelf.valve_unknown valve=" + valve +
+                "valve_unknown valve=" + valve +
                     (meant ? " did_you_mean=" + *meant : ""));
   }
 }

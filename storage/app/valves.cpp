@@ -1,5 +1,6 @@
 // fdi-store valves: list, show, add, assign, event, remove.
 #include <algorithm>
+#include <cstdio>
 
 #include "cli/signal_list.h"
 #include "diagnosis/error.h"
@@ -78,6 +79,13 @@ Json BaselineJson(const BaselineRecord& record) {
        })}};
 }
 
+// Six digits, however small: air coefficients have a size of 1e-6.
+std::string SixDigits(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
 // As found and as left: a column for the newest baseline of each epoch, a row
 // for every figure in any of them.
 void AddComparison(const std::vector<BaselineRecord>& records, Report& report) {
@@ -124,8 +132,7 @@ void AddComparison(const std::vector<BaselineRecord>& records, Report& report) {
     std::vector<std::string> cells = {name};
     for (const auto& of_epoch : figures) {
       const auto found = of_epoch.find(name);
-      cells.push_back(
-          found == of_epoch.end() ? "-" : cli::FormatNumber(found->second, 4));
+      cells.push_back(found == of_epoch.end() ? "-" : SixDigits(found->second));
     }
     table.AddRow(cells);
   }

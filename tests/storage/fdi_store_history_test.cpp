@@ -166,7 +166,7 @@ TEST_F(FdiStoreHistoryTest, AShelvedAlarmSaysSoUntilItIsTakenOff) {
   EXPECT_EQ(Store("history unshelve --valve LV-1").code, 5);
   EXPECT_EQ(Store("history shelve LV-1 --for 91d").code, 2);
   EXPECT_THAT(Store("history shelve LV-11").err,
-              HasSubstr("shelf.valve_unknown valve=LV-11 did_you_mean=LV-1"));
+              HasSubstr("warning valve_unknown valve=LV-11 did_you_mean=LV-1"));
 }
 
 TEST_F(FdiStoreHistoryTest, SlipsOfThePenAreSuggested) {

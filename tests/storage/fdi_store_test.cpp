@@ -283,7 +283,7 @@ TEST_F(FdiStoreTest, BaselinesOfEpochsAreShownSideBySide) {
     models.SetBaseline("LV-1", record);
     models.AddValveEvent("LV-1", {});
     record.epoch = 1;
-    record.parameters = {{"kv", 131.5}, {"play", 0.02}};
+    record.parameters = {{"kv", 131.5}, {"play", 0.02}, {"air", 2.498e-6}};
     models.SetBaseline("LV-1", record);
     models.SaveTemplate("globe", std::vector<std::byte>(7), "19 faults");
   }
@@ -291,7 +291,8 @@ TEST_F(FdiStoreTest, BaselinesOfEpochsAreShownSideBySide) {
   EXPECT_THAT(shown, AllOf(HasSubstr("epoch 0: pump@1"),
                            HasSubstr("epoch 1: pump@1"), HasSubstr("valid"),
                            testing::ContainsRegex("kv +118.25[0-9]* +131.5"),
-                           testing::ContainsRegex("play +- +0.02")));
+                           testing::ContainsRegex("play +- +0.02"),
+                           testing::ContainsRegex("air +- +2.498e-06")));
   const json valve = StoreJson("valves show LV-1");
   EXPECT_EQ(valve["baselines"][1]["parameters"]["kv"], 131.5);
   EXPECT_EQ(valve["baselines"][0]["channels"][0]["vaf"], 99.5);
