@@ -1,8 +1,10 @@
 #include "idl/profile_file.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <mutex>
 #include <string_view>
+#include <vector>
 
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <tinyxml2.h>
@@ -85,10 +87,22 @@ void ForEachPolicy(Visit visit) {
 constexpr const char* kPublishMode = "publishMode";
 constexpr const char* kTimes = "times";
 
-bool CanOverride(const std::string& element) {
-  bool known = element == kPublishMode || element == kTimes;
-  ForEachPolicy([&](const char* name, auto) { known |= element == name; });
-  return known;
+std::vector<std::string> Overridable() {
+  std::vector<std::string> names;
+  ForEachPolicy([&](const char* name, auto) { names.emplace_back(name); });
+  names.emplace_back(kPublishMode);
+  names.emplace_back(kTimes);
+  return names;
+}
+
+// "accepted are a b c"
+template <typename Names>
+std::string Accepted(const Names& names) {
+  std::string text = "accepted are";
+  for (const std::string& name : names) {
+    text += ' ' + name;
+  }
+  return text;
 }
 
 // Copies the policies common to both kinds of endpoint, each as a whole: parts
@@ -116,18 +130,16 @@ void CheckProfile(const std::string& path, const std::string& name,
     }
   }
   if (!accepted.contains(name)) {
-    std::string names;
-    for (const std::string& each : accepted) {
-      names += " " + each;
-    }
     throw ConfigError("QoS file '" + path + "': unknown profile '" + name +
-                      "', accepted are" + names);
+                      "', " + Accepted(accepted));
   }
+  const std::vector<std::string> overridable = Overridable();
   for (const std::string& element : elements) {
-    if (!suffix.empty() && !CanOverride(element)) {
-      throw ConfigError("QoS file '" + path + "': profile '" + name +
-                        "' states '" + element +
-                        "', which cannot be overridden");
+    if (!suffix.empty() &&
+        std::ranges::find(overridable, element) == overridable.end()) {
+      throw ConfigError(
+          "QoS file '" + path + "': profile '" + name + "' states '" + element +
+          "', which cannot be overridden; " + Accepted(overridable));
     }
   }
 }

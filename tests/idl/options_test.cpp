@@ -91,7 +91,10 @@ TEST_F(ProfileFileTest, APolicyThatWouldBeIgnoredIsAnError) {
       "<data_reader profile_name=\"fdi_valve_sample_reader\"><qos><ownership>"
       "<kind>EXCLUSIVE</kind></ownership></qos></data_reader>");
   EXPECT_THAT([&] { ProfileFile{path}; },
-              ThrowsMessage<ConfigError>(HasSubstr("ownership")));
+              ThrowsMessage<ConfigError>(
+                  AllOf(HasSubstr("ownership"),
+                        HasSubstr("accepted are reliability durability"),
+                        HasSubstr("publishMode times"))));
 }
 
 TEST_F(ProfileFileTest, WhatIsNoXmlIsAnError) {
