@@ -352,7 +352,7 @@ void AddScoringOptions(CLI::App& verb, EvaluateOptions& options) {
           ->type_name("FILE.csv,...");
   CLI::Option* baseline =
       verb.add_option("--baseline", options.baseline,
-                      "Score a detector that readers know, fitted to the "
+                      "Score a well-known detector, fitted to the "
                       "training runs of the campaign, or those given")
           ->check(CLI::IsMember(BaselineNames()))
           ->type_name("NAME");
