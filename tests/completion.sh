@@ -57,6 +57,15 @@ last=$(tail -1 <<<"$runs")
 expect 'FV-7' fdi-store history list --valve F
 expect "$first" fdi-store runs show "${first:0:8}"
 expect "$first,$last" fdi-trainer train --runs "$first,${last:0:8}"
+# Names are offered as the shell has to read them, and never executed.
+"$bin/fdi-simulator" run --no-publish --record --duration 60 \
+  --valve "\$(touch $folder/executed) 1" --log-level error >/dev/null
+expect "\\\$\\(touch\\ $folder/executed\\)\\ 1" \
+  fdi-store history list --valve '\$'
+[ ! -e "$folder/executed" ] || {
+  echo "completion: the name of a valve is executed"
+  failed=1
+}
 expect '' fdi-store --data "$folder/none" runs show "${first:0:8}"
 expect 'last' fdi-store history ack la
 exit $failed

@@ -15,6 +15,16 @@ _fdi_faults() {
   _fdi_listed fault faults | grep -vE '_|^unknown$'
 }
 
+# Offers the lines that begin with WORD, as the shell has to read them. Names
+# hold what their owners like: compgen -W would execute a $(command) in them.
+_fdi_offer() {  # WORD [BEFORE]
+  local line
+  while IFS= read -r line; do
+    printf -v line %q "$line"
+    [[ $line != "$1"* ]] || COMPREPLY+=("$2$line")
+  done
+}
+
 # The headings in a section of the help of `program $path`.
 _fdi_section() {
   "$program" $path --help 2>/dev/null |
@@ -80,17 +90,18 @@ _fdi_value() {
   fi
   if [[ $value == *SPEC* ]]; then
     compopt -o nospace
-    how=(-S : -W "$(_fdi_candidates "$name" "$entry")")
-    [[ ! $colon ]] || how=(-W 'abrupt@ incipient@')
-    mapfile -t COMPREPLY < <(compgen "${how[@]}" -- "$word")
+    if [[ $colon ]]; then
+      _fdi_offer "$word" < <(printf '%s\n' abrupt@ incipient@)
+    else
+      _fdi_offer "$word" < <(_fdi_candidates "$name" "$entry" | sed 's/$/:/')
+    fi
     return
   fi
   if [[ $word == *,* ]]; then
     before=${word%,*},
     last=${word##*,}
   fi
-  mapfile -t COMPREPLY < <(
-    compgen -P "$before" -W "$(_fdi_candidates "$name" "$entry")" -- "$last")
+  _fdi_offer "$last" "$before" < <(_fdi_candidates "$name" "$entry")
 }
 
 _fdi_complete() {
