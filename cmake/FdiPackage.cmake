@@ -17,6 +17,7 @@ valves, fdi-trainer makes the models from recorded runs, and fdi-store looks
 after runs, models, valves and the fault history.")
 set(CPACK_STRIP_FILES ON)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_PRE_BUILD_SCRIPTS ${FDI_PACKAGING}/permissions.cmake)
 set(CPACK_VERBATIM_VARIABLES ON)
 
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)

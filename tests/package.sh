@@ -13,8 +13,9 @@ fail() {
   exit 1
 }
 
-cpack --config "$build/CPackConfig.cmake" -B "$folder" \
-  >"$folder/cpack.log" 2>&1 ||
+# The umask of the one who builds is not that of the package.
+(umask 077 && cpack --config "$build/CPackConfig.cmake" -B "$folder" \
+  >"$folder/cpack.log" 2>&1) ||
   fail "$(cat "$folder/cpack.log")"
 package=$(ls "$folder"/fdi_*.deb)
 root=$folder/root
@@ -33,6 +34,8 @@ done
   fail "conffiles: $(cat "$folder/control/conffiles")"
 dpkg-deb --contents "$package" | awk '$2 != "root/root" {bad = 1; print}
   END {exit bad}' || fail "files that are not root's"
+dpkg-deb --contents "$package" | awk '$1 !~ /^.rw.r..r../ {bad = 1; print}
+  END {exit bad}' || fail "files that not everybody may read"
 
 for file in etc/default/fdi-monitor usr/lib/systemd/system/fdi-monitor.service \
   usr/lib/sysusers.d/fdi.conf usr/share/fdi/campaigns/paper.toml \
@@ -45,6 +48,12 @@ grep -q '^ExecStart=/usr/bin/fdi-monitor run' \
   "$root/usr/lib/systemd/system/fdi-monitor.service" || fail "ExecStart"
 grep -q '^EnvironmentFile=-/etc/default/fdi-monitor$' \
   "$root/usr/lib/systemd/system/fdi-monitor.service" || fail "EnvironmentFile"
+# So it is for a prefix below the current directory.
+(cd "$folder" && cmake -D CMAKE_INSTALL_PREFIX=other \
+  -P "$build/monitor/systemd/install.cmake" >/dev/null)
+grep -q "^ExecStart=$folder/other/bin/fdi-monitor run" \
+  "$folder/other/lib/systemd/system/fdi-monitor.service" ||
+  fail "ExecStart of a relative prefix"
 
 # A page for the program, its groups and their verbs: every word that --help
 # lists has one.
