@@ -7,6 +7,7 @@
 set -euo pipefail
 bin=$(cd "$1" && pwd)
 tree=$(cd "$(dirname "$0")/.." && pwd)
+source "$tree/tests/domain.sh"
 out=$(mktemp -d)
 finish() {
   kill "${service:-}" 2>/dev/null || true
@@ -24,7 +25,7 @@ fail() {
 adapt() {
   sed -e "s#/usr/share/fdi/campaigns#$tree/campaigns#g" \
     -e 's#=127\.0\.0\.1:8080#=127.0.0.1:0#' \
-    -e "s#^\(fdi-monitor\|fdi-simulator\) #&--domain ${FDI_DOMAIN:-18} #"
+    -e "s#^\(fdi-monitor\|fdi-simulator\) #&--domain $domain #"
 }
 # A file for each block, in order: 01.sh, 02.service, 03.admin, ...
 awk -v out="$out" '/^```sh/ {kind = $2 == "" ? "sh" : $2; ++n; next}

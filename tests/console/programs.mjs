@@ -25,7 +25,7 @@ export class Plant {
   data = mkdtempSync(path.join(tmpdir(), 'fdi-console-'));
   tokenFile = path.join(this.data, 'token');
   access = ['--console-write', this.tokenFile];
-  #domain = String(70 + process.pid % 20);
+  #domain = process.env.FDI_DOMAIN;
   #children = new Set();
 
   constructor() {

@@ -16,6 +16,8 @@ command -v node >/dev/null || {
   echo "skipped: npm has not fetched what drives the browser (see the build)"
   exit 77
 }
+source ../domain.sh
+export FDI_DOMAIN=$domain
 export FDI_CHROMIUM FDI_BIN=$1 FDI_NODE_MODULES=$2
 export FDI_CAMPAIGN=$PWD/../survival/quick.toml
 # One after the other: the load is measured alone.

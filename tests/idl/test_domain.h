@@ -21,7 +21,12 @@ class TestDomain {
       id_ = 60 + (getpid() + i) % 40;
       const std::string path =
           "/tmp/fdi-test-domain-" + std::to_string(id_) + ".lock";
-      file_ = open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+      // The file may be another user's, which nobody else can write, and which
+      // the kernel does not open with O_CREAT in a folder that all share.
+      file_ = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+      if (file_ < 0) {
+        file_ = open(path.c_str(), O_CREAT | O_RDONLY | O_CLOEXEC, 0644);
+      }
       if (file_ >= 0 && flock(file_, LOCK_EX | LOCK_NB) == 0) {
         return;
       }

@@ -14,7 +14,7 @@ episode=${FDI_SOAK_EPISODE:-600}
 max_slope_kb_min=${FDI_SOAK_SLOPE:-$((seconds > 480 ? 1024 : 10240))}
 max_wal_mb=80
 max_bytes_per_sample=30
-domain=${FDI_DOMAIN:-94}
+source "$(dirname "$0")/../domain.sh"
 out=$(mktemp -d)
 export FDI_DATA=$out/data
 mkdir "$FDI_DATA"

@@ -6,10 +6,7 @@
 bin=$(cd "$1" && pwd)
 work=$(mktemp -d)
 export FDI_DATA=$work/data
-for domain in $(seq 60 99); do  # As TestDomain in tests/idl/test_domain.h.
-  exec 9>"/tmp/fdi-test-domain-$domain.lock"
-  ! flock -n 9 || break
-done
+source "$(dirname "${BASH_SOURCE[0]}")/../domain.sh"
 monitor=
 trap '[ -z "$monitor" ] || kill -9 "$monitor" 2>/dev/null; rm -rf "$work"' EXIT
 cd "$work"
