@@ -4,6 +4,10 @@
 set -u
 cd "$(dirname "$0")/.."
 failed=0
+[ -n "$(git ls-files '*.cpp')" ] || {
+  echo "include_rules: git knows no sources here"
+  exit 1
+}
 
 forbid() {  # WHERE(regex of file) WHAT(regex of include) WHY
   local hits
