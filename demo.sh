@@ -103,7 +103,7 @@ done
 
 say "Done: databases in $FDI_DATA, pictures in $out"
 right=$(sqlite3 -readonly "$FDI_DATA/history.db" "
-  select count(*) from (values ('F1a','f1'),('F2a','f3'),('F3a','f6'),
+  select count(distinct valve_id) from (values ('F1a','f1'),('F2a','f3'),('F3a','f6'),
     ('F4a','f7'),('F5a','f19'),('F1i','f1'),('F2i','f3'),('F3i','f6'),
     ('F4i','f7'),('F5i','f19')) s
   join fault_history h on h.valve_id = s.column1 and h.fault = s.column2")
