@@ -64,12 +64,12 @@ if [ "${#missing[@]}" -gt 0 ]; then
 fi
 
 log=$(mktemp)
+trap 'rm -f "$log"' EXIT
 cmake --preset release -DBUILD_TESTING=$testing -DFDI_PACKAGE=$packaging \
   >"$log" 2>&1 || {
   cat "$log" >&2
   exit 1
 }
 cmake --build --preset release
-rm -f "$log"
 [ "$purpose" != package ] ||
   cpack --config build/release/CPackConfig.cmake -B build/package
