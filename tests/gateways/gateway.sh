@@ -33,7 +33,7 @@ await() {  # WORD FILE
 }
 
 count=420
-port=$((46000 + domain))
+port=$((16000 + domain))  # No ephemeral one, nor one of a test's domain.
 "$bin/fdi-trainer" train --campaign "$tests/survival/quick.toml" \
   >/dev/null 2>train.log
 "$bin/fdi-store" valves assign FV-101 quick >/dev/null
