@@ -45,7 +45,7 @@ quietly within sh -ec 'cd /empty
   fdi-trainer train --campaign /usr/share/fdi/campaigns/paper.toml
   fdi-monitor run --model-set paper --console=127.0.0.1:0 2>monitor.log &
   monitor=$!
-  until grep -q monitor_ready monitor.log; do sleep 0.1; done
+  timeout 60 sh -c "until grep -q monitor_ready monitor.log; do sleep 0.1; done"
   fdi-simulator run --valve FV-101 --parameters paper-operating-point \
     --duration 600 --speed max --set excitation.amplitude_pct=12 \
     --set excitation.period_s=60 --fault f19:abrupt@120:strength=0.5
