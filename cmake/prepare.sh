@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that are missing and builds Release.
-# Usage: cmake/prepare.sh [programs|tests|package]
+# Usage: cmake/prepare.sh [programs|tests|package [DEBIAN_PACKAGE...]]
 #   programs   the four programs and the live page (default)
 #   tests      these and the tests
 #   package    the programs, and the Debian package in build/package/
+# Installs further packages of Debian, too, if they are named.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 purpose=${1:-programs}
@@ -43,6 +44,7 @@ case $purpose in
     ;;
 esac
 
+packages+=("${@:2}")
 missing=()
 for package in "${packages[@]}"; do
   dpkg-query -W -f='${Status}' "$package" 2>/dev/null |
