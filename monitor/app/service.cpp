@@ -37,7 +37,9 @@ constexpr int kTakeLimit = 4096;  // Bounds a call of Take() under full load.
 constexpr milliseconds kPairTakeTimeout{20};
 constexpr int kPairTakeLimit = 256;
 constexpr milliseconds kTickPeriod{1000};
-constexpr milliseconds kReloadRetry{5000};
+// After a reload that failed; doubled each time, as all sets are read again.
+constexpr milliseconds kReloadPause{2000};
+constexpr milliseconds kMaxReloadPause{300'000};
 // Each of these bounds one step of a stop. SIGTERM ends the monitor within 5 s,
 // also with a subscriber that does not read (docs/operations.md).
 constexpr milliseconds kHookPatience{1000};
@@ -444,7 +446,8 @@ void Service::Tick() {
     if (changes_.Changed()) {
       Reload("models_changed");
     } else if (retry_reload_at_ && Clock::now() >= *retry_reload_at_) {
-      *retry_reload_at_ = Clock::now() + kReloadRetry;
+      reload_pause_ = std::min(2 * reload_pause_, kMaxReloadPause);
+      *retry_reload_at_ = Clock::now() + reload_pause_;
       ReadModels({});  // Announces nothing, as it may fail for ever.
       LoadModels();
       context_.log(LogLevel::kInfo, "models_reload cause=retry");
@@ -471,7 +474,8 @@ void Service::Reload(const char* cause) {
   try {
     LoadModels();
   } catch (const std::exception& error) {
-    retry_reload_at_ = Clock::now() + kReloadRetry;
+    reload_pause_ = kReloadPause;
+    retry_reload_at_ = Clock::now() + reload_pause_;
     counters_.Add(Counter::kModelFailures);
     log_.Line(LogLevel::kError, LogLine(LogId::kModelFailure, "reload_failed",
                                         "reason=" + LogValue(error.what())));

@@ -148,7 +148,8 @@ class Service {
   std::int64_t started_ns_;
   std::uint64_t reported_loss_{0};
   TimePoint last_status_line_;
-  std::optional<TimePoint> retry_reload_at_;  // After a reload that failed.
+  std::optional<TimePoint> retry_reload_at_;   // After a reload that failed,
+  std::chrono::milliseconds reload_pause_{0};  // this long after the last try.
   std::atomic<bool> stopping_{false};
   std::atomic<TimePoint> drain_until_{TimePoint{}};
   Worker diagnosis_;
