@@ -198,8 +198,8 @@ TEST_F(FdiStoreHistoryTest, ColourIsForTerminalsThatWantIt) {
   const std::string list = directory_.path().string() + " history list";
   const auto on_terminal = [&](const std::string& environment) {
     const std::string out = (directory_.path() / "terminal.txt").string();
-    const std::string command = environment + " script -qec '" +
-                                FDI_STORE_PROGRAM + " --data " + list +
+    const std::string command = environment + " script -qec '\"" +
+                                FDI_STORE_PROGRAM + "\" --data " + list +
                                 "' /dev/null >" + out;
     EXPECT_EQ(std::system(command.c_str()), 0);
     return Slurp(out);

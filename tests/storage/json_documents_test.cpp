@@ -288,8 +288,8 @@ class JsonDocumentsTest : public FdiStoreTest {
     called_.insert(type->first);
     const auto bin = std::filesystem::path(FDI_STORE_PROGRAM).parent_path();
     const int status =
-        std::system(("cd " + directory_.path().string() + " && " +
-                     (bin / program).string() + " --data . " + verb + " " +
+        std::system(("cd " + directory_.path().string() + " && \"" +
+                     (bin / program).string() + "\" --data . " + verb + " " +
                      arguments + " --json >out.txt 2>err.txt")
                         .c_str());
     EXPECT_EQ(status, 0) << verb << ": "

@@ -35,9 +35,10 @@ class FdiStoreTest : public HistoryFixture {
   // In the fresh folder, which is the data directory too.
   Outcome Store(const std::string& arguments,
                 const std::string& environment = "TZ=UTC") {
-    const std::string command =
-        "cd " + directory_.path().string() + " && " + environment + " " +
-        FDI_STORE_PROGRAM + " --data . " + arguments + " >out.txt 2>err.txt";
+    const std::string command = "cd " + directory_.path().string() + " && " +
+                                environment +
+                                " \"" FDI_STORE_PROGRAM "\" --data . " +
+                                arguments + " >out.txt 2>err.txt";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1,
             Slurp(directory_.path() / "out.txt"),

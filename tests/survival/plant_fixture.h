@@ -60,8 +60,9 @@ class PlantFixture : public HistoryFixture {
   Outcome Store(const std::string& arguments) const {
     const auto out = directory_.path() / "out.txt";
     const auto err = directory_.path() / "err.txt";
-    const std::string command = "TZ=UTC " FDI_STORE_PROGRAM " " + arguments +
-                                " >" + out.string() + " 2>" + err.string();
+    const std::string command = "TZ=UTC \"" FDI_STORE_PROGRAM "\" " +
+                                arguments + " >" + out.string() + " 2>" +
+                                err.string();
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, Slurp(out),
             Slurp(err)};

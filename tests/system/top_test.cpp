@@ -36,7 +36,7 @@ TEST_F(TopSystemTest, OnceIsTheTableOfWhatWasSaidLast) {
   const std::filesystem::path file = directory_.path() / "top.json";
   std::string command;
   for (const std::string& word : Top()) {
-    command += word + " ";
+    command += "\"" + word + "\" ";
   }
 
   const int status =

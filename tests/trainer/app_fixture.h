@@ -38,9 +38,9 @@ class TrainerProgram : public ::testing::Test {
 
   Outcome Run(const std::string& arguments,
               const std::string& data = "data") const {
-    const std::string command = "cd " + directory_.path().string() + " && " +
-                                FDI_TRAINER_PROGRAM + " --data " + data + " " +
-                                arguments + " >out.txt 2>err.txt";
+    const std::string command = "cd " + directory_.path().string() + " && \"" +
+                                FDI_TRAINER_PROGRAM + "\" --data " + data +
+                                " " + arguments + " >out.txt 2>err.txt";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, Read("out.txt"),
             Read("err.txt")};
