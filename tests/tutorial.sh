@@ -23,7 +23,7 @@ fail() {
 # What differs from a new user's machine: where the campaigns are, ports that
 # others may have, the domain.
 adapt() {
-  sed -e "s#/usr/share/fdi/campaigns#$tree/campaigns#g" \
+  sed -e "s#/usr/share/fdi/campaigns#$out/campaigns#g" \
     -e 's#=127\.0\.0\.1:8080#=127.0.0.1:0#' \
     -e "s#^\(fdi-monitor\|fdi-simulator\) #&--domain $domain #"
 }
@@ -35,6 +35,7 @@ awk -v out="$out" '/^```sh/ {kind = $2 == "" ? "sh" : $2; ++n; next}
 unset FDI_DATA
 export PATH=$bin:$PATH
 mkdir "$out/home"
+ln -s "$tree/campaigns" "$out/campaigns"  # A path without blanks.
 cd "$out/home"
 for block in "$out"/[0-9][0-9].*; do
   adapt <"$block" >"$out/block"
