@@ -98,7 +98,6 @@ std::string Plain(std::string_view character) {
 // The regular expression that matches what GlobMatches() does. PostgreSQL
 // refuses empty sets and ranges, and ranges that share an end (a-c-e).
 std::string RegexOf(std::string_view glob) {
-  const std::string nothing = "$.";
   std::string regex = "^";
   while (!glob.empty()) {
     const std::string_view character = TakeCharacter(glob);
@@ -113,7 +112,7 @@ std::string RegexOf(std::string_view glob) {
             }
           });
       if (!negated || (members.empty() && !*negated)) {
-        return nothing;
+        return "$.";  // Matches nothing.
       }
       regex += members.empty() ? "." : (*negated ? "[^" : "[") + members + ']';
     } else {
