@@ -7,6 +7,9 @@
 
 namespace fdi {
 
+/// Bytes of the id of a valve, a set, an observer, as in idl/fdi_v1.idl.
+inline constexpr std::size_t kMaxIdLength = 64;
+
 /// Length of the printable UTF-8 character of `text` at `place`, 1 to 4 bytes.
 /// 0 for a control character (C0, DEL, C1, which control the terminal) and for
 /// invalid UTF-8.

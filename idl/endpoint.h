@@ -27,7 +27,7 @@ struct PublisherOptions {
   int valves{0};  ///< Number of valves it publishes; 0: max_valves.
   /// Partitions to write to; "" is the default one, as is an empty list.
   std::vector<std::string> partitions{};
-  /// A valve beyond the limit takes the place of the one that was written
+  /// A valve beyond this number takes the place of the one that was written
   /// longest ago, whose instance is disposed of; otherwise it is refused.
   bool replaces{false};
 };

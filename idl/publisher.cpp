@@ -22,6 +22,11 @@ using Clock = std::chrono::steady_clock;
 // retries from starving the reader.
 constexpr auto kBackOff = std::chrono::microseconds(100);
 constexpr auto kDisposeTimeout = std::chrono::seconds(5);
+// A writer that replaces valves has places to spare: one is free again only
+// once all readers have acknowledged the end of its valve, and a writer without
+// a free one forgets the oldest message, the last one of a silent valve.
+constexpr int kSparePlaces = 64;
+constexpr int kMaxPlaces = 100'000;  // See DdsOptions::max_valves.
 
 bool IsFull(const ReturnCode& code) {
   return code == return_code::RETCODE_TIMEOUT ||
@@ -44,10 +49,11 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   Impl(Participant& participant, const PublisherOptions& options)
       : bus(participant.impl()),
         lossless(options.profile == Profile::kLossless),
+        valves(options.valves > 0 ? options.valves : bus.options().max_valves),
         replaces(options.replaces) {
     const EndpointQos ours = QosFor<Message>(
         options.profile,
-        options.valves > 0 ? options.valves : bus.options().max_valves);
+        replaces ? std::min(valves + kSparePlaces, kMaxPlaces) : valves);
     dds::PublisherQos publisher_qos;
     for (const std::string& partition : options.partitions) {
       publisher_qos.partition().push_back(partition.c_str());
@@ -87,12 +93,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
   const dds::InstanceHandle_t* InstanceOf(const Message& message) {
     auto found = instances.find(KeyOf(message));
     if (found == instances.end()) {
-      dds::InstanceHandle_t handle = writer->register_instance(&wire);
-      if (!handle.isDefined() && replaces) {
-        UnregisterOldest();
-        Traits::Encode(message, wire);
-        handle = writer->register_instance(&wire);
-      }
+      const dds::InstanceHandle_t handle = writer->register_instance(&wire);
       if (!handle.isDefined()) {
         return nullptr;
       }
@@ -102,11 +103,11 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
     return &found->second.handle;
   }
 
-  // Ends the instance that was written longest ago; no other one until its
-  // place is free.
-  void UnregisterOldest() {
-    limit = std::max(limit, instances.size());
-    if (instances.size() < limit) {
+  // Makes room for a new valve before its message is encoded: `wire` is needed
+  // for the key of the one that goes.
+  void MakeRoomFor(const Message& message) {
+    if (!replaces || instances.size() < static_cast<std::size_t>(valves) ||
+        instances.contains(KeyOf(message))) {
       return;
     }
     const auto oldest = std::ranges::min_element(
@@ -171,6 +172,7 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
 
   Participant::Impl& bus;
   const bool lossless;
+  const int valves;
   const bool replaces;
   std::unique_ptr<dds::Publisher, std::function<void(dds::Publisher*)>>
       publisher;
@@ -190,7 +192,6 @@ struct Publisher<Message>::Impl : dds::DataWriterListener {
     std::uint64_t last_write;
   };
   std::map<Key<Message>, Instance, std::less<>> instances;
-  std::size_t limit{0};  // Of instances, as far as it has been reached.
   std::uint64_t writes{0};
   typename Traits::Wire wire;
 };
@@ -209,6 +210,7 @@ WriteResult Publisher<Message>::Write(const Message& message,
                                       std::chrono::milliseconds timeout) {
   Impl& impl = *impl_;
   const std::lock_guard lock(impl.mutex);
+  impl.MakeRoomFor(message);
   Impl::Traits::Encode(message, impl.wire);
   const dds::InstanceHandle_t* instance = impl.InstanceOf(message);
   if (instance == nullptr) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/printable.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/monitor_share.h"
 #include "diagnosis/records/operator_action.h"
@@ -18,8 +19,8 @@
 /// Doubles are transmitted bit for bit, including NaN.
 namespace fdi::idl {
 
-/// Lengths in bytes; a longer text is rejected, never truncated.
-inline constexpr std::size_t kMaxIdLength = 64;  ///< Valve, set, observer, ...
+/// Lengths in bytes, besides kMaxIdLength; a longer text is rejected, never
+/// truncated.
 inline constexpr std::size_t kMaxNameLength = 32;  ///< Channel, counter.
 inline constexpr std::size_t kMaxTextLength = 255;
 inline constexpr std::size_t kMaxGroups = 64;

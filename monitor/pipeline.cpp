@@ -14,8 +14,6 @@
 namespace fdi::monitor {
 namespace {
 
-// The bound of valve_id in idl/fdi_v1.idl.
-constexpr std::size_t kMaxIdLength = 64;
 constexpr std::size_t kRememberedRefusals = 65536;
 constexpr std::chrono::milliseconds kPollPeriod{250};
 // Under load Poll() comes only after thousands of samples, and a slow

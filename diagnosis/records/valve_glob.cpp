@@ -1,8 +1,11 @@
 #include "diagnosis/records/valve_glob.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <tuple>
 #include <utility>
+
+#include "diagnosis/printable.h"
 
 namespace fdi {
 namespace {
@@ -27,11 +30,7 @@ bool TakeMatch(std::string_view& glob, std::string_view& text) {
 }  // namespace
 
 std::string_view TakeCharacter(std::string_view& text) {
-  std::size_t size = 1;
-  while (size < text.size() &&
-         (static_cast<unsigned char>(text[size]) & 0xC0U) == 0x80U) {
-    ++size;
-  }
+  const std::size_t size = std::max<std::size_t>(1, LetterSize(text, 0));
   const std::string_view character = text.substr(0, size);
   text.remove_prefix(size);
   return character;

@@ -16,7 +16,8 @@ bool GlobMatches(std::string_view glob, std::string_view text);
 /// matches "V1" and not itself.
 std::string GlobOf(std::string_view valve_id);
 
-/// Removes the first character of UTF-8 from a text that is not empty.
+/// Removes the first printable character, or else the first byte, from a text
+/// that is not empty.
 std::string_view TakeCharacter(std::string_view& text);
 
 /// Removes the rest of a set behind its [ from the front of `glob`, and calls

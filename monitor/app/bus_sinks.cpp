@@ -1,8 +1,6 @@
 #include "monitor/app/bus_sinks.h"
 
 #include <algorithm>
-#include <chrono>
-#include <thread>
 #include <utility>
 
 #include "cli/logging.h"
@@ -15,7 +13,6 @@ namespace {
 // A UDP datagram holds at most 64 kB, part of which goes to the security
 // header.
 constexpr std::size_t kMaxBatchBytes = 48'000;
-constexpr std::chrono::milliseconds kPlacePatience{200};
 
 // Upper bound of the CDR size of one vector.
 std::size_t BytesOf(const idl::DecisionMessage& message) {
@@ -174,16 +171,7 @@ bool BusEventSink::Send(const FaultEvent& message) {
               {"episode", storage::EpisodeIdText(message.episode_id)},
               {"persisted", message.persisted ? "true" : "false"}}));
   }
-  // The place of a valve that is gone becomes free once all subscribers have
-  // acknowledged its end.
-  const auto end = std::chrono::steady_clock::now() + kPlacePatience;
-  idl::WriteResult result = publisher_.Write(message);
-  while (result == idl::WriteResult::kTooManyValves &&
-         std::chrono::steady_clock::now() < end) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    result = publisher_.Write(message);
-  }
-  return result == idl::WriteResult::kSent;
+  return publisher_.Write(message) == idl::WriteResult::kSent;
 }
 
 }  // namespace fdi::monitor

@@ -95,20 +95,11 @@ std::filesystem::path LockOf(const storage::DataDirectory& data) {
   return path += ".lock";
 }
 
-constexpr int kMaxSlots = 100'000;  // See idl::DdsOptions.
-
 // The reader never frees the slot of a valve while its publisher is alive, so
 // it needs more slots than the pipeline, which does free them.
 int IntakeValves(int max_valves) {
   constexpr int kSpareSlots = 60'000;
-  return std::min(max_valves + kSpareSlots, kMaxSlots);
-}
-
-// A writer whose history is full forgets the oldest vector, which may be the
-// last one of a silent valve. With slots to spare it never is, also while the
-// subscribers have not yet acknowledged the end of valves that are gone.
-int WriterValves(int max_valves) {
-  constexpr int kSpareSlots = 64;
+  constexpr int kMaxSlots = 100'000;  // See idl::DdsOptions.
   return std::min(max_valves + kSpareSlots, kMaxSlots);
 }
 
@@ -158,9 +149,8 @@ Service::Service(const ServiceOptions& options, const cli::Context& context)
               ? nullptr
               : MakeEventDelivery(options.on_event,
                                   Milliseconds(options.on_event_timeout_s))),
-      participant_(
-          DdsOptionsOf(context.options, WriterValves(options.max_valves)),
-          context.log, "fdi-monitor"),
+      participant_(DdsOptionsOf(context.options, options.max_valves),
+                   context.log, "fdi-monitor"),
       intake_participant_(
           DdsOptionsOf(context.options, IntakeValves(options.max_valves)),
           context.log, "fdi-monitor intake"),

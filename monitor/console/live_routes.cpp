@@ -5,6 +5,7 @@
 #include <httplib.h>
 
 #include "diagnosis/error.h"
+#include "diagnosis/printable.h"
 #include "diagnosis/time_units.h"
 #include "monitor/console/api.h"
 
@@ -13,7 +14,6 @@ namespace {
 
 constexpr double kStalePeriods = 3.0;
 constexpr std::chrono::milliseconds kPingPeriod{5000};
-constexpr std::size_t kMaxIdLength = 64;
 
 Json Status(const Api& api, const httplib::Request& request) {
   const std::optional<Visitor> visitor = api.access.Authenticate(request);

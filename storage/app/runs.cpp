@@ -174,9 +174,7 @@ std::uint64_t RandomSource() {
 
 // As on the bus, where a run may be replayed.
 void CheckValve(const std::string& valve) {
-  constexpr std::size_t kMaxValveIdLength = 64;
-  if (valve.empty() || valve.size() > kMaxValveIdLength ||
-      !IsPrintable(valve)) {
+  if (valve.empty() || valve.size() > kMaxIdLength || !IsPrintable(valve)) {
     throw ConfigError("--valve is '" + Printable(valve) +
                       "', accepted are 1 to 64 bytes without control "
                       "characters, in UTF-8");

@@ -4,6 +4,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/printable.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_database.h"
@@ -15,7 +16,6 @@ namespace {
 
 constexpr std::size_t kMaxWhoLength = 128;
 constexpr std::size_t kMaxCommentLength = 2000;
-constexpr std::size_t kMaxValveIdLength = 64;
 
 // Replaces control characters, which could move the cursor of a terminal.
 std::string Plain(std::string text) {
@@ -191,7 +191,7 @@ bool HistoryEditor::AdoptNote(const OperatorAction& action) {
 
 bool HistoryEditor::AdoptShelf(const OperatorAction& action) {
   const OperatorNote note = NoteOf(action);
-  RequireLength(action.valve_id, "valve", 1, kMaxValveIdLength);
+  RequireLength(action.valve_id, "valve", 1, kMaxIdLength);
   CheckShelfTime(action.stamp_ns, action.until_ns);
   const std::optional<std::string> fault =
       action.value.empty() ? std::nullopt
@@ -226,7 +226,7 @@ Shelf HistoryEditor::Shelve(std::string_view valve_id,
   const OperatorNote checked = Checked(note);
   Shelf shelf;
   shelf.valve_id = Plain(std::string(valve_id));
-  RequireLength(shelf.valve_id, "valve", 1, kMaxValveIdLength);
+  RequireLength(shelf.valve_id, "valve", 1, kMaxIdLength);
   shelf.fault = fault ? std::optional(CheckedFaults(*fault)) : std::nullopt;
   shelf.from_ns = checked.now_ns;
   shelf.until_ns = until_ns;
