@@ -30,7 +30,6 @@
 #include <algorithm>
 #include <random>
 #include <set>
-#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -129,7 +128,7 @@ bool Pair::IsCovered(const std::string& valve_id,
 
 bool Pair::Publish(const std::string& valve_id, const ModelSet* models,
                    const Verdict& verdict) {
-  if (held_vectors_.empty() && Leads()) {
+  if (held_vectors_.empty() && !round_.contains(valve_id) && Leads()) {
     return decisions_.Publish(valve_id, models, verdict);
   }
   if (held_vectors_.size() >= kMaxHeldVectors) {
@@ -142,7 +141,7 @@ bool Pair::Publish(const std::string& valve_id, const ModelSet* models,
 }
 
 bool Pair::LastValuesDue() {
-  if (!Leads()) {
+  if (!Leads() || !held_vectors_.empty() || !round_.empty()) {
     return false;
   }
   const bool lacks =
@@ -233,9 +232,13 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
   last_tick_ = now;
   constexpr milliseconds kNow{0};
   states_.Take(
-      {[&](const PairState& state, const auto&) {
+      {[&](const PairState& state, const idl::Reception& reception) {
          if (election_.OnState(state, now) && (state.leads || state.leaving)) {
            arrived_ = state.leaving ? now : now - kMaxDeliveryTime;
+         }
+         if (state.instance == election_.self().instance &&
+             reception.sent_ns >= round_ns_) {
+           round_.clear();
          }
        },
        {}},
@@ -300,7 +303,7 @@ void Pair::ApplyElection(TimePoint now) {
   }
   if (leads) {
     arrived_ = now;
-    PublishHeld();
+    PublishHeld(now);
   }
   if (!election_.same_rank().empty()) {
     log_.Report(
@@ -326,19 +329,13 @@ void Pair::ApplyElection(TimePoint now) {
   status_.takeovers += changed && leads ? 1 : 0;
 }
 
-// Publishes what was held before a takeover, or while the lease had expired:
-// one vector per valve and call, because the writer keeps only the last one
-// until it is sent.
-void Pair::PublishHeld() {
-  std::unordered_set<std::string> sent;
-  const bool all = held_vectors_.size() > kMaxHeldVectors / 2;
-  while (!held_vectors_.empty()) {
-    const idl::DecisionMessage& message = held_vectors_.front().message;
-    if (!sent.insert(message.valve_id).second && !all) {
-      break;
-    }
-    decisions_.Send(message);
-    held_vectors_.pop_front();
+// Publishes what was held before a takeover, or while the lease had expired.
+void Pair::PublishHeld(TimePoint now) {
+  if (now - round_since_ >= kMaxDeliveryTime) {
+    round_.clear();
+  }
+  if (round_.empty()) {
+    PublishHeldVectors(now);
   }
   const std::lock_guard lock(mutex_);
   for (const HeldEvent& held : std::exchange(held_events_, {})) {
@@ -346,6 +343,26 @@ void Pair::PublishHeld() {
       EventSink& out = held.resent ? bus_ : events_;
       out.Publish(held.event, held.event.persisted);
     }
+  }
+}
+
+// One vector per valve, because the writer forgets an older one even if the
+// library has not sent it yet. The library sends in the order of writing, so
+// once our state comes back the vectors before it are on their way.
+void Pair::PublishHeldVectors(TimePoint now) {
+  const bool all = held_vectors_.size() > kMaxHeldVectors / 2;
+  while (!held_vectors_.empty()) {
+    const idl::DecisionMessage& message = held_vectors_.front().message;
+    if (!round_.insert(message.valve_id).second && !all) {
+      break;
+    }
+    decisions_.Send(message);
+    held_vectors_.pop_front();
+  }
+  if (!round_.empty()) {
+    round_ns_ = storage::UtcNow();
+    round_since_ = now;
+    own_state_.Write(election_.self());
   }
 }
 

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "idl/endpoint.h"
@@ -108,7 +109,8 @@ class Pair : public DecisionSink, public EventSink {
   void OnVector(const idl::DecisionMessage& message);
   void OnEvent(const FaultEvent& event, TimePoint now);
   void ApplyElection(TimePoint now);
-  void PublishHeld();
+  void PublishHeld(TimePoint now);
+  void PublishHeldVectors(TimePoint now);
   void DropCovered(TimePoint now);
   void Adopt(TimePoint now, Pipeline& pipeline);
   void RepeatEvents(TimePoint since);
@@ -140,6 +142,11 @@ class Pair : public DecisionSink, public EventSink {
   TimePoint arrived_;
   std::unordered_map<std::string, Place> covered_;  // Heard, by valve.
   std::deque<HeldVector> held_vectors_;             // In order of arrival.
+  // Valves of which a held vector may not have left the writer yet, and since
+  // when, UTC and monotonic.
+  std::unordered_set<std::string> round_;
+  std::int64_t round_ns_{0};
+  TimePoint round_since_;
   // Number of subscribers at the takeover: a later one lacks what the former
   // leader published. -1: nothing is lacking.
   int vectors_lacked_{-1};
