@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <mutex>
 #include <string_view>
@@ -234,6 +236,17 @@ std::vector<std::string> SplitWords(const std::string& text) {
   return words;
 }
 
+// A request that was left behind may still use static objects of cpp-httplib.
+// So they outlive it: the process ends without destroying them.
+void KeepStaticObjects() {
+  [[maybe_unused]] static const int once = on_exit(
+      [](int status, void*) {
+        std::fflush(nullptr);
+        _exit(status);
+      },
+      nullptr);
+}
+
 // @returns why the server did not accept the text, or nothing on success.
 std::optional<std::string> Post(const std::string& server,
                                 const std::string& path,
@@ -285,6 +298,7 @@ class UrlDelivery : public EventDelivery {
     request_->changed.wait(
         lock, [this] { return request_->ended || request_->stopped; });
     if (!request_->ended) {
+      KeepStaticObjects();
       thread.detach();
       return kStops;
     }

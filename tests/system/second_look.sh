@@ -12,7 +12,7 @@ record() {  # FILE OPTIONS
 }
 
 record healthy.csv --seed 31 --duration 3600
-record faulty.csv --seed 32 --duration 1200 --fault f3:abrupt@300:strength=0.6
+record faulty.csv --seed 32 --duration 720 --fault f3:abrupt@300:strength=0.6
 "$bin/fdi-trainer" onboard --valve LV-1 --file healthy.csv --no-coverage \
   >onboard.log 2>&1 || fail "onboarding fails"
 "$bin/fdi-trainer" evaluate --valve LV-1 --file faulty.csv --json \
