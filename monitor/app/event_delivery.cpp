@@ -236,10 +236,10 @@ std::vector<std::string> SplitWords(const std::string& text) {
   return words;
 }
 
-// A request that was left behind may still use static objects of cpp-httplib.
-// So they outlive it: the process ends without destroying them.
+// A request that is left behind may still use static objects of cpp-httplib. So
+// the process ends without destroying them.
 void KeepStaticObjects() {
-  [[maybe_unused]] static const int once = on_exit(
+  on_exit(
       [](int status, void*) {
         std::fflush(nullptr);
         _exit(status);
@@ -275,7 +275,7 @@ class UrlDelivery : public EventDelivery {
 
   // The request has a thread of its own, which a stop leaves behind: neither
   // the lookup of the host's name nor cpp-httplib's connect() can be aborted.
-  // That thread uses nothing but its copies, until the process ends.
+  // That thread uses nothing of ours but its copies, until the process ends.
   std::optional<std::string> Deliver(const std::string& json) override {
     std::unique_lock lock(request_->mutex);
     if (request_->stopped) {

@@ -35,6 +35,7 @@
 
 #include "diagnosis/error.h"
 #include "diagnosis/printable.h"
+#include "storage/database/database.h"
 
 namespace fdi::monitor {
 namespace {
@@ -128,7 +129,7 @@ bool Pair::IsCovered(const std::string& valve_id,
 
 bool Pair::Publish(const std::string& valve_id, const ModelSet* models,
                    const Verdict& verdict) {
-  if (held_vectors_.empty() && !round_.contains(valve_id) && Leads()) {
+  if (held_vectors_.empty() && !in_flight_.contains(valve_id) && Leads()) {
     return decisions_.Publish(valve_id, models, verdict);
   }
   if (held_vectors_.size() >= kMaxHeldVectors) {
@@ -141,7 +142,7 @@ bool Pair::Publish(const std::string& valve_id, const ModelSet* models,
 }
 
 bool Pair::LastValuesDue() {
-  if (!Leads() || !held_vectors_.empty() || !round_.empty()) {
+  if (!Leads() || !held_vectors_.empty() || !in_flight_.empty()) {
     return false;
   }
   const bool lacks =
@@ -237,8 +238,8 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
            arrived_ = state.leaving ? now : now - kMaxDeliveryTime;
          }
          if (state.instance == election_.self().instance &&
-             reception.sent_ns >= round_ns_) {
-           round_.clear();
+             reception.sent_ns >= in_flight_ns_) {
+           in_flight_.clear();
          }
        },
        {}},
@@ -331,10 +332,10 @@ void Pair::ApplyElection(TimePoint now) {
 
 // Publishes what was held before a takeover, or while the lease had expired.
 void Pair::PublishHeld(TimePoint now) {
-  if (now - round_since_ >= kMaxDeliveryTime) {
-    round_.clear();
+  if (now - in_flight_since_ >= kMaxDeliveryTime) {
+    in_flight_.clear();
   }
-  if (round_.empty()) {
+  if (in_flight_.empty()) {
     PublishHeldVectors(now);
   }
   const std::lock_guard lock(mutex_);
@@ -353,15 +354,15 @@ void Pair::PublishHeldVectors(TimePoint now) {
   const bool all = held_vectors_.size() > kMaxHeldVectors / 2;
   while (!held_vectors_.empty()) {
     const idl::DecisionMessage& message = held_vectors_.front().message;
-    if (!round_.insert(message.valve_id).second && !all) {
+    if (!in_flight_.insert(message.valve_id).second && !all) {
       break;
     }
     decisions_.Send(message);
     held_vectors_.pop_front();
   }
-  if (!round_.empty()) {
-    round_ns_ = storage::UtcNow();
-    round_since_ = now;
+  if (!in_flight_.empty()) {
+    in_flight_ns_ = storage::UtcNow();
+    in_flight_since_ = now;
     own_state_.Write(election_.self());
   }
 }

@@ -143,10 +143,10 @@ class Pair : public DecisionSink, public EventSink {
   std::unordered_map<std::string, Place> covered_;  // Heard, by valve.
   std::deque<HeldVector> held_vectors_;             // In order of arrival.
   // Valves of which a held vector may not have left the writer yet, and since
-  // when, UTC and monotonic.
-  std::unordered_set<std::string> round_;
-  std::int64_t round_ns_{0};
-  TimePoint round_since_;
+  // when.
+  std::unordered_set<std::string> in_flight_;
+  std::int64_t in_flight_ns_{0};  // UTC, for comparison with messages.
+  TimePoint in_flight_since_;
   // Number of subscribers at the takeover: a later one lacks what the former
   // leader published. -1: nothing is lacking.
   int vectors_lacked_{-1};
