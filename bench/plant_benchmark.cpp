@@ -11,7 +11,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "storage/plant/shipper.h"
+#include "plant/shipper.h"
 #include "tests/storage/many_episodes.h"
 #include "tests/storage/private_postgres.h"
 

@@ -14,8 +14,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "base/error.h"
 #include "bench/cpu_seconds.h"
-#include "diagnosis/error.h"
 #include "idl/endpoint.h"
 #include "simulator/valve_simulation.h"
 

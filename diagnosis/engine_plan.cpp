@@ -1,6 +1,6 @@
 #include "diagnosis/engine_plan.h"
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi {
 namespace {

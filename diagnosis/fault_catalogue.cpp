@@ -5,8 +5,8 @@
 #include <cctype>
 #include <charconv>
 
-#include "diagnosis/error.h"
-#include "diagnosis/suggestion.h"
+#include "base/error.h"
+#include "base/suggestion.h"
 
 namespace fdi {
 namespace {

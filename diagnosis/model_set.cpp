@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi {

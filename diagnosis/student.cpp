@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/exponential.h"
 
 namespace fdi {

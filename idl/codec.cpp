@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/field_list.h"
+#include "base/printable.h"
 #include "diagnosis/fault_catalogue.h"
-#include "diagnosis/field_list.h"
-#include "diagnosis/printable.h"
 
 // Maps records to messages of fdi_v1.idl and back:
 //

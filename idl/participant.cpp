@@ -12,8 +12,8 @@
 #include <ifaddrs.h>
 #include <netinet/in.h>
 
-#include "diagnosis/error.h"
-#include "diagnosis/time_units.h"
+#include "base/error.h"
+#include "base/time_units.h"
 #include "idl/participant_impl.h"
 #include "idl/security/keys.h"
 #if FDI_FAST_DDS == 2

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "diagnosis/log.h"
+#include "base/log.h"
 #include "idl/datagram.h"
 
 namespace fdi::idl {

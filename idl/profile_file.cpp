@@ -9,7 +9,7 @@
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <tinyxml2.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "idl/participant_impl.h"
 #include "idl/qos.h"
 

@@ -13,7 +13,7 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
-#include "diagnosis/concurrency/bounded_queue.h"
+#include "base/bounded_queue.h"
 #include "idl/codec.h"
 #include "idl/endpoint.h"
 #include "idl/gap_counter.h"

@@ -2,8 +2,8 @@
 
 #include <iterator>
 
-#include "diagnosis/error.h"
-#include "diagnosis/printable.h"
+#include "base/error.h"
+#include "base/printable.h"
 
 namespace fdi::idl {
 

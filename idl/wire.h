@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/printable.h"
 #include "diagnosis/model_set.h"
-#include "diagnosis/printable.h"
 #include "diagnosis/records/fault_event.h"
 #include "diagnosis/records/monitor_share.h"
 #include "diagnosis/records/operator_action.h"

@@ -4,7 +4,7 @@
 #include <tuple>
 #include <utility>
 
-#include "diagnosis/time_units.h"
+#include "base/time_units.h"
 
 namespace fdi::monitor {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/student.h"
-#include "diagnosis/time_units.h"
 
 namespace fdi::monitor {
 namespace {

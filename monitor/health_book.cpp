@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "diagnosis/time_units.h"
+#include "base/time_units.h"
 #include "monitor/checkpoint.h"
 
 namespace fdi::monitor {

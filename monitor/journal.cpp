@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "diagnosis/printable.h"
+#include "base/printable.h"
 
 namespace fdi::monitor {
 namespace {

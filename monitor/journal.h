@@ -11,7 +11,7 @@
 #include <variant>
 #include <vector>
 
-#include "diagnosis/concurrency/worker.h"
+#include "base/worker.h"
 #include "monitor/checkpoint.h"
 #include "monitor/counters.h"
 #include "monitor/episode_tracker.h"

@@ -7,7 +7,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "diagnosis/printable.h"
+#include "base/printable.h"
 #include "monitor/counters.h"
 #include "monitor/throttled_log.h"
 

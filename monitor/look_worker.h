@@ -10,7 +10,7 @@
 #include <stop_token>
 #include <string>
 
-#include "diagnosis/concurrency/worker.h"
+#include "base/worker.h"
 #include "diagnosis/model_set.h"
 #include "monitor/sinks.h"
 #include "simulator/second_look/episode_looks.h"

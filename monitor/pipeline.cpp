@@ -7,7 +7,7 @@
 #include <exception>
 #include <utility>
 
-#include "diagnosis/printable.h"
+#include "base/printable.h"
 #include "diagnosis/quality_count.h"
 #include "diagnosis/records/valve_glob.h"
 

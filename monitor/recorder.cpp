@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "diagnosis/printable.h"
+#include "base/printable.h"
 
 namespace fdi::monitor {
 namespace {

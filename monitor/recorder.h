@@ -7,8 +7,8 @@
 #include <mutex>
 #include <optional>
 
-#include "diagnosis/concurrency/bounded_queue.h"
-#include "diagnosis/concurrency/worker.h"
+#include "base/bounded_queue.h"
+#include "base/worker.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
 #include "monitor/sinks.h"

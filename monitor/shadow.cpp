@@ -4,10 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "base/printable.h"
+#include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
-#include "diagnosis/printable.h"
 #include "diagnosis/records/valve_glob.h"
-#include "diagnosis/time_units.h"
 
 namespace fdi::monitor {
 namespace {

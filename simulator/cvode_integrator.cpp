@@ -7,7 +7,7 @@
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::simulator {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "simulator/level_loop.h"
 #include "simulator/random.h"
 #include "simulator/require_range.h"

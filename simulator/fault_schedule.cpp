@@ -4,7 +4,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "simulator/require_range.h"
 

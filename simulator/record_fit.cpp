@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "simulator/control_valve.h"
 #include "simulator/valve_equations.h"
 #include "simulator/valve_simulation.h"

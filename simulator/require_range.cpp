@@ -3,7 +3,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::simulator {
 

@@ -6,7 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::simulator {
 namespace {

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <optional>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "simulator/require_range.h"
 #include "simulator/robust_least_squares.h"
 #include "simulator/valve_equations.h"

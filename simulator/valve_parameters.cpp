@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "simulator/require_range.h"
 
 namespace fdi::simulator {

@@ -30,7 +30,7 @@ for id in $(grep -hoE '^\| M[0-9]{3}' docs/troubleshooting.md | tr -d '| '); do
   grep -qx "$id" <<<"$ids" || complain "$id is in the documents alone"
 done
 
-events=$(perl -0ne 'while (/Level::k(?:Warning|Error),\s*(?:std::string\(|(?:cli::)?EventLine\()?\s*"([a-z]+_[a-z_]+)/g) {
+events=$(perl -0ne 'while (/Level::k(?:Warning|Error),\s*(?:std::string\(|EventLine\()?\s*"([a-z]+_[a-z_]+)/g) {
   print "$1\n"}
   while (/LogId::k\w+,\s*"([a-z]+_[a-z_]+)/g) { print "$1\n" }' $sources | sort -u)
 [ "$(wc -l <<<"$events")" -gt 15 ] || complain "found few events in the sources"

@@ -19,16 +19,18 @@ forbid() {  # WHERE(regex of file) WHAT(regex of include) WHY
   fi
 }
 
-forbid '^(diagnosis|storage|cli|simulator|trainer|monitor)/' '(fastdds|fastrtps|fastcdr)/' \
+forbid '^(base|diagnosis|storage|import|report|simulator|trainer|monitor|planner|plant|programs)/' '(fastdds|fastrtps|fastcdr)/' \
   'Fast DDS belongs to idl'
-forbid '^(diagnosis|idl|cli|simulator|trainer|monitor)/' '(sqlite3\.h|SQLiteCpp/)' \
+forbid '^(base|diagnosis|idl|import|report|simulator|trainer|monitor|planner|plant|programs)/' '(sqlite3\.h|SQLiteCpp/)' \
   'SQLite belongs to storage'
-forbid '^(diagnosis|idl|cli|simulator|trainer|monitor|storage/(app|database|history|models|runs))/' 'libpq' \
-  'PostgreSQL belongs to storage/plant'
-forbid '^(diagnosis|idl|cli|storage|trainer|monitor)/' '(cvode|nvector|sun[a-z]+)/' \
+forbid '^(base|diagnosis|idl|import|report|simulator|trainer|monitor|planner|storage|programs)/' 'libpq' \
+  'PostgreSQL belongs to plant'
+forbid '^(base|diagnosis|idl|import|report|storage|trainer|monitor|planner|plant|programs)/' '(cvode|nvector|sun[a-z]+)/' \
   'SUNDIALS belongs to simulator'
-forbid '^((diagnosis|idl|simulator|trainer|monitor)/[^/]+$|storage/(database|runs|models|history|plant)/)' '(CLI/|toml\+\+|spdlog/|nlohmann/)' \
-  'command line, TOML, logging and JSON belong to the programs'
-forbid '^(diagnosis|idl|cli|simulator|trainer|storage)/' 'httplib\.h' \
+forbid '^((diagnosis|idl|simulator|trainer|monitor)/[^/]+$|(base|plant|storage)/)' '(CLI/|spdlog/|nlohmann/)' \
+  'command line, logging and JSON belong to the programs'
+forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|planner|plant|programs)/' 'toml\+\+' \
+  'TOML belongs to base and to the options'
+forbid '^(base|diagnosis|idl|import|report|simulator|trainer|storage|planner|plant|programs)/' 'httplib\.h' \
   'HTTP belongs to the monitor'
 exit "$failed"

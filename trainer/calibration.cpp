@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/residual_windows.h"
 #include "diagnosis/student.h"

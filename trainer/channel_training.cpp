@@ -6,7 +6,7 @@
 #include <optional>
 #include <random>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/regression.h"
 #include "trainer/statistics.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "trainer/gustafson_kessel.h"
 
 namespace fdi::trainer {

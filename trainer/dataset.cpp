@@ -8,7 +8,7 @@
 #include <map>
 #include <string>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi::trainer {

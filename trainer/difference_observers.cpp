@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "trainer/calibration.h"
 #include "trainer/channel_training.h"
 #include "trainer/model_set_description.h"

@@ -12,7 +12,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::trainer {
 namespace {

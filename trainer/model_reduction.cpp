@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 
 namespace fdi::trainer {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/floor_fit.h"
 

@@ -8,7 +8,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "trainer/regression.h"
 #include "trainer/statistics.h"

@@ -1,4 +1,4 @@
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "trainer/training.h"
 
 namespace fdi::trainer {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::trainer {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::trainer {
 double Mean(std::span<const double> values) {

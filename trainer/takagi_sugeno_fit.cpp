@@ -7,7 +7,7 @@
 
 #include <Eigen/QR>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "trainer/cluster_antecedents.h"
 #include "trainer/gustafson_kessel.h"
 

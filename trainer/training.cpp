@@ -2,7 +2,7 @@
 
 #include <atomic>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "trainer/calibration.h"
 #include "trainer/model_set_description.h"
 #include "trainer/observer_adaptation.h"

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "base/time_units.h"
 #include "diagnosis/student.h"
-#include "diagnosis/time_units.h"
 
 namespace fdi {
 namespace {

@@ -4,7 +4,7 @@
 #include <sstream>
 #include <string_view>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi {
 

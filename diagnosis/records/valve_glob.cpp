@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "diagnosis/printable.h"
+#include "base/printable.h"
 
 namespace fdi {
 namespace {

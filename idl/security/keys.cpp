@@ -21,9 +21,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/time_units.h"
 #include "diagnosis/records/partitions.h"
-#include "diagnosis/time_units.h"
 
 namespace fdi::idl {
 namespace {

@@ -7,7 +7,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "monitor/console/users.h"
 #include "monitor/http/private_file.h"
 

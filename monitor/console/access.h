@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "diagnosis/log.h"
+#include "base/log.h"
 
 namespace fdi::console {
 

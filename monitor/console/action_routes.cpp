@@ -1,8 +1,8 @@
 // Operator actions on alarms, recorded with who, why and from where.
 #include <httplib.h>
 
-#include "diagnosis/error.h"
-#include "diagnosis/time_units.h"
+#include "base/error.h"
+#include "base/time_units.h"
 #include "monitor/console/api.h"
 #include "storage/history/alarm.h"
 #include "storage/history/history_editor.h"

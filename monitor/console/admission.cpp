@@ -4,7 +4,7 @@
 
 #include <httplib.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "monitor/console/api.h"
 
 namespace fdi::console {

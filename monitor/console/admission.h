@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "diagnosis/log.h"
+#include "base/log.h"
 #include "monitor/console/access.h"
 #include "monitor/console/logins.h"
 #include "monitor/throttled_log.h"

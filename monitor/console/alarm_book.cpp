@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::console {
 namespace {

@@ -31,7 +31,7 @@ class AlarmBook {
  public:
   using ByValveMap = std::map<std::string, ValveAlarm>;
 
-  AlarmBook(OpenHistory open, const cli::FaultTexts& texts)
+  AlarmBook(OpenHistory open, const report::FaultTexts& texts)
       : open_(std::move(open)), texts_(texts) {}
 
   /// Polls the history, and reopens it after a failure. One thread.
@@ -56,7 +56,7 @@ class AlarmBook {
   void Combine();
 
   OpenHistory open_;
-  const cli::FaultTexts& texts_;
+  const report::FaultTexts& texts_;
   std::unique_ptr<storage::History> history_;
   std::optional<std::string> version_;
   std::int64_t earliest_shelf_end_ns_{0};

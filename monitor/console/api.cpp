@@ -6,9 +6,9 @@
 
 #include <httplib.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "plant/plant_database.h"
 #include "storage/history/history_reader.h"
-#include "storage/plant/plant_database.h"
 
 namespace fdi::console {
 namespace {
@@ -17,7 +17,7 @@ constexpr std::int64_t kLastMs = 9'000'000'000'000;  // year 2255
 
 // Lower-cases a name for the middle of a sentence: "flow transmitter ...", but
 // "CV ...".
-std::string PlainName(const cli::FaultTexts& texts, std::string_view fault) {
+std::string PlainName(const report::FaultTexts& texts, std::string_view fault) {
   std::string name = texts.Words(fault, 0.0).name;
   if (name.size() > 1 &&
       std::islower(static_cast<unsigned char>(name[1])) != 0) {

@@ -11,12 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include "cli/fault_texts.h"
 #include "monitor/console/admission.h"
 #include "monitor/console/alarm_book.h"
 #include "monitor/console/live_board.h"
 #include "monitor/console/live_stream.h"
-#include "monitor/planner/work_list.h"
+#include "planner/work_list.h"
+#include "report/fault_texts.h"
 
 namespace httplib {
 class Server;
@@ -77,7 +77,7 @@ struct Api {
   AlarmBook& alarms;
   StoredModels& models;
   WorkListCache& work_list;
-  const cli::FaultTexts& texts;
+  const report::FaultTexts& texts;
   Admission& access;
   std::string instance;  ///< Differs after a restart.
   std::stop_token stopping{};

@@ -4,9 +4,9 @@
 
 #include <httplib.h>
 
-#include "cli/shared_files.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "monitor/http/request_head.h"
+#include "report/shared_files.h"
 #include "storage/history/history_reader.h"
 
 namespace fdi::console {
@@ -86,7 +86,7 @@ void Console::OnEvent(const FaultEvent& event) {
 
 std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked) {
   std::filesystem::path folder =
-      asked.empty() ? cli::SharedFile("console") : asked;
+      asked.empty() ? report::SharedFile("console") : asked;
   if (!std::filesystem::is_regular_file(folder / "index.html")) {
     const std::string what = folder.string() +
                              ": no index.html there; expected the folder of "
@@ -100,12 +100,12 @@ std::filesystem::path FindConsoleFiles(const std::filesystem::path& asked) {
 }
 
 Console::Console(const ConsoleOptions& options,
-                 const cli::GlobalOptions& global, LogSink log)
+                 const report::GlobalOptions& global, LogSink log)
     : server_(std::make_unique<monitor::HttpServer>(ServerOptions(options))),
       files_(FindConsoleFiles(options.files)),
       log_(std::move(log)),
       access_(options.admission, log_),
-      texts_(cli::LoadFaultTexts(global)) {}
+      texts_(report::LoadFaultTexts(global)) {}
 
 Console::~Console() {
   Close();

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/log.h"
+#include "base/log.h"
 #include "monitor/console/admission.h"
 #include "monitor/console/api.h"
 #include "monitor/http/http_server.h"
@@ -38,7 +38,7 @@ class Console {
  public:
   /// Binds the address and finds the page's files; nothing is served yet.
   /// @throws ConfigError, DataError, NotFoundError, std::runtime_error
-  Console(const ConsoleOptions& options, const cli::GlobalOptions& global,
+  Console(const ConsoleOptions& options, const report::GlobalOptions& global,
           LogSink log);
   /// Calls Close().
   ~Console();
@@ -84,7 +84,7 @@ class Console {
   std::filesystem::path files_;
   LogSink log_;
   Admission access_;
-  cli::FaultTexts texts_;
+  report::FaultTexts texts_;
   LiveBoard board_;
   LiveStream stream_;
   WorkListCache work_list_;

@@ -7,15 +7,15 @@
 
 #include <httplib.h>
 
-#include "cli/csv.h"
-#include "cli/plot/episode_figure.h"
-#include "cli/plot/gnuplot.h"
-#include "cli/report.h"
-#include "cli/time_text.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/time_text.h"
+#include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
-#include "diagnosis/time_units.h"
+#include "import/csv.h"
 #include "monitor/console/api.h"
+#include "report/plot/episode_figure.h"
+#include "report/plot/gnuplot.h"
+#include "report/report.h"
 #include "storage/history/strength.h"
 
 namespace fdi::console {
@@ -83,7 +83,7 @@ Json DaysJson(const storage::AlarmStatistics& statistics) {
   Json days = Json::array();
   for (const storage::DayAlarms& day : statistics.days) {
     days.push_back(
-        {{"day", cli::FormatTime(day.day * kNsPerDay, true).substr(0, 10)},
+        {{"day", FormatTime(day.day * kNsPerDay, true).substr(0, 10)},
          {"episodes", day.episodes},
          {"alarm_s", Rounded(day.alarm_s, 1)}});
   }
@@ -295,7 +295,7 @@ Json Episode(const Api& api, const httplib::Request& request) {
 }
 
 std::string ColumnName(Signal signal, FlowUnit unit) {
-  for (const cli::SignalColumn& column : cli::kSignalColumns) {
+  for (const importer::SignalColumn& column : importer::kSignalColumns) {
     if (column.signal == signal &&
         (signal != Signal::kF || column.flow_unit == unit)) {
       return std::string(column.name);
@@ -306,7 +306,7 @@ std::string ColumnName(Signal signal, FlowUnit unit) {
 
 Json CsvRow(const TracePoint& point, SignalMask signals,
             const ModelFacts& models) {
-  Json row{{"utc", cli::FormatTime(point.sample.stamp_ns, true)}};
+  Json row{{"utc", FormatTime(point.sample.stamp_ns, true)}};
   const auto value = [](const std::vector<double>& values, std::size_t i) {
     return i < values.size() ? Rounded(values[i], 6) : Json();
   };
@@ -341,12 +341,12 @@ File EpisodeCsv(const Api& api, const httplib::Request& request) {
   for (const TracePoint& point : points) {
     signals = static_cast<SignalMask>(signals | point.sample.present);
   }
-  std::vector<cli::Column> columns;
+  std::vector<report::Column> columns;
   const Json keys = CsvRow({}, signals, *models);
   for (const auto& [key, value] : keys.items()) {
     columns.push_back({key, key});
   }
-  cli::Report report;
+  report::Report report;
   Json& rows = report.document["rows"] = Json::array();
   for (const TracePoint& point : points) {
     rows.push_back(CsvRow(point, signals, *models));

@@ -271,9 +271,9 @@ Json ShelfJson(const storage::Shelf& shelf) {
           {"ended_by", TextOrNull(shelf.ended_by)}};
 }
 
-Json AlarmJson(const storage::Alarm& alarm, const cli::FaultTexts& texts) {
+Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {
   const storage::Episode& e = alarm.episode;
-  const cli::FaultWords words =
+  const report::FaultWords words =
       texts.Words(e.fault.value_or("unknown"), e.strength);
   Json json{{"episode", e.episode_id},
             {"valve", e.valve_id},
@@ -293,9 +293,9 @@ Json AlarmJson(const storage::Alarm& alarm, const cli::FaultTexts& texts) {
             {"acked_by", TextOrNull(e.acked_by)},
             {"acked_ms", Ms(e.acked_ns)},
             {"model_set", e.model_set},
-            {"severity", cli::SeverityName(words.severity)},
+            {"severity", report::SeverityName(words.severity)},
             {"discipline", words.discipline},
-            {"namur", cli::NamurName(words.namur)},
+            {"namur", report::NamurName(words.namur)},
             {"name", words.name},
             {"check", words.check}};
   if (!e.monitor.empty()) {
@@ -305,7 +305,7 @@ Json AlarmJson(const storage::Alarm& alarm, const cli::FaultTexts& texts) {
 }
 
 Json AlarmsJson(const std::vector<storage::Alarm>& alarms,
-                const cli::FaultTexts& texts) {
+                const report::FaultTexts& texts) {
   Json list = Json::array();
   for (const storage::Alarm& alarm : alarms) {
     list.push_back(AlarmJson(alarm, texts));

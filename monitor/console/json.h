@@ -5,16 +5,16 @@
 #include <string>
 #include <vector>
 
-#include "cli/fault_texts.h"
-#include "cli/json_output.h"
 #include "monitor/console/live_board.h"
+#include "report/fault_texts.h"
+#include "report/json_output.h"
 #include "storage/history/alarm.h"
 
 /// JSON of the console's responses; the keys are those of docs/console.md.
 namespace fdi::console {
 
-using cli::Json;
-using cli::JsonText;
+using report::Json;
+using report::JsonText;
 
 /// ns to ms since 1970.
 Json Ms(std::int64_t stamp_ns);
@@ -53,9 +53,9 @@ Json GapJson(const DataGap& gap);
 Json DriftJson(const ModelFacts* models,
                const std::vector<FollowedDrift>& drift);
 
-Json AlarmJson(const storage::Alarm& alarm, const cli::FaultTexts& texts);
+Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts);
 Json AlarmsJson(const std::vector<storage::Alarm>& alarms,
-                const cli::FaultTexts& texts);
+                const report::FaultTexts& texts);
 Json ShelfJson(const storage::Shelf& shelf);
 
 /// The alarm that `event` belongs to, made from the event alone because it is

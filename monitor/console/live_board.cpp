@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
-#include "diagnosis/time_units.h"
 #include "monitor/trace.h"
 
 namespace fdi::console {

@@ -4,9 +4,9 @@
 
 #include <httplib.h>
 
-#include "diagnosis/error.h"
-#include "diagnosis/printable.h"
-#include "diagnosis/time_units.h"
+#include "base/error.h"
+#include "base/printable.h"
+#include "base/time_units.h"
 #include "monitor/console/api.h"
 
 namespace fdi::console {
@@ -126,7 +126,7 @@ Json Trend(const Api& api, const httplib::Request& request) {
 }
 
 Json Faults(const Api& api, const httplib::Request& /*request*/) {
-  return cli::FaultTextsJson(api.texts);
+  return report::FaultTextsJson(api.texts);
 }
 
 constexpr Route kLiveRoutes[] = {{"/api/v1/status", Status},

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "diagnosis/log.h"
+#include "base/log.h"
 #include "monitor/console/alarm_book.h"
 #include "monitor/console/live_board.h"
 
@@ -42,7 +42,7 @@ struct StreamCounts {
 struct FeedParts {
   LiveBoard& board;
   AlarmBook& alarms;
-  const cli::FaultTexts& texts;
+  const report::FaultTexts& texts;
   std::function<std::int64_t()> utc_now_ns;
   LogSink log;
   /// For a plant, whose history may be away: PlantJson(), sent every second.

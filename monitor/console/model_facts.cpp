@@ -7,7 +7,7 @@
 #include <limits>
 #include <optional>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/models/models.h"
 

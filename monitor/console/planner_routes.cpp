@@ -4,7 +4,7 @@
 
 #include <httplib.h>
 
-#include "diagnosis/time_units.h"
+#include "base/time_units.h"
 #include "monitor/console/api.h"
 #include "storage/history/health.h"
 
@@ -15,7 +15,7 @@ constexpr std::int64_t kDays = 90;  // Unless since_ms says otherwise.
 constexpr std::int64_t kMaxRows = 1000;
 constexpr std::int64_t kCacheNs = 60'000'000'000;
 
-std::vector<monitor::HealthLimit> LimitsOf(const httplib::Request& request) {
+std::vector<planner::HealthLimit> LimitsOf(const httplib::Request& request) {
   std::vector<std::string> texts;
   for (std::size_t i = 0; i < request.get_param_value_count("limit"); ++i) {
     texts.push_back(request.get_param_value("limit", i));
@@ -23,7 +23,7 @@ std::vector<monitor::HealthLimit> LimitsOf(const httplib::Request& request) {
   return planner::ParseLimits(texts);
 }
 
-cli::Report ReadReport(const Api& api, const httplib::Request& request) {
+report::Report ReadReport(const Api& api, const httplib::Request& request) {
   std::string query = "?";
   for (const auto& [name, value] : request.params) {
     query += name + "=" + value + "&";

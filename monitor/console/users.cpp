@@ -16,7 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "monitor/http/private_file.h"
 
 namespace fdi::console {

@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::monitor {
 namespace {

@@ -15,7 +15,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "monitor/http/private_file.h"
 
 namespace fdi::monitor {

@@ -7,8 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
-#include "diagnosis/time_units.h"
 #include "simulator/fault_effects.h"
 
 namespace fdi::simulator {

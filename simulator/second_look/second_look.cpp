@@ -7,7 +7,7 @@
 #include <map>
 #include <utility>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "simulator/control_valve.h"
 #include "simulator/fault_effects.h"

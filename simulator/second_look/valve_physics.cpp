@@ -7,8 +7,8 @@
 #include <string>
 #include <type_traits>
 
-#include "diagnosis/error.h"
-#include "diagnosis/field_list.h"
+#include "base/error.h"
+#include "base/field_list.h"
 
 namespace fdi::simulator {
 namespace {

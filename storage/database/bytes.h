@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::storage {
 

@@ -2,7 +2,7 @@
 
 #include <system_error>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::storage {
 

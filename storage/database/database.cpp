@@ -11,7 +11,7 @@
 #include <sqlite3.h>
 #include <unistd.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/records/valve_glob.h"
 #include "storage/database/data_directory.h"
 #include "storage/database/locks.h"

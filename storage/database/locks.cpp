@@ -12,7 +12,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/database/database.h"
 
 namespace fdi::storage {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "diagnosis/time_units.h"
+#include "base/time_units.h"
 #include "storage/database/record.h"
 #include "storage/history/sql.h"
 

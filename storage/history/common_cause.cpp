@@ -4,7 +4,7 @@
 #include <array>
 #include <set>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/records/valve_glob.h"
 #include "diagnosis/verdict.h"
 #include "storage/database/record.h"

@@ -7,8 +7,8 @@
 #include <cstdio>
 #include <utility>
 
-#include "diagnosis/error.h"
-#include "diagnosis/suggestion.h"
+#include "base/error.h"
+#include "base/suggestion.h"
 
 namespace fdi::storage {
 namespace {

@@ -2,10 +2,10 @@
 
 #include <cstdint>
 
+#include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/records/valve_glob.h"
-#include "diagnosis/time_units.h"
 #include "storage/database/bytes.h"
 #include "storage/history/sql.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/history/episode.h"
 #include "storage/history/sql.h"
 

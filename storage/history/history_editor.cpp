@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/printable.h"
 #include "diagnosis/fault_catalogue.h"
-#include "diagnosis/printable.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_database.h"

@@ -2,9 +2,9 @@
 
 #include <iterator>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
-#include "diagnosis/time_units.h"
 #include "storage/database/record.h"
 #include "storage/history/episode.h"
 #include "storage/history/sql.h"

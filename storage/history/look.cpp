@@ -1,7 +1,7 @@
 // Second looks, as HistoryWriter stores and HistoryReader returns them.
 #include <string>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_reader.h"

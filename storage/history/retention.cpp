@@ -6,7 +6,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "diagnosis/time_units.h"
+#include "base/time_units.h"
 #include "storage/history/health.h"
 #include "storage/history/history_database.h"
 #include "storage/history/sql.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/database/bytes.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_database.h"

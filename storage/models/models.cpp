@@ -6,7 +6,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/models/model_codec.h"

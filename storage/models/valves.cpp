@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/database/record.h"
 #include "storage/models/models.h"
 #include "storage/models/sql.h"

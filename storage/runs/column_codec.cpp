@@ -10,7 +10,7 @@
 
 #include <zlib.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::storage {
 

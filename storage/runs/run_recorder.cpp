@@ -5,7 +5,7 @@
 
 #include <unistd.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/runs/sql.h"
 
 namespace fdi::storage {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/database/record.h"
 #include "storage/runs/run_rows.h"

@@ -5,7 +5,7 @@
 #include <limits>
 #include <string>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/database/bytes.h"
 #include "storage/runs/column_codec.h"
 

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/valve_engine.h"
 #include "tests/diagnosis/linear_plant.h"
 

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/valve_engine.h"
 #include "tests/diagnosis/linear_plant.h"

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/time_units.h"
 #include "diagnosis/student.h"
-#include "diagnosis/time_units.h"
 
 namespace fdi {
 namespace {

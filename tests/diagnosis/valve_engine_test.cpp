@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "tests/diagnosis/allocation_count.h"
 #include "tests/diagnosis/engine_run.h"
 #include "tests/diagnosis/linear_plant.h"

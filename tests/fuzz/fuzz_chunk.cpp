@@ -6,7 +6,7 @@
 
 #include <zlib.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/runs/sample_codec.h"
 
 namespace {

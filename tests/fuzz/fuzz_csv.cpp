@@ -4,8 +4,8 @@
 #include <sstream>
 #include <string>
 
-#include "cli/csv.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "import/csv.h"
 
 namespace {
 
@@ -13,12 +13,13 @@ using fdi::SampleSeries;
 
 void ReadAgain(const SampleSeries& run) {
   std::stringstream text;
-  fdi::cli::WriteCsv(text, run.samples, run.flow_unit, 0);
-  fdi::cli::CsvOptions options;
+  fdi::importer::WriteCsv(text, run.samples, run.flow_unit, 0);
+  fdi::importer::CsvOptions options;
   options.period_s = run.period_s;
   options.required = 0;
   try {
-    const fdi::cli::CsvTable table = fdi::cli::ReadCsv(text.str(), options);
+    const fdi::importer::CsvTable table =
+        fdi::importer::ReadCsv(text.str(), options);
     if (table.runs.size() != 1 ||
         table.runs[0].samples.size() != run.samples.size()) {
       std::abort();
@@ -35,7 +36,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
   if (size == 0) {
     return 0;
   }
-  fdi::cli::CsvOptions options;
+  fdi::importer::CsvOptions options;
   options.split_gaps = (data[0] & 1) != 0;
   options.period_s = (data[0] & 2) != 0 ? 1.0 : 0.0;
   const std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
@@ -44,7 +45,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data,
   }
   try {
     for (const SampleSeries& run :
-         fdi::cli::ReadCsv(fdi::cli::ToUtf8(bytes, "input"), options).runs) {
+         fdi::importer::ReadCsv(fdi::ToUtf8(bytes, "input"), options).runs) {
       ReadAgain(run);
     }
   } catch (const fdi::DataError&) {

@@ -7,7 +7,7 @@
 
 #include <zlib.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/models/model_codec.h"
 
 namespace {

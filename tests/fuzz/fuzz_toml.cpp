@@ -6,22 +6,22 @@
 
 #include <unistd.h>
 
-#include "cli/tag_map.h"
-#include "cli/toml_reader.h"
-#include "diagnosis/error.h"
-#include "simulator/app/scenario_toml.h"
+#include "base/error.h"
+#include "base/toml_reader.h"
+#include "import/tag_map.h"
+#include "simulator/scenario/scenario_toml.h"
 
 namespace {
 
 // What was taken, and written as text, is taken again.
 void ReadScenario(const std::string& text) {
   fdi::simulator::Scenario scenario;
-  fdi::cli::TomlReader file(text, "fuzz.toml");
+  fdi::TomlReader file(text, "fuzz.toml");
   fdi::simulator::ApplyScenario(file, "/nowhere", scenario);
   file.Finish();
   const std::string canonical = fdi::simulator::ScenarioText(scenario);
   fdi::simulator::Scenario again;
-  fdi::cli::TomlReader written(canonical, "written.toml");
+  fdi::TomlReader written(canonical, "written.toml");
   try {
     fdi::simulator::ApplyScenario(written, "/nowhere", again);
     written.Finish();
@@ -35,7 +35,7 @@ void ReadTagMap(const std::string& text) {
       std::filesystem::temp_directory_path() /
       ("fdi-fuzz-" + std::to_string(getpid()) + ".toml");
   std::ofstream(path, std::ios::trunc) << text;
-  fdi::cli::ReadTagMap(path);
+  fdi::importer::ReadTagMap(path);
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // Bytes from a foreign publisher: refused, or a message that can be sent again.
 #include <string_view>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "tests/idl/payload.h"
 
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/csv.h"
-#include "simulator/app/scenario_toml.h"
+#include "import/csv.h"
+#include "simulator/scenario/scenario_toml.h"
 #include "storage/models/model_codec.h"
 #include "storage/runs/sample_codec.h"
 #include "tests/idl/payload.h"
@@ -48,7 +48,7 @@ void WriteTables() {
     for (std::size_t k = 0; truth && k < samples.size(); ++k) {
       samples[k].truth = fdi::FaultTruth{k > 9 ? 19 : 0, k > 9 ? 0.5 : 0.0};
     }
-    fdi::cli::WriteCsv(text, samples, fdi::FlowUnit::kM3PerHour, start);
+    fdi::importer::WriteCsv(text, samples, fdi::FlowUnit::kM3PerHour, start);
     Write("csv", truth ? "truth" : "plain", std::string(1, '\1') + text.str());
   }
 }

@@ -10,7 +10,7 @@
 #include <openssl/pkcs7.h>
 #include <openssl/x509v3.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::idl {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "idl/security/keys.h"
 #include "tests/idl/dds_fixture.h"
 #include "tests/storage/temporary_directory.h"

@@ -1,12 +1,12 @@
-#include "monitor/app/cause_groups.h"
+#include "monitor/service/cause_groups.h"
 
 #include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
-#include "monitor/app/history_store.h"
+#include "base/error.h"
+#include "monitor/service/history_store.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -120,7 +120,7 @@ TEST_F(CauseGroupsTest, CauseIsToldOnceItIsStoredAndOverARestart) {
   Record("A-2", TransitionKind::kIsolated, 20);
   ASSERT_EQ(told_.size(), 1u);
   EXPECT_EQ(told_[0].kind, Kind::kOpened);
-  const cli::Json json = CauseJson(told_[0]);
+  const report::Json json = CauseJson(told_[0]);
   EXPECT_EQ(json["kind"], "COMMON_CAUSE_OPENED");
   EXPECT_EQ(json["valves"], 2);
 

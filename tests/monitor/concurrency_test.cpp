@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "diagnosis/concurrency/bounded_queue.h"
-#include "diagnosis/concurrency/worker.h"
+#include "base/bounded_queue.h"
+#include "base/worker.h"
 
 namespace fdi {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "monitor/console/access.h"
 #include "tests/storage/message_of.h"
 #include "tests/storage/temporary_directory.h"

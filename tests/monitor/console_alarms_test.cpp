@@ -1,12 +1,12 @@
 #include <gmock/gmock.h>
 
-#include "cli/shared_files.h"
 #include "monitor/console/alarm_book.h"
 #include "monitor/console/model_facts.h"
+#include "plant/plant_database.h"
+#include "report/shared_files.h"
 #include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
-#include "storage/plant/plant_database.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/history_fixture.h"
 
@@ -30,7 +30,7 @@ class AlarmBookTest : public storage::HistoryFixture {
   }
 
   storage::HistoryWriter writer_{path_};
-  cli::FaultTexts texts_{cli::SharedFile("faults.toml")};
+  report::FaultTexts texts_{report::SharedFile("faults.toml")};
   AlarmBook book_{
       [this] { return std::make_unique<storage::HistoryReader>(path_); },
       texts_};

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 #include <httplib.h>
 
-#include "cli/time_text.h"
+#include "base/time_text.h"
 #include "diagnosis/valve_engine.h"
 #include "monitor/console/console.h"
 #include "storage/models/models.h"
@@ -56,7 +56,7 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
     options.address.host = "127.0.0.1";
     options.files = directory_.path() / "page";
     options.admission = admission;
-    console_.emplace(options, cli::GlobalOptions{},
+    console_.emplace(options, report::GlobalOptions{},
                      [this](LogLevel, std::string_view line) {
                        const std::lock_guard lock(log_mutex_);
                        log_.append(line).append("\n");
@@ -66,7 +66,7 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
                      [] {
                        return MonitorFacts{"OK", {{"received", 7}}, 1};
                      },
-                     cli::NowNs});
+                     NowNs});
     const std::string log = TakeLog();
     const std::size_t line = log.find("console_listening");
     port_ = std::stoi(log.substr(log.find(':', line) + 1));

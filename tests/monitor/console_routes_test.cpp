@@ -6,9 +6,9 @@
 
 #include <gmock/gmock.h>
 
-#include "cli/plot/gnuplot.h"
-#include "diagnosis/error.h"
-#include "diagnosis/time_units.h"
+#include "base/error.h"
+#include "base/time_units.h"
+#include "report/plot/gnuplot.h"
 #include "tests/monitor/console_http_fixture.h"
 #include "tests/storage/message_of.h"
 

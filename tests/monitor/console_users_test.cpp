@@ -6,7 +6,7 @@
 
 #include <gmock/gmock.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "monitor/console/logins.h"
 #include "monitor/console/users.h"
 #include "tests/storage/message_of.h"

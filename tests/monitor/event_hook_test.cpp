@@ -1,4 +1,4 @@
-#include "monitor/app/event_hook.h"
+#include "monitor/service/event_hook.h"
 
 #include <csignal>
 #include <fstream>
@@ -16,8 +16,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "cli/shared_files.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "report/shared_files.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -39,7 +39,7 @@ class FakeDelivery : public EventDelivery {
  public:
   std::optional<std::string> Deliver(const std::string& json) override {
     std::unique_lock lock(mutex);
-    got.push_back(cli::Json::parse(json));
+    got.push_back(report::Json::parse(json));
     changed.notify_all();
     changed.wait(lock, [this] { return open; });
     if (got.size() <= throwing) {
@@ -61,7 +61,7 @@ class FakeDelivery : public EventDelivery {
 
   std::mutex mutex;
   std::condition_variable changed;
-  std::vector<cli::Json> got;
+  std::vector<report::Json> got;
   bool open{true};
   std::size_t throwing{0};  // So many deliveries first.
   std::optional<std::string> failure;
@@ -354,7 +354,7 @@ TEST_F(EventHookTest, ADeliveryThatThrowsFailsAndTheNextOneIsMade) {
 }
 
 TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
-  const cli::FaultTexts texts(cli::SharedFile("faults.toml"));
+  const report::FaultTexts texts(report::SharedFile("faults.toml"));
   FaultEvent event;
   event.valve_id = "V1";
   event.episode_id = 0xAB;
@@ -366,7 +366,7 @@ TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
   event.transition.faults = 2;  // f7
   event.transition.strength = 0.7;
 
-  const cli::Json json = EventJson(event, true, texts);
+  const report::Json json = EventJson(event, true, texts);
   EXPECT_EQ(json["kind"], "ISOLATED");
   EXPECT_EQ(json["fault"], "f7");
   EXPECT_EQ(json["name"], texts.Of(7).name);
@@ -378,7 +378,7 @@ TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
 
 // Only once no known fault explains it any more.
 TEST(EventJsonTest, ADetectionIsNotYetUnlikeAnyKnownFault) {
-  const cli::FaultTexts texts(cli::SharedFile("faults.toml"));
+  const report::FaultTexts texts(report::SharedFile("faults.toml"));
   FaultEvent event;
   event.transition.kind = TransitionKind::kDetected;
   event.transition.unknown = Unknown::kTooEarly;

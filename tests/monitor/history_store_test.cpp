@@ -1,4 +1,4 @@
-#include "monitor/app/history_store.h"
+#include "monitor/service/history_store.h"
 
 #include <string>
 #include <vector>

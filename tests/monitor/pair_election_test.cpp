@@ -1,4 +1,4 @@
-#include "monitor/pair_election.h"
+#include "monitor/pair/pair_election.h"
 
 #include <memory>
 #include <optional>

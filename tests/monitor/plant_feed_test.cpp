@@ -1,4 +1,4 @@
-#include "monitor/app/plant_feed.h"
+#include "monitor/service/plant_feed.h"
 
 #include <gtest/gtest.h>
 

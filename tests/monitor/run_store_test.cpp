@@ -1,4 +1,4 @@
-#include "monitor/app/run_store.h"
+#include "monitor/service/run_store.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

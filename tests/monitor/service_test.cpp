@@ -1,4 +1,4 @@
-#include "monitor/app/service.h"
+#include "monitor/service/service.h"
 
 #include <csignal>
 #include <filesystem>
@@ -12,8 +12,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "cli/time_text.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/time_text.h"
 #include "storage/history/history_database.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
@@ -43,7 +43,7 @@ class ServiceTest : public testing::Test {
     global_.data_dir = directory_.path() / "data";
     global_.domain = domain_.id();
   }
-  cli::Context Context(const std::string& software = "fdi-test 1.0") {
+  report::Context Context(const std::string& software = "fdi-test 1.0") {
     return {global_,
             [this](LogLevel, std::string_view line) {
               notice_.Apply([&] { lines_.emplace_back(line); });
@@ -69,22 +69,22 @@ class ServiceTest : public testing::Test {
 
   storage::TemporaryDirectory directory_;
   const idl::TestDomain domain_;
-  cli::GlobalOptions global_;
+  report::GlobalOptions global_;
   Notice notice_;
   std::vector<std::string> lines_;
 };
 
 // The bus takes no text of more than 64 bytes: publishing the status throws.
 TEST_F(ServiceTest, AnErrorWhileServingStillEndsTheSessionInOrder) {
-  const cli::Context context = Context(std::string(100, 's'));
-  cli::StopSignals signals;
+  const report::Context context = Context(std::string(100, 's'));
+  report::StopSignals signals;
   Service service({}, context);
 
   EXPECT_THROW(service.Run(signals), DataError);
 
   EXPECT_EQ(Count("monitor_stopping"), 1U);
   EXPECT_EQ(Count("monitor_stopped"), 1U);
-  HistoryStore(global_.data_dir / "history.db", cli::NowNs, context.log)
+  HistoryStore(global_.data_dir / "history.db", NowNs, context.log)
       .BeginSession("test", "");
   EXPECT_THAT(lines_, Not(Contains(StartsWith("session_died"))));
 }
@@ -110,8 +110,8 @@ TEST_F(ServiceTest, AnErrorAtTheStartLeavesNoThreadOfTheConsole) {
   options.console->files = page;
   options.http.emplace();
   options.http->host = options.console->address.host = "127.0.0.1";
-  const cli::Context context = Context();
-  cli::StopSignals signals;
+  const report::Context context = Context();
+  report::StopSignals signals;
   std::size_t threads_left = 0;
   for (const char* data : {"first", "second"}) {
     global_.data_dir = directory_.path() / data;
@@ -131,8 +131,8 @@ TEST_F(ServiceTest, AnErrorAtTheStartLeavesNoThreadOfTheConsole) {
 
 // Who asks for a reload wants to know, however often.
 TEST_F(ServiceTest, EveryReloadThatFailsIsALineOfTheLog) {
-  const cli::Context context = Context();
-  cli::StopSignals signals;
+  const report::Context context = Context();
+  report::StopSignals signals;
   Service service({}, context);
   Execute(global_.data_dir / "models.db", storage::ModelsSchema(),
           "DROP TABLE valve");
@@ -164,8 +164,8 @@ TEST_F(ServiceTest, AReloadThatFailedIsTriedAgain) {
       store.AssignModelSet(name, storage::ModelReference{name, 1});
     }
   }
-  const cli::Context context = Context();
-  cli::StopSignals signals;
+  const report::Context context = Context();
+  report::StopSignals signals;
   Service service({}, context);
   const auto rename = [&](const std::string& from, const std::string& to) {
     Execute(

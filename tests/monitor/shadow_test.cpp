@@ -1,4 +1,4 @@
-#include "monitor/app/shadow.h"
+#include "monitor/service/shadow.h"
 
 #include <memory>
 #include <string>

@@ -1,10 +1,10 @@
-#include "monitor/app/share_watch.h"
+#include "monitor/bus/share_watch.h"
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/records/partitions.h"
-#include "monitor/app/status.h"
+#include "monitor/service/status.h"
 
 namespace fdi::monitor {
 namespace {

@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <httplib.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "monitor/http/http_server.h"
 #include "tests/monitor/certificates.h"
 #include "tests/monitor/raw_client.h"

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <httplib.h>
 
-#include "cli/time_text.h"
+#include "base/time_text.h"
 #include "monitor/console/console.h"
 #include "tests/storage/history_fixture.h"
 
@@ -21,7 +21,7 @@ class PlannerRoutesTest : public storage::HistoryFixture {
     options.address.host = "127.0.0.1";
     options.files = directory_.path();
     std::string listening;
-    console_.emplace(options, cli::GlobalOptions{},
+    console_.emplace(options, report::GlobalOptions{},
                      [&listening](LogLevel, std::string_view line) {
                        if (line.starts_with("console_listening")) {
                          listening = line;

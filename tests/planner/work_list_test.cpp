@@ -1,11 +1,11 @@
-#include "monitor/planner/work_list.h"
+#include "planner/work_list.h"
 
 #include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/shared_files.h"
+#include "report/shared_files.h"
 #include "storage/history/history_editor.h"
 #include "tests/storage/history_fixture.h"
 
@@ -17,8 +17,8 @@ using testing::HasSubstr;
 constexpr std::int64_t kDay = 86'400'000'000'000;
 constexpr std::int64_t kNow = 20'000 * kDay;
 
-const cli::FaultTexts& Texts() {
-  static const cli::FaultTexts texts(cli::SharedFile("faults.toml"));
+const report::FaultTexts& Texts() {
+  static const report::FaultTexts texts(report::SharedFile("faults.toml"));
   return texts;
 }
 
@@ -68,10 +68,10 @@ TEST(WorkListTest, WeightIsSeverityConfidenceUrgencyAndRepetition) {
 }
 
 TEST(WorkListTest, TrendsWeighTheMoreTheNearerTheirLimit) {
-  using Answer = monitor::HealthForecast::Answer;
+  using Answer = HealthForecast::Answer;
   LimitTrend reason;
   reason.forecast.answer = Answer::kTime;
-  reason.forecast.time = monitor::TimeToLimit{45.0, 30.0, 60.0};
+  reason.forecast.time = TimeToLimit{45.0, 30.0, 60.0};
   EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 3.0);
   reason.forecast.time->days = 400.0;
   EXPECT_DOUBLE_EQ(WeightOf(reason, Options()), 0.0);

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "simulator/valve_simulation.h"
 
 namespace fdi::simulator {

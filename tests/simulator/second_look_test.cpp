@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/records/growth.h"
 #include "simulator/second_look/episode_looks.h"

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "simulator/random.h"
 #include "simulator/valve_simulation.h"
 

@@ -9,7 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/database/data_directory.h"
 #include "storage/history/history_database.h"
 #include "storage/history/history_reader.h"

@@ -7,7 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/database/data_directory.h"
 #include "storage/database/locks.h"
 #include "tests/storage/temporary_directory.h"

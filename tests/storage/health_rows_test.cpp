@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/history/health.h"
 #include "storage/history/history_database.h"
 #include "storage/history/history_writer.h"

@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/history/operator_log.h"
 #include "tests/storage/history_fixture.h"
 #include "tests/storage/message_of.h"

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {

@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {

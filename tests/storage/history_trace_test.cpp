@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/history/history_writer.h"
 #include "tests/storage/history_fixture.h"
 

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "tests/storage/history_fixture.h"
 
 namespace fdi::storage {

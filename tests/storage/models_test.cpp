@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/models/model_codec.h"
 #include "tests/storage/message_of.h"
 #include "tests/storage/model_set_fixture.h"

@@ -4,9 +4,9 @@
 
 #include <gmock/gmock.h>
 
-#include "cli/csv.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "import/csv.h"
 #include "storage/runs/run_recorder.h"
 #include "tests/storage/runs_fixture.h"
 
@@ -23,11 +23,11 @@ using RunsTest = RunsFixture;
 
 std::vector<SampleSeries> TableOf(const std::string& text,
                                   bool split_gaps = false) {
-  cli::CsvOptions options;
+  importer::CsvOptions options;
   options.required = 0;
   options.start_ns = kStart;
   options.split_gaps = split_gaps;
-  return cli::ReadCsv(text, options).runs;
+  return importer::ReadCsv(text, options).runs;
 }
 
 TEST_F(RunsTest, AStretchIsHalfOpenAndInSecondsFromTheStart) {
@@ -226,7 +226,7 @@ TEST_F(RunsTest, PlantRecordReadsBackExactly) {
   }
   const auto csv = std::filesystem::path(reference) / "plant" /
                    "lublin_actuator3_2001-10-11_first40min.csv";
-  const auto table = cli::ReadCsvFile(csv);
+  const auto table = importer::ReadCsvFile(csv);
   RunStore store(file_, Access::kOccasionalWriter);
   const std::string id = store.Import(table.runs, RunOf("V"))[0];
   const StoredRun run = store.Load(id);

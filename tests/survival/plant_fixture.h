@@ -10,7 +10,7 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
-#include "storage/plant/plant_database.h"
+#include "plant/plant_database.h"
 #include "tests/storage/history_fixture.h"
 #include "tests/storage/private_postgres.h"
 

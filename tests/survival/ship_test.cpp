@@ -11,10 +11,10 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "plant/plant_reader.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/retention.h"
 #include "storage/history/valve_move.h"
-#include "storage/plant/plant_reader.h"
 #include "tests/storage/many_episodes.h"
 #include "tests/survival/plant_fixture.h"
 

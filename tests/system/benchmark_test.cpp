@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string>
 
-#include "tests/trainer/app_fixture.h"
+#include "tests/programs/trainer/fixture.h"
 
 namespace fdi::trainer {
 namespace {

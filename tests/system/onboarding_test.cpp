@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/trainer/app_fixture.h"
+#include "tests/programs/trainer/fixture.h"
 
 namespace fdi::trainer {
 namespace {

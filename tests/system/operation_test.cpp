@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/quality_count.h"
-#include "simulator/app/scenario_toml.h"
+#include "simulator/scenario/scenario_toml.h"
 #include "trainer/evaluation.h"
 #include "trainer/onboarding/onboarding.h"
 

@@ -5,7 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 
 namespace fdi::trainer {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "trainer/regression.h"
 
 namespace fdi::trainer {

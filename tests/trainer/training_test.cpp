@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "tests/trainer/gaussian.h"
 #include "trainer/evaluation.h"
 

@@ -5,16 +5,15 @@
 #include <cmath>
 #include <utility>
 
-#include "cli/toml_reader.h"
-#include "diagnosis/error.h"
-#include "simulator/app/scenario_toml.h"
+#include "base/error.h"
+#include "base/toml_reader.h"
+#include "simulator/scenario/scenario_toml.h"
 #include "trainer/campaign/campaign_fields.h"
 #include "trainer/campaign/file_runs.h"
 
 namespace fdi::trainer {
 namespace {
 
-using cli::TomlReader;
 using simulator::QuoteToml;
 using std::filesystem::path;
 

@@ -6,7 +6,7 @@
 #include <variant>
 #include <vector>
 
-#include "simulator/app/scenario_toml.h"
+#include "simulator/scenario/scenario_toml.h"
 #include "storage/runs/runs.h"
 #include "trainer/training.h"
 

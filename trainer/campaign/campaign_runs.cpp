@@ -8,11 +8,11 @@
 #include <optional>
 #include <utility>
 
-#include "cli/csv.h"
-#include "cli/progress.h"
-#include "cli/stop_signals.h"
-#include "cli/time_text.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/time_text.h"
+#include "import/csv.h"
+#include "report/progress.h"
+#include "report/stop_signals.h"
 #include "storage/runs/run_recorder.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/run_input.h"
@@ -147,9 +147,9 @@ class Collector {
     if (IsRepeated(scenario + '\n' + run.valve_id)) {
       return;
     }
-    cli::CsvOptions csv;
+    importer::CsvOptions csv;
     csv.start_ns = options_.start_ns;
-    cli::CsvTable table = cli::ReadCsvFile(run.file, csv);
+    importer::CsvTable table = importer::ReadCsvFile(run.file, csv);
     const SampleSeries& content = table.runs.front();
     const bool found = Reuse([&](const RunInfo& info) {
       if (info.run.origin != RunOrigin::kImported ||
@@ -217,7 +217,7 @@ class Collector {
   }
 
   void Import(std::size_t i, const ImportedRun& run,
-              const cli::CsvTable& table) {
+              const importer::CsvTable& table) {
     storage::NewRun row;
     row.valve_id = run.valve_id;
     row.start_ns = options_.start_ns;
@@ -275,8 +275,8 @@ class Collector {
   std::vector<RunInfo> known_;
   std::vector<std::string> ids_;  // Of the runs of the campaign.
   std::size_t at_{0};             // The run that is looked for.
-  std::vector<std::pair<std::size_t, cli::CsvTable>> files_;  // To import.
-  std::vector<std::size_t> missing_;                          // To simulate.
+  std::vector<std::pair<std::size_t, importer::CsvTable>> files_;  // To import.
+  std::vector<std::size_t> missing_;          // To simulate.
   std::map<std::string, std::size_t> first_;  // The first run, by content.
   // A later run, and the first one of the same content.
   std::vector<std::pair<std::size_t, std::size_t>> repeated_;
@@ -293,12 +293,12 @@ CollectedRuns CollectRuns(const std::vector<CampaignRun>& runs,
 }
 
 std::vector<storage::StoredRun> LoadCampaignRuns(
-    const std::vector<CampaignRun>& runs, const cli::Context& context) {
+    const std::vector<CampaignRun>& runs, const report::Context& context) {
   const storage::DataDirectory directory{context.options.data_dir};
-  const cli::StopSignals signals;
-  std::optional<cli::Progress> progress;  // Only if something is simulated.
+  const report::StopSignals signals;
+  std::optional<report::Progress> progress;  // Only if something is simulated.
   const CollectedRuns collected =
-      CollectRuns(runs, directory, {context.software, cli::NowNs(), 0},
+      CollectRuns(runs, directory, {context.software, NowNs(), 0},
                   [&](double share, const std::string& what) {
                     if (signals.stop_requested()) {
                       throw Interrupted("interrupted");

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/program.h"
+#include "report/program.h"
 #include "storage/database/data_directory.h"
 #include "trainer/campaign/campaign.h"
 
@@ -49,7 +49,7 @@ CollectedRuns CollectRuns(const std::vector<CampaignRun>& runs,
 /// The same with a progress bar, and loads them all.
 /// @throws as CollectRuns(), or Interrupted.
 std::vector<storage::StoredRun> LoadCampaignRuns(
-    const std::vector<CampaignRun>& runs, const cli::Context& context);
+    const std::vector<CampaignRun>& runs, const report::Context& context);
 
 /// Simulates a run in memory; its id stays empty.
 storage::StoredRun SimulateRun(const SimulatedRun& run);

@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "cli/logging.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/log.h"
 #include "simulator/valve_equations.h"
 
 namespace fdi::trainer {
@@ -97,11 +97,13 @@ std::vector<path> MatchingFiles(const std::string& pattern,
   return files;
 }
 
-storage::StoredRun ReadRunFile(const std::string& text, cli::CsvOptions csv) {
+storage::StoredRun ReadRunFile(const std::string& text,
+                               importer::CsvOptions csv) {
   storage::StoredRun run;
   run.selector = SplitStretch(text);
   csv.split_gaps = true;
-  const cli::CsvTable table = cli::ReadCsvFile(run.selector.id, std::move(csv));
+  const importer::CsvTable table =
+      importer::ReadCsvFile(run.selector.id, std::move(csv));
   const SampleSeries& content = table.runs.front();
   run.info.id = run.selector.id;
   run.info.run.start_ns = table.start_ns;
@@ -133,7 +135,7 @@ storage::StoredRun ReadRunFile(const std::string& text, cli::CsvOptions csv) {
 
 std::vector<storage::StoredRun> LoadRunsAndFiles(
     const std::vector<std::string>& runs, const std::vector<std::string>& files,
-    const storage::DataDirectory& directory, const cli::CsvOptions& csv) {
+    const storage::DataDirectory& directory, const importer::CsvOptions& csv) {
   std::vector<storage::StoredRun> loaded;
   if (!runs.empty()) {
     storage::RunStore store(directory.runs());
@@ -157,11 +159,10 @@ void ConvertFlow(storage::StoredRun& run, FlowUnit unit, const LogSink& log) {
   }
   if (log && (run.info.signals & MaskOf(Signal::kF)) != 0) {
     log(LogLevel::kInfo,
-        cli::EventLine(
-            "flow_converted",
-            {{"run", run.info.id},
-             {"from", std::string(FlowUnitName(run.info.run.flow_unit))},
-             {"to", std::string(FlowUnitName(unit))}}));
+        EventLine("flow_converted",
+                  {{"run", run.info.id},
+                   {"from", std::string(FlowUnitName(run.info.run.flow_unit))},
+                   {"to", std::string(FlowUnitName(unit))}}));
   }
   run.info.run.flow_unit = unit;
 }

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/csv.h"
 #include "diagnosis/sample.h"
+#include "import/csv.h"
 #include "storage/database/data_directory.h"
 #include "storage/runs/runs.h"
 
@@ -27,13 +27,14 @@ std::vector<std::filesystem::path> MatchingFiles(
 ///   from the first sample if times have a date].
 /// @throws NotFoundError if there is no such file or no sample in the stretch.
 /// @throws ConfigError if the stretch is none; DataError as ReadCsvFile().
-storage::StoredRun ReadRunFile(const std::string& text, cli::CsvOptions csv);
+storage::StoredRun ReadRunFile(const std::string& text,
+                               importer::CsvOptions csv);
 
 /// Stored runs, ID or ID@from:to, then files as ReadRunFile() reads them.
 /// @throws as RunStore::Load() and ReadRunFile().
 std::vector<storage::StoredRun> LoadRunsAndFiles(
     const std::vector<std::string>& runs, const std::vector<std::string>& files,
-    const storage::DataDirectory& directory, const cli::CsvOptions& csv);
+    const storage::DataDirectory& directory, const importer::CsvOptions& csv);
 
 /// Brings the flow of a run to `unit` by the density of water at T1.
 void ConvertFlow(storage::StoredRun& run, FlowUnit unit, const LogSink& log);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "cli/csv_cells.h"
+#include "base/csv_cells.h"
 
 namespace fdi::trainer {
 namespace {
@@ -37,7 +37,7 @@ std::string SelectorOf(const std::string& id,
     return id;
   }
   const auto bound = [](double seconds) {
-    return std::isfinite(seconds) ? cli::NumberText(seconds) : std::string();
+    return std::isfinite(seconds) ? NumberText(seconds) : std::string();
   };
   return id + '@' + bound(part.from_s) + ':' + bound(part.to_s);
 }

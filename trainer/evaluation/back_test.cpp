@@ -8,11 +8,11 @@
 #include <regex>
 #include <tuple>
 
-#include "cli/text_table.h"
-#include "cli/time_text.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/time_text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/valve_engine.h"
+#include "report/text_table.h"
 #include "simulator/valve_equations.h"
 #include "trainer/campaign/file_runs.h"
 #include "trainer/evaluation/csv_rows.h"
@@ -22,7 +22,7 @@
 namespace fdi::trainer {
 namespace {
 
-using cli::Json;
+using report::Json;
 using std::filesystem::path;
 
 // Work orders.
@@ -43,7 +43,7 @@ std::int64_t TimeOf(const CsvRows& rows, std::size_t row) {
     return std::llround(seconds * 1e9);
   }
   try {
-    return cli::ParseTime(cell, true);
+    return ParseTime(cell, true);
   } catch (const ConfigError& error) {
     rows.Refuse(row, error.what());
   }
@@ -101,7 +101,7 @@ std::optional<std::int64_t> StartInName(const path& file) {
            (match[4].matched ? match[4].str() : "00") + "Z";
   }
   try {
-    return cli::ParseTime(time, true);
+    return ParseTime(time, true);
   } catch (const ConfigError&) {
     throw DataError(file.string() + ": the date in its name, " +
                     match[0].str() + ", does not exist");
@@ -322,7 +322,7 @@ std::string SaidText(const Json& row) {
 }
 
 // A date, or seconds if the axis of the records is not UTC.
-cli::Column TimeColumn(const char* heading, const char* key, bool utc) {
+report::Column TimeColumn(const char* heading, const char* key, bool utc) {
   // An axis of seconds from 0 would have to be three years long to be taken for
   // dates.
   constexpr double kFirstDate = 1e8;  // 1973
@@ -334,23 +334,23 @@ cli::Column TimeColumn(const char* heading, const char* key, bool utc) {
             }
             const double seconds = row.at(key);
             return seconds < kFirstDate
-                       ? cli::FormatNumber(seconds, 0) + " s"
-                       : cli::FormatTime(std::llround(seconds * 1e9), utc);
+                       ? report::FormatNumber(seconds, 0) + " s"
+                       : FormatTime(std::llround(seconds * 1e9), utc);
           }};
 }
 
-cli::Column DurationColumn(
+report::Column DurationColumn(
     const char* heading, const char* key,
     const std::function<double(const Json& row)>& seconds) {
   return {.heading = heading, .key = key, .text = [seconds](const Json& row) {
             const double value = seconds(row);
             return value < 0.0 ? "-"
-                               : cli::FormatDuration(std::llround(value * 1e9));
+                               : FormatDuration(std::llround(value * 1e9));
           }};
 }
 
 void AddEpisodes(const char* heading, const char* key, bool utc,
-                 cli::Report& report) {
+                 report::Report& report) {
   if (report.document.at(key).empty()) {
     return;
   }
@@ -371,11 +371,11 @@ int CountOf(const OutcomeCounts& counts, std::size_t outcome) {
 }
 
 std::string OutcomesTable(const BackTest& test) {
-  std::vector<cli::TextTable::Column> columns{{"found"}};
+  std::vector<report::TextTable::Column> columns{{"found"}};
   for (const std::string_view name : kOutcomeNames) {
-    columns.push_back({std::string(name), cli::Align::kRight});
+    columns.push_back({std::string(name), report::Align::kRight});
   }
-  cli::TextTable table(std::move(columns));
+  report::TextTable table(std::move(columns));
   for (const auto& [fault, counts] : test.by_fault) {
     std::vector<std::string> row{FoundText(fault)};
     for (std::size_t o = 0; o < kOutcomeNames.size(); ++o) {
@@ -429,7 +429,7 @@ std::vector<ValveFiles> FindHistory(const std::string& pattern,
 
 PastRecord FollowHistory(const ValveFiles& files,
                          const std::shared_ptr<const ModelSet>& models,
-                         const cli::CsvOptions& options,
+                         const importer::CsvOptions& options,
                          const std::function<void(const path&)>& begin_file) {
   PastRecord record;
   record.valve = files.valve;
@@ -438,20 +438,20 @@ PastRecord FollowHistory(const ValveFiles& files,
     if (begin_file) {
       begin_file(file);
     }
-    cli::CsvOptions csv = options;
+    importer::CsvOptions csv = options;
     csv.required = RequiredSignals(*models);
     // Without the period of the models, a file of one sample has none.
     csv.split_gaps = true;
     csv.period_s = models->sample_period_s;
     csv.start_ns = StartInName(file).value_or(0);
-    const cli::CsvTable table = cli::ReadCsvFile(file, csv);
+    const importer::CsvTable table = importer::ReadCsvFile(file, csv);
     simulator::FlowConversion conversion(models->flow_unit);
     const Sample& first = table.runs.front().samples.front().sample;
     if (follower.has_samples() && first.stamp_ns <= record.last_ns) {
       throw DataError(file.string() + ": begins at " +
-                      cli::FormatTime(first.stamp_ns, true) +
+                      FormatTime(first.stamp_ns, true) +
                       ", not after the end of the file before, " +
-                      cli::FormatTime(record.last_ns, true) +
+                      FormatTime(record.last_ns, true) +
                       "; a date in the names of files (YYYY-MM-DD or "
                       "YYYY-MM-DDTHHMM) tells when t_s = 0 is");
     }
@@ -494,9 +494,10 @@ BackTest JudgeHistory(const std::vector<PastRecord>& records,
   return result;
 }
 
-cli::Report BackTestReport(const BackTest& test,
-                           const std::vector<PastRecord>& records, bool utc) {
-  cli::Report report;
+report::Report BackTestReport(const BackTest& test,
+                              const std::vector<PastRecord>& records,
+                              bool utc) {
+  report::Report report;
   Json& json = report.document;
   json["orders"] = Json::array();
   for (const JudgedOrder& judged : test.orders) {
@@ -542,15 +543,15 @@ cli::Report BackTestReport(const BackTest& test,
   AddEpisodes("false episode", "false_episodes", utc, report);
   AddEpisodes("undecided episode", "undecided_episodes", utc, report);
   const auto false_episodes = static_cast<int>(test.false_episodes.size());
-  std::string line = '\n' + cli::FormatNumber(hours, 1) + " h of samples, " +
-                     cli::FormatNumber(live_hours, 1) + " h diagnosed, " +
+  std::string line = '\n' + report::FormatNumber(hours, 1) + " h of samples, " +
+                     report::FormatNumber(live_hours, 1) + " h diagnosed, " +
                      std::to_string(rejected) + " samples rejected; " +
                      std::to_string(false_episodes) + " false episodes";
   if (live_hours > 0.0) {
     const EventRate rate = RateOf(false_episodes, live_hours);
-    line += ", " + cli::FormatNumber(rate.per_year, 2) +
-            " per valve-year (95 %: below " + cli::FormatNumber(rate.upper, 2) +
-            ")";
+    line += ", " + report::FormatNumber(rate.per_year, 2) +
+            " per valve-year (95 %: below " +
+            report::FormatNumber(rate.upper, 2) + ")";
   }
   return report.Line(line);
 }

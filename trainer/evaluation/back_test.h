@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "cli/csv.h"
-#include "cli/report.h"
 #include "diagnosis/model_set.h"
+#include "import/csv.h"
+#include "report/report.h"
 
 /// Back-tests: what would have been said about months of recorded files, and
 /// what people found when they looked at the valves.
@@ -74,7 +74,7 @@ struct PastRecord {
 ///   begins before the end of the file before.
 PastRecord FollowHistory(
     const ValveFiles& files, const std::shared_ptr<const ModelSet>& models,
-    const cli::CsvOptions& csv,
+    const importer::CsvOptions& csv,
     const std::function<void(const std::filesystem::path&)>& begin_file = {});
 
 enum class OrderOutcome {
@@ -119,7 +119,7 @@ BackTest JudgeHistory(const std::vector<PastRecord>& records,
 
 /// Orders with what was said before them, outcomes by fault, episodes that were
 /// false or are undecided, hours. @param utc Times for people in UTC.
-cli::Report BackTestReport(const BackTest& test,
-                           const std::vector<PastRecord>& records, bool utc);
+report::Report BackTestReport(const BackTest& test,
+                              const std::vector<PastRecord>& records, bool utc);
 
 }  // namespace fdi::trainer

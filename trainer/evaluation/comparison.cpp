@@ -5,8 +5,8 @@
 #include <sstream>
 #include <utility>
 
-#include "cli/text_table.h"
 #include "diagnosis/fault_catalogue.h"
+#include "report/text_table.h"
 #include "storage/models/model_codec.h"
 #include "trainer/evaluation/evaluation_report.h"
 #include "trainer/statistics.h"
@@ -14,9 +14,9 @@
 namespace fdi::trainer {
 namespace {
 
-using cli::Align;
-using cli::Column;
-using cli::Json;
+using report::Align;
+using report::Column;
+using report::Json;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSignificant = 0.05;
@@ -128,7 +128,7 @@ std::string JudgementOf(const ComparedMeasure& measure, const std::string& a,
   // p is not corrected for the number of figures (docs/learning.md, 3).
   const double p = PValue(test);
   const std::string value =
-      p < 1e-4 ? " (p < 0.0001)" : " (p = " + cli::FormatNumber(p, 4) + ")";
+      p < 1e-4 ? " (p < 0.0001)" : " (p = " + report::FormatNumber(p, 4) + ")";
   if (p > kSignificant) {
     return "no difference shown" + value;
   }
@@ -225,7 +225,7 @@ std::vector<Column> RunColumns(const ModelSet& a, const ModelSet& b) {
 
 // The runs on which the sets differ, and how many others there are.
 std::string RunsText(const Comparison& comparison, const Json& runs, bool all) {
-  cli::Report shown;
+  report::Report shown;
   Json& rows = shown.document["runs"] = Json::array();
   std::copy_if(
       runs.begin(), runs.end(), std::back_inserter(rows),
@@ -243,9 +243,9 @@ std::string RunsText(const Comparison& comparison, const Json& runs, bool all) {
 // The summaries of both sets, a line per figure.
 std::string SummaryTable(const Comparison& comparison, const Json& a,
                          const Json& b) {
-  cli::TextTable table({{"summary"},
-                        {NameOf(*comparison.a), Align::kRight},
-                        {NameOf(*comparison.b), Align::kRight}});
+  report::TextTable table({{"summary"},
+                           {NameOf(*comparison.a), Align::kRight},
+                           {NameOf(*comparison.b), Align::kRight}});
   for (const Column& field : SummaryFields()) {
     const auto text = [&field](const Json& summary) {
       return field.text ? field.text(summary) : summary.at(field.key).dump();
@@ -257,7 +257,7 @@ std::string SummaryTable(const Comparison& comparison, const Json& a,
     for (const EvaluatedRun& run : runs) {
       seconds += LiveSeconds(run);
     }
-    return cli::FormatNumber(seconds / 3600.0, 2);
+    return report::FormatNumber(seconds / 3600.0, 2);
   };
   table.AddRow({"judged (LIVE) [h]", live_hours(comparison.runs_of_a),
                 live_hours(comparison.runs_of_b)});
@@ -274,10 +274,10 @@ Comparison Compare(const std::shared_ptr<const ModelSet>& a,
           Evaluate(EngineDetector(b), runs, settings)};
 }
 
-cli::Report ComparisonReport(const Comparison& comparison, bool all) {
+report::Report ComparisonReport(const Comparison& comparison, bool all) {
   const std::string a = NameOf(*comparison.a);
   const std::string b = NameOf(*comparison.b);
-  cli::Report report;
+  report::Report report;
   report.document["a"] = ModelsJson(comparison.a, comparison.runs_of_a);
   report.document["b"] = ModelsJson(comparison.b, comparison.runs_of_b);
   Json& runs = report.document["runs"] = Json::array();

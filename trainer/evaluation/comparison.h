@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "cli/report.h"
+#include "report/report.h"
 #include "trainer/evaluation/detectors.h"
 
 namespace fdi::trainer {
@@ -27,6 +27,6 @@ Comparison Compare(const std::shared_ptr<const ModelSet>& a,
 /// set", "wrong faults", "false alarms"), the figures of both sets, and figures
 /// of merit run by run with a sign test over the runs that have a truth.
 /// @param all Also lists runs on which both are alike.
-cli::Report ComparisonReport(const Comparison& comparison, bool all);
+report::Report ComparisonReport(const Comparison& comparison, bool all);
 
 }  // namespace fdi::trainer

@@ -2,8 +2,8 @@
 
 #include <sstream>
 
-#include "cli/csv_cells.h"
-#include "diagnosis/error.h"
+#include "base/csv_cells.h"
+#include "base/error.h"
 
 namespace fdi::trainer {
 
@@ -12,8 +12,8 @@ CsvRows::CsvRows(const std::filesystem::path& path,
                  const std::vector<std::string>& optional)
     : source_(path.string()), columns_(required) {
   columns_.insert(columns_.end(), optional.begin(), optional.end());
-  std::istringstream input(cli::ReadTextFile(path));
-  cli::CsvCells record;
+  std::istringstream input(ReadTextFile(path));
+  CsvCells record;
   const std::vector<std::string>& cells = record.cells();
   // Messages name the line on which a record ends; a quoted cell may span some.
   std::int64_t number = 0;
@@ -51,7 +51,7 @@ void CsvRows::TakeHeader(const std::vector<std::string>& cells,
   for (std::size_t c = 0; c < columns_.size(); ++c) {
     std::ptrdiff_t found = -1;
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (!cli::SameName(cells[i], columns_[c])) {
+      if (!SameName(cells[i], columns_[c])) {
         continue;
       }
       if (found >= 0) {
@@ -72,7 +72,7 @@ const std::string& CsvRows::Cell(std::size_t row, std::size_t column) const {
 
 double CsvRows::Number(std::size_t row, std::size_t column) const {
   const std::string& cell = Cell(row, column);
-  const auto value = cli::ParseNumber(cell);
+  const auto value = ParseNumber(cell);
   if (!value) {
     Refuse(row, columns_[column] + " '" + cell + "' is not a finite number");
   }

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <map>
 
-#include "cli/text_table.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/quality_count.h"
+#include "report/text_table.h"
 #include "simulator/second_look/episode_looks.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/evaluation/csv_rows.h"
@@ -148,12 +148,12 @@ std::string SignatureTable(const Baseline& baseline) {
   if (baseline.table.empty()) {
     return {};
   }
-  std::vector<cli::TextTable::Column> columns;
+  std::vector<report::TextTable::Column> columns;
   for (const LinearModel& model : baseline.models) {
     columns.push_back({model.name});
   }
   columns.push_back({"faults"});
-  cli::TextTable table(std::move(columns));
+  report::TextTable table(std::move(columns));
   for (const auto& [signature, faults] : baseline.table) {
     std::vector<std::string> row;
     for (const int sign : signature) {
@@ -239,8 +239,8 @@ Answer ReadVerdicts(const std::string& file, const storage::StoredRun& run) {
     }
     if (row == rows.size() ||
         rows.Number(row, kVerdictTime) > t_s + tolerance) {
-      throw DataError(file + ": no row for t_s = " + cli::FormatNumber(t_s, 3) +
-                      " of " + RunName(run));
+      throw DataError(file + ": no row for t_s = " +
+                      report::FormatNumber(t_s, 3) + " of " + RunName(run));
     }
     first_s = all.empty() ? t_s : first_s;
     Indication indication = IndicationIn(rows, row);

@@ -5,17 +5,17 @@
 #include <cstdio>
 #include <sstream>
 
-#include "cli/csv_cells.h"
-#include "cli/text_table.h"
+#include "base/csv_cells.h"
 #include "diagnosis/fault_catalogue.h"
+#include "report/text_table.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
 
-using cli::Align;
-using cli::FormatNumber;
-using cli::Json;
+using report::Align;
+using report::FormatNumber;
+using report::Json;
 
 // An index of RunIndices. The order is that of the contract of --json.
 struct IndexField {
@@ -139,20 +139,20 @@ Json SummaryJson(const Detector& detector,
   return json;
 }
 
-std::vector<cli::Column> SummaryFields() {
+std::vector<report::Column> SummaryFields() {
   const auto share = [](const char* heading, const char* key) {
-    return cli::Column{
+    return report::Column{
         .heading = heading, .key = key, .text = [key](const Json& summary) {
           return summary.at(key).dump() + " of " +
                  summary.at("faulty_runs").dump();
         }};
   };
   const auto index = [](const char* heading, const char* key, int decimals) {
-    return cli::Column{.heading = heading,
-                       .key = key,
-                       .text = [key, decimals](const Json& summary) {
-                         return IndexText(summary.at(key), decimals);
-                       }};
+    return report::Column{.heading = heading,
+                          .key = key,
+                          .text = [key, decimals](const Json& summary) {
+                            return IndexText(summary.at(key), decimals);
+                          }};
   };
   return {share("faults detected", "detected"),
           share("final set has the fault", "contained"),
@@ -171,9 +171,9 @@ std::vector<cli::Column> SummaryFields() {
           {"runs without truth, not counted", "runs_without_truth"}};
 }
 
-cli::Report EvaluationReport(const Detector& detector,
-                             const std::vector<EvaluatedRun>& runs) {
-  cli::Report report;
+report::Report EvaluationReport(const Detector& detector,
+                                const std::vector<EvaluatedRun>& runs) {
+  report::Report report;
   report.document["runs"] = Json::array();
   for (const EvaluatedRun& run : runs) {
     report.document["runs"].push_back(RunJson(run));
@@ -185,7 +185,7 @@ cli::Report EvaluationReport(const Detector& detector,
   }
   report.Line(TextOf(RunsGrid(runs))).Line("\nsummary");
   report.Fields("summary", SummaryFields());
-  std::vector<cli::Column> hours;
+  std::vector<report::Column> hours;
   for (const auto& [quality, value] : summary.at("hours_by_quality").items()) {
     hours.push_back({quality, quality});
   }
@@ -218,21 +218,19 @@ void WriteEvaluationCsv(std::ostream& out,
   }
   header.insert(header.end(),
                 {"final_set", "t_exact", "episodes", "wrong_isolations"});
-  cli::WriteCsvLine(out, header);
+  WriteCsvLine(out, header);
   for (const EvaluatedRun& run : runs) {
     const RunIndices& i = run.indices;
-    std::vector<std::string> cells{
-        i.run_id, TruthText(run),
-        run.has_truth ? cli::NumberText(i.strength) : "",
-        IsDetected(run) ? "true" : "false"};
+    std::vector<std::string> cells{i.run_id, TruthText(run),
+                                   run.has_truth ? NumberText(i.strength) : "",
+                                   IsDetected(run) ? "true" : "false"};
     for (const IndexField& field : kIndexFields) {
-      cells.push_back(cli::NumberText(i.*field.value));
+      cells.push_back(NumberText(i.*field.value));
     }
-    cells.insert(
-        cells.end(),
-        {SetText(Outcome(run)), cli::NumberText(i.t_exact),
-         std::to_string(i.episodes), std::to_string(i.wrong_isolations)});
-    cli::WriteCsvLine(out, cells);
+    cells.insert(cells.end(), {SetText(Outcome(run)), NumberText(i.t_exact),
+                               std::to_string(i.episodes),
+                               std::to_string(i.wrong_isolations)});
+    WriteCsvLine(out, cells);
   }
 }
 
@@ -292,7 +290,7 @@ std::string CountText(double count) {
                       : FormatNumber(count, count == std::round(count) ? 0 : 2);
 }
 
-std::string TextOf(const cli::TextTable& table) {
+std::string TextOf(const report::TextTable& table) {
   std::ostringstream out;
   table.Print(out);
   std::string text = out.str();
@@ -301,7 +299,7 @@ std::string TextOf(const cli::TextTable& table) {
 }
 
 std::string TextOf(const Grid& grid) {
-  cli::TextTable table(grid.columns);
+  report::TextTable table(grid.columns);
   for (const std::vector<std::string>& row : grid.rows) {
     table.AddRow(row);
   }
@@ -324,7 +322,7 @@ VectorsCsv::VectorsCsv(std::ostream& out, const ModelSet& models)
   for (const Observer& observer : models_.observers) {
     header.push_back("o_" + observer.name);
   }
-  cli::WriteCsvLine(out_, header);
+  WriteCsvLine(out_, header);
 }
 
 void VectorsCsv::Add(const std::string& run, const Verdict& verdict) {
@@ -354,7 +352,7 @@ void VectorsCsv::Add(const std::string& run, const Verdict& verdict) {
   for (std::size_t o = 0; o < models_.observers.size(); ++o) {
     add(verdict.observer_factors[o]);
   }
-  cli::WriteCsvLine(out_, cells);
+  WriteCsvLine(out_, cells);
 }
 
 }  // namespace fdi::trainer

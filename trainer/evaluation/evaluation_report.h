@@ -4,29 +4,29 @@
 #include <string>
 #include <vector>
 
-#include "cli/report.h"
-#include "cli/text_table.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/verdict.h"
+#include "report/report.h"
+#include "report/text_table.h"
 #include "trainer/evaluation/detectors.h"
 
 /// What an evaluation prints and writes, but for its page.
 namespace fdi::trainer {
 
 /// {"model_set", "version"}, or {"detector"}.
-cli::Json DetectorJson(const Detector& detector);
+report::Json DetectorJson(const Detector& detector);
 
 /// What DetectorJson() says, figures over all runs, hours, confusion.
-cli::Json SummaryJson(const Detector& detector,
-                      const std::vector<EvaluatedRun>& runs);
+report::Json SummaryJson(const Detector& detector,
+                         const std::vector<EvaluatedRun>& runs);
 
 /// The figures of a SummaryJson() for people.
-std::vector<cli::Column> SummaryFields();
+std::vector<report::Column> SummaryFields();
 
 /// {"runs": [...], "summary": SummaryJson()}; for people a table of the runs,
 /// the summary and the confusion matrices.
-cli::Report EvaluationReport(const Detector& detector,
-                             const std::vector<EvaluatedRun>& runs);
+report::Report EvaluationReport(const Detector& detector,
+                                const std::vector<EvaluatedRun>& runs);
 
 /// One line per run: the columns of the JSON and a few more.
 void WriteEvaluationCsv(std::ostream& out,
@@ -34,7 +34,7 @@ void WriteEvaluationCsv(std::ostream& out,
 
 /// A table for people, as text or as HTML.
 struct Grid {
-  std::vector<cli::TextTable::Column> columns;
+  std::vector<report::TextTable::Column> columns;
   std::vector<std::vector<std::string>> rows;
 };
 
@@ -52,7 +52,7 @@ std::string IndexText(double value, int decimals);
 /// "3", "0.33", "." for none: a count, or a share of one.
 std::string CountText(double count);
 /// The table as it would be printed, without its last line break.
-std::string TextOf(const cli::TextTable& table);
+std::string TextOf(const report::TextTable& table);
 std::string TextOf(const Grid& grid);
 
 /// The file of `evaluate --vectors`: one line per sample with what the engine

@@ -10,10 +10,10 @@
 #include <sstream>
 #include <utility>
 
-#include "cli/plot/figure.h"
-#include "cli/plot/gnuplot.h"
-#include "cli/text_table.h"
 #include "diagnosis/fault_catalogue.h"
+#include "report/plot/figure.h"
+#include "report/plot/gnuplot.h"
+#include "report/text_table.h"
 #include "storage/models/model_codec.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/evaluation/evaluation_report.h"
@@ -22,7 +22,7 @@
 namespace fdi::trainer {
 namespace {
 
-using cli::FormatNumber;
+using report::FormatNumber;
 
 constexpr double kPictureWidth = 1100.0;  // [px]
 constexpr double kLegendWidth = 210.0;    // [px]

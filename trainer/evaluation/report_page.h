@@ -18,7 +18,7 @@ namespace fdi::trainer {
 ///     settings.watch = [&](const ScoredRun& run) { return page.Watch(run); };
 ///     settings.scored = [&](...) { page.Draw(...); };
 ///     Evaluate(detector, runs, settings);
-///     cli::WriteFile(path, page.Html(results, software, command_line));
+///     report::WriteFile(path, page.Html(results, software, command_line));
 class ReportPage {
  public:
   /// @param runs how many there are. `models` must outlive the page.

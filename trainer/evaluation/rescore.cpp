@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/valve_engine.h"
 #include "trainer/campaign/run_input.h"
 

@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "storage/database/data_directory.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/campaign_runs.h"
@@ -30,8 +30,8 @@ void RunSelection::AddTo(CLI::App& verb) {
   table.AddTo(verb);
 }
 
-cli::CsvOptions RunSelection::ForFiles(SignalMask required,
-                                       const cli::Context& context) const {
+importer::CsvOptions RunSelection::ForFiles(
+    SignalMask required, const report::Context& context) const {
   return {.map = table.Read(context.options.utc),
           .required = required,
           .log = context.log};
@@ -40,7 +40,7 @@ cli::CsvOptions RunSelection::ForFiles(SignalMask required,
 std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
                                       SignalMask required,
                                       std::optional<FlowUnit> flow_unit,
-                                      const cli::Context& context) {
+                                      const report::Context& context) {
   if (selection.runs.empty() && selection.files.empty() &&
       selection.campaign.empty()) {
     throw ConfigError(

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/csv.h"
-#include "cli/program.h"
-#include "cli/tag_map.h"
+#include "import/csv.h"
+#include "import/tag_map.h"
+#include "report/program.h"
 #include "storage/runs/runs.h"
 
 namespace CLI {
@@ -23,14 +23,14 @@ struct RunSelection {
   std::vector<std::string> files;  ///< FILE.csv or FILE.csv@from:to.
   std::filesystem::path campaign;  ///< Its validation runs; empty: none.
   std::uint64_t seed_offset{0};    ///< Added to the seeds of the campaign.
-  cli::TableOptions table;         ///< Of files.
+  importer::TableOptions table;    ///< Of files.
 
   /// The options --runs, --file, --campaign, --seed-offset and of tables.
   void AddTo(CLI::App& verb);
   /// How files are read. @param required signals that a file must have.
-  /// @throws as cli::ReadTagMap().
-  cli::CsvOptions ForFiles(SignalMask required,
-                           const cli::Context& context) const;
+  /// @throws as importer::ReadTagMap().
+  importer::CsvOptions ForFiles(SignalMask required,
+                                const report::Context& context) const;
 };
 
 /// A run to score, under the name that results list it by.
@@ -50,6 +50,6 @@ struct ScoredRun {
 std::vector<ScoredRun> LoadScoredRuns(const RunSelection& selection,
                                       SignalMask required,
                                       std::optional<FlowUnit> flow_unit,
-                                      const cli::Context& context);
+                                      const report::Context& context);
 
 }  // namespace fdi::trainer

@@ -4,11 +4,11 @@
 #include <mutex>
 #include <sstream>
 
-#include "cli/progress.h"
-#include "cli/stop_signals.h"
-#include "cli/text_table.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "report/progress.h"
+#include "report/stop_signals.h"
+#include "report/text_table.h"
 #include "trainer/campaign/campaign_runs.h"
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
@@ -19,9 +19,9 @@
 namespace fdi::trainer {
 namespace {
 
-using cli::Align;
-using cli::FormatNumber;
-using cli::Json;
+using report::Align;
+using report::FormatNumber;
+using report::Json;
 
 Json JsonOf(const LeftOutFault& f) {
   return {{"runs", f.runs},
@@ -85,11 +85,11 @@ std::string PerSeed(const SeedStudy& study, int SeedCounts::*field) {
 }
 
 std::string SharesTable(const SeedStudy& study) {
-  cli::TextTable table({{"fault"},
-                        {"runs", Align::kRight},
-                        {"detected [95 %]"},
-                        {"set has the fault [95 %]"},
-                        {"set is the fault [95 %]"}});
+  report::TextTable table({{"fault"},
+                           {"runs", Align::kRight},
+                           {"detected [95 %]"},
+                           {"set has the fault [95 %]"},
+                           {"set is the fault [95 %]"}});
   const auto add = [&](const std::string& name, const SeedCounts& counts) {
     table.AddRow({name, std::to_string(counts.runs),
                   ShareText(counts.detected, counts.runs),
@@ -154,8 +154,8 @@ LeftOutFault SumOf(const std::vector<LeftOutFault>& faults) {
   return sum;
 }
 
-cli::Report LeaveOneOut(const ModelSet& models, std::vector<ScoredRun> runs,
-                        const EvaluationSettings& settings) {
+report::Report LeaveOneOut(const ModelSet& models, std::vector<ScoredRun> runs,
+                           const EvaluationSettings& settings) {
   std::erase_if(runs, [](const ScoredRun& r) { return FaultOf(r.run) == 0; });
   const Detector detector = LeaveOneOutDetector(models);
   const std::vector<EvaluatedRun> scored = Evaluate(detector, runs, settings);
@@ -164,7 +164,7 @@ cli::Report LeaveOneOut(const ModelSet& models, std::vector<ScoredRun> runs,
   for (std::size_t r = 0; r < runs.size(); ++r) {
     by_fault[FaultOf(runs[r].run)].push_back(scored[r]);
   }
-  cli::Report report;
+  report::Report report;
   report.document = DetectorJson(detector);
   report.document["left_out"] = Json::array();
   std::vector<LeftOutFault> faults;
@@ -180,13 +180,13 @@ cli::Report LeaveOneOut(const ModelSet& models, std::vector<ScoredRun> runs,
     report.document["left_out"].push_back(std::move(row));
   }
   report.document["total"] = JsonOf(SumOf(faults));
-  const std::vector<cli::Column> counts{
+  const std::vector<report::Column> counts{
       {"runs", "runs"},
       {"detected", "detected"},
       {"unknown", "unknown"},
       {"wrongly named", "wrongly_named"},
       {"look-alike of its group", "as_look_alike"}};
-  std::vector<cli::Column> columns{{"left out", "fault"}};
+  std::vector<report::Column> columns{{"left out", "fault"}};
   columns.insert(columns.end(), counts.begin(), counts.end());
   columns.push_back({.heading = "named", .key = "named", .text = NamedText});
   return report.Table("left_out", std::move(columns), "no run has a fault")
@@ -244,8 +244,8 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
   // need no lock and do not depend on the order in which the tasks end.
   std::vector<std::vector<EvaluatedRun>> results(
       scenarios.size(), std::vector<EvaluatedRun>(count));
-  const cli::StopSignals signals;
-  cli::Progress progress("simulate");
+  const report::StopSignals signals;
+  report::Progress progress("simulate");
   std::mutex mutex;  // Of the progress.
   int done = 0;
   const int total = static_cast<int>(scenarios.size() * count);
@@ -274,8 +274,8 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
   return StudySeeds(results);
 }
 
-cli::Report SeedReport(const Detector& detector, const SeedStudy& study) {
-  cli::Report report;
+report::Report SeedReport(const Detector& detector, const SeedStudy& study) {
+  report::Report report;
   Json& json = report.document;
   json = DetectorJson(detector);
   json["seeds"] = study.repetitions.size();

@@ -3,7 +3,7 @@
 #include <map>
 #include <vector>
 
-#include "cli/report.h"
+#include "report/report.h"
 #include "trainer/campaign/campaign.h"
 #include "trainer/evaluation/detectors.h"
 
@@ -32,8 +32,8 @@ LeftOutFault SumOf(const std::vector<LeftOutFault>& faults);
 
 /// Scores every run with a fault by the set without that fault. Document: what
 /// DetectorJson() says, `left_out` by fault, `total`.
-cli::Report LeaveOneOut(const ModelSet& models, std::vector<ScoredRun> runs,
-                        const EvaluationSettings& settings);
+report::Report LeaveOneOut(const ModelSet& models, std::vector<ScoredRun> runs,
+                           const EvaluationSettings& settings);
 
 /// Counts over repetitions of one fault's scenarios.
 struct SeedCounts {
@@ -65,6 +65,6 @@ SeedStudy RepeatWithSeeds(const Detector& detector,
                           const RunSelection& selection, int seeds);
 
 /// Shares with 95 % Wilson intervals, by fault and over all.
-cli::Report SeedReport(const Detector& detector, const SeedStudy& study);
+report::Report SeedReport(const Detector& detector, const SeedStudy& study);
 
 }  // namespace fdi::trainer

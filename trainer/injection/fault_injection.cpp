@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "simulator/valve_equations.h"
 #include "trainer/campaign/run_input.h"

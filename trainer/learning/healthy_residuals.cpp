@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "diagnosis/coverage.h"
-#include "diagnosis/error.h"
 #include "diagnosis/observer_bank.h"
 #include "trainer/campaign/run_input.h"
 #include "trainer/evaluation/rescore.h"

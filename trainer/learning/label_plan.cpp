@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/records/valve_glob.h"
 #include "storage/models/models.h"

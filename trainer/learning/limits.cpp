@@ -8,8 +8,8 @@
 #include <span>
 #include <utility>
 
-#include "cli/time_text.h"
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/time_text.h"
 #include "diagnosis/fault_catalogue.h"
 #include "diagnosis/observer_bank.h"
 #include "diagnosis/residual_windows.h"
@@ -417,7 +417,7 @@ void RequireHealthy(const ModelSet& first, const ModelSet& parent,
   }
   throw DataError(
       "run " + peaks[worst].run + " at " +
-      cli::FormatTime(peaks[worst].stamp_ns, true) + ", channel " +
+      FormatTime(peaks[worst].stamp_ns, true) + ", channel " +
       first.channels[limits[worst].channel].name + ": the residual is at " +
       Digits(most, 3) + " times the limit of onboarding (" +
       LimitText(limits[worst]) + "), accepted is up to " +

@@ -8,9 +8,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
+#include "base/time_units.h"
 #include "diagnosis/records/valve_glob.h"
-#include "diagnosis/time_units.h"
 #include "storage/history/history_reader.h"
 #include "storage/models/models.h"
 #include "trainer/campaign/file_runs.h"

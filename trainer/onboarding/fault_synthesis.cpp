@@ -5,7 +5,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "simulator/record_fit.h"
 #include "simulator/valve_simulation.h"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <thread>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "simulator/second_look/valve_physics.h"
 #include "simulator/valve_equations.h"

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <string>
 
-#include "diagnosis/error.h"
+#include "base/error.h"
 #include "simulator/valve_equations.h"
 #include "trainer/statistics.h"
 

@@ -1,0 +1,404 @@
+#include "base/csv_cells.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <ostream>
+#include <utility>
+
+#include <unistd.h>
+#include <zlib.h>
+
+#include "base/error.h"
+
+namespace fdi {
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
+// The CR of a CRLF counts as a blank.
+bool IsBlank(char c) {
+  return c == ' ' || c == '\t' || c == '\r';
+}
+
+void AppendUtf8(char32_t code, std::string& out) {
+  const auto tail = [&](int shift) {
+    out += static_cast<char>(0x80U | ((code >> shift) & 0x3FU));
+  };
+  if (code < 0x80) {
+    out += static_cast<char>(code);
+  } else if (code < 0x800) {
+    out += static_cast<char>(0xC0U | (code >> 6U));
+    tail(0);
+  } else if (code < 0x10000) {
+    out += static_cast<char>(0xE0U | (code >> 12U));
+    tail(6);
+    tail(0);
+  } else {
+    out += static_cast<char>(0xF0U | (code >> 18U));
+    tail(12);
+    tail(6);
+    tail(0);
+  }
+}
+
+// A code point above U+FFFF less 0x10000 has twenty bits: a pair of units,
+// 0xD800 plus the upper and 0xDC00 plus the lower ten. A byte order mark is
+// dropped.
+std::string FromUtf16(std::string_view bytes, bool big_endian) {
+  const auto unit = [&](std::size_t i) {
+    const auto byte = [&](std::size_t at) {
+      return static_cast<unsigned char>(bytes[at]);
+    };
+    return static_cast<char32_t>(big_endian ? byte(i) << 8U | byte(i + 1)
+                                            : byte(i + 1) << 8U | byte(i));
+  };
+  std::string text;
+  for (std::size_t i = 0; i + 1 < bytes.size(); i += 2) {
+    char32_t code = unit(i);
+    if (code >= 0xD800 && code < 0xDC00 && i + 3 < bytes.size()) {
+      i += 2;
+      code = 0x10000 + ((code - 0xD800) << 10U) + (unit(i) - 0xDC00);
+    }
+    if (i > 0 || code != 0xFEFF) {
+      AppendUtf8(code, text);
+    }
+  }
+  return text;
+}
+
+// Checks the number of continuation bytes (10xxxxxx) after each first byte, not
+// whether the code point is valid. That is enough: in Latin-1 a letter with an
+// accent is rarely followed by just such bytes.
+bool IsUtf8(std::string_view text) {
+  std::size_t more = 0;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool tail = (byte & 0xC0U) == 0x80U;
+    if (tail != (more > 0)) {
+      return false;
+    }
+    more = tail          ? more - 1
+           : byte < 0x80 ? 0
+           : byte < 0xE0 ? 1
+           : byte < 0xF0 ? 2
+                         : 3;
+  }
+  return more == 0;
+}
+
+// Whether a spreadsheet would evaluate the cell as a formula. Numbers are not
+// formulas, not even hexadecimal ones.
+bool IsFormula(const std::string& cell) {
+  if (cell.size() < 2 || std::string_view("=+-@\t\r").find(cell.front()) ==
+                             std::string_view::npos) {
+    return false;
+  }
+  char* end = nullptr;
+  std::strtod(cell.c_str(), &end);
+  return end != cell.c_str() + cell.size();
+}
+
+// Formulas are written with a leading quote, which spreadsheets hide. Text that
+// already looks like a guarded formula gets one more, so that it round-trips.
+bool IsGuarded(const std::string& cell) {
+  const std::size_t quotes = cell.find_first_not_of('\'');
+  return quotes != 0 && quotes != std::string::npos &&
+         IsFormula(cell.substr(quotes));
+}
+
+}  // namespace
+
+// The state is kept between lines only while a quote is open; the line break,
+// which the caller has removed, belongs to the cell then.
+bool CsvCells::TakeLine(std::string_view line) {
+  if (first_line_ && line.starts_with(kByteOrderMark)) {
+    line.remove_prefix(kByteOrderMark.size());
+  }
+  first_line_ = false;
+  if (state_ == State::kQuoted) {
+    cell_ += '\n';
+  } else {
+    cells_.clear();
+  }
+  for (const char c : line) {
+    Take(c);
+  }
+  if (state_ == State::kQuoted) {
+    return false;
+  }
+  EndCell();
+  return true;
+}
+
+void CsvCells::Take(char c) {
+  switch (state_) {
+    case State::kQuoted:
+      if (c == '"') {
+        state_ = State::kAfter;
+      } else {
+        cell_ += c;
+      }
+      return;
+    case State::kAfter:
+      if (c == '"') {
+        cell_ += c;  // The first of two: an escaped quote.
+        state_ = State::kQuoted;
+      } else if (c == separator_) {
+        EndCell();
+      } else if (!IsBlank(c)) {
+        cell_ += c;  // "FV"-101 is invalid, but harmless.
+      }
+      return;
+    case State::kBefore:
+      if (c == '"') {
+        state_ = State::kQuoted;
+        return;
+      }
+      if (IsBlank(c)) {
+        return;
+      }
+      state_ = State::kText;
+      [[fallthrough]];
+    case State::kText:
+      if (c == separator_) {
+        EndCell();
+      } else {
+        cell_ += c;
+      }
+      return;
+  }
+}
+
+// Blanks are dropped behind a cell without quotes only: quoted ones are part of
+// it.
+void CsvCells::EndCell() {
+  while (state_ == State::kText && !cell_.empty() && IsBlank(cell_.back())) {
+    cell_.pop_back();
+  }
+  if (IsGuarded(cell_)) {
+    cell_.erase(0, 1);
+  }
+  cells_.push_back(cell_);
+  cell_.clear();
+  state_ = State::kBefore;
+}
+
+// std::from_chars, unlike strtod(), does not depend on the locale, skips no
+// blanks and gives the double nearest to the text. It accepts no leading +,
+// which is therefore skipped, and accepts nan and inf, which are refused below.
+std::optional<double> ParseNumber(std::string_view text, char decimal) {
+  std::string point;
+  if (decimal != '.') {
+    // Beside a decimal comma a point can only group thousands: "1.234" would be
+    // read as 1.234 instead of 1234.
+    if (text.find('.') != std::string_view::npos) {
+      return std::nullopt;
+    }
+    point = text;
+    std::replace(point.begin(), point.end(), decimal, '.');
+    text = point;
+  }
+  const char* first = text.data();
+  const char* last = first + text.size();
+  if (first != last && *first == '+') {
+    ++first;
+  }
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(first, last, value);
+  // A number too small for a double is out of range as well.
+  if (error != std::errc() || end != last || !std::isfinite(value)) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+std::string Quoted(std::string_view text) {
+  return '"' + std::string(text.substr(0, 60)) + '"';
+}
+
+// std::to_chars without a precision gives the shortest digits that read back as
+// the same double, at most 24 characters.
+std::string NumberText(double value) {
+  std::array<char, 32> digits;
+  const auto end =
+      std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+  return {digits.data(), end};
+}
+
+std::string Listed(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) {
+    list += (list.empty() ? "" : ",") + name;
+  }
+  return list;
+}
+
+//     grouped = 1*3DIGIT sign 3DIGIT       not beginning with 0
+//
+// "0.123" and "1.2345" have decimals, "1.234" may have either, and a second
+// sign in a grouped number means thousands. With an exponent a number is not
+// grouped.
+Digits DigitsOf(std::string_view cell, char& sign) {
+  if (!cell.empty() && (cell.front() == '+' || cell.front() == '-')) {
+    cell.remove_prefix(1);
+  }
+  const std::size_t exponent = cell.find_first_of("eE");
+  const std::string_view number = cell.substr(0, exponent);
+  const std::size_t first = number.find_first_of(".,");
+  if (first == std::string_view::npos ||
+      number.find_first_not_of("0123456789.,") != std::string_view::npos) {
+    return Digits::kNone;
+  }
+  sign = number[first];
+  const std::size_t second = number.find_first_of(".,", first + 1);
+  const bool grouped = first >= 1 && first <= 3 && number.front() != '0' &&
+                       std::min(second, number.size()) - first == 4;
+  if (second == std::string_view::npos) {
+    return grouped && exponent == std::string_view::npos ? Digits::kEither
+                                                         : Digits::kDecimal;
+  }
+  // Dates such as 01.02.2026 are not grouped in threes.
+  return grouped ? Digits::kThousands : Digits::kNone;
+}
+
+// Separators are compared by (header and row have as many cells, number of
+// cells). The agreement comes first: a semicolon table with decimal commas may
+// have more commas than semicolons, but not as many in the header as in the
+// row. Of equal ones the first in the list is taken.
+char FindSeparator(std::string_view header, std::string_view row) {
+  char best = ',';
+  std::pair<bool, std::size_t> most{false, 1};
+  for (const char separator : {',', ';', '\t', '|'}) {
+    CsvCells names(separator);
+    CsvCells cells(separator);
+    names.TakeLine(header);
+    cells.TakeLine(row);
+    const std::size_t count = names.cells().size();
+    const std::pair fit{count > 1 && cells.cells().size() == count, count};
+    if (fit > most) {
+      most = fit;
+      best = separator;
+    }
+  }
+  return best;
+}
+
+// The order of the tests matters. A file in UTF-16 of ASCII text is also valid
+// UTF-8 with zeros in it, so UTF-16 is tested first. Latin-1 comes last,
+// because every sequence of bytes is valid in it.
+std::string ToUtf8(std::string bytes, const std::string& source) {
+  const auto zero_at = [&](std::size_t i) {
+    return bytes.size() > i && bytes[i] == '\0';
+  };
+  std::string text;
+  if (bytes.starts_with("\xFF\xFE") || zero_at(1)) {
+    text = FromUtf16(bytes, false);
+  } else if (bytes.starts_with("\xFE\xFF") || zero_at(0)) {
+    text = FromUtf16(bytes, true);
+  } else if (IsUtf8(bytes)) {
+    text = std::move(bytes);
+    text.erase(0, text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0);
+  } else {
+    for (const char c : bytes) {
+      AppendUtf8(static_cast<unsigned char>(c), text);
+    }
+  }
+  if (text.starts_with("PK\x03\x04")) {
+    throw DataError(source +
+                    ": is a spreadsheet or zip archive, not text: save it as "
+                    "CSV (or unpack it)");
+  }
+  if (text.starts_with("PAR1")) {
+    throw DataError(source +
+                    ": is a Parquet file: docs/import.md has the line of "
+                    "DuckDB that makes it a CSV");
+  }
+  if (text.find('\0') != std::string::npos) {
+    throw DataError(source + ": is binary, not text: export it as CSV");
+  }
+  // Without any LF, CR is taken as the line break (old Macintosh files).
+  if (text.find('\n') == std::string::npos) {
+    std::replace(text.begin(), text.end(), '\r', '\n');
+  }
+  return text;
+}
+
+std::string ReadTextFile(const std::filesystem::path& path) {
+  const bool is_stdin = path == "-";
+  const std::string source = is_stdin ? "stdin" : path.string();
+  std::error_code error;
+  if (!is_stdin && !std::filesystem::exists(path, error)) {
+    throw NotFoundError("no file " + source);
+  }
+  if (!is_stdin && std::filesystem::is_directory(path, error)) {
+    throw DataError(source + ": is a directory, not a file");
+  }
+  // zlib passes uncompressed files through.
+  const auto close = [](gzFile file) { gzclose(file); };
+  const std::unique_ptr<gzFile_s, decltype(close)> file(
+      // gzclose() closes the descriptor. stdin itself has to stay open, hence
+      // dup().
+      is_stdin ? gzdopen(dup(STDIN_FILENO), "rb") : gzopen(path.c_str(), "rb"),
+      close);
+  if (!file) {
+    throw DataError(source + ": cannot be opened: " + std::strerror(errno));
+  }
+  std::string bytes;
+  std::array<char, 65536> part;
+  int count = 0;
+  while ((count = gzread(file.get(), part.data(), part.size())) > 0) {
+    bytes.append(part.data(), static_cast<std::size_t>(count));
+  }
+  // gzread() returns 0 at the end of a truncated file, too; only gzerror() then
+  // says Z_BUF_ERROR.
+  int code = Z_OK;
+  const char* reason = gzerror(file.get(), &code);
+  if (count < 0 || code != Z_OK) {
+    throw DataError(source + ": cannot be read: " +
+                    (code == Z_ERRNO ? std::strerror(errno) : reason) +
+                    (code == Z_ERRNO ? "" : "; try gzip -t, or export again"));
+  }
+  return ToUtf8(std::move(bytes), source);
+}
+
+bool SameName(std::string_view a, std::string_view b) {
+  return std::ranges::equal(a, b, [](char x, char y) {
+    return std::tolower(static_cast<unsigned char>(x)) ==
+           std::tolower(static_cast<unsigned char>(y));
+  });
+}
+
+// The guard is added before the cell is quoted: it is part of the content, and
+// reading removes the quotes first.
+void WriteCsvLine(std::ostream& out, const std::vector<std::string>& cells) {
+  const char* separator = "";
+  for (const std::string& text : cells) {
+    const std::string cell =
+        IsFormula(text) || IsGuarded(text) ? "'" + text : text;
+    out << separator;
+    separator = ",";
+    // Blanks at either end are quoted, because readers may drop them.
+    const bool quoted =
+        cell.find_first_of(",\"\r\n") != std::string::npos ||
+        (!cell.empty() && (IsBlank(cell.front()) || IsBlank(cell.back())));
+    if (!quoted) {
+      out << cell;
+      continue;
+    }
+    out << '"';
+    for (const char c : cell) {
+      out << (c == '"' ? "\"\"" : std::string_view(&c, 1));
+    }
+    out << '"';
+  }
+  out << '\n';
+}
+
+}  // namespace fdi

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <filesystem>
+#include <iosfwd>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fdi {
+
+/// Splits CSV into cells as in RFC 4180, one line at a time, so that the input
+/// can be a pipe:
+///
+///     record = cell *(separator cell) break      break = LF / CRLF
+///     cell   = *blank (text / DQUOTE *(char / 2DQUOTE) DQUOTE) *blank
+///
+/// A quoted cell may contain separators, line breaks and doubled quotes. In
+/// addition to the RFC, the separator may be another character, blanks around a
+/// cell are ignored, and a byte order mark is skipped.
+class CsvCells {
+ public:
+  explicit CsvCells(char separator = ',') : separator_(separator) {}
+
+  /// Processes the next line, without its LF. @returns whether it ends a
+  /// record; if not, a quote is open and the record continues on the next line.
+  bool TakeLine(std::string_view line);
+  /// A quote is still open, which is an error at the end of a file.
+  bool open() const { return state_ == State::kQuoted; }
+
+  /// Cells of the last complete record.
+  const std::vector<std::string>& cells() const { return cells_; }
+  /// Whether that record is a blank line.
+  bool blank() const { return cells_.size() == 1 && cells_.front().empty(); }
+
+ private:
+  enum class State {
+    kBefore,  // The cell has not begun.
+    kText,    // In a cell without quotes.
+    kQuoted,  // Within quotes.
+    kAfter,   // Behind the closing quote, or at one that is doubled.
+  };
+  void Take(char c);
+  void EndCell();
+
+  char separator_;
+  State state_{State::kBefore};
+  bool first_line_{true};
+  std::vector<std::string> cells_;
+  std::string cell_;
+};
+
+/// Parses a finite number and nothing else; a leading "+" is allowed.
+std::optional<double> ParseNumber(std::string_view text, char decimal = '.');
+
+/// The shortest text that round-trips to the same double.
+std::string NumberText(double value);
+
+/// For messages: the text in quotes, truncated to 60 characters.
+std::string Quoted(std::string_view text);
+
+/// "a,b"
+std::string Listed(const std::vector<std::string>& names);
+
+/// What a cell tells about the decimal sign.
+enum class Digits {
+  kNone,       ///< No sign, or no number.
+  kDecimal,    ///< "0.5", "12.34": the sign cannot group thousands.
+  kEither,     ///< "1.234"
+  kThousands,  ///< "1.234.567", "1.234,5"
+};
+/// @param sign set to the first one in the cell, unless kNone.
+Digits DigitsOf(std::string_view cell, char& sign);
+
+/// Detects the separator of a table: the one that splits `header` and `row`
+/// into the same number of cells, as many as possible.
+char FindSeparator(std::string_view header, std::string_view row);
+
+/// Reads a whole file, or stdin for `-`, as UTF-8 with LF: gzip is
+/// decompressed, UTF-16 (with a byte order mark, or recognised by its zeros) is
+/// converted, and anything that is neither UTF-8 nor UTF-16 is read as Latin-1.
+/// @throws NotFoundError if there is no such file; DataError naming it and its
+///   actual type (folder, spreadsheet, Parquet, damaged gzip, binary).
+std::string ReadTextFile(const std::filesystem::path& path);
+/// The same for bytes in memory, except for gzip.
+std::string ToUtf8(std::string bytes, const std::string& source);
+
+/// Whether two column names are equal, ignoring case.
+bool SameName(std::string_view a, std::string_view b);
+
+/// Writes a record. Text that a spreadsheet would evaluate as a formula (it
+/// begins with = + - @ and is not a number) gets a leading ', which CsvCells
+/// removes. Cells are quoted only where necessary; the line ends with LF.
+void WriteCsvLine(std::ostream& out, const std::vector<std::string>& cells);
+
+}  // namespace fdi

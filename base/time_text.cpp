@@ -1,0 +1,471 @@
+#include "base/time_text.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <optional>
+#include <regex>
+
+#include "base/error.h"
+#include "base/time_units.h"
+
+namespace fdi {
+namespace {
+
+/// std::regex recurses with the length of its input.
+constexpr std::size_t kMaxTimeLength = 64;
+
+constexpr const char* kTimeForms =
+    "2026-11-20, 2026-11-20T14:56, 2026-11-20T14:56:11.5 and these with Z or "
+    "an offset such as +01:00";
+
+[[noreturn]] void RefuseTime(std::string_view text) {
+  throw ConfigError("'" + std::string(text) + "' is not a time; accepted are " +
+                    kTimeForms);
+}
+
+// A cursor over the text of a time.
+// The grammar is:
+//
+//     time    = date [("T" / "t" / " ") clock] [offset]
+//     date    = YYYY s month s day / day s month s (YYYY / YY)   one s per date
+//     month   = number / "Jan" ... "Dec"
+//     clock   = hh ":" mm [":" ss [("." / ",") 1*DIGIT]] [[" "] ("AM" / "PM")]
+//     offset  = [" "] ("Z" / "UTC" / "GMT" / ("+" / "-") hh [[":"] mm])
+//
+// A year of two digits is accepted only beside the name of a month: in
+// "01-02-03" nothing shows which number is the year.
+class Scanner {
+ public:
+  explicit Scanner(std::string_view text) : rest_(text) {}
+
+  bool done() const { return rest_.empty(); }
+  char next() const { return rest_.empty() ? '\0' : rest_.front(); }
+  bool Take(std::string_view any) {
+    if (rest_.empty() || any.find(rest_.front()) == std::string_view::npos) {
+      return false;
+    }
+    rest_.remove_prefix(1);
+    return true;
+  }
+  // Digits only; sets `count` to the number of digits.
+  std::optional<int> Number(std::size_t* count = nullptr) {
+    const std::size_t digits =
+        std::min(rest_.find_first_not_of("0123456789"), rest_.size());
+    int value = 0;
+    const auto [end, error] =
+        std::from_chars(rest_.data(), rest_.data() + digits, value);
+    if (count != nullptr) {
+      *count = digits;
+    }
+    if (error != std::errc() || digits > 4) {
+      return std::nullopt;
+    }
+    rest_.remove_prefix(digits);
+    return value;
+  }
+  std::string_view Word() {
+    const auto end = std::ranges::find_if(rest_, [](char c) {
+      return !std::isalpha(static_cast<unsigned char>(c));
+    });
+    const std::string_view word(rest_.data(),
+                                static_cast<std::size_t>(end - rest_.begin()));
+    rest_.remove_prefix(word.size());
+    return word;
+  }
+  // Digits beyond nanoseconds are read and dropped: `unit` is 0 by then.
+  std::int64_t Fraction() {
+    std::int64_t unit = kNsPerSecond;
+    std::int64_t fraction = 0;
+    for (; std::isdigit(static_cast<unsigned char>(next())) != 0;
+         rest_.remove_prefix(1)) {
+      unit /= 10;
+      fraction += unit * (next() - '0');
+    }
+    return fraction;
+  }
+
+ private:
+  std::string_view rest_;
+};
+
+std::string Lower(std::string_view text) {
+  std::string lower(text);
+  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return lower;
+}
+
+// 1..12 for "Oct" etc., in English, which historians use.
+std::optional<int> MonthOf(std::string_view word) {
+  constexpr std::string_view kMonths = "janfebmaraprmayjunjulaugsepoctnovdec";
+  const std::size_t at = kMonths.find(Lower(word));
+  return word.size() == 3 && at % 3 == 0
+             ? std::optional(static_cast<int>(at / 3) + 1)
+             : std::nullopt;
+}
+
+// 2026-11-20, 20.11.2026, 20-Nov-2026, 20-Nov-26; 20/11/2026 by `order`.
+bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
+  std::size_t digits = 0;
+  const auto first = in.Number(&digits);
+  const bool iso = digits == 4;
+  const char separator = in.next();
+  if (!first || !in.Take(iso ? "-/." : "./-")) {
+    return false;
+  }
+  const bool named = std::isalpha(static_cast<unsigned char>(in.next())) != 0;
+  auto month = named ? MonthOf(in.Word()) : in.Number();
+  if (!month || !in.Take(std::string_view(&separator, 1))) {
+    return false;
+  }
+  auto last = in.Number(&digits);
+  if (!last) {
+    return false;
+  }
+  auto day = iso ? last : first;
+  auto year = iso ? first : last;
+  if (!iso && named && digits == 2) {
+    *year += 2000;
+  } else if (!iso && digits != 4) {
+    return false;
+  }
+  // Dates with points are taken as day first. With slashes or dashes the order
+  // depends on the country, so a file has to say it.
+  if (!iso && !named && separator != '.') {
+    if (order == DateOrder::kNotSaid) {
+      return false;
+    }
+    if (order == DateOrder::kMonthFirst) {
+      std::swap(day, month);
+    }
+  }
+  fields.tm_year = *year - 1900;
+  fields.tm_mon = *month - 1;
+  fields.tm_mday = *day;
+  // mktime() and timegm() would turn 31 February into 3 March without an error.
+  return std::chrono::year_month_day{
+      std::chrono::year(*year),
+      std::chrono::month(static_cast<unsigned>(*month)),
+      std::chrono::day(static_cast<unsigned>(*day))}
+      .ok();
+}
+
+// " 14:56", "T14:56:11.5", "14:56:11,5 PM"
+bool ScanClock(Scanner& in, CivilTime& time) {
+  const auto hour = in.Number();
+  const auto minute = in.Take(":") ? in.Number() : std::nullopt;
+  if (!hour || !minute) {
+    return false;
+  }
+  time.fields.tm_hour = *hour;
+  time.fields.tm_min = *minute;
+  if (in.Take(":")) {
+    const auto second = in.Number();
+    if (!second) {
+      return false;
+    }
+    time.fields.tm_sec = *second;
+    if (in.Take(".,")) {
+      if (std::isdigit(static_cast<unsigned char>(in.next())) == 0) {
+        return false;
+      }
+      time.fraction_ns = in.Fraction();
+    }
+  }
+  // A copy looks ahead, because the blank may belong to an offset: "14:56 UTC".
+  Scanner ahead = in;
+  ahead.Take(" ");
+  const std::string half = Lower(ahead.Word());
+  if (half == "am" || half == "pm") {
+    in = ahead;
+    if (*hour < 1 || *hour > 12) {
+      return false;
+    }
+    // 12 AM is midnight and 12 PM is noon.
+    time.fields.tm_hour = *hour % 12 + (half == "pm" ? 12 : 0);
+  }
+  // A leap second has number 60.
+  return time.fields.tm_hour <= 23 && *minute <= 59 && time.fields.tm_sec <= 60;
+}
+
+// "Z", " UTC", "+01:00", "+0100", "+01"
+bool ScanOffset(Scanner& in, CivilTime& time) {
+  in.Take(" ");
+  if (std::isalpha(static_cast<unsigned char>(in.next())) != 0) {
+    const std::string name = Lower(in.Word());
+    time.offset_s = 0;
+    return in.done() && (name == "z" || name == "utc" || name == "gmt");
+  }
+  const int sign = in.next() == '-' ? -1 : 1;
+  std::size_t digits = 0;
+  auto hours = in.Take("+-") ? in.Number(&digits) : std::nullopt;
+  if (!hours || (digits != 2 && digits != 4)) {
+    return false;
+  }
+  std::optional<int> minutes = digits == 4 ? *hours % 100 : 0;
+  if (digits == 4) {
+    *hours /= 100;
+  } else if (in.Take(":")) {
+    minutes = in.Number(&digits);
+  }
+  if (!in.done() || !minutes || digits % 2 != 0 || *hours > 23 ||
+      *minutes > 59) {
+    return false;
+  }
+  time.offset_s = sign * 60 * (60 * *hours + *minutes);
+  return true;
+}
+
+struct Unit {
+  std::string_view name;
+  double seconds;
+};
+constexpr Unit kDurationUnits[] = {
+    {"ns", 1e-9}, {"us", 1e-6},  {"ms", 1e-3},   {"s", 1.0},     {"min", 60.0},
+    {"m", 60.0},  {"h", 3600.0}, {"d", 86400.0}, {"w", 604800.0}};
+
+[[noreturn]] void RefuseDuration(std::string_view text) {
+  throw ConfigError("'" + std::string(text) +
+                    "' is not a duration; accepted are numbers with ns, us, "
+                    "ms, s, m, min, h, d or w, such as 90s, 2h or 1h30m, up "
+                    "to 100 years, and plain seconds");
+}
+
+bool IsDuration(std::string_view text) {
+  return !text.empty() && text.find_first_of("T:-") == std::string_view::npos;
+}
+
+}  // namespace
+
+std::string FormatTime(std::int64_t stamp_ns, bool utc) {
+  // Non-negative also before 1970, where % gives a negative remainder.
+  const std::int64_t fraction =
+      ((stamp_ns % kNsPerSecond) + kNsPerSecond) % kNsPerSecond;
+  const std::time_t seconds =
+      stamp_ns / kNsPerSecond - (stamp_ns % kNsPerSecond < 0 ? 1 : 0);
+  std::tm fields{};
+  utc ? gmtime_r(&seconds, &fields) : localtime_r(&seconds, &fields);
+  char text[64];
+  std::size_t length =
+      std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &fields);
+  std::string result(text, length);
+  if (fraction != 0) {
+    std::snprintf(text, sizeof text, ".%09lld",
+                  static_cast<long long>(fraction));
+    const int decimals =
+        fraction % 1'000'000 == 0 ? 3 : (fraction % 1'000 == 0 ? 6 : 9);
+    result.append(text, static_cast<std::size_t>(decimals) + 1);
+  }
+  if (utc) {
+    return result + 'Z';
+  }
+  const long offset_min = fields.tm_gmtoff / 60;
+  std::snprintf(text, sizeof text, "%c%02ld:%02ld", offset_min < 0 ? '-' : '+',
+                std::labs(offset_min) / 60, std::labs(offset_min) % 60);
+  return result + text;
+}
+
+std::optional<CivilTime> ScanTime(std::string_view text, DateOrder order) {
+  CivilTime time;
+  Scanner in(text);
+  if (text.size() > kMaxTimeLength || !ScanDate(in, order, time.fields)) {
+    return std::nullopt;
+  }
+  const bool clock = in.Take("Tt ");
+  if ((clock && !ScanClock(in, time)) ||
+      (!in.done() && !ScanOffset(in, time))) {
+    return std::nullopt;
+  }
+  return time;
+}
+
+// glibc takes an unknown TZ for UTC without an error. The name must therefore
+// be a file of the zone database, inside its folder.
+LocalClock::LocalClock(std::string zone) : zone_(std::move(zone)) {
+  CivilTime offset;
+  Scanner scanner(zone_);
+  if (!zone_.empty() && ScanOffset(scanner, offset)) {
+    fixed_s_ = offset.offset_s;
+  } else if (!zone_.empty() && (zone_.find("..") != std::string::npos ||
+                                !std::filesystem::is_regular_file(
+                                    "/usr/share/zoneinfo/" + zone_))) {
+    throw ConfigError("zone '" + zone_ +
+                      "' is not known here; accepted are UTC, offsets such as "
+                      "+01:00 and, with the package tzdata, names such as "
+                      "Europe/Warsaw");
+  }
+}
+
+// The offsets from UTC, in summer and in standard time, with which the clock
+// showed `fields`: none in the hour that is skipped in spring, two in the hour
+// that is repeated in autumn, else one. Summer time comes first, because it is
+// the earlier of the two.
+//
+// The C library has one time zone per process, so TZ is exchanged and restored.
+// setenv() and tzset() are not thread-safe: no other thread may read the
+// environment or convert local times meanwhile.
+void LocalClock::FindOffsets(const std::tm& fields) {
+  const char* before = std::getenv("TZ");
+  const std::optional<std::string> saved =
+      before != nullptr ? std::optional<std::string>(before) : std::nullopt;
+  if (!zone_.empty()) {
+    setenv("TZ", zone_.c_str(), 1);
+    tzset();
+  }
+  offsets_s_.clear();
+  for (const int summer : {1, 0}) {
+    std::tm trial = fields;
+    trial.tm_isdst = summer;
+    mktime(&trial);
+    // Otherwise mktime() changed it to a time that the clock did show.
+    if (trial.tm_isdst == summer && trial.tm_hour == fields.tm_hour &&
+        trial.tm_min == fields.tm_min) {
+      offsets_s_.push_back(static_cast<int>(trial.tm_gmtoff));
+    }
+  }
+  if (!zone_.empty()) {
+    saved ? setenv("TZ", saved->c_str(), 1) : unsetenv("TZ");
+    tzset();
+  }
+}
+
+std::optional<std::int64_t> LocalClock::Utc(const CivilTime& time,
+                                            std::int64_t last_ns) {
+  constexpr std::time_t kHalfHour = 1800;
+  std::tm fields = time.fields;
+  const std::time_t shown = timegm(&fields);
+  if (fields.tm_year < 0 || fields.tm_year > 2261 - 1900) {
+    return std::nullopt;
+  }
+  std::vector<int> offsets{time.offset_s.value_or(fixed_s_.value_or(0))};
+  if (!time.offset_s && !fixed_s_) {
+    // Asking the C library anew for every row would be slow. Today's zones
+    // change their offsets at full or half hours, so those of half an hour are
+    // kept.
+    if (std::time_t half = shown / kHalfHour; half != known_) {
+      FindOffsets(time.fields);
+      known_ = half;
+    }
+    offsets = offsets_s_;
+  }
+  std::optional<std::int64_t> found;
+  // stamp = shown - offset. The offsets descend, so the stamps ascend, and the
+  // first one that is not before the previous row is taken. If all are before
+  // it, it is the last.
+  for (const int offset : offsets) {
+    const std::int64_t stamp =
+        (shown - offset) * kNsPerSecond + time.fraction_ns;
+    if (!found || *found < last_ns) {
+      found = stamp;
+    }
+  }
+  return found;
+}
+
+std::int64_t ParseTime(std::string_view text, bool utc) {
+  const std::optional<CivilTime> time = ScanTime(text);
+  if (!time) {
+    RefuseTime(text);
+  }
+  std::tm fields = time->fields;
+  std::time_t seconds = 0;
+  if (time->offset_s || utc) {
+    seconds = timegm(&fields) - time->offset_s.value_or(0);
+  } else {
+    fields.tm_isdst = -1;  // mktime() determines daylight saving time.
+    seconds = mktime(&fields);
+  }
+  constexpr std::time_t kLimit = 9'223'372'000;  // int64 ns overflow in 2262.
+  if (seconds < -kLimit || seconds > kLimit) {
+    RefuseTime(text);
+  }
+  return seconds * kNsPerSecond + time->fraction_ns;
+}
+
+std::int64_t ParseTimeOrAgo(std::string_view text, bool utc,
+                            std::int64_t now_ns) {
+  if (text == "now") {
+    return now_ns;
+  }
+  try {
+    return IsDuration(text) ? now_ns - ParseDuration(text)
+                            : ParseTime(text, utc);
+  } catch (const ConfigError&) {
+    throw ConfigError("'" + std::string(text) +
+                      "' is not a time; accepted are " + kTimeForms +
+                      ", a time before now such as 90s, 2h, 1h30m or 7d, up to "
+                      "100 years, and now");
+  }
+}
+
+std::int64_t ParseDuration(std::string_view text) {
+  //     duration = number / 1*(number unit)     without a unit: seconds
+  static const std::regex plain(R"(\d+\.?\d*|\.\d+)");
+  static const std::regex part(
+      R"((\d+\.?\d*|\.\d+)(ns|us|ms|s|min|m|h|d|w)(?![a-z]))");
+  double seconds = 0.0;
+  const std::string whole(text.substr(0, kMaxTimeLength + 1));
+  if (std::regex_match(whole, plain)) {
+    seconds = std::strtod(whole.c_str(), nullptr);
+  } else {
+    // The parts must be contiguous up to the end.
+    std::string rest = whole;
+    std::smatch found;
+    while (std::regex_search(rest, found, part,
+                             std::regex_constants::match_continuous)) {
+      const std::string name = found[2];
+      const auto unit = std::ranges::find(kDurationUnits, name, &Unit::name);
+      seconds += std::strtod(found.str(1).c_str(), nullptr) * unit->seconds;
+      rest = found.suffix();
+    }
+    if (whole.empty() || !rest.empty()) {
+      RefuseDuration(text);
+    }
+  }
+  // `whole` was cut one character beyond the limit, which shows that `text` is
+  // longer. 100 years in nanoseconds fit into 64 bits, also when subtracted
+  // from now.
+  if (whole.size() > kMaxTimeLength || seconds > 100.0 * 365.25 * 86400.0) {
+    RefuseDuration(text);
+  }
+  return std::llround(seconds * 1e9);
+}
+
+std::string FormatDuration(std::int64_t duration_ns) {
+  const double seconds = static_cast<double>(duration_ns) * 1e-9;
+  char text[64];
+  if (seconds < 10.0) {
+    std::snprintf(text, sizeof text, "%.2f s", seconds);
+  } else if (seconds < 120.0) {
+    std::snprintf(text, sizeof text, "%.0f s", seconds);
+  } else {
+    const auto whole = std::llround(seconds);
+    if (whole < 7200) {
+      std::snprintf(text, sizeof text, "%lld min %02lld s", whole / 60,
+                    whole % 60);
+    } else if (whole < 2LL * 86400) {
+      std::snprintf(text, sizeof text, "%lld h %02lld min", whole / 3600,
+                    whole % 3600 / 60);
+    } else {
+      std::snprintf(text, sizeof text, "%lld d %02lld h", whole / 86400,
+                    whole % 86400 / 3600);
+    }
+  }
+  return text;
+}
+
+std::int64_t NowNs() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace fdi

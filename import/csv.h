@@ -1,0 +1,284 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <iosfwd>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/csv_cells.h"
+#include "base/log.h"
+#include "base/time_text.h"
+#include "diagnosis/sample_series.h"
+
+namespace fdi::importer {
+
+/// A column of the CSV contract.
+struct SignalColumn {
+  std::string_view name;
+  Signal signal;
+  FlowUnit flow_unit;  ///< Used for kF only.
+};
+
+inline constexpr std::array<SignalColumn, kSignalCount + 1> kSignalColumns{{
+    {"CV_pct", Signal::kCv, FlowUnit::kM3PerHour},
+    {"P1_kPa", Signal::kP1, FlowUnit::kM3PerHour},
+    {"P2_kPa", Signal::kP2, FlowUnit::kM3PerHour},
+    {"T1_degC", Signal::kT1, FlowUnit::kM3PerHour},
+    {"X_pct", Signal::kX, FlowUnit::kM3PerHour},
+    {"F_m3_h", Signal::kF, FlowUnit::kM3PerHour},
+    {"F_t_h", Signal::kF, FlowUnit::kTPerHour},
+    {"SP_pct", Signal::kSp, FlowUnit::kM3PerHour},
+    {"CVI", Signal::kCvi, FlowUnit::kM3PerHour},
+    {"Ps_kPa", Signal::kPs, FlowUnit::kM3PerHour},
+    {"Pz_kPa", Signal::kPz, FlowUnit::kM3PerHour},
+}};
+
+inline constexpr std::string_view kTimeColumn = "t_s";
+inline constexpr std::string_view kModeColumn = "mode";
+inline constexpr std::string_view kFaultColumn = "fault";
+inline constexpr std::string_view kFaultNumberColumn = "fault_no";
+inline constexpr std::string_view kStrengthColumn = "fault_strength";
+
+/// Source of a signal in a foreign table:
+/// value = offset + scale · cell, then 100 − value if it is % of opening.
+struct ColumnMapping {
+  std::string column;  ///< Name in the header, or the tag of a long table.
+  Signal signal{Signal::kCv};
+  double scale{1.0};
+  double offset{0.0};
+  Sense sense{Sense::kClosing};
+  std::string unit{};  ///< Of the cells, as written in the map.
+};
+
+/// Format of the time column.
+enum class TimeForm {
+  kFindOut,
+  kElapsed,  ///< Seconds (after scaling) from CsvOptions::start_ns.
+  kUnix,     ///< Seconds (after scaling) since 1970.
+  kSerial,   ///< Days of a spreadsheet, 25569 being 1970-01-01, in local time.
+  kText,     ///< As ScanTime() reads it.
+};
+
+/// A table with one reading per row.
+struct LongTable {
+  std::string tag{"tag"};
+  std::string value{"value"};
+  std::string quality;            ///< Name of the column; empty: none.
+  std::vector<std::string> good;  ///< Others are bad; empty: usual words.
+};
+
+/// How a signal is resampled to a fixed period.
+struct Resampling {
+  double period_s{1.0};
+  bool linear{false};    ///< Otherwise the last reading is held.
+  double limit_s{10.0};  ///< Limit for holding and interpolation.
+};
+
+/// Content of `--map tags.toml`, `--zone` and `--resample`. Signals that are
+/// not mapped are still found by their names in the CSV contract.
+struct ColumnMap {
+  char separator{'\0'};      ///< NUL: detected.
+  char decimal{'\0'};        ///< NUL: detected.
+  int skip{0};               ///< Lines in front of the header.
+  std::string time_column;   ///< Empty: t_s, time, timestamp or datetime.
+  std::string clock_column;  ///< Time of day, if in a column of its own.
+  TimeForm time_form{TimeForm::kFindOut};
+  double time_scale{1.0};  ///< To seconds.
+  DateOrder date_order{DateOrder::kNotSaid};
+  std::string zone;  ///< Of times without an offset; empty: the machine's.
+  std::optional<LongTable> long_table;
+  std::vector<ColumnMapping> columns;
+  std::optional<FlowUnit> flow_unit;  ///< Needed if the flow is mapped.
+  std::optional<Resampling> resampling;
+};
+
+/// Settings of the CSV readers.
+struct CsvOptions {
+  std::string source{"input"};  ///< File name for error messages.
+  ColumnMap map;
+  /// Required columns; with a map, those of the map instead. Time, CV and one
+  /// of X, F are always required.
+  SignalMask required{kBasicSignals};
+  bool split_gaps{false};    ///< A gap starts another run instead of an error.
+  double period_s{0.0};      ///< 0: detected.
+  std::int64_t start_ns{0};  ///< UTC of t_s = 0, unless times have a date.
+  LogSink log;               ///< Receives CsvTable::notes, each as `csv_note`.
+};
+
+/// Information from the header of a table.
+struct CsvHeader {
+  SignalMask signals{0};
+  FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  bool has_truth{false};
+  std::vector<std::string> ignored_columns;  ///< Worth one notice.
+};
+
+/// A whole table: one run, or several with CsvOptions::split_gaps.
+struct CsvTable {
+  CsvHeader header;
+  std::vector<SampleSeries> runs;
+  bool dated{false};         ///< The times in the file have a date.
+  std::int64_t start_ns{0};  ///< Of t = 0; dated: the first sample.
+  /// What was detected, converted or filled in, one sentence each.
+  std::vector<std::string> notes;
+};
+
+/// A row accepted by CsvReader; in a long table it has one signal.
+struct CsvRow {
+  LabelledSample labelled;  ///< seq counts from 0; source_id 0, epoch 0.
+  double t_s{0.0};          ///< Dated: since the first row.
+  std::int64_t line{0};
+};
+
+/// Checks the time steps of samples that arrive one by one.
+class StepCheck {
+ public:
+  /// @param period_s 0: taken from the first step.
+  explicit StepCheck(bool split_gaps, double period_s = 0.0)
+      : split_gaps_(split_gaps), period_s_(period_s) {}
+
+  /// A step may differ from the period by half of it, or be longer with
+  /// `split_gaps`. @returns what is wrong with the next step; empty if it is
+  /// valid.
+  std::string Take(double t_s);
+  double period_s() const { return period_s_; }
+
+ private:
+  bool split_gaps_;
+  double period_s_;
+  std::optional<double> last_t_s_;
+};
+
+/// Reads a table line by line, e.g. from a pipe; checking the time steps is
+/// left to the caller.
+///
+/// Header: t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h (or F_t_h), in any
+/// order and case; optional SP_pct,CVI,Ps_kPa,Pz_kPa; optional truth: fault
+/// (f1..f19, t1, p1, p2, normal) or fault_no (0..22) with fault_strength, where
+/// only a non-zero strength marks a fault; optional mode (kValveModeNames; AUTO
+/// if the column is missing). Further columns are ignored. docs/import.md has
+/// the rest: other names, forms of time, separators, long tables.
+///
+/// A signal whose cell is empty or means "no reading" (Bad, I/O Timeout, #N/A,
+/// ...) is missing from that sample, with quality BAD.
+class CsvReader {
+ public:
+  /// @throws ConfigError if a map has a flow without its unit.
+  explicit CsvReader(CsvOptions options);
+
+  /// Processes the next line, without its line break. @returns nothing for the
+  /// header, for blank lines, for an unmapped tag, and while a quoted cell
+  /// continues on the next line.
+  /// @throws DataError naming source, line, column, value, what was expected
+  ///   and what to try: missing or duplicate column, too few or too many cells,
+  ///   not a number, not a time, an unknown fault.
+  std::optional<CsvRow> TakeLine(std::string_view line);
+
+  /// Call after the last line. @throws DataError if there was no row.
+  void Finish() const;
+
+  /// Valid after the header line.
+  const CsvHeader& header() const { return header_; }
+  const CsvOptions& options() const { return options_; }
+  bool dated() const {
+    return time_form_ != TimeForm::kElapsed && time_form_ != TimeForm::kFindOut;
+  }
+  const std::vector<std::string>& notes() const { return notes_; }
+  [[noreturn]] void Refuse(const std::string& reason) const;
+
+ private:
+  struct Conversion {
+    std::size_t column;
+    Signal signal;
+    double scale;
+    double offset;
+    Sense sense;
+    std::string tag;
+  };
+
+  void TakeHeader();
+  std::optional<std::size_t> Column(std::string_view name);
+  void AddSignal(const Conversion& conversion);
+  void AddMapped();
+  bool AddByContract(std::size_t column, std::string_view name);
+  void CheckHeader() const;
+  void CheckLongHeader() const;
+  const std::string& Cell(std::size_t column) const {
+    return record_.cells()[column];
+  }
+  /// The value in the unit of the file; nothing if there is no reading.
+  std::optional<double> Reading(std::size_t column) const;
+  double Number(std::size_t column) const;
+  void Convert(const Conversion& conversion, Sample& sample) const;
+  bool TakeTagged(Sample& sample);
+  SignalQuality TaggedQuality() const;
+  void FindTimeForm(const std::string& cell);
+  void TakeTime(CsvRow& row);
+  FaultTruth Truth() const;
+  ValveMode Mode() const;
+
+  CsvOptions options_;
+  LocalClock clock_;
+  CsvHeader header_;
+  std::vector<std::string> names_;
+  std::vector<std::string> notes_;
+  CsvCells record_;
+  std::vector<Conversion> conversions_;
+  std::vector<bool> used_;
+  std::optional<std::size_t> time_column_;
+  std::optional<std::size_t> clock_column_;
+  std::optional<std::size_t> tag_column_;
+  std::size_t value_column_{0};
+  std::optional<std::size_t> quality_column_;
+  std::optional<std::size_t> fault_column_;
+  std::optional<std::size_t> strength_column_;
+  std::optional<std::size_t> mode_column_;
+  bool fault_by_number_{false};
+  TimeForm time_form_{TimeForm::kFindOut};
+  std::optional<std::int64_t> first_ns_;
+  // Per tag, because a table may be sorted by tag; a wide table uses the first.
+  std::array<std::int64_t, kSignalCount> last_ns_{};
+  std::size_t tag_{0};
+  std::uint64_t rows_{0};
+  std::int64_t line_{0};
+};
+
+/// Reads a whole table (UTF-8, see ReadTextFile()). The sample period is the
+/// option's, or else the median step. Samples within half a period of
+/// its grid are moved onto it; ColumnMap::resampling makes a grid from any
+/// table, where instants without a nearby reading have quality UNCERTAIN.
+/// @throws DataError as CsvReader, or naming the line of a step that is not the
+///   sample period; if there are fewer than two rows and no period is given; if
+///   the decimal sign is ambiguous; if most values of a mapped signal are
+///   impossible.
+CsvTable ReadCsv(std::string_view text, const CsvOptions& options = {});
+
+/// Reads `path`, or stdin for `-`; CsvOptions::source is set to its name.
+/// @throws as above and as ReadTextFile().
+CsvTable ReadCsvFile(const std::filesystem::path& path,
+                     CsvOptions options = {});
+
+/// `map` with the separator and decimal sign of the table, where it does not
+/// set them. @throws DataError if the decimal sign is ambiguous.
+ColumnMap WithSigns(std::string_view text, ColumnMap map,
+                    const std::string& source);
+
+/// Whether a cell means "no reading": empty, NaN, Bad, #N/A, ...
+bool IsNoReading(std::string_view cell);
+
+/// The form of a time column, by its name and its first cell, a number.
+TimeForm TimeFormOf(std::string_view name, double first);
+
+/// Writes the CSV contract's columns for the signals that occur; mode if it is
+/// not AUTO throughout; fault and fault_strength if the truth is known. Numbers
+/// round-trip bit for bit. t_s counts from `start_ns`. The cell of a missing
+/// signal, or of a flow in another unit than the run's, is empty.
+void WriteCsv(std::ostream& output, std::span<const LabelledSample> samples,
+              FlowUnit flow_unit, std::int64_t start_ns);
+
+}  // namespace fdi::importer

@@ -1,0 +1,365 @@
+#include "import/tag_map.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <CLI/CLI.hpp>
+
+#include "base/error.h"
+#include "base/time_text.h"
+#include "base/toml_reader.h"
+
+namespace fdi::importer {
+namespace {
+
+constexpr double kAtmosphereKpa = 101.325;
+
+/// Kinds of quantity; signals of one kind have the same units.
+enum class Quantity { kPercent, kPressure, kTemperature, kFlow, kNumber };
+
+Quantity QuantityOf(Signal signal) {
+  switch (signal) {
+    case Signal::kCv:
+    case Signal::kX:
+    case Signal::kSp:
+      return Quantity::kPercent;
+    case Signal::kP1:
+    case Signal::kP2:
+    case Signal::kPs:
+    case Signal::kPz:
+      return Quantity::kPressure;
+    case Signal::kT1:
+      return Quantity::kTemperature;
+    case Signal::kF:
+      return Quantity::kFlow;
+    case Signal::kCvi:
+      return Quantity::kNumber;
+  }
+  return Quantity::kNumber;
+}
+
+struct UnitEntry {
+  std::string_view name;
+  Quantity quantity;
+  UnitConversion conversion;
+};
+
+constexpr FlowUnit kVolume = FlowUnit::kM3PerHour;
+constexpr FlowUnit kMass = FlowUnit::kTPerHour;
+constexpr UnitEntry kSignalUnits[] = {
+    {"%", Quantity::kPercent, {1.0, 0.0, kVolume}},
+    {"1", Quantity::kPercent, {100.0, 0.0, kVolume}},
+    {"kPa", Quantity::kPressure, {1.0, 0.0, kVolume}},
+    {"Pa", Quantity::kPressure, {1e-3, 0.0, kVolume}},
+    {"mbar", Quantity::kPressure, {0.1, 0.0, kVolume}},
+    {"bar", Quantity::kPressure, {100.0, 0.0, kVolume}},
+    {"MPa", Quantity::kPressure, {1000.0, 0.0, kVolume}},
+    {"psi", Quantity::kPressure, {6.894757293168, 0.0, kVolume}},
+    {"kg/cm2", Quantity::kPressure, {98.0665, 0.0, kVolume}},
+    {"degC", Quantity::kTemperature, {1.0, 0.0, kVolume}},
+    {"degF", Quantity::kTemperature, {5.0 / 9.0, -160.0 / 9.0, kVolume}},
+    {"K", Quantity::kTemperature, {1.0, -273.15, kVolume}},
+    {"m3/h", Quantity::kFlow, {1.0, 0.0, kVolume}},
+    {"m3/s", Quantity::kFlow, {3600.0, 0.0, kVolume}},
+    {"l/min", Quantity::kFlow, {0.06, 0.0, kVolume}},
+    {"l/s", Quantity::kFlow, {3.6, 0.0, kVolume}},
+    {"l/h", Quantity::kFlow, {1e-3, 0.0, kVolume}},
+    {"gpm", Quantity::kFlow, {0.22712470704, 0.0, kVolume}},  // US gallons
+    {"t/h", Quantity::kFlow, {1.0, 0.0, kMass}},
+    {"kg/h", Quantity::kFlow, {1e-3, 0.0, kMass}},
+    {"kg/s", Quantity::kFlow, {3.6, 0.0, kMass}},
+    {"1", Quantity::kNumber, {1.0, 0.0, kVolume}},
+};
+
+// Normalises a unit: "bar (g)" to "barg", "m³/h" to "m3/h", "°C" to "degC".
+std::string Plain(std::string_view name) {
+  std::string plain;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    if (name.substr(i).starts_with("³")) {
+      plain += '3';
+      ++i;
+    } else if (name.substr(i).starts_with("°")) {
+      plain += "deg";
+      ++i;
+    } else if (std::string_view(" ()[]_").find(name[i]) ==
+               std::string_view::npos) {
+      plain += name[i];
+    }
+  }
+  if (SameName(plain, "c") || SameName(plain, "f")) {
+    plain = "deg" + plain;
+  }
+  return SameName(plain, "pct") ? "%" : plain;
+}
+
+void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
+              ColumnMapping& mapping) {
+  const bool flow = signal == Signal::kF;
+  const bool percent = QuantityOf(signal) == Quantity::kPercent;
+  // A flow is measured as volume or mass; only the file's author knows which.
+  const std::string name = table.Text("unit").value_or(
+      flow                     ? ""
+      : signal == Signal::kCvi ? "1"
+                               : std::string(SignalUnit(signal)));
+  const auto unit = FindUnit(signal, name == "mA" && percent ? "%" : name);
+  if (!unit) {
+    table.Refuse("unit", "unknown unit '" + name + "'; accepted are" +
+                             UnitNames(signal));
+  }
+  // raw and span are two points of a line, reading = offset + scale · cell:
+  //
+  //     scale = (span₁ − span₀)/(raw₁ − raw₀),   offset = span₀ − scale · raw₀.
+  //
+  // By default a current in mA is 4 to 20, and a percentage is 0 to 100 % over
+  // `raw`. Other signals have to state both.
+  std::vector<double> raw = table.Numbers("raw");
+  std::vector<double> span = table.Numbers("span");
+  if (name == "mA" && raw.empty()) {
+    raw = {4.0, 20.0};
+  }
+  if (!raw.empty() && span.empty() && percent) {
+    span = {0.0, 100.0};
+  }
+  double scale = table.Number("scale").value_or(1.0);
+  double offset = table.Number("offset").value_or(0.0);
+  if (!raw.empty() || !span.empty()) {
+    if (raw.size() != 2 || span.size() != 2 || raw[0] == raw[1] ||
+        table.Has("scale") || table.Has("offset")) {
+      table.Refuse(raw.empty() ? "span" : "raw",
+                   "raw = [4, 20] and span = [LOW, HIGH] belong together, each "
+                   "with two numbers, and without scale and offset");
+    }
+    scale = (span[1] - span[0]) / (raw[1] - raw[0]);
+    offset = span[0] - scale * raw[0];
+  }
+  // The linear map of the user is applied first, then the unit: value = u₀ + u₁
+  // (offset + scale · cell).
+  mapping.scale = unit->scale * scale;
+  mapping.offset = unit->offset + unit->scale * offset;
+  mapping.unit = name;
+  if (flow) {
+    map.flow_unit = unit->flow_unit;
+  }
+}
+
+void ReadSignal(Signal signal, TomlReader table, ColumnMap& map) {
+  ColumnMapping mapping;
+  mapping.signal = signal;
+  const auto column = table.Text("column");
+  if (!column) {
+    table.Refuse("column",
+                 "is missing: the name in the header of the table, or the tag");
+  }
+  mapping.column = *column;
+  ReadUnit(table, signal, map, mapping);
+  const std::string sense = table.Text("sense").value_or("closing");
+  if (sense != "closing" && sense != "opening") {
+    table.Refuse("sense", "'" + sense + "' is neither closing nor opening");
+  }
+  mapping.sense = sense == "opening" ? Sense::kOpening : Sense::kClosing;
+  if (QuantityOf(signal) != Quantity::kPercent &&
+      mapping.sense == Sense::kOpening) {
+    table.Refuse("sense", "only CV, X and SP count in % of closing or opening");
+  }
+  map.columns.push_back(mapping);
+}
+
+void ReadTime(TomlReader table, ColumnMap& map) {
+  struct Form {
+    std::string_view name;
+    TimeForm form;
+    double scale;
+  };
+  static constexpr Form kForms[] = {
+      {"s", TimeForm::kElapsed, 1.0},     {"ms", TimeForm::kElapsed, 1e-3},
+      {"min", TimeForm::kElapsed, 60.0},  {"h", TimeForm::kElapsed, 3600.0},
+      {"unix", TimeForm::kUnix, 1.0},     {"unix ms", TimeForm::kUnix, 1e-3},
+      {"serial", TimeForm::kSerial, 1.0}, {"text", TimeForm::kText, 1.0},
+      {"auto", TimeForm::kFindOut, 1.0}};
+  map.time_column = table.Text("column").value_or("");
+  map.clock_column = table.Text("clock").value_or("");
+  map.zone = table.Text("zone").value_or("");
+  const std::string unit = table.Text("unit").value_or("auto");
+  const auto form = std::ranges::find(kForms, unit, &Form::name);
+  if (form == std::end(kForms)) {
+    table.Refuse("unit", "'" + unit +
+                             "' is none of s, ms, min, h, unix, unix ms, "
+                             "serial, text, auto");
+  }
+  map.time_form = form->form;
+  map.time_scale = form->scale;
+  if (const auto date = table.Text("date")) {
+    if (*date != "d/m/y" && *date != "m/d/y") {
+      table.Refuse("date", "'" + *date + "' is neither d/m/y nor m/d/y");
+    }
+    map.date_order =
+        *date == "d/m/y" ? DateOrder::kDayFirst : DateOrder::kMonthFirst;
+  }
+}
+
+// One of the `accepted` characters; NUL if the key is absent.
+char ReadSign(TomlReader& table, std::string_view key,
+              std::string_view accepted) {
+  const std::string text = table.Text(key).value_or("");
+  if (text == "tab") {
+    return '\t';
+  }
+  if (text.size() > 1 ||
+      (!text.empty() && accepted.find(text) == std::string_view::npos)) {
+    table.Refuse(key, "'" + text + "' is none of the signs " +
+                          std::string(accepted) +
+                          (accepted.size() > 2 ? " and tab" : ""));
+  }
+  return text.empty() ? '\0' : text.front();
+}
+
+void ReadFile(TomlReader table, ColumnMap& map) {
+  map.separator = ReadSign(table, "separator", ",;|\t");
+  map.decimal = ReadSign(table, "decimal", ".,");
+  map.skip = static_cast<int>(table.Number("skip", 0.0, 1e6).value_or(0.0));
+  if (const auto resample = table.Text("resample")) {
+    try {
+      map.resampling = ParseResampling(*resample);
+    } catch (const ConfigError& error) {
+      table.Refuse("resample", error.what());
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
+  std::string plain = Plain(name);
+  const auto find = [&]() -> std::optional<UnitConversion> {
+    for (const UnitEntry& unit : kSignalUnits) {
+      // mPa is not MPa.
+      if (unit.quantity == QuantityOf(signal) &&
+          (unit.name == plain ||
+           (unit.name != "MPa" && SameName(unit.name, plain)))) {
+        return unit.conversion;
+      }
+    }
+    return std::nullopt;
+  };
+  // The whole name comes first, because "Pa" and "kPa" end with the a of
+  // "absolute".
+  auto found = find();
+  for (const std::string_view suffix : {"gauge", "abs", "g", "a"}) {
+    if (!found && QuantityOf(signal) == Quantity::kPressure &&
+        plain.size() > suffix.size() &&
+        SameName(std::string_view(plain).substr(plain.size() - suffix.size()),
+                 suffix)) {
+      plain.resize(plain.size() - suffix.size());
+      found = find();
+      if (found && suffix.front() == 'g') {
+        found->offset += kAtmosphereKpa;
+      }
+    }
+  }
+  return found;
+}
+
+std::string UnitNames(Signal signal) {
+  std::string names;
+  for (const UnitEntry& unit : kSignalUnits) {
+    if (unit.quantity == QuantityOf(signal)) {
+      names += " " + std::string(unit.name);
+    }
+  }
+  switch (QuantityOf(signal)) {
+    case Quantity::kPressure:
+      return names + " and these with g for gauge (barg)";
+    case Quantity::kPercent:
+      return names + " mA";
+    default:
+      return names;
+  }
+}
+
+//     resampling = period [":" ("hold" / "linear") [":" age]]
+Resampling ParseResampling(const std::string& text) {
+  const auto parts = CLI::detail::split(text, ':');
+  try {
+    Resampling how;
+    how.period_s = static_cast<double>(ParseDuration(parts.at(0))) / 1e9;
+    how.limit_s = parts.size() > 2
+                      ? static_cast<double>(ParseDuration(parts[2])) / 1e9
+                      : 10.0 * how.period_s;
+    const std::string filling = parts.size() > 1 ? parts[1] : "hold";
+    how.linear = filling == "linear";
+    if ((how.linear || filling == "hold") && parts.size() <= 3 &&
+        how.period_s >= 1e-3) {
+      return how;
+    }
+  } catch (const ConfigError&) {
+  }
+  throw ConfigError("--resample '" + text +
+                    "': accepted are 1s, 1s:hold, 1s:linear and these with a "
+                    "limit on age, 1s:linear:2min");
+}
+
+ColumnMap ReadTagMap(const std::filesystem::path& path) {
+  TomlReader file(path);
+  ColumnMap map;
+  if (auto table = file.Table("file")) {
+    ReadFile(std::move(*table), map);
+  }
+  if (auto time = file.Table("time")) {
+    ReadTime(std::move(*time), map);
+  }
+  if (auto table = file.Table("long")) {
+    LongTable& tall = map.long_table.emplace();
+    tall.tag = table->Text("tag").value_or(tall.tag);
+    tall.value = table->Text("value").value_or(tall.value);
+    tall.quality = table->Text("quality").value_or("");
+    tall.good = table->Texts("good");
+  }
+  // The keys of [signal] are data, so they are not known to the reader in
+  // advance: each is checked here, and Table() marks it as known for Finish().
+  if (auto signals = file.Table("signal")) {
+    for (const std::string& name : signals->Keys()) {
+      const auto signal = ParseSignal(name);
+      if (!signal) {
+        signals->Refuse(name,
+                        "unknown signal; there are CV P1 P2 T1 X F SP CVI Ps "
+                        "Pz");
+      }
+      ReadSignal(*signal, *signals->Table(name), map);
+    }
+  }
+  file.Finish();
+  return map;
+}
+
+void TableOptions::AddTo(CLI::App& verb) {
+  verb.add_option("--map", map,
+                  "Names, units, spans and senses of the columns of a file "
+                  "(made by fdi-store runs sniff; docs/import.md)")
+      ->type_name("FILE.toml");
+  verb.add_option("--zone", zone,
+                  "Time zone of times in a file that name none: "
+                  "Europe/Warsaw, UTC, +01:00 (default: the machine's)")
+      ->type_name("ZONE");
+  verb.add_option("--resample", resample,
+                  "Bring a file of any timing to this period; missing values "
+                  "are held or interpolated for at most AGE (default: hold, "
+                  "ten periods)")
+      ->type_name("1s[:hold|linear[:AGE]]");
+}
+
+// For the zone: the option, then the file, then UTC if `utc`. A zone in the
+// file is part of what is known about it, so `utc` does not override it.
+ColumnMap TableOptions::Read(bool utc) const {
+  ColumnMap columns = map.empty() ? ColumnMap{} : ReadTagMap(map);
+  if (!zone.empty()) {
+    columns.zone = zone;
+  } else if (utc && columns.zone.empty()) {
+    columns.zone = "UTC";
+  }
+  if (!resample.empty()) {
+    columns.resampling = ParseResampling(resample);
+  }
+  return columns;
+}
+
+}  // namespace fdi::importer

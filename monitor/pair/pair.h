@@ -1,0 +1,163 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "idl/endpoint.h"
+#include "monitor/bus/bus_sinks.h"
+#include "monitor/pair/pair_election.h"
+#include "monitor/pipeline.h"
+#include "monitor/throttled_log.h"
+
+namespace fdi::monitor {
+
+/// Settings of a monitor in a redundant pair.
+struct PairOptions {
+  std::string name;        ///< The same for both; letters, digits, - and _.
+  int rank{0};             ///< 1..9; the lower one is preferred.
+  double patience_s{0.3};  ///< A leader that is silent for longer is replaced.
+};
+
+/// @throws ConfigError naming the option and what is accepted.
+void Validate(const PairOptions& options);
+
+/// The partitions in which this monitor of a pair publishes: the default one,
+/// and one that only the other monitor reads.
+std::vector<std::string> PartitionsOf(const PairOptions& options);
+/// The partitions of the other monitors, as a pattern.
+std::vector<std::string> PartitionOfOthers(const PairOptions& options);
+
+/// One monitor of a redundant pair. Both diagnose and record everything and
+/// publish through this class; the standby holds its messages until it has
+/// heard the same from the leader, and publishes the unheard ones when it takes
+/// over.
+///
+/// Tick() is called by the diagnosis thread and is the only sign of life that
+/// the other monitor gets.
+class Pair : public DecisionSink, public EventSink {
+ public:
+  /// @param events sink of events while we lead; it forwards to `bus`.
+  /// @throws idl::TransportError
+  Pair(idl::Participant& participant, const PairOptions& options,
+       const std::string& monitor, BusDecisionSink& decisions,
+       BusEventSink& bus, EventSink& events, ThrottledLog& log);
+
+  bool Publish(const std::string& valve_id, const ModelSet* models,
+               const Verdict& verdict) override;
+  std::uint64_t Flush() override { return decisions_.Flush(); }
+  bool LastValuesDue() override;
+  void PublishLast(const std::string& valve_id, const ModelSet* models,
+                   const Verdict& verdict) override {
+    decisions_.PublishLast(valve_id, models, verdict);
+  }
+  void Remove(const std::string& valve_id) override {
+    decisions_.Remove(valve_id);
+  }
+  bool Publish(const FaultEvent& event, bool persisted) override;
+  /// As Publish(), with an event of an earlier session: it goes to the bus
+  /// alone, because its session may have notified others of it. Before the
+  /// first Tick().
+  void Resend(const FaultEvent& event);
+
+  /// Receives the states of the others, decides who leads and publishes our
+  /// own. Called by the diagnosis thread, several times per patience interval.
+  void Tick(std::uint64_t received, Pipeline& pipeline);
+  /// Hands leadership over if another monitor is there; call before the end.
+  void StepDown();
+
+  /// Thread safe.
+  struct Status {
+    std::string name;
+    int rank{0};
+    bool leads{false};
+    std::string leader;  ///< Empty: none is known.
+    int others{0};
+    std::uint64_t takeovers{0};  ///< Times it began to lead.
+  };
+  Status status() const;
+  /// True if every event was heard from the leader or is too old to be heard.
+  /// Thread safe.
+  bool AllEventsCovered() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  using TimePoint = Clock::time_point;
+  struct Place {  // Position in the stream of a valve.
+    std::uint64_t source_id{0};
+    std::uint64_t seq{0};
+  };
+  struct HeldVector {
+    TimePoint since;
+    idl::DecisionMessage message;
+  };
+  struct HeldEvent {
+    TimePoint since;
+    FaultEvent event;
+    bool resent{false};  // See Resend().
+  };
+
+  bool Leads() const { return Clock::now() < lease_until_.load(); }
+  bool IsCovered(const std::string& valve_id, const Verdict& verdict) const;
+  void OnVector(const idl::DecisionMessage& message);
+  void OnEvent(const FaultEvent& event, TimePoint now);
+  void ApplyElection(TimePoint now);
+  void PublishHeld(TimePoint now);
+  void PublishHeldVectors(TimePoint now);
+  void DropCovered(TimePoint now);
+  void Adopt(TimePoint now, Pipeline& pipeline);
+  void RepeatEvents(TimePoint since);
+  void HoldLocked(FaultEvent event, bool resent);
+  bool IsPublishedLocked(const FaultEvent& event) const;
+  bool MarkPublishedLocked(const FaultEvent& event);
+
+  const PairOptions options_;
+  const Clock::duration patience_;
+  BusDecisionSink& decisions_;
+  BusEventSink& bus_;
+  EventSink& events_;
+  ThrottledLog& log_;
+  idl::Publisher<PairState> own_state_;
+  idl::Subscriber<PairState> states_;
+  idl::Subscriber<idl::DecisionMessage> peer_vectors_;
+  idl::Subscriber<FaultEvent> peer_events_;
+  // Until then we certainly lead: no other monitor takes over earlier.
+  std::atomic<TimePoint> lease_until_{TimePoint{}};
+
+  // Used by the diagnosis thread only.
+  PairElection election_;
+  TimePoint last_tick_;
+  TimePoint state_sent_;
+  bool led_{false};
+  std::string leader_;
+  // Messages heard earlier have reached all subscribers: their leader was alive
+  // until then.
+  TimePoint arrived_;
+  std::unordered_map<std::string, Place> covered_;  // Heard, by valve.
+  std::deque<HeldVector> held_vectors_;             // In order of arrival.
+  // Valves of which a held vector may not have left the writer yet, and since
+  // when.
+  std::unordered_set<std::string> in_flight_;
+  std::int64_t in_flight_ns_{0};  // UTC, for comparison with messages.
+  TimePoint in_flight_since_;
+  // Number of subscribers at the takeover: a later one lacks what the former
+  // leader published. -1: nothing is lacking.
+  int vectors_lacked_{-1};
+  int events_lacked_{-1};
+
+  mutable std::mutex mutex_;  // Guards the members below.
+  Status status_;
+  // The last events of each valve that are on the bus.
+  std::map<std::string, std::deque<HeldEvent>> published_;
+  std::deque<HeldEvent> held_events_;  // Ours, not heard from the leader yet.
+  std::deque<HeldEvent> unmatched_events_;  // Heard, not raised by us yet.
+};
+
+}  // namespace fdi::monitor

@@ -1,0 +1,371 @@
+// The two ways in which an event leaves the monitor: a user's program, and a
+// POST to a web server.
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <mutex>
+#include <string_view>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include <httplib.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/eventfd.h>
+#include <sys/mman.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "base/error.h"
+#include "monitor/service/event_hook.h"
+
+extern char** environ;
+
+namespace fdi::monitor {
+namespace {
+
+constexpr const char* kStops = "the monitor stops";
+
+class File {
+ public:
+  explicit File(int fd) : fd_(fd) {}
+  ~File() {
+    if (fd_ >= 0) {
+      close(fd_);
+    }
+  }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+std::string Reason(const char* operation, int code) {
+  return std::string(operation) + ": " + std::strerror(code);
+}
+
+// An in-memory file, not a pipe: a program that never reads its input cannot
+// block us.
+int MakeInput(std::string_view text) {
+  const int fd = memfd_create("fdi-event", MFD_CLOEXEC);
+  if (fd >= 0 && (write(fd, text.data(), text.size()) !=
+                      static_cast<ssize_t>(text.size()) ||
+                  lseek(fd, 0, SEEK_SET) != 0)) {
+    close(fd);
+    return -1;
+  }
+  return fd;
+}
+
+// @returns the exit status of the child; waits for it to exit.
+int Reap(pid_t pid) {
+  int status = 0;
+  while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  return status;
+}
+
+// Kills the whole process group.
+// The child has not been reaped yet, so its pid cannot belong to anyone else.
+void Kill(pid_t pid) {
+  kill(-pid, SIGKILL);
+  Reap(pid);
+}
+
+// Attributes of the child: `input` as standard input, our standard error as its
+// output, no other open file, default signals, its own process group.
+class SpawnPlan {
+ public:
+  // The child performs the file actions in this order: the input is duplicated
+  // before all above standard error is closed. Ignored signals outlive exec(),
+  // and the monitor ignores SIGXFSZ, so all are set to their defaults.
+  explicit SpawnPlan(int input) {
+    posix_spawn_file_actions_init(&files_);
+    posix_spawn_file_actions_adddup2(&files_, input, STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&files_, STDERR_FILENO, STDOUT_FILENO);
+    posix_spawn_file_actions_addclosefrom_np(&files_, STDERR_FILENO + 1);
+    sigset_t none;
+    sigset_t all;
+    sigemptyset(&none);
+    sigfillset(&all);
+    posix_spawnattr_init(&attributes_);
+    posix_spawnattr_setsigmask(&attributes_, &none);
+    posix_spawnattr_setsigdefault(&attributes_, &all);
+    posix_spawnattr_setpgroup(&attributes_, 0);
+    posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK |
+                                               POSIX_SPAWN_SETSIGDEF |
+                                               POSIX_SPAWN_SETPGROUP);
+  }
+  ~SpawnPlan() {
+    posix_spawn_file_actions_destroy(&files_);
+    posix_spawnattr_destroy(&attributes_);
+  }
+  SpawnPlan(const SpawnPlan&) = delete;
+  SpawnPlan& operator=(const SpawnPlan&) = delete;
+
+  // @returns an error code, 0 for success.
+  int Spawn(const std::vector<std::string>& words, pid_t& pid) const {
+    std::vector<char*> arguments;
+    for (const std::string& word : words) {
+      arguments.push_back(const_cast<char*>(word.c_str()));
+    }
+    arguments.push_back(nullptr);
+    return posix_spawnp(&pid, arguments[0], &files_, &attributes_,
+                        arguments.data(), environ);
+  }
+
+ private:
+  posix_spawn_file_actions_t files_;
+  posix_spawnattr_t attributes_;
+};
+
+std::optional<std::string> StatusReason(int status) {
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+    return std::nullopt;
+  }
+  return WIFEXITED(status)
+             ? "exit status " + std::to_string(WEXITSTATUS(status))
+             : "signal " + std::to_string(WTERMSIG(status));
+}
+
+class ProgramDelivery : public EventDelivery {
+ public:
+  ProgramDelivery(std::vector<std::string> words,
+                  std::chrono::milliseconds limit)
+      : words_(std::move(words)),
+        limit_(limit),
+        stop_(eventfd(0, EFD_CLOEXEC)) {
+    if (stop_.get() < 0) {
+      throw std::system_error(errno, std::generic_category(), "eventfd");
+    }
+  }
+
+  std::optional<std::string> Deliver(const std::string& json) override {
+    const File input(MakeInput(json));
+    if (input.get() < 0) {
+      return Reason("memfd_create", errno);
+    }
+    pid_t pid = 0;
+    if (const int code = SpawnPlan(input.get()).Spawn(words_, pid); code != 0) {
+      return Reason(words_.front().c_str(), code);
+    }
+    return Await(pid);
+  }
+
+  // Nobody reads the descriptor: it stays readable and aborts later deliveries,
+  // too.
+  void Interrupt() override { eventfd_write(stop_.get(), 1); }
+
+ private:
+  std::optional<std::string> Await(pid_t pid) const {
+    // A descriptor, because poll() awaits it together with stop_ and a timeout,
+    // which waitpid() cannot.
+    // The header of glibc 2.36 declares pidfd_open() for C alone.
+    const File process(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
+    if (process.get() < 0) {
+      // Without it the end of the process would go unnoticed until the timeout.
+      const int code = errno;
+      Kill(pid);
+      return Reason("pidfd_open", code);
+    }
+    pollfd wanted[2] = {{process.get(), POLLIN, 0}, {stop_.get(), POLLIN, 0}};
+    const auto end = std::chrono::steady_clock::now() + limit_;
+    int ready = 0;
+    do {
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+          end - std::chrono::steady_clock::now());
+      ready = poll(wanted, 2,
+                   static_cast<int>(std::max<std::int64_t>(0, left.count())));
+    } while (ready < 0 && errno == EINTR);
+    // A program that has ended counts by its status, even if the monitor stops
+    // now.
+    const bool ended = ready > 0 && wanted[0].revents != 0;
+    if (ended) {
+      return StatusReason(Reap(pid));
+    }
+    Kill(pid);
+    return ready > 0 ? kStops
+                     : "killed after " + std::to_string(limit_.count()) + " ms";
+  }
+
+  std::vector<std::string> words_;
+  std::chrono::milliseconds limit_;
+  File stop_;
+};
+
+constexpr std::string_view kScheme = "http://";
+
+[[noreturn]] void Refuse(const std::string& target, const std::string& why) {
+  throw ConfigError("--on-event '" + target + "': " + why +
+                    "; accepted are a command with its arguments and "
+                    "http://HOST[:PORT][/PATH]");
+}
+
+// Words are separated by blanks; within '...' or "..." a blank belongs to the
+// word. There are no other special characters and no escapes.
+std::vector<std::string> SplitWords(const std::string& text) {
+  std::vector<std::string> words;
+  bool in_word = false;
+  char quote = '\0';
+  for (const char c : text) {
+    if (quote == '\0' && (c == ' ' || c == '\t')) {
+      in_word = false;
+      continue;
+    }
+    if (!std::exchange(in_word, true)) {
+      words.emplace_back();
+    }
+    if (c == quote) {
+      quote = '\0';
+    } else if (quote == '\0' && (c == '\'' || c == '"')) {
+      quote = c;
+    } else {
+      words.back() += c;
+    }
+  }
+  if (quote != '\0') {
+    Refuse(text, "a quote is not closed");
+  }
+  return words;
+}
+
+// A request that is left behind may still use static objects of cpp-httplib. So
+// the process ends without destroying them.
+void KeepStaticObjects() {
+  on_exit(
+      [](int status, void*) {
+        std::fflush(nullptr);
+        _exit(status);
+      },
+      nullptr);
+}
+
+// @returns why the server did not accept the text, or nothing on success.
+std::optional<std::string> Post(const std::string& server,
+                                const std::string& path,
+                                const std::string& json,
+                                std::chrono::milliseconds limit) {
+  httplib::Client client(server);
+  // cpp-httplib applies each limit to one operation, so a server that sends
+  // its answer byte by byte can take longer in all.
+  client.set_connection_timeout(limit);
+  client.set_read_timeout(limit);
+  client.set_write_timeout(limit);
+  const httplib::Result answer = client.Post(path, json, "application/json");
+  if (!answer) {
+    return httplib::to_string(answer.error());
+  }
+  return answer->status / 100 == 2
+             ? std::nullopt
+             : std::optional("HTTP status " + std::to_string(answer->status));
+}
+
+class UrlDelivery : public EventDelivery {
+ public:
+  UrlDelivery(std::string server, std::string path,
+              std::chrono::milliseconds limit)
+      : server_(std::move(server)), path_(std::move(path)), limit_(limit) {}
+
+  // The request has a thread of its own, which a stop leaves behind: neither
+  // the lookup of the host's name nor cpp-httplib's connect() can be aborted.
+  // That thread uses nothing of ours but its copies, until the process ends.
+  std::optional<std::string> Deliver(const std::string& json) override {
+    std::unique_lock lock(request_->mutex);
+    if (request_->stopped) {
+      return kStops;
+    }
+    request_->ended = false;
+    std::thread thread([request = request_, server = server_, path = path_,
+                        limit = limit_, json] {
+      std::optional<std::string> failure;
+      try {
+        failure = Post(server, path, json, limit);
+      } catch (const std::exception& error) {
+        failure = error.what();
+      }
+      const std::lock_guard guard(request->mutex);
+      request->failure = std::move(failure);
+      request->ended = true;
+      request->changed.notify_all();
+    });
+    request_->changed.wait(
+        lock, [this] { return request_->ended || request_->stopped; });
+    if (!request_->ended) {
+      KeepStaticObjects();
+      thread.detach();
+      return kStops;
+    }
+    lock.unlock();
+    thread.join();
+    return request_->failure;
+  }
+
+  void Interrupt() override {
+    const std::lock_guard lock(request_->mutex);
+    request_->stopped = true;
+    request_->changed.notify_all();
+  }
+
+ private:
+  struct Request {
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool stopped{false};
+    bool ended{false};
+    std::optional<std::string> failure;
+  };
+
+  std::string server_;  // http://HOST[:PORT]
+  std::string path_;
+  std::chrono::milliseconds limit_;
+  std::shared_ptr<Request> request_{std::make_shared<Request>()};
+};
+
+}  // namespace
+
+std::unique_ptr<EventDelivery> DeliverToProgram(
+    std::vector<std::string> words, std::chrono::milliseconds limit) {
+  return std::make_unique<ProgramDelivery>(std::move(words), limit);
+}
+
+std::unique_ptr<EventDelivery> DeliverToUrl(const std::string& url,
+                                            std::chrono::milliseconds limit) {
+  const std::size_t slash = std::min(url.find('/', kScheme.size()), url.size());
+  if (!url.starts_with(kScheme) || slash == kScheme.size()) {
+    Refuse(url, "no host");
+  }
+  const std::string path = url.substr(slash);
+  const std::string server = url.substr(0, slash);
+  if (!httplib::Client(server).is_valid()) {
+    Refuse(url, "no host and port");
+  }
+  return std::make_unique<UrlDelivery>(server, path.empty() ? "/" : path,
+                                       limit);
+}
+
+std::unique_ptr<EventDelivery> MakeEventDelivery(
+    const std::string& target, std::chrono::milliseconds limit) {
+  if (target.starts_with(kScheme)) {
+    return DeliverToUrl(target, limit);
+  }
+  // In the first word this is a URL of a scheme that is not spoken. In a later
+  // word it is an argument of the command, such as the address given to curl.
+  if (target.find("://") != std::string::npos &&
+      target.find("://") < target.find(' ')) {
+    Refuse(target, "only http is spoken");
+  }
+  std::vector<std::string> words = SplitWords(target);
+  if (words.empty()) {
+    Refuse(target, "nothing to run");
+  }
+  return DeliverToProgram(std::move(words), limit);
+}
+
+}  // namespace fdi::monitor

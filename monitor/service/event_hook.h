@@ -1,0 +1,151 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/log.h"
+#include "base/worker.h"
+#include "monitor/sinks.h"
+#include "report/fault_texts.h"
+#include "report/json_output.h"
+
+namespace fdi::monitor {
+
+/// Delivers one text to an external receiver.
+class EventDelivery {
+ public:
+  virtual ~EventDelivery() = default;
+  /// Waits until the text was accepted, or the timeout. Called by one thread.
+  /// @returns why it was not accepted, or nothing on success.
+  virtual std::optional<std::string> Deliver(const std::string& json) = 0;
+  /// Aborts the delivery in progress and all later ones. Thread safe.
+  virtual void Interrupt() = 0;
+};
+
+/// Runs a program with the text as its standard input; exit status 0 is
+/// success. There is no shell: `words` are the program, looked up in PATH, and
+/// its arguments. It inherits no other open file, writes to our standard error,
+/// and is killed after `limit` together with the children in its process group.
+/// @throws std::system_error if no event file descriptor can be created.
+std::unique_ptr<EventDelivery> DeliverToProgram(
+    std::vector<std::string> words, std::chrono::milliseconds limit);
+
+/// POSTs the text as application/json; a status of 2xx is success.
+/// @param url http://HOST[:PORT][/PATH]
+/// @throws ConfigError naming `url` and what is accepted.
+std::unique_ptr<EventDelivery> DeliverToUrl(const std::string& url,
+                                            std::chrono::milliseconds limit);
+
+/// Chooses between the two: a target that begins with http:// is a URL, any
+/// other a command whose words are separated by blanks; words that contain
+/// blanks are quoted.
+/// @throws ConfigError naming what is accepted.
+std::unique_ptr<EventDelivery> MakeEventDelivery(
+    const std::string& target, std::chrono::milliseconds limit);
+
+/// Settings of EventHook.
+struct EventHookOptions {
+  int per_minute{60};  ///< Rate and burst size of deliveries.
+  std::size_t max_waiting{256};
+  std::function<std::chrono::steady_clock::time_point()> now{
+      std::chrono::steady_clock::now};
+};
+
+/// {"kind", "valve_id", "episode_id", "stamp_utc", "fault", "name", "severity",
+/// "discipline", "namur", "check", "factor", "strength", "reason", "model_set",
+/// "persisted"}; missing values are null. Without a fault, name and check are
+/// null too, until the event is known to lie outside all known faults.
+report::Json EventJson(const FaultEvent& event, bool persisted,
+                       const report::FaultTexts& texts);
+
+/// Notifies a program or a web server of every fault event that goes to the
+/// bus, each at most once and in order, from a thread of its own: neither the
+/// diagnosis nor the bus waits.
+///
+/// The rate is limited to `per_minute`. Of the events beyond it only the newest
+/// is kept, and delivered once the rate allows it. Each delivery carries
+/// "left_out", the number of events dropped since the previous one.
+///
+/// Built idle. Thread safe except for Start() and Stop().
+class EventHook {
+ public:
+  struct Counts {
+    std::uint64_t delivered{0};
+    std::uint64_t failed{0};
+    std::uint64_t left_out{0};
+  };
+
+  EventHook(std::unique_ptr<EventDelivery> delivery, EventHookOptions options,
+            LogSink log);
+  ~EventHook();
+  EventHook(const EventHook&) = delete;
+  EventHook& operator=(const EventHook&) = delete;
+
+  /// Queues `event`, a JSON object, for delivery. Never blocks.
+  void Notify(report::Json event);
+
+  void Start();
+  /// Allows `patience` for the deliveries in progress and in the queue, then
+  /// ends the thread. Does nothing if it was not started.
+  void Stop(std::chrono::milliseconds patience);
+
+  Counts counts() const;
+
+ private:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  void Run();
+  bool TakeToken(TimePoint now);
+  void Enqueue(report::Json event);
+  void RecordResult(const std::optional<std::string>& failure);
+
+  std::unique_ptr<EventDelivery> delivery_;
+  EventHookOptions options_;
+  LogSink log_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<report::Json> waiting_;    // Within the rate.
+  std::optional<report::Json> newest_;  // Beyond it.
+  std::uint64_t left_out_{0};           // Since the last one delivered.
+  double tokens_;
+  TimePoint filled_;
+  bool busy_{false};
+  bool stopping_{false};
+  Counts counts_;
+  Worker worker_;
+};
+
+/// Decorates `bus`: the hook is notified of every event that went to it.
+class OutwardEvents : public EventSink {
+ public:
+  OutwardEvents(EventSink& bus, std::unique_ptr<EventDelivery> delivery,
+                EventHookOptions options, report::FaultTexts texts, LogSink log)
+      : bus_(bus),
+        texts_(std::move(texts)),
+        hook_(std::move(delivery), std::move(options), std::move(log)) {}
+
+  bool Publish(const FaultEvent& event, bool persisted) override {
+    const bool sent = bus_.Publish(event, persisted);
+    hook_.Notify(EventJson(event, persisted, texts_));
+    return sent;
+  }
+
+  EventHook& hook() { return hook_; }
+
+ private:
+  EventSink& bus_;
+  report::FaultTexts texts_;
+  EventHook hook_;
+};
+
+}  // namespace fdi::monitor

@@ -1,0 +1,138 @@
+#include "monitor/service/plant_feed.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace fdi::monitor {
+namespace {
+
+constexpr std::chrono::seconds kMinPatience{3};
+constexpr std::chrono::seconds kMonitorExpiry{60};
+constexpr double kSilentPeriods = 3.0;
+
+// "leader" or "standby"; empty for a monitor that is not in a pair.
+std::string PairOf(const idl::MonitorStatusMessage& status) {
+  const auto leads =
+      std::ranges::find(status.counters, "pair_leader",
+                        &std::pair<std::string, std::uint64_t>::first);
+  return leads == status.counters.end() ? ""
+         : leads->second != 0           ? "leader"
+                                        : "standby";
+}
+
+}  // namespace
+
+std::shared_ptr<const console::ModelFacts> PlantFeed::Add(
+    const idl::ModelSetInfoMessage& info) {
+  ModelSet models;
+  models.name = info.model_set;
+  models.version = info.version;
+  models.content_hash = info.model_hash;
+  models.channels = info.channels;
+  models.faults = info.faults;
+  models.decision.isolation_threshold = info.isolation_threshold;
+  models.decision.isolation_samples = info.isolation_samples;
+  models.decision.detection_samples = info.detection_samples;
+  models.sample_period_s = info.sample_period_s;
+  models.flow_unit = info.flow_unit;
+  // Several monitors may use the same set; sharing one object keeps trends
+  // continuous.
+  auto& facts = models_[info.model_hash];
+  if (!facts) {
+    facts = console::FactsOf(models);
+  }
+  return facts;
+}
+
+console::MonitorLine& PlantFeed::MarkAlive(const idl::Reception& reception,
+                                           Clock::time_point now) {
+  Monitor& monitor = monitors_[reception.participant_id];
+  monitor.heard = now;
+  monitor.line.heard_ns = reception.received_ns;
+  return monitor.line;
+}
+
+void PlantFeed::Add(const idl::DecisionMessage& message,
+                    const idl::Reception& reception, Clock::time_point now) {
+  std::string monitor;
+  {
+    const std::lock_guard lock(mutex_);
+    monitor = MarkAlive(reception, now).name;
+  }
+  const Verdict& verdict = message.verdict;
+  Valve& valve = valves_[message.valve_id];
+  const bool repeated =
+      valve.source_id == verdict.source_id && verdict.seq <= valve.seq;
+  valve.participant = reception.participant_id;
+  if (repeated || OutOfOrder(verdict.intake)) {
+    return;  // A new leader of a pair repeats some vectors.
+  }
+  const auto models = models_.find(message.model_hash);
+  const auto facts = models == models_.end() ? nullptr : models->second;
+  board_.ShowRemote(message.valve_id, verdict, facts, monitor);
+  valve.source_id = verdict.source_id;
+  valve.seq = verdict.seq;
+  valve.heard = now;
+  valve.silence = Silence::kNone;
+  valve.patience = std::max<Clock::duration>(
+      kMinPatience,
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+          facts ? kSilentPeriods * facts->period_s : 0.0)));
+}
+
+void PlantFeed::Add(const idl::MonitorStatusMessage& status,
+                    const idl::Reception& reception, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  console::MonitorLine& line = MarkAlive(reception, now);
+  line.name = status.monitor;
+  line.software = status.software;
+  line.health = idl::HealthName(status.health);
+  line.text = status.text;
+  line.pair = PairOf(status);
+}
+
+void PlantFeed::Poll(Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  for (auto& [participant, monitor] : monitors_) {
+    monitor.line.silent = now - monitor.heard > kMonitorSilence;
+    monitor.line.valves = 0;
+  }
+  for (auto& [id, valve] : valves_) {
+    Monitor& monitor = monitors_[valve.participant];
+    ++monitor.line.valves;
+    UpdateSilence(id, valve, monitor, now);
+  }
+  std::erase_if(monitors_, [now](const auto& item) {
+    return item.second.line.valves == 0 &&
+           now - item.second.heard > kMonitorExpiry;
+  });
+}
+
+void PlantFeed::UpdateSilence(const std::string& valve_id, Valve& valve,
+                              const Monitor& monitor, Clock::time_point now) {
+  const Silence silence = monitor.line.silent ? Silence::kMonitor
+                          : now - valve.heard > valve.patience ? Silence::kStale
+                                                               : Silence::kNone;
+  if (silence == std::exchange(valve.silence, silence)) {
+    return;
+  }
+  if (silence == Silence::kMonitor) {
+    board_.ShowMonitorSilence(valve_id, monitor.line.heard_ns);
+  } else {
+    board_.ShowSilence(valve_id, silence);
+  }
+}
+
+std::vector<console::MonitorLine> PlantFeed::monitors() const {
+  std::vector<console::MonitorLine> lines;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [participant, monitor] : monitors_) {
+    if (!monitor.line.name.empty()) {
+      lines.push_back(monitor.line);
+    }
+  }
+  std::ranges::sort(lines, {}, &console::MonitorLine::name);
+  return lines;
+}
+
+}  // namespace fdi::monitor

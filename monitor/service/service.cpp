@@ -1,0 +1,622 @@
+// The service from start to end. Orders that matter:
+//
+// Start: what an earlier session left unsent is published before the journal's
+// threads use the same connection. The subscription is served last, once all
+// consumers are ready; until then samples queue at the subscriber.
+//
+// Stop: HTTP stops accepting requests, the diagnosis drains the subscriber,
+// journal and recorder store and publish the results, the hook gets a second
+// for its deliveries, the session is closed in the history, and the last status
+// is published. Each step is attempted even if an earlier one failed.
+#include "monitor/service/service.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <functional>
+#include <utility>
+
+#include <systemd/sd-daemon.h>
+
+#include "base/printable.h"
+#include "base/time_text.h"
+#include "diagnosis/records/partitions.h"
+#include "monitor/bus/dds_options.h"
+#include "monitor/service/cause_groups.h"
+#include "monitor/service/shadow.h"
+
+namespace fdi::monitor {
+namespace {
+
+using std::chrono::milliseconds;
+using Clock = std::chrono::steady_clock;
+
+// Without samples, Pipeline::Poll() runs as often as this.
+constexpr milliseconds kTakeTimeout{100};
+constexpr int kTakeLimit = 4096;  // Bounds a call of Take() under full load.
+// A pair must exchange states more often.
+constexpr milliseconds kPairTakeTimeout{20};
+constexpr int kPairTakeLimit = 256;
+constexpr milliseconds kTickPeriod{1000};
+// After a reload that failed; doubled each time, as all sets are read again.
+constexpr milliseconds kReloadPause{2000};
+constexpr milliseconds kMaxReloadPause{300'000};
+// Each of these bounds one step of a stop. SIGTERM ends the monitor within 5 s,
+// also with a subscriber that does not read (docs/operations.md).
+constexpr milliseconds kHookPatience{1000};
+constexpr milliseconds kDrainLimit{1000};
+constexpr milliseconds kSubscriberPatience{1000};
+constexpr milliseconds kAcknowledgeLimit{300};
+
+milliseconds Milliseconds(double seconds) {
+  return milliseconds(static_cast<std::int64_t>(seconds * 1e3));
+}
+
+storage::DataDirectory Prepared(const std::filesystem::path& path) {
+  storage::DataDirectory data{path};
+  storage::EnsureExists(data);
+  PrepareModels(data.models());
+  return data;
+}
+
+PipelineOptions PipelineOptionsOf(const ServiceOptions& options,
+                                  const storage::DataDirectory& data) {
+  PipelineOptions pipeline;
+  if (options.shadow) {
+    pipeline.shadow.candidate = LoadCandidate(data.models(), *options.shadow);
+    pipeline.shadow.valve_glob = options.shadow_valves;
+  }
+  pipeline.max_valves = options.max_valves;
+  pipeline.valve_glob = options.valves;
+  pipeline.stale_timeout = Milliseconds(options.stale_timeout_s);
+  pipeline.trace.before_s = options.trace_before_s;
+  pipeline.second_look = options.second_look;
+  pipeline.recorder.lossless = options.recording == Recording::kLossless;
+  return pipeline;
+}
+
+std::vector<Heartbeat::Member> Members(const Pipeline& pipeline,
+                                       const Pulse& service) {
+  std::vector<Heartbeat::Member> members = pipeline.threads();
+  members.push_back({"service", &service});
+  return members;
+}
+
+std::vector<storage::CauseGroup> CauseGroupsOf(
+    const ServiceOptions& options, const storage::DataDirectory& data) {
+  const std::filesystem::path usual = data.path / "groups.toml";
+  if (options.groups.empty() && !std::filesystem::exists(usual)) {
+    return {};
+  }
+  return ReadCauseGroups(options.groups.empty() ? usual : options.groups);
+}
+
+std::filesystem::path LockOf(const storage::DataDirectory& data) {
+  std::filesystem::path path = data.history();
+  return path += ".lock";
+}
+
+// The reader never frees the slot of a valve while its publisher is alive, so
+// it needs more slots than the pipeline, which does free them.
+int IntakeValves(int max_valves) {
+  constexpr int kSpareSlots = 60'000;
+  constexpr int kMaxSlots = 100'000;  // See idl::DdsOptions.
+  return std::min(max_valves + kSpareSlots, kMaxSlots);
+}
+
+std::vector<std::string> Partitions(const ServiceOptions& options) {
+  return options.pair ? PartitionsOf(*options.pair)
+                      : std::vector<std::string>{};
+}
+
+std::string PairText(const Pair& pair) {
+  const Pair::Status status = pair.status();
+  const std::string leader = status.leader.empty() ? "nobody" : status.leader;
+  return status.leads ? "leader" : "standby, " + leader + " leads";
+}
+
+// Notifies the service manager (systemd, Type=notify), if there is one.
+void Notify(const std::string& state) {
+  sd_notify(0, state.c_str());
+}
+
+std::string MonotonicMicroseconds() {
+  return std::to_string(std::chrono::duration_cast<std::chrono::microseconds>(
+                            Clock::now().time_since_epoch())
+                            .count());
+}
+
+}  // namespace
+
+// Members are initialised in the order in which they use each other. The
+// session in the history begins only in Start(), so that an error in options or
+// files leaves no trace.
+Service::Service(const ServiceOptions& options, const report::Context& context)
+    : options_(options),
+      context_(context),
+      http_(options.http ? std::make_unique<HttpServer>(
+                               ProbeServer(*options.http, options.http_names))
+                         : nullptr),
+      console_(options.console
+                   ? std::make_unique<console::Console>(
+                         *options.console, context.options, context.log)
+                   : nullptr),
+      data_(Prepared(context.options.data_dir)),
+      lock_(LockOf(data_), "recording faults"),
+      pipeline_options_(PipelineOptionsOf(options, data_)),
+      cause_groups_(CauseGroupsOf(options, data_)),
+      delivery_(
+          options.on_event.empty()
+              ? nullptr
+              : MakeEventDelivery(options.on_event,
+                                  Milliseconds(options.on_event_timeout_s))),
+      participant_(DdsOptionsOf(context.options, options.max_valves),
+                   context.log, "fdi-monitor"),
+      intake_participant_(
+          DdsOptionsOf(context.options, IntakeValves(options.max_valves)),
+          context.log, "fdi-monitor intake"),
+      models_topic_(participant_),
+      changes_(data_.models()),
+      assignment_(std::make_shared<const ModelAssignment>(
+          data_.models(), options.model_set,
+          [this](const ModelSet& models) { AnnounceModels(models); })),
+      model_sets_(assignment_->loaded()),
+      history_(data_.history(), NowNs, context.log),
+      runs_(options.recording == Recording::kOff
+                ? nullptr
+                : std::make_unique<RunStore>(data_.runs(), context.software)),
+      decisions_(participant_,
+                 options.lossless_decisions ? MonitorName() : std::string(),
+                 publication_stop_.get_token(), Partitions(options)),
+      events_(participant_, context.log, Partitions(options)),
+      outward_(
+          delivery_ == nullptr
+              ? nullptr
+              : std::make_unique<OutwardEvents>(
+                    events_, std::move(delivery_),
+                    EventHookOptions{.per_minute = options.on_event_per_minute},
+                    report::LoadFaultTexts(context.options), context.log)),
+      status_topic_(participant_),
+      samples_(
+          intake_participant_,
+          options.best_effort ? idl::Profile::kBestEffort : idl::Profile::kLive,
+          idl::Overflow::kOnTheWay,
+          ParsePartitions(context.options.partition, true)),
+      log_(context.log),
+      pair_(options.pair ? std::make_unique<Pair>(participant_, *options.pair,
+                                                  MonitorName(), decisions_,
+                                                  events_, EventsOut(), log_)
+                         : nullptr),
+      operators_(options.pair ? std::make_unique<OperatorSync>(
+                                    participant_, *options.pair, MonitorName(),
+                                    data_.history(), log_)
+                              : nullptr),
+      shares_(participant_,
+              {MonitorName(), options.pair ? options.pair->name : "",
+               options.valves, context.options.partition},
+              log_),
+      pipeline_(WithDelivery(pipeline_options_), Sinks(), assignment_,
+                {counters_, log_, NowNs}),
+      heartbeat_(Members(pipeline_, service_pulse_)),
+      started_ns_(NowNs()),
+      last_status_line_(Clock::now()) {}
+
+Service::~Service() = default;
+
+// The bus, inside the event hook if there is one.
+EventSink& Service::EventsOut() {
+  return outward_ ? static_cast<EventSink&>(*outward_) : events_;
+}
+
+// The event sinks are nested: console, pair, hook, bus, from the outside. The
+// console is outside the pair, so that the page of a standby shows all events;
+// the hook is inside, so that only the leader notifies.
+PipelineSinks Service::Sinks() {
+  EventSink& events = pair_ ? *pair_ : EventsOut();
+  return {pair_ ? static_cast<DecisionSink&>(*pair_) : decisions_,
+          console_ ? console_->Wrap(events) : events, history_, runs_.get(),
+          console_ ? &console_->live() : nullptr};
+}
+
+PipelineOptions Service::WithDelivery(PipelineOptions options) {
+  // A standby publishes nothing itself: its events are delivered once it has
+  // heard them from the leader.
+  options.journal.acknowledged = [this](milliseconds patience) {
+    return (!pair_ || pair_->AllEventsCovered()) &&
+           events_.WaitForAcknowledged(patience);
+  };
+  return options;
+}
+
+// Called by any thread that resolves models.
+void Service::AnnounceModels(const ModelSet& models) {
+  models_topic_.Write(idl::Describe(models));
+  context_.log(LogLevel::kInfo, "models_loaded model_set=" + NameOf(models));
+}
+
+int Service::Run(report::StopSignals& signals) {
+  FirstError errors;
+  errors.Try([&] {
+    Start();
+    Serve(signals);
+  });
+  errors.Try([this] { Stop(); });
+  errors.Rethrow();
+  const bool incomplete =
+      pipeline_.history_degraded() || pipeline_.recording_degraded();
+  return incomplete ? report::kExitData : report::kExitOk;
+}
+
+void Service::Start() {
+  history_.BeginSession(context_.software, context_.command_line);
+  ResendEvents();
+  WatchCauses();
+  if (outward_) {
+    outward_->hook().Start();
+  }
+  if (console_) {
+    ServeConsole();
+  }
+  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators(),
+                  history_.ShadowAccumulators());
+  diagnosis_.Start([this] { Diagnose(); });
+  if (operators_) {
+    operators_->Start();
+  }
+  if (http_) {
+    ServeProbes();
+  }
+}
+
+// Publishes what an earlier session committed but may not have sent.
+void Service::ResendEvents() {
+  for (const FaultEvent& event : history_.UnsentEvents()) {
+    if (pair_) {
+      pair_->Resend(event);
+    }
+    if (pair_ || events_.Publish(event, true)) {
+      pipeline_.MarkPublished(event);
+      counters_.Add(Counter::kEventsResent);
+    }
+  }
+}
+
+// Causes that ended meanwhile are ended in the history, so this must precede
+// Pipeline::Start(), from which on the connection belongs to the journal.
+void Service::WatchCauses() {
+  if (cause_groups_.empty()) {
+    return;
+  }
+  context_.log(LogLevel::kInfo,
+               "cause_groups groups=" + std::to_string(cause_groups_.size()));
+  history_.WatchCauses(std::move(cause_groups_),
+                       [this](const storage::CauseChange& change) {
+                         // Both of a pair find the cause; the leader notifies.
+                         if (outward_ && (!pair_ || pair_->status().leads)) {
+                           outward_->hook().Notify(CauseJson(change));
+                         }
+                       });
+}
+
+void Service::ServeConsole() {
+  const auto facts = [this] {
+    const idl::MonitorStatusMessage status = StatusOf(Facts());
+    return console::MonitorFacts{
+        idl::HealthName(status.health), status.counters,
+        pipeline_.census().open_episodes, pair_ ? PairText(*pair_) : ""};
+  };
+  console_->Start({data_.history(), data_.models(), context_.software,
+                   started_ns_, facts, NowNs});
+}
+
+void Service::ServeProbes() {
+  const auto readiness = [this] {
+    return Readiness{
+        model_sets_,
+        !pipeline_.history_degraded() && !pipeline_.recording_degraded(),
+        samples_.status().matched};
+  };
+  http_->Add(ProbePages(heartbeat_, {[this] { return Metrics(); }, readiness}));
+  http_->Start();
+  context_.log(LogLevel::kInfo,
+               "http_listening address=" + ToString(http_->address()));
+}
+
+// The diagnosis thread: takes samples from the bus and diagnoses them. The
+// receive thread has decoded them already, so an intermediate thread would only
+// move them. The backlog stays at the subscriber, which stops receiving once it
+// holds 16 MB.
+void Service::Diagnose() {
+  TimePoint
+      received{};  // The last sample; when it came, not when it was taken.
+  std::int64_t utc_to_steady_ns = 0;
+  const idl::Handlers<idl::ValveSampleMessage> handlers{
+      [&](const idl::ValveSampleMessage& message,
+          const idl::Reception& reception) {
+        received = TimePoint(
+            std::chrono::nanoseconds(reception.received_ns + utc_to_steady_ns));
+        pipeline_.OnSample(message.valve_id, message.sample,
+                           reception.writer_id, received);
+      },
+      [&](const idl::ValveSampleMessage& message,
+          const idl::Reception& reception) {
+        pipeline_.OnStreamEnded(message.valve_id, reception.writer_id);
+      }};
+  const int limit = pair_ ? kPairTakeLimit : kTakeLimit;
+  const auto take = [&](milliseconds timeout) {
+    // Recomputed each time, because the UTC clock may have been set.
+    utc_to_steady_ns =
+        Clock::now().time_since_epoch() / std::chrono::nanoseconds(1) - NowNs();
+    return samples_.Take(handlers, timeout, limit);
+  };
+  while (!stopping_) {
+    // While samples wait, silence is measured up to the newest one handled.
+    const int taken = take(pair_ ? kPairTakeTimeout : kTakeTimeout);
+    pipeline_.Poll(taken < limit ? Clock::now() : received);
+    if (pair_) {
+      pair_->Tick(counters_[Counter::kReceived], pipeline_);
+    }
+  }
+  // Before the queue is drained: the standby takes over at once, without
+  // waiting for its patience to pass.
+  if (pair_) {
+    pair_->StepDown();
+  }
+  // Drains what has arrived already; publishers that continue to send do not
+  // delay the shutdown beyond drain_until_.
+  while (Clock::now() < drain_until_.load() && take(milliseconds(0)) > 0) {
+  }
+  pipeline_.FlushDecisions();
+}
+
+void Service::Serve(report::StopSignals& signals) {
+  // Not written through the log: scripts wait for this line at every log level.
+  const std::string ready =
+      "monitor_ready model_set=" + assignment_->DefaultName() +
+      " assigned=" + std::to_string(assignment_->assigned()) +
+      " valves=" + options_.valves +
+      " max_valves=" + std::to_string(options_.max_valves) +
+      " domain=" + std::to_string(context_.options.domain) + "\n";
+  std::fputs(ready.c_str(), stderr);
+  Notify("READY=1");
+  TimePoint next_tick = Clock::now();
+  std::uint64_t limit_us = 0;
+  if (sd_watchdog_enabled(0, &limit_us) > 0) {
+    // sd_watchdog_enabled() gives the limit after which the manager ends us;
+    // its manual recommends to notify at half of it.
+    watchdog_.emplace(heartbeat_, std::chrono::microseconds(limit_us / 2),
+                      next_tick);
+  }
+  while (!pipeline_.failed() && !diagnosis_.failed()) {
+    const TimePoint now = Clock::now();
+    service_pulse_.Beat();
+    if (now >= next_tick) {
+      Tick();
+      next_tick = now + kTickPeriod;
+    }
+    const TimePoint wake = FeedWatchdog(next_tick);
+    // The cast truncates: without the added millisecond the last fraction of
+    // one would be spent in a busy loop.
+    const report::StopSignals::Event event = signals.WaitFor(
+        std::chrono::duration_cast<milliseconds>(wake - Clock::now()) +
+        milliseconds(1));
+    if (event == report::StopSignals::Event::kStop) {
+      return;
+    }
+    if (event == report::StopSignals::Event::kReload) {
+      // Under Type=notify-reload the manager requires the time stamp, and takes
+      // the reload as finished at READY=1.
+      Notify("RELOADING=1\nMONOTONIC_USEC=" + MonotonicMicroseconds());
+      Reload("signal");
+      if (console_) {
+        console_->Reload();
+      }
+      Notify("READY=1");
+    }
+  }
+}
+
+// @returns when to be called again, `next_tick` at the latest.
+Service::TimePoint Service::FeedWatchdog(TimePoint next_tick) {
+  if (!watchdog_) {
+    return next_tick;
+  }
+  const TimePoint now = Clock::now();
+  if (watchdog_->Due(now)) {
+    Notify("WATCHDOG=1");
+  }
+  return watchdog_->next() > now ? std::min(watchdog_->next(), next_tick)
+                                 : next_tick;
+}
+
+// A models.db that cannot be read now does not end the service: the models in
+// use stay, and it is read again later, because nobody would change it again.
+void Service::Tick() {
+  try {
+    if (changes_.Changed()) {
+      Reload("models_changed");
+    } else if (retry_reload_at_ && Clock::now() >= *retry_reload_at_) {
+      reload_pause_ = std::min(2 * reload_pause_, kMaxReloadPause);
+      *retry_reload_at_ = Clock::now() + reload_pause_;
+      ReadModels({});  // Announces nothing, as it may fail for ever.
+      LoadModels();
+      context_.log(LogLevel::kInfo, "models_reload cause=retry");
+    }
+  } catch (const std::exception& error) {
+    const std::string reason = error.what();
+    log_.Report(LogId::kModelFailure, "models_unreadable",
+                [&reason] { return "reason=" + LogValue(reason); });
+  }
+  shares_.Tick([this] { return pipeline_.valve_names(); });
+  ReportLoss();
+  ReportStall();
+  PublishStatus();
+  if (Clock::now() - last_status_line_ >=
+      Milliseconds(options_.status_period_s)) {
+    last_status_line_ = Clock::now();
+    context_.log(LogLevel::kInfo, StatusLine(StatusOf(Facts())));
+  }
+}
+
+// A reload was requested, or the models changed: its outcome is not throttled.
+void Service::Reload(const char* cause) {
+  context_.log(LogLevel::kInfo, std::string("models_reload cause=") + cause);
+  try {
+    LoadModels();
+  } catch (const std::exception& error) {
+    reload_pause_ = kReloadPause;
+    retry_reload_at_ = Clock::now() + reload_pause_;
+    counters_.Add(Counter::kModelFailures);
+    log_.Line(LogLevel::kError, LogLine(LogId::kModelFailure, "reload_failed",
+                                        "reason=" + LogValue(error.what())));
+  }
+}
+
+std::shared_ptr<const ModelAssignment> Service::ReadModels(
+    ModelAssignment::Announce announce) const {
+  auto next = std::make_shared<const ModelAssignment>(
+      data_.models(), options_.model_set, std::move(announce));
+  // Loads the sets here, so that the diagnosis thread need not.
+  for (const std::string& valve : pipeline_.valve_names()) {
+    next->ModelsFor(valve);
+  }
+  return next;
+}
+
+void Service::LoadModels() {
+  auto next =
+      ReadModels([this](const ModelSet& models) { AnnounceModels(models); });
+  assignment_ = next;
+  model_sets_ = next->loaded();
+  pipeline_.Reassign(std::move(next));
+  retry_reload_at_.reset();
+}
+
+StatusFacts Service::Facts() const {
+  idl::DatagramCounts datagrams = participant_.datagrams();
+  std::ranges::transform(datagrams, intake_participant_.datagrams(),
+                         datagrams.begin(), std::plus<>());
+  return {counters_,
+          pipeline_.census(),
+          samples_.status(),
+          datagrams,
+          intake_participant_.refused_participants(),
+          decisions_.status(),
+          pipeline_.journal_backlog(),
+          pipeline_.recorder_backlog(),
+          pipeline_.history_degraded(),
+          pipeline_.recording_degraded(),
+          heartbeat_.StalledSince(Clock::now() - kStallLimit),
+          pair_ ? std::optional(pair_->status()) : std::nullopt,
+          shares_.contested()};
+}
+
+std::string Service::Metrics() const {
+  MetricsFacts facts{context_.software, started_ns_, data_,
+                     heartbeat_.members()};
+  facts.requests = http_->counts();
+  if (console_) {
+    facts.streams = console_->streams();
+    facts.board_bytes = console_->board_bytes();
+    for (const auto& [outcome, count] : console_->requests()) {
+      facts.requests[outcome] += count;
+    }
+    facts.admissions = console_->admissions();
+  }
+  std::string page = MetricsPage(Facts(), facts);
+  if (const ShadowCounts* counts = pipeline_.shadow_counts()) {
+    page += ShadowMetrics(*counts);
+  }
+  return page;
+}
+
+void Service::ReportLoss() {
+  const idl::SubscriberStatus dds = samples_.status();
+  const std::uint64_t loss =
+      dds.lost + dds.undecodable + dds.rejected_instances;
+  if (loss != std::exchange(reported_loss_, loss)) {
+    log_.Report(LogId::kTransport, "transport_loss", [&dds] {
+      return "lost=" + std::to_string(dds.lost) +
+             " undecodable=" + std::to_string(dds.undecodable) +
+             " rejected_instances=" + std::to_string(dds.rejected_instances) +
+             " refused_valves=" + std::to_string(dds.refused_valves);
+    });
+  }
+}
+
+void Service::ReportStall() {
+  const auto stalled = heartbeat_.StalledSince(Clock::now() - kStallLimit);
+  if (!stalled.empty()) {
+    log_.Report(
+        LogId::kStalled, "threads_stalled",
+        [&stalled] { return "threads=" + Joined(stalled); }, LogLevel::kError);
+  }
+}
+
+void Service::PublishStatus() {
+  idl::MonitorStatusMessage status = StatusOf(Facts());
+  status.monitor = MonitorName();
+  status.software = context_.software;
+  status.started_ns = started_ns_;
+  status.stamp_ns = NowNs();
+  status_topic_.Write(status);
+  const std::string line = ManagerLine(status);
+  if (line != std::exchange(notified_status_, line)) {
+    Notify("STATUS=" + line);
+  }
+}
+
+void Service::Stop() {
+  context_.log(LogLevel::kInfo, "monitor_stopping");
+  Notify("STOPPING=1");
+  FirstError errors;
+  if (http_) {
+    errors.Try([this] { http_->Stop(); });
+  }
+  if (console_) {
+    errors.Try([this] { console_->Stop(); });
+  }
+  if (operators_) {
+    operators_->Stop();
+  }
+  errors.Try([this] { StopDiagnosis(); });
+  if (outward_) {
+    errors.Try([this] { outward_->hook().Stop(kHookPatience); });
+  }
+  errors.Try([this] { history_.EndSession(); });
+  errors.Try([this] { PublishStatus(); });
+  // A subscriber that has not read until now is not given more time.
+  if (!publication_stop_.stop_requested()) {
+    decisions_.WaitForAcknowledged(kAcknowledgeLimit);
+  }
+  events_.WaitForAcknowledged(kAcknowledgeLimit);
+  status_topic_.WaitForAcknowledged(kAcknowledgeLimit);
+  context_.log(LogLevel::kInfo, StatusLine(StatusOf(Facts())));
+  context_.log(LogLevel::kInfo, "monitor_stopped");
+  // Last, because clients may keep the server's threads busy for a second.
+  // These threads use everything above, so they must end within this call.
+  http_.reset();
+  if (console_) {
+    errors.Try([this] { console_->Close(); });
+  }
+  errors.Rethrow();
+}
+
+// Diagnoses, stores and publishes what was received.
+void Service::StopDiagnosis() {
+  // In this order: the diagnosis thread reads the limit once it sees stopping_.
+  // The pipeline stops after that thread has ended, because its calls come from
+  // there.
+  drain_until_ = Clock::now() + kDrainLimit;
+  stopping_ = true;
+  samples_.Interrupt();
+  // A subscriber that does not read must not prevent the shutdown.
+  if (!diagnosis_.WaitFor(kSubscriberPatience)) {
+    publication_stop_.request_stop();
+  }
+  FirstError errors;
+  errors.Try([this] { diagnosis_.Join(); });
+  errors.Try([this] { pipeline_.Stop(); });
+  errors.Rethrow();
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,158 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "base/worker.h"
+#include "idl/endpoint.h"
+#include "monitor/bus/bus_sinks.h"
+#include "monitor/bus/share_watch.h"
+#include "monitor/console/console.h"
+#include "monitor/heartbeat.h"
+#include "monitor/http/http_server.h"
+#include "monitor/pair/operator_sync.h"
+#include "monitor/pair/pair.h"
+#include "monitor/pipeline.h"
+#include "monitor/service/event_hook.h"
+#include "monitor/service/history_store.h"
+#include "monitor/service/model_assignment.h"
+#include "monitor/service/run_store.h"
+#include "monitor/service/status.h"
+#include "report/program.h"
+#include "report/stop_signals.h"
+#include "storage/database/data_directory.h"
+#include "storage/database/locks.h"
+
+namespace fdi::monitor {
+
+enum class Recording : std::uint8_t { kOff, kOn, kLossless };
+
+/// Settings of `fdi-monitor run`.
+struct ServiceOptions {
+  std::optional<storage::ModelReference> model_set;
+  Recording recording{Recording::kOff};
+  std::string valves{"*"};
+  int max_valves{2000};
+  bool lossless_decisions{false};
+  bool best_effort{false};  ///< ValveSample without retransmission.
+  bool second_look{true};   ///< Of onboarded valves, by physics.
+  double stale_timeout_s{3600.0};
+  double trace_before_s{1800.0};
+  double status_period_s{60.0};     ///< Of the status line in the log.
+  std::optional<PairOptions> pair;  ///< This monitor has a standby.
+  /// Runs beside the active sets; without a version the newest one.
+  std::optional<storage::ModelReference> shadow;
+  std::string shadow_valves{"*"};
+  /// Serve metrics and probes over HTTP.
+  std::optional<HttpAddress> http;
+  std::vector<std::string> http_names;  ///< See HostAllowed().
+  /// Groups of valves with common causes; empty: DATA/groups.toml if it exists.
+  std::filesystem::path groups;
+  /// Notify a program or a web server of events; empty: disabled.
+  std::string on_event;
+  int on_event_per_minute{60};
+  double on_event_timeout_s{10.0};
+  /// Serve the live page.
+  std::optional<console::ConsoleOptions> console;
+};
+
+/// The monitor as a service: DDS on one side, the databases on the other, the
+/// pipeline between them. The thread of Run() handles signals, status, watchdog
+/// and new models. Runs once.
+class Service {
+ public:
+  /// Opens all resources and starts none of its threads.
+  /// @throws ConfigError, DataError, NotFoundError, idl::TransportError,
+  ///   storage::SqliteError
+  Service(const ServiceOptions& options, const report::Context& context);
+  ~Service();
+  Service(const Service&) = delete;
+  Service& operator=(const Service&) = delete;
+
+  /// Serves until a signal requests a stop or a thread fails, then stores and
+  /// publishes what was received and ends all threads in any case.
+  /// @returns the exit code. @throws the first error.
+  int Run(report::StopSignals& signals);
+
+ private:
+  using TimePoint = Heartbeat::TimePoint;
+
+  EventSink& EventsOut();
+  PipelineSinks Sinks();
+  PipelineOptions WithDelivery(PipelineOptions options);
+  void AnnounceModels(const ModelSet& models);
+
+  void Start();
+  void WatchCauses();
+  void ResendEvents();
+  void ServeConsole();
+  void ServeProbes();
+  void Diagnose();
+
+  void Serve(report::StopSignals& signals);
+  void Tick();
+  void Reload(const char* cause);
+  std::shared_ptr<const ModelAssignment> ReadModels(
+      ModelAssignment::Announce announce) const;
+  void LoadModels();
+  TimePoint FeedWatchdog(TimePoint next_tick);
+
+  StatusFacts Facts() const;
+  std::string Metrics() const;
+  void ReportLoss();
+  void ReportStall();
+  void PublishStatus();
+
+  void Stop();
+  void StopDiagnosis();
+
+  ServiceOptions options_;
+  const report::Context& context_;
+  std::unique_ptr<HttpServer> http_;           // Null: no probes.
+  std::unique_ptr<console::Console> console_;  // Null: no console.
+  storage::DataDirectory data_;
+  storage::ExclusiveLock lock_;
+  PipelineOptions pipeline_options_;
+  std::vector<storage::CauseGroup> cause_groups_;
+  std::unique_ptr<EventDelivery> delivery_;  // Null: no event hook.
+  idl::Participant participant_;
+  idl::Participant intake_participant_;  // See idl::Overflow.
+  idl::Publisher<idl::ModelSetInfoMessage> models_topic_;
+  storage::ChangeCounter changes_;
+  std::shared_ptr<const ModelAssignment> assignment_;
+  std::atomic<std::size_t> model_sets_;
+  HistoryStore history_;
+  std::unique_ptr<RunStore> runs_;     // Null: nothing is recorded.
+  std::stop_source publication_stop_;  // Ends waits for slow subscribers.
+  BusDecisionSink decisions_;
+  BusEventSink events_;
+  std::unique_ptr<OutwardEvents> outward_;  // Null: no event hook.
+  idl::Publisher<idl::MonitorStatusMessage> status_topic_;
+  idl::Subscriber<idl::ValveSampleMessage> samples_;
+  Counters counters_;
+  ThrottledLog log_;
+  std::unique_ptr<Pair> pair_;               // Null: not in a pair.
+  std::unique_ptr<OperatorSync> operators_;  // Set together with pair_.
+  ShareWatch shares_;
+  Pipeline pipeline_;
+  Pulse service_pulse_;  // Beaten by the thread of Run().
+  Heartbeat heartbeat_;
+  std::optional<Watchdog> watchdog_;  // Only if a service manager asks for it.
+  std::string notified_status_;
+  std::int64_t started_ns_;
+  std::uint64_t reported_loss_{0};
+  TimePoint last_status_line_;
+  std::optional<TimePoint> retry_reload_at_;   // After a reload that failed,
+  std::chrono::milliseconds reload_pause_{0};  // this long after the last try.
+  std::atomic<bool> stopping_{false};
+  std::atomic<TimePoint> drain_until_{TimePoint{}};
+  Worker diagnosis_;
+};
+
+}  // namespace fdi::monitor

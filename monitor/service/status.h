@@ -1,0 +1,106 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "idl/endpoint.h"
+#include "idl/wire.h"
+#include "monitor/bus/share_watch.h"
+#include "monitor/console/admission.h"
+#include "monitor/console/live_stream.h"
+#include "monitor/counters.h"
+#include "monitor/heartbeat.h"
+#include "monitor/http/http_server.h"
+#include "monitor/pair/pair.h"
+#include "monitor/pipeline.h"
+#include "storage/database/data_directory.h"
+
+// The state of the monitor: on the bus, in the log, over HTTP.
+
+namespace fdi::monitor {
+
+/// Snapshot from which the status on the bus and the metrics page are made.
+struct StatusFacts {
+  const Counters& counters;
+  ValveCensus census;
+  idl::SubscriberStatus samples;
+  idl::DatagramCounts datagrams;       ///< Summed over all participants.
+  std::uint64_t refused_participants;  ///< By the intake participant.
+  idl::PublisherStatus decisions;
+  Journal::Backlog journal;
+  std::size_t recorder_backlog{0};
+  bool history_degraded{false};
+  bool recording_degraded{false};
+  std::vector<std::string_view> stalled{};  ///< Names of threads.
+  std::optional<Pair::Status> pair{};       ///< Nothing: not in a pair.
+  ContestedValves contested{};
+};
+
+/// All counters and gauges, the counters first.
+std::vector<Measure> MeasuresOf(const StatusFacts& facts);
+
+/// Named measures and health. The caller sets monitor, software and stamps.
+idl::MonitorStatusMessage StatusOf(const StatusFacts& facts);
+
+/// "host:pid"
+std::string MonitorName();
+
+/// One line for a service manager, without values that change all the time.
+std::string ManagerLine(const idl::MonitorStatusMessage& status);
+
+/// "a,b"
+std::string Joined(const std::vector<std::string_view>& words);
+
+/// "monitor_status received=1 ...": the values that are not zero.
+std::string StatusLine(const idl::MonitorStatusMessage& status);
+
+/// A thread without progress for this long is reported as stalled. Longer than
+/// a database may block it.
+inline constexpr std::chrono::seconds kStallLimit{10};
+
+/// What a monitor needs to be useful.
+struct Readiness {
+  std::size_t model_sets{0};
+  bool databases{false};  ///< They accept writes.
+  int publishers{0};      ///< Publishers of samples.
+
+  bool ready() const { return model_sets > 0 && databases && publishers > 0; }
+};
+
+/// What the metrics page adds to the status.
+struct MetricsFacts {
+  std::string software;
+  std::int64_t started_ns{0};  ///< UTC.
+  storage::DataDirectory data;
+  std::vector<Heartbeat::Member> threads;
+  std::optional<console::StreamCounts> streams{};  ///< Nothing: no console.
+  std::uint64_t board_bytes{0};                    ///< Of the console.
+  console::AdmissionCounts admissions{};           ///< Of the console.
+  HttpServer::Counts requests{};
+};
+
+/// All metrics in the Prometheus text format.
+std::string MetricsPage(const StatusFacts& status, const MetricsFacts& facts);
+
+/// Callbacks behind the pages; called by server threads.
+struct ProbeSources {
+  std::function<std::string()> metrics;
+  std::function<Readiness()> readiness;
+};
+
+/// Probes have a thread of their own, so that slow metrics requests do not make
+/// a healthy service look dead.
+HttpServerOptions ProbeServer(const HttpAddress& address,
+                              const std::vector<std::string>& names);
+
+/// /metrics; /healthz: 200 while all threads make progress; /readyz: 200 while
+/// there are models, databases and a publisher. Otherwise 503 with the reason
+/// as JSON.
+HttpServer::Pages ProbePages(const Heartbeat& heartbeat, ProbeSources sources);
+
+}  // namespace fdi::monitor

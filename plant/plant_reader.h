@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "plant/plant_database.h"
+#include "storage/history/history.h"
+
+namespace fdi::storage {
+
+/// Reads the plant's history, over all monitors or those of one name. Of an id
+/// that several monitors have, Show(), Events(), Look(), Trace() and
+/// AlarmList() give that of the first by host and name; of an hour of a valve,
+/// Health() the one with the longest LIVE time.
+class PlantReader : public History {
+ public:
+  /// @param monitor a name; empty: all. @throws PlantError as PlantDatabase.
+  explicit PlantReader(const std::string& url, std::string monitor = {});
+
+  std::vector<Episode> List(const EpisodeFilter& filter) override;
+  Episode Show(std::string_view id) override;
+  std::vector<HistoryEntry> Events(std::uint64_t episode_id) override;
+  std::optional<EpisodeLook> Look(std::uint64_t episode_id) override;
+  std::vector<StrengthPoint> Strengths(std::uint64_t episode_id) override;
+  std::vector<TracePoint> Trace(std::uint64_t episode_id) override;
+  std::vector<EpisodeStatistics> Statistics(
+      const EpisodeFilter& filter) override;
+  std::vector<DataGap> Gaps(const EpisodeFilter& filter) override;
+  std::vector<CoverageTime> Coverage(const EpisodeFilter& filter) override;
+  std::vector<Alarm> AlarmList(std::int64_t now_ns,
+                               std::int64_t limit) override;
+  AlarmStatistics AlarmFigures(const EpisodeFilter& filter,
+                               std::int64_t now_ns) override;
+  std::vector<Shelf> Shelves(
+      std::optional<std::int64_t> in_force_at_ns) override;
+  std::vector<HealthHour> Health(const HealthFilter& filter) override;
+  std::vector<std::string> HealthValves(const std::string& glob) override;
+  std::string Version() override;
+
+ private:
+  std::vector<Episode> ListWhere(const std::string& more,
+                                 const EpisodeFilter& filter);
+  PlantRows Query(std::string_view sql, const EpisodeFilter& filter);
+  PlantRows QueryEpisode(std::string_view sql, std::uint64_t episode_id,
+                         const char* order = "");
+
+  PlantDatabase plant_;
+  std::string monitor_;
+};
+
+}  // namespace fdi::storage

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "plant/plant_database.h"
+#include "storage/database/data_directory.h"
+#include "storage/database/database.h"
+
+namespace fdi::storage {
+
+/// Under which names a history stands in the plant's.
+struct ShipSource {
+  std::string host;
+  std::string monitor;
+};
+
+/// What a call of Ship() moved.
+struct Shipped {
+  std::int64_t batches{0};
+  /// By table of the plant's history: rows that were new or different there.
+  std::map<std::string, std::int64_t> rows;
+};
+
+/// Ends shipping: no change is logged any more, none is kept, and `prune` waits
+/// for no plant. The next shipping begins anew.
+/// @throws DataError, SqliteError
+void StopShipping(const DataDirectory& data);
+
+/// Brings what changed in a data directory to the plant's history, in order.
+///
+/// The first shipping copies what is there, in the order of detection, while
+/// changes are logged from its begin on; then follows what they name. A batch
+/// is read in one short transaction of history.db, while the row of this
+/// monitor in PostgreSQL is locked, so that of several shippers none can
+/// overwrite a later state with an earlier one. PostgreSQL commits the rows
+/// with the time of shipping; only then is it noted in history.db how far the
+/// plant is, with that time. After a crash between the two commits, or a
+/// restore of history.db from a backup, rows are sent again and change nothing.
+/// If the plant's time is before the one noted here, PostgreSQL lost what it
+/// had committed, or was restored from a backup: all is copied anew. One thread
+/// at a time.
+class Shipper {
+ public:
+  /// Connects, and opens history.db beside a running monitor.
+  /// @throws DataError, SqliteError, PlantError
+  Shipper(const DataDirectory& data, const std::string& url,
+          const ShipSource& source);
+
+  /// Until nothing is left. @throws DataError, SqliteError, PlantError; what
+  ///   was shipped before is there, and the next call, of a new object, goes
+  ///   on behind it.
+  Shipped Ship();
+
+  const PlantDatabase& plant() const { return plant_; }
+
+ private:
+  struct Batch;
+  struct Cursor;
+
+  bool ShipBatch(Shipped& shipped);
+  void ShipModels(Shipped& shipped);
+  void Merge(const Batch& batch, Shipped& shipped);
+  Cursor ReadCursor(std::int64_t shipped_ns_there);
+  bool TakeItems(Cursor& cursor);
+  void StoreCursor(const Cursor& cursor);
+  void MakeStage(const Batch& batch);
+
+  DataDirectory data_;
+  Database history_;
+  PlantDatabase plant_;
+  ShipSource source_;
+  std::string monitor_id_;
+  std::set<std::string> staged_;  // Tables that have a stage.
+};
+
+}  // namespace fdi::storage

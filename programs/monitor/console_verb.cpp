@@ -1,0 +1,117 @@
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <string>
+#include <type_traits>
+
+#include <CLI/CLI.hpp>
+
+#include "base/time_text.h"
+#include "monitor/console/console.h"
+#include "monitor/service/plant_feed.h"
+#include "monitor/throttled_log.h"
+#include "plant/plant_reader.h"
+#include "programs/monitor/bus_view.h"
+#include "programs/monitor/verbs.h"
+#include "report/program.h"
+#include "report/stop_signals.h"
+
+namespace fdi::monitor {
+namespace {
+
+struct PlantConsoleOptions {
+  std::string from;
+  std::string listen{"127.0.0.1:8081"};
+  console::ConsoleOptions console;
+  BusOptions bus{.program = "fdi-monitor console"};
+};
+
+// OK if there is at least one monitor and all of them are healthy.
+console::MonitorFacts FactsOf(const std::vector<console::MonitorLine>& lines) {
+  const bool well =
+      !lines.empty() && std::ranges::all_of(lines, [](const auto& line) {
+        return !line.silent && line.health == "OK";
+      });
+  return {well ? "OK" : "DEGRADED", {}, 0};
+}
+
+int RunConsole(PlantConsoleOptions options, const report::Context& context) {
+  options.console.address = ParseHttpAddress(options.listen, "--listen");
+  const LogSink log = LimitLog(context.log);
+  const report::StopSignals signals;
+  const std::int64_t started_ns = NowNs();
+  std::optional<PlantFeed> feed;  // Outlives the console's threads.
+  console::Console console(options.console, context.options, log);
+  feed.emplace(console.live());
+  BusView bus(options.bus, context, log);
+  console.Start({{},
+                 {},
+                 context.software,
+                 started_ns,
+                 [&feed] { return FactsOf(feed->monitors()); },
+                 NowNs,
+                 [url = options.from] {
+                   return std::make_unique<storage::PlantReader>(url);
+                 },
+                 [&feed] { return feed->monitors(); }});
+  while (!signals.stop_requested()) {
+    bus.Take(
+        [&](const auto& message, const idl::Reception& reception) {
+          using Message = std::decay_t<decltype(message)>;
+          if constexpr (std::is_same_v<Message, FaultEvent>) {
+            console.OnEvent(message);
+          } else if constexpr (std::is_same_v<Message,
+                                              idl::ModelSetInfoMessage>) {
+            console.OnModels(feed->Add(message));
+          } else {
+            feed->Add(message, reception, PlantFeed::Clock::now());
+          }
+        },
+        [](const std::string& /*valve_id*/) {});
+    feed->Poll(PlantFeed::Clock::now());
+  }
+  console.Close();
+  return report::kExitOk;
+}
+
+}  // namespace
+
+void AddConsoleVerb(report::Program& program) {
+  auto options = std::make_shared<PlantConsoleOptions>();
+  CLI::App& console = program.AddVerb(
+      "console",
+      "Serve one live page of all monitors on the bus; their episodes come "
+      "from "
+      "the plant's history (fdi-store ship). It diagnoses nothing",
+      [options](const report::Context& context) {
+        return RunConsole(*options, context);
+      });
+  console
+      .add_option("--from", options->from,
+                  "The plant's history: postgresql://user@host/database")
+      ->required()
+      ->type_name("URL");
+  console
+      .add_option("--listen", options->listen,
+                  "Where to serve it; a PORT alone is on loopback, port 0 any "
+                  "free one")
+      ->capture_default_str()
+      ->type_name("ADDRESS:PORT");
+  console
+      .add_option("--console-files", options->console.files,
+                  "Folder of the page instead of the installed one")
+      ->type_name("DIR");
+  console
+      .add_option("--allow-host", options->console.names,
+                  "Answer under this name, too, and not only under localhost, "
+                  "addresses and the name of the machine")
+      ->type_name("NAME");
+  console.add_option("--valves", options->bus.valves,
+                     "Only ids that match GLOB");
+  console
+      .add_option("--max-valves", options->bus.max_valves,
+                  "Maximum number of valves")
+      ->check(CLI::Range(1, 100000));
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,69 @@
+#include <vector>
+
+#include "idl/participant.h"
+#include "programs/monitor/verbs.h"
+#include "report/examples.h"
+#include "report/program.h"
+#include "storage/database/database.h"
+
+namespace {
+
+// Shown by --help and in the manual pages.
+std::vector<fdi::report::VerbExamples> Examples() {
+  return {
+      {"",
+       {{"Diagnose what is on the bus, with a page to look at",
+         "fdi-monitor run --model-set paper --console"},
+        {"Watch it in another terminal", "fdi-monitor top"}}},
+      {"run",
+       {{"Every valve with the set that is assigned to it; store the samples",
+         "fdi-monitor run --record"},
+        {"One set for the valves FV-1..., open to the plant network",
+         "fdi-monitor run --model-set paper@2 --valves 'FV-1*' --interface "
+         "all"},
+        {"A page on which people may acknowledge and label",
+         "fdi-monitor run --console=127.0.0.1:8080 --console-write token"},
+        {"The page for the control room, over https and with logins",
+         "fdi-monitor run --console=0.0.0.0:8443 --console-tls console.pem "
+         "--console-users users"},
+        {"See what a new set would say, beside the old one",
+         "fdi-monitor run --shadow paper@3"}}},
+      {"console-user",
+       {{"Add a user; the password is asked for twice",
+         "fdi-monitor console-user anna --role acknowledge --users users"},
+        {"Remove one",
+         "fdi-monitor console-user anna --remove --users users"}}},
+      {"watch",
+       {{"All fault events as JSON lines", "fdi-monitor watch --events --json"},
+        {"How many vectors come in ten seconds",
+         "fdi-monitor watch --count --for 10"}}},
+      {"top",
+       {{"The worst valves first; q quits, s sorts, / filters",
+         "fdi-monitor top"},
+        {"Once, for a script", "fdi-monitor top --once --valves 'FV-1*'"}}},
+      {"console",
+       {{"One page of all monitors, with the plant's history",
+         "fdi-monitor console --from postgresql://screen@db.example/plant"},
+        {"Open to the plant network, of one hall",
+         "fdi-monitor console --from postgresql://screen@db.example/plant "
+         "--listen 10.1.2.9:8081 --valves 'H1-*'"}}},
+  };
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  fdi::report::Program program("fdi-monitor",
+                               "Recognises which fault a control valve has");
+  program.AddBusOptions();
+  program.AddFaultCatalogueOption();
+  program.MapError<fdi::storage::SqliteError>(fdi::report::kExitData);
+  program.MapError<fdi::idl::TransportError>(fdi::report::kExitTransport);
+  fdi::monitor::AddRunVerb(program);
+  fdi::monitor::AddConsoleUserVerb(program);
+  fdi::monitor::AddWatchVerb(program);
+  fdi::monitor::AddTopVerb(program);
+  fdi::monitor::AddConsoleVerb(program);
+  program.AddExamples(Examples());
+  return program.Run(argc, argv);
+}

@@ -1,0 +1,301 @@
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <arpa/inet.h>
+
+#include "base/error.h"
+#include "monitor/service/service.h"
+#include "monitor/throttled_log.h"
+#include "programs/monitor/verbs.h"
+#include "report/program.h"
+#include "report/stop_signals.h"
+
+namespace fdi::monitor {
+namespace {
+
+struct RunArguments {
+  std::string model_set;
+  std::string shadow;
+  std::string record{"off"};
+  std::string http{"off"};
+  std::string console{"off"};
+  console::ConsoleOptions console_options;
+  std::string console_token;
+  std::string console_users;
+  TlsFiles console_tls;
+  PairOptions pair;
+  ServiceOptions service;
+};
+
+// A flag with an optional value; TOML may give it as true or false.
+// In CLI11, default_str() of an option with expected(0, 1) is its value if it
+// is given bare (--record). If it is not given, its variable stays as it is,
+// here "off".
+std::string ParseRecord(const std::string& word) {
+  if (word == "true" || word == "on") {
+    return "on";
+  }
+  if (word == "false" || word == "off") {
+    return "off";
+  }
+  if (word != "lossless") {
+    throw CLI::ValidationError("--record",
+                               word + " is none of on, lossless, off");
+  }
+  return word;
+}
+
+// As for --record; an address is validated where it is used.
+std::function<std::string(std::string)> AddressOr(const std::string& usual) {
+  return [usual](const std::string& word) {
+    if (word == "true" || word == "on") {
+      return usual;
+    }
+    return word == "false" ? "off" : word;
+  };
+}
+
+std::string CheckAddress(const std::string& text) {
+  std::array<unsigned char, sizeof(in6_addr)> ignored{};
+  return inet_pton(AF_INET, text.c_str(), ignored.data()) == 1 ||
+                 inet_pton(AF_INET6, text.c_str(), ignored.data()) == 1
+             ? ""
+             : text + " is no IPv4 or IPv6 address";
+}
+
+std::string CheckHeader(const std::string& text) {
+  return std::all_of(
+             text.begin(), text.end(),
+             [](unsigned char c) { return std::isalnum(c) != 0 || c == '-'; })
+             ? ""
+             : text + " has more than letters, digits and '-'";
+}
+
+void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
+  const bool writable = !arguments.console_token.empty();
+  const bool users = !arguments.console_users.empty();
+  const bool tls = !arguments.console_tls.certificate.empty();
+  if (arguments.console == "off") {
+    if (writable || users || tls || !arguments.console_options.files.empty()) {
+      throw ConfigError(
+          "--console-write, --console-users, --console-tls and "
+          "--console-files need --console[=[ADDRESS:]PORT]");
+    }
+    return;
+  }
+  console::ConsoleOptions& console =
+      options.console.emplace(arguments.console_options);
+  console.address = ParseHttpAddress(arguments.console, "--console");
+  console.names = options.http_names;
+  if (writable) {
+    console.admission.token_file = arguments.console_token;
+  }
+  if (users) {
+    console.admission.users_file = arguments.console_users;
+  }
+  if (tls) {
+    console.tls = arguments.console_tls;
+  }
+}
+
+void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
+  run.add_option("--console", arguments.console,
+                 "Serve the live page and its API; port 0: any free one")
+      ->expected(0, 1)
+      ->default_str("127.0.0.1:8080")
+      ->transform(AddressOr("127.0.0.1:8080"))
+      ->type_name("[=[ADDRESS:]PORT]");
+  CLI::Option* token =
+      run.add_option("--console-write", arguments.console_token,
+                     "Let everybody who has the token in FILE acknowledge, "
+                     "shelve and label; a FILE that does not exist is made "
+                     "with a random token")
+          ->type_name("FILE");
+  CLI::Option* users =
+      run.add_option("--console-users", arguments.console_users,
+                     "Ask for a name and a password of FILE, which "
+                     "console-user makes, and let each user do what the role "
+                     "allows")
+          ->excludes(token)
+          ->type_name("FILE");
+  console::AdmissionOptions& admission = arguments.console_options.admission;
+  CLI::Option* header =
+      run.add_option("--console-proxy-user", admission.proxy_header,
+                     "Header by which a proxy says which of those users asks")
+          ->needs(users)
+          ->check(CheckHeader)
+          ->type_name("HEADER");
+  CLI::Option* proxy =
+      run.add_option("--console-proxy-from", admission.proxy_address,
+                     "Address of that proxy; the header is ignored from others")
+          ->needs(header)
+          ->check(CheckAddress)
+          ->type_name("ADDRESS");
+  header->needs(proxy);
+  CLI::Option* tls =
+      run.add_option("--console-tls", arguments.console_tls.certificate,
+                     "Serve https with this certificate, its issuers and, "
+                     "without --console-key, its key; SIGHUP reads them anew")
+          ->type_name("FILE.pem");
+  run.add_option("--console-key", arguments.console_tls.key,
+                 "Its key, without passphrase and only for the service to read")
+      ->needs(tls)
+      ->type_name("FILE.pem");
+  run.add_option("--console-files", arguments.console_options.files,
+                 "Folder of the page instead of the installed one")
+      ->type_name("DIR");
+}
+
+void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
+  run.add_option("--groups", service.groups,
+                 "Groups of valves, [[group]] name, valves, faults, "
+                 "min_valves, within_s: faults that many have at once get one "
+                 "common cause (default: DATA/groups.toml)")
+      ->check(CLI::ExistingFile)
+      ->type_name("FILE.toml");
+  run.add_option("--on-event", service.on_event,
+                 "Notify of every fault event: a command that reads it as JSON "
+                 "from its standard input, or http://HOST[:PORT][/PATH] that "
+                 "it is posted to")
+      ->type_name("CMD|URL");
+  run.add_option("--on-event-rate", service.on_event_per_minute,
+                 "At most this many a minute; the rest is counted")
+      ->check(CLI::Range(1, 6000))
+      ->capture_default_str();
+  run.add_option("--on-event-timeout", service.on_event_timeout_s,
+                 "Abandon a delivery after this time [s]")
+      ->check(CLI::Range(0.1, 600.0))
+      ->capture_default_str();
+}
+
+void AddPairOptions(CLI::App& run, PairOptions& pair) {
+  CLI::Option* name =
+      run.add_option(
+             "--pair", pair.name,
+             "Diagnose beside another monitor of the same NAME: one of the "
+             "two publishes, the other one takes over when it fails")
+          ->type_name("NAME");
+  run.add_option("--rank", pair.rank,
+                 "Of this monitor in the pair; when both may lead, 1 does "
+                 "before 2")
+      ->default_str("")
+      ->type_name("1..9")
+      ->needs(name);
+  run.add_option("--pair-patience", pair.patience_s,
+                 "Take over when nothing was heard from the diagnosis of the "
+                 "leader for this time [s]")
+      ->check(CLI::Range(0.1, 60.0))
+      ->capture_default_str()
+      ->needs(name);
+}
+
+int Run(const RunArguments& arguments, const report::Context& context) {
+  ServiceOptions options = arguments.service;
+  if (!arguments.model_set.empty()) {
+    options.model_set = storage::ParseModelReference(arguments.model_set);
+  }
+  if (!arguments.shadow.empty()) {
+    options.shadow = storage::ParseModelReference(arguments.shadow);
+  } else if (options.shadow_valves != "*") {
+    throw ConfigError("--shadow-valves needs --shadow NAME[@VERSION]");
+  }
+  if (arguments.record != "off") {
+    options.recording =
+        arguments.record == "lossless" ? Recording::kLossless : Recording::kOn;
+  }
+  if (!arguments.pair.name.empty()) {
+    Validate(options.pair.emplace(arguments.pair));
+  }
+  if (arguments.http != "off") {
+    options.http = ParseHttpAddress(arguments.http, "--http");
+  }
+  TakeConsole(arguments, options);
+  if (!options.http_names.empty() && !options.http && !options.console) {
+    throw ConfigError("--allow-host needs --http or --console");
+  }
+  // Before the service, so that a signal during its start requests an orderly
+  // stop.
+  report::StopSignals signals;
+  const report::Context limited{context.options, LimitLog(context.log),
+                                context.software, context.command_line};
+  Service service(options, limited);
+  return service.Run(signals);
+}
+
+}  // namespace
+
+void AddRunVerb(report::Program& program) {
+  // CLI11 holds references to the variables and fills them when it parses,
+  // after this function has returned; the callback shares their ownership.
+  auto arguments = std::make_shared<RunArguments>();
+  CLI::App& run = program.AddVerb(
+      "run", "Diagnose the valves on the bus until SIGINT or SIGTERM",
+      [arguments](const report::Context& context) {
+        return Run(*arguments, context);
+      });
+  run.add_option("--model-set", arguments->model_set,
+                 "NAME[@VERSION] for valves that none is assigned to; without "
+                 "it the only active one, if no valve is assigned any");
+  run.add_option("--shadow", arguments->shadow,
+                 "Run a candidate beside the active sets and record where they "
+                 "differ; without VERSION the newest one")
+      ->type_name("NAME[@VERSION]");
+  run.add_option("--shadow-valves", arguments->service.shadow_valves,
+                 "Compare only on ids that match GLOB")
+      ->capture_default_str();
+  run.add_option("--record", arguments->record,
+                 "Store the samples as runs; =lossless waits for the disk "
+                 "instead of counting what it could not take")
+      ->expected(0, 1)
+      ->default_str("on")
+      ->transform(ParseRecord)
+      ->type_name("[=on|lossless|off]");
+  ServiceOptions& service = arguments->service;
+  run.add_option("--valves", service.valves, "Serve only ids that match GLOB")
+      ->capture_default_str();
+  run.add_option("--max-valves", service.max_valves,
+                 "Serve at most N valves, count the others")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  run.add_flag("--lossless-decisions", service.lossless_decisions,
+               "Publish every decision vector on fdi/v1/DecisionBatch, too; a "
+               "slow subscriber of it holds the monitor up");
+  run.add_flag("--best-effort", service.best_effort,
+               "Take samples without retransmission");
+  run.add_flag("!--no-second-look", service.second_look,
+               "Name faults as the observers do, without the second look by "
+               "the physics of an onboarded valve");
+  run.add_option("--stale-timeout", service.stale_timeout_s,
+                 "Close an episode when its valve was silent for this time [s]")
+      ->check(CLI::Range(1.0, 1e7))
+      ->capture_default_str();
+  run.add_option("--trace-before", service.trace_before_s,
+                 "Evidence kept from before a detection [s], at most 1800 "
+                 "samples")
+      ->check(CLI::Range(0.0, 1800.0))
+      ->capture_default_str();
+  AddOnEventOptions(run, service);
+  AddPairOptions(run, arguments->pair);
+  run.add_option("--http", arguments->http,
+                 "Serve /metrics, /healthz and /readyz; port 0: any free one")
+      ->expected(0, 1)
+      ->default_str("127.0.0.1:9464")
+      ->transform(AddressOr("127.0.0.1:9464"))
+      ->type_name("[=[ADDRESS:]PORT]");
+  AddConsoleOptions(run, *arguments);
+  run.add_option("--allow-host", service.http_names,
+                 "Answer --http and --console under this name, too, and not "
+                 "only under localhost, addresses and the name of the machine")
+      ->type_name("NAME");
+  run.add_option("--status-period", service.status_period_s,
+                 "Time between status lines in the log [s]")
+      ->check(CLI::Range(1.0, 86400.0))
+      ->capture_default_str();
+}
+
+}  // namespace fdi::monitor

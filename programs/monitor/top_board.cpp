@@ -1,0 +1,343 @@
+#include "programs/monitor/top_board.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <sstream>
+#include <tuple>
+#include <vector>
+
+#include "base/printable.h"
+#include "base/time_text.h"
+#include "base/time_units.h"
+#include "diagnosis/fault_catalogue.h"
+#include "monitor/console/model_facts.h"
+
+namespace fdi::monitor {
+namespace {
+
+using report::Json;
+using report::Tone;
+
+constexpr std::chrono::seconds kMonitorSilence{5};
+constexpr std::size_t kShownFactors = 3;
+
+std::string Lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return text;
+}
+
+bool Contains(const Json& row, const std::string& filter) {
+  return std::ranges::any_of(
+      std::array{"valve_id", "fault", "state", "quality", "model_set"},
+      [&](const char* key) {
+        return row[key].is_string() &&
+               Lower(row[key].get<std::string>()).find(filter) !=
+                   std::string::npos;
+      });
+}
+
+bool Abnormal(const Json& row) {
+  return row["state"] != "NORMAL" && row["state"] != "NOT_JUDGED";
+}
+
+// Smaller is worse: isolated, detected, not diagnosed, normal.
+int Rank(const Json& row) {
+  return row["state"] == "ISOLATED"     ? 0
+         : Abnormal(row)                ? 1
+         : row["silent"].get<bool>()    ? 2
+         : row["state"] == "NOT_JUDGED" ? 3
+                                        : 4;
+}
+
+Tone ToneOf(const Json& row) {
+  return Abnormal(row)                                           ? Tone::kAlarm
+         : row["silent"].get<bool>() || row["quality"] != "LIVE" ? Tone::kQuiet
+                                                                 : Tone::kPlain;
+}
+
+// "f7 0.95  f19 0.80"
+std::string NumbersText(const Json& numbers) {
+  std::string text;
+  for (const auto& [name, value] : numbers.items()) {
+    text += (text.empty() ? "" : "  ") + name + " " +
+            report::FormatNumber(value.get<double>(), 2);
+  }
+  return text.empty() ? "-" : text;
+}
+
+Json LargestOf(const Json& factors) {
+  std::vector<std::pair<std::string, double>> sorted;
+  for (const auto& [name, factor] : factors.items()) {
+    if (factor > 0.0) {
+      sorted.emplace_back(name, factor);
+    }
+  }
+  std::ranges::stable_sort(
+      sorted, [](const auto& a, const auto& b) { return a.second > b.second; });
+  Json largest = Json::object();
+  for (std::size_t i = 0; i < std::min(sorted.size(), kShownFactors); ++i) {
+    largest[sorted[i].first] = sorted[i].second;
+  }
+  return largest;
+}
+
+// "leader host:1 "; empty for a monitor that is not in a pair.
+std::string PairText(const idl::MonitorStatusMessage& status) {
+  const auto leads =
+      std::ranges::find(status.counters, "pair_leader",
+                        &std::pair<std::string, std::uint64_t>::first);
+  return leads == status.counters.end()
+             ? ""
+             : (leads->second != 0 ? "leader " : "standby ") + status.monitor +
+                   " ";
+}
+
+// Lines other than rows: title, blank, heading, "too narrow", blank, keys.
+constexpr std::size_t kOtherLines = 6;
+
+std::string Title(const TopBoard& board, const TopView& view,
+                  const Json& document) {
+  const auto abnormal = std::ranges::count_if(document["valves"], Abnormal);
+  std::string title =
+      "fdi-monitor top  " +
+      FormatTime(view.now_ns / kNsPerSecond * kNsPerSecond, view.utc) + "  " +
+      std::to_string(board.valves()) + " valves, " + std::to_string(abnormal) +
+      " abnormal, " + std::string(TopSortName(view.sort));
+  if (!view.filter.empty()) {
+    title += ", " + std::to_string(view.rows) + " with '" + view.filter + "'";
+  }
+  return title + (document["monitor"].is_null()
+                      ? "  NO MONITOR IS HEARD"
+                      : "  monitor " + document["monitor"].get<std::string>());
+}
+
+std::string Keys(const TopView& view) {
+  return view.typing
+             ? "filter: " + view.filter + "_   (Enter: keep, Esc: all valves)"
+             : "q quit  s sort  / filter  up, down, PgUp, PgDn, Home, End "
+               "scroll";
+}
+
+}  // namespace
+
+std::string_view TopSortName(TopSort sort) {
+  constexpr std::array<std::string_view, 4> kNames{"worst first", "by valve",
+                                                   "by factor", "newest first"};
+  return kNames.at(static_cast<std::size_t>(sort));
+}
+
+TopSort NextSort(TopSort sort) {
+  return static_cast<TopSort>((static_cast<int>(sort) + 1) % 4);
+}
+
+void TopBoard::Add(const idl::ModelSetInfoMessage& info,
+                   Clock::time_point /*now*/) {
+  names_.Add(info);
+}
+
+void TopBoard::Add(const idl::DecisionMessage& message, Clock::time_point now) {
+  decisions_[message.valve_id] = {message, now};
+}
+
+void TopBoard::Add(const FaultEvent& message, Clock::time_point /*now*/) {
+  const Transition& transition = message.transition;
+  if (transition.kind != TransitionKind::kClosed) {
+    open_[message.valve_id] = {transition.detection_stamp_ns,
+                               message.episode_id};
+    return;
+  }
+  const auto found = open_.find(message.valve_id);
+  if (found != open_.end() && found->second.second == message.episode_id) {
+    open_.erase(found);
+  }
+}
+
+void TopBoard::Add(const idl::MonitorStatusMessage& message,
+                   Clock::time_point now) {
+  monitors_[message.monitor] = {message, now};
+}
+
+void TopBoard::Remove(const std::string& valve_id) {
+  decisions_.erase(valve_id);
+  open_.erase(valve_id);
+}
+
+std::string TopBoard::Health(Clock::time_point now) const {
+  std::string text;
+  for (const auto& [monitor, heard] : monitors_) {
+    const auto& [status, at] = heard;
+    if (now - at <= kMonitorSilence) {
+      text += (text.empty() ? "" : ", ") + PairText(status) +
+              std::string(idl::HealthName(status.health)) +
+              (status.text.empty() ? "" : ": " + status.text);
+    }
+  }
+  return text;
+}
+
+Json TopBoard::RowOf(const LatestVector& latest, Clock::time_point now) const {
+  const idl::DecisionMessage& message = latest.message;
+  const Verdict& verdict = message.verdict;
+  const idl::ModelSetInfoMessage* info = names_.Find(message.model_hash);
+  const Json factors = names_.Factors(message);
+  std::string faults;
+  double largest = 0.0;
+  double strength = 0.0;
+  std::size_t f = 0;
+  for (const auto& [name, value] : factors.items()) {
+    const double factor = value.get<double>();
+    const bool isolated = (verdict.isolated >> f & 1U) != 0;
+    if (isolated) {
+      faults += (faults.empty() ? "" : "|") + name;
+      strength = factor >= largest ? verdict.strengths[f] : strength;
+    }
+    if (isolated || verdict.isolated == 0) {
+      largest = std::max(largest, factor);
+    }
+    ++f;
+  }
+  if (faults.empty() && verdict.state != State::kNormal) {
+    faults = "unknown";
+  }
+  const auto open = open_.find(message.valve_id);
+  const bool since = open != open_.end() && verdict.state != State::kNormal;
+  return {{"valve_id", message.valve_id},
+          {"state", console::ShownState(verdict.state, verdict.quality)},
+          {"quality", QualityName(verdict.quality)},
+          {"silent", now - latest.at > silence_},
+          {"fault", faults.empty() ? Json() : Json(faults)},
+          {"name",
+           faults.empty() ? Json() : Json(texts_.Words(faults, strength).name)},
+          {"factor", largest},
+          {"strength", verdict.isolated == 0 ? Json() : Json(strength)},
+          {"normal_factor", verdict.normal_factor},
+          {"factors", LargestOf(factors)},
+          {"residuals", names_.Residuals(message)},
+          {"since_utc",
+           since ? Json(FormatTime(open->second.first, true)) : Json()},
+          {"abnormal_s",
+           since ? Json((verdict.stamp_ns - open->second.first) / 1'000'000'000)
+                 : Json()},
+          {"stamp_utc", FormatTime(verdict.stamp_ns, true)},
+          {"model_set", info == nullptr ? Json()
+                                        : Json(info->model_set + "@" +
+                                               std::to_string(info->version))}};
+}
+
+report::Report TopBoard::Valves(TopSort sort, const std::string& filter,
+                                Clock::time_point now) const {
+  const std::string lower = Lower(filter);
+  // Sort keys in order of precedence; those that `sort` ignores are equal.
+  using Order = std::tuple<int, std::int64_t, double, std::string>;
+  std::vector<std::pair<Order, Json>> rows;
+  for (const auto& [valve_id, latest] : decisions_) {
+    Json row = RowOf(latest, now);
+    if (!lower.empty() && !Contains(row, lower)) {
+      continue;
+    }
+    const bool by_time =
+        sort == TopSort::kSince && row["since_utc"].is_string();
+    const bool by_factor = sort == TopSort::kWorst || sort == TopSort::kFactor;
+    rows.emplace_back(
+        Order{sort == TopSort::kWorst ? Rank(row) : 0,
+              by_time ? -open_.at(valve_id).first : 0,
+              by_factor ? -row["factor"].get<double>() : 0.0, valve_id},
+        std::move(row));
+  }
+  std::ranges::sort(rows, {}, [](const auto& row) { return row.first; });
+  const std::string health = Health(now);
+  report::Report report;
+  report.document = {{"monitor", health.empty() ? Json() : Json(health)},
+                     {"valves", Json::array()}};
+  for (auto& [order, row] : rows) {
+    report.document["valves"].push_back(std::move(row));
+  }
+  using Format = report::Format;
+  const auto quality = [](const Json& row) {
+    return row["silent"].get<bool>() ? "SILENT"
+                                     : row["quality"].get<std::string>();
+  };
+  report.Table(
+      "valves",
+      {{.heading = "valve", .key = "valve_id", .tone = ToneOf},
+       {.heading = "state", .key = "state", .tone = ToneOf},
+       {.heading = "quality", .text = quality, .tone = ToneOf},
+       {.heading = "fault", .key = "fault", .tone = ToneOf},
+       {.heading = "which is", .key = "name", .spare = 2},
+       {.heading = "strength [-]", .key = "strength", .spare = 5},
+       {"since", "abnormal_s", Format::kDuration, 0, 3},
+       {.heading = "d_0 [-]", .key = "normal_factor", .spare = 4},
+       {.heading = "factors d [-]",
+        .spare = 1,
+        .text = [](const Json& row) { return NumbersText(row["factors"]); }},
+       {.heading = "residuals",
+        .spare = 6,
+        .text = [](const Json& row) { return NumbersText(row["residuals"]); }},
+       {.heading = "model set", .key = "model_set", .spare = 7}});
+  return report;
+}
+
+std::string TopScreen(const TopBoard& board, TopView& view,
+                      const report::TextStyle& style, std::size_t height,
+                      TopBoard::Clock::time_point now) {
+  report::Report report = board.Valves(view.sort, view.filter, now);
+  auto& rows = report.document["valves"].get_ref<report::Json::array_t&>();
+  view.rows = rows.size();
+  std::string text = Printable(Title(board, view, report.document)) + "\n\n";
+  const std::size_t room =
+      std::max<std::size_t>(1, height - std::min(height, kOtherLines));
+  view.first = std::min(view.first, rows.size() - std::min(rows.size(), room));
+  const std::size_t first = view.first;
+  const std::size_t below =
+      rows.size() - first - std::min(room, rows.size() - first);
+  rows.resize(rows.size() - below);
+  rows.erase(rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(first));
+  std::ostringstream table;
+  report.PrintText(table, {style, view.utc});
+  text += table.str();
+  std::istringstream lines(text);
+  std::vector<std::string> screen;
+  for (std::string line; std::getline(lines, line);) {
+    screen.push_back(Clipped(line, style.width));
+  }
+  screen.resize(std::max<std::size_t>(2, height) - 2);
+  screen.push_back(
+      below > 0 ? Clipped(std::to_string(below) + " more below", style.width)
+                : "");
+  screen.push_back(Clipped(Keys(view), style.width));
+  text = screen.front();
+  for (std::size_t i = 1; i < screen.size(); ++i) {
+    text += "\n" + screen[i];
+  }
+  return text;
+}
+
+std::string Clipped(const std::string& line, std::size_t width) {
+  if (width == 0) {
+    return line;
+  }
+  std::string clipped;
+  std::size_t cells = 0;
+  bool escape = false;
+  bool fits = true;
+  for (const char c : line) {
+    if (escape || c == '\x1b') {
+      clipped += c;
+      escape = c != 'm';
+      continue;
+    }
+    if ((c & '\xC0') != '\x80') {  // Not a UTF-8 continuation byte.
+      fits = cells < width;
+      cells += fits ? 1 : 0;
+    }
+    if (fits) {
+      clipped += c;
+    }
+  }
+  return clipped;
+}
+
+}  // namespace fdi::monitor

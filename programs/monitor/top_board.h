@@ -1,0 +1,92 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "programs/monitor/bus_view.h"
+#include "report/fault_texts.h"
+#include "report/report.h"
+#include "report/terminal.h"
+
+namespace fdi::monitor {
+
+enum class TopSort { kWorst, kValve, kFactor, kSince };
+std::string_view TopSortName(TopSort sort);  ///< "worst first", ...
+TopSort NextSort(TopSort sort);
+
+/// The latest state of every valve as published by monitors: what `top` shows.
+class TopBoard {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// @param silence after which a valve without vectors is marked silent.
+  TopBoard(report::FaultTexts texts, std::chrono::milliseconds silence)
+      : texts_(std::move(texts)), silence_(silence) {}
+
+  void Add(const idl::ModelSetInfoMessage& info, Clock::time_point now);
+  void Add(const idl::DecisionMessage& message, Clock::time_point now);
+  void Add(const FaultEvent& message, Clock::time_point now);
+  void Add(const idl::MonitorStatusMessage& message, Clock::time_point now);
+  /// The monitor disposed of this valve.
+  void Remove(const std::string& valve_id);
+
+  /// {"monitor", "valves": [{"valve_id", "state", "quality", "silent", "fault",
+  /// "name", "factor", "strength", "normal_factor", "factors", "residuals",
+  /// "since_utc", "abnormal_s", "stamp_utc", "model_set"}]}, and its table.
+  /// `state` is NOT_JUDGED where the quality rules out a verdict; `factor` is
+  /// the largest of the isolated set, or of any fault; `strength` is null until
+  /// a fault is isolated; `factors` are the three that fit best; `since_utc`
+  /// and `abnormal_s` belong to the open episode.
+  /// @param filter substring of valve id, faults, state, quality or model set,
+  ///   ignoring case; empty: all.
+  report::Report Valves(TopSort sort, const std::string& filter,
+                        Clock::time_point now) const;
+
+  std::size_t valves() const { return decisions_.size(); }
+  /// "OK", "DEGRADED: why", for a pair "leader host:1 OK, standby host:2 OK";
+  /// empty if no status has arrived recently.
+  std::string Health(Clock::time_point now) const;
+
+ private:
+  struct LatestVector {
+    idl::DecisionMessage message;
+    Clock::time_point at;
+  };
+  report::Json RowOf(const LatestVector& latest, Clock::time_point now) const;
+
+  report::FaultTexts texts_;
+  std::chrono::milliseconds silence_;
+  ModelNames names_;
+  std::map<std::string, LatestVector> decisions_;
+  /// First abnormal sample of the open episode, and its id.
+  std::map<std::string, std::pair<std::int64_t, std::uint64_t>> open_;
+  std::map<std::string, std::pair<idl::MonitorStatusMessage, Clock::time_point>>
+      monitors_;
+};
+
+/// The state of the view in `top`.
+struct TopView {
+  TopSort sort{TopSort::kWorst};
+  std::string filter;
+  bool typing{false};    ///< The filter is being typed.
+  std::size_t first{0};  ///< Row at the top.
+  std::size_t rows{0};   ///< Rows that pass the filter, as of TopScreen().
+  std::int64_t now_ns{0};
+  bool utc{false};
+};
+
+/// Renders a whole screen: `height` lines, none wider than style.width. The
+/// view is scrolled no further than to the last row.
+std::string TopScreen(const TopBoard& board, TopView& view,
+                      const report::TextStyle& style, std::size_t height,
+                      TopBoard::Clock::time_point now);
+
+/// `line` truncated to `width` cells; escape codes take no cells.
+std::string Clipped(const std::string& line, std::size_t width);
+
+}  // namespace fdi::monitor

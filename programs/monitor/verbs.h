@@ -1,0 +1,24 @@
+#pragma once
+
+namespace fdi::report {
+class Program;
+}
+
+namespace fdi::monitor {
+
+/// `run`: diagnoses the valves on the bus.
+void AddRunVerb(report::Program& program);
+
+/// `console-user`: adds, changes or removes a user of the console.
+void AddConsoleUserVerb(report::Program& program);
+
+/// `watch`: prints or counts what monitors publish.
+void AddWatchVerb(report::Program& program);
+
+/// `console`: the live page of all monitors.
+void AddConsoleVerb(report::Program& program);
+
+/// `top`: a live table of what they publish.
+void AddTopVerb(report::Program& program);
+
+}  // namespace fdi::monitor

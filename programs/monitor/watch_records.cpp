@@ -1,0 +1,196 @@
+#include "programs/monitor/watch_records.h"
+
+#include "base/time_text.h"
+#include "diagnosis/fault_catalogue.h"
+#include "monitor/console/model_facts.h"
+#include "report/text_table.h"
+#include "storage/history/episode.h"
+#include "storage/history/history_database.h"
+
+namespace fdi::monitor {
+namespace {
+
+using report::FormatNumber;
+using report::Json;
+
+std::string Hex(std::uint64_t value) {
+  return storage::EpisodeIdText(value);  // 16 digits
+}
+
+Json Utc(std::int64_t stamp_ns) {
+  return FormatTime(stamp_ns, true);
+}
+
+// Why there is no name: the candidates, or that no known fault fits.
+std::string UnknownReason(const FaultEvent& message) {
+  if (message.transition.faults != 0) {
+    return "";
+  }
+  std::string names;
+  for (const FaultCandidate& candidate : message.candidates) {
+    names += (names.empty() ? "" : "|") + FaultName(candidate.fault);
+  }
+  if (!names.empty()) {
+    return " too_early=" + names;
+  }
+  return message.transition.kind == TransitionKind::kDetected
+             ? " too_early"
+             : " outside_known";
+}
+
+}  // namespace
+
+// "2026-11-20T14:56:11Z V1"
+std::string WatchRecords::Start(std::int64_t stamp_ns,
+                                const std::string& who) const {
+  return FormatTime(stamp_ns, utc_) + " " + who;
+}
+
+void WatchRecords::Add(const idl::DecisionMessage& message,
+                       Clock::time_point now) {
+  waiting_.emplace_back(now, message);
+  Flush(now);
+}
+
+void WatchRecords::Flush(Clock::time_point now) {
+  while (!waiting_.empty() && (names_.Explains(waiting_.front().second) ||
+                               now - waiting_.front().first >= kPatience)) {
+    sink_(RecordOf(waiting_.front().second));
+    waiting_.pop_front();
+  }
+}
+
+WatchRecord WatchRecords::RecordOf(const idl::DecisionMessage& message) const {
+  const Verdict& v = message.verdict;
+  const std::string state(console::ShownState(v.state, v.quality));
+  const Json residuals = names_.Residuals(message);
+  const Json factors = names_.Factors(message);
+  std::string line = Start(v.stamp_ns, message.valve_id) + " " +
+                     std::string(QualityName(v.quality)) + " " + state;
+  for (const auto& [name, residual] : residuals.items()) {
+    line += " r_" + name + "=" + FormatNumber(residual.get<double>(), 3);
+  }
+  if (message.channel_count > 0) {
+    line += " normal=" + FormatNumber(v.normal_factor, 2);
+  }
+  Json isolated = Json::array();
+  std::size_t bit = 0;
+  for (const auto& [name, factor] : factors.items()) {
+    const bool member = (v.isolated >> bit++ & 1U) != 0;
+    if (member) {
+      isolated.push_back(name);
+    }
+    if (member || factor.get<double>() > 0.0) {
+      line += " " + name + "=" + FormatNumber(factor.get<double>(), 2) +
+              (member ? "*" : "");
+    }
+  }
+  return {{{"topic", "DecisionVector"},
+           {"valve_id", message.valve_id},
+           {"source_id", Hex(v.source_id)},
+           {"seq", v.seq},
+           {"stamp_utc", Utc(v.stamp_ns)},
+           {"model_hash", Hex(message.model_hash)},
+           {"quality", QualityName(v.quality)},
+           {"state", state},
+           {"detected", v.detected},
+           {"confidence", v.confidence},
+           {"normal_factor", v.normal_factor},
+           {"residuals", residuals},
+           {"factors", factors},
+           {"isolated", std::move(isolated)}},
+          line};
+}
+
+void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
+  const Transition& t = message.transition;
+  std::string faults;
+  Json candidates = Json::array();
+  for (const FaultCandidate& candidate : message.candidates) {
+    const std::string name = FaultName(candidate.fault);
+    if (candidate.isolated) {
+      faults += (faults.empty() ? "" : "|") + name;
+    }
+    candidates.push_back({{"fault", name},
+                          {"factor", candidate.factor},
+                          {"strength", candidate.strength},
+                          {"isolated", candidate.isolated}});
+  }
+  faults = faults.empty() ? "unknown" : faults;
+  const std::string kind(TransitionName(t.kind));
+  const std::string reason(EndReasonName(t.reason));
+  sink_({{{"topic", "FaultEvent"},
+          {"valve_id", message.valve_id},
+          {"episode_id", Hex(message.episode_id)},
+          {"transition", kind},
+          {"stamp_utc", Utc(t.stamp_ns)},
+          {"detected_utc", Utc(t.detection_stamp_ns)},
+          {"fault", faults},
+          {"factor", t.factor},
+          {"strength", t.strength},
+          {"reason", reason},
+          {"candidates", std::move(candidates)},
+          {"model_set",
+           message.model_set + "@" + std::to_string(message.model_version)},
+          {"persisted", message.persisted}},
+         Start(t.stamp_ns, message.valve_id) + " EVENT " + kind + " " + faults +
+             UnknownReason(message) + " factor=" + FormatNumber(t.factor, 2) +
+             " episode=" + Hex(message.episode_id) +
+             (t.reason == EndReason::kNone ? "" : " reason=" + reason) +
+             (message.persisted ? "" : " NOT_PERSISTED")});
+}
+
+void WatchRecords::Add(const idl::MonitorStatusMessage& message,
+                       Clock::time_point /*now*/) {
+  const std::string health(idl::HealthName(message.health));
+  std::string line = Start(message.stamp_ns, message.monitor) + " STATUS " +
+                     health +
+                     (message.text.empty() ? "" : " (" + message.text + ")");
+  Json counters = Json::object();
+  for (const auto& [name, value] : message.counters) {
+    counters[name] = value;
+    if (value != 0) {
+      line += " " + name + "=" + std::to_string(value);
+    }
+  }
+  sink_({{{"topic", "MonitorStatus"},
+          {"monitor", message.monitor},
+          {"software", message.software},
+          {"started_utc", Utc(message.started_ns)},
+          {"stamp_utc", Utc(message.stamp_ns)},
+          {"health", health},
+          {"text", message.text},
+          {"counters", std::move(counters)}},
+         line});
+}
+
+void WatchRecords::Add(const idl::ModelSetInfoMessage& message,
+                       Clock::time_point now) {
+  names_.Add(message);
+  Json faults = Json::array();
+  for (const int fault : message.faults) {
+    faults.push_back(FaultName(fault));
+  }
+  Json channels = Json::array();
+  for (const ChannelSpec& channel : message.channels) {
+    channels.push_back(channel.name);
+  }
+  const std::string hash = Hex(message.model_hash);
+  const std::string line =
+      Start(message.created_ns, "MODELS ") + message.model_set + "@" +
+      std::to_string(message.version) + " hash=" + hash +
+      " channels=" + std::to_string(channels.size()) +
+      " observers=" + std::to_string(message.observers.size());
+  sink_({{{"topic", "ModelSetInfo"},
+          {"model_set", message.model_set},
+          {"version", message.version},
+          {"model_hash", hash},
+          {"sample_period_s", message.sample_period_s},
+          {"channels", std::move(channels)},
+          {"faults", std::move(faults)},
+          {"observers", message.observers.size()}},
+         line});
+  Flush(now);
+}
+
+}  // namespace fdi::monitor

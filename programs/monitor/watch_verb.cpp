@@ -1,0 +1,142 @@
+#include <chrono>
+#include <cstdint>
+#include <iostream>
+#include <memory>
+#include <set>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "programs/monitor/verbs.h"
+#include "programs/monitor/watch_records.h"
+#include "report/json_output.h"
+#include "report/program.h"
+#include "report/stop_signals.h"
+
+namespace fdi::monitor {
+namespace {
+
+using Clock = WatchRecords::Clock;
+
+struct WatchOptions {
+  BusOptions bus{.program = "fdi-monitor watch"};
+  bool count{false};
+  bool lossless{false};
+  bool events_only{false};
+  double for_s{0.0};   // 0: no limit
+  double idle_s{0.0};  // 0: no limit
+  std::uint64_t expect{0};
+};
+
+struct WatchCounts {
+  std::uint64_t decisions{0};
+  std::uint64_t events{0};
+  std::uint64_t status{0};
+  std::uint64_t models{0};
+  std::set<std::string> valves;
+
+  void Add(const idl::DecisionMessage& message) {
+    ++decisions;
+    valves.insert(message.valve_id);
+  }
+  void Add(const FaultEvent& /*message*/) { ++events; }
+  void Add(const idl::MonitorStatusMessage& /*message*/) { ++status; }
+  void Add(const idl::ModelSetInfoMessage& /*message*/) { ++models; }
+};
+
+bool Passed(Clock::time_point since, double seconds) {
+  return seconds > 0.0 &&
+         Clock::now() - since > std::chrono::duration<double>(seconds);
+}
+
+void PrintCounts(const WatchCounts& counts, std::uint64_t lost, bool json) {
+  const report::Json object{
+      {"decision_vectors", counts.decisions}, {"fault_events", counts.events},
+      {"valves", counts.valves.size()},       {"monitor_status", counts.status},
+      {"model_sets", counts.models},          {"lost", lost}};
+  if (json) {
+    std::cout << report::JsonText(object, 2) << '\n';
+    return;
+  }
+  for (const auto& [name, value] : object.items()) {
+    std::cout << name << ' ' << value << '\n';
+  }
+}
+
+int RunWatch(WatchOptions options, const report::Context& context) {
+  if (options.events_only) {
+    options.bus.vectors = Vectors::kNone;
+  } else if (options.lossless) {
+    options.bus.vectors = Vectors::kAll;
+  }
+  report::StopSignals signals;
+  BusView bus(options.bus, context, context.log);
+  std::cerr << "watch_ready domain=" << context.options.domain << '\n';
+  const bool json = context.options.json;
+  WatchRecords records(context.options.utc, [json](const WatchRecord& record) {
+    std::cout << (json ? report::JsonText(record.object) : record.line) << '\n';
+  });
+  WatchCounts counts;
+  const Clock::time_point start = Clock::now();
+  Clock::time_point last_message = start;
+  const auto satisfied = [&] {
+    return options.expect > 0 && counts.decisions >= options.expect;
+  };
+  while (!signals.stop_requested() && !Passed(start, options.for_s) &&
+         !Passed(last_message, options.idle_s) && !satisfied()) {
+    bus.Take(
+        [&](const auto& message, const auto&) {
+          counts.Add(message);
+          if constexpr (requires { message.valve_id; }) {
+            last_message = Clock::now();
+          }
+          if (!options.count) {
+            records.Add(message, Clock::now());
+          }
+        },
+        [](const std::string& /*valve_id*/) {});
+    records.Flush(Clock::now());
+    std::cout.flush();
+  }
+  records.Flush(Clock::time_point::max());
+  if (options.count) {
+    PrintCounts(counts, bus.lost(), json);
+  }
+  return options.expect == 0 || satisfied() ? report::kExitOk
+                                            : report::kExitFailure;
+}
+
+}  // namespace
+
+void AddWatchVerb(report::Program& program) {
+  auto options = std::make_shared<WatchOptions>();
+  CLI::App& watch = program.AddVerb(
+      "watch", "Print what monitors publish: decision vectors, fault events",
+      [options](const report::Context& context) {
+        return RunWatch(*options, context);
+      });
+  watch.add_flag("--count", options->count,
+                 "Print only how many messages came, at the end");
+  watch.add_option("--valves", options->bus.valves, "Only ids that match GLOB");
+  watch.add_flag("--lossless", options->lossless,
+                 "Every decision vector of monitors that run with "
+                 "--lossless-decisions");
+  watch.add_flag("--events", options->events_only,
+                 "Leave out decision vectors");
+  watch
+      .add_option("--max-valves", options->bus.max_valves,
+                  "Maximum number of valves")
+      ->check(CLI::Range(1, 100000));
+  watch
+      .add_option("--for", options->for_s, "Stop after this time [s]; 0: never")
+      ->check(CLI::NonNegativeNumber);
+  watch
+      .add_option("--idle", options->idle_s,
+                  "Stop after this time without a vector or event [s]; 0: "
+                  "never")
+      ->check(CLI::NonNegativeNumber);
+  watch.add_option("--expect", options->expect,
+                   "Stop after N decision vectors; exit code 1 if fewer came");
+}
+
+}  // namespace fdi::monitor

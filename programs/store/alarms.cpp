@@ -1,0 +1,249 @@
+// fdi-store history: operator actions on episodes (ack, label) and on alarms
+// (shelve, unshelve, shelf).
+#include <set>
+
+#include "base/error.h"
+#include "base/suggestion.h"
+#include "programs/store/verbs.h"
+#include "storage/history/history_database.h"
+#include "storage/history/history_editor.h"
+#include "storage/history/history_reader.h"
+
+namespace fdi::storage {
+namespace {
+
+using report::Format;
+
+struct AckOptions {
+  std::vector<std::string> ids;
+  bool all{false};
+  EpisodeOptions filter;
+  NoteOptions note;
+};
+
+// The selected episodes: those named, or all unacknowledged ones that pass the
+// filter.
+std::vector<Episode> Chosen(const AckOptions& options, HistoryReader& reader,
+                            const Context& context) {
+  if (options.all != options.ids.empty()) {
+    throw ConfigError(
+        "name episodes, or give --all (and --valve, --fault, "
+        "--state, --since, --until to narrow it)");
+  }
+  std::vector<Episode> episodes;
+  if (options.all) {
+    episodes = reader.List(options.filter.Filter(context));
+    std::erase_if(episodes, [](const Episode& episode) {
+      return episode.acked_by.has_value();
+    });
+  }
+  for (const std::string& id : options.ids) {
+    episodes.push_back(reader.Show(id));
+  }
+  return episodes;
+}
+
+Report Acknowledge(const AckOptions& options, const Context& context) {
+  const auto path = DataOf(context).history();
+  // The reader is opened first, because an editor would create a missing file.
+  HistoryReader reader(path);
+  // All ids are looked up before the first episode is acknowledged.
+  auto episodes = Chosen(options, reader, context);
+  HistoryEditor editor(path);
+  const OperatorNote note = options.note.Note();
+  Report report;
+  for (Episode& episode : episodes) {
+    editor.Acknowledge(episode.episode_id, note);
+    episode = reader.Show(episode.episode_id);
+    report.Line(episode.episode_id + ' ' + episode.valve_id +
+                " acknowledged by " + note.who);
+  }
+  if (episodes.empty()) {
+    report.Line("no episode to acknowledge");
+  }
+  report.document["episodes"] = Rows(episodes, EpisodeJson);
+  return report;
+}
+
+struct EpisodeLabelOptions {
+  std::string id;
+  std::string label;
+  NoteOptions note;
+};
+
+Report LabelEpisode(const EpisodeLabelOptions& options,
+                    const Context& context) {
+  const auto path = DataOf(context).history();
+  HistoryReader reader(path);
+  HistoryEditor editor(path);
+  const std::uint64_t id =
+      editor.Label(options.id, options.label, options.note.Note());
+  const Episode episode = reader.Show(EpisodeIdText(id));
+  Report report;
+  report.document = EpisodeJson(episode);
+  return report.Line(episode.episode_id + " labelled " +
+                     episode.label.value_or(""));
+}
+
+Report ShelfReport(const std::vector<Shelf>& shelves, const Context& context) {
+  Report report;
+  report.document["shelf"] = Rows(shelves, ShelfJson);
+  const bool utc = context.options.utc;
+  const auto fault = [](const Json& shelf) {
+    return shelf["fault"].is_null() ? "any" : shelf["fault"].get<std::string>();
+  };
+  const auto ended = [utc](const Json& shelf) -> std::string {
+    if (shelf["ended_utc"].is_null()) {
+      return "-";
+    }
+    const std::int64_t ns =
+        ParseTime(shelf["ended_utc"].get<std::string>(), true);
+    return FormatTime(ns, utc) + " by " + shelf["ended_by"].get<std::string>();
+  };
+  const auto comment = [](const Json& shelf) {
+    return shelf["comment"].is_null() ? ""
+                                      : shelf["comment"].get<std::string>();
+  };
+  return report.Table("shelf",
+                      {{"id", "shelf_id"},
+                       {"valve", "valve_id"},
+                       TextColumn("fault", fault),
+                       {"from", "from_utc", Format::kTime, 0, 2},
+                       {"until", "until_utc", Format::kTime},
+                       {"by", "who"},
+                       TextColumn("ended", ended, 1),
+                       {"from where", "origin", Format::kPlain, 0, 3},
+                       TextColumn("comment", comment)},
+                      "nothing is shelved");
+}
+
+struct ShelveOptions {
+  std::string valve;
+  std::string fault;
+  std::string duration{"8h"};
+  NoteOptions note;
+};
+
+// Warns about a valve that was never seen, which may be a typing error.
+void WarnIfUnknown(const std::string& valve, HistoryReader& reader,
+                   const Context& context) {
+  std::set<std::string> known;
+  for (const CoverageTime& time : reader.Coverage()) {
+    known.insert(time.valve_id);
+  }
+  for (const EpisodeStatistics& s : reader.Statistics()) {
+    known.insert(s.valve_id);
+  }
+  if (!known.contains(valve)) {
+    const auto meant = Suggest(valve, {known.begin(), known.end()});
+    context.log(LogLevel::kWarning,
+                "valve_unknown valve=" + valve +
+                    (meant ? " did_you_mean=" + *meant : ""));
+  }
+}
+
+Report Shelve(const ShelveOptions& options, const Context& context) {
+  const auto path = DataOf(context).history();
+  HistoryReader reader(path);
+  const OperatorNote note = options.note.Note();
+  const std::int64_t until_ns = note.now_ns + ParseDuration(options.duration);
+  WarnIfUnknown(options.valve, reader, context);
+  const Shelf shelf = HistoryEditor(path).Shelve(
+      options.valve,
+      options.fault.empty() ? std::nullopt : std::optional(options.fault),
+      until_ns, note);
+  return ShelfReport({shelf}, context);
+}
+
+struct UnshelveOptions {
+  std::vector<std::int64_t> ids;
+  std::string valve;
+  NoteOptions note;
+};
+
+Report Unshelve(const UnshelveOptions& options, const Context& context) {
+  if (options.ids.empty() == options.valve.empty()) {
+    throw ConfigError(
+        "name shelved alarms by id (see history shelf), or give "
+        "--valve");
+  }
+  const auto path = DataOf(context).history();
+  HistoryReader reader(path);
+  const OperatorNote note = options.note.Note();
+  std::vector<std::int64_t> ids = options.ids;
+  for (const Shelf& shelf : reader.Shelves(note.now_ns)) {
+    if (shelf.valve_id == options.valve) {
+      ids.push_back(shelf.shelf_id);
+    }
+  }
+  if (ids.empty()) {
+    throw NotFoundError("nothing of " + options.valve + " is shelved");
+  }
+  HistoryEditor editor(path);
+  std::vector<Shelf> ended;
+  for (const std::int64_t id : ids) {
+    ended.push_back(editor.EndShelf(id, note));
+  }
+  return ShelfReport(ended, context);
+}
+
+struct ShelfOptions {
+  bool all{false};
+};
+
+Report ListShelf(const ShelfOptions& options, const Context& context) {
+  HistoryReader reader(DataOf(context).history());
+  return ShelfReport(options.all ? reader.Shelves() : reader.Shelves(NowNs()),
+                     context);
+}
+
+}  // namespace
+
+void AddAlarmVerbs(report::Program& program, CLI::App& group) {
+  auto [ack, acked] =
+      AddVerb(program, group, "ack",
+              "Acknowledge episodes: somebody has seen them", Acknowledge);
+  ack.add_option("episodes", acked.ids,
+                 "IDs, unique beginnings of them, or last");
+  ack.add_flag("--all", acked.all,
+               "All that the options below find and that nobody has "
+               "acknowledged yet");
+  acked.filter.AddTo(ack);
+  acked.note.AddTo(ack);
+
+  auto [label, labelled] = AddVerb(
+      program, group, "label",
+      "Say what an episode really was, for the next training", LabelEpisode);
+  AddEpisode(label, labelled.id);
+  label
+      .add_option("label", labelled.label,
+                  "true (the answer was right), false (there was no fault), "
+                  "or the fault it was")
+      ->required();
+  labelled.note.AddTo(label);
+
+  auto [shelve, shelved] = AddVerb(
+      program, group, "shelve",
+      "Set the alarms of a valve aside for a while; they are recorded all "
+      "the same",
+      Shelve);
+  shelve.add_option("valve", shelved.valve, "Valve id")->required();
+  shelve.add_option("--fault", shelved.fault,
+                    "Only this answer: f19, 'f3|f6', unknown");
+  shelve.add_option("--for", shelved.duration,
+                    "How long: 8h, 30min, 3d; 90 days at most");
+  shelved.note.AddTo(shelve);
+
+  auto [unshelve, ended] = AddVerb(program, group, "unshelve",
+                                   "Take alarms off the shelf early", Unshelve);
+  unshelve.add_option("id", ended.ids, "Ids that history shelf shows");
+  unshelve.add_option("--valve", ended.valve, "All of this valve");
+  ended.note.AddTo(unshelve);
+
+  auto [shelf, listed] =
+      AddVerb(program, group, "shelf",
+              "List what is shelved now, by whom and why", ListShelf);
+  shelf.add_flag("--all", listed.all, "Also what was shelved before");
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,213 @@
+// Shared by the verbs: options, JSON values, texts.
+#include <sstream>
+
+#include "base/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "plant/plant_reader.h"
+#include "programs/store/verbs.h"
+#include "storage/models/models.h"
+
+namespace fdi::storage {
+
+DataDirectory DataOf(const Context& context) {
+  return {context.options.data_dir};
+}
+
+DataDirectory WritableDataOf(const Context& context) {
+  DataDirectory data = DataOf(context);
+  EnsureExists(data);
+  return data;
+}
+
+ModelStore WritableModels(const Context& context) {
+  return ModelStore(WritableDataOf(context).models(),
+                    Access::kOccasionalWriter);
+}
+
+void EpisodeOptions::AddTo(CLI::App& verb) {
+  verb.add_option("--valve", valve, "Glob over valve ids: 'FV-1*'");
+  verb.add_option("--fault", fault,
+                  std::string(kFaultNames) + ", paper1..paper5 or unknown");
+  window.AddTo(verb);
+  verb.add_option("--state", state,
+                  "any; of the episode open, detected, isolated or closed; of "
+                  "the alarm unack, acked, rtn_unack, normal or shelved; "
+                  "unacked: unack or rtn_unack");
+  AddLimit(verb, limit);
+}
+
+void PlantOptions::AddTo(CLI::App& verb) {
+  verb.add_option("--from", url,
+                  "Read the history of the whole plant instead: "
+                  "postgresql://user@host/database");
+  verb.add_option("--monitor", monitor,
+                  "With --from: only what this monitor recorded");
+}
+
+std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
+                                     const Context& context) {
+  if (plant.asked()) {
+    return std::make_unique<PlantReader>(plant.url, plant.monitor);
+  }
+  return std::make_unique<HistoryReader>(DataOf(context).history());
+}
+
+EpisodeFilter EpisodeOptions::Filter(const Context& context) const {
+  if (!fault.empty() && fault != "unknown" && !ParseFinding(fault)) {
+    throw ConfigError("--fault: unknown fault '" + fault + "'" +
+                      DidYouMeanFault(fault, {"unknown"}) + ": expected " +
+                      std::string(kFaultNames) + ", paper1..paper5 or unknown");
+  }
+  EpisodeFilter filter;
+  filter.valve_glob = valve;
+  filter.fault = fault;
+  filter.since_ns = window.since_ns(context);
+  filter.until_ns = window.until_ns(context);
+  filter.state = ParseEpisodeState(state);
+  filter.limit = limit;
+  filter.now_ns = NowNs();
+  return filter;
+}
+
+void NoteOptions::AddTo(CLI::App& verb) {
+  verb.add_option("--by", who, "Who says so");
+  verb.add_option("--comment", comment, "Why");
+}
+
+OperatorNote NoteOptions::Note() const {
+  return {who, comment, report::Origin("fdi-store"), NowNs()};
+}
+
+void AddEpisode(CLI::App& verb, std::string& id, bool required) {
+  verb.add_option("episode", id, "ID, a unique beginning of it, or last")
+      ->required(required);
+}
+
+void AddOutput(CLI::App& verb, std::string& output) {
+  output = "-";
+  verb.add_option("-o,--output", output, "File, or - for stdout");
+}
+
+void AddLimit(CLI::App& verb, std::int64_t& limit) {
+  verb.add_option("--limit", limit,
+                  "At most this many, the newest ones; 0: all")
+      ->check(CLI::NonNegativeNumber);
+}
+
+Json TimeJson(const std::optional<std::int64_t>& stamp_ns) {
+  return stamp_ns ? Json(FormatTime(*stamp_ns, true)) : Json();
+}
+
+Json TextJson(const std::optional<std::string>& text) {
+  return text && !text->empty() ? Json(*text) : Json();
+}
+
+Json NumberJson(const std::optional<double>& number) {
+  return number && std::isfinite(*number) ? Json(*number) : Json();
+}
+
+// The VAF of an output that stood still is rounding noise: its variance is some
+// 1e-28 of that of the residual. For an output that varies, a model would have
+// to be off by 3000 standard deviations to get here.
+bool IsVafMeaningful(double vaf) {
+  return vaf > -1e9;
+}
+
+Json VafJson(double vaf) {
+  return IsVafMeaningful(vaf) ? NumberJson(vaf) : Json();
+}
+
+std::string Hex(std::uint64_t value) {
+  return EpisodeIdText(value);
+}
+
+const std::vector<std::string>& EpisodeKeys() {
+  static const std::vector<std::string> keys = {
+      "episode_id",  "valve_id", "detected_utc", "isolated_utc",
+      "cleared_utc", "fault",    "peak_factor",  "model_set",
+      "end_reason",  "label",    "acked_by"};
+  return keys;
+}
+
+Json EpisodeJson(const Episode& episode) {
+  return {{"episode_id", episode.episode_id},
+          {"valve_id", episode.valve_id},
+          {"detected_utc", episode.detected_utc},
+          {"isolated_utc", TextJson(episode.isolated_utc)},
+          {"cleared_utc", TextJson(episode.cleared_utc)},
+          {"fault", TextJson(episode.fault)},
+          {"peak_factor", episode.peak_factor},
+          {"model_set", episode.model_set},
+          {"end_reason", TextJson(episode.end_reason)},
+          {"label", TextJson(episode.label)},
+          {"acked_by", TextJson(episode.acked_by)}};
+}
+
+Json ShelfJson(const Shelf& shelf) {
+  return {{"shelf_id", shelf.shelf_id},
+          {"valve_id", shelf.valve_id},
+          {"fault", TextJson(shelf.fault)},
+          {"from_utc", TimeJson(shelf.from_ns)},
+          {"until_utc", TimeJson(shelf.until_ns)},
+          {"who", shelf.who},
+          {"comment", TextJson(shelf.comment)},
+          {"origin", shelf.origin},
+          {"ended_utc", TimeJson(shelf.ended_ns)},
+          {"ended_by", TextJson(shelf.ended_by)},
+          {"ended_origin", TextJson(shelf.ended_origin)}};
+}
+
+Json HoursJson(const std::vector<CoverageTime>& coverage) {
+  Json valves = Json::object();
+  for (const CoverageTime& time : coverage) {
+    valves[time.valve_id][time.quality] = time.hours;
+  }
+  return valves;
+}
+
+void AddHours(Report& report, const std::vector<CoverageTime>& coverage) {
+  if (coverage.empty()) {
+    return;
+  }
+  report::TextTable table({{"valve"},
+                           {"quality"},
+                           {"hours", report::Align::kRight},
+                           {"samples", report::Align::kRight}});
+  for (const CoverageTime& time : coverage) {
+    table.AddRow({time.valve_id, time.quality,
+                  report::FormatNumber(time.hours, 2),
+                  std::to_string(time.samples)});
+  }
+  AddTextTable(report, table);
+}
+
+void AddTextTable(Report& report, const report::TextTable& table) {
+  std::ostringstream text;
+  table.Print(text);
+  std::string lines = text.str();
+  lines.pop_back();  // Line() adds the last newline.
+  report.Line(std::move(lines));
+}
+
+std::string TimeText(const std::optional<std::int64_t>& stamp_ns,
+                     const Context& context) {
+  return stamp_ns ? FormatTime(*stamp_ns, context.options.utc) : "-";
+}
+
+report::Column TextColumn(std::string heading,
+                          std::function<std::string(const Json& row)> text,
+                          int spare, report::Align align) {
+  report::Column column;
+  column.heading = std::move(heading);
+  column.text = std::move(text);
+  column.spare = spare;
+  column.align = align;
+  return column;
+}
+
+report::Column TextField(std::string heading, std::string text) {
+  return TextColumn(std::move(heading),
+                    [text = std::move(text)](const Json&) { return text; });
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,557 @@
+// fdi-store history: list, show, export, plot. The other verbs of the group are
+// in figures.cpp and alarms.cpp.
+#include <map>
+
+#include "base/csv_cells.h"
+#include "programs/store/verbs.h"
+#include "report/fault_texts.h"
+#include "report/plot/episode_figure.h"
+#include "report/text_table.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/strength.h"
+
+namespace fdi::storage {
+namespace {
+
+using report::Align;
+using report::Column;
+using report::Format;
+using report::Tone;
+
+Tone ToneOf(AlarmState state) {
+  switch (state) {
+    case AlarmState::kUnacked:
+    case AlarmState::kAcked:
+      return Tone::kAlarm;
+    case AlarmState::kReturnedUnacked:
+      return Tone::kWarning;
+    case AlarmState::kNormal:
+      return Tone::kPlain;
+    case AlarmState::kShelved:
+      return Tone::kQuiet;
+  }
+  return Tone::kPlain;
+}
+
+// "20 s", or "-" if it has not happened yet.
+std::string After(std::int64_t from_ns, std::optional<std::int64_t> to_ns) {
+  return to_ns ? FormatDuration(*to_ns - from_ns) : "-";
+}
+
+// Rows of the plant history also have host and monitor.
+Json ListedJson(const Episode& e) {
+  Json row = EpisodeJson(e);
+  if (!e.monitor.empty()) {
+    row.update({{"host", e.host}, {"monitor", e.monitor}});
+  }
+  return row;
+}
+
+// Both monitors of a pair have a row of an episode.
+std::string RowKey(const Json& row) {
+  return row["episode_id"].get<std::string>() + ' ' + row.value("host", "") +
+         ' ' + row.value("monitor", "");
+}
+
+// What the text output shows beside the columns of fault_history.
+struct EpisodeText {
+  AlarmState state;  // Shelved, or else the episode's.
+  std::string fault_name;
+  std::string isolated_after;
+  std::string lasted;
+};
+using EpisodeTexts = std::map<std::string, EpisodeText>;  // By RowKey().
+
+EpisodeTexts TextsOf(const std::vector<Alarm>& alarms, const Context& context) {
+  const report::FaultTexts words = report::LoadFaultTexts(context.options);
+  EpisodeTexts texts;
+  for (const Alarm& alarm : alarms) {
+    const Episode& e = alarm.episode;
+    texts[RowKey(ListedJson(e))] = {
+        alarm.shelf ? AlarmState::kShelved : alarm.state,
+        e.fault ? words.Words(*e.fault, e.strength).name : "-",
+        After(e.detected_ns, e.isolated_ns), After(e.detected_ns, e.ended_ns)};
+  }
+  return texts;
+}
+
+Report ListEpisodes(const HistoryOptions& options, const Context& context) {
+  const auto history = OpenHistory(options.plant, context);
+  auto episodes = history->List(options.filter.Filter(context));
+  Report report;
+  report.document["episodes"] = Rows(episodes, ListedJson);
+  std::vector<std::string> keys = EpisodeKeys();
+  if (options.plant.asked()) {
+    keys.insert(keys.end(), {"host", "monitor"});
+  }
+  report.Csv("episodes", keys);
+  const auto texts = std::make_shared<const EpisodeTexts>(
+      TextsOf(history->Alarms(std::move(episodes), NowNs()), context));
+  const auto of = [texts](const Json& row) -> const EpisodeText& {
+    return texts->at(RowKey(row));
+  };
+  Column alarm = TextColumn("alarm", [of](const Json& row) {
+    return std::string(AlarmStateName(of(row).state));
+  });
+  alarm.tone = [of](const Json& row) { return ToneOf(of(row).state); };
+  const auto end = [](const Json& row) {
+    return row["end_reason"].is_null() ? "open"
+                                       : row["end_reason"].get<std::string>();
+  };
+  std::vector<Column> columns = {
+      {"episode", "episode_id"},
+      {"valve", "valve_id"},
+      {"detected", "detected_utc", Format::kTime},
+      alarm,
+      {"fault", "fault"},
+      TextColumn(
+          "which is", [of](const Json& row) { return of(row).fault_name; }, 2),
+      {"peak [-]", "peak_factor", Format::kPlain, 3, 4},
+      TextColumn(
+          "isolated after",
+          [of](const Json& row) { return of(row).isolated_after; }, 5,
+          Align::kRight),
+      TextColumn(
+          "lasted", [of](const Json& row) { return of(row).lasted; }, 3,
+          Align::kRight),
+      TextColumn("end", end, 1),
+      {"label", "label", Format::kPlain, 0, 6},
+      {"acked by", "acked_by", Format::kPlain, 0, 7},
+      {"model set", "model_set", Format::kPlain, 0, 8}};
+  if (options.plant.asked()) {
+    columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
+                                         {"monitor", "monitor"}});
+  }
+  return report.Table("episodes", columns, "no episode matches");
+}
+
+// Transitions have faults and a factor; operator actions have a who.
+Json HistoryEntryJson(const HistoryEntry& event) {
+  const bool by_hand = !event.who.empty();
+  return {{"kind", event.kind},
+          {"stamp_utc", TimeJson(event.stamp_ns)},
+          {"recorded_utc", TimeJson(event.recorded_ns)},
+          {"faults", TextJson(event.faults)},
+          {"factor", by_hand ? Json() : NumberJson(event.factor)},
+          {"strength", by_hand ? Json() : NumberJson(event.strength)},
+          {"reason", TextJson(event.reason)},
+          {"layer", TextJson(event.layer)},
+          {"who", TextJson(event.who)},
+          {"value", TextJson(event.value)},
+          {"comment", TextJson(event.comment)},
+          {"origin", TextJson(event.origin)}};
+}
+
+constexpr const char* kByPhysics = "by simulation of the valve";
+
+bool ByPhysics(const std::string& layer) {
+  return layer == LayerName(Layer::kPhysics);
+}
+
+std::string NoteText(const HistoryEntry& event) {
+  if (event.who.empty()) {
+    return ByPhysics(event.layer) ? kByPhysics : event.reason;
+  }
+  return event.value + (event.value.empty() ? "" : " ") + "by " + event.who +
+         (event.origin.empty() ? "" : " (" + event.origin + ")") +
+         (event.comment.empty() ? "" : ": " + event.comment);
+}
+
+void AddEvents(const std::vector<HistoryEntry>& events, const Context& context,
+               Report& report) {
+  report.document["events"] = Rows(events, HistoryEntryJson);
+  report::TextTable table({{"event"},
+                           {"at"},
+                           {"faults"},
+                           {"factor [-]", Align::kRight},
+                           {"strength [-]", Align::kRight},
+                           {"note"}});
+  for (const HistoryEntry& event : events) {
+    const bool by_hand = !event.who.empty();
+    table.AddRow({event.kind, TimeText(event.stamp_ns, context), event.faults,
+                  by_hand ? "" : report::FormatNumber(event.factor, 3),
+                  by_hand ? "" : report::FormatNumber(event.strength, 3),
+                  NoteText(event)});
+  }
+  AddTextTable(report, table);
+}
+
+Json LookFaultJson(const LookFault& f) {
+  return {{"fault", FaultName(f.fault)},
+          {"strength", f.strength},
+          {"lowest", f.lowest},
+          {"highest", f.highest},
+          {"begins_utc", TimeJson(f.begins_ns)},
+          {"growing", f.growing}};
+}
+
+void AddLook(const std::optional<EpisodeLook>& look, const Context& context,
+             Report& report) {
+  report.document["look"] = Json();
+  if (!look) {
+    return;
+  }
+  report.document["look"] = {{"misfit", look->misfit},
+                             {"faults", Rows(look->faults, LookFaultJson)}};
+  report::TextTable table({{"second look"},
+                           {"strength [-]", Align::kRight},
+                           {"95 % interval", Align::kRight},
+                           {"begins"}});
+  const auto number = [](double value) {
+    return report::FormatNumber(value, 2);
+  };
+  for (const LookFault& f : look->faults) {
+    table.AddRow(
+        {FaultName(f.fault), number(f.strength),
+         number(f.lowest) + ".." + number(f.highest),
+         TimeText(f.begins_ns, context) + (f.growing ? ", growing" : "")});
+  }
+  if (look->faults.empty()) {
+    table.AddRow({"no fault fits"});
+  }
+  AddTextTable(report, table);
+}
+
+// "0.42 (0.38 to 0.46)", "9.6 days (7.2 to 14.5)"
+std::string IntervalText(double value, double lowest, double highest,
+                         int decimals, const std::string& unit = "") {
+  const auto number = [decimals](double x) {
+    return report::FormatNumber(x, decimals);
+  };
+  return number(value) + unit + " (" + number(lowest) + " to " +
+         number(highest) + ")";
+}
+
+// In a unit of which there is one at least.
+std::string TimeToFullText(const TimeToFull& full) {
+  const auto [unit_s, unit] =
+      full.seconds >= 86'400.0 ? std::pair(86'400.0, " days")
+      : full.seconds >= 3600.0 ? std::pair(3600.0, " hours")
+                               : std::pair(60.0, " minutes");
+  return IntervalText(full.seconds / unit_s, full.lowest / unit_s,
+                      full.highest / unit_s, 1, unit);
+}
+
+// "strength 0.42 (0.38 to 0.46), growing by 0.06 a day (0.04 to 0.08); full in
+// 9.6 days (7.2 to 14.5)"
+std::string GrowthText(const Growth& growth) {
+  const StrengthPoint& last = growth.last;
+  std::string text =
+      "strength " + IntervalText(last.strength, last.lowest, last.highest, 2);
+  if (growth.rate) {
+    const GrowthRate& rate = *growth.rate;
+    text += rate.grows()
+                ? ", growing by " + IntervalText(rate.per_day, rate.lowest,
+                                                 rate.highest, 2, " a day")
+            : rate.falls()
+                ? ", falling by " + IntervalText(-rate.per_day, -rate.highest,
+                                                 -rate.lowest, 2, " a day")
+                : ", neither growing nor falling";
+  }
+  if (growth.full) {
+    text += "; full in " + TimeToFullText(*growth.full);
+  }
+  return text;
+}
+
+const char* TrendName(const GrowthRate& rate) {
+  return rate.grows() ? "growing" : rate.falls() ? "falling" : "steady";
+}
+
+Json GrowthJson(const Growth& growth) {
+  const StrengthPoint& last = growth.last;
+  Json json = {{"fault", FaultName(last.fault)},
+               {"stamp_utc", TimeJson(last.stamp_ns)},
+               {"strength", last.strength},
+               {"lowest", last.lowest},
+               {"highest", last.highest},
+               {"trend", Json()},
+               {"per_day", Json()},
+               {"per_day_lowest", Json()},
+               {"per_day_highest", Json()},
+               {"full_in_s", Json()},
+               {"full_in_s_lowest", Json()},
+               {"full_in_s_highest", Json()}};
+  if (growth.rate) {
+    json.update({{"trend", TrendName(*growth.rate)},
+                 {"per_day", growth.rate->per_day},
+                 {"per_day_lowest", growth.rate->lowest},
+                 {"per_day_highest", growth.rate->highest}});
+  }
+  if (growth.full) {
+    json.update({{"full_in_s", growth.full->seconds},
+                 {"full_in_s_lowest", growth.full->lowest},
+                 {"full_in_s_highest", growth.full->highest}});
+  }
+  return json;
+}
+
+Json StrengthJson(const StrengthPoint& p) {
+  return {{"stamp_utc", TimeJson(p.stamp_ns)},
+          {"fault", FaultName(p.fault)},
+          {"strength", p.strength},
+          {"lowest", p.lowest},
+          {"highest", p.highest},
+          {"layer", LayerName(p.layer)}};
+}
+
+void AddGrowth(const Episode& episode,
+               const std::vector<StrengthPoint>& strengths,
+               const Context& context, Report& report) {
+  const std::vector<Growth> growths = GrowthOf(episode, strengths);
+  report.document["growth"] = Rows(growths, GrowthJson);
+  report.document["strengths"] = Rows(strengths, StrengthJson);
+  for (const Growth& growth : growths) {
+    report.Line(FaultName(growth.last.fault) + ": " + GrowthText(growth) +
+                ", as of " + TimeText(growth.last.stamp_ns, context));
+  }
+}
+
+// "f19: Flow transmitter wrong", "unknown (outside_known): ...".
+std::string FaultLine(const Episode& e, const std::string& name) {
+  const std::string why = e.unknown_kind ? " (" + *e.unknown_kind + ")" : "";
+  const std::string by =
+      ByPhysics(e.layer.value_or("")) ? std::string(", ") + kByPhysics : "";
+  return e.fault ? *e.fault + why + ": " + name + by
+                 : "- (not isolated yet)" + why;
+}
+
+std::string AlarmLine(const Alarm& alarm, const Context& context) {
+  std::string line(AlarmStateName(alarm.state));
+  if (alarm.shelf) {
+    const Shelf& shelf = *alarm.shelf;
+    line += ", shelved by " + shelf.who + " until " +
+            TimeText(shelf.until_ns, context) +
+            (shelf.comment.empty() ? "" : ": " + shelf.comment);
+  }
+  return line;
+}
+
+std::vector<Column> EpisodeFields(const Alarm& alarm, const Context& context) {
+  const Episode& e = alarm.episode;
+  const report::FaultWords words = report::LoadFaultTexts(context.options)
+                                       .Words(e.fault.value_or(""), e.strength);
+  const auto when = [&](std::optional<std::int64_t> stamp_ns) {
+    return TimeText(stamp_ns, context) +
+           (stamp_ns ? ", after " + After(e.detected_ns, stamp_ns) : "");
+  };
+  return {
+      {"episode", "episode_id"},
+      {"valve", "valve_id"},
+      {"source", "source_id"},
+      TextField("fault", FaultLine(e, words.name)),
+      TextField("check", words.check),
+      TextField("severity", std::string(SeverityName(words.severity)) + " (" +
+                                words.discipline + "; NAMUR NE 107 " +
+                                std::string(NamurName(words.namur)) + ")"),
+      TextField("alarm", AlarmLine(alarm, context)),
+      {"detected", "detected_utc", Format::kTime},
+      TextField("isolated", when(e.isolated_ns)),
+      TextField("cleared", when(e.cleared_ns)),
+      TextField("ended", TimeText(e.ended_ns, context) + " " +
+                             e.end_reason.value_or("(open)")),
+      {"peak factor", "peak_factor", Format::kPlain, 3},
+      TextField("strength", e.fault ? report::FormatNumber(e.strength, 3) +
+                                          " when it was named"
+                                    : "-"),
+      TextField("model set", e.model_set + " " + Hex(e.model_hash)),
+      {"label", "label"},
+      {"acked by", "acked_by"},
+      TextColumn("trace", [](const Json& episode) {
+        return episode["trace_instants"].dump() + " instants";
+      })};
+}
+
+struct ShowOptions {
+  std::string id;
+  PlantOptions plant;
+};
+
+Report ShowEpisode(const ShowOptions& options, const Context& context) {
+  const auto history = OpenHistory(options.plant, context);
+  const Alarm alarm =
+      history->Alarms({history->Show(options.id)}, NowNs()).front();
+  const Episode& e = alarm.episode;
+  Report report;
+  report.document = ListedJson(e);
+  report.document.update(
+      {{"source_id", Hex(e.source_id)},
+       {"model_hash", Hex(e.model_hash)},
+       {"strength", NumberJson(e.strength)},
+       {"unknown_kind", TextJson(e.unknown_kind)},
+       {"layer", TextJson(e.layer)},
+       {"ended_utc", TimeJson(e.ended_ns)},
+       {"acked_utc", TimeJson(e.acked_ns)},
+       {"alarm_state", AlarmStateName(alarm.state)},
+       {"shelf", alarm.shelf ? ShelfJson(*alarm.shelf) : Json()},
+       {"trace_instants", history->Trace(e.id).size()}});
+  if (!e.monitor.empty()) {
+    report.Fields("", {TextField("monitor", e.host + "/" + e.monitor)});
+  }
+  report.Fields("", EpisodeFields(alarm, context));
+  AddEvents(history->Events(e.id), context, report);
+  AddLook(history->Look(e.id), context, report);
+  AddGrowth(e, history->Strengths(e.id), context, report);
+  return report;
+}
+
+// Round-trips bit for bit; "nan" for NaN.
+std::string CsvNumber(double value) {
+  if (std::isnan(value)) {
+    return "nan";
+  }
+  return NumberText(value);
+}
+
+// CSV heading of a signal, as in the import format.
+std::string Heading(Signal signal, FlowUnit flow_unit) {
+  const std::string name(SignalName(signal));
+  if (signal == Signal::kF) {
+    return name + (flow_unit == FlowUnit::kM3PerHour ? "_m3_h" : "_t_h");
+  }
+  const std::string unit(SignalUnit(signal));
+  return name + (unit == "%" ? "_pct" : unit.empty() ? "" : "_" + unit);
+}
+
+// One row per instant: time, verdict, the signals of the valve, residuals by
+// channel, decision factors. Missing values are nan.
+void WriteTrace(const Episode& episode, const std::vector<TracePoint>& trace,
+                std::ostream& out) {
+  SignalMask present = 0;
+  for (const TracePoint& instant : trace) {
+    present = static_cast<SignalMask>(present | instant.sample.present);
+  }
+  std::vector<Signal> signals;
+  std::vector<std::string> cells = {"t_s",    "stamp_ns", "seq",
+                                    "intake", "quality",  "state"};
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    if ((present & MaskOf(signal)) != 0) {
+      signals.push_back(signal);
+      cells.push_back(Heading(signal, episode.flow_unit));
+    }
+  }
+  for (const std::string& channel : episode.channels) {
+    cells.push_back("r_" + channel);
+  }
+  cells.emplace_back("d_0");
+  for (const std::string& fault : episode.faults) {
+    cells.push_back("d_" + fault);
+  }
+  WriteCsvLine(out, cells);
+  for (const TracePoint& instant : trace) {
+    const Sample& sample = instant.sample;
+    cells = {
+        CsvNumber(static_cast<double>(sample.stamp_ns - episode.detected_ns) /
+                  1e9),
+        std::to_string(sample.stamp_ns),
+        std::to_string(sample.seq),
+        std::string(IntakeName(instant.intake)),
+        std::string(QualityName(instant.quality)),
+        std::string(StateName(instant.state))};
+    for (const Signal signal : signals) {
+      cells.push_back(
+          CsvNumber(sample.Has(signal) ? sample[signal] : std::nan("")));
+    }
+    for (const double residual : instant.residuals) {
+      cells.push_back(CsvNumber(residual));
+    }
+    cells.push_back(CsvNumber(instant.normal_factor));
+    for (const double factor : instant.factors) {
+      cells.push_back(CsvNumber(factor));
+    }
+    WriteCsvLine(out, cells);
+  }
+}
+
+struct EpisodeExportOptions {
+  std::string id;
+  std::string output;
+  EpisodeOptions filter;
+};
+
+int ExportEpisodes(const EpisodeExportOptions& options,
+                   const Context& context) {
+  if (options.id.empty()) {
+    const Report report = ListEpisodes({options.filter, {}}, context);
+    report::WriteOutput(options.output,
+                        [&](std::ostream& out) { report.PrintCsv(out); });
+  } else {
+    HistoryReader reader(DataOf(context).history());
+    const Episode episode = reader.Show(options.id);
+    const auto trace = reader.Trace(episode.id);
+    report::WriteOutput(options.output, [&](std::ostream& out) {
+      WriteTrace(episode, trace, out);
+    });
+  }
+  return report::kExitOk;
+}
+
+struct PlotOptions {
+  std::string id;
+  std::string output;
+  plot::EpisodeFigureOptions figure;
+};
+
+Report PlotEpisode(const PlotOptions& options, const Context& context) {
+  const DataDirectory data = DataOf(context);
+  HistoryReader reader(data.history());
+  const plot::EpisodeEvidence evidence =
+      plot::LoadEvidence(reader, options.id, data.models());
+  const Episode& episode = evidence.episode;
+  plot::EpisodeFigureOptions figure = options.figure;
+  figure.fault_name = report::LoadFaultTexts(context.options)
+                          .Words(episode.fault.value_or(""), episode.strength)
+                          .name;
+  const std::filesystem::path path =
+      options.output.empty() ? episode.episode_id + ".png" : options.output;
+  plot::DrawFigure(plot::EpisodeFigure(evidence, figure), path);
+  Report report;
+  report.document = {{"episode_id", episode.episode_id},
+                     {"file", path.string()}};
+  return report.Line("drawn to " + path.string());
+}
+
+}  // namespace
+
+void AddHistoryVerbs(report::Program& program) {
+  CLI::App& group = program.AddGroup(
+      "history",
+      "Fault episodes: what happened, how certain it is, who has seen it");
+  auto [list, list_options] =
+      AddVerb(program, group, "list", "List the episodes, the newest last",
+              ListEpisodes);
+  list_options.AddTo(list);
+  program.AllowCsv(list, "The columns of fault_history as CSV");
+
+  auto [show, shown] =
+      AddVerb(program, group, "show",
+              "Show an episode, what to check, and its events", ShowEpisode);
+  AddEpisode(show, shown.id);
+  shown.plant.AddTo(show);
+  AddHistoryFigures(program, group);
+  AddAlarmVerbs(program, group);
+
+  auto exported = std::make_shared<EpisodeExportOptions>();
+  CLI::App& exporting = program.AddVerb(
+      group, "export",
+      "Write as CSV the list of episodes, or the trace of one of them",
+      [exported](const Context& c) { return ExportEpisodes(*exported, c); });
+  AddEpisode(exporting, exported->id, false);
+  AddOutput(exporting, exported->output);
+  exported->filter.AddTo(exporting);
+
+  auto [plot, plotted] =
+      AddVerb(program, group, "plot",
+              "Draw the evidence of an episode for a report, with gnuplot",
+              PlotEpisode);
+  AddEpisode(plot, plotted.id);
+  plot.add_option("-o,--output", plotted.output,
+                  "FILE.png or FILE.svg (ID.png)");
+  plot.add_option("--from", plotted.figure.from_s,
+                  "Start of the picture in s after detection");
+  plot.add_option("--to", plotted.figure.to_s,
+                  "End of the picture in s after detection");
+}
+
+}  // namespace fdi::storage

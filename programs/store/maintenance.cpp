@@ -1,0 +1,325 @@
+// fdi-store doctor, backup, migrate, prune: the files of the data directory.
+#include "base/error.h"
+#include "programs/store/verbs.h"
+#include "storage/history/history_database.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/retention.h"
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
+
+namespace fdi::storage {
+namespace {
+
+using report::Format;
+
+struct File {
+  const char* name;
+  std::filesystem::path path;
+  const Schema* schema;
+  /// Figures that `doctor` reports: name and query.
+  std::vector<std::pair<const char*, const char*>> counts;
+};
+
+std::vector<File> FilesOf(const DataDirectory& data) {
+  return {{"runs.db",
+           data.runs(),
+           &RunsSchema(),
+           {{"runs", "SELECT count(*) FROM run"},
+            {"tail_rows", "SELECT count(*) FROM tail"}}},
+          {"models.db",
+           data.models(),
+           &ModelsSchema(),
+           {{"model_sets", "SELECT count(*) FROM model_set"},
+            {"valves", "SELECT count(*) FROM valve"}}},
+          {"history.db",
+           data.history(),
+           &HistorySchema(),
+           {{"episodes", "SELECT count(*) FROM episode"},
+            {"open_episodes",
+             "SELECT count(*) FROM episode WHERE ended_ns IS NULL"},
+            {"unsent_events", "SELECT count(*) FROM event_outbox"},
+            {"unclean_sessions",
+             "SELECT count(*) FROM monitor_session WHERE clean = 0"}}}};
+}
+
+bool Exists(const std::filesystem::path& path) {
+  std::error_code error;
+  const bool there = std::filesystem::exists(path, error);
+  if (error) {
+    throw DataError(path.string() + ": " + error.message());
+  }
+  return there;
+}
+
+Json Examine(const File& file) {
+  Json finding = {{"name", file.name},
+                  {"present", false},
+                  {"version", 0},
+                  {"bytes", 0},
+                  {"wal_bytes", 0},
+                  {"figures", Json::object()},
+                  {"troubles", Json::array()}};
+  Json& troubles = finding["troubles"];
+  try {
+    if (!Exists(file.path)) {
+      return finding;
+    }
+    finding["present"] = true;
+    Database database(file.path, *file.schema, Access::kReader);
+    finding["version"] = database.version();
+    finding["bytes"] = database.FileBytes();
+    finding["wal_bytes"] = database.WalBytes();
+    troubles = database.Check();
+    for (const auto& [what, sql] : file.counts) {
+      finding["figures"][what] = database.QueryInt64(sql).value_or(0);
+    }
+  } catch (const DataError& error) {
+    troubles.push_back(error.what());
+  } catch (const SqliteError& error) {
+    troubles.push_back(error.what());
+  }
+  return finding;
+}
+
+// "12 episodes, 1 open_episodes"
+std::string FiguresText(const Json& finding) {
+  std::string text;
+  for (const auto& [name, value] : finding["figures"].items()) {
+    text += (text.empty() ? "" : ", ") + value.dump() + " " + name;
+  }
+  return text;
+}
+
+std::string VerdictText(const Json& finding) {
+  return !finding["troubles"].empty()     ? "trouble"
+         : finding["present"].get<bool>() ? "sound"
+                                          : "not there";
+}
+
+// Only for files that exist; in kB if `divisor` is 1000.
+report::Column NumberColumn(std::string heading, const char* key, int divisor) {
+  return TextColumn(
+      std::move(heading),
+      [key, divisor](const Json& finding) {
+        return finding["present"].get<bool>()
+                   ? std::to_string(finding[key].get<std::int64_t>() / divisor)
+                   : "-";
+      },
+      0, report::Align::kRight);
+}
+
+Report Doctor(const NoOptions&, const Context& context) {
+  const DataDirectory data = DataOf(context);
+  if (!Exists(data.path)) {
+    throw DataError("no data directory " + data.path.string());
+  }
+  const Json databases = Rows(FilesOf(data), Examine);
+  Report report;
+  report.Table("databases", {{"file", "name"},
+                             NumberColumn("version", "version", 1),
+                             NumberColumn("size [kB]", "bytes", 1000),
+                             NumberColumn("WAL [kB]", "wal_bytes", 1000),
+                             TextColumn("contents", FiguresText),
+                             TextColumn("verdict", VerdictText)});
+  for (const Json& finding : databases) {
+    for (const Json& trouble : finding["troubles"]) {
+      report.Line(finding["name"].get<std::string>() + ": " +
+                  trouble.get<std::string>());
+      report.exit_code = report::kExitData;
+    }
+  }
+  report.document = {{"sound", report.exit_code == report::kExitOk},
+                     {"databases", databases}};
+  return report;
+}
+
+Report Backup(const std::string& target, const Context& context) {
+  const std::filesystem::path folder(target);
+  const DataDirectory data = DataOf(context);
+  std::vector<File> present;
+  for (File& file : FilesOf(data)) {
+    if (Exists(file.path)) {
+      if (Exists(folder / file.name)) {
+        throw DataError("backup " + (folder / file.name).string() +
+                        " exists already");
+      }
+      present.push_back(std::move(file));
+    }
+  }
+  if (present.empty()) {
+    throw NotFoundError("no database in " + data.path.string());
+  }
+  EnsureExists({folder});
+  Report report;
+  for (const File& file : present) {
+    const std::filesystem::path copy = folder / file.name;
+    Database(file.path, *file.schema, Access::kReader).BackupTo(copy);
+    report.document["files"].push_back(copy.string());
+    report.Line(copy.string());
+  }
+  return report;
+}
+
+Report Migrate(const NoOptions&, const Context& context) {
+  Report report;
+  report.document["databases"] = Json::array();
+  for (const File& file : FilesOf(DataOf(context))) {
+    if (!Exists(file.path)) {
+      continue;
+    }
+    const Database database(file.path, *file.schema, Access::kOccasionalWriter);
+    const auto& backup = database.migration_backup();
+    report.document["databases"].push_back(
+        {{"name", file.name},
+         {"version", database.version()},
+         {"backup", backup ? Json(backup->string()) : Json()}});
+    report.Line(std::string(file.name) + ": version " +
+                std::to_string(database.version()) +
+                (backup ? ", migrated; the old file is " + backup->string()
+                        : ", nothing to do"));
+  }
+  return report;
+}
+
+// Limits of one kind of record.
+struct AgeAndSize {
+  std::string age;
+  std::optional<std::uint64_t> bytes;
+};
+
+struct PruneOptions {
+  AgeAndSize runs;
+  AgeAndSize history;
+  AgeAndSize health;
+  AgeAndSize shadow;
+  bool dry_run{false};
+};
+
+// One row per kind of record that has a limit.
+Json PruneAll(const PruneOptions& options, const DataDirectory& data) {
+  struct Task {
+    const AgeAndSize& asked;
+    const char* name;
+    const char* items;
+    std::filesystem::path path;
+    PruneResult (*prune)(const std::filesystem::path&, const RetentionLimits&);
+  };
+  Json rows = Json::array();
+  for (const Task& task :
+       {Task{options.runs, "runs.db", "runs", data.runs(), PruneRuns},
+        Task{options.history, "history.db", "episodes", data.history(),
+             PruneHistory},
+        Task{options.health, "history.db", "hours of health", data.history(),
+             PruneHealth},
+        Task{options.shadow, "history.db", "shadow differences", data.history(),
+             PruneShadow}}) {
+    if (task.asked.age.empty() && !task.asked.bytes) {
+      continue;
+    }
+    if (!std::filesystem::exists(task.path)) {
+      throw NotFoundError("no database " + task.path.string());
+    }
+    RetentionLimits limits;
+    if (!task.asked.age.empty()) {
+      limits.before_ns = NowNs() - ParseDuration(task.asked.age);
+    }
+    limits.max_bytes = task.asked.bytes;
+    limits.dry_run = options.dry_run;
+    const PruneResult r = task.prune(task.path, limits);
+    rows.push_back({{"name", task.name},
+                    {"items", task.items},
+                    {"deleted", r.deleted},
+                    {"protected", r.kept},
+                    {"from_utc", TimeJson(r.from_ns)},
+                    {"to_utc", TimeJson(r.to_ns)},
+                    {"bytes_before", r.bytes_before},
+                    {"bytes_after", r.bytes_after},
+                    {"fits", r.fits}});
+  }
+  return rows;
+}
+
+Report Prune(const PruneOptions& options, const Context& context) {
+  const Json databases = PruneAll(options, DataOf(context));
+  if (databases.empty()) {
+    throw ConfigError(
+        "prune: choose what may be deleted: --runs-age, --runs-size, "
+        "--history-age, --history-size, --health-age or --shadow-age");
+  }
+  Report report;
+  report.document = {{"dry_run", options.dry_run}, {"databases", databases}};
+  if (options.dry_run) {
+    report.Line("Nothing is deleted; this would be deleted:");
+  }
+  const auto kilobytes = [](std::string heading, const char* key) {
+    return TextColumn(
+        std::move(heading),
+        [key](const Json& row) {
+          return std::to_string(row[key].get<std::int64_t>() / 1000);
+        },
+        0, report::Align::kRight);
+  };
+  report.Table("databases", {{"file", "name"},
+                             {"deleted", "deleted"},
+                             {"items", "items"},
+                             {"from", "from_utc", Format::kTime},
+                             {"to", "to_utc", Format::kTime},
+                             {"protected", "protected"},
+                             kilobytes("before [kB]", "bytes_before"),
+                             kilobytes("after [kB]", "bytes_after")});
+  for (const Json& row : databases) {
+    if (!row["fits"].get<bool>()) {
+      context.log(LogLevel::kWarning,
+                  "prune_incomplete file=" + row["name"].get<std::string>() +
+                      " bytes=" + row["bytes_after"].dump() +
+                      " reason=\"the rest is protected\"");
+    }
+  }
+  return report;
+}
+
+void AddPrune(report::Program& program) {
+  auto [verb, options] = AddVerb(
+      program, program.root(), "prune",
+      "Delete old recorded runs, old episodes that are closed, acknowledged "
+      "and not labelled, old hours of health and old differences of candidates",
+      Prune);
+  for (auto& [what, limits] :
+       {std::pair<std::string, AgeAndSize*>("--runs", &options.runs),
+        {"--history", &options.history}}) {
+    verb.add_option(what + "-age", limits->age,
+                    "Delete what ended longer ago than this: 90d, 2d12h, ...");
+    verb.add_option(
+            what + "-size", limits->bytes,
+            "Then delete the oldest until at most this much is left: 20GB, "
+            "500MB, ...")
+        ->transform(CLI::AsSizeValue(true));
+  }
+  verb.add_option("--health-age", options.health.age,
+                  "Delete hours of health that are older than this: 1000d, "
+                  "...");
+  verb.add_option("--shadow-age", options.shadow.age,
+                  "Delete differences of a candidate that are older than "
+                  "this: 90d, ...");
+  verb.add_flag("--dry-run", options.dry_run,
+                "Only print what would be deleted");
+}
+
+}  // namespace
+
+void AddMaintenanceVerbs(report::Program& program) {
+  AddVerb(program, program.root(), "doctor", "Check the three databases",
+          Doctor);
+  auto [backup, target] =
+      AddVerb(program, program.root(), "backup",
+              "Copy the databases while they are in use", Backup);
+  backup
+      .add_option("folder", target,
+                  "Folder to copy to; made if it does not exist")
+      ->required();
+  AddVerb(program, program.root(), "migrate",
+          "Bring the databases to the current version", Migrate);
+  AddPrune(program);
+}
+
+}  // namespace fdi::storage

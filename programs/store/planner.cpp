@@ -1,0 +1,248 @@
+// fdi-store faults, health show|trend, worklist: for maintenance planners.
+#include <algorithm>
+#include <string>
+
+#include "base/error.h"
+#include "diagnosis/fault_catalogue.h"
+#include "planner/health_view.h"
+#include "planner/work_list.h"
+#include "programs/store/verbs.h"
+#include "report/fault_texts.h"
+#include "storage/history/history.h"
+
+namespace fdi::storage {
+namespace {
+
+using report::Format;
+
+// "low; medium from 0.25"
+std::string SeverityText(const Json& fault) {
+  std::string bands;
+  for (const Json& band : fault["severity"]) {
+    const auto level = band["level"].get<std::string>();
+    bands += bands.empty() ? level
+                           : "; " + level + " from " +
+                                 report::FormatNumber(band["from"], 2);
+  }
+  return bands;
+}
+
+Report Faults(const std::string& name, const Context& context) {
+  Report report;
+  report.document = FaultTextsJson(report::LoadFaultTexts(context.options));
+  std::vector<report::Column> columns = {{"fault", "fault"},
+                                         {"name", "name"},
+                                         {"discipline", "discipline"},
+                                         {"NAMUR NE 107", "namur"},
+                                         TextColumn("severity", SeverityText)};
+  if (name.empty()) {
+    return report.Table("faults", std::move(columns));
+  }
+  const std::string key =
+      name == "unknown" ? name : FaultName(RequireFinding(name));
+  Json& faults = report.document["faults"];
+  std::erase_if(faults.get_ref<Json::array_t&>(),
+                [&key](const Json& row) { return row["fault"] != key; });
+  for (report::Column& column : columns) {
+    const Json& fault = faults.front();
+    column = TextField(column.heading,
+                       column.text ? column.text(fault)
+                                   : fault[column.key].get<std::string>());
+  }
+  columns.push_back(TextField("check", faults.front()["check"]));
+  return report.Fields("", std::move(columns));
+}
+
+struct HealthOptions {
+  std::string valve;
+  report::TimeWindow window;
+  bool hourly{false};
+  const CLI::Option* csv{nullptr};
+  std::vector<std::string> limits;
+  PlantOptions plant;
+};
+
+std::vector<HealthHour> Hours(const HealthOptions& options,
+                              const Context& context) {
+  std::vector<HealthHour> hours =
+      OpenHistory(options.plant, context)
+          ->Health({options.valve, options.window.since_ns(context),
+                    options.window.until_ns(context)});
+  if (hours.empty()) {
+    throw NotFoundError("no health of valve '" + options.valve +
+                        "' in that time; `fdi-store worklist --top 0` and "
+                        "`fdi-store history list` name valves");
+  }
+  return hours;
+}
+
+// "X -1.25 (2.10), F ...": mean and rms of each channel.
+std::string ChannelsText(const Json& hour) {
+  std::string text;
+  for (const Json& channel : hour["channels"]) {
+    const auto number = [&channel](const char* key) {
+      return channel[key].is_null() ? "-"
+                                    : report::FormatNumber(channel[key], 3);
+    };
+    text += (text.empty() ? "" : ", ") + channel["signal"].get<std::string>() +
+            " " + number("mean") + " (" + number("rms") + ")";
+  }
+  return text.empty() ? "-" : text;
+}
+
+// The CSV has a row per hour and channel, unlike the text table, whose row is
+// an hour. An hour without channels gets a row, too.
+Report CsvOf(const Json& hours, bool of_plant) {
+  Report report;
+  Json& rows = report.document["hours"] = Json::array();
+  for (const Json& hour : hours) {
+    const Json& channels = hour["channels"];
+    for (const Json& channel :
+         channels.empty() ? Json::array({Json::object()}) : channels) {
+      rows.push_back(hour);
+      rows.back().update(channel);
+    }
+  }
+  std::vector<std::string> keys = {
+      "hour_utc", "epoch",          "model_hash", "seen_h",
+      "live_h",   "alarm_h",        "open_h",     "shut_h",
+      "d0",       "travel_strokes", "reversals",  "signal",
+      "unit",     "mean",           "rms",        "percent"};
+  if (of_plant) {
+    keys.insert(keys.end(), {"host", "monitor"});
+  }
+  return report.Csv("hours", std::move(keys));
+}
+
+Report ShowHealth(const HealthOptions& options, const Context& context) {
+  std::vector<HealthHour> hours = Hours(options, context);
+  if (!options.hourly) {
+    hours = planner::DaysOf(hours);
+  }
+  const Json rows = planner::HealthHoursJson(hours);
+  if (options.csv->count() > 0) {
+    return CsvOf(rows, options.plant.asked());
+  }
+  Report report;
+  report.document = {{"valve_id", options.valve}, {"hours", rows}};
+  std::vector<report::Column> columns = {
+      {"from", "hour_utc", Format::kTime},
+      {"seen [h]", "seen_h"},
+      {"LIVE [h]", "live_h"},
+      {"alarm [h]", "alarm_h"},
+      {"open [h]", "open_h"},
+      {"shut [h]", "shut_h"},
+      {"d_0", "d0", Format::kPlain, 3},
+      {"strokes", "travel_strokes"},
+      {"turns", "reversals"},
+      TextColumn("residual mean (rms)", ChannelsText)};
+  if (options.plant.asked()) {
+    columns.insert(columns.begin() + 1, {{"host", "host", Format::kPlain, 0, 9},
+                                         {"monitor", "monitor"}});
+  }
+  return report.Table("hours", std::move(columns));
+}
+
+Report Trend(const HealthOptions& options, const Context& context) {
+  const auto limits = planner::ParseLimits(options.limits);
+  Report report;
+  report.document = {{"valve_id", options.valve},
+                     {"trends", planner::TrendsJson(planner::TrendsOf(
+                                    Hours(options, context), limits))}};
+  return report.Table("trends", {{"limit", "limit"},
+                                 {"unit", "unit"},
+                                 {"now", "now", Format::kPlain, 3},
+                                 {"a day", "per_day", Format::kPlain, 4},
+                                 {"days seen", "rests_on_days"},
+                                 {"answer", "text"}});
+}
+
+struct WorkListOptions {
+  std::string valve{"*"};
+  std::string since{"90d"};
+  std::string discipline;
+  std::vector<std::string> limits;
+  std::size_t top{10};
+  double horizon_days{180.0};
+  PlantOptions plant;
+};
+
+Report WorkList(const WorkListOptions& options, const Context& context) {
+  planner::WorkQuery query;
+  query.valve_glob = options.valve;
+  query.options.now_ns = NowNs();
+  query.options.horizon_days = options.horizon_days;
+  query.since_ns =
+      ParseTimeOrAgo(options.since, context.options.utc, query.options.now_ns);
+  query.top = options.top;
+  query.discipline = options.discipline;
+  query.limits = planner::ParseLimits(options.limits);
+  const auto history = OpenHistory(options.plant, context);
+  return planner::WorkListReport(planner::ReadWorkList(
+      *history, report::LoadFaultTexts(context.options), query));
+}
+
+}  // namespace
+
+void AddPlannerVerbs(report::Program& program) {
+  auto [faults, name] =
+      AddVerb(program, program.root(), "faults",
+              "The fault catalogue: names, severity, who should go there; of "
+              "one fault also what to check",
+              Faults);
+  faults.add_option(
+      "fault", name,
+      std::string(kFaultNames) + " or unknown (default: all of them)");
+
+  CLI::App& group = program.AddGroup(
+      "health",
+      "How a valve has changed over months, and when it may reach a limit");
+  auto [show, shown] = AddVerb(
+      program, group, "show",
+      "Days or hours of a valve: time, travel, d_0, residuals of the normal "
+      "model, means and (rms)",
+      ShowHealth);
+  auto [trend, limits] =
+      AddVerb(program, group, "trend",
+              "How long until a limit is met, with a 90 % interval where there "
+              "is a significant trend",
+              Trend);
+  for (auto [verb, options] : {std::pair(&show, &shown), {&trend, &limits}}) {
+    verb->add_option("--valve", options->valve, "Id of the valve")->required();
+    options->window.AddTo(*verb);
+    options->plant.AddTo(*verb);
+  }
+  show.add_flag("--hourly", shown.hourly, "Hours instead of days");
+  program.AllowCsv(show, "CSV, one line per time and signal");
+  shown.csv = show.get_option("--csv");
+  trend
+      .add_option("--limit", limits.limits,
+                  "F=-10% (of the flow expected), X=3 (its unit), f19=0.5 "
+                  "(strength), travel=100000 (strokes), reversals=1000000; may "
+                  "be repeated")
+      ->required()
+      ->type_name("NAME=VALUE");
+
+  auto [list, options] =
+      AddVerb(program, program.root(), "worklist",
+              "The valves to look at at the next stop, and why", WorkList);
+  list.add_option("--top", options.top, "Number of valves to list; 0: all");
+  list.add_option("--valve", options.valve,
+                  "Only valves whose ids match this glob");
+  list.add_option("--since", options.since,
+                  "Episodes and trends from this time on: 90d, 2026-10-01");
+  list.add_option("--discipline", options.discipline,
+                  "Only work for operator, instrument, air or mechanical");
+  list.add_option("--limit", options.limits,
+                  "Limits of trends, as in `health trend`; may be repeated "
+                  "(default: F=-10% and F=10%)")
+      ->type_name("NAME=VALUE");
+  list.add_option("--horizon", options.horizon_days,
+                  "Leave out trends that reach their limit later than this")
+      ->check(CLI::Range(1.0, 36500.0))
+      ->type_name("DAYS");
+  options.plant.AddTo(list);
+  program.AllowCsv(list, "CSV, one line per valve");
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,233 @@
+// fdi-store ship: copies the history to the plant history in PostgreSQL.
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <set>
+#include <thread>
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "plant/shipper.h"
+#include "programs/store/verbs.h"
+
+namespace fdi::storage {
+namespace {
+
+constexpr std::chrono::nanoseconds kMaxPause = std::chrono::minutes(5);
+
+struct ShipOptions {
+  std::string url;
+  std::string host;
+  std::string monitor{"monitor"};
+  std::string every;
+  bool init{false};
+  bool forget{false};
+  bool prune{false};
+  std::string history_age;
+  std::string health_age;
+  bool dry_run{false};
+};
+
+std::string HostName() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data()
+                                                        : "localhost";
+}
+
+Report InitPlant(const ShipOptions& options) {
+  const PlantDatabase plant = PlantDatabase::Init(options.url);
+  Report report;
+  report.document = {{"plant", plant.name()}, {"plant_id", plant.plant_id()}};
+  return report.Line("schema fdi is in " + plant.name() +
+                     "; grant fdi_writer to the monitors' accounts and "
+                     "fdi_reader to those who read");
+}
+
+Report ShipReport(const ShipOptions& options, const std::string& plant,
+                  const Shipped& shipped) {
+  Report report;
+  std::int64_t rows = 0;
+  Json tables = Json::array();
+  for (const auto& [table, count] : shipped.rows) {
+    tables.push_back({{"table", table}, {"rows", count}});
+    rows += count;
+  }
+  report.document = {{"plant", plant},
+                     {"host", options.host},
+                     {"monitor", options.monitor},
+                     {"rows", rows},
+                     {"tables", tables}};
+  report.Line("shipped " + std::to_string(rows) + " new or changed rows to " +
+              plant + " as " + options.host + "/" + options.monitor);
+  return report.Table("tables", {{"table", "table"}, {"rows", "rows"}},
+                      "nothing was new");
+}
+
+// A history that was restored from a backup is another file of that name.
+std::pair<dev_t, ino_t> FileId(const std::filesystem::path& file) {
+  struct stat facts {};
+  if (stat(file.c_str(), &facts) != 0) {
+    throw DataError("database " + file.string() + ": " + std::strerror(errno));
+  }
+  return {facts.st_dev, facts.st_ino};
+}
+
+// Reports each reason once until shipping works again; pauses double up to five
+// minutes. No cleanup is needed on a signal: a kill loses nothing.
+[[noreturn]] void ShipForEver(const ShipOptions& options,
+                              const Context& context) {
+  const std::chrono::nanoseconds every(ParseDuration(options.every));
+  if (every.count() == 0) {
+    throw ConfigError("--every is '" + options.every +
+                      "', accepted are intervals above 0: 10s, 1min, ...");
+  }
+  const DataDirectory data = DataOf(context);
+  std::optional<Shipper> shipper;
+  std::pair<dev_t, ino_t> shipped;
+  std::set<std::string> said;
+  auto pause = every;
+  while (true) {
+    std::string failure;
+    try {
+      const auto file = FileId(data.history());
+      if (!shipper || file != shipped) {
+        shipper.emplace(data, options.url,
+                        ShipSource{options.host, options.monitor});
+        shipped = file;
+      }
+      shipper->Ship();
+    } catch (const DataError& error) {
+      failure = error.what();
+    } catch (const SqliteError& error) {
+      failure = error.what();
+    }
+    if (failure.empty()) {
+      if (!said.empty()) {
+        context.log(LogLevel::kInfo, "ship_goes_on");
+      }
+      said.clear();
+      pause = every;
+    } else {
+      shipper.reset();
+      if (said.insert(failure).second) {
+        context.log(LogLevel::kWarning,
+                    EventLine("ship_failed", {{"reason", failure}}));
+      }
+      pause = std::min(pause * 2, std::max(every, kMaxPause));
+    }
+    std::this_thread::sleep_for(pause);
+  }
+}
+
+Report PrunePlant(const ShipOptions& options) {
+  struct Rule {
+    const std::string& age;
+    const char* items;
+    PlantPruned (*prune)(PlantDatabase&, std::int64_t, bool);
+  };
+  if (options.history_age.empty() && options.health_age.empty()) {
+    throw ConfigError(
+        "ship --prune: choose what may be deleted: --history-age or "
+        "--health-age");
+  }
+  PlantDatabase plant(options.url);
+  Json rows = Json::array();
+  for (const Rule& rule :
+       {Rule{options.history_age, "episodes", PrunePlantEpisodes},
+        Rule{options.health_age, "hours of health", PrunePlantHealth}}) {
+    if (rule.age.empty()) {
+      continue;
+    }
+    const PlantPruned pruned =
+        rule.prune(plant, NowNs() - ParseDuration(rule.age), options.dry_run);
+    rows.push_back({{"items", rule.items},
+                    {"deleted", pruned.deleted},
+                    {"protected", pruned.kept},
+                    {"from_utc", TimeJson(pruned.from_ns)},
+                    {"to_utc", TimeJson(pruned.to_ns)}});
+  }
+  Report report;
+  report.document = {{"dry_run", options.dry_run}, {"pruned", rows}};
+  if (options.dry_run) {
+    report.Line("Nothing is deleted; this would be deleted:");
+  }
+  return report.Table("pruned", {{"deleted", "deleted"},
+                                 {"items", "items"},
+                                 {"from", "from_utc", report::Format::kTime},
+                                 {"to", "to_utc", report::Format::kTime},
+                                 {"protected", "protected"}});
+}
+
+Report Ship(const ShipOptions& given, const Context& context) {
+  ShipOptions options = given;
+  if (options.host.empty()) {
+    options.host = HostName();
+  }
+  const DataDirectory data = DataOf(context);
+  if (!options.init && !options.prune &&
+      !std::filesystem::exists(data.history())) {
+    throw NotFoundError("no database " + data.history().string());
+  }
+  if (options.forget) {
+    StopShipping(data);
+    Report report;
+    report.document = {{"forgotten", true}};
+    return report.Line(
+        "changes are logged for no plant any more, and prune waits for none");
+  }
+  if (options.url.empty()) {
+    throw ConfigError("ship: say where to: --to postgresql://user@host/plant");
+  }
+  if (options.init) {
+    return InitPlant(options);
+  }
+  if (options.prune) {
+    return PrunePlant(options);
+  }
+  if (!options.every.empty()) {
+    ShipForEver(options, context);
+  }
+  Shipper shipper(data, options.url, {options.host, options.monitor});
+  return ShipReport(options, shipper.plant().name(), shipper.Ship());
+}
+
+}  // namespace
+
+void AddShipVerb(report::Program& program) {
+  auto [verb, options] = AddVerb(
+      program, program.root(), "ship",
+      "Copy the history to that of the whole plant, in PostgreSQL", Ship);
+  verb.add_option("--to", options.url, "postgresql://user@host/database");
+  verb.add_option("--host", options.host, "This host's name there");
+  verb.add_option("--monitor", options.monitor, "This monitor's name there")
+      ->capture_default_str();
+  verb.add_option("--every", options.every,
+                  "Repeat at this interval: 10s, 1min, ... (default: ship "
+                  "once)");
+  CLI::Option* init =
+      verb.add_flag("--init", options.init,
+                    "Make the schema and the roles, or bring them up to date");
+  CLI::Option* prune = verb.add_flag(
+      "--prune", options.prune,
+      "Delete there, as prune does here: --history-age, --health-age");
+  verb.add_option("--history-age", options.history_age,
+                  "Delete episodes that ended longer ago than this: 1500d, ...")
+      ->needs(prune);
+  verb.add_option("--health-age", options.health_age,
+                  "Delete hours of health that are older than this")
+      ->needs(prune);
+  verb.add_flag("--dry-run", options.dry_run,
+                "Only print what would be deleted")
+      ->needs(prune);
+  verb.add_flag("--forget", options.forget,
+                "Stop shipping for good: changes are no longer logged, and "
+                "prune may delete what was not shipped")
+      ->excludes(init, prune);
+  init->excludes(prune);
+}
+
+}  // namespace fdi::storage

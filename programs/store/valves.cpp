@@ -1,0 +1,450 @@
+// fdi-store valves: list, show, add, assign, event, remove.
+#include <algorithm>
+#include <cstdio>
+
+#include "base/error.h"
+#include "diagnosis/records/valve_glob.h"
+#include "programs/store/verbs.h"
+#include "report/signal_list.h"
+#include "storage/database/locks.h"
+#include "storage/history/history_database.h"
+#include "storage/history/history_reader.h"
+#include "storage/history/valve_move.h"
+#include "storage/models/models.h"
+
+namespace fdi::storage {
+namespace {
+
+using report::Align;
+using report::Format;
+
+Json SetJson(const std::optional<ModelReference>& reference) {
+  return reference ? Json(ToString(*reference)) : Json();
+}
+
+// An entry applies to all valves whose ids match its pattern, so it has no
+// valve_id.
+Json EntryJson(const ValveEntry& entry) {
+  return {{"valve", entry.pattern},
+          {"type", entry.type},
+          {"flow_unit", FlowUnitName(entry.flow_unit)},
+          {"sense", entry.sense == Sense::kClosing ? "closing" : "opening"},
+          {"signals", report::SignalsJson(entry.signals)},
+          {"period_s", entry.period_s},
+          {"epoch", entry.epoch},
+          {"baseline", BaselineStateName(entry.baseline())},
+          {"model_set", SetJson(entry.model_set)}};
+}
+
+Report ListValves(const NoOptions&, const Context& context) {
+  Report report;
+  report.document["valves"] =
+      Rows(ModelStore(DataOf(context).models()).Valves(), EntryJson);
+  return report.Table("valves", {{"valve", "valve"},
+                                 {"type", "type"},
+                                 {"flow in", "flow_unit"},
+                                 {"% of", "sense"},
+                                 {"signals", "signals"},
+                                 {"Ts [s]", "period_s", Format::kPlain, 3},
+                                 {"epoch", "epoch"},
+                                 {"baseline", "baseline"},
+                                 {"model set", "model_set"}});
+}
+
+Json ValveEventJson(const ValveEvent& event) {
+  return {{"epoch", event.epoch},
+          {"kind", ValveEventKindName(event.kind)},
+          {"at_utc", TimeJson(event.at_ns)},
+          {"who", event.who},
+          {"note", event.note}};
+}
+
+Json BaselineJson(const BaselineRecord& record) {
+  Json parameters = Json::object();
+  for (const auto& [name, value] : record.parameters) {
+    parameters[name] = value;
+  }
+  return {
+      {"epoch", record.epoch},
+      {"model_set", record.model_set + '@' + std::to_string(record.version)},
+      {"created_utc", TimeJson(record.created_ns)},
+      {"hours", record.hours},
+      {"parameters", parameters},
+      {"channels",
+       Rows(record.channels, [](const ChannelFigures& channel) -> Json {
+         return {{"name", channel.name},
+                 {"rmse", channel.rmse},
+                 {"bias", channel.bias},
+                 {"vaf", VafJson(channel.vaf)}};
+       })}};
+}
+
+// Six digits, however small: air coefficients have a size of 1e-6.
+std::string SixDigits(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+// As found and as left: a column for the newest baseline of each epoch, a row
+// for every figure in any of them.
+void AddComparison(const std::vector<BaselineRecord>& records, Report& report) {
+  std::vector<BaselineRecord> newest;
+  for (const BaselineRecord& record : records) {
+    if (!newest.empty() && newest.back().epoch == record.epoch) {
+      newest.back() = record;
+    } else {
+      newest.push_back(record);
+    }
+  }
+  if (newest.empty()) {
+    return;
+  }
+  std::vector<std::string> names;  // In order of first occurrence.
+  std::vector<std::map<std::string, double>> figures(newest.size());
+  std::vector<report::TextTable::Column> columns = {{"baseline"}};
+  for (std::size_t i = 0; i < newest.size(); ++i) {
+    const BaselineRecord& record = newest[i];
+    const auto add = [&](const std::string& name, double value) {
+      if (std::ranges::find(names, name) == names.end()) {
+        names.push_back(name);
+      }
+      figures[i][name] = value;
+    };
+    columns.push_back({"epoch " + std::to_string(record.epoch) + ": " +
+                           record.model_set + '@' +
+                           std::to_string(record.version),
+                       Align::kRight});
+    add("hours", record.hours);
+    for (const auto& [name, value] : record.parameters) {
+      add(name, value);
+    }
+    for (const ChannelFigures& channel : record.channels) {
+      add(channel.name + " rmse", channel.rmse);
+      add(channel.name + " bias", channel.bias);
+      if (IsVafMeaningful(channel.vaf)) {
+        add(channel.name + " VAF [%]", channel.vaf);
+      }
+    }
+  }
+  report::TextTable table(columns);
+  for (const std::string& name : names) {
+    std::vector<std::string> cells = {name};
+    for (const auto& of_epoch : figures) {
+      const auto found = of_epoch.find(name);
+      cells.push_back(found == of_epoch.end() ? "-" : SixDigits(found->second));
+    }
+    table.AddRow(cells);
+  }
+  report.Line("");
+  AddTextTable(report, table);
+}
+
+// Time by quality; empty if no monitor has run here.
+std::vector<CoverageTime> CoverageOf(const std::string& valve_id,
+                                     const Context& context) {
+  const auto path = DataOf(context).history();
+  if (!std::filesystem::exists(path)) {
+    return {};
+  }
+  EpisodeFilter filter;
+  filter.valve_glob = GlobOf(valve_id);
+  return HistoryReader(path).Coverage(filter);
+}
+
+// `fields` come first: they apply to the valve whose entry it is.
+void AddEntry(ModelStore& store, const ValveEntry& entry,
+              std::vector<report::Column> fields, Report& report) {
+  fields.insert(fields.end(),
+                {{"entry", "valve"},
+                 {"type", "type"},
+                 {"flow in", "flow_unit"},
+                 {"% of", "sense"},
+                 {"signals", "signals"},
+                 TextField("sample period",
+                           report::FormatNumber(entry.period_s, 3) + " s"),
+                 {"epoch", "epoch"},
+                 {"baseline", "baseline"}});
+  report.Fields("", std::move(fields));
+  const auto events = store.ValveEvents(entry.pattern);
+  const auto baselines = store.Baselines(entry.pattern);
+  report.document["events"] = Rows(events, ValveEventJson);
+  report.document["baselines"] = Rows(baselines, BaselineJson);
+  if (!events.empty()) {
+    report.Line("").Table("events", {{"epoch", "epoch"},
+                                     {"event", "kind"},
+                                     {"at", "at_utc", Format::kTime},
+                                     {"by", "who"},
+                                     {"note", "note"}});
+  }
+  AddComparison(baselines, report);
+}
+
+// What applies to one valve: the entry that matches it and its model set.
+Report ShowValve(const std::string& valve_id, const Context& context) {
+  ModelStore store(DataOf(context).models());
+  const auto entry = store.FindValve(valve_id);
+  const auto assigned = store.AssignedModelSet(valve_id);
+  if (!entry && !assigned) {
+    throw NotFoundError("no entry and no active model set for valve '" +
+                        valve_id + "'");
+  }
+  Report report;
+  report.document = entry ? EntryJson(*entry) : Json::object();
+  report.document["valve_id"] = valve_id;
+  report.document["diagnosed_with"] = SetJson(assigned);
+  std::vector<report::Column> fields = {
+      {"valve", "valve_id"},
+      TextField("diagnosed with",
+                assigned ? ToString(*assigned) : "UNASSIGNED")};
+  if (entry) {
+    AddEntry(store, *entry, std::move(fields), report);
+  } else {
+    report.Fields("", std::move(fields));
+  }
+  const auto coverage = CoverageOf(valve_id, context);
+  report.document["hours"] = HoursJson(coverage);
+  AddHours(report, coverage);
+  return report;
+}
+
+// Reports the entry after a change.
+Report Changed(const ValveEntry& entry) {
+  Report report;
+  report.document = EntryJson(entry);
+  return report.Line(entry.pattern + ": model set " +
+                     (entry.model_set ? ToString(*entry.model_set) : "-") +
+                     ", epoch " + std::to_string(entry.epoch) + ", baseline " +
+                     std::string(BaselineStateName(entry.baseline())));
+}
+
+struct AddOptions {
+  std::string pattern;
+  std::string type;
+  std::string flow_unit{"m3/h"};
+  std::string sense{"closing"};
+  std::string signals{"CV,P1,P2,T1,X,F"};
+  std::string model_set;
+  double period_s{1.0};
+  std::uint32_t epoch{0};
+};
+
+Report AddValves(const AddOptions& options, const Context& context) {
+  ValveEntry entry;
+  entry.pattern = options.pattern;
+  entry.type = options.type;
+  entry.flow_unit = *ParseFlowUnit(options.flow_unit);
+  entry.sense = options.sense == "opening" ? Sense::kOpening : Sense::kClosing;
+  entry.signals = report::ParseSignals(options.signals);
+  entry.period_s = options.period_s;
+  entry.epoch = options.epoch;
+  ModelStore store = WritableModels(context);
+  if (!options.model_set.empty()) {
+    entry.model_set = ParseModelReference(options.model_set);
+    store.Summary(*entry.model_set);  // Throws if it does not exist.
+  }
+  store.PutValve(entry);
+  return Changed(entry);
+}
+
+struct AssignOptions {
+  std::string pattern;
+  std::string set;
+};
+
+Report Assign(const AssignOptions& options, const Context& context) {
+  ModelStore store = WritableModels(context);
+  store.AssignModelSet(options.pattern,
+                       options.set == "none"
+                           ? std::nullopt
+                           : std::optional(ParseModelReference(options.set)));
+  const auto entries = store.Valves();
+  const auto entry =
+      std::ranges::find(entries, options.pattern, &ValveEntry::pattern);
+  if (entry == entries.end()) {
+    throw NotFoundError("no valve entry '" + options.pattern + "'");
+  }
+  return Changed(*entry);
+}
+
+struct EventOptions {
+  std::string pattern;
+  std::string kind;
+  std::string note;
+  std::string at;
+  std::string who{report::UserName()};
+};
+
+// To the models, a replaced, repacked or recalibrated valve is a different one.
+Report Event(const EventOptions& options, const Context& context) {
+  ValveEvent event;
+  event.kind = ParseValveEventKind(options.kind);
+  event.note = options.note;
+  event.at_ns = options.at.empty() ? NowNs() : ParseTime(options.at, true);
+  event.who = options.who;
+  return Changed(WritableModels(context).AddValveEvent(options.pattern, event));
+}
+
+Report Remove(const std::string& pattern, const Context& context) {
+  WritableModels(context).RemoveValve(pattern);
+  Report report;
+  report.document["removed"] = pattern;
+  return report.Line(pattern + " removed");
+}
+
+struct MoveOptions {
+  std::string pattern;
+  std::string target;
+};
+
+ExclusiveLock LockOf(const DataDirectory& data) {
+  std::filesystem::path path = data.history();
+  return {path += ".lock", "recording faults; stop it to move valves"};
+}
+
+// Ids in models.db and history.db that match the glob.
+std::vector<std::string> ValvesToMove(ModelStore& models, Database& history,
+                                      const std::string& glob) {
+  std::vector<std::string> valves = ValvesInProgress(history, glob);
+  for (const ValveEntry& entry : models.Valves()) {
+    if (entry.pattern.find_first_of("*?[") == std::string::npos &&
+        GlobMatches(glob, entry.pattern)) {
+      valves.push_back(entry.pattern);
+    }
+  }
+  std::ranges::sort(valves);
+  valves.erase(std::unique(valves.begin(), valves.end()), valves.end());
+  return valves;
+}
+
+// Everything is copied before anything is deleted, so an interrupted move can
+// be repeated.
+Report Move(const MoveOptions& options, const Context& context) {
+  const DataDirectory from = DataOf(context);
+  const DataDirectory to{options.target};
+  std::error_code error;
+  if (std::filesystem::equivalent(from.path, to.path, error)) {
+    throw ConfigError("--to is the data directory that the valves are in");
+  }
+  if (!std::filesystem::exists(from.history())) {
+    throw NotFoundError("no monitor has run in " + from.path.string());
+  }
+  const ExclusiveLock lock = LockOf(from);
+  Database history(from.history(), HistorySchema(), Access::kOccasionalWriter);
+  ModelStore models(from.models(), Access::kOccasionalWriter);
+  const auto valves = ValvesToMove(models, history, options.pattern);
+  if (valves.empty()) {
+    throw NotFoundError("no valve that matches '" + options.pattern + "' in " +
+                        from.path.string());
+  }
+  EnsureExists(to);
+  const ExclusiveLock lock_there = LockOf(to);
+  Database there(to.history(), HistorySchema(), Access::kOccasionalWriter);
+  ModelStore models_there(to.models(), Access::kOccasionalWriter);
+  Report report;
+  Json rows = Json::array();
+  for (const std::string& valve : valves) {
+    const auto hash = history.QueryInt64(
+        "SELECT model_hash FROM accumulator WHERE valve_id = ?", valve);
+    const auto set = models_there.TakeValve(
+        models, valve,
+        hash ? std::optional(static_cast<std::uint64_t>(*hash)) : std::nullopt);
+    const MovedHistory moved =
+        CopyProgress(there, from.history(), valve, NowNs());
+    rows.push_back({{"valve_id", valve},
+                    {"model_set", SetJson(set)},
+                    {"accumulators", moved.accumulators},
+                    {"open_episodes", moved.episodes},
+                    {"shelves", moved.shelves}});
+  }
+  for (const std::string& valve : valves) {
+    RemoveProgress(history, valve, NowNs());
+    const auto entry = models.FindValve(valve);
+    if (entry && entry->pattern == valve) {
+      models.RemoveValve(valve);
+    }
+  }
+  report.document["to"] = to.path.string();
+  report.document["valves"] = std::move(rows);
+  return report.Table("valves", {{"valve", "valve_id"},
+                                 {"model set", "model_set"},
+                                 {"accumulators", "accumulators"},
+                                 {"open episodes", "open_episodes"},
+                                 {"shelves", "shelves"}});
+}
+
+void AddMove(report::Program& program, CLI::App& group) {
+  auto [verb, options] =
+      AddVerb(program, group, "move",
+              "Move valves to another monitor, which continues where this one "
+              "stopped: model set, entry, accumulators, open episodes, shelves",
+              Move);
+  verb.add_option("valve", options.pattern, "Id or glob")->required();
+  verb.add_option("--to", options.target,
+                  "Data directory of the other monitor, or a new one to "
+                  "carry there")
+      ->type_name("DIR")
+      ->required();
+}
+
+void AddAdd(report::Program& program, CLI::App& group) {
+  auto [verb, options] = AddVerb(
+      program, group, "add",
+      "Describe a valve, or all valves whose ids match a glob", AddValves);
+  verb.add_option("valve", options.pattern, "Id or glob")->required();
+  verb.add_option("--type", options.type, "Free text");
+  verb.add_option("--flow-unit", options.flow_unit, "m3/h or t/h")
+      ->check(CLI::IsMember({"m3/h", "t/h"}));
+  verb.add_option("--sense", options.sense,
+                  "Whether CV and X are in % of closing or of opening")
+      ->check(CLI::IsMember({"closing", "opening"}));
+  verb.add_option("--signals", options.signals, "Signals it delivers");
+  verb.add_option("--period", options.period_s, "Sample period in s")
+      ->check(CLI::PositiveNumber);
+  verb.add_option("--epoch", options.epoch,
+                  "Replacements and recalibrations so far");
+  verb.add_option("--model-set", options.model_set, "NAME[@VERSION]");
+}
+
+void AddEvent(report::Program& program, CLI::App& group) {
+  auto [verb, options] = AddVerb(
+      program, group, "event",
+      "Note what was done to a valve; this begins its next epoch, in which no "
+      "fault is isolated until the valve is onboarded again",
+      Event);
+  verb.add_option("valve", options.pattern, "Id, or the glob of an entry")
+      ->required();
+  verb.add_option("--kind", options.kind, "replaced, repacked, recalibrated")
+      ->required();
+  verb.add_option("--note", options.note, "Free text");
+  verb.add_option("--at", options.at, "When, RFC 3339 in UTC (default: now)")
+      ->type_name("UTC");
+  verb.add_option("--by", options.who, "Who did this");
+}
+
+}  // namespace
+
+void AddValvesVerbs(report::Program& program) {
+  CLI::App& group = program.AddGroup("valves", "Valves and their model sets");
+  AddVerb(program, group, "list", "List the entries, first match first",
+          ListValves);
+  auto [show, shown] =
+      AddVerb(program, group, "show",
+              "Show which entry and model set a valve gets", ShowValve);
+  show.add_option("valve", shown, "Id, or the glob of an entry")->required();
+  AddAdd(program, group);
+  auto [assign, assigned] =
+      AddVerb(program, group, "assign", "Assign a model set to a valve or glob",
+              Assign);
+  assign.add_option("valve", assigned.pattern, "Id or glob")->required();
+  assign.add_option("model-set", assigned.set, "NAME[@VERSION] or none")
+      ->required();
+  AddEvent(program, group);
+  AddMove(program, group);
+  auto [remove, removed] =
+      AddVerb(program, group, "remove", "Remove an entry", Remove);
+  remove.add_option("valve", removed, "Id, or the glob of an entry")
+      ->required();
+}
+
+}  // namespace fdi::storage

@@ -1,0 +1,179 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "base/time_text.h"
+#include "report/output_folder.h"
+#include "report/program.h"
+#include "report/report.h"
+#include "report/text_table.h"
+#include "report/verb_options.h"
+#include "storage/database/data_directory.h"
+#include "storage/history/alarm.h"
+#include "storage/history/episode.h"
+#include "storage/history/history_editor.h"
+#include "storage/history/history_reader.h"
+
+/// The verbs of fdi-store, one file per noun. A verb reads its data, fills the
+/// document of a Report, and declares which members the text output shows.
+namespace fdi::storage {
+
+class ModelStore;
+
+using report::Context;
+using report::Json;
+using report::Report;
+
+// Each adds the verbs of one group, in the order in which --help lists them.
+void AddRunsVerbs(report::Program& program);
+void AddSniffVerb(report::Program& program, CLI::App& group);
+void AddModelsVerbs(report::Program& program);
+void AddValvesVerbs(report::Program& program);
+void AddTypesVerbs(report::Program& program);
+void AddHistoryVerbs(report::Program& program);  ///< list, show, export, plot
+// Added to the group `history`, which must exist.
+void AddHistoryFigures(report::Program& program, CLI::App& group);
+void AddAlarmVerbs(report::Program& program, CLI::App& group);
+void AddPlannerVerbs(report::Program& program);  ///< faults, health, worklist
+void AddMaintenanceVerbs(report::Program& program);
+void AddKeysVerbs(report::Program& program);
+void AddShipVerb(report::Program& program);
+
+/// Examples for --help and the manual pages.
+std::vector<report::VerbExamples> Examples();
+
+/// For verbs without options.
+struct NoOptions {};
+
+/// Adds a verb to a group or, with program.root(), to the program. The action
+/// receives the Options that the caller binds to command-line options:
+///
+///     auto [verb, options] = AddVerb(program, group, "list", "...", List);
+///     verb.add_option("--valve", options.valve, "Glob over valve ids");
+template <typename Options>
+std::pair<CLI::App&, Options&> AddVerb(report::Program& program,
+                                       CLI::App& group, const std::string& name,
+                                       const std::string& description,
+                                       Report (*action)(const Options&,
+                                                        const Context&)) {
+  auto options = std::make_shared<Options>();
+  CLI::App& verb = program.AddVerb(
+      group, name, description,
+      report::ReportAction([options, action](const Context& context) {
+        return action(*options, context);
+      }));
+  return {verb, *options};
+}
+
+/// The data directory of --data.
+DataDirectory DataOf(const Context& context);
+/// The same, created if it does not exist; for verbs that write.
+DataDirectory WritableDataOf(const Context& context);
+/// Its model store, opened for changes.
+ModelStore WritableModels(const Context& context);
+
+/// Options that filter a list of episodes.
+struct EpisodeOptions {
+  std::string valve{"*"};
+  std::string fault;
+  std::string state{"any"};
+  std::int64_t limit{0};
+  report::TimeWindow window;
+
+  void AddTo(CLI::App& verb);
+  /// @throws ConfigError
+  EpisodeFilter Filter(const Context& context) const;
+};
+
+/// --from, --monitor: selects a history other than that of --data.
+struct PlantOptions {
+  std::string url;
+  std::string monitor;
+
+  bool asked() const { return !url.empty(); }
+  void AddTo(CLI::App& verb);
+};
+
+/// Which episodes of which history.
+struct HistoryOptions {
+  EpisodeOptions filter;
+  PlantOptions plant;
+
+  void AddTo(CLI::App& verb) {
+    filter.AddTo(verb);
+    plant.AddTo(verb);
+  }
+};
+
+/// The history of --data, or the plant's.
+std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
+                                     const Context& context);
+
+/// Options of operator actions: --by, --comment.
+struct NoteOptions {
+  std::string who{report::UserName()};
+  std::string comment;
+
+  void AddTo(CLI::App& verb);
+  /// A note from this program, stamped now.
+  OperatorNote Note() const;
+};
+
+/// The positional argument of verbs about one episode.
+void AddEpisode(CLI::App& verb, std::string& id, bool required = true);
+/// -o, --output with "-" for stdout.
+void AddOutput(CLI::App& verb, std::string& output);
+/// --limit.
+void AddLimit(CLI::App& verb, std::int64_t& limit);
+
+// JSON values; null where there is none.
+Json TimeJson(const std::optional<std::int64_t>& stamp_ns);  ///< RFC 3339, UTC
+Json TextJson(const std::optional<std::string>& text);  ///< Null if empty, too.
+Json NumberJson(const std::optional<double>& number);   ///< Null if not finite.
+/// False if the variance accounted for, 100 (1 - var(residual) / var(output))
+/// %, is meaningless because the output stood still in the validation data.
+bool IsVafMeaningful(double vaf);
+Json VafJson(double vaf);              ///< Null if it is meaningless.
+std::string Hex(std::uint64_t value);  ///< 16 digits
+
+/// An array with row_of(item) for each item.
+template <typename Items, typename RowOf>
+Json Rows(const Items& items, RowOf row_of) {
+  Json rows = Json::array();
+  for (const auto& item : items) {
+    rows.push_back(row_of(item));
+  }
+  return rows;
+}
+
+/// The columns of the view fault_history, in its order.
+const std::vector<std::string>& EpisodeKeys();
+Json EpisodeJson(const Episode& episode);
+Json ShelfJson(const Shelf& shelf);
+
+/// {"V1": {"LIVE": 12.5, ...}, ...}: hours by valve and quality.
+Json HoursJson(const std::vector<CoverageTime>& coverage);
+/// The same as a text table; adds nothing if it is empty.
+void AddHours(Report& report, const std::vector<CoverageTime>& coverage);
+/// A table in the text output only, whose rows are not in the document.
+void AddTextTable(Report& report, const report::TextTable& table);
+
+/// In the user's time format; "-" if there is none.
+std::string TimeText(const std::optional<std::int64_t>& stamp_ns,
+                     const Context& context);
+/// A column, or field, whose text is not a member of the document.
+report::Column TextColumn(std::string heading,
+                          std::function<std::string(const Json& row)> text,
+                          int spare = 0,
+                          report::Align align = report::Align::kLeft);
+report::Column TextField(std::string heading, std::string text);
+
+}  // namespace fdi::storage

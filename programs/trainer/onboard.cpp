@@ -1,0 +1,551 @@
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include <CLI/CLI.hpp>
+
+#include "base/csv_cells.h"
+#include "base/error.h"
+#include "base/time_text.h"
+#include "base/toml_reader.h"
+#include "diagnosis/fault_catalogue.h"
+#include "import/tag_map.h"
+#include "programs/trainer/model_report.h"
+#include "programs/trainer/verbs.h"
+#include "report/program.h"
+#include "report/progress.h"
+#include "report/report.h"
+#include "report/signal_list.h"
+#include "report/stop_signals.h"
+#include "simulator/scenario/scenario_toml.h"
+#include "storage/database/data_directory.h"
+#include "storage/models/model_codec.h"
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
+#include "trainer/campaign/campaign_runs.h"
+#include "trainer/campaign/file_runs.h"
+#include "trainer/campaign/run_input.h"
+#include "trainer/evaluation/evaluated_run.h"
+#include "trainer/learning/labelled_episodes.h"
+#include "trainer/onboarding/onboarding.h"
+#include "trainer/rule_text.h"
+#include "trainer/statistics.h"
+
+// The verbs `onboard` and `coverage`: both make difference observers for a
+// valve type, one from the data of a valve, the other from a simulation.
+
+namespace fdi::trainer {
+namespace {
+
+constexpr auto kPlain = report::Format::kPlain;
+using report::Align;
+using report::FormatNumber;
+using report::Json;
+
+// What the two verbs have in common.
+struct TypeOptions {
+  std::vector<std::string> signals;
+  std::string type{"lublin-actuator-3"};
+  int threads{0};
+};
+
+struct CoverageOptions : TypeOptions {
+  bool gains{true};
+};
+
+struct OnboardOptions : TypeOptions {
+  std::string valve;
+  std::vector<std::string> runs;
+  std::vector<std::string> files;
+  importer::TableOptions table;
+  std::string save_type;
+  std::string name;
+  double false_alarms_per_hour{1e-3};
+  bool fit{true};
+  bool assess{true};
+  bool gains{false};
+};
+
+struct FoundType {
+  ValveType type;
+  bool stored{false};       // In models.db: made for this type, taken as it is.
+  std::string model_set{};  // Of the valve it was saved from, NAME@VERSION.
+};
+
+// A stored type is a scenario in TOML that has the parameters, behind a line
+// `levels = [CV, P1, P2, T1]`, the delay of the command and the model set that
+// it was saved with. A sine is the one excitation that may be continuous
+// without a file.
+std::string TypeText(const ValveType& type, const std::string& model_set) {
+  simulator::Scenario scenario;
+  scenario.config.parameters = type.parameters;
+  scenario.config.excitation = simulator::SineExcitation{};
+  scenario.config.continuous_inputs = type.interpolated_command;
+  const simulator::InputRow& levels = type.levels;
+  return "levels = [" + NumberText(levels.cv_pct) + ", " +
+         NumberText(levels.p1_kpa) + ", " + NumberText(levels.p2_kpa) + ", " +
+         NumberText(levels.t1_degc) +
+         "]\ncommand_delay = " + std::to_string(type.command_delay) +
+         "\nmodel_set = \"" + model_set + "\"\n" + ScenarioText(scenario);
+}
+
+FoundType ParseType(const std::string& text, const std::string& name) {
+  TomlReader reader(text, "valve type " + name);
+  const std::vector<double> levels = reader.Numbers("levels");
+  if (levels.size() != 4) {
+    throw DataError("valve type " + name + ": levels must be 4 numbers");
+  }
+  const auto delay = reader.Integer("command_delay");
+  const auto model_set = reader.Text("model_set");
+  simulator::Scenario scenario;
+  ApplyScenario(reader, {}, scenario);
+  reader.Finish();
+  return {{name,
+           scenario.config.parameters,
+           scenario.config.continuous_inputs,
+           static_cast<int>(delay.value_or(0)),
+           {levels[0], levels[1], levels[2], levels[3]}},
+          true,
+          model_set.value_or("")};
+}
+
+// The type called `name`: one stored in models.db, a shipped parameter set, or
+// the parameters in FILE.toml.
+FoundType FindType(const std::string& name, storage::ModelStore& store) {
+  for (const storage::ValveType& stored : store.ListTemplates()) {
+    if (stored.name == name) {
+      const std::vector<std::byte> bytes = store.LoadTemplate(name).bytes;
+      return ParseType(
+          {reinterpret_cast<const char*>(bytes.data()), bytes.size()}, name);
+    }
+  }
+  ValveType type;
+  type.name = name;
+  type.parameters = simulator::FindParameters(name);
+  return {std::move(type), false};
+}
+
+// Nothing if the set of the type is not there any more.
+std::optional<ModelSet> SetOf(const FoundType& found,
+                              storage::ModelStore& store) {
+  if (found.model_set.empty()) {
+    return std::nullopt;
+  }
+  try {
+    return store.Load(found.model_set);
+  } catch (const NotFoundError&) {
+    return std::nullopt;
+  }
+}
+
+void SaveType(const ValveType& type, const std::string& model_set,
+              storage::ModelStore& store) {
+  const std::string text = TypeText(type, model_set);
+  store.SaveTemplate(type.name, std::as_bytes(std::span(text)),
+                     type.parameters.name + ", Kv " +
+                         NumberText(type.parameters.trim.kv_m3_h) +
+                         " m3/h, command " +
+                         (type.interpolated_command ? "interpolated" : "held"));
+}
+
+Json CoverageJson(const CoverageTable& table) {
+  Json json = {{"signals", report::SignalsJson(table.signals)},
+               {"seconds", table.seconds},
+               {"faults", Json::array()},
+               {"gains", Json::array()}};
+  for (const FaultCoverage& coverage : table.faults) {
+    const double direction = coverage.negative ? -1.0 : 1.0;
+    const auto strength = [direction](const std::optional<double>& smallest) {
+      return smallest ? Json(direction * *smallest) : Json();
+    };
+    json["faults"].push_back(
+        {{"fault", FaultName(coverage.fault)},
+         {"description", FaultFactsOf(coverage.fault).description},
+         {"direction", coverage.negative ? -1 : 1},
+         {"detectable_from", strength(coverage.detectable)},
+         {"isolable_from", strength(coverage.isolable)},
+         {"look_alikes", FaultsJson(coverage.look_alikes)}});
+  }
+  for (const TransmitterGain& gain : table.gains) {
+    json["gains"].push_back({{"signal", SignalName(gain.signal)},
+                             {"detectable", FaultsJson(gain.detectable)},
+                             {"isolable", FaultsJson(gain.isolable)}});
+  }
+  return json;
+}
+
+// Shows the CoverageJson() that stands at `path` of the document.
+void AddCoverage(const CoverageTable& table, const std::string& path,
+                 report::Report& report) {
+  const auto directed = [](const Json& row) {
+    return row["fault"].get<std::string>() +
+           (row["direction"] == -1 ? " (-)" : "");
+  };
+  report.Line("coverage with " + report::SignalsText(table.signals) +
+              ", each fault given " + FormatNumber(table.seconds, 0) +
+              " s to show; smallest strength");
+  report.Table(path + "faults",
+               {{.heading = "fault", .key = "fault", .text = directed},
+                {"description", "description"},
+                {"detected from", "detectable_from"},
+                {"isolated from", "isolable_from"},
+                {"looks like", "look_alikes"}});
+  report.Line("isolated: named in a set of at most two");
+  report.Table(path + "gains", {{"one more transmitter", "signal"},
+                                {"detects also", "detectable"},
+                                {"isolates also", "isolable"}});
+}
+
+Json OnboardingJson(const Onboarding& onboarding,
+                    const std::optional<ModelSet>& of_type) {
+  Json json = ModelsJson(onboarding.models);
+  json["hours"] = onboarding.hours;
+  json["fault_observers_of"] =
+      onboarding.transferred ? Json(NameOf(*of_type)) : Json();
+  json["parameters"] = Json::array();
+  if (onboarding.fit) {
+    for (const simulator::FittedParameter& value : onboarding.fit->values) {
+      json["parameters"].push_back({{"name", value.name},
+                                    {"nominal", value.nominal},
+                                    {"value", value.value},
+                                    {"relative_sd", value.relative_sd},
+                                    {"identified", value.identified}});
+    }
+  }
+  json["fit"] = Json::array();
+  for (const ChannelFit& fit : onboarding.channels) {
+    json["fit"].push_back(
+        {{"channel", fit.name},
+         {"unit", UnitOf(fit.output, onboarding.models.flow_unit)},
+         {"rmse", fit.rmse},
+         {"bias", fit.bias},
+         {"vaf", VafJson(fit.vaf)},
+         {"naive_rmse", fit.naive_rmse}});
+  }
+  if (onboarding.coverage) {
+    json["coverage"] = CoverageJson(*onboarding.coverage);
+  }
+  return json;
+}
+
+void AddFit(const simulator::ValveFit& fit, report::Report& report) {
+  // Coefficients of a relay are small, pressures large.
+  const auto significant = [](const char* heading, const char* key) {
+    return report::Column{
+        .heading = heading,
+        .key = key,
+        .text = [key](const Json& row) { return Digits(row[key], 4); },
+        .align = Align::kRight};
+  };
+  report.Table("parameters", {{"parameter", "name"},
+                              significant("nominal", "nominal"),
+                              significant("fitted", "value"),
+                              {"sd", "relative_sd", report::Format::kPercent},
+                              {"identified", "identified"}});
+  report.Line(std::string("What is not identified stays nominal. Command ") +
+              (fit.interpolated_command ? "interpolated" : "held") +
+              " from sample to sample, acting " +
+              std::to_string(fit.command_delay) +
+              " samples after its stamp; simulation against record: X RMSE " +
+              FormatNumber(fit.nominal.x_rmse_pct, 3) + " -> " +
+              FormatNumber(fit.fitted.x_rmse_pct, 3) + " %, F RMSE " +
+              FormatNumber(fit.nominal.flow_rmse, 3) + " -> " +
+              FormatNumber(fit.fitted.flow_rmse, 3) + "\n");
+}
+
+// Physical parameters, fit of the normal observer against a naive model, model
+// set, coverage.
+report::Report ReportOf(const Onboarding& onboarding,
+                        const std::optional<ModelSet>& of_type,
+                        const std::string& title) {
+  const ModelSet& models = onboarding.models;
+  report::Report report;
+  report.document = OnboardingJson(onboarding, of_type);
+  report.Line(title + "\n");
+  if (onboarding.fit) {
+    AddFit(*onboarding.fit, report);
+  }
+  report.Table("fit",
+               {{"channel", "channel"},
+                {"unit", "unit"},
+                {.heading = "RMSE", .key = "rmse", .decimals = 3},
+                {.heading = "bias", .key = "bias", .decimals = 3},
+                {.heading = "VAF [%]", .key = "vaf", .decimals = 1},
+                {.heading = "naive RMSE", .key = "naive_rmse", .decimals = 3}});
+  report.Line(
+      "normal observer on data it was not fitted to; naive: X = CV, else the "
+      "mean\n");
+  report.Line("model set " + NameOf(models) + ", hash " +
+              storage::HashHex(models.content_hash) + ", " +
+              std::to_string(models.observers.size()) + " observers");
+  if (of_type) {
+    report.Line("fault observers: " +
+                (onboarding.transferred
+                     ? "those of " + NameOf(*of_type) + ", the type's set"
+                     : "simulated, since " + NameOf(*of_type) +
+                           ", the type's set, has other channels or was made "
+                           "for other commands, pressures or temperatures"));
+  }
+  report.Line(AlarmRateText(models));
+  if (onboarding.left_out_s > 0.0) {
+    report.Line(FormatNumber(onboarding.left_out_s, 0) +
+                " s of the record with X at a stop, and the minute after, were "
+                "left out");
+  }
+  for (const std::string& channel : onboarding.unread) {
+    report.Line(channel +
+                " has fewer than 100 readings: filled in as an input, "
+                "not watched");
+  }
+  report.Line("not told apart: " + GroupsText(models) +
+              "; not seen at half their strengths: " +
+              FaultsText(models.undetectable) + "\n");
+  if (onboarding.coverage) {
+    AddCoverage(*onboarding.coverage, "coverage/", report);
+  }
+  return report;
+}
+
+std::vector<TrainingRun> LoadRuns(const OnboardOptions& options,
+                                  const report::Context& context) {
+  if (options.runs.empty() && options.files.empty()) {
+    throw ConfigError("healthy data are needed: --runs ID,... or --file CSV");
+  }
+  if (options.files.empty() && options.table.given()) {
+    throw ConfigError("--map, --zone and --resample are of --file");
+  }
+  importer::CsvOptions csv{.map = options.table.Read(context.options.utc),
+                           .log = context.log};
+  csv.required =
+      static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kX));
+  std::vector<storage::StoredRun> stored = LoadRunsAndFiles(
+      options.runs, options.files, {context.options.data_dir}, csv);
+  std::vector<TrainingRun> runs;
+  for (storage::StoredRun& run : stored) {
+    ConvertFlow(run, stored.front().info.run.flow_unit, context.log);
+    runs.push_back(ToTrainingRun(run, true));
+    if (!options.signals.empty()) {
+      runs.back() =
+          WithSignals(std::move(runs.back()),
+                      report::ParseSignals(options.signals, kBasicSignals));
+    }
+  }
+  return runs;
+}
+
+// The epoch of the valve; one that is not in the table yet is added.
+std::uint32_t EpochOf(const std::string& valve, const Onboarding& onboarding,
+                      storage::ModelStore& store) {
+  for (const storage::ValveEntry& entry : store.Valves()) {
+    if (entry.pattern == valve) {
+      return entry.epoch;
+    }
+  }
+  storage::ValveEntry entry;
+  entry.pattern = valve;
+  entry.type = onboarding.type.name;
+  entry.flow_unit = onboarding.models.flow_unit;
+  entry.signals = onboarding.signals;
+  entry.period_s = onboarding.models.sample_period_s;
+  store.PutValve(entry);
+  return entry.epoch;
+}
+
+// Stores the set, assigns it to the valve, and keeps how the valve was found
+// beside earlier onboardings.
+void Store(const OnboardOptions& options, Onboarding& onboarding,
+           storage::ModelStore& store) {
+  onboarding.models =
+      store.Save(onboarding.models, storage::Activation::kAlways);
+  if (!options.save_type.empty()) {
+    onboarding.type.name = options.save_type;
+    SaveType(onboarding.type, NameOf(onboarding.models), store);
+  }
+  storage::BaselineRecord record;
+  record.epoch = EpochOf(options.valve, onboarding, store);
+  record.model_set = onboarding.models.name;
+  record.version = onboarding.models.version;
+  record.hours = onboarding.hours;
+  if (onboarding.fit) {
+    for (const simulator::FittedParameter& value : onboarding.fit->values) {
+      record.parameters.emplace_back(value.name, value.value);
+    }
+  }
+  for (const ChannelFit& fit : onboarding.channels) {
+    record.channels.push_back({fit.name, fit.rmse, fit.bias, fit.vaf});
+  }
+  store.SetBaseline(options.valve, record);
+}
+
+// Moves the bar, and ends the work where the user asked for it.
+Progress Reporting(report::Progress& bar, const report::StopSignals& signals) {
+  return [&](double share, std::string_view stage) {
+    if (signals.stop_requested()) {
+      throw Interrupted("interrupted: nothing was stored");
+    }
+    bar.Update(share, std::string(stage));
+  };
+}
+
+report::Report OnboardValve(const OnboardOptions& options,
+                            const report::Context& context) {
+  const std::string name = options.name.empty() ? options.valve : options.name;
+  RequireStorable(name, "--name");
+  if (!options.save_type.empty()) {
+    RequireStorable(options.save_type, "--save-type");
+  }
+  const storage::DataDirectory directory{context.options.data_dir};
+  const std::vector<TrainingRun> runs = LoadRuns(options, context);
+  storage::EnsureExists(directory);
+  storage::ModelStore store(directory.models(),
+                            storage::Access::kOccasionalWriter);
+  const FoundType found = FindType(options.type, store);
+  OnboardingOptions settings;
+  settings.name = name;
+  settings.type = found.type;
+  settings.fit = options.fit && !found.stored;
+  settings.of_type = SetOf(found, store);
+  settings.false_alarms_per_hour = options.false_alarms_per_hour;
+  settings.threads = options.threads;
+  settings.assess = options.assess;
+  settings.software = context.software;
+  settings.created_ns = NowNs();
+  const report::StopSignals signals;
+  report::Progress bar("onboard");
+  const auto start = std::chrono::steady_clock::now();
+  Onboarding onboarding = Onboard(runs, settings, Reporting(bar, signals));
+  if (options.gains && onboarding.coverage) {
+    onboarding.coverage->gains =
+        AssessType(onboarding.type, onboarding.coverage->signals, true,
+                   settings, Reporting(bar, signals))
+            .gains;
+  }
+  bar.Finish();
+  Store(options, onboarding, store);
+  const std::chrono::duration<double> seconds =
+      std::chrono::steady_clock::now() - start;
+  return ReportOf(onboarding, settings.of_type,
+                  "valve " + options.valve + ": " +
+                      FormatNumber(onboarding.hours, 2) +
+                      " h of healthy data, onboarded in " +
+                      std::to_string(std::lround(seconds.count())) + " s");
+}
+
+report::Report Assess(const CoverageOptions& options,
+                      const report::Context& context) {
+  const SignalMask signals =
+      report::ParseSignals(options.signals, kBasicSignals);
+  const storage::DataDirectory directory{context.options.data_dir};
+  storage::EnsureExists(directory);
+  storage::ModelStore store(directory.models(),
+                            storage::Access::kOccasionalWriter);
+  OnboardingOptions settings;
+  settings.name = "coverage";
+  settings.threads = options.threads;
+  const report::StopSignals stop;
+  report::Progress bar("coverage");
+  const CoverageTable table =
+      AssessType(FindType(options.type, store).type, signals, options.gains,
+                 settings, Reporting(bar, stop));
+  bar.Finish();
+  report::Report report;
+  report.document = CoverageJson(table);
+  AddCoverage(table, "", report);
+  return report;
+}
+
+CLI::Option* AddTypeOptions(CLI::App& verb, const char* signals,
+                            const char* type, TypeOptions& options) {
+  verb.add_option("--type", options.type, type)
+      ->type_name("NAME|FILE.toml")
+      ->capture_default_str();
+  verb.add_option("--threads", options.threads,
+                  "Number of threads; 0 uses all cores")
+      ->check(CLI::Range(0, 1024))
+      ->type_name("N");
+  return verb.add_option("--signals", options.signals, signals)
+      ->delimiter(',')
+      ->type_name("CV,X,...");
+}
+
+void AddOptions(CLI::App& verb, OnboardOptions& options) {
+  verb.add_option("--valve", options.valve,
+                  "Id of the valve that the set is assigned to")
+      ->required()
+      ->type_name("ID");
+  verb.add_option("--runs", options.runs,
+                  "Healthy runs, or stretches of them [s]")
+      ->delimiter(',')
+      ->type_name("ID[@from:to],...");
+  verb.add_option("--file", options.files,
+                  "Healthy CSV file, not stored; repeatable")
+      ->type_name("FILE.csv[@from:to]");
+  options.table.AddTo(verb);
+  AddTypeOptions(verb,
+                 "Use these signals alone, as if the others were not measured",
+                 "Valve type: a stored one, whose fault effects are taken as "
+                 "they are, or parameters that are fitted to the valve",
+                 options);
+  verb.add_option("--save-type", options.save_type,
+                  "Store the fitted parameters as a valve type for others of "
+                  "its kind")
+      ->type_name("NAME");
+  verb.add_option("--name", options.name,
+                  "Name of the model set (default: the id of the valve)")
+      ->type_name("NAME");
+  verb.add_option("--false-alarms-per-hour", options.false_alarms_per_hour,
+                  "Rate that the thresholds are set for")
+      ->check(CLI::Range(1e-9, 3600.0))
+      ->type_name("R");
+  verb.add_flag("!--no-fit", options.fit,
+                "Take the parameters of the type as they are");
+  verb.add_flag("!--no-coverage", options.assess,
+                "Leave out the table of faults that can be detected");
+  verb.add_flag("--gains", options.gains,
+                "Compute what each missing transmitter would add; takes the "
+                "time of an onboarding for each");
+}
+
+}  // namespace
+
+void AddOnboardVerb(report::Program& program) {
+  auto options = std::make_shared<OnboardOptions>();
+  CLI::App& verb = program.AddVerb(
+      "onboard",
+      "Make models for a valve that has only ever been healthy, and assign "
+      "them",
+      [options](const report::Context& context) -> report::Report {
+        return OnboardValve(*options, context);
+      });
+  AddOptions(verb, *options);
+  program.AddExamples(
+      {{"onboard",
+        {{"A valve of the plant that has only ever been healthy",
+          "fdi-trainer onboard --valve FV-101 --runs 1a2b,3c4d"},
+         {"From a CSV file, with what it would gain by more transmitters",
+          "fdi-trainer onboard --valve FV-101 --file fv101.csv --gains"}}}});
+}
+
+void AddCoverageVerb(report::Program& program) {
+  auto options = std::make_shared<CoverageOptions>();
+  CLI::App& verb = program.AddVerb(
+      "coverage",
+      "Show which faults of a valve type can be seen with some transmitters",
+      [options](const report::Context& context) -> report::Report {
+        return Assess(*options, context);
+      });
+  AddTypeOptions(verb, "Signals that the valve measures", "Valve type",
+                 *options)
+      ->required();
+  verb.add_flag("!--no-gains", options->gains,
+                "Leave out what one more transmitter would add");
+  program.AddExamples({{"coverage",
+                        {{"What a valve with three transmitters can tell",
+                          "fdi-trainer coverage --signals CV,X,F"},
+                         {"Without what one more transmitter would add",
+                          "fdi-trainer coverage --signals CV,X --no-gains"}}}});
+}
+
+}  // namespace fdi::trainer

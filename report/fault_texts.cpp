@@ -1,0 +1,227 @@
+#include "report/fault_texts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include "base/error.h"
+#include "base/suggestion.h"
+#include "base/toml_reader.h"
+#include "report/shared_files.h"
+
+namespace fdi::report {
+namespace {
+
+constexpr std::string_view kFileName = "faults.toml";
+constexpr std::string_view kUnknown = "unknown";
+
+// Indexed by the enumerations.
+constexpr std::array<std::string_view, 4> kDisciplines{"operator", "instrument",
+                                                       "air", "mechanical"};
+constexpr std::array<std::string_view, 4> kNamur{"maintenance required",
+                                                 "out of specification",
+                                                 "check function", "failure"};
+constexpr std::array<std::string_view, 4> kSeverities{"low", "medium", "high",
+                                                      "critical"};
+
+std::string KeyOf(int fault) {
+  return fault == 0 ? std::string(kUnknown) : FaultName(fault);
+}
+
+std::optional<int> FaultOf(std::string_view key) {
+  return key == kUnknown ? 0 : ParseFinding(key);
+}
+
+void AppendTo(std::string& list, std::string_view separator,
+              std::string_view item) {
+  if (!list.empty()) {
+    list += separator;
+  }
+  list += item;
+}
+
+template <typename E>
+E Choice(const TomlReader& table, std::string_view key, const std::string& word,
+         std::span<const std::string_view> words) {
+  const auto place = std::ranges::find(words, word);
+  if (place == words.end()) {
+    std::string accepted;
+    for (const std::string_view candidate : words) {
+      AppendTo(accepted, ", ", candidate);
+    }
+    table.Refuse(key, "'" + word + "' is none of " + accepted);
+  }
+  return static_cast<E>(place - words.begin());
+}
+
+// [[f1.severity]] from = 0.3, level = "high": each band goes up to the next.
+std::vector<SeverityBand> ReadBands(TomlReader& table) {
+  std::vector<SeverityBand> bands;
+  for (TomlReader& row : table.Tables("severity")) {
+    const auto from = row.Number("from", 0.0, 1.0);
+    const auto level = row.Text("level");
+    if (!from || !level) {
+      table.Refuse("severity", "each band needs from and level");
+    }
+    if (bands.empty() ? *from != 0.0 : *from <= bands.back().from) {
+      table.Refuse("severity", "bands begin at 0 and ascend");
+    }
+    bands.push_back(
+        {*from, Choice<Severity>(row, "level", *level, kSeverities)});
+  }
+  return bands;
+}
+
+void ReadText(TomlReader& table, FaultText& text) {
+  text.name = table.Text("name").value_or(text.name);
+  text.check = table.Text("check").value_or(text.check);
+  if (const auto word = table.Text("discipline")) {
+    text.discipline =
+        Choice<Discipline>(table, "discipline", *word, kDisciplines);
+  }
+  if (const auto word = table.Text("namur")) {
+    text.namur = Choice<NamurClass>(table, "namur", *word, kNamur);
+  }
+  if (auto bands = ReadBands(table); !bands.empty()) {
+    text.bands = std::move(bands);
+  }
+}
+
+[[noreturn]] void RefuseFault(const TomlReader& file, const std::string& key) {
+  std::vector<std::string> names{std::string(kUnknown)};
+  for (const int fault : kFaultsAndFindings) {
+    names.push_back(FaultName(fault));
+  }
+  const auto meant = Suggest(key, names);
+  file.Refuse(key, meant ? "unknown fault: did you mean '" + *meant + "'?"
+                         : "unknown fault; accepted are " +
+                               std::string(kFaultNames) + ", unknown");
+}
+
+}  // namespace
+
+std::string_view DisciplineName(Discipline discipline) {
+  return kDisciplines[static_cast<std::size_t>(discipline)];
+}
+
+std::string_view NamurName(NamurClass namur) {
+  return kNamur[static_cast<std::size_t>(namur)];
+}
+
+std::string_view SeverityName(Severity severity) {
+  return kSeverities[static_cast<std::size_t>(severity)];
+}
+
+Severity FaultText::SeverityAt(double strength) const {
+  // A failed estimate counts as the smallest fault, not as the most severe one.
+  const double size = std::isfinite(strength) ? std::abs(strength) : 0.0;
+  Severity level = bands.front().level;
+  for (const SeverityBand& band : bands) {
+    if (size >= band.from) {
+      level = band.level;
+    }
+  }
+  return level;
+}
+
+// Requires every key for every fault; Override() then rejects unknown ones.
+FaultTexts::FaultTexts(const std::filesystem::path& path) {
+  TomlReader file(path);
+  const auto require = [&file](const std::string& fault) {
+    const auto table = file.Table(fault);
+    for (const char* key :
+         {"name", "check", "discipline", "namur", "severity"}) {
+      if (!table || !table->Has(key)) {
+        file.Refuse(fault, std::string(key) + " is missing");
+      }
+    }
+  };
+  require(std::string(kUnknown));
+  for (const int fault : kFaultsAndFindings) {
+    require(FaultName(fault));
+  }
+  Override(path);
+}
+
+void FaultTexts::Override(const std::filesystem::path& path) {
+  TomlReader file(path);
+  for (const std::string& key : file.Keys()) {
+    const auto fault = FaultOf(key);
+    auto table = fault ? file.Table(key) : std::nullopt;
+    if (!table) {
+      RefuseFault(file, key);
+    }
+    ReadText(*table, texts_[*fault]);
+  }
+  file.Finish();
+}
+
+const FaultText& FaultTexts::Of(int fault) const {
+  const auto text = texts_.find(fault);
+  Require(text != texts_.end(), "fault is not of the catalogue");
+  return text->second;
+}
+
+FaultWords FaultTexts::Words(std::string_view answer, double strength) const {
+  FaultWords words;
+  std::vector<Discipline> disciplines;
+  // "f3|f6": faults that the diagnosis cannot distinguish.
+  while (true) {
+    const std::size_t bar = std::min(answer.find('|'), answer.size());
+    const FaultText& text = Of(FaultOf(answer.substr(0, bar)).value_or(0));
+    if (words.name.empty()) {
+      words.check = text.check;
+    }
+    AppendTo(words.name, " or ", text.name);
+    if (std::ranges::find(disciplines, text.discipline) == disciplines.end()) {
+      disciplines.push_back(text.discipline);
+    }
+    words.namur = std::max(words.namur, text.namur);
+    words.severity = std::max(words.severity, text.SeverityAt(strength));
+    if (bar == answer.size()) {
+      break;
+    }
+    answer.remove_prefix(bar + 1);
+  }
+  for (const Discipline discipline : disciplines) {
+    AppendTo(words.discipline, "|", DisciplineName(discipline));
+  }
+  return words;
+}
+
+FaultTexts LoadFaultTexts(const GlobalOptions& options) {
+  FaultTexts texts(SharedFile(kFileName));
+  if (const auto own = options.data_dir / kFileName;
+      std::filesystem::exists(own)) {
+    texts.Override(own);
+  }
+  if (!options.fault_catalogue.empty()) {
+    texts.Override(options.fault_catalogue);
+  }
+  return texts;
+}
+
+Json FaultTextsJson(const FaultTexts& texts) {
+  Json rows = Json::array();
+  std::vector<int> faults(kFaultsAndFindings.begin(), kFaultsAndFindings.end());
+  faults.push_back(0);
+  for (const int fault : faults) {
+    const FaultText& text = texts.Of(fault);
+    Json bands = Json::array();
+    for (const SeverityBand& band : text.bands) {
+      bands.push_back({{"from", band.from},
+                       {"level", std::string(SeverityName(band.level))}});
+    }
+    rows.push_back(
+        {{"fault", KeyOf(fault)},
+         {"name", text.name},
+         {"check", text.check},
+         {"discipline", std::string(DisciplineName(text.discipline))},
+         {"namur", std::string(NamurName(text.namur))},
+         {"severity", bands}});
+  }
+  return {{"faults", rows}};
+}
+
+}  // namespace fdi::report

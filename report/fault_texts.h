@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/fault_catalogue.h"
+#include "report/global_options.h"
+#include "report/json_output.h"
+
+namespace fdi::report {
+
+/// Who is responsible.
+enum class Discipline : std::uint8_t {
+  kOperator,
+  kInstrument,
+  kAir,
+  kMechanical
+};
+/// Status signals of NAMUR NE 107, the most severe last.
+enum class NamurClass : std::uint8_t {
+  kMaintenanceRequired,
+  kOutOfSpecification,
+  kCheckFunction,
+  kFailure
+};
+enum class Severity : std::uint8_t { kLow, kMedium, kHigh, kCritical };
+
+std::string_view DisciplineName(Discipline discipline);  ///< "air", ...
+std::string_view NamurName(NamurClass namur);            ///< "failure", ...
+std::string_view SeverityName(Severity severity);        ///< "critical", ...
+
+/// The severity from |strength| `from` on, in 0..1.
+struct SeverityBand {
+  double from{0.0};
+  Severity level{Severity::kMedium};
+};
+
+/// Texts about a fault for operators and planners.
+struct FaultText {
+  std::string name;   ///< "Flow transmitter wrong"
+  std::string check;  ///< How to tell it from similar faults in the field.
+  Discipline discipline{Discipline::kInstrument};
+  NamurClass namur{NamurClass::kCheckFunction};
+  std::vector<SeverityBand> bands;  ///< Ascending, the first from 0.
+
+  Severity SeverityAt(double strength) const;
+};
+
+/// A diagnosis in plain words. For faults that cannot be distinguished, the
+/// names are joined by " or ", and the most severe of the other values are
+/// used.
+struct FaultWords {
+  std::string name;
+  std::string check;       ///< Of the first fault.
+  std::string discipline;  ///< Distinct ones, joined by "|".
+  NamurClass namur{NamurClass::kMaintenanceRequired};
+  Severity severity{Severity::kLow};
+};
+
+/// The fault catalogue: a text for every fault and for faults unlike any of
+/// them. A TOML file with one table per fault, [f1]..[p2] and [unknown], and
+/// the keys name, check, discipline, namur and severity; see
+/// monitor/catalogue/faults.toml.
+class FaultTexts {
+ public:
+  /// Reads the whole catalogue from `path`.
+  /// @throws ConfigError for a missing, unknown or invalid key; NotFoundError.
+  explicit FaultTexts(const std::filesystem::path& path);
+
+  /// Replaces the keys that `path` contains; rejects unknown faults and keys.
+  /// @throws as the constructor.
+  void Override(const std::filesystem::path& path);
+
+  /// @param fault or finding of the catalogue; 0 means unknown.
+  const FaultText& Of(int fault) const;
+
+  /// @param answer as in fault_history: "f19", "f3|f6", "unknown", or empty;
+  ///   other names count as unknown.
+  /// @param strength estimated; the sign is ignored.
+  FaultWords Words(std::string_view answer, double strength) const;
+
+ private:
+  std::map<int, FaultText> texts_;  // [0]: unknown
+};
+
+/// The catalogue installed with the programs, overridden by DATA/faults.toml if
+/// it exists, then by --fault-catalogue.
+FaultTexts LoadFaultTexts(const GlobalOptions& options);
+
+/// {"faults": [{"fault", "name", "check", "discipline", "namur", "severity":
+/// [{"from", "level"}]}]}, unknown last.
+Json FaultTextsJson(const FaultTexts& texts);
+
+}  // namespace fdi::report

@@ -1,0 +1,314 @@
+#include "report/global_options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <toml++/toml.h>
+
+#include "base/suggestion.h"
+#include "fdi_version_config.h"
+
+namespace fdi::report {
+namespace {
+
+[[noreturn]] void Refuse(const toml::node& node, const std::string& message) {
+  std::ostringstream text;
+  text << "line " << node.source().begin.line << ": " << message;
+  throw CLI::ConfigError(text.str());
+}
+
+// CLI11 converts values from text, as on the command line.
+std::string TextOf(const toml::node& node, const std::string& key) {
+  if (const auto text = node.value_exact<std::string>()) {
+    return *text;
+  }
+  if (const auto flag = node.value_exact<bool>()) {
+    return *flag ? "true" : "false";
+  }
+  if (const auto integer = node.value_exact<std::int64_t>()) {
+    return std::to_string(*integer);
+  }
+  if (const auto number = node.value_exact<double>()) {
+    char text[64];
+    const auto end = std::to_chars(text, text + sizeof text, *number);
+    return {text, end.ptr};
+  }
+  Refuse(node, key + ": expected text, a number, true or false");
+}
+
+bool IsKey(const CLI::Option& option) {
+  return option.get_configurable() && !option.get_lnames().empty();
+}
+
+// Rejects a key that is neither an option nor a verb of `app`. CLI11 would,
+// too, but without the line and the key that was probably meant.
+void RefuseUnknown(const CLI::App& app, const toml::node& node,
+                   const std::string& path, const std::string& key) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    if (IsKey(*option)) {
+      names.insert(names.end(), option->get_lnames().begin(),
+                   option->get_lnames().end());
+    }
+  }
+  for (const CLI::App* verb : app.get_subcommands({})) {
+    names.push_back(verb->get_name());
+  }
+  const auto meant = Suggest(key, names);
+  Refuse(node, "unknown key '" + path + key + "'" +
+                   (meant ? ": did you mean '" + path + *meant + "'?" : ""));
+}
+
+void Collect(const CLI::App& app, const toml::table& table,
+             std::vector<std::string>& parents,
+             std::vector<CLI::ConfigItem>& items) {
+  std::string path;
+  for (const std::string& parent : parents) {
+    path += parent + '.';
+  }
+  for (const auto& [toml_key, node] : table) {
+    const std::string key(toml_key.str());
+    const auto verbs = app.get_subcommands(
+        [&key](const CLI::App* verb) { return verb->get_name() == key; });
+    if (const toml::table* inner = node.as_table()) {
+      if (verbs.empty()) {
+        RefuseUnknown(app, node, path, key);
+      }
+      parents.push_back(key);
+      Collect(*verbs.front(), *inner, parents, items);
+      parents.pop_back();
+      continue;
+    }
+    const CLI::Option* option = app.get_option_no_throw("--" + key);
+    if (option == nullptr && !verbs.empty()) {
+      Refuse(node, key + " is a verb: expected a table [" + path + key + "]");
+    }
+    if (option == nullptr || !IsKey(*option)) {
+      RefuseUnknown(app, node, path, key);
+    }
+    CLI::ConfigItem item;
+    item.parents = parents;
+    item.name = key;
+    if (const toml::array* list = node.as_array()) {
+      for (const toml::node& element : *list) {
+        item.inputs.push_back(TextOf(element, key));
+      }
+    } else {
+      item.inputs.push_back(TextOf(node, key));
+    }
+    items.push_back(std::move(item));
+  }
+}
+
+// Inserts an option's value with the type that its text suggests, if TextOf()
+// gives that text back: "007" and "1e3" may be names.
+void Insert(toml::table& table, const std::string& key,
+            const std::string& text) {
+  const auto insert_as = [&](auto number) {
+    const char* const end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, number);
+    const bool same = error == std::errc() && stop == end &&
+                      TextOf(toml::value(number), key) == text;
+    if (same) {
+      table.insert_or_assign(key, number);
+    }
+    return same;
+  };
+  if (text == "true" || text == "false") {
+    table.insert_or_assign(key, text == "true");
+  } else if (!insert_as(std::int64_t{0}) && !insert_as(0.0)) {
+    table.insert_or_assign(key, text);
+  }
+}
+
+// If its default were read back, it would exclude other options or need one
+// that is not given.
+bool BindsOthers(const CLI::Option& option) {
+  const auto needed = option.get_needs();
+  return !option.get_excludes().empty() ||
+         std::any_of(needed.begin(), needed.end(),
+                     [](const auto* other) { return other->count() == 0; });
+}
+
+toml::table Effective(CLI::App& app) {
+  toml::table table;
+  for (CLI::Option* option : app.get_options()) {
+    if (!IsKey(*option) || option == app.get_help_ptr()) {
+      continue;
+    }
+    if (option->count() == 0 && BindsOthers(*option)) {
+      continue;
+    }
+    const std::string& key = option->get_lnames().front();
+    const bool flag = option->get_expected_max() == 0;
+    if (option->count() == 0 && !flag && option->get_expected_min() == 0) {
+      // Replaces the value that the option has when given without one.
+      option->capture_default_str();
+    }
+    if (option->count() > 1 && !flag) {
+      toml::array list;
+      for (const std::string& text : option->results()) {
+        list.push_back(text);
+      }
+      table.insert_or_assign(key, std::move(list));
+    } else if (option->count() > 0) {
+      const std::string& text = option->results().front();
+      // The result of --no-KEY is what it turns off: false.
+      Insert(table, key, flag ? option->get_flag_value(key, text) : text);
+    } else if (flag) {
+      table.insert_or_assign(key, false);
+    } else if (const std::string text = option->get_default_str();
+               !text.empty() && text != "\"\"" && text != "[]") {
+      const bool quoted = text.size() > 1 && text.front() == '"';
+      Insert(table, key, quoted ? text.substr(1, text.size() - 2) : text);
+    }
+  }
+  for (CLI::App* verb : app.get_subcommands()) {
+    table.insert_or_assign(verb->get_name(), Effective(*verb));
+  }
+  return table;
+}
+
+// Makes CLI11 read --config as TOML 1.0 with toml++: a key is the option of
+// that name, a table is a verb.
+class TomlConfig : public CLI::Config {
+ public:
+  // @param root whose options and verbs the file may contain; outlives this.
+  explicit TomlConfig(const CLI::App& root) : root_(root) {}
+
+  // @throws CLI::ConfigError naming line and key: invalid TOML, an unknown
+  //   key, a value that is neither text, number nor flag.
+  std::vector<CLI::ConfigItem> from_config(std::istream& in) const override;
+  // Unused, because its app cannot be queried for defaults; see
+  // EffectiveToml().
+  std::string to_config(const CLI::App*, bool, bool,
+                        std::string) const override {
+    return {};
+  }
+
+ private:
+  const CLI::App& root_;
+};
+
+std::vector<CLI::ConfigItem> TomlConfig::from_config(std::istream& in) const {
+  try {
+    const toml::table table = toml::parse(in);
+    std::vector<CLI::ConfigItem> result;
+    std::vector<std::string> parents;
+    Collect(root_, table, parents, result);
+    return result;
+  } catch (const toml::parse_error& error) {
+    std::ostringstream message;
+    message << "line " << error.source().begin.line << ", column "
+            << error.source().begin.column << ": " << error.description();
+    throw CLI::ConfigError(message.str());
+  }
+}
+
+void AddLogLevel(CLI::App& app, GlobalOptions& options) {
+  static const std::map<std::string, LogLevel> levels = {
+      {"debug", LogLevel::kDebug},
+      {"info", LogLevel::kInfo},
+      {"warning", LogLevel::kWarning},
+      {"error", LogLevel::kError}};
+  app.add_option_function<std::string>(
+         "--log-level",
+         [&options](const std::string& name) {
+           options.log_level = levels.at(name);
+         },
+         "Log messages of this level and above to standard error")
+      ->check(CLI::IsMember({"debug", "info", "warning", "error"}))
+      ->default_str("info")
+      ->type_name("LEVEL");
+}
+
+// If an option is repeated, the last one wins, so that the options of a script
+// can be overridden.
+void SetTakeLastPolicy(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    option->take_last();
+  }
+}
+
+}  // namespace
+
+void AddGlobalOptions(CLI::App& app, GlobalOptions& options) {
+  app.option_defaults()->always_capture_default();
+  app.set_help_flag("-h,--help", "Print this help and exit");
+  app.set_version_flag("--version", app.get_name() + " " + SoftwareVersion(),
+                       "Print the version and exit");
+  app.add_option("--data", options.data_dir, "Data directory")
+      ->envname("FDI_DATA")
+      ->type_name("DIR");
+  app.add_flag("--json", options.json, "Print the result as one JSON object");
+  app.add_flag("--utc", options.utc,
+               "Show times in UTC instead of the local time zone");
+  AddLogLevel(app, options);
+  SetTakeLastPolicy(app);
+  app.config_formatter(std::make_shared<TomlConfig>(app));
+  app.set_config("--config", "",
+                 "Read options from a TOML file: KEY = VALUE for the option "
+                 "--KEY, a table [VERB] for those of a verb")
+      ->type_name("FILE.toml")
+      ->configurable(false);
+  app.add_flag_callback(
+         "--print-config", [] { throw PrintConfigRequest(); },
+         "Print the effective configuration as TOML and exit")
+      ->configurable(false);
+}
+
+void AddBusOptions(CLI::App& app, GlobalOptions& options) {
+  app.add_option("--domain", options.domain, "DDS domain")
+      ->check(CLI::Range(0, 232));
+  app.add_option("--interface", options.interface,
+                 "Addresses of the network interfaces to use, or all")
+      ->type_name("ADDR[,ADDR]|all");
+  app.add_option("--transport", options.transport,
+                 "Carry samples over UDP, over shared memory, or over both, "
+                 "which is the default of Fast DDS")
+      ->check(CLI::IsMember({"udp", "shm", "default"}))
+      ->type_name("NAME");
+  app.add_option("--partition", options.partition,
+                 "Share of the plant that samples are published to or taken "
+                 "from; a monitor may take several, 'hall-1,pumps-*'")
+      ->type_name("NAME[,NAME]");
+  app.add_option("--security", options.security,
+                 "Folder of the key that fdi-store keys has made for this "
+                 "program or host; without one the bus is open to all")
+      ->check(CLI::ExistingDirectory)
+      ->type_name("DIR");
+  app.add_option("--qos", options.qos_file,
+                 "Fast DDS XML file whose QoS profiles override the built-in "
+                 "ones")
+      ->check(CLI::ExistingFile)
+      ->type_name("FILE.xml");
+  SetTakeLastPolicy(app);
+}
+
+void AddFaultCatalogueOption(CLI::App& app, GlobalOptions& options) {
+  app.add_option("--fault-catalogue", options.fault_catalogue,
+                 "TOML file whose names and advice for faults replace those of "
+                 "the installed catalogue and of faults.toml in the data "
+                 "directory")
+      ->check(CLI::ExistingFile)
+      ->type_name("FILE.toml");
+  SetTakeLastPolicy(app);
+}
+
+std::string EffectiveToml(CLI::App& root) {
+  std::ostringstream text;
+  text << Effective(root) << '\n';
+  return text.str();
+}
+
+std::string SoftwareVersion() {
+  return FDI_VERSION "+" FDI_REVISION;
+}
+
+}  // namespace fdi::report

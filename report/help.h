@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace fdi::report {
+
+/// Gives the program `root` and its verbs help that reads like a manual page:
+///
+///     -h, --help           Print this help and exit
+///     --domain 0..232      DDS domain (default 0)
+///     --record[=on|off]    Store the samples (without a value: on)
+///
+/// Accepted values, defaults and exclusions are taken from the parser. Call
+/// once, after the last option was added.
+void PrepareHelp(CLI::App& root);
+
+/// "a, b, c".
+std::string Joined(const std::vector<std::string>& words,
+                   const char* separator = ", ");
+
+/// Drops the requirement that files and folders named by options exist.
+void AllowMissingFiles(CLI::App& root);
+
+}  // namespace fdi::report

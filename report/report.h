@@ -1,0 +1,109 @@
+#pragma once
+
+#include <functional>
+#include <iosfwd>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "report/json_output.h"
+#include "report/terminal.h"
+#include "report/text_table.h"
+
+namespace fdi::report {
+
+/// How a value is shown in text. JSON and CSV have the raw value.
+enum class Format {
+  kPlain,     ///< Text unchanged, numbers with Column::decimals.
+  kTime,      ///< A `*_utc` text as a time in the user's zone.
+  kDuration,  ///< A `*_s` number as "3 min 05 s".
+  kPercent,   ///< A share of 0..1 as "12.5 %".
+};
+
+/// One column of a table, or one line of a list of fields.
+///
+/// Missing, null or non-finite values are shown as "-", flags as yes or no,
+/// lists separated by commas.
+struct Column {
+  std::string heading;  ///< With its unit: "period [s]".
+  /// The member of the row, which is also the CSV header: "period_s". A nested
+  /// member is given by its path, "fit/vaf_pct"; its CSV header is
+  /// "fit_vaf_pct".
+  std::string key{};
+  Format format{Format::kPlain};
+  int decimals{2};  ///< Of numbers that are not integers.
+  /// If a table is wider than the terminal, columns above 0 are omitted, the
+  /// highest first.
+  int spare{0};
+  /// Makes the text from the whole row, where one member does not suffice.
+  std::function<std::string(const Json& row)> text{};
+  std::function<Tone(const Json& row)> tone{};
+  /// Default: columns with numbers are right-aligned, others left-aligned.
+  std::optional<Align> align{};
+};
+
+/// How a Report is rendered.
+struct ReportStyle {
+  TextStyle text;   ///< Colour and width.
+  bool utc{false};  ///< Times in UTC instead of the local zone.
+};
+
+/// The result of a verb: a JSON document, and which parts of it the text shows.
+/// A verb fills `document`; text, JSON and CSV follow from it. Returned by the
+/// action of Program::AddVerb(), which prints it in the requested form:
+///
+///     Report report;
+///     report.document["runs"] = RunRows(...);
+///     report.Table("runs", {{"run", "run_id"},
+///                           {"start", "start_utc", Format::kTime},
+///                           {"Ts [s]", "period_s"}}, "no run matches");
+///     return report;
+class Report {
+ public:
+  Json document = Json::object();
+  int exit_code{0};
+
+  /// Shows the array at `key`, a member of the document or a path "a/b", as a
+  /// table. A row is an object. `if_empty` is printed if there is no row.
+  Report& Table(std::string key, std::vector<Column> columns,
+                std::string if_empty = "");
+  /// Shows members of the object at `key` ("" is the document) as aligned
+  /// lines "heading:  value".
+  Report& Fields(std::string key, std::vector<Column> fields);
+  /// One or more lines in the text output only.
+  Report& Line(std::string text);
+  /// What --csv prints, if not the first table: the members `keys` of the rows
+  /// at `key`.
+  Report& Csv(std::string key, std::vector<std::string> keys);
+
+  /// The text output, in the order in which parts were added.
+  void PrintText(std::ostream& out, const ReportStyle& style) const;
+  /// The document.
+  void PrintJson(std::ostream& out) const;
+  /// One table as WriteCsvLine() writes it: keys as header, raw values.
+  /// @throws std::logic_error if there is no table.
+  void PrintCsv(std::ostream& out) const;
+
+ private:
+  struct TableView {
+    std::string key;
+    std::vector<Column> columns;
+    std::string if_empty;
+  };
+  struct FieldsView {
+    std::string key;
+    std::vector<Column> fields;
+  };
+  using View = std::variant<TableView, FieldsView, std::string>;
+
+  void Print(const TableView& view, std::ostream& out,
+             const ReportStyle& style) const;
+  void Print(const FieldsView& view, std::ostream& out,
+             const ReportStyle& style) const;
+
+  std::vector<View> views_;
+  std::optional<TableView> csv_;
+};
+
+}  // namespace fdi::report

@@ -1,0 +1,121 @@
+#include "report/stop_signals.h"
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdint>
+#include <stdexcept>
+#include <system_error>
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+namespace fdi::report {
+namespace {
+
+constexpr std::array<int, 3> kSignals = {SIGINT, SIGTERM, SIGHUP};
+
+// A signal handler can only access globals.
+std::atomic<int> g_event{-1};
+std::atomic<bool> g_stop{false};
+std::atomic<bool> g_reload{false};
+std::atomic<bool> g_installed{false};
+std::array<struct sigaction, kSignals.size()> g_previous;
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+// Makes the descriptor readable. A handler may interrupt code that has not read
+// its errno yet.
+void Wake() noexcept {
+  const int saved_errno = errno;
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const auto written = write(g_event, &one, sizeof one);
+  errno = saved_errno;
+}
+
+extern "C" void FdiOnSignal(int signal) {
+  if (signal == SIGHUP) {
+    g_reload = true;
+  } else if (g_stop.exchange(true)) {
+    _exit(1);  // The orderly stop hangs; exit() is unsafe here.
+  }
+  Wake();
+}
+
+}  // namespace
+
+StopSignals::StopSignals() {
+  if (g_installed.exchange(true)) {
+    throw std::logic_error("StopSignals: one at a time");
+  }
+  g_event = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+  if (g_event < 0) {
+    g_installed = false;
+    throw std::system_error(errno, std::generic_category(), "eventfd");
+  }
+  g_stop = false;
+  g_reload = false;
+  // SA_RESTART: other system calls continue; waiters use the descriptor.
+  struct sigaction action {};
+  action.sa_handler = &FdiOnSignal;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    sigaction(kSignals[i], &action, &g_previous[i]);
+  }
+}
+
+StopSignals::~StopSignals() {
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    sigaction(kSignals[i], &g_previous[i], nullptr);
+  }
+  close(g_event.exchange(-1));
+  g_installed = false;
+}
+
+bool StopSignals::stop_requested() const noexcept {
+  return g_stop;
+}
+
+StopSignals::Event StopSignals::WaitFor(std::chrono::milliseconds timeout) {
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  while (true) {
+    if (g_stop) {
+      return Event::kStop;  // The descriptor stays readable for others.
+    }
+    if (g_reload.exchange(false)) {
+      // The reload is consumed, so the descriptor must not stay readable,
+      // unless a signal arrived between exchange and read.
+      std::uint64_t count = 0;
+      [[maybe_unused]] const auto got = read(g_event, &count, sizeof count);
+      if (g_stop || g_reload) {
+        Wake();
+      }
+      return Event::kReload;
+    }
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        deadline - std::chrono::steady_clock::now());
+    if (left.count() <= 0) {
+      return Event::kTimeout;
+    }
+    pollfd entry{g_event, POLLIN, 0};
+    const int ready = poll(&entry, 1, static_cast<int>(left.count()) + 1);
+    if (ready < 0 && errno != EINTR) {
+      throw std::system_error(errno, std::generic_category(), "poll");
+    }
+    if (ready > 0 && !g_stop && !g_reload) {
+      std::uint64_t count = 0;  // Another thread consumed the reload.
+      [[maybe_unused]] const auto got = read(g_event, &count, sizeof count);
+      if (g_stop || g_reload) {
+        Wake();
+      }
+    }
+  }
+}
+
+int StopSignals::descriptor() const noexcept {
+  return g_event;
+}
+
+}  // namespace fdi::report

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <chrono>
+
+namespace fdi::report {
+
+/// While an object exists, SIGINT and SIGTERM request an orderly stop, a second
+/// one ends the process at once (exit code 1), and SIGHUP requests a reload.
+/// One object at a time; the destructor restores the previous handlers.
+class StopSignals {
+ public:
+  enum class Event { kTimeout, kReload, kStop };
+
+  /// @throws std::logic_error if another object exists; std::system_error.
+  StopSignals();
+  ~StopSignals();
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+
+  /// Cheap; thread safe.
+  bool stop_requested() const noexcept;
+  /// Waits for a signal. Returns kStop from the first stop on, and kReload once
+  /// per SIGHUP (signals in quick succession count once).
+  Event WaitFor(std::chrono::milliseconds timeout);
+  /// Becomes readable when a signal arrives; for poll().
+  int descriptor() const noexcept;
+};
+
+}  // namespace fdi::report

@@ -1,0 +1,143 @@
+#include "report/text_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+
+#include "base/error.h"
+
+namespace fdi::report {
+namespace {
+
+constexpr const char* kBold = "\x1b[1m";
+constexpr const char* kPlainAgain = "\x1b[0m";
+constexpr std::size_t kGap = 2;  // Blanks between columns.
+
+// The standard library pads by bytes, which is too few after "µ".
+std::string Padded(const std::string& text, std::size_t width, Align align) {
+  const std::string blanks(width - std::min(width, TextWidth(text)), ' ');
+  return align == Align::kRight ? blanks + text : text + blanks;
+}
+
+std::string Toned(const std::string& text, const char* code, bool colour) {
+  return colour && code[0] != '\0' ? code + text + kPlainAgain : text;
+}
+
+}  // namespace
+
+const char* ToneCode(Tone tone) {
+  switch (tone) {
+    case Tone::kPlain:
+      return "";
+    case Tone::kAlarm:
+      return "\x1b[1;31m";
+    case Tone::kWarning:
+      return "\x1b[33m";
+    case Tone::kQuiet:
+      return "\x1b[2m";
+  }
+  return "";
+}
+
+TextTable::TextTable(std::vector<Column> columns)
+    : columns_(std::move(columns)) {}
+
+void TextTable::AddRow(std::vector<std::string> cells) {
+  Require(cells.size() == columns_.size(), "TextTable: one cell per column");
+  rows_.push_back(
+      {std::move(cells), std::vector<Tone>(columns_.size(), Tone::kPlain)});
+}
+
+void TextTable::SetTone(std::size_t column, Tone tone) {
+  Require(!rows_.empty() && column < columns_.size(),
+          "TextTable: no such cell");
+  rows_.back().tones[column] = tone;
+}
+
+std::vector<std::size_t> TextTable::Widths() const {
+  std::vector<std::size_t> widths;
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    std::size_t width = TextWidth(columns_[c].heading);
+    for (const Row& row : rows_) {
+      width = std::max(width, TextWidth(row.cells[c]));
+    }
+    widths.push_back(width);
+  }
+  return widths;
+}
+
+// The columns that remain, in order: while the table is too wide, the one with
+// the highest `spare` is dropped, of equal ones the leftmost. Columns with 0
+// always remain.
+std::vector<std::size_t> TextTable::Shown(
+    const std::vector<std::size_t>& widths, std::size_t width) const {
+  std::vector<std::size_t> shown(columns_.size());
+  std::iota(shown.begin(), shown.end(), 0);
+  const auto needed = [&] {
+    return std::accumulate(
+        shown.begin(), shown.end(), std::size_t{0},
+        [&](std::size_t sum, std::size_t c) { return sum + widths[c] + kGap; });
+  };
+  while (width > 0 && needed() > width + kGap) {
+    const auto most_spare = std::max_element(
+        shown.begin(), shown.end(), [this](std::size_t a, std::size_t b) {
+          return columns_[a].spare < columns_[b].spare;
+        });
+    if (columns_[*most_spare].spare == 0) {
+      break;
+    }
+    shown.erase(most_spare);
+  }
+  return shown;
+}
+
+void TextTable::Print(std::ostream& out, const TextStyle& style) const {
+  const std::vector<std::size_t> widths = Widths();
+  const std::vector<std::size_t> shown = Shown(widths, style.width);
+  const auto print = [&](const auto& cell_of, const auto& code_of) {
+    for (const std::size_t c : shown) {
+      const bool last = c == shown.back();
+      // No trailing blanks: they could wrap on a terminal.
+      const bool bare = last && columns_[c].align == Align::kLeft;
+      const std::string text =
+          Padded(cell_of(c), bare ? 0 : widths[c], columns_[c].align);
+      out << Toned(text, code_of(c), style.colour)
+          << (last ? "\n" : std::string(kGap, ' '));
+    }
+  };
+  print([&](std::size_t c) { return columns_[c].heading; },
+        [](std::size_t) { return kBold; });
+  for (const Row& row : rows_) {
+    print([&](std::size_t c) { return row.cells[c]; },
+          [&](std::size_t c) { return ToneCode(row.tones[c]); });
+  }
+  // Names the omitted columns, so that they are not taken for missing data.
+  std::string left_out;
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    if (std::find(shown.begin(), shown.end(), c) == shown.end()) {
+      left_out += (left_out.empty() ? "" : ", ") + columns_[c].heading;
+    }
+  }
+  if (!left_out.empty()) {
+    out << Toned("(too narrow for: " + left_out + ")", ToneCode(Tone::kQuiet),
+                 style.colour)
+        << '\n';
+  }
+}
+
+std::size_t TextWidth(const std::string& text) {
+  return static_cast<std::size_t>(std::count_if(
+      text.begin(), text.end(), [](char c) { return (c & '\xC0') != '\x80'; }));
+}
+
+std::string FormatNumber(double value, int decimals) {
+  if (!std::isfinite(value)) {
+    return "-";
+  }
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+  return text;
+}
+
+}  // namespace fdi::report

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace fdi::report {
+
+struct Context;
+
+/// The options --since and --until of a verb.
+struct TimeWindow {
+  std::string since;
+  std::string until;
+
+  void AddTo(CLI::App& verb);
+  /// The smallest int64 without --since. @throws ConfigError
+  std::int64_t since_ns(const Context& context) const;
+  /// The largest int64 without --until. @throws ConfigError
+  std::int64_t until_ns(const Context& context) const;
+};
+
+/// The user who runs the program: the default of --by.
+std::string UserName();
+
+/// "fdi-store anna@host": the origin of an operator action.
+std::string Origin(const std::string& program);
+
+}  // namespace fdi::report

@@ -1,0 +1,505 @@
+#include "simulator/scenario/scenario_toml.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <limits>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/field_list.h"
+#include "base/time_text.h"
+#include "import/csv.h"
+
+// A scenario as TOML. The keys of a table are the member names of its struct,
+// listed once for reader and writer; the unit of a field is the suffix of its
+// name, its range is in the Validate() of its struct.
+namespace fdi::simulator {
+namespace {
+
+using std::filesystem::path;
+
+constexpr double kForever = 1e10;
+
+// VisitFields(value, visit) calls visit(name, field) for each field; nested
+// structs have lists of their own.
+#define FDI_VISIT(FIELD) visit(#FIELD, value.FIELD);
+#define FDI_FIELDS(STRUCT, ...)                      \
+  template <typename Visitor>                        \
+  void VisitFields(STRUCT& value, Visitor&& visit) { \
+    FDI_FOR_EACH(FDI_VISIT, __VA_ARGS__)             \
+  }
+
+FDI_FIELDS(Disturbance, sd, correlation)
+FDI_FIELDS(OperatingPointExcitation, cv_pct, cv_noise_pct, p1_kpa, p1_noise_kpa,
+           p2_kpa, p2_noise_kpa, t1_degc, amplitude_pct, period_s)
+FDI_FIELDS(SineExcitation, phase_s)
+FDI_FIELDS(LevelLoopExcitation, level_set_point_pct, steam_demand_t_h,
+           steam_noise_t_h, level_noise_pct, pump_noise_kpa, initial_cv_pct,
+           proportional_gain, integral_time_s, inlet_opening, outlet_opening,
+           bypass_opening)
+FDI_FIELDS(InputProfile, t_s, cv_pct, p1_kpa, p2_kpa, t1_degc, cv_noise_pct,
+           p1_noise_kpa, p2_noise_kpa)
+FDI_FIELDS(ActuatorParameters, moving_mass_kg, damping_n_s_m, spring_rate_n_m,
+           spring_preload_m, diaphragm_area_m2, stroke_m, chamber_volume_m3,
+           air_temperature_k, ambient_pressure_pa, supply_pressure_gauge_pa,
+           plug_area_m2, play_fraction, coulomb_friction_n)
+FDI_FIELDS(PositionerParameters, gain, integral_time_s, derivative_time_s,
+           filter_time_s, sampling_period_s, filling_cv, venting_cv,
+           transducer_dead_zone)
+FDI_FIELDS(TrimParameters, kv_m3_h, characteristic, exponent, bypass_kv_m3_h)
+FDI_FIELDS(Transmitter, low, high, noise_sd)
+FDI_FIELDS(InstrumentParameters, flow_unit, command, pressure, temperature,
+           position, flow, positioner_noise_sd_pct, resolution_bits)
+FDI_FIELDS(ValveParameters, name, actuator, positioner, trim, instruments)
+FDI_FIELDS(ValveSimulationConfig, cold_start, continuous_inputs, noise,
+           resolution)
+// The rows of a recorded excitation come from a file.
+template <typename Visitor>
+void VisitFields(RecordedExcitation& /*value*/, Visitor&& /*visit*/) {}
+
+#undef FDI_FIELDS
+#undef FDI_VISIT
+
+constexpr const char* kCharacteristics[] = {"exponential", "linear"};
+static_assert(static_cast<int>(FlowCharacteristic::kLinear) == 1);
+
+path Resolve(const path& folder, const path& file) {
+  return file.is_absolute() ? file : folder / file;
+}
+
+// Sets the fields that the table contains; all keys become known.
+class FieldReader {
+ public:
+  explicit FieldReader(TomlReader& table) : table_(table) {}
+
+  void operator()(const char* key, double& field) {
+    field = table_.Number(key).value_or(field);
+  }
+  void operator()(const char* key, int& field) {
+    constexpr int kMaxInt = std::numeric_limits<int>::max();
+    if (table_.Number(key, -kMaxInt, kMaxInt)) {
+      field = static_cast<int>(*table_.Integer(key));
+    }
+  }
+  void operator()(const char* key, bool& field) {
+    field = table_.Boolean(key).value_or(field);
+  }
+  void operator()(const char* key, std::vector<double>& field) {
+    field = table_.Numbers(key);
+  }
+  void operator()(const char* key, std::string& field) {
+    field = table_.Text(key).value_or(field);
+  }
+  void operator()(const char* key, FlowUnit& field) {
+    if (const auto text = table_.Text(key)) {
+      const auto unit = ParseFlowUnit(*text);
+      if (!unit) {
+        table_.Refuse(key, "'" + *text + "': expected m3/h or t/h");
+      }
+      field = *unit;
+    }
+  }
+  void operator()(const char* key, FlowCharacteristic& field) {
+    if (const auto text = table_.Text(key)) {
+      const auto found = std::ranges::find(kCharacteristics, *text);
+      if (found == std::end(kCharacteristics)) {
+        table_.Refuse(key, "'" + *text + "': expected exponential or linear");
+      }
+      field = static_cast<FlowCharacteristic>(found - kCharacteristics);
+    }
+  }
+  template <typename Struct>
+  requires std::is_class_v<Struct>
+  void operator()(const char* key, Struct& field) {
+    if (auto inner = table_.Table(key)) {
+      VisitFields(field, FieldReader(*inner));
+    }
+  }
+
+ private:
+  TomlReader& table_;
+};
+
+// The shortest text that round-trips to `value`.
+template <typename Number>
+std::string Shortest(Number value) {
+  std::array<char, 32> buffer{};
+  const auto [end, error] =
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+  return {buffer.data(), end};
+}
+
+// "[a, b, c]", made by `text_of` from `items`.
+template <typename Items, typename TextOf>
+std::string List(const Items& items, TextOf text_of) {
+  std::string list;
+  for (const auto& item : items) {
+    list += (list.empty() ? "" : ", ") + text_of(item);
+  }
+  return '[' + list + ']';
+}
+
+using Lines = std::vector<std::pair<std::string, std::string>>;
+
+// Appends "PREFIXfield" and its value for all fields, nested structs included.
+class FieldWriter {
+ public:
+  FieldWriter(std::string prefix, Lines& lines)
+      : prefix_(std::move(prefix)), lines_(lines) {}
+
+  void operator()(const char* key, double field) { Add(key, Shortest(field)); }
+  void operator()(const char* key, int field) { Add(key, Shortest(field)); }
+  void operator()(const char* key, bool field) {
+    Add(key, field ? "true" : "false");
+  }
+  void operator()(const char* key, std::vector<double>& field) {
+    Add(key, List(field, Shortest<double>));
+  }
+  void operator()(const char* key, std::string& field) {
+    Add(key, QuoteToml(field));
+  }
+  void operator()(const char* key, FlowUnit field) {
+    Add(key, QuoteToml(FlowUnitName(field)));
+  }
+  void operator()(const char* key, FlowCharacteristic field) {
+    Add(key, QuoteToml(kCharacteristics[static_cast<int>(field)]));
+  }
+  template <typename Struct>
+  requires(std::is_class_v<Struct> && !std::is_same_v<Struct, std::string> &&
+           !std::is_same_v<Struct, std::vector<double>>) void
+  operator()(const char* key, Struct& field) {
+    VisitFields(field, FieldWriter(prefix_ + key + '.', lines_));
+  }
+
+ private:
+  void Add(const char* key, std::string value) {
+    lines_.emplace_back(prefix_ + key, std::move(value));
+  }
+
+  std::string prefix_;
+  Lines& lines_;
+};
+
+// Appends the fields of `value` that differ from those of `defaults`.
+template <typename Struct>
+void AppendDifferences(const std::string& prefix, Struct value, Struct defaults,
+                       Lines& result) {
+  Lines lines;
+  Lines others;
+  VisitFields(value, FieldWriter(prefix, lines));
+  VisitFields(defaults, FieldWriter(prefix, others));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (lines[i] != others[i]) {
+      result.push_back(std::move(lines[i]));
+    }
+  }
+}
+
+// Runs `read`; a ConfigError from it is reported at the place of `key`.
+template <typename Read>
+void AtKey(const TomlReader& table, std::string_view key, Read&& read) {
+  try {
+    read();
+  } catch (const ConfigError& error) {
+    table.Refuse(key, error.what());
+  }
+}
+
+void ReadParameterTable(TomlReader& table, const path& folder,
+                        ValveParameters& parameters) {
+  if (const auto base = table.Text("base")) {
+    AtKey(table, "base", [&] { parameters = FindParameters(*base, folder); });
+  }
+  VisitFields(parameters, FieldReader(table));
+}
+
+void ReadParameters(TomlReader& table, const path& folder,
+                    ValveParameters& parameters) {
+  constexpr const char* kKey = "parameters";
+  if (table.IsTable(kKey)) {
+    TomlReader inner = *table.Table(kKey);
+    ReadParameterTable(inner, folder, parameters);
+  } else if (const auto name = table.Text(kKey)) {
+    AtKey(table, kKey, [&] { parameters = FindParameters(*name, folder); });
+  }
+  AtKey(table, kKey, [&] { Validate(parameters); });
+}
+
+// Uses CV, P1, P2 and T1 of a CSV as excitation, with its period and length.
+void LoadExcitation(const path& folder, const std::string& file,
+                    Scenario& scenario) {
+  importer::CsvOptions options;
+  options.required =
+      static_cast<SignalMask>(MaskOf(Signal::kCv) | MaskOf(Signal::kP1) |
+                              MaskOf(Signal::kP2) | MaskOf(Signal::kT1));
+  const auto table = importer::ReadCsvFile(Resolve(folder, file), options);
+  const SampleSeries& run = table.runs.front();
+  RecordedExcitation recorded;
+  recorded.rows.reserve(run.samples.size());
+  for (const LabelledSample& row : run.samples) {
+    const Sample& s = row.sample;
+    recorded.rows.push_back({s[Signal::kCv], s[Signal::kP1], s[Signal::kP2],
+                             s[Signal::kT1], s.mode});
+  }
+  scenario.excitation_file = file;
+  scenario.config.period_s = run.period_s;
+  scenario.config.duration_s =
+      static_cast<double>(recorded.rows.size()) * run.period_s;
+  scenario.config.excitation = std::move(recorded);
+}
+
+void ReadExcitation(TomlReader& table, const path& folder, Scenario& scenario) {
+  constexpr const char* kKey = "excitation";
+  if (table.IsTable(kKey)) {
+    TomlReader inner = *table.Table(kKey);
+    if (const auto name = inner.Text("name")) {
+      AtKey(inner, "name", [&] { ChooseExcitation(*name, folder, scenario); });
+    }
+    std::visit([&](auto& e) { VisitFields(e, FieldReader(inner)); },
+               scenario.config.excitation);
+  } else if (const auto name = table.Text(kKey)) {
+    AtKey(table, kKey, [&] { ChooseExcitation(*name, folder, scenario); });
+  }
+  AtKey(table, kKey, [&] { Validate(scenario.config.excitation); });
+}
+
+void ReadFaults(TomlReader& table, ValveSimulationConfig& config) {
+  constexpr const char* kKey = "faults";
+  const auto texts = table.Texts(kKey);
+  if (!table.Has(kKey)) {
+    return;
+  }
+  config.faults.clear();
+  for (const std::string& text : texts) {
+    AtKey(table, kKey,
+          [&] { config.faults.push_back(ParseFaultSchedule(text)); });
+  }
+}
+
+void ReadInputs(TomlReader& table, ValveSimulationConfig& config) {
+  constexpr const char* kKey = "input";
+  auto profiles = table.Tables(kKey);
+  if (!table.Has(kKey)) {
+    return;
+  }
+  config.inputs.clear();
+  for (TomlReader& own : profiles) {
+    InputProfile& profile = config.inputs.emplace_back();
+    VisitFields(profile, FieldReader(own));
+    AtKey(own, "t_s", [&] { Validate(profile); });
+  }
+}
+
+void ReadModes(TomlReader& table, ValveSimulationConfig& config) {
+  constexpr const char* kKey = "mode";
+  auto stretches = table.Tables(kKey);
+  if (!table.Has(kKey)) {
+    return;
+  }
+  config.modes.clear();
+  for (TomlReader& own : stretches) {
+    ModeStretch& stretch = config.modes.emplace_back();
+    stretch.from_s = own.Number("from_s").value_or(0.0);
+    stretch.until_s = own.Number("until_s").value_or(kForever);
+    const auto name = own.Text("mode");
+    const auto mode = ParseValveMode(name.value_or(""));
+    if (!mode) {
+      own.Refuse("mode", "'" + name.value_or("") + "': expected one of " +
+                             std::string(kValveModeNames));
+    }
+    stretch.mode = *mode;
+    AtKey(own, "from_s", [&] { Validate(stretch); });
+  }
+}
+
+void ReadNumbers(TomlReader& table, ValveSimulationConfig& config) {
+  constexpr double kMaxDurationS = 1e10;
+  constexpr double kTiny = 1e-6;
+  config.duration_s = table.Number("duration_s", kTiny, kMaxDurationS)
+                          .value_or(config.duration_s);
+  config.period_s =
+      table.Number("period_s", 1e-3, 1e6).value_or(config.period_s);
+  config.tolerance_scale = table.Number("tolerance_scale", kTiny, 1e6)
+                               .value_or(config.tolerance_scale);
+  if (const auto seed = table.Integer("seed")) {
+    if (*seed < 0) {
+      table.Refuse("seed", std::to_string(*seed) + " is below 0");
+    }
+    config.seed = static_cast<std::uint64_t>(*seed);
+  }
+}
+
+// Parses the value as TOML if possible, else as text.
+TomlReader ReaderOf(const std::string& setting, std::string_view key,
+                    std::string_view value) {
+  const std::string source = "setting '" + setting + "'";
+  const std::string head = std::string(key) + " = ";
+  try {
+    return TomlReader(head + std::string(value), source);
+  } catch (const ConfigError&) {
+    return TomlReader(head + QuoteToml(value), source);
+  }
+}
+
+void AppendParameters(const ValveParameters& parameters, Lines& result) {
+  const auto names = ParameterSetNames();
+  const bool shipped = std::ranges::count(names, parameters.name) > 0;
+  const std::string base = shipped ? parameters.name : names.front();
+  result.emplace_back("parameters.base", QuoteToml(base));
+  AppendDifferences("parameters.", parameters, ParameterSet(base), result);
+}
+
+void AppendExcitation(const Scenario& scenario, Lines& result) {
+  const ExcitationConfig& excitation = scenario.config.excitation;
+  const std::string name(ExcitationName(excitation));
+  const bool from_file = std::holds_alternative<RecordedExcitation>(excitation);
+  result.emplace_back(
+      "excitation.name",
+      QuoteToml(from_file ? name + ':' + scenario.excitation_file : name));
+  std::visit(
+      [&result](const auto& e) {
+        AppendDifferences("excitation.", e, std::remove_cvref_t<decltype(e)>{},
+                          result);
+      },
+      excitation);
+}
+
+// As an inline table: {t_s = [0, 10], ...}.
+std::string InputText(const InputProfile& input) {
+  Lines lines;
+  AppendDifferences("", input, InputProfile{}, lines);
+  std::string table;
+  for (const auto& [key, value] : lines) {
+    table += (table.empty() ? "" : ", ") + key + " = " + value;
+  }
+  return '{' + table + '}';
+}
+
+std::string ModeText(const ModeStretch& stretch) {
+  return "{from_s = " + Shortest(stretch.from_s) +
+         ", until_s = " + Shortest(stretch.until_s) +
+         ", mode = " + QuoteToml(ValveModeName(stretch.mode)) + '}';
+}
+
+}  // namespace
+
+ValveSimulationConfig DefaultConfig() {
+  ValveSimulationConfig config;
+  config.parameters = ParameterSet("lublin-actuator-3");
+  return config;
+}
+
+ValveParameters FindParameters(const std::string& name, const path& folder) {
+  if (path(name).extension() != ".toml") {
+    try {
+      return ParameterSet(name);
+    } catch (const ConfigError& error) {
+      throw ConfigError(std::string(error.what()) + ", or a file FILE.toml");
+    }
+  }
+  TomlReader file(Resolve(folder, name));
+  ValveParameters parameters;
+  parameters.name = path(name).stem().string();
+  ReadParameterTable(file, Resolve(folder, name).parent_path(), parameters);
+  file.Finish();
+  Validate(parameters);
+  return parameters;
+}
+
+void ChooseExcitation(const std::string& name, const path& folder,
+                      Scenario& scenario) {
+  constexpr std::string_view kCsv = "csv:";
+  if (name.starts_with(kCsv)) {
+    LoadExcitation(folder, name.substr(kCsv.size()), scenario);
+    return;
+  }
+  if (name == "csv") {
+    throw ConfigError("csv needs a file: csv:FILE");
+  }
+  scenario.config.excitation = DefaultExcitation(name);
+  scenario.excitation_file.clear();
+}
+
+void ApplyScenario(TomlReader& table, const path& folder, Scenario& scenario) {
+  ValveSimulationConfig& config = scenario.config;
+  scenario.valve_id = table.Text("valve").value_or(scenario.valve_id);
+  ReadParameters(table, folder, config.parameters);
+  ReadExcitation(table, folder, scenario);
+  ReadInputs(table, config);
+  ReadModes(table, config);
+  ReadFaults(table, config);
+  ReadNumbers(table, config);
+  if (const auto start = table.Text("start")) {
+    AtKey(table, "start", [&] { config.start_ns = ParseTime(*start, true); });
+  }
+  VisitFields(config, FieldReader(table));
+}
+
+void ApplyScenarioFile(const path& file, Scenario& scenario) {
+  TomlReader reader(file);
+  ApplyScenario(reader, file.parent_path(), scenario);
+  reader.Finish();
+}
+
+void ApplySetting(std::string_view setting, Scenario& scenario) {
+  const std::size_t at = setting.find('=');
+  if (at == 0 || at == setting.npos) {
+    throw ConfigError("setting '" + std::string(setting) +
+                      "': expected KEY=VALUE");
+  }
+  TomlReader reader = ReaderOf(std::string(setting), setting.substr(0, at),
+                               setting.substr(at + 1));
+  ApplyScenario(reader, {}, scenario);
+  reader.Finish();
+}
+
+std::string QuoteToml(std::string_view text) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string quoted = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7F) {
+      quoted += "\\u00";
+      quoted += {kDigits[byte >> 4U], kDigits[byte & 0xFU]};
+    } else {
+      quoted += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
+    }
+  }
+  return quoted + '"';
+}
+
+std::string ScenarioText(const Scenario& scenario) {
+  ValveSimulationConfig config = scenario.config;
+  Lines lines = {{"valve", QuoteToml(scenario.valve_id)}};
+  AppendParameters(config.parameters, lines);
+  AppendExcitation(scenario, lines);
+  if (!config.inputs.empty()) {
+    lines.emplace_back("input", List(config.inputs, InputText));
+  }
+  if (!config.modes.empty()) {
+    lines.emplace_back("mode", List(config.modes, ModeText));
+  }
+  lines.emplace_back("faults",
+                     List(config.faults, [](const FaultSchedule& fault) {
+                       return QuoteToml(ToText(fault));
+                     }));
+  lines.emplace_back("seed", Shortest(config.seed));
+  lines.emplace_back("duration_s", Shortest(config.duration_s));
+  lines.emplace_back("period_s", Shortest(config.period_s));
+  if (config.start_ns != 0) {
+    lines.emplace_back("start", QuoteToml(FormatTime(config.start_ns, true)));
+  }
+  VisitFields(config, FieldWriter("", lines));
+  lines.emplace_back("tolerance_scale", Shortest(config.tolerance_scale));
+  std::string text;
+  for (const auto& [key, value] : lines) {
+    text += key + " = " + value + '\n';
+  }
+  return text;
+}
+
+}  // namespace fdi::simulator

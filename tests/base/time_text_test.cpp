@@ -1,0 +1,118 @@
+#include "base/time_text.h"
+
+#include <cstdlib>
+#include <ctime>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "tests/storage/message_of.h"
+
+namespace fdi::report {
+namespace {
+
+// date -u -d 2026-11-20T14:56:11Z +%s
+constexpr std::int64_t kStampNs = 1'795'186'571'000'000'000;
+
+class TimeTextTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    setenv("TZ", "Europe/Warsaw", 1);  // +01:00 in November, +02:00 in July.
+    tzset();
+  }
+  void TearDown() override {
+    unsetenv("TZ");
+    tzset();
+  }
+};
+
+TEST_F(TimeTextTest, UtcEndsInZAndLocalTimeInItsOffset) {
+  EXPECT_EQ(FormatTime(kStampNs, true), "2026-11-20T14:56:11Z");
+  EXPECT_EQ(FormatTime(kStampNs, false), "2026-11-20T15:56:11+01:00");
+}
+
+TEST_F(TimeTextTest, DecimalsAreAsManyAsTheStampNeeds) {
+  EXPECT_EQ(FormatTime(kStampNs + 500'000'000, true),
+            "2026-11-20T14:56:11.500Z");
+  EXPECT_EQ(FormatTime(kStampNs + 1'000, true), "2026-11-20T14:56:11.000001Z");
+  EXPECT_EQ(FormatTime(kStampNs + 1, true), "2026-11-20T14:56:11.000000001Z");
+}
+
+TEST_F(TimeTextTest, StampsBeforeTheEpochKeepTheirDecimals) {
+  EXPECT_EQ(FormatTime(-1, true), "1969-12-31T23:59:59.999999999Z");
+  EXPECT_EQ(FormatTime(std::numeric_limits<std::int64_t>::min(), true),
+            "1677-09-21T00:12:43.145224192Z");
+  EXPECT_EQ(ParseTime("1969-12-31T23:59:59.999999999Z", false), -1);
+}
+
+TEST_F(TimeTextTest, ParsingReadsBackWhatFormattingWrote) {
+  for (const std::int64_t stamp :
+       {kStampNs, kStampNs + 123'456'789, std::int64_t{0},
+        std::int64_t{1'000'000'000'000'000'001}}) {
+    EXPECT_EQ(ParseTime(FormatTime(stamp, true), false), stamp);
+    EXPECT_EQ(ParseTime(FormatTime(stamp, false), true), stamp);
+  }
+}
+
+TEST_F(TimeTextTest, TimeWithoutOffsetIsLocalUnlessUtcIsAskedFor) {
+  EXPECT_EQ(ParseTime("2026-11-20T15:56:11", false), kStampNs);
+  EXPECT_EQ(ParseTime("2026-11-20 14:56:11", true), kStampNs);
+  EXPECT_EQ(ParseTime("2026-07-01", false),
+            ParseTime("2026-06-30T22:00:00Z", false));
+}
+
+TEST_F(TimeTextTest, WhatIsNoTimeIsRefused) {
+  for (const char* text :
+       {"", "yesterday", "2026-13-01", "2026-02-30", "2026-11-20T25:00",
+        "2026-11-20T14:56:11.Z", "2026-11-20T14:56:11+1", "2026-11-20x",
+        "9999-01-01"}) {
+    EXPECT_THROW(ParseTime(text, true), ConfigError) << text;
+  }
+}
+
+TEST_F(TimeTextTest, DurationsAddUpTheirParts) {
+  EXPECT_EQ(ParseDuration("90s"), 90'000'000'000);
+  EXPECT_EQ(ParseDuration("90"), 90'000'000'000);
+  EXPECT_EQ(ParseDuration("2h"), 7'200'000'000'000);
+  EXPECT_EQ(ParseDuration("1h30m"), 5'400'000'000'000);
+  EXPECT_EQ(ParseDuration("0.25s"), 250'000'000);
+  EXPECT_EQ(ParseDuration("250ms"), 250'000'000);
+  EXPECT_EQ(ParseDuration("2d"), 172'800'000'000'000);
+}
+
+TEST_F(TimeTextTest, WhatIsNoDurationIsRefused) {
+  for (const char* text :
+       {"", "h", "2x", "-2h", "1h30", "1..5s", "9e99s", "1e3", "101000d"}) {
+    EXPECT_THROW(ParseDuration(text), ConfigError) << text;
+  }
+}
+
+TEST_F(TimeTextTest, AgoIsADurationBeforeNow) {
+  EXPECT_EQ(ParseTimeOrAgo("2h", true, kStampNs), kStampNs - 7'200'000'000'000);
+  EXPECT_EQ(ParseTimeOrAgo("now", true, kStampNs), kStampNs);
+  EXPECT_EQ(ParseTimeOrAgo("2026-11-20T14:56:11Z", true, 0), kStampNs);
+}
+
+TEST_F(TimeTextTest, WhatIsNeitherTimeNorAgoIsToldBoth) {
+  for (const char* text : {"yesterday", "-5", "2026-13-01", "5x", ""}) {
+    EXPECT_THAT(
+        storage::MessageOf<ConfigError>(
+            [text] { ParseTimeOrAgo(text, true, kStampNs); }),
+        testing::AllOf(testing::StartsWith("'" + std::string(text) + "'"),
+                       testing::HasSubstr("2026-11-20T14:56"),
+                       testing::HasSubstr("2h")));
+  }
+}
+
+TEST_F(TimeTextTest, DurationsForPeopleCarryTwoUnitsAtMost) {
+  EXPECT_EQ(FormatDuration(250'000'000), "0.25 s");
+  EXPECT_EQ(FormatDuration(42'000'000'000), "42 s");
+  EXPECT_EQ(FormatDuration(185'000'000'000), "3 min 05 s");
+  EXPECT_EQ(FormatDuration(7'800'000'000'000), "2 h 10 min");
+  EXPECT_EQ(FormatDuration(356'400'000'000'000), "4 d 03 h");
+}
+
+}  // namespace
+}  // namespace fdi::report

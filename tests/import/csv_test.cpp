@@ -1,0 +1,435 @@
+#include "import/csv.h"
+
+#include <bit>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <random>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::report {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+constexpr std::string_view kHeader =
+    "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h";
+
+/// Rows at the given times, all signals 1..6.
+std::string Table(const std::vector<std::string>& times) {
+  std::string text(kHeader);
+  for (const std::string& t : times) {
+    text += "\n" + t + ",1,2,3,4,5,6";
+  }
+  return text;
+}
+
+CsvTable Read(const std::string& text, const CsvOptions& options = {}) {
+  return ReadCsv(text, options);
+}
+
+std::string Refusal(const std::string& text, CsvOptions options = {}) {
+  options.source = "plant.csv";
+  try {
+    Read(text, options);
+  } catch (const DataError& error) {
+    return error.what();
+  }
+  return "not refused";
+}
+
+TEST(CsvTest, ColumnsAreFoundByNameInAnyOrderAndCase) {
+  const CsvTable table = Read(
+      "\xEF\xBB\xBF"
+      "F_t_h, x_PCT ,\"T1_degC\",P2_kPa,P1_kPa,CV_pct,t_s,level_pct\r\n"
+      "13.5,68.3,100.7,2601.2,3541.9,68.6,10,49.0\r\n"
+      "11.9,67.9,100.7,2609.0,3523.3,60.1,12,50.0\r\n"
+      "\r\n");
+
+  ASSERT_EQ(table.runs.size(), 1U);
+  const SampleSeries& run = table.runs[0];
+  EXPECT_EQ(run.flow_unit, FlowUnit::kTPerHour);
+  EXPECT_EQ(run.period_s, 2.0);
+  EXPECT_FALSE(run.has_truth);
+  EXPECT_EQ(run.signals, kBasicSignals);
+  EXPECT_THAT(table.header.ignored_columns, ElementsAre("level_pct"));
+  ASSERT_EQ(run.samples.size(), 2U);
+  const Sample& sample = run.samples[1].sample;
+  EXPECT_EQ(sample[Signal::kCv], 60.1);
+  EXPECT_EQ(sample[Signal::kP1], 3523.3);
+  EXPECT_EQ(sample[Signal::kP2], 2609.0);
+  EXPECT_EQ(sample[Signal::kT1], 100.7);
+  EXPECT_EQ(sample[Signal::kX], 67.9);
+  EXPECT_EQ(sample[Signal::kF], 11.9);
+  EXPECT_EQ(sample.flow_unit, FlowUnit::kTPerHour);
+  EXPECT_EQ(sample.stamp_ns, 12'000'000'000);
+  EXPECT_EQ(sample.seq, 1U);
+  EXPECT_FALSE(run.samples[1].truth);
+}
+
+TEST(CsvTest, NameAndSizeOfTheFirstCellTellTheFormOfTimes) {
+  EXPECT_EQ(TimeFormOf("t_s", 1.7e9), TimeForm::kElapsed);
+  EXPECT_EQ(TimeFormOf("Time", 46027.4), TimeForm::kSerial);
+  EXPECT_EQ(TimeFormOf("Time", 30000.0), TimeForm::kElapsed);
+  EXPECT_EQ(TimeFormOf("Time", 1.7e9), TimeForm::kUnix);
+  for (const char* name : {"time_s", "Time [s]", "Zeit (s)"}) {
+    EXPECT_EQ(TimeFormOf(name, 30000.5), TimeForm::kElapsed) << name;
+    EXPECT_EQ(TimeFormOf(name, 1.7e9), TimeForm::kUnix) << name;
+  }
+}
+
+TEST(CsvTest, TruthNeedsAStrengthOtherThanZero) {
+  const CsvTable by_number = Read(
+      "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h,fault_no,fault_strength\n"
+      "0,1,2,3,4,5,6,18,0\n"
+      "1,1,2,3,4,5,6,18,-0.25\n"
+      "2,1,2,3,4,5,6,22,1\n");
+  const CsvTable by_name = Read(
+      "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h,fault,fault_strength\n"
+      "0,1,2,3,4,5,6,normal,0\n"
+      "1,1,2,3,4,5,6,F18,-0.25\n"
+      "2,1,2,3,4,5,6,P2,1\n");
+
+  for (const CsvTable& table : {by_number, by_name}) {
+    const auto& samples = table.runs.at(0).samples;
+    ASSERT_TRUE(samples[0].truth && samples[1].truth);
+    EXPECT_EQ(samples[0].truth->fault, 0);
+    EXPECT_EQ(samples[1].truth->fault, 18);
+    EXPECT_EQ(samples[1].truth->strength, -0.25);
+    EXPECT_EQ(samples[2].truth->fault, 22);
+  }
+}
+
+TEST(CsvTest, ModeIsAnOptionalColumn) {
+  const std::string text =
+      "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h,mode\n"
+      "0,1,2,3,4,5,6,AUTO\n"
+      "1,1,2,3,4,5,6,MANUAL\n"
+      "2,1,2,3,4,5,6,OUT_OF_SERVICE\n";
+  const CsvTable table = Read(text);
+  const auto& samples = table.runs.at(0).samples;
+  EXPECT_EQ(samples[0].sample.mode, ValveMode::kAuto);
+  EXPECT_EQ(samples[1].sample.mode, ValveMode::kManual);
+  EXPECT_EQ(samples[2].sample.mode, ValveMode::kOutOfService);
+  EXPECT_THAT(table.header.ignored_columns, IsEmpty());
+
+  std::ostringstream written;
+  WriteCsv(written, samples, FlowUnit::kM3PerHour, 0);
+  EXPECT_EQ(written.str(), text);
+  std::ostringstream plain;
+  WriteCsv(plain, std::span(samples).first(1), FlowUnit::kM3PerHour, 0);
+  EXPECT_THAT(plain.str(), Not(HasSubstr("mode")));
+
+  EXPECT_THAT(Refusal(std::string(kHeader) + ",Mode\n0,1,2,3,4,5,6,HAND"),
+              AllOf(HasSubstr("\"HAND\" is none of AUTO, MANUAL"),
+                    HasSubstr("plant.csv:2:")));
+}
+
+TEST(CsvTest, RefusalsNameFileLineColumnAndReason) {
+  EXPECT_THAT(Refusal("t_s,CV_pct,P2_kPa,T1_degC,X_pct\n0,1,2,3,4"),
+              AllOf(HasSubstr("plant.csv:1:"),
+                    HasSubstr("missing column P1_kPa, F_m3_h or F_t_h")));
+  EXPECT_THAT(Refusal(Table({"0", "1"}) + "\n2,1,2,3,4,abc,6"),
+              AllOf(HasSubstr("plant.csv:4:"),
+                    HasSubstr("column \"X_pct\": \"abc\" is not a finite")));
+  for (const std::string bad : {"inf", "-inf", "NaN?", "1e999", "1.5x"}) {
+    EXPECT_THAT(Refusal(Table({"0"}) + "\n1,1," + bad + ",3,4,5,6"),
+                AllOf(HasSubstr("plant.csv:3:"), HasSubstr("P1_kPa"),
+                      HasSubstr("is not a finite number")));
+  }
+  EXPECT_THAT(Refusal(""), HasSubstr("plant.csv: is empty"));
+  EXPECT_THAT(Refusal("\n\n"), HasSubstr("is empty"));
+  EXPECT_THAT(Refusal(std::string(kHeader)), HasSubstr("no rows"));
+  EXPECT_THAT(Refusal(Table({"0"})), HasSubstr("sample period"));
+  EXPECT_THAT(Refusal(std::string(kHeader) + ",CV_pct\n0,1,2,3,4,5,6,7"),
+              HasSubstr("signal CV occurs twice"));
+  EXPECT_THAT(Refusal(std::string(kHeader) + ",F_t_h\n0,1,2,3,4,5,6,7"),
+              HasSubstr("signal F occurs twice"));
+  EXPECT_THAT(Refusal(std::string(kHeader) + ",t_s\n0,1,2,3,4,5,6,7"),
+              HasSubstr("\"t_s\" occurs twice"));
+  EXPECT_THAT(Refusal(Table({"0"}) + ",7"),
+              AllOf(HasSubstr("plant.csv:2:"), HasSubstr("8 cells")));
+  EXPECT_THAT(Refusal(std::string(kHeader) + ",fault\n0,1,2,3,4,5,6,f1"),
+              HasSubstr("missing column fault_strength"));
+  const std::string truth =
+      std::string(kHeader) + ",fault,fault_strength\n0,1,2,3,4,5,6,";
+  EXPECT_THAT(Refusal(truth + "f99,0.5"), HasSubstr("\"f99\" is not a fault"));
+  EXPECT_THAT(Refusal(truth + "f99,0.5"), HasSubstr("f1..f19, t1, p1, p2"));
+  EXPECT_THAT(Refusal(truth + "normal,0.5"), HasSubstr("needs a fault"));
+  EXPECT_THAT(Refusal(truth + "f1,1.5"), HasSubstr("not in [-1, 1]"));
+}
+
+TEST(CsvTest, AJumpInTimeIsRefusedWhereItIs) {
+  EXPECT_THAT(Refusal(Table({"0", "1", "2", "7", "8"})),
+              AllOf(HasSubstr("plant.csv:5:"), HasSubstr("jumps by 5 s")));
+  EXPECT_THAT(Refusal(Table({"0", "5", "6", "7", "8"})),
+              AllOf(HasSubstr("plant.csv:3:"), HasSubstr("jumps by 5 s")));
+  EXPECT_THAT(Refusal(Table({"0", "1", "1.5", "2.5", "3.5"})),
+              AllOf(HasSubstr("plant.csv:4:"), HasSubstr("by 0.5 s")));
+  EXPECT_THAT(Refusal(Table({"0", "1", "2", "1", "2"})),
+              AllOf(HasSubstr("plant.csv:5:"), HasSubstr("goes back")));
+  EXPECT_THAT(Refusal(Table({"0", "1", "1"})), HasSubstr("stands still"));
+  CsvOptions other_period;
+  other_period.period_s = 2.0;
+  EXPECT_THAT(Refusal(Table({"0", "1", "2"}), other_period),
+              HasSubstr("the sample period is 2 s"));
+}
+
+TEST(CsvTest, PeriodsThatDecimalsOnlyRoundAreAccepted) {
+  const CsvTable table = Read(Table({"0", "0.333", "0.667", "1", "1.333"}));
+  EXPECT_EQ(table.runs.at(0).samples.size(), 5U);
+}
+
+TEST(CsvTest, SplitGapsBeginsARunAtEachGap) {
+  CsvOptions options;
+  options.split_gaps = true;
+  options.start_ns = 1'000;
+  const CsvTable table = Read(Table({"0", "1", "2", "7", "8", "20"}), options);
+
+  ASSERT_EQ(table.runs.size(), 3U);
+  EXPECT_EQ(table.runs[0].samples.size(), 3U);
+  EXPECT_EQ(table.runs[1].samples.size(), 2U);
+  EXPECT_EQ(table.runs[2].samples.size(), 1U);
+  EXPECT_EQ(table.runs[1].samples[0].sample.stamp_ns, 7'000'001'000);
+  EXPECT_EQ(table.runs[2].period_s, 1.0);
+  EXPECT_THAT(Refusal(Table({"0", "1", "2", "1", "2"}), options),
+              HasSubstr("goes back"));
+}
+
+TEST(CsvTest, AMapRenamesScalesAndTurnsColumns) {
+  CsvOptions options;
+  options.map.time_column = "ms";
+  options.map.time_scale = 1e-3;
+  options.map.columns = {
+      {"LIC01.OP", Signal::kCv, 1.0, 0.0, Sense::kOpening},
+      {"PI02", Signal::kP1, 100.0, 101.3, Sense::kClosing},  // bar gauge
+      {"FI03", Signal::kF, 1.0, 0.0, Sense::kClosing}};
+  const std::string text =
+      "ms,LIC01.OP,PI02,FI03,X_pct\n0,30,2,9,1\n500,20,2,9,1";
+  EXPECT_THROW(Read(text, options), ConfigError);
+  options.map.flow_unit = FlowUnit::kTPerHour;
+
+  const SampleSeries run = Read(text, options).runs.at(0);
+  EXPECT_EQ(run.period_s, 0.5);
+  EXPECT_EQ(run.flow_unit, FlowUnit::kTPerHour);
+  EXPECT_EQ(run.samples[1].sample[Signal::kCv], 80.0);
+  EXPECT_EQ(run.samples[1].sample[Signal::kP1], 301.3);
+  EXPECT_EQ(run.samples[1].sample[Signal::kX], 1.0);
+  EXPECT_FALSE(run.samples[1].sample.Has(Signal::kP2));
+  EXPECT_THAT(Refusal("ms,LIC01.OP,FI03\n0,30,2", options),
+              HasSubstr("missing column PI02"));
+}
+
+TEST(CsvTest, AValveMayLackSignalsIfTheCallerSaysSo) {
+  CsvOptions options;
+  options.required = MaskOf(Signal::kCv);
+  EXPECT_EQ(Read("t_s,CV_pct,X_pct\n0,1,2\n1,1,2", options).header.signals,
+            MaskOf(Signal::kCv) | MaskOf(Signal::kX));
+  EXPECT_THAT(Refusal("t_s,CV_pct,P1_kPa\n0,1,2", options),
+              HasSubstr("one of X_pct, F_m3_h, F_t_h"));
+  EXPECT_THAT(Refusal("t_s,X_pct\n0,1", options), HasSubstr("column CV_pct"));
+}
+
+TEST(CsvTest, LineByLineReaderAnswersWithEachRow) {
+  CsvReader reader({});
+  EXPECT_FALSE(reader.TakeLine(kHeader));
+  EXPECT_THROW(reader.Finish(), DataError);
+  EXPECT_EQ(reader.TakeLine("0,1,2,3,4,5,6")->t_s, 0.0);
+  EXPECT_EQ(reader.TakeLine("0.5,1,2,3,4,5,6")->t_s, 0.5);
+
+  StepCheck steps(false);
+  for (const double t_s : {0.0, 0.5, 1.1, 1.5}) {
+    EXPECT_EQ(steps.Take(t_s), "");
+  }
+  EXPECT_THAT(steps.Take(7.0), HasSubstr("time jumps by 5.5 s"));
+}
+
+TEST(CsvTest, WrittenNumbersReadBackAsTheSameBits) {
+  std::mt19937_64 random(11);
+  std::vector<LabelledSample> samples(500);
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    Sample& s = samples[k].sample;
+    s.stamp_ns =
+        1'700'000'000'123'456'789 + static_cast<std::int64_t>(k) * 333'333'333;
+    s.flow_unit = FlowUnit::kTPerHour;
+    for (std::size_t i = 0; i < kSignalCount; ++i) {
+      double value = std::bit_cast<double>(random());
+      s.Set(static_cast<Signal>(i), std::isfinite(value) ? value : 5e-324);
+    }
+    samples[k].truth = k < 250 ? FaultTruth{} : FaultTruth{7, -1.0 / 3.0};
+  }
+  std::ostringstream output;
+  WriteCsv(output, samples, FlowUnit::kTPerHour, 1'700'000'000'000'000'000);
+
+  CsvOptions options;
+  options.start_ns = 1'700'000'000'000'000'000;
+  const SampleSeries run = Read(output.str(), options).runs.at(0);
+  ASSERT_EQ(run.samples.size(), samples.size());
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const Sample& s = run.samples[k].sample;
+    ASSERT_EQ(s.stamp_ns, samples[k].sample.stamp_ns);
+    for (std::size_t i = 0; i < kSignalCount; ++i) {
+      ASSERT_EQ(std::bit_cast<std::uint64_t>(s.values[i]),
+                std::bit_cast<std::uint64_t>(samples[k].sample.values[i]));
+    }
+    ASSERT_EQ(run.samples[k].truth->fault, samples[k].truth->fault);
+    ASSERT_EQ(run.samples[k].truth->strength, samples[k].truth->strength);
+  }
+}
+
+// A transmitter that fails for some samples, and one that never answers.
+TEST(CsvTest, RunWithMissingReadingsIsReadBackBitForBit) {
+  std::vector<LabelledSample> samples(20);
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    Sample& s = samples[k].sample;
+    s.stamp_ns = static_cast<std::int64_t>(k) * 1'000'000'000;
+    s.seq = k;
+    for (std::size_t i = 0; i < kSignalCount; ++i) {
+      const auto signal = static_cast<Signal>(i);
+      if (signal != Signal::kPz && (k + i) % 3 != 0) {
+        s.Set(signal, 0.1 * static_cast<double>(k + i));
+      }
+    }
+  }
+  std::ostringstream written;
+  WriteCsv(written, samples, FlowUnit::kM3PerHour, 0);
+  EXPECT_THAT(written.str(), Not(HasSubstr("nan")));
+
+  const SampleSeries run = Read(written.str()).runs.at(0);
+
+  ASSERT_EQ(run.samples.size(), samples.size());
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const Sample& s = run.samples[k].sample;
+    ASSERT_EQ(s.present, samples[k].sample.present) << k;
+    for (std::size_t i = 0; i < kSignalCount; ++i) {
+      if (s.Has(static_cast<Signal>(i))) {
+        ASSERT_EQ(std::bit_cast<std::uint64_t>(s.values[i]),
+                  std::bit_cast<std::uint64_t>(samples[k].sample.values[i]));
+      }
+    }
+  }
+  std::ostringstream again;
+  WriteCsv(again, run.samples, FlowUnit::kM3PerHour, 0);
+  EXPECT_EQ(again.str(), written.str());
+}
+
+TEST(CsvTest, EmptyAndNanCellsOfASignalAreMissingReadings) {
+  const SampleSeries run =
+      Read(std::string(kHeader) + "\n0,1,,3,4,5,6\n1,1,NaN,3,4,5,6").runs.at(0);
+
+  EXPECT_FALSE(run.samples[0].sample.Has(Signal::kP1));
+  EXPECT_FALSE(run.samples[1].sample.Has(Signal::kP1));
+  EXPECT_TRUE(run.samples[1].sample.Has(Signal::kP2));
+  EXPECT_THAT(Refusal(Table({"0", ""})), HasSubstr("column \"t_s\": \"\" is "
+                                                   "not a finite number"));
+}
+
+TEST(CsvTest, QuotedCellsHoldSeparatorsQuotesAndLineBreaks) {
+  CsvCells record;
+  const std::vector<std::string> cells = {
+      "plain", "a,b", "say \"no\"", "two\nlines", " blanks ", ""};
+  std::ostringstream written;
+  WriteCsvLine(written, cells);
+  EXPECT_EQ(written.str(),
+            "plain,\"a,b\",\"say \"\"no\"\"\",\"two\nlines\",\" blanks \",\n");
+
+  EXPECT_FALSE(record.TakeLine("plain,\"a,b\",\"say \"\"no\"\"\",\"two"));
+  EXPECT_TRUE(record.open());
+  EXPECT_TRUE(record.TakeLine("lines\",\" blanks \",\r"));
+  EXPECT_EQ(record.cells(), cells);
+  EXPECT_TRUE(record.TakeLine(" \r"));
+  EXPECT_TRUE(record.blank());
+
+  const CsvTable table = Read(
+      "\xEF\xBB\xBFt_s,\"CV_pct\",P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h,note\r\n"
+      "0,1,2,3,4,5,6,\"tag, \"\"old\"\"\r\nunit\"\r\n"
+      "1,\"1\",2,3,4,5,6,\r\n");
+  EXPECT_EQ(table.runs.at(0).samples.size(), 2U);
+  EXPECT_THAT(Refusal(Table({"0", "1"}) + "\n2,\"1,2,3,4,5,6\n"),
+              HasSubstr("a quote is not closed"));
+}
+
+TEST(CsvTest, AByteOrderMarkDoesNotHideTheSeparator) {
+  CsvOptions options;
+  options.required = MaskOf(Signal::kX);
+  const CsvTable table = ReadCsv(
+      ToUtf8("\xEF\xBB\xBFsep=|\nt_s|CV_pct|X_pct\n0|1,5|2\n1|1|2\n", "input"),
+      options);
+  EXPECT_EQ(table.runs.at(0).samples.size(), 2U);
+}
+
+TEST(CsvTest, WhatIsSkippedTellsNothingAboutTheDecimalSign) {
+  CsvOptions options;
+  options.required = MaskOf(Signal::kX);
+  options.map.skip = 1;
+  const CsvTable table = ReadCsv(
+      "Plant 2;1.234,5;t\nt_s;CV_pct;X_pct\n0;1.5;2.25\n1;1.5;2.25\n", options);
+  EXPECT_DOUBLE_EQ(table.runs.at(0).samples.at(0).sample[Signal::kX], 2.25);
+}
+
+// Of a long table in UTF-16, with an hour that clocks show twice.
+TEST(CsvTest, TagsOfALongTableAreResampledAndWhatIsFilledIsMarked) {
+  CsvOptions options;
+  options.map.long_table = LongTable{"Tag", "Wert", "Q", {}};
+  options.map.time_column = "Zeit";
+  options.map.zone = "Europe/Warsaw";
+  options.map.columns = {{"CV", Signal::kCv, 1.0, 0.0, Sense::kOpening, "%"},
+                         {"X", Signal::kX, 1.0, 0.0, Sense::kOpening, "%"}};
+  options.map.resampling = Resampling{1.0, true, 5.0};
+  std::string wide("\xFF\xFE", 2);
+  for (const char c : std::string("Tag;Zeit;Wert;Q\r\n"
+                                  "CV;25.10.2026 02:59:58;40,5;Good\r\n"
+                                  "X;25.10.2026 02:59:58;40,5;Good\r\n"
+                                  "CV;25.10.2026 02:00:00;42,5;Good\r\n"
+                                  "X;25.10.2026 02:00:00;7,5;Bad\r\n"
+                                  "X;25.10.2026 02:00:02;48,5;Good\r\n"
+                                  "CV;25.10.2026 02:00:02;44,5;Good\r\n")) {
+    wide += c;
+    wide += '\0';
+  }
+
+  const CsvTable table = ReadCsv(ToUtf8(wide, "input"), options);
+
+  // date -d 2026-10-25T02:59:58+02:00 +%s
+  EXPECT_EQ(table.start_ns, 1'792'889'998'000'000'000);
+  ASSERT_EQ(table.runs.size(), 1U);
+  const auto& samples = table.runs[0].samples;
+  ASSERT_EQ(samples.size(), 5U);
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const Sample& sample = samples[k].sample;
+    const auto quality = [&](bool filled) {
+      return filled ? SignalQuality::kUncertain : SignalQuality::kGood;
+    };
+    EXPECT_DOUBLE_EQ(sample[Signal::kCv], 59.5 - static_cast<double>(k));
+    EXPECT_DOUBLE_EQ(sample[Signal::kX], 59.5 - 2.0 * static_cast<double>(k));
+    EXPECT_EQ(sample.quality[Index(Signal::kCv)], quality(k % 2 == 1));
+    EXPECT_EQ(sample.quality[Index(Signal::kX)], quality(k % 4 != 0));
+  }
+}
+
+TEST(CsvTest, FilesThatCannotBeReadAreNamedWithTheReason) {
+  const storage::TemporaryDirectory directory;
+  const auto message = [](const std::filesystem::path& path) {
+    try {
+      ReadCsvFile(path);
+    } catch (const DataError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THROW(ReadCsvFile(directory.path() / "none.csv"), NotFoundError);
+  EXPECT_THAT(message(directory.path()), HasSubstr("is a directory"));
+}
+
+}  // namespace
+}  // namespace fdi::report

@@ -1,0 +1,360 @@
+// Runs the built program on a history: list, show, ack, export, doctor, backup.
+#include <gmock/gmock.h>
+
+#include "tests/programs/store/store_program_fixture.h"
+
+namespace fdi::storage {
+namespace {
+
+using testing::HasSubstr;
+
+class FdiStoreHistoryTest : public FdiStoreTest {
+ protected:
+  FdiStoreHistoryTest() {
+    HistoryWriter writer(path_);
+    writer.Record(Event(TransitionKind::kDetected, 0, 0, 0.3), kDetected);
+    writer.AppendTrace(Id(), Instants(100, -20));
+    writer.Record(Event(TransitionKind::kIsolated, 20, 0b010, 0.8), kDetected);
+    writer.EndSession(kDetected, true);
+  }
+};
+
+TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
+  const json listed = StoreJson("history list");
+
+  ASSERT_EQ(listed["episodes"].size(), 1U);
+  const json& episode = listed["episodes"][0];
+  EXPECT_THAT(KeysOf(episode),
+              testing::UnorderedElementsAre(
+                  "episode_id", "valve_id", "detected_utc", "isolated_utc",
+                  "cleared_utc", "fault", "peak_factor", "model_set",
+                  "end_reason", "label", "acked_by"));
+  EXPECT_EQ(episode["fault"], "f7");
+  EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
+  EXPECT_TRUE(episode["cleared_utc"].is_null());
+}
+
+TEST_F(FdiStoreHistoryTest, FiltersReachTheQuery) {
+  const auto count = [this](const std::string& arguments) {
+    return StoreJson("history list " + arguments)["episodes"].size();
+  };
+
+  EXPECT_EQ(count("--fault f7"), 1U);
+  EXPECT_EQ(count("--fault paper5"), 0U);
+  EXPECT_EQ(count("--valve 'PV*'"), 0U);
+  EXPECT_EQ(count("--since 2026-11-20T14:56:12Z"), 0U);
+  EXPECT_EQ(count("--until 2026-11-20T14:56:12Z"), 1U);
+  EXPECT_EQ(count("--state isolated"), 1U);
+  EXPECT_EQ(Store("history list --state odd").code, 2);
+  EXPECT_EQ(Store("history list --fault f99").code, 2);
+}
+
+TEST_F(FdiStoreHistoryTest, AcknowledgedAndLabelledEpisodeSaysSo) {
+  EXPECT_EQ(Store("history ack last --by anna --comment 'seat worn'").code, 0);
+  EXPECT_EQ(Store("history label last f1 --by jan").code, 0);
+
+  const json shown = StoreJson("history show last");
+  EXPECT_EQ(shown["acked_by"], "anna");
+  EXPECT_EQ(shown["label"], "f1");
+  EXPECT_EQ(shown["events"].back()["kind"], "LABEL");
+  EXPECT_EQ(shown["trace_instants"], 100);
+  {
+    HistoryWriter writer(path_);
+    CoverageDay count{"LV-1", 20'000, 1.0, {}};
+    count.samples.Add(Quality::kLive, 7200);
+    Checkpoint checkpoint;
+    checkpoint.coverage = {count};
+    writer.CommitCheckpoint(checkpoint);
+  }
+  EXPECT_EQ(StoreJson("history stats")["hours"]["LV-1"]["LIVE"], 2.0);
+  EXPECT_THAT(Store("history stats").out,
+              testing::ContainsRegex("LV-1 +LIVE +2.00 +7200"));
+  const json statistics = StoreJson("history stats")["statistics"];
+  EXPECT_EQ(statistics[0]["labelled_false"], 1);
+  EXPECT_EQ(Store("history label last perhaps").code, 2);
+}
+
+TEST_F(FdiStoreHistoryTest, OfAGapOnlyThePartInTheTimeCounts) {
+  {
+    HistoryWriter writer(path_);
+    writer.AddGap({"", kDetected - 86'400 * kSecond,
+                   kDetected + 86'400 * kSecond, "monitor_down"});
+    writer.Commit(kDetected);
+  }
+  EXPECT_EQ(StoreJson("history stats")["gaps_s"], 172'800.0);
+  const json minute = StoreJson(
+      "history stats --since 2026-11-20T14:56:00Z "
+      "--until 2026-11-20T14:57:00Z");
+  EXPECT_EQ(minute["gaps"], 1);
+  EXPECT_DOUBLE_EQ(minute["gaps_s"], 60.0);
+}
+
+TEST_F(FdiStoreHistoryTest, AGrowingFaultSaysWhenItWillBeFull) {
+  {
+    HistoryWriter writer(path_);
+    for (int day = 0; day < 5; ++day) {
+      const double strength = 0.2 + 0.05 * day;
+      writer.StoreStrength({Id(), kDetected + day * 86'400 * kSecond, 7,
+                            strength, strength - 0.01, strength + 0.01,
+                            Layer::kPhysics});
+    }
+  }
+  const json shown = StoreJson("history show last");
+  ASSERT_EQ(shown["strengths"].size(), 5U);
+  EXPECT_EQ(shown["strengths"][0]["layer"], "physics");
+  EXPECT_EQ(shown["strengths"][4]["strength"], 0.4);
+  ASSERT_EQ(shown["growth"].size(), 1U);
+  const json& growth = shown["growth"][0];
+  EXPECT_EQ(growth["fault"], "f7");
+  EXPECT_EQ(growth["trend"], "growing");
+  EXPECT_NEAR(growth["per_day"].get<double>(), 0.05, 1e-9);
+  EXPECT_NEAR(growth["full_in_s"].get<double>(), 12 * 86'400.0, 1e-3);
+  EXPECT_LT(growth["full_in_s_lowest"], growth["full_in_s"]);
+  EXPECT_GT(growth["full_in_s_highest"], growth["full_in_s"]);
+  EXPECT_THAT(
+      Store("history show last").out,
+      testing::ContainsRegex("f7: strength 0.40 \\(0.39 to 0.41\\), growing "
+                             "by 0.05 a day \\(0.04 to 0.06\\); full in 12.0 "
+                             "days \\(10.5 to 13.8\\), as of 2026-11-24"));
+}
+
+TEST_F(FdiStoreHistoryTest, EveryOneNoticedStandsInTheRecord) {
+  EXPECT_EQ(Store("history ack last --by anna --comment 'on it'").code, 0);
+  EXPECT_EQ(Store("history ack last --by jan").code, 0);
+
+  const json shown = StoreJson("history show last");
+  EXPECT_EQ(shown["acked_by"], "anna");
+  EXPECT_EQ(shown["alarm_state"], "ACKED");
+  EXPECT_EQ(shown["events"].size(), 4U);
+  EXPECT_EQ(shown["events"].back()["who"], "jan");
+  EXPECT_THAT(shown["events"].back()["origin"].get<std::string>(),
+              testing::MatchesRegex("fdi-store .+@.+"));
+}
+
+TEST_F(FdiStoreHistoryTest, AFilterAcknowledgesAllItFindsIfAskedTo) {
+  {
+    HistoryWriter writer(path_);
+    RecordEpisode(writer, 0b001, "PV-1");
+    RecordEpisode(writer, 0b001, "PV-2");
+  }
+  EXPECT_EQ(Store("history ack").code, 2);
+  EXPECT_EQ(Store("history ack last --all").code, 2);
+
+  const json first = StoreJson("history ack --all --valve 'PV-*'");
+  const json again = StoreJson("history ack --all --valve 'PV-*'");
+
+  EXPECT_EQ(first["episodes"].size(), 2U);
+  EXPECT_EQ(again["episodes"].size(), 0U);
+  EXPECT_EQ(StoreJson("history list --state unack")["episodes"].size(), 1U);
+  EXPECT_EQ(StoreJson("history list --state NORMAL")["episodes"].size(), 2U);
+  EXPECT_EQ(Store("history ack last ffff").code, 5);
+}
+
+TEST_F(FdiStoreHistoryTest, AShelvedAlarmSaysSoUntilItIsTakenOff) {
+  const json shelf =
+      StoreJson("history shelve LV-1 --for 1h --by anna --comment ordered");
+  EXPECT_EQ(shelf["shelf"][0]["valve_id"], "LV-1");
+  EXPECT_EQ(StoreJson("history list --state shelved")["episodes"].size(), 1U);
+  EXPECT_THAT(Store("history list").out, HasSubstr("SHELVED"));
+  EXPECT_EQ(StoreJson("history show last")["shelf"]["who"], "anna");
+
+  EXPECT_EQ(StoreJson("history unshelve --valve LV-1")["shelf"].size(), 1U);
+
+  EXPECT_EQ(StoreJson("history shelf")["shelf"].size(), 0U);
+  EXPECT_EQ(StoreJson("history shelf --all")["shelf"].size(), 1U);
+  EXPECT_EQ(Store("history unshelve 1").code, 3);
+  EXPECT_EQ(Store("history unshelve --valve LV-1").code, 5);
+  EXPECT_EQ(Store("history shelve LV-1 --for 91d").code, 2);
+  EXPECT_THAT(Store("history shelve LV-11").err,
+              HasSubstr("warning valve_unknown valve=LV-11 did_you_mean=LV-1"));
+}
+
+TEST_F(FdiStoreHistoryTest, SlipsOfThePenAreSuggested) {
+  EXPECT_THAT(Store("history lsit").err, HasSubstr("did you mean 'list'"));
+  EXPECT_THAT(Store("hsitory list").err, HasSubstr("did you mean 'history'"));
+  EXPECT_THAT(Store("history list --valv x").err,
+              HasSubstr("did you mean '--valve'"));
+  EXPECT_THAT(Store("history list --fault unknwon").err,
+              HasSubstr("did you mean 'unknown'"));
+  EXPECT_THAT(Store("history list --state isolatd").err,
+              HasSubstr("did you mean 'isolated'"));
+  EXPECT_THAT(Store("history label last ff7").err,
+              HasSubstr("did you mean 'f7'"));
+}
+
+TEST_F(FdiStoreHistoryTest, ListIsCsvIfAskedForAndTextWithoutColour) {
+  const std::string csv = Store("history list --csv").out;
+  EXPECT_THAT(csv, testing::StartsWith("episode_id,valve_id,detected_utc,"));
+  EXPECT_EQ(csv, Store("history export").out);
+  EXPECT_EQ(Store("history list --csv --json").code, 2);
+  const std::string text = Store("history list").out;
+  EXPECT_THAT(text, HasSubstr("UNACK"));
+  EXPECT_EQ(text.find('\x1b'), std::string::npos);
+  EXPECT_THAT(Store("history list --valve none").out,
+              HasSubstr("no episode matches"));
+}
+
+TEST_F(FdiStoreHistoryTest, ColourIsForTerminalsThatWantIt) {
+  const std::string list = directory_.path().string() + " history list";
+  const auto on_terminal = [&](const std::string& environment) {
+    const std::string out = (directory_.path() / "terminal.txt").string();
+    const std::string command = environment + " script -qec '\"" +
+                                FDI_STORE_PROGRAM + "\" --data " + list +
+                                "' /dev/null >" + out;
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return Slurp(out);
+  };
+
+  EXPECT_THAT(on_terminal("TERM=xterm NO_COLOR="),
+              HasSubstr("\x1b[1;31mUNACK"));
+  EXPECT_THAT(on_terminal("TERM=xterm NO_COLOR=1"),
+              testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(on_terminal("TERM=dumb"), testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(on_terminal("TERM=xterm COLUMNS=80"), HasSubstr("too narrow"));
+}
+
+TEST_F(FdiStoreHistoryTest, StatisticsHaveDaysValvesFaultsAndLabels) {
+  {
+    HistoryWriter writer(path_);
+    RecordEpisode(writer, 0b001, "PV-1");
+  }
+  Store("history label last false");
+
+  const json stats = StoreJson("history stats");
+
+  EXPECT_EQ(stats["days"][0]["day_utc"], "2026-11-20");
+  EXPECT_EQ(stats["days"][0]["episodes"], 2);
+  EXPECT_EQ(stats["valves"][1]["valve_id"], "PV-1");
+  EXPECT_EQ(stats["valves"][1]["alarm_s"], 91.0);
+  EXPECT_EQ(stats["faults"][0]["fault"], "f1");
+  EXPECT_EQ(stats["faults"][0]["wrong"], 1);
+  EXPECT_EQ(stats["labelled"]["false"], 1);
+  EXPECT_EQ(stats["labelled"]["none"], 1);
+  EXPECT_EQ(stats["most_in_10_min"], 2);
+  EXPECT_THAT(Store("history stats").out, HasSubstr("1 false alarms"));
+}
+
+TEST_F(FdiStoreHistoryTest, TraceIsExportedWithAColumnPerChannelAndFault) {
+  const Outcome outcome = Store("history export last");
+
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.out,
+              testing::StartsWith("t_s,stamp_ns,seq,intake,quality,state,"
+                                  "CV_pct,X_pct,F_m3_h,r_X,r_F,d_0,d_f1,d_f7,"
+                                  "d_f19\n-20,"));
+  EXPECT_EQ(std::count(outcome.out.begin(), outcome.out.end(), '\n'), 101);
+}
+
+TEST_F(FdiStoreHistoryTest, PlotIsAPictureOrAClearError) {
+  const Outcome missing =
+      Store("history plot last --output a.png", "PATH=/nowhere");
+  EXPECT_EQ(missing.code, 1);
+  EXPECT_THAT(missing.err, HasSubstr("gnuplot cannot run"));
+  EXPECT_EQ(Store("history plot last --output a.bmp").code, 2);
+  if (std::system("gnuplot --version >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "gnuplot is not installed";
+  }
+
+  EXPECT_EQ(Store("history plot last --output a.png").code, 0);
+
+  EXPECT_EQ(Slurp(directory_.path() / "a.png").substr(1, 3), "PNG");
+  EXPECT_EQ(Store("history plot last -o a.svg --from -10").code, 0);
+  EXPECT_THAT(Slurp(directory_.path() / "a.svg"), HasSubstr("isolated f7"));
+}
+
+TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
+  const json report = StoreJson("doctor");
+
+  EXPECT_EQ(report["sound"], true);
+  ASSERT_EQ(report["databases"].size(), 3U);
+  EXPECT_EQ(report["databases"][0]["present"], false);
+  EXPECT_EQ(report["databases"][2]["version"], 10);
+  EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
+  EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
+}
+
+TEST_F(FdiStoreHistoryTest, DoctorExitsWithThreeOnADamagedFile) {
+  const auto size = std::filesystem::file_size(path_);
+  std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(4096 * 2);
+  for (std::uintmax_t at = 4096 * 2; at < size; ++at) {
+    file.put('\x5A');
+  }
+  file.close();
+
+  const Outcome outcome = Store("doctor --json");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(json::parse(outcome.out)["sound"], false);
+}
+
+// Such an id is valid text to SQLite, but the event cannot be sent.
+TEST_F(FdiStoreHistoryTest, DoctorFindsADamagedIdInTheOutbox) {
+  {
+    Database database(path_, HistorySchema(), Access::kOccasionalWriter);
+    Transaction transaction(database);
+    database.Run(
+        "INSERT INTO episode (episode_id, session_id, valve_id, source_id, "
+        "detected_ns, peak_factor, strength, model_set, model_hash, flow_unit, "
+        "channels, faults) SELECT 'zzzzzzzzzzzzzzzz', session_id, valve_id, "
+        "source_id, detected_ns, peak_factor, strength, model_set, model_hash, "
+        "flow_unit, channels, faults FROM episode");
+    database.Run(
+        "INSERT INTO episode_event (event_id, episode_id, kind, stamp_ns, "
+        "recorded_ns) VALUES (99, 'zzzzzzzzzzzzzzzz', 'DETECTED', 1, 1)");
+    database.Run("INSERT INTO event_outbox VALUES (99)");
+    transaction.Commit();
+  }
+
+  const Outcome outcome = Store("doctor --json");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(json::parse(outcome.out)["databases"][2]["troubles"],
+            json::array({"episode 'zzzzzzzzzzzzzzzz': its id is not 16 hex "
+                         "digits",
+                         "episode_event 99: its episode id 'zzzzzzzzzzzzzzzz' "
+                         "is not 16 hex digits (in event_outbox, not sent)"}));
+  EXPECT_THAT(Store("doctor").out, HasSubstr("not 16 hex digits"));
+}
+
+// gnuplot does not accept two single quotes at the beginning of a string.
+TEST_F(FdiStoreHistoryTest, PictureOfAValveWhoseIdBeginsWithAQuote) {
+  if (std::system("gnuplot --version >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "gnuplot is not installed";
+  }
+  {
+    HistoryWriter writer(path_);
+    RecordEpisode(writer, 0b001, "'1\"");
+    writer.AppendTrace(Id("'1\""), Instants(50, -10));
+    writer.EndSession(kDetected, true);
+  }
+  const std::string id = EpisodeIdText(Id("'1\""));
+
+  EXPECT_EQ(Store("history plot " + id + " -o a.svg").code, 0);
+
+  EXPECT_THAT(Slurp(directory_.path() / "a.svg"), HasSubstr("'1\":  f1"));
+}
+
+TEST_F(FdiStoreHistoryTest, PruneTellsWhatWentAndNeedsALimit) {
+  EXPECT_EQ(Store("prune").code, 2);
+  EXPECT_EQ(Store("prune --runs-age 90d").code, 5);
+
+  const json dry = StoreJson("prune --history-age 0s --dry-run");
+  EXPECT_EQ(dry["dry_run"], true);
+  const json done = StoreJson("prune --history-age 0s --history-size 1B");
+  EXPECT_EQ(done["databases"][0]["name"], "history.db");
+  EXPECT_EQ(done["databases"][0]["deleted"], 0);
+  EXPECT_EQ(done["databases"][0]["protected"], 1);
+  EXPECT_EQ(done["databases"][0]["fits"], false);
+}
+
+TEST_F(FdiStoreHistoryTest, BackupIsACompleteCopyAndNeverOverwrites) {
+  EXPECT_EQ(Store("backup copy").code, 0);
+
+  EXPECT_EQ(HistoryReader(directory_.path() / "copy/history.db").List().size(),
+            1U);
+  EXPECT_EQ(Store("backup copy").code, 3);
+}
+
+}  // namespace
+}  // namespace fdi::storage

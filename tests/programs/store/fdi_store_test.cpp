@@ -1,0 +1,342 @@
+// Runs the built program: exit codes, messages, JSON keys, nothing stored.
+#include <algorithm>
+#include <iterator>
+
+#include <gmock/gmock.h>
+
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
+#include "tests/programs/store/store_program_fixture.h"
+#include "tests/storage/model_set_fixture.h"
+
+namespace fdi::storage {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST_F(FdiStoreTest, ImportedRunIsListedAndExportedAsItWas) {
+  Write("a.csv", header_ + Rows(5));
+
+  const json imported = StoreJson("runs import a.csv --valve LV-1");
+
+  EXPECT_EQ(imported["samples"], 5);
+  EXPECT_EQ(imported["flow_unit"], "t/h");
+  EXPECT_EQ(imported["period_s"], 1.0);
+  const std::string id = imported["run_id"];
+  EXPECT_EQ(id.size(), 12U);
+  const json listed = StoreJson("runs list");
+  ASSERT_EQ(listed["runs"].size(), 1U);
+  EXPECT_EQ(listed["runs"][0]["run_id"], id);
+  EXPECT_EQ(Store("runs export " + id).out, header_ + Rows(5));
+  EXPECT_EQ(Store("runs export " + id + "@1:3").out, header_ + Rows(2, 1));
+}
+
+// Not m3/h: that would be stored without a word.
+TEST_F(FdiStoreTest, SniffTakesTheUnitThatTheNameOfAColumnEndsWith) {
+  Write("a.csv", header_ + Rows(30));
+
+  const json sniffed = StoreJson("runs sniff a.csv --map-output tags.toml");
+
+  EXPECT_THAT(header_, HasSubstr("F_t_h"));
+  const json& columns = sniffed["columns"];
+  const auto flow = std::ranges::find(columns, "F_t_h", [](const json& column) {
+    return column["column"].get<std::string>();
+  });
+  ASSERT_NE(flow, columns.end());
+  EXPECT_EQ((*flow)["unit"], "t/h");
+}
+
+TEST_F(FdiStoreTest, SniffDoesNotTakeSecondsForDaysOfASpreadsheet) {
+  const std::string row = ",40.5,3500,2500,130,41,22\n";
+  Write("t.csv", header_ + "30000.5" + row + "30001.5" + row + "30002.5" + row);
+  Write("late.csv", "Time" + header_.substr(3) + "29999.5" + row + "30000" +
+                        row + "30000.5" + row + "30001" + row);
+
+  EXPECT_EQ(StoreJson("runs sniff t.csv")["period_s"], 1.0);
+  // As in the importer, the first row decides for all.
+  EXPECT_EQ(StoreJson("runs sniff late.csv")["period_s"], 0.5);
+}
+
+TEST_F(FdiStoreTest, TheMapOfSniffTakesNamesOfSeveralLines) {
+  std::string rows;
+  for (int i = 0; i < 30; ++i) {
+    rows += std::to_string(i) + "," + std::to_string(20 + i % 7) + "," +
+            std::to_string(50 - i % 7) + "\n";
+  }
+  Write("lines.csv", "t_s,CV_pct,\"Flow\n[m3/h]\"\n" + rows);
+
+  StoreJson("runs sniff lines.csv --map-output lines.toml");
+  const json imported = StoreJson(
+      "runs import lines.csv --valve V1 --map lines.toml --signals CV,F");
+  EXPECT_EQ(imported["samples"], 30);
+}
+
+TEST_F(FdiStoreTest, AValveThatNoSampleCanHaveIsRefused) {
+  Write("a.csv", header_ + Rows(5));
+  for (const std::string& valve :
+       {std::string("''"), std::string(65, 'V'), std::string("'V\n1'")}) {
+    EXPECT_EQ(Store("runs import a.csv --valve " + valve).code, 2) << valve;
+  }
+}
+
+TEST_F(FdiStoreTest, CsvWithoutAColumnIsRefusedAndNothingIsStored) {
+  Write("a.csv", "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,F_t_h\n0,1,2,3,4,5\n");
+
+  const Outcome outcome = Store("runs import a.csv --valve LV-1");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("a.csv"), HasSubstr("X_pct")));
+  EXPECT_FALSE(RunsAreStored());
+}
+
+TEST_F(FdiStoreTest, TextInANumberIsRefusedWithItsLine) {
+  Write("a.csv", header_ + Rows(3) + "3,40.5,3500,x12,130,41,22\n");
+
+  const Outcome outcome = Store("runs import a.csv --valve LV-1");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("a.csv:5"), HasSubstr("P2_kPa")));
+  EXPECT_FALSE(RunsAreStored());
+}
+
+TEST_F(FdiStoreTest, JumpInTimeIsRefusedUnlessGapsMaySplitTheRun) {
+  Write("a.csv", header_ + Rows(5) + Rows(4, 10));
+
+  const Outcome outcome = Store("runs import a.csv --valve LV-1");
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("a.csv:7"));
+  EXPECT_FALSE(RunsAreStored());
+
+  const json split = StoreJson("runs import a.csv --valve LV-1 --split-gaps");
+  ASSERT_EQ(split["runs"].size(), 2U);
+  EXPECT_EQ(split["runs"][0]["samples"], 5);
+  EXPECT_EQ(split["runs"][1]["samples"], 4);
+  EXPECT_EQ(split["samples"], 9);
+}
+
+TEST_F(FdiStoreTest, EmptyFileIsRefused) {
+  Write("empty.csv", "");
+  Write("header.csv", header_);
+
+  for (const char* file : {"empty.csv", "header.csv"}) {
+    const Outcome outcome =
+        Store("runs import " + std::string(file) + " --valve LV-1");
+    EXPECT_EQ(outcome.code, 3);
+    EXPECT_THAT(outcome.err, HasSubstr(file));
+  }
+  EXPECT_FALSE(RunsAreStored());
+}
+
+TEST_F(FdiStoreTest, MapGivesForeignColumnsTheirSignalUnitAndSense) {
+  Write("foreign.csv",
+        "ms,MV,PI1,PI2,TI,ZI,FI\n0,59.5,35,26,403.15,0.59,6\n"
+        "1000,59.5,35,26,403.15,0.59,6\n");
+  Write("tags.toml",
+        "[time]\ncolumn = \"ms\"\nunit = \"ms\"\n"
+        "[signal.CV]\ncolumn = \"MV\"\nsense = \"opening\"\n"
+        "[signal.P1]\ncolumn = \"PI1\"\nunit = \"bar\"\n"
+        "[signal.P2]\ncolumn = \"PI2\"\nunit = \"bar\"\n"
+        "[signal.T1]\ncolumn = \"TI\"\nunit = \"K\"\n"
+        "[signal.X]\ncolumn = \"ZI\"\nunit = \"1\"\nsense = \"opening\"\n"
+        "[signal.F]\ncolumn = \"FI\"\nunit = \"kg/s\"\nscale = 2\n");
+
+  const json run =
+      StoreJson("runs import foreign.csv --valve V --map tags.toml");
+
+  const std::string id = run["run_id"];
+  EXPECT_EQ(run["flow_unit"], "t/h");
+  std::istringstream lines(Store("runs export " + id).out);
+  std::string header;
+  std::string row;
+  std::getline(lines, header);
+  std::getline(lines, row);
+  std::replace(row.begin(), row.end(), ',', ' ');
+  std::istringstream cells(row);
+  std::vector<double> values((std::istream_iterator<double>(cells)), {});
+  using testing::DoubleNear;
+  EXPECT_THAT(values,
+              ElementsAre(0.0, DoubleNear(40.5, 1e-9), DoubleNear(3500, 1e-9),
+                          DoubleNear(2600, 1e-9), DoubleNear(130, 1e-9),
+                          DoubleNear(41, 1e-9), DoubleNear(43.2, 1e-9)));
+}
+
+TEST_F(FdiStoreTest, UnknownKeyOrUnitInAMapIsAConfigurationError) {
+  Write("a.csv", header_ + Rows(5));
+  Write("key.toml", "[signal.CV]\ncolumn = \"CV_pct\"\nscal = 2.0\n");
+  Write("unit.toml", "[signal.P1]\ncolumn = \"P1_kPa\"\nunit = \"atm\"\n");
+
+  const Outcome key = Store("runs import a.csv --valve V --map key.toml");
+  const Outcome unit = Store("runs import a.csv --valve V --map unit.toml");
+
+  EXPECT_EQ(key.code, 2);
+  EXPECT_THAT(key.err, HasSubstr("key.toml:3: unknown key 'scal'"));
+  EXPECT_EQ(unit.code, 2);
+  EXPECT_THAT(unit.err, AllOf(HasSubstr("atm"), HasSubstr("kPa Pa mbar bar")));
+  EXPECT_FALSE(RunsAreStored());
+}
+
+TEST_F(FdiStoreTest, UsageErrorsExitWithTwo) {
+  EXPECT_EQ(Store("runs list --no-such-option").code, 2);
+  EXPECT_EQ(Store("runs").code, 2);
+  EXPECT_EQ(Store("history lsit").code, 2);
+  EXPECT_EQ(Store("runs import a.csv").code, 2);  // --valve is missing.
+  EXPECT_EQ(Store("runs list --since yesterday").code, 2);
+  Write("bad.toml", "domian = 3\n");
+  const Outcome outcome = Store("runs list --config bad.toml");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("unknown key 'domian'"));
+}
+
+TEST_F(FdiStoreTest, WhatIsNotThereExitsWithFive) {
+  Write("a.csv", header_ + Rows(5));
+  Store("runs import a.csv --valve LV-1");
+  Store("valves add LV-1");
+  { HistoryWriter writer(path_); }
+
+  EXPECT_EQ(Store("runs show 0123456789ab").code, 5);
+  EXPECT_EQ(Store("runs import no.csv --valve LV-1").code, 5);
+  EXPECT_EQ(Store("models show nothing").code, 5);
+  EXPECT_EQ(Store("models activate nothing@1").code, 5);
+  EXPECT_EQ(Store("valves show PV-9").code, 5);
+  EXPECT_EQ(Store("valves assign LV-1 nothing").code, 5);
+  EXPECT_EQ(Store("history show 0123456789abcdef").code, 5);
+  EXPECT_EQ(Store("history ack last").code, 5);
+}
+
+TEST_F(FdiStoreTest, DataDirectoryThatIsAFileExitsWithThree) {
+  Write("a.csv", header_ + Rows(5));
+  Write("file", "");
+
+  const Outcome outcome = Store("runs import a.csv --valve V --data ./file");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("file"));
+}
+
+TEST_F(FdiStoreTest, DatabaseOfANewerVersionIsRefusedWithBothVersions) {
+  Schema newer = RunsSchema();
+  const auto version = newer.migrations.size();
+  newer.migrations.push_back("CREATE TABLE later (x INTEGER) STRICT;");
+  { Database(directory_.path() / "runs.db", newer, Access::kWriter); }
+
+  const Outcome outcome = Store("runs list");
+
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("version " + std::to_string(version + 1)),
+                    HasSubstr("up to " + std::to_string(version))));
+}
+
+TEST_F(FdiStoreTest, LabelsAreShownAndRemoved) {
+  Write("a.csv", header_ + Rows(5));
+  const std::string id =
+      StoreJson("runs import a.csv --valve V --assume-normal")["run_id"];
+  EXPECT_EQ(Store("runs label " + id + "@2:4 F7 --strength 0.5").code, 0);
+
+  const json labels = StoreJson("runs show " + id)["labels"];
+  ASSERT_EQ(labels.size(), 2U);
+  EXPECT_EQ(labels[0]["fault"], "normal");
+  EXPECT_EQ(labels[1]["fault"], "f7");
+  EXPECT_EQ(labels[1]["from_s"], 2.0);
+
+  EXPECT_EQ(Store("runs label " + id + " --remove").code, 0);
+  EXPECT_THAT(StoreJson("runs show " + id)["labels"], IsEmpty());
+  EXPECT_EQ(Store("runs delete " + id + "@0:2").code, 2);
+  EXPECT_EQ(StoreJson("runs list")["runs"].size(), 1U);
+  EXPECT_EQ(Store("runs delete " + id).code, 0);
+  EXPECT_THAT(StoreJson("runs list")["runs"], IsEmpty());
+}
+
+TEST_F(FdiStoreTest, ValvesAreDescribedAndTheirEpochCounts) {
+  EXPECT_EQ(Store("valves add 'LV-*' --flow-unit t/h --sense opening").code, 0);
+  EXPECT_EQ(Store("valves event 'LV-*' --kind repacked --note 'new packing' "
+                  "--at 2026-01-02T03:04:05Z --by me")
+                .code,
+            0);
+  EXPECT_EQ(Store("valves event 'LV-*'").code, 2);
+  EXPECT_EQ(Store("valves event 'LV-*' --kind painted").code, 2);
+  EXPECT_EQ(Store("valves event LV-1 --kind replaced").code, 5);
+
+  const json valve = StoreJson("valves show LV-7");
+
+  EXPECT_EQ(valve["valve"], "LV-*");
+  EXPECT_EQ(valve["flow_unit"], "t/h");
+  EXPECT_EQ(valve["sense"], "opening");
+  EXPECT_EQ(valve["epoch"], 1);
+  EXPECT_EQ(valve["baseline"], "provisional");
+  EXPECT_TRUE(valve["diagnosed_with"].is_null());
+  ASSERT_EQ(valve["events"].size(), 1U);
+  EXPECT_EQ(valve["events"][0]["kind"], "repacked");
+  EXPECT_EQ(valve["events"][0]["at_utc"], "2026-01-02T03:04:05Z");
+}
+
+TEST_F(FdiStoreTest, BaselinesOfEpochsAreShownSideBySide) {
+  {
+    ModelStore models(directory_.path() / "models.db",
+                      Access::kOccasionalWriter);
+    models.Save(RandomModelSet("pump", 3, 1));
+    BaselineRecord record{0,   "pump",           1,
+                          1.5, {{"kv", 118.25}}, {{"X", 0.25, 0.001, 99.5}}};
+    models.SetBaseline("LV-1", record);
+    models.AddValveEvent("LV-1", {});
+    record.epoch = 1;
+    record.parameters = {{"kv", 131.5}, {"play", 0.02}, {"air", 2.498e-6}};
+    models.SetBaseline("LV-1", record);
+    models.SaveTemplate("globe", std::vector<std::byte>(7), "19 faults");
+  }
+  const std::string shown = Store("valves show LV-1").out;
+  EXPECT_THAT(shown, AllOf(HasSubstr("epoch 0: pump@1"),
+                           HasSubstr("epoch 1: pump@1"), HasSubstr("valid"),
+                           testing::ContainsRegex("kv +118.25[0-9]* +131.5"),
+                           testing::ContainsRegex("play +- +0.02"),
+                           testing::ContainsRegex("air +- +2.498e-06")));
+  const json valve = StoreJson("valves show LV-1");
+  EXPECT_EQ(valve["baselines"][1]["parameters"]["kv"], 131.5);
+  EXPECT_EQ(valve["baselines"][0]["channels"][0]["vaf"], 99.5);
+
+  EXPECT_EQ(StoreJson("types list")["types"][0]["name"], "globe");
+  EXPECT_EQ(StoreJson("types show globe")["bytes"], 7);
+  EXPECT_EQ(Store("types delete globe").code, 0);
+  EXPECT_EQ(Store("types show globe").code, 5);
+}
+
+// T1 of a water loop is one number all day: a variance of nothing but rounding.
+TEST_F(FdiStoreTest, OutputThatStoodStillHasNoVaf) {
+  {
+    ModelSet models = RandomModelSet("still", 2, 1);
+    models.observers[0].channels[1].validation.vaf = -1.3e29;
+    ModelStore(directory_.path() / "models.db", Access::kOccasionalWriter)
+        .Save(models);
+  }
+
+  EXPECT_TRUE(
+      StoreJson("models list")["model_sets"][0]["lowest_vaf"].is_null());
+  EXPECT_THAT(Store("models list").out,
+              testing::Not(HasSubstr("0000000000000000000")));
+  EXPECT_THAT(Store("models show still").out,
+              HasSubstr("the output did not vary in the validation data, so "
+                        "there is no variance to account for (F of normal)"));
+  const json shown = StoreJson("models show still");
+  EXPECT_TRUE(shown["observers"][0]["channels"][1]["vaf"].is_null());
+  EXPECT_TRUE(shown["observers"][0]["channels"][0]["vaf"].is_number());
+}
+
+TEST_F(FdiStoreTest, WhatTakesOutputTakesMinusO) {
+  Write("a.csv", header_ + Rows(5));
+  const std::string id = StoreJson("runs import a.csv --valve LV-1")["run_id"];
+  ModelStore(directory_.path() / "models.db", Access::kOccasionalWriter)
+      .Save(RandomModelSet("pump", 2, 1));
+  { HistoryWriter writer(path_); }
+
+  EXPECT_EQ(Store("runs export " + id + " -o run.csv").code, 0);
+  EXPECT_EQ(Slurp(directory_.path() / "run.csv"), header_ + Rows(5));
+  EXPECT_EQ(Store("models export pump -o pump.fdm").code, 0);
+  EXPECT_EQ(Store("models import pump.fdm").code, 0);
+  EXPECT_EQ(Store("history export -o history.csv").code, 0);
+}
+
+}  // namespace
+}  // namespace fdi::storage

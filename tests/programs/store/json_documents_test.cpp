@@ -1,0 +1,451 @@
+// docs/json.md and the programs say the same: every key that a verb prints is
+// documented, and every documented key is printed by some verb.
+#include <map>
+#include <regex>
+#include <set>
+
+#include <gmock/gmock.h>
+
+#include "storage/models/models.h"
+#include "tests/programs/store/store_program_fixture.h"
+#include "tests/storage/model_set_fixture.h"
+#include "tests/storage/private_postgres.h"
+
+namespace fdi::storage {
+namespace {
+
+using testing::IsEmpty;
+
+// A type of the page: a word (string, time, run, ...), perhaps "or null", or an
+// example of JSON with such words in it: ["run"], {"*": "number"}.
+struct Type {
+  json shape;
+  bool or_null{false};
+};
+
+Type ParseType(std::string text) {
+  Type type;
+  const std::string null = " or null";
+  if (text.ends_with(null)) {
+    type.or_null = true;
+    text.resize(text.size() - null.size());
+  }
+  std::erase(text, '`');
+  type.shape = text.front() == '[' || text.front() == '{' ? json::parse(text)
+                                                          : json(text);
+  return type;
+}
+
+// What docs/json.md says.
+class Page {
+ public:
+  using Kind = std::map<std::string, Type>;
+
+  explicit Page(const std::string& text) {
+    // A cell may hold "\|", which is no border.
+    const std::regex row(R"(^\| `([^`]+)` \| ((?:[^|\\]|\\.)*?) ?\|.*)");
+    std::istringstream lines(text);
+    std::string kind;
+    for (std::string line; std::getline(lines, line);) {
+      std::smatch match;
+      if (line.starts_with("### `")) {
+        kind = line.substr(5, line.rfind('`') - 5);
+        kinds_[kind];
+      } else if (line.starts_with("## ")) {
+        kind.clear();
+      } else if (std::regex_match(line, match, row)) {
+        AddRow(kind, match[1], match[2]);
+      }
+    }
+  }
+
+  // Notes what `value` does not share with `type` in complaints().
+  void Check(const json& value, const Type& type, const std::string& where) {
+    if (value.is_null() && type.or_null) {
+      return;
+    }
+    if (type.shape.is_array()) {
+      if (!value.is_array()) {
+        return Complain(where + " is no list");
+      }
+      for (const json& item : value) {
+        Check(item, {type.shape[0]}, where + "[]");
+      }
+    } else if (type.shape.is_object()) {
+      CheckObject(value, type.shape, where);
+    } else {
+      CheckWord(value, type.shape, where);
+    }
+  }
+
+  const std::map<std::string, Type>& verbs() const { return verbs_; }
+  std::vector<std::string> complaints() const { return complaints_; }
+  // "run.seed": documented in a kind of which `verbs` print something, and
+  // printed by none of them.
+  // Left out are kinds and keys in `others`, which other programs print, or
+  // these for model sets that the test does not make.
+  std::vector<std::string> Unseen(const std::set<std::string>& verbs,
+                                  const std::set<std::string>& others) const {
+    std::set<std::string> kinds;
+    for (const std::string& verb : verbs) {
+      AddKinds(verbs_.at(verb).shape, kinds);
+    }
+    std::vector<std::string> unseen;
+    for (const std::string& name : kinds) {
+      for (const auto& [key, type] : kinds_.at(name)) {
+        if (!key.starts_with("...") && !seen_.contains(name + '.' + key) &&
+            !others.contains(name) && !others.contains(name + '.' + key)) {
+          unseen.push_back(name + '.' + key);
+        }
+      }
+    }
+    return unseen;
+  }
+
+ private:
+  void AddRow(const std::string& kind, const std::string& key,
+              const std::string& type) {
+    if (!kind.empty()) {
+      kinds_[kind][key] = key.starts_with("...") ? Type{} : ParseType(type);
+    } else if (key.starts_with("fdi-")) {
+      verbs_[key] = ParseType(type);
+    }
+  }
+
+  // All kinds that a type leads to.
+  void AddKinds(const json& shape, std::set<std::string>& kinds) const {
+    if (shape.is_string()) {
+      const auto found = kinds_.find(shape.get<std::string>());
+      if (found != kinds_.end() && kinds.insert(found->first).second) {
+        for (const auto& [key, type] : found->second) {
+          AddKinds(key.starts_with("...") ? json(key.substr(3)) : type.shape,
+                   kinds);
+        }
+      }
+    }
+    for (const json& part : shape.is_structured() ? shape : json::array()) {
+      AddKinds(part, kinds);
+    }
+  }
+
+  void Complain(const std::string& text) { complaints_.push_back(text); }
+
+  void CheckObject(const json& value, const json& shape,
+                   const std::string& where) {
+    if (!value.is_object()) {
+      return Complain(where + " is no object");
+    }
+    for (const auto& [key, item] : value.items()) {
+      const auto found =
+          shape.contains(key) ? shape.find(key) : shape.find("*");
+      if (found == shape.end()) {
+        Complain(where + "." + key + " is not documented");
+      } else {
+        Check(item, {*found}, where + "." + key);
+      }
+    }
+  }
+
+  // The kind that documents `key` of `kind`, itself or one that it includes.
+  std::string OwnerOf(const std::string& kind, const std::string& key) const {
+    for (const auto& [name, type] : kinds_.at(kind)) {
+      if (name == key) {
+        return kind;
+      }
+      if (name.starts_with("...")) {
+        const std::string owner = OwnerOf(name.substr(3), key);
+        if (!owner.empty()) {
+          return owner;
+        }
+      }
+    }
+    return "";
+  }
+
+  void CheckWord(const json& value, const std::string& word,
+                 const std::string& where) {
+    if (kinds_.contains(word)) {
+      if (!value.is_object()) {
+        return Complain(where + " is no " + word);
+      }
+      for (const auto& [key, item] : value.items()) {
+        const std::string owner = OwnerOf(word, key);
+        if (owner.empty()) {
+          Complain(where + "." + key + " is not documented in " + word);
+          continue;
+        }
+        seen_.insert(owner + '.' + key);
+        Check(item, kinds_.at(owner).at(key), where + "." + key);
+      }
+      return;
+    }
+    static const std::regex time(R"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z)");
+    const bool fits = word == "any"       ? true
+                      : word == "string"  ? value.is_string()
+                      : word == "boolean" ? value.is_boolean()
+                      : word == "integer" ? value.is_number_integer()
+                      : word == "number"  ? value.is_number()
+                      : word == "time"
+                          ? value.is_string() &&
+                                std::regex_match(value.get<std::string>(), time)
+                          : false;
+    if (!fits) {
+      Complain(where + " = " + value.dump() + " is no " + word);
+    }
+  }
+
+  std::map<std::string, Kind> kinds_;
+  std::map<std::string, Type> verbs_;
+  std::set<std::string> seen_;
+  std::vector<std::string> complaints_;
+};
+
+// A data directory in which every kind of record has something to say.
+class JsonDocumentsTest : public FdiStoreTest {
+ protected:
+  JsonDocumentsTest() {
+    Write("a.csv",
+          "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_t_h,note\n"
+          "0,40,3500,2600,130,41,22,1\n1,40,3500,2600,130,41,22,1\n");
+    StoreModels();
+    StoreHistory();
+  }
+
+  void StoreModels() {
+    ModelStore models(directory_.path() / "models.db",
+                      Access::kOccasionalWriter);
+    const ModelSet parent = models.Save(RandomModelSet("pump", 3, 1));
+    Lineage lineage;
+    lineage.settings = R"({"seed": 1})";
+    lineage.parent = {{parent.name, parent.version, parent.content_hash}};
+    lineage.episodes = {{"00c0ffee12345678", "LV-1", "f1", "anna", kDetected, 1,
+                         0.5, "0123456789ab", 100}};
+    models.Save(RandomModelSet("pump", 3, 2), Activation::kAlways, lineage);
+    models.SetBaseline(
+        "LV-1",
+        {0, "pump", 1, 1.5, {{"kv", 118.25}}, {{"X", 0.25, 0.001, 99.5}}});
+    models.SaveTemplate("globe", std::vector<std::byte>(7), "19 faults");
+  }
+
+  void StoreHistory() {
+    HistoryWriter writer(path_);
+    RecordEpisode(writer, 0b010);
+    writer.AppendTrace(Id(), Instants(20, -5));
+    EpisodeLook look;
+    look.episode_id = Id();
+    look.first_ns = kDetected;
+    look.period_ns = kSecond;
+    look.faults = {{7, 0.5, 0.4, 0.6, kDetected, false}};
+    writer.StoreLook(look);
+    for (int hour = 0; hour < 3; ++hour) {
+      writer.StoreStrength({Id(), kDetected + hour * 3600 * kSecond, 7,
+                            0.1 * (hour + 1), 0.1 * hour + 0.09,
+                            0.1 * hour + 0.11, Layer::kPhysics});
+    }
+    CoverageDay day{"LV-1", 20'000, 1.0, {}};
+    day.samples.Add(Quality::kLive, 7200);
+    std::vector<HealthHour> hours(12);
+    for (int i = 0; i < 12; ++i) {
+      HealthHour& hour = hours[static_cast<std::size_t>(i)];
+      hour.valve_id = "LV-1";
+      hour.hour = 480'000 + 24 * i;
+      hour.model_hash = 1;
+      hour.seen_ms = hour.live_ms = 3'600'000;
+      hour.channels = {{Signal::kX, -10}};
+      hour.bins[7] = {{3600, 3600LL * 51 * i, 0, 3600LL * 71'000}};
+      hour.strengths = {{1, 3600, 3600LL * 100}};
+    }
+    Checkpoint checkpoint;
+    checkpoint.coverage = {day};
+    checkpoint.health = hours;
+    writer.CommitCheckpoint(checkpoint);
+    writer.EndSession(kDetected, true);
+    Database database(path_, HistorySchema(), Access::kOccasionalWriter);
+    Transaction transaction(database);
+    database.Run(
+        "INSERT INTO common_cause VALUES ('00000000000000aa', 'air', ?, NULL)",
+        kDetected);
+    database.Run(
+        "INSERT INTO common_cause_member SELECT '00000000000000aa', "
+        "episode_id, "
+        "valve_id, 'f7', detected_ns FROM episode");
+    database.Run(
+        "INSERT INTO shadow_difference VALUES (1, 'LV-1', 1, ?1, ?1 + 1000, 5, "
+        "'pump@1', 1, 'ISOLATED', 'f7', 'pump@2', 2, 'NORMAL', NULL)",
+        kDetected);
+    transaction.Commit();
+  }
+
+  // The document of a verb, compared with what the page says of it.
+  json Printed(Page& page, const std::string& verb,
+               const std::string& arguments = "",
+               const std::string& program = "fdi-store") {
+    const auto type = page.verbs().find(program + " " + verb);
+    if (type == page.verbs().end()) {
+      ADD_FAILURE() << program << " " << verb << " is not on the page";
+      return {};
+    }
+    called_.insert(type->first);
+    const auto bin = std::filesystem::path(FDI_STORE_PROGRAM).parent_path();
+    const int status =
+        std::system(("cd " + directory_.path().string() + " && \"" +
+                     (bin / program).string() + "\" --data . " + verb + " " +
+                     arguments + " --json >out.txt 2>err.txt")
+                        .c_str());
+    EXPECT_EQ(status, 0) << verb << ": "
+                         << Slurp(directory_.path() / "err.txt");
+    const json document =
+        json::parse(Slurp(directory_.path() / "out.txt"), nullptr, false);
+    page.Check(document, type->second, verb);
+    return document;
+  }
+
+  std::set<std::string> called_;
+};
+
+TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
+  Page page(Slurp(FDI_JSON_PAGE));
+  const std::string id =
+      Printed(page, "runs import", "a.csv --valve LV-1")["run_id"];
+  Printed(page, "runs sniff", "a.csv --map-output tags.toml");
+  Printed(page, "runs label", id + "@0:1 f7");
+  Printed(page, "runs list");
+  Printed(page, "runs show", id);
+  Printed(page, "models list");
+  Printed(page, "models activate", "pump@1");
+  Printed(page, "models show", "pump@2");
+  Printed(page, "models export", "pump@2 -o pump.fdm");
+  Printed(page, "models import", "pump.fdm");
+  Printed(page, "types list");
+  Printed(page, "types show", "globe");
+  Printed(page, "types delete", "globe");
+  Printed(page, "valves add", "'PV-*' --type globe");
+  Printed(page, "valves event", "LV-1 --kind repacked");
+  Printed(page, "valves assign", "LV-1 pump@2");
+  Printed(page, "valves list");
+  Printed(page, "valves show", "LV-1");
+  Printed(page, "valves move", "LV-1 --to moved");
+  Printed(page, "valves remove", "'PV-*'");
+  Printed(page, "history shelve", "LV-1 --for 1h --comment ordered");
+  Printed(page, "history shelf");
+  Printed(page, "history list");
+  Printed(page, "history ack", "last");
+  Printed(page, "history label", "last f7 --comment seen");
+  Printed(page, "history show", "last");
+  Printed(page, "history stats");
+  Printed(page, "history causes");
+  Printed(page, "history shadow");
+  Printed(page, "history unshelve", "--valve LV-1");
+  Printed(page, "faults");
+  Printed(page, "health show", "--valve LV-1");
+  Printed(page, "health trend", "--valve LV-1 --limit X=3");
+  Printed(page, "worklist", "--since 2020-01-01 --limit X=0.01");
+  Printed(page, "keys init", "keys");
+  Printed(page, "keys add", "keys monitor-1 --role monitor");
+  Printed(page, "keys renew", "keys monitor-1");
+  Printed(page, "keys list", "keys");
+  Printed(page, "doctor");
+  Printed(page, "backup", "copy");
+  Printed(page, "migrate");
+  Printed(page, "prune", "--history-age 1d --dry-run");
+  if (PrivatePostgres::IsInstalled()) {
+    PrivatePostgres server;
+    server.Create("plant");
+    const std::string to = "--to '" + server.Url("plant") + "'";
+    Printed(page, "ship --init", to);
+    Printed(page, "ship", to);
+    const std::string from = "'" + server.Url("plant") + "'";
+    Printed(page, "history list --from", from);
+    Printed(page, "history show --from", from + " last");
+    Printed(page, "health show --from", from + " --valve LV-1");
+    Printed(page, "worklist --from",
+            from + " --since 2020-01-01 --limit X=0.01");
+    Printed(page, "ship --prune", to + " --history-age 36000d");
+    Printed(page, "ship --forget");
+  } else {
+    called_.insert(
+        {"fdi-store ship", "fdi-store ship --init", "fdi-store ship --prune",
+         "fdi-store ship --forget", "fdi-store history list --from",
+         "fdi-store history show --from", "fdi-store health show --from",
+         "fdi-store worklist --from"});
+  }
+  if (std::system("gnuplot --version >/dev/null 2>&1") == 0) {
+    Printed(page, "runs plot", id);
+    Printed(page, "history plot", "last");
+  } else {
+    called_.insert({"fdi-store runs plot", "fdi-store history plot"});
+  }
+  Printed(page, "runs delete", id);
+
+  EXPECT_THAT(page.complaints(), IsEmpty());
+  EXPECT_THAT(
+      page.Unseen(called_, {"channel.regressor_max", "channel.regressor_min",
+                            "channel.regressors", "channel.rule_list",
+                            "fuzzy_set", "rule"}),
+      IsEmpty());
+  for (const auto& [verb, type] : page.verbs()) {
+    EXPECT_TRUE(called_.contains(verb) || !verb.starts_with("fdi-store"))
+        << verb;
+  }
+}
+
+// Of the other programs those verbs that need neither minutes (onboard,
+// coverage) nor a bus (watch, top).
+TEST_F(JsonDocumentsTest, SimulatorAndTrainerAreOnThePage) {
+  const auto bin = std::filesystem::path(FDI_STORE_PROGRAM).parent_path();
+  if (!exists(bin / "fdi-trainer") || !exists(bin / "fdi-simulator")) {
+    GTEST_SKIP() << "fdi-trainer or fdi-simulator is not built";
+  }
+  Page page(Slurp(FDI_JSON_PAGE));
+  Write("quick.toml",
+        "name = \"quick\"\n[training]\nmax_rules = 1\nmax_regressors = 2\n"
+        "starts = 1\n[scenario]\nparameters = \"paper-operating-point\"\n"
+        "excitation = {name = \"operating-point\", amplitude_pct = 8, "
+        "period_s = 80}\nduration_s = 300\nseed = 1\n"
+        "[[run]]\nsimulate = {duration_s = 900}\n"
+        "[[run]]\nsimulate = {}\nfaults = [\"f19\"]\nstrengths = [0.5]\n");
+  Printed(page, "faults", "", "fdi-simulator");
+  const std::string id =
+      Printed(page, "run",
+              "--valve V --duration 300 --parameters paper-operating-point "
+              "--fault f19:abrupt@100:strength=0.5 --no-publish --record",
+              "fdi-simulator")["sources"][0]["run_id"];
+  const std::string healthy =
+      Printed(page, "run", "--valve W --duration 300 --no-publish --record",
+              "fdi-simulator")["sources"][0]["run_id"];
+  Printed(page, "train", "--campaign quick.toml", "fdi-trainer");
+  Printed(page, "train", "--campaign quick.toml", "fdi-trainer");
+  Printed(page, "show", "quick --rules", "fdi-trainer");
+  Printed(page, "evaluate", "--model-set quick@1 --runs " + id, "fdi-trainer");
+  Printed(page, "compare", "quick@1 quick@2 --all --runs " + id, "fdi-trainer");
+  Printed(page, "inject",
+          "--run " + healthy + " --fault f6:abrupt@10:strength=0.3 -o f6.csv",
+          "fdi-trainer");
+
+  {
+    // As if onboarding had made it for the valve.
+    ModelStore models(directory_.path() / "models.db",
+                      Access::kOccasionalWriter);
+    ModelSet set = models.Load("quick");
+    set.name = "U";
+    set.preset = "onboard";
+    models.Save(set);
+  }
+  const std::string more =
+      Printed(page, "run",
+              "--valve U --duration 300 --parameters paper-operating-point "
+              "--no-publish --record",
+              "fdi-simulator")["sources"][0]["run_id"];
+  Printed(page, "limits", "--valve U --runs " + more, "fdi-trainer");
+
+  EXPECT_THAT(page.complaints(), IsEmpty());
+  // A set that learnt from labels has episodes, one of the preset `extended`
+  // has windows; limits are compared here without an alarm, and no fault shows
+  // at another strength.
+  EXPECT_THAT(page.Unseen(called_, {"training_episode", "window", "false_alarm",
+                                    "fault_visibility"}),
+              IsEmpty());
+}
+
+}  // namespace
+}  // namespace fdi::storage

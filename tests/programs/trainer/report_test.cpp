@@ -1,0 +1,282 @@
+// Runs the built program: the report, files that are not stored, pictures.
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "import/csv.h"
+#include "storage/models/models.h"
+#include "storage/runs/runs.h"
+#include "tests/programs/trainer/fixture.h"
+
+namespace fdi::trainer {
+namespace {
+
+using nlohmann::json;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr std::size_t kBytesPerRun = 100'000;
+
+class AppReportTest : public TrainerProgram {
+ protected:
+  void SetUp() override {
+    Write("c.toml", Quick() + TwoConditions());
+    ASSERT_EQ(Run("train --campaign c.toml").code, 0) << Read("err.txt");
+  }
+  std::filesystem::path Runs() const { return Path("data") / "runs.db"; }
+  storage::StoredRun NormalRun() const {
+    storage::RunStore store(Runs());
+    for (const storage::RunInfo& run : store.List()) {
+      if (run.samples == 900) {
+        return store.Load(run.id);
+      }
+    }
+    throw std::runtime_error("no normal run");
+  }
+  // `copies` of the normal run, one after another; in the last 300 samples the
+  // flow sensor reads half.
+  std::vector<LabelledSample> FaultySamples(std::size_t copies = 1) const {
+    const storage::StoredRun normal = NormalRun();
+    std::vector<LabelledSample> samples;
+    for (std::size_t k = 0; k < copies * normal.samples.size(); ++k) {
+      LabelledSample labelled{normal.samples[k % normal.samples.size()].sample,
+                              FaultTruth{}};
+      labelled.sample.seq = k;
+      labelled.sample.stamp_ns = static_cast<std::int64_t>(k) * 1'000'000'000;
+      if (k + 300 >= copies * normal.samples.size()) {
+        labelled.truth = FaultTruth{19, 0.5};
+        labelled.sample.Set(Signal::kF, 0.5 * labelled.sample[Signal::kF]);
+      }
+      samples.push_back(labelled);
+    }
+    return samples;
+  }
+  void WriteFile(const std::string& name,
+                 const std::vector<LabelledSample>& samples) const {
+    std::ofstream file(Path(name));
+    importer::WriteCsv(file, samples, FlowUnit::kM3PerHour, 0);
+  }
+  // The model set again, with an f1 that looks like f19.
+  void AddTwin() const {
+    storage::ModelStore store(Path("data") / "models.db",
+                              storage::Access::kOccasionalWriter);
+    ModelSet models = store.Load("quick");
+    Observer twin = models.observers[1];
+    twin.fault = 1;
+    twin.name = "f1 0.50";
+    models.observers.insert(models.observers.begin() + 1, twin);
+    models.faults.insert(models.faults.begin(), 1);
+    models.groups = {{1, 19}};
+    store.Save(models, storage::Activation::kAlways);
+  }
+  static std::size_t Count(const std::string& text, const std::string& part) {
+    std::size_t count = 0;
+    for (std::size_t at = text.find(part); at != std::string::npos;
+         at = text.find(part, at + 1)) {
+      ++count;
+    }
+    return count;
+  }
+};
+
+TEST_F(AppReportTest, FileIsScoredAsTheSameRunWouldBeOnceStored) {
+  WriteFile("f.csv", FaultySamples());
+  storage::NewRun row;
+  row.valve_id = "V";
+  const std::string id =
+      storage::RunStore(Runs(), storage::Access::kOccasionalWriter)
+          .Import(importer::ReadCsvFile(Path("f.csv")).runs, row)
+          .front();
+  const std::size_t stored = storage::RunStore(Runs()).List().size();
+
+  json result = RunJson("evaluate --model-set quick --runs " + id +
+                        " --file f.csv --file f.csv@:700");
+
+  json& runs = result["runs"];
+  ASSERT_EQ(runs.size(), 3U);
+  EXPECT_EQ(runs[1]["run_id"], "f.csv");
+  EXPECT_EQ(runs[2]["run_id"], "f.csv@:700");
+  EXPECT_EQ(runs[1]["final_set"], json::array({"f19"}));
+  runs[1]["run_id"] = runs[0]["run_id"];
+  EXPECT_EQ(runs[1], runs[0]);
+  EXPECT_EQ(runs[2]["t_dt"], runs[0]["t_dt"]);
+  EXPECT_EQ(storage::RunStore(Runs()).List().size(), stored);
+}
+
+TEST_F(AppReportTest, MapTellsWhereTheSignalsOfAFileStand) {
+  WriteFile("f.csv", FaultySamples());
+  std::string text = Read("f.csv");
+  text.replace(text.find("F_m3_h"), 6, "FLOW");
+  Write("foreign.csv", text);
+  Write("tags.toml", "[signal.F]\ncolumn = \"FLOW\"\nunit = \"m3/h\"\n");
+  const std::string call = "evaluate --model-set quick --file foreign.csv";
+
+  const Outcome refused = Run(call);
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_THAT(refused.err,
+              AllOf(HasSubstr("foreign.csv"), HasSubstr("F_m3_h")));
+
+  json mapped = RunJson(call + " --map tags.toml");
+  json plain = RunJson("evaluate --model-set quick --file f.csv");
+  mapped["runs"][0].erase("run_id");
+  plain["runs"][0].erase("run_id");
+  EXPECT_EQ(mapped["runs"], plain["runs"]);
+}
+
+TEST_F(AppReportTest, BadFilesAreNamedWithTheirExitCode) {
+  WriteFile("f.csv", FaultySamples());
+  const auto outcome = [&](const std::string& arguments) {
+    return Run("evaluate --model-set quick " + arguments);
+  };
+  EXPECT_EQ(outcome("").code, 2);
+  EXPECT_EQ(outcome("--map m.toml --runs abcdef").code, 2);
+  EXPECT_EQ(outcome("--file no.csv").code, 5);
+  EXPECT_THAT(outcome("--file no.csv").err, HasSubstr("no.csv"));
+  EXPECT_EQ(outcome("--file f.csv@x:1").code, 2);
+  EXPECT_THAT(outcome("--file f.csv@x:1").err, HasSubstr("FILE@from:to"));
+  EXPECT_EQ(outcome("--file f.csv@5000:").code, 5);
+}
+
+TEST_F(AppReportTest, GroupsOfTheSetAreJudgedBesideFaults) {
+  WriteFile("f.csv", FaultySamples());
+  const std::string call = "evaluate --model-set quick --file f.csv";
+  EXPECT_EQ(RunJson(call)["summary"]["confusion_by_group"],
+            RunJson(call)["summary"]["confusion"]);
+  AddTwin();
+
+  const json summary = RunJson(call)["summary"];
+
+  EXPECT_EQ(summary["exact"], 0);
+  EXPECT_EQ(summary["contained"], 1);
+  EXPECT_EQ(summary["exact_group"], 1);
+  EXPECT_EQ(summary["contained_group"], 1);
+  EXPECT_EQ(summary["mean_d_acc"], 0.5);
+  EXPECT_EQ(summary["mean_d_acc_group"], 1.0);
+  EXPECT_EQ(summary["confusion"]["f19"]["f1"], 0.5);
+  EXPECT_EQ(summary["confusion_by_group"]["f1|f19"]["f1|f19"], 1.0);
+  EXPECT_THAT(Run(call).out, HasSubstr("truth \\ outcome by group  f1|f19"));
+}
+
+TEST_F(AppReportTest, ReportStandsAloneAndShowsEveryRun) {
+  WriteFile("a&b.csv", FaultySamples());
+  const Outcome outcome =
+      Run("evaluate --model-set quick --file 'a&b.csv' --runs " +
+          NormalRun().info.id + " --report out");
+
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::string page = Read("out/index.html");
+  EXPECT_THAT(page, AllOf(HasSubstr("a&amp;b.csv"), Not(HasSubstr("a&b.csv"))));
+  EXPECT_THAT(page, HasSubstr("1 of 1 faults detected"));
+  EXPECT_THAT(
+      page,
+      AllOf(HasSubstr("Confusion by fault"), HasSubstr("Confusion by group"),
+            HasSubstr("f19, strength 0.50"), HasSubstr("d_f19 (the fault)"),
+            HasSubstr("T = 0.7"), HasSubstr("prefers-color-scheme:dark")));
+  EXPECT_THAT(page, AllOf(Not(HasSubstr("<script")), Not(HasSubstr("src=")),
+                          Not(HasSubstr("@import")), Not(HasSubstr("url("))));
+  // Nothing but links within the page and the name of the SVG namespace.
+  EXPECT_EQ(Count(page, "href="), Count(page, "href=\"#run-"));
+  EXPECT_EQ(Count(page, "http"), Count(page, "http://www.w3.org/2000/svg"));
+  EXPECT_EQ(Count(page, "Traces of run"), 2U);
+  EXPECT_EQ(Count(page, "<svg"), Count(page, "</svg>"));
+  EXPECT_EQ(Count(page, "<table"), Count(page, "</table>"));
+}
+
+// All traces end at 899 of 900 s, whose x is 889.12. Those of a run whose first
+// samples are rejected ended earlier, beside the mark of the fault.
+TEST_F(AppReportTest, TracesBeginWhereTheRunDoes) {
+  std::vector<LabelledSample> samples = FaultySamples();
+  WriteFile("a.csv", samples);
+  for (std::size_t k = 0; k < 200; ++k) {
+    samples[k].sample.Set(Signal::kX, 5000.0);
+  }
+  WriteFile("b.csv", samples);
+  const auto ends = [&](const std::string& name) {
+    EXPECT_EQ(Run("evaluate --model-set quick --file " + name +
+                  ".csv --report " + name)
+                  .code,
+              0);
+    return Count(Read(name + "/index.html"), "889.12,");
+  };
+  EXPECT_GE(ends("a"), 4U);
+  EXPECT_GE(ends("b"), 4U);
+}
+
+TEST_F(AppReportTest, DayLongRunStaysWithinItsBytes) {
+  WriteFile("long.csv", FaultySamples(96));  // 86400 samples
+  ASSERT_EQ(
+      Run("evaluate --model-set quick --file long.csv --report long").code, 0);
+  WriteFile("f.csv", FaultySamples());
+  ASSERT_EQ(Run("evaluate --model-set quick --file f.csv --report short").code,
+            0);
+  EXPECT_LT(Read("long/index.html").size(), kBytesPerRun);
+  EXPECT_GT(Read("short/index.html").size(), 10'000U);
+}
+
+TEST_F(AppReportTest, FolderThatCannotBeMadeIsNamed) {
+  WriteFile("f.csv", FaultySamples());
+  const std::string call = "evaluate --model-set quick --file f.csv --report ";
+  const Outcome missing = Run(call + "no/such");
+  EXPECT_EQ(missing.code, 3);
+  EXPECT_THAT(missing.err, HasSubstr(Path("no").string()));
+  EXPECT_EQ(missing.out, "");
+  const Outcome file = Run(call + "f.csv");
+  EXPECT_EQ(file.code, 3);
+  EXPECT_THAT(file.err, HasSubstr("f.csv"));
+  if (geteuid() != 0) {  // Root may write anywhere.
+    std::filesystem::create_directory(Path("closed"));
+    std::filesystem::permissions(Path("closed"),
+                                 std::filesystem::perms::owner_read);
+    EXPECT_EQ(Run(call + "closed").code, 3);
+    EXPECT_EQ(Run(call + "closed/inner").code, 3);
+  }
+}
+
+TEST_F(AppReportTest, PicturesShowEverySetAndEveryMembership) {
+  const json set = RunJson("show quick --rules");
+  const Outcome outcome = Run("show quick --pictures pics");
+
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, Not(HasSubstr("residuals_missing")));
+  std::size_t memberships = 0;
+  std::size_t residuals = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(Path("pics"))) {
+    const std::string name = entry.path().filename();
+    const std::string picture = Read("pics/" + name);
+    EXPECT_THAT(picture, HasSubstr("membership [-]")) << name;
+    memberships += name.starts_with("membership_");
+    residuals += name.starts_with("residual_");
+    if (name.starts_with("residual_")) {
+      EXPECT_THAT(picture, AllOf(HasSubstr("residuals in training"),
+                                 HasSubstr("tallest bar")))
+          << name;
+    }
+  }
+  std::size_t regressors = 0;
+  for (const json& channel : set["observers"][0]["channels"]) {
+    regressors += channel["regressors"].size();
+  }
+  EXPECT_EQ(memberships, regressors);
+  EXPECT_EQ(residuals, 4U);  // normal and f19, X and F
+}
+
+TEST_F(AppReportTest, MissingTrainingRunIsNamedAndTheTrapezoidStandsAlone) {
+  const std::string id = NormalRun().info.id;
+  storage::RunStore(Runs(), storage::Access::kOccasionalWriter).Delete(id);
+
+  const Outcome outcome = Run("show quick --pictures pics");
+
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("residuals_missing"), HasSubstr(id)));
+  const std::string picture = Read("pics/residual_normal_X.svg");
+  EXPECT_THAT(picture, AllOf(HasSubstr("training runs missing"),
+                             Not(HasSubstr("residuals in training"))));
+}
+
+}  // namespace
+}  // namespace fdi::trainer

@@ -1,0 +1,235 @@
+// Tables, suggestions, event lines and strict TOML.
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/printable.h"
+#include "base/suggestion.h"
+#include "base/toml_reader.h"
+#include "diagnosis/fault_catalogue.h"
+#include "report/json_output.h"
+#include "report/logging.h"
+#include "report/text_table.h"
+
+namespace fdi::report {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+template <typename Function>
+std::string MessageOf(const Function& function) {
+  try {
+    function();
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+TEST(TextTableTest, ColumnsAlignAlsoBehindMultiByteLetters) {
+  TextTable table({{"valve", Align::kLeft}, {"MSE [%²]", Align::kRight}});
+  table.AddRow({"zażółć", "1.25"});
+  table.AddRow({"a", "100.00"});
+  std::ostringstream out;
+
+  table.Print(out);
+
+  EXPECT_EQ(out.str(),
+            "valve   MSE [%²]\n"
+            "zażółć      1.25\n"
+            "a         100.00\n");
+}
+
+// For people in front of it; the first to go is the one most spare.
+TEST(TextTableTest, SpareColumnsGoUntilTheTableFits) {
+  TextTable table({{"valve"}, {"note", Align::kLeft, 1}, {"set", {}, 2}});
+  table.AddRow({"LV-1", "long note", "demo@1"});
+  const auto printed = [&table](std::size_t width) {
+    std::ostringstream out;
+    table.Print(out, {false, width});
+    return out.str();
+  };
+
+  EXPECT_EQ(printed(24), "valve  note       set\nLV-1   long note  demo@1\n");
+  EXPECT_EQ(printed(23),
+            "valve  note\nLV-1   long note\n(too narrow for: set)\n");
+  EXPECT_EQ(printed(3), "valve\nLV-1\n(too narrow for: note, set)\n");
+}
+
+TEST(TextTableTest, ColourIsAskedForAndMovesNoColumn) {
+  TextTable table({{"a"}, {"b"}});
+  table.AddRow({"x", "y"});
+  table.SetTone(0, Tone::kAlarm);
+  std::ostringstream plain;
+  std::ostringstream coloured;
+
+  table.Print(plain);
+  table.Print(coloured, {true, 0});
+
+  EXPECT_EQ(plain.str(), "a  b\nx  y\n");
+  EXPECT_THAT(coloured.str(), HasSubstr("\x1b[1;31mx\x1b[0m  y\n"));
+}
+
+TEST(TextTableTest, RowOfAnotherLengthIsRefused) {
+  TextTable table({{"a", Align::kLeft}});
+
+  EXPECT_THROW(table.AddRow({"1", "2"}), std::invalid_argument);
+}
+
+TEST(FormatNumberTest, NotFiniteIsADash) {
+  EXPECT_EQ(FormatNumber(1.0 / 3.0, 3), "0.333");
+  EXPECT_EQ(FormatNumber(std::numeric_limits<double>::quiet_NaN(), 3), "-");
+}
+
+TEST(SuggestTest, AFaultIsSuggestedUnlessItsNumberIsWrong) {
+  EXPECT_EQ(DidYouMeanFault("ff7"), " (did you mean 'f7'?)");
+  EXPECT_EQ(DidYouMeanFault("F_19"), " (did you mean 'f19'?)");
+  EXPECT_EQ(DidYouMeanFault("ture", {"true"}), " (did you mean 'true'?)");
+  EXPECT_EQ(DidYouMeanFault("f99"), "");
+  EXPECT_EQ(DidYouMeanFault("seat"), "");
+}
+
+TEST(SuggestTest, NearWordsAreMeantAndFarOnesAreNot) {
+  const std::vector<std::string> verbs = {"list", "show", "import", "export"};
+
+  EXPECT_EQ(Suggest("lsit", verbs), "list");
+  EXPECT_EQ(Suggest("improt", verbs), "import");
+  EXPECT_EQ(Suggest("shw", verbs), "show");
+  EXPECT_EQ(Suggest("delete", verbs), std::nullopt);
+}
+
+TEST(EventLineTest, ValuesWithBlanksOrQuotesAreQuoted) {
+  EXPECT_EQ(EventLine("import", {{"file", "a b"}, {"rows", "3"}, {"x", ""}}),
+            "import file=\"a b\" rows=3 x=\"\"");
+  EXPECT_EQ(EventLine("e", {{"m", "say \"no\"\nnow"}}),
+            "e m=\"say \\\"no\\\"\\x0anow\"");
+  EXPECT_EQ(EventLine("e", {{"id", "V\x1b[2J"}}), "e id=V\\x1b[2J");
+}
+
+// ESC, BEL, OSC 52, DEL, C1 (CSI in UTF-8), half a letter, a line of its own.
+constexpr const char* kHostile =
+    "\x1b]52;c;aGk=\x07|\x7f|\xc2\x9b"
+    "2J|\xe2\x82|V\r\n2026 error";
+
+TEST(PrintableTest, OnlyLettersReachATerminal) {
+  EXPECT_EQ(
+      Printable(kHostile),
+      "\\x1b]52;c;aGk=\\x07|\\x7f|\\xc2\\x9b2J|\\xe2\\x82|V\\x0d\\x0a2026 "
+      "error");
+  EXPECT_EQ(Printable(std::string("a\0b", 3)), "a\\x00b");
+  EXPECT_EQ(Printable("FV-101 \u00b5\u20ac\U0001f600"),
+            "FV-101 \u00b5\u20ac\U0001f600");
+  EXPECT_EQ(Printable("a\nb\x1b", "\n"), "a\nb\\x1b");
+  EXPECT_FALSE(IsPrintable(kHostile));
+  EXPECT_TRUE(IsPrintable("\u00b5"));
+  // ESC in a longer form, a surrogate, a longer form, beyond U+10FFFF.
+  for (const char* text : {"\xe0\x80\x9b", "\xed\xa0\x80", "\xf0\x82\x82\xac",
+                           "\xf4\x90\x80\x80"}) {
+    EXPECT_FALSE(IsPrintable(text)) << Printable(text);
+  }
+}
+
+TEST(LogSinkTest, NoTextMakesALineOrCommandsTheTerminal) {
+  testing::internal::CaptureStderr();
+  MakeStderrSink(LogLevel::kInfo)(LogLevel::kWarning,
+                                  std::string("valve_stale valve=") + kHostile);
+  const std::string log = testing::internal::GetCapturedStderr();
+
+  EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), 1);
+  EXPECT_TRUE(IsPrintable(log.substr(0, log.size() - 1))) << log;
+}
+
+TEST(LogValueTest, AValueCannotLookLikeAnotherField) {
+  EXPECT_EQ(LogValue("FV-101"), "FV-101");
+  EXPECT_EQ(LogValue("V1 level=error"), "\"V1 level=error\"");
+  EXPECT_EQ(LogValue("V\" x=\"1"), "\"V\\\" x=\\\"1\"");
+}
+
+TEST(JsonTextTest, ControlsThatJsonAllowsAreEscapedToo) {
+  EXPECT_EQ(JsonText(Json("\x1b|\x7f|\xc2\x9b|\u00b5")),
+            "\"\\u001b|\\u007f|\\u009b|\u00b5\"");
+}
+
+constexpr const char* kToml =
+    "seed = 7\n"
+    "name = \"x\"\n"
+    "[loop]\n"
+    "gain = 2\n"
+    "[[fault]]\n"
+    "id = \"f1\"\n"
+    "[[fault]]\n"
+    "id = \"f7\"\n"
+    "strength = 0.5\n";
+
+TEST(TomlReaderTest, TypedKeysAreReadAndAbsentOnesAreNothing) {
+  TomlReader file(kToml, "c.toml");
+  std::vector<std::string> ids;
+
+  EXPECT_EQ(file.Integer("seed"), 7);
+  EXPECT_EQ(file.Text("name"), "x");
+  EXPECT_EQ(file.Number("absent"), std::nullopt);
+  auto loop = file.Table("loop");
+  ASSERT_TRUE(loop.has_value());
+  EXPECT_EQ(loop->Number("gain", 0.0, 10.0), 2.0);
+  for (TomlReader& fault : file.Tables("fault")) {
+    ids.push_back(fault.Text("id").value_or(""));
+    fault.Number("strength");
+  }
+  EXPECT_THAT(ids, ElementsAre("f1", "f7"));
+  EXPECT_NO_THROW(file.Finish());
+}
+
+TEST(TomlReaderTest, KeyThatNobodyAskedForIsRefusedWithItsLine) {
+  TomlReader file(kToml, "c.toml");
+  file.Integer("sede");
+  file.Text("name");
+  file.Table("loop")->Number("gain");
+  for (TomlReader& fault : file.Tables("fault")) {
+    fault.Text("id");
+    fault.Number("strength");
+  }
+
+  EXPECT_EQ(MessageOf([&] { file.Finish(); }),
+            "c.toml:1: unknown key 'seed': did you mean 'sede'?");
+}
+
+TEST(TomlReaderTest, KeyInsideATableThatNobodyAskedForIsRefusedToo) {
+  TomlReader file(kToml, "c.toml");
+  file.Integer("seed");
+  file.Text("name");
+  file.Table("loop")->Number("gain");
+  for (TomlReader& fault : file.Tables("fault")) {
+    fault.Text("id");
+  }
+
+  EXPECT_THAT(MessageOf([&] { file.Finish(); }),
+              AllOf(HasSubstr("c.toml:9"), HasSubstr("'strength'")));
+}
+
+TEST(TomlReaderTest, WrongTypeAndRangeNameFileLineAndKey) {
+  TomlReader file(kToml, "c.toml");
+
+  EXPECT_EQ(MessageOf([&] { file.Number("name"); }),
+            "c.toml:2: name: expected a number");
+  EXPECT_EQ(MessageOf([&] { file.Number("seed", 0.0, 1.0); }),
+            "c.toml:1: seed: 7 is not in 0..1");
+  EXPECT_EQ(MessageOf([&] { file.Table("loop")->Number("gain", 5.0, 6.0); }),
+            "c.toml:4: loop.gain: 2 is not in 5..6");
+  EXPECT_THAT(MessageOf([] { TomlReader("a = = 1", "d.toml"); }),
+              HasSubstr("d.toml:1:"));
+}
+
+TEST(TomlReaderTest, MissingFileIsNotFound) {
+  EXPECT_THROW(TomlReader(std::filesystem::path("/nowhere/x.toml")),
+               NotFoundError);
+}
+
+}  // namespace
+}  // namespace fdi::report
