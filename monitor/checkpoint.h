@@ -19,6 +19,11 @@ Checkpoint Merged(Checkpoint older, Checkpoint newer);
 
 /// The most days or hours that a valve accumulates between checkpoints.
 inline constexpr std::size_t kMaxBookRows = 256;
+/// A book with so many rows has to be emptied soon; the other half is for the
+/// samples until then.
+constexpr bool IsFilling(std::size_t rows) {
+  return rows >= kMaxBookRows / 2;
+}
 
 /// The row of a book to which a sample is added: the one for which `is` holds,
 /// else the last one if no row may be opened (`may_open` is false, or there are

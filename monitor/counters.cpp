@@ -8,7 +8,7 @@ namespace fdi::monitor {
 namespace {
 
 struct CounterInfo {
-  std::string_view name;
+  std::string_view name;  // Empty: not on the bus, see MeasuresOf().
   std::string_view family;
   std::string_view help;
   std::string_view reason{};  // Reason label of an exclusion.
@@ -67,8 +67,16 @@ constexpr std::array<CounterInfo, kCounterCount> kInfos{{
      "Second looks dropped because too many were waiting"},
     {"looks_failed", "fdi_second_looks_failed_total",
      "Second looks whose simulation failed, or without usable physics"},
+    {"", "fdi_part_failures_total",
+     "Failures of parts that diagnosis and history do not need"},
+    {"", "fdi_history_events_refused_total",
+     "Fault events that history.db refused: the episode has ended there, or "
+     "does not exist"},
+    {"", "fdi_history_records_set_aside_total",
+     "Records that history.db did not take for their own sake, left out after "
+     "three tries"},
 }};
-static_assert(!kInfos.back().name.empty(), "a counter has no name");
+static_assert(!kInfos.back().help.empty(), "a counter has no description");
 
 std::string Lower(std::string_view text) {
   std::string lower(text);

@@ -43,6 +43,9 @@ enum class Counter : std::uint8_t {
   kLooks,
   kLooksDropped,
   kLooksFailed,
+  kPartFailures,
+  kEventsRefused,
+  kRecordsSetAside,
   kCount_
 };
 inline constexpr std::size_t kCounterCount =

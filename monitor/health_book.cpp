@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/time_units.h"
+#include "diagnosis/quality_count.h"
 #include "monitor/checkpoint.h"
 
 namespace fdi::monitor {
@@ -159,6 +160,27 @@ void HealthBook::AddStroke(const Sample& sample, std::int64_t period_ms,
     hour.open_ms += period_ms;
   } else if (position >= 100.0 - HealthHour::kStopPercent) {
     hour.shut_ms += period_ms;
+  }
+}
+
+void HealthBooks::OnVerdict(const std::string& valve_id, const Sample& sample,
+                            const ValveOutcome& outcome) {
+  if (CountsAsTime(outcome.verdict)) {
+    books_[valve_id].Add(sample, outcome.verdict, outcome.models,
+                         outcome.period_s);
+  }
+}
+
+void HealthBooks::OnRemoved(const std::string& valve_id, Checkpoint& last) {
+  books_[valve_id].DrainInto(valve_id, last.health);
+  books_.erase(valve_id);
+}
+
+void HealthBooks::TakeCheckpoint(Checkpoint& checkpoint, bool urgent) {
+  for (auto& [valve_id, book] : books_) {
+    if (!urgent || IsFilling(book.rows())) {
+      book.DrainInto(valve_id, checkpoint.health);
+    }
   }
 }
 

@@ -2,11 +2,14 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "diagnosis/health_hour.h"
 #include "diagnosis/model_set.h"
 #include "diagnosis/verdict.h"
+#include "monitor/sinks.h"
 
 namespace fdi::monitor {
 
@@ -57,6 +60,19 @@ class HealthBook {
   StrokeCount stroke_;
   std::uint64_t source_id_{0};
   bool by_command_{false};  // The position is CV for want of X.
+};
+
+/// Gathers the health of all valves.
+class HealthBooks : public ValveListener {
+ public:
+  std::string_view name() const override { return "health"; }
+  void OnVerdict(const std::string& valve_id, const Sample& sample,
+                 const ValveOutcome& outcome) override;
+  void OnRemoved(const std::string& valve_id, Checkpoint& last) override;
+  void TakeCheckpoint(Checkpoint& checkpoint, bool urgent) override;
+
+ private:
+  std::unordered_map<std::string, HealthBook> books_;
 };
 
 }  // namespace fdi::monitor

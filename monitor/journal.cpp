@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 #include <optional>
+#include <ranges>
 #include <string>
 #include <utility>
 
@@ -70,6 +71,10 @@ void Journal::Stop() {
   errors.Try([this] { publisher_.Join(); });
   // From here on this thread alone uses the queues and the history. What it
   // cannot write is not tried again; the events among it count as lost.
+  options_.tries = 1;
+  for (Deferred& each : std::exchange(deferred_, {})) {
+    records_.push_back(std::move(each.record));
+  }
   MarkDelivered(Clock::now(), kLastDelivery);
   WriteRecords();
   for (const Record& record : std::exchange(records_, {})) {
@@ -101,8 +106,17 @@ void Journal::OnEvent(FaultEvent event) {
   pending->event = std::move(event);
   pending->deadline = Clock::now() + options_.patience;
   const std::lock_guard lock(mutex_);
-  unsent_.push_back(pending);
-  unsent_changed_.notify_one();
+  // The bus does not take events as fast as they come. What is committed and
+  // not published, the next session publishes.
+  if (unsent_.size() < options_.max_records) {
+    unsent_.push_back(pending);
+    unsent_changed_.notify_one();
+  } else {
+    counters_.Add(Counter::kEventsUnsent);
+    log_.Report(LogId::kUnsent, "publication_failed", [] {
+      return std::string("topic=FaultEvent reason=queue_full");
+    });
+  }
   const bool kept = AddLocked(pending);
   if (!kept) {
     counters_.Add(Counter::kEventsLost);
@@ -160,7 +174,7 @@ void Journal::OnResumed(const OpenEpisode& episode, std::int64_t stamp_ns) {
   log_.Line(LogLevel::kInfo,
             "episode_resumed valve=" + LogValue(episode.valve_id));
   const std::lock_guard lock(mutex_);
-  AddLocked(Resumption{episode.episode_id, stamp_ns});
+  AddLocked(Resumption{episode.episode_id, stamp_ns, episode.valve_id});
 }
 
 void Journal::Commit(Checkpoint checkpoint) {
@@ -235,7 +249,7 @@ void Journal::Write() {
 // @returns false once the history fails.
 bool Journal::WriteWaiting() {
   while (true) {
-    if (!WriteRecords() || !WriteCheckpoint()) {
+    if (!RetryDeferred() || !WriteRecords() || !WriteCheckpoint()) {
       return false;
     }
     {
@@ -282,46 +296,141 @@ bool Journal::WriteRecords() {
 
 // Commits events, resumptions, looks and strengths together; gaps and marks are
 // buffered only after that succeeded, so that a retry does not buffer them
-// twice.
-bool Journal::WriteBatch(const std::vector<const Record*>& batch) {
+// twice. A record that fails for its own sake leaves the batch.
+// @param failures of the records so far. @returns false once the history fails.
+bool Journal::WriteBatch(std::vector<const Record*> batch, int failures) {
+  const Record* at = nullptr;
+  std::vector<std::pair<const Record*, std::string>> failed;
+  std::vector<const Record*> refused;
+  const auto commit_the_others = [&] {
+    refused.clear();
+    try {
+      history_.CommitBatch([&] {
+        for (const Record* record : batch) {
+          at = record;
+          if (!Store(*record)) {
+            refused.push_back(record);
+          }
+        }
+        at = nullptr;
+      });
+      return true;
+    } catch (const RecordError& error) {
+      if (at == nullptr) {
+        throw;  // Of what is buffered.
+      }
+      failed.emplace_back(at, error.what());
+      std::erase(batch, std::exchange(at, nullptr));
+      return false;
+    }
+  };
   const bool any = std::ranges::any_of(batch, [](const Record* record) {
-    return std::holds_alternative<PendingEvent>(*record) ||
-           std::holds_alternative<Resumption>(*record) ||
-           std::holds_alternative<EpisodeLook>(*record) ||
-           std::holds_alternative<StrengthPoint>(*record);
+    return !std::holds_alternative<DataGap>(*record) &&
+           !std::holds_alternative<Sent>(*record);
   });
   const bool committed = !any || Attempt([&] {
-    history_.CommitBatch([&] {
-      for (const Record* record : batch) {
-        if (const auto* event = std::get_if<PendingEvent>(record)) {
-          history_.Record((*event)->event);
-        } else if (const auto* resumed = std::get_if<Resumption>(record)) {
-          history_.Resume(resumed->episode_id, resumed->stamp_ns);
-        } else if (const auto* look = std::get_if<EpisodeLook>(record)) {
-          history_.StoreLook(*look);
-        } else if (const auto* point = std::get_if<StrengthPoint>(record)) {
-          history_.StoreStrength(*point);
-        }
-      }
-    });
+    while (!commit_the_others()) {
+    }
   });
-  {
+  const auto set_stages = [this](const auto& records, bool stored) {
     const std::lock_guard lock(mutex_);
-    for (const Record* record : batch) {
+    for (const Record* record : records) {
       if (const auto* event = std::get_if<PendingEvent>(record)) {
-        SetStageLocked(**event, committed);
+        SetStageLocked(**event, stored);
       }
     }
+  };
+  set_stages(std::views::keys(failed), false);
+  if (!committed) {
+    set_stages(batch, false);
+    return false;
   }
-  return committed && Attempt([&] {
-           for (const Record* record : batch) {
-             if (const auto* gap = std::get_if<DataGap>(record)) {
-               history_.AddGap(*gap);
-             } else if (const auto* sent = std::get_if<Sent>(record)) {
-               history_.MarkSent(sent->pending->event);
-             }
-           }
-         });
+  for (const Record* record : refused) {
+    const FaultEvent& event = std::get<PendingEvent>(*record)->event;
+    counters_.Add(Counter::kEventsRefused);
+    log_.Report(LogId::kRefused, "event_refused", [&event] {
+      return "valve=" + LogValue(event.valve_id) + " transition=" +
+             std::string(TransitionName(event.transition.kind));
+    });
+    std::erase(batch, record);
+  }
+  set_stages(refused, false);
+  set_stages(batch, true);
+  for (const auto& [record, reason] : failed) {
+    if (failures + 1 >= options_.tries) {
+      SetAside(*record, reason);
+    } else {
+      deferred_.push_back({*record, failures + 1});
+      retry_deferred_at_ = Clock::now() + options_.retry_period;
+    }
+  }
+  return Attempt([&] {
+    for (const Record* record : batch) {
+      if (const auto* gap = std::get_if<DataGap>(record)) {
+        history_.AddGap(*gap);
+      } else if (const auto* sent = std::get_if<Sent>(record)) {
+        history_.MarkSent(sent->pending->event);
+      }
+    }
+  });
+}
+
+// @returns false if the history refuses it.
+bool Journal::Store(const Record& record) {
+  if (const auto* event = std::get_if<PendingEvent>(&record)) {
+    return history_.Record((*event)->event);
+  }
+  if (const auto* resumed = std::get_if<Resumption>(&record)) {
+    history_.Resume(resumed->episode_id, resumed->stamp_ns);
+  } else if (const auto* look = std::get_if<EpisodeLook>(&record)) {
+    history_.StoreLook(*look);
+  } else if (const auto* point = std::get_if<StrengthPoint>(&record)) {
+    history_.StoreStrength(*point);
+  }
+  return true;
+}
+
+// Tries again, each by itself, what failed for its own sake.
+// @returns false once the history fails.
+bool Journal::RetryDeferred() {
+  if (Clock::now() < retry_deferred_at_) {
+    return true;
+  }
+  bool served = true;
+  for (Deferred& each : std::exchange(deferred_, {})) {
+    served = served && WriteBatch({&each.record}, each.failures);
+    if (!served) {
+      deferred_.push_back(std::move(each));
+    }
+  }
+  return served;
+}
+
+// A record is given up. Evidence, looks and strengths do not know their valve.
+void Journal::SetAside(const Record& record, const std::string& reason) {
+  const std::int64_t now_ns = context_.utc_now_ns();
+  DataGap where{"", now_ns, now_ns, "record_set_aside"};
+  std::string_view what = "evidence";
+  if (const auto* event = std::get_if<PendingEvent>(&record)) {
+    counters_.Add(Counter::kEventsLost);
+    what = TransitionName((*event)->event.transition.kind);
+    where.valve_id = (*event)->event.valve_id;
+    where.from_ns = where.to_ns = (*event)->event.transition.stamp_ns;
+  } else if (const auto* resumed = std::get_if<Resumption>(&record)) {
+    what = "RESUMED";
+    where.valve_id = resumed->valve_id;
+    where.from_ns = where.to_ns = resumed->stamp_ns;
+  }
+  counters_.Add(Counter::kRecordsSetAside);
+  log_.Report(
+      LogId::kSetAside, "record_set_aside",
+      [&] {
+        return "record=" + std::string(what) +
+               " valve=" + LogValue(where.valve_id) +
+               " reason=" + LogValue(reason);
+      },
+      LogLevel::kError);
+  OnGap(std::move(where));
 }
 
 // A checkpoint that fails is merged into the next one.
@@ -334,7 +443,8 @@ bool Journal::WriteCheckpoint() {
     checkpoint = std::exchange(checkpoint_, {});
   }
   if (checkpoint.empty() ||
-      Attempt([&] { history_.CommitCheckpoint(checkpoint); })) {
+      AttemptOrDrop([&] { history_.CommitCheckpoint(checkpoint); },
+                    checkpoint_failures_, [&] { checkpoint = {}; })) {
     return true;
   }
   const std::lock_guard lock(mutex_);
@@ -384,7 +494,30 @@ bool Journal::HasQueuedEvent() const {
 }
 
 bool Journal::CommitBuffered() {
-  return Attempt([this] { history_.Commit(); });
+  return AttemptOrDrop([this] { history_.Commit(); }, buffered_failures_,
+                       [this] { history_.DropBuffered(); });
+}
+
+// As Attempt(), for what is buffered and for checkpoints: what fails for its
+// own sake too often is dropped, so that the next attempt can succeed.
+bool Journal::AttemptOrDrop(const std::function<void()>& call, int& failures,
+                            const std::function<void()>& drop) {
+  std::optional<std::string> reason;
+  const bool done = Attempt([&] {
+    try {
+      call();
+    } catch (const RecordError& error) {
+      reason = error.what();
+      throw;
+    }
+  });
+  failures = reason ? failures + 1 : 0;
+  if (failures >= options_.tries) {
+    failures = 0;
+    drop();
+    SetAside(EpisodeLook{}, *reason);
+  }
+  return done;
 }
 
 bool Journal::Attempt(const std::function<void()>& call) {

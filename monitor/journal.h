@@ -27,7 +27,9 @@ struct JournalOptions {
   std::chrono::milliseconds commit_period{1000};
   std::chrono::milliseconds retry_period{1000};
   std::chrono::milliseconds stop_limit{1000};  ///< For evidence at shutdown.
-  std::size_t max_records{100'000};         ///< Queued events, gaps and marks.
+  int tries{3};  ///< Before a record that fails for its own sake is left out.
+  /// Queued events, gaps and marks; and events that wait for the bus.
+  std::size_t max_records{100'000};
   std::size_t max_trace_points{2'000'000};  ///< Queued evidence.
   /// Whether all current subscribers acknowledge, within the timeout, what was
   /// published.
@@ -53,7 +55,9 @@ struct JournalOptions {
 ///
 /// If the history fails, everything is kept and retried every second; what
 /// exceeds the queues is counted as lost, and the outage becomes a data gap
-/// once the history has recovered.
+/// once the history has recovered. A record that fails for its own sake
+/// (RecordError) is tried three times, a second apart, while the others go on;
+/// then it is set aside: counted, logged, and noted as a gap of its valve.
 ///
 /// Built idle. Thread safe except for Start() and Stop().
 class Journal : public EpisodeOutlet {
@@ -109,12 +113,18 @@ class Journal : public EpisodeOutlet {
   struct Resumption {
     std::uint64_t episode_id;
     std::int64_t stamp_ns;
+    std::string valve_id;
   };
   struct Sent {  // The event is on the bus.
     PendingEvent pending;
   };
   using Record = std::variant<PendingEvent, Resumption, EpisodeLook,
                               StrengthPoint, DataGap, Sent>;
+
+  struct Deferred {  // Failed for its own sake so many times.
+    Record record;
+    int failures;
+  };
 
   // Used by callers. Functions named Locked require mutex_.
   bool AddLocked(Record record);
@@ -124,12 +134,17 @@ class Journal : public EpisodeOutlet {
   void Write();
   bool WriteWaiting();
   bool WriteRecords();
-  bool WriteBatch(const std::vector<const Record*>& batch);
+  bool WriteBatch(std::vector<const Record*> batch, int failures = 0);
+  bool Store(const Record& record);
+  bool RetryDeferred();
+  void SetAside(const Record& record, const std::string& reason);
   bool WriteCheckpoint();
   bool WriteTraces();
   bool HasQueuedEvent() const;
   bool CommitBuffered();
   bool Attempt(const std::function<void()>& call);
+  bool AttemptOrDrop(const std::function<void()>& call, int& failures,
+                     const std::function<void()>& drop);
   void FailWaitingEvents();
   void Recovered();
 
@@ -147,8 +162,13 @@ class Journal : public EpisodeOutlet {
   JournalOptions options_;
   Pulse pulse_;
   std::atomic<bool> degraded_{false};
-  std::int64_t degraded_since_ns_{0};  // Used by the history
-  Clock::time_point last_commit_;      // thread only.
+  // Used by the history thread only.
+  std::int64_t degraded_since_ns_{0};
+  Clock::time_point last_commit_;
+  std::vector<Deferred> deferred_;
+  Clock::time_point retry_deferred_at_;
+  int buffered_failures_{0};
+  int checkpoint_failures_{0};
 
   mutable std::mutex mutex_;                // Guards what follows.
   std::condition_variable work_;            // For the history thread,

@@ -10,6 +10,7 @@
 #include "base/printable.h"
 #include "diagnosis/quality_count.h"
 #include "diagnosis/records/valve_glob.h"
+#include "monitor/guard.h"
 
 namespace fdi::monitor {
 namespace {
@@ -59,21 +60,11 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
                    const MonitorContext& context)
     : options_(std::move(options)),
       decisions_(sinks.decisions),
-      live_(sinks.live),
       resolver_(std::move(resolver)),
       context_(context),
       counters_(context.counters),
       log_(context.log),
       journal_(sinks.history, sinks.events, context, options_.journal),
-      recorder_(
-          sinks.samples == nullptr
-              ? nullptr
-              : std::make_unique<Recorder>(
-                    *sinks.samples, context, options_.recorder,
-                    [this](DataGap gap) { journal_.OnGap(std::move(gap)); })),
-      shadow_(options_.shadow.candidate
-                  ? std::make_unique<ShadowBank>(options_.shadow, log_)
-                  : nullptr),
       looks_(options_.second_look ? std::make_unique<LookWorker>(context_)
                                   : nullptr) {}
 
@@ -85,9 +76,20 @@ Pipeline::~Pipeline() {
   }
 }
 
+void Pipeline::Attach(std::unique_ptr<ValveListener> listener) {
+  Attach(*listener);
+  owned_.push_back(std::move(listener));
+}
+
+template <typename Call>
+void Pipeline::Tell(Call call) {
+  for (ValveListener* const listener : listeners_) {
+    Guarded(counters_, log_, listener->name(), [&] { call(*listener); });
+  }
+}
+
 void Pipeline::Start(const std::vector<OpenEpisode>& open,
-                     std::vector<Accumulator> accumulators,
-                     std::vector<Accumulator> shadow_accumulators) {
+                     std::vector<Accumulator> accumulators) {
   // All reservations come before the first sample, so that unknown ids cannot
   // take the slots of known valves.
   for (const std::string& id : resolver_->AssignedValves()) {
@@ -100,16 +102,10 @@ void Pipeline::Start(const std::vector<OpenEpisode>& open,
     Reserve(accumulator.valve_id);
     accumulators_[accumulator.valve_id] = std::move(accumulator);
   }
-  if (shadow_) {
-    shadow_->Restore(std::move(shadow_accumulators));
-  }
   last_poll_ = last_checkpoint_ = std::chrono::steady_clock::now();
   Recover(open);
   started_ = true;
   journal_.Start();
-  if (recorder_) {
-    recorder_->Start();
-  }
   if (looks_) {
     looks_->Start();
   }
@@ -147,14 +143,10 @@ void Pipeline::Stop() {
     for (const std::unique_ptr<Valve>& valve : valves_) {
       valve->monitor.Flush(journal_);
     }
-    TakeCheckpoint();
+    TakeCheckpoint(false);
   });
   if (looks_) {
     errors.Try([this] { looks_->Stop(); });
-  }
-  // The recorder stops before the journal, because it may report a gap.
-  if (recorder_) {
-    errors.Try([this] { recorder_->Stop(); });
   }
   errors.Try([this] { journal_.Stop(); });
   errors.Rethrow();
@@ -244,19 +236,9 @@ void Pipeline::Evict(Valve& valve) {
   Checkpoint checkpoint;
   valve.monitor.Flush(journal_);
   valve.monitor.TakeCheckpoint(checkpoint);
-  if (valve.shadow != nullptr) {
-    valve.shadow->TakeCheckpoint(checkpoint);
-    shadow_->Remove(valve.shadow);
-  }
+  Tell([&](ValveListener& each) { each.OnRemoved(id, checkpoint); });
   journal_.Commit(std::move(checkpoint));
-  if (recorder_) {
-    // Its run ends: the recorder keeps the state of each open run.
-    recorder_->Record({id, {}, {}, false, false, true});
-  }
   decisions_.Remove(id);
-  if (live_ != nullptr) {
-    live_->Remove(id);
-  }
   {
     const std::lock_guard lock(mutex_);
     std::erase(names_, id);
@@ -291,7 +273,7 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
                 (parts ? NameOf(parts->plan->models()) : "none"));
   auto valve = std::make_unique<Valve>(
       Valve{ValveMonitor(id, parts, options_.trace, looks_.get()),
-            shadow_ ? shadow_->Add(id) : nullptr, reserved_.erase(id) > 0});
+            reserved_.erase(id) > 0});
   valve->monitor.HoldIsolation(resolver_->IsolationHeld(id));
   if (const auto open = recovered_.find(id); open != recovered_.end()) {
     valve->monitor.Recover(open->second);
@@ -353,29 +335,15 @@ void Pipeline::OnSample(std::string_view valve_id, const Sample& sample,
   }
   const ValveOutcome outcome =
       valve->monitor.Step(sample, writer, received, journal_);
-  if (valve->shadow != nullptr) {
-    // Compares without second looks, which the candidate does not get.
-    const ValveOutcome observed{valve->monitor.observed(), outcome.models,
-                                outcome.model_swapped, outcome.isolation_held,
-                                outcome.missing};
-    shadow_->Step(*valve->shadow, sample, observed);
-  }
   Count(*valve, sample, outcome);
-  const Verdict& verdict = outcome.verdict;
   // A sample out of order did not affect the engine, so its verdict is that of
   // an earlier sample, which is on the bus already.
-  if (!OutOfOrder(verdict.intake)) {
+  if (!OutOfOrder(outcome.verdict.intake)) {
     Publish(*valve, outcome);
-    if (live_ != nullptr) {
-      live_->Show(valve->monitor.id(), sample, outcome);
-    }
   }
-  // Samples out of order are recorded, too: re-scoring a run must give the
-  // engine what it was given here.
-  if (recorder_) {
-    recorder_->Record({valve->monitor.id(), sample, verdict.intake,
-                       verdict.initialised, outcome.model_swapped, false});
-  }
+  Tell([&](ValveListener& each) {
+    each.OnVerdict(valve->monitor.id(), sample, outcome);
+  });
 }
 
 void Pipeline::OnStreamEnded(std::string_view valve_id, std::uint64_t writer) {
@@ -386,15 +354,9 @@ void Pipeline::OnStreamEnded(std::string_view valve_id, std::uint64_t writer) {
   if (valve == nullptr || !valve->monitor.EndStream(writer, journal_)) {
     return;
   }
-  if (valve->shadow != nullptr) {
-    valve->shadow->EndStream();
-  }
-  if (recorder_) {
-    recorder_->Record({valve->monitor.id(), {}, {}, false, false, true});
-  }
-  if (live_ != nullptr) {
-    live_->ShowSilence(valve->monitor.id(), Silence::kEnded);
-  }
+  Tell([&](ValveListener& each) {
+    each.OnSilence(valve->monitor.id(), Silence::kEnded);
+  });
 }
 
 void Pipeline::Adopt(FaultEvent event) {
@@ -507,7 +469,7 @@ void Pipeline::Poll(TimePoint now) {
   }
   if (now - last_checkpoint_ >= options_.checkpoint_period) {
     last_checkpoint_ = now;
-    TakeCheckpoint();
+    TakeCheckpoint(false);
   }
 }
 
@@ -518,8 +480,9 @@ void Pipeline::UpdateDrift(Valve& valve) {
     valve.drift_used = std::max(valve.drift_used, drift_[c].used());
     ReportDriftAtBound(valve, c, drift_[c]);
   }
-  if (live_ != nullptr && !drift_.empty()) {
-    live_->ShowDrift(valve.monitor.id(), drift_);
+  if (!drift_.empty()) {
+    Tell(
+        [&](ValveListener& each) { each.OnDrift(valve.monitor.id(), drift_); });
   }
 }
 
@@ -547,14 +510,8 @@ void Pipeline::ReportDriftAtBound(Valve& valve, std::size_t channel,
 
 void Pipeline::CheckSilentValves(TimePoint now) {
   idle_.clear();
-  Checkpoint full;  // Of valves that are running out of rows.
   for (const std::unique_ptr<Valve>& valve : valves_) {
     ValveMonitor& monitor = valve->monitor;
-    // At kMaxBookRows a book opens no new day or hour. The other half is for
-    // the samples until the next call.
-    if (monitor.book_rows() >= kMaxBookRows / 2) {
-      monitor.TakeCheckpoint(full);
-    }
     if (IsEvictable(*valve) && monitor.Silence(now) >= options_.place_timeout) {
       idle_.push_back(valve.get());
     }
@@ -564,9 +521,9 @@ void Pipeline::CheckSilentValves(TimePoint now) {
       counters_.Add(Counter::kStaleEvents);
       log_.Report(LogId::kStale, "valve_stale",
                   [&monitor] { return "valve=" + LogValue(monitor.id()); });
-      if (live_ != nullptr) {
-        live_->ShowSilence(monitor.id(), Silence::kStale);
-      }
+      Tell([&](ValveListener& each) {
+        each.OnSilence(monitor.id(), Silence::kStale);
+      });
     }
     counters_.Add(Quality::kStale, monitor.CountStale(now));
     monitor.CheckTimeout(now, options_.stale_timeout, journal_);
@@ -575,9 +532,7 @@ void Pipeline::CheckSilentValves(TimePoint now) {
     recovery_deadline_.reset();
     ExpireRecovery();
   }
-  if (!full.empty()) {
-    journal_.Commit(std::move(full));
-  }
+  TakeCheckpoint(true);
   UpdateCensus();
 }
 
@@ -626,15 +581,18 @@ void Pipeline::PublishLast() {
   }
 }
 
-void Pipeline::TakeCheckpoint() {
+// @param urgent only what is running out of rows.
+void Pipeline::TakeCheckpoint(bool urgent) {
   Checkpoint checkpoint;
   for (const std::unique_ptr<Valve>& valve : valves_) {
-    valve->monitor.TakeCheckpoint(checkpoint);
-    if (valve->shadow != nullptr) {
-      valve->shadow->TakeCheckpoint(checkpoint);
+    if (!urgent || IsFilling(valve->monitor.book_rows())) {
+      valve->monitor.TakeCheckpoint(checkpoint);
     }
   }
-  journal_.Commit(std::move(checkpoint));
+  Tell([&](ValveListener& each) { each.TakeCheckpoint(checkpoint, urgent); });
+  if (!checkpoint.empty()) {
+    journal_.Commit(std::move(checkpoint));
+  }
 }
 
 void Pipeline::Reassign(std::shared_ptr<const ModelResolver> resolver) {
@@ -685,15 +643,6 @@ ValveCensus Pipeline::census() const {
 std::vector<std::string> Pipeline::valve_names() const {
   const std::lock_guard lock(mutex_);
   return names_;
-}
-
-std::vector<Heartbeat::Member> Pipeline::threads() const {
-  std::vector<Heartbeat::Member> threads{{"diagnosis", &pulse_},
-                                         {"history", &journal_.pulse()}};
-  if (recorder_) {
-    threads.push_back({"recorder", &recorder_->pulse()});
-  }
-  return threads;
 }
 
 }  // namespace fdi::monitor

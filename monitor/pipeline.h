@@ -18,8 +18,6 @@
 #include "monitor/heartbeat.h"
 #include "monitor/journal.h"
 #include "monitor/look_worker.h"
-#include "monitor/recorder.h"
-#include "monitor/shadow.h"
 #include "monitor/sinks.h"
 #include "monitor/throttled_log.h"
 #include "monitor/valve_monitor.h"
@@ -41,8 +39,6 @@ struct PipelineOptions {
   std::chrono::milliseconds recovery_window{60'000};
   std::chrono::milliseconds checkpoint_period{60'000};
   JournalOptions journal;
-  RecorderOptions recorder;
-  ShadowOptions shadow;    ///< Without a candidate: disabled.
   bool second_look{true};  ///< By simulation, for model sets with physics.
 };
 
@@ -51,8 +47,6 @@ struct PipelineSinks {
   DecisionSink& decisions;
   EventSink& events;
   HistorySink& history;
-  SampleSink* samples{nullptr};  ///< Null: samples are not recorded.
-  LiveSink* live{nullptr};       ///< Null: no live view.
 };
 
 /// The current state of the valves.
@@ -74,7 +68,7 @@ struct ValveCensus {
 ///
 ///     diagnosis thread: OnSample() -> engine -> decision vectors
 ///                                    |-> Journal: history thread, publisher
-///                                    |-> Recorder: recorder thread
+///                                    |-> ValveListener, one after the other
 ///                                    \-> LookWorker, which answers later
 ///
 /// Built idle; Start() starts the threads of these parts. All calls come from
@@ -91,12 +85,16 @@ class Pipeline {
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
+  /// Adds a listener, which is called after those added before it. Before
+  /// Start(); it outlives the pipeline.
+  void Attach(ValveListener& listener) { listeners_.push_back(&listener); }
+  /// The same, of a listener that nobody else uses.
+  void Attach(std::unique_ptr<ValveListener> listener);
+
   /// @param open episodes that the last session left open.
   /// @param accumulators of the valves, from the last checkpoint.
-  /// @param shadow_accumulators the same for the candidate.
   void Start(const std::vector<OpenEpisode>& open,
-             std::vector<Accumulator> accumulators = {},
-             std::vector<Accumulator> shadow_accumulators = {});
+             std::vector<Accumulator> accumulators = {});
 
   /// Reports that `event`, of an earlier session, was published. Before
   /// Start().
@@ -118,6 +116,8 @@ class Pipeline {
   /// assignments. Call about ten times a second, even under load. @param now
   /// all samples received earlier have been offered.
   void Poll(TimePoint now = std::chrono::steady_clock::now());
+  /// Records a gap. Thread safe.
+  void ReportGap(DataGap gap) { journal_.OnGap(std::move(gap)); }
   /// Sends the decision vectors that the sink has buffered, as Poll() does.
   void FlushDecisions();
 
@@ -136,29 +136,21 @@ class Pipeline {
 
   /// A thread ended with an exception, which Stop() throws.
   bool failed() const {
-    return journal_.failed() || (recorder_ && recorder_->failed()) ||
-           (looks_ && looks_->failed());
+    return journal_.failed() || (looks_ && looks_->failed());
   }
   ValveCensus census() const;                    ///< As of the last Poll().
   std::vector<std::string> valve_names() const;  ///< Of all valves seen.
-  /// Counts of the candidate; null without one.
-  const ShadowCounts* shadow_counts() const {
-    return shadow_ ? &shadow_->counts() : nullptr;
-  }
   bool history_degraded() const { return journal_.degraded(); }
-  bool recording_degraded() const { return recorder_ && recorder_->degraded(); }
   Journal::Backlog journal_backlog() const { return journal_.backlog(); }
-  std::size_t recorder_backlog() const {
-    return recorder_ ? recorder_->waiting() : 0;
+  /// Diagnosis and history.
+  std::vector<Heartbeat::Member> threads() const {
+    return {{"diagnosis", &pulse_}, {"history", &journal_.pulse()}};
   }
-  /// Diagnosis, history and, if there is one, recorder.
-  std::vector<Heartbeat::Member> threads() const;
 
  private:
   struct Valve {
     ValveMonitor monitor;
-    ShadowValve* shadow;  // Null: not compared.
-    bool known;           // Never evicted.
+    bool known;  // Never evicted.
     // Limits at the bound of their drift: two for each channel.
     std::bitset<std::size_t{2} * kMaxChannels> drift_full{};
     double drift_used{0.0};  // The largest share of a bound.
@@ -190,19 +182,20 @@ class Pipeline {
   void ExpireRecovery();
   void UpdateCensus();
   void PublishLast();
-  void TakeCheckpoint();
+  void TakeCheckpoint(bool urgent);
+  template <typename Call>
+  void Tell(Call call);
 
   PipelineOptions options_;
   DecisionSink& decisions_;
-  LiveSink* live_;
   std::shared_ptr<const ModelResolver> resolver_;
   MonitorContext context_;
   Counters& counters_;
   ThrottledLog& log_;
   Journal journal_;
-  std::unique_ptr<Recorder> recorder_;
-  std::unique_ptr<ShadowBank> shadow_;
   std::unique_ptr<LookWorker> looks_;  // Null: no second looks.
+  std::vector<ValveListener*> listeners_;
+  std::vector<std::unique_ptr<ValveListener>> owned_;  // Of listeners_.
   EnginePlans plans_;
 
   std::vector<std::unique_ptr<Valve>> valves_;  // In order of first samples.

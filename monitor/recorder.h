@@ -31,18 +31,34 @@ struct RecorderOptions {
 /// dropped, so that the diagnosis continues. The time of the drops becomes a
 /// data gap of all valves, "record_dropped", once a commit succeeds again.
 ///
-/// Built idle.
-class Recorder {
+/// Samples out of order are recorded, too: re-scoring a run must give the
+/// engine what it was given here. A run ends when its stream does or its valve
+/// is evicted.
+///
+/// Built idle. It is stopped before what `on_gap` calls.
+class Recorder : public ValveListener {
  public:
   /// @param on_gap called by the recorder thread.
   Recorder(SampleSink& sink, const MonitorContext& context,
            const RecorderOptions& options, std::function<void(DataGap)> on_gap);
-  ~Recorder();
+  ~Recorder() override;
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// Called by one thread.
-  void Record(ReceivedSample sample);
+  std::string_view name() const override { return "recorder"; }
+  void OnVerdict(const std::string& valve_id, const Sample& sample,
+                 const ValveOutcome& outcome) override {
+    Record({valve_id, sample, outcome.verdict.intake,
+            outcome.verdict.initialised, outcome.model_swapped, false});
+  }
+  void OnSilence(const std::string& valve_id, Silence silence) override {
+    if (silence == Silence::kEnded) {
+      Record({valve_id, {}, {}, false, false, true});
+    }
+  }
+  void OnRemoved(const std::string& valve_id, Checkpoint& /*last*/) override {
+    Record({valve_id, {}, {}, false, false, true});
+  }
 
   void Start();
   /// Stores what is queued and ends the runs and the thread; does nothing if it
@@ -58,6 +74,7 @@ class Recorder {
   std::size_t waiting() const { return queue_.size(); }
 
  private:
+  void Record(ReceivedSample sample);
   void Run();
   void Take(const ReceivedSample& sample);
   void Commit();

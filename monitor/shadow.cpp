@@ -93,7 +93,7 @@ std::optional<ShadowOutcome> ShadowValve::Step(const Sample& sample,
                                                const ValveOutcome& active) {
   // What the active engine ignored, the candidate does not get either, so that
   // no difference comes from the input.
-  if (OutOfOrder(active.verdict.intake)) {
+  if (OutOfOrder(active.observed().intake)) {
     return std::nullopt;
   }
   SetFit(FitOf(sample, active.models));
@@ -126,12 +126,12 @@ std::optional<ShadowOutcome> ShadowValve::Step(const Sample& sample,
   source_id_ = sample.source_id;
   engine_->HoldIsolation(active.isolation_held);
   const Verdict& candidate = engine_->Step(sample);
-  if (!Judged(active.verdict) || !Judged(candidate)) {
+  if (!Judged(active.observed()) || !Judged(candidate)) {
     Close();
     ++counts_.samples[static_cast<std::size_t>(ShadowOutcome::kNotJudged)];
     return ShadowOutcome::kNotJudged;
   }
-  Compare(active.verdict, *active.models);
+  Compare(active.observed(), *active.models);
   const auto outcome =
       open_ ? ShadowOutcome::kDiffered : ShadowOutcome::kAgreed;
   ++counts_.samples[static_cast<std::size_t>(outcome)];
@@ -234,34 +234,56 @@ void ShadowBank::Restore(std::vector<Accumulator> accumulators) {
   }
 }
 
-ShadowValve* ShadowBank::Add(const std::string& valve_id) {
-  if (!GlobMatches(options_.valve_glob, valve_id)) {
-    return nullptr;
+ShadowValve* ShadowBank::At(const std::string& valve_id) {
+  const auto [place, added] = valves_.try_emplace(valve_id);
+  if (added && GlobMatches(options_.valve_glob, valve_id)) {
+    place->second = std::make_unique<ShadowValve>(valve_id, parts_,
+                                                  options_.limits, counts_);
+    if (auto saved = saved_.extract(valve_id)) {
+      place->second->Resume(std::move(saved.mapped()));
+    }
   }
-  valves_.push_back(std::make_unique<ShadowValve>(valve_id, parts_,
-                                                  options_.limits, counts_));
-  if (auto saved = saved_.extract(valve_id)) {
-    valves_.back()->Resume(std::move(saved.mapped()));
-  }
-  return valves_.back().get();
+  return place->second.get();
 }
 
-void ShadowBank::Remove(const ShadowValve* valve) {
-  --counts_.valves[static_cast<std::size_t>(valve->fit())];
-  std::erase_if(valves_,
-                [valve](const auto& each) { return each.get() == valve; });
-}
-
-void ShadowBank::Step(ShadowValve& valve, const Sample& sample,
-                      const ValveOutcome& active) {
-  const ShadowFit before = valve.fit();
-  valve.Step(sample, active);
-  if (valve.fit() != before && valve.fit() != ShadowFit::kCompared) {
+void ShadowBank::OnVerdict(const std::string& valve_id, const Sample& sample,
+                           const ValveOutcome& active) {
+  ShadowValve* const valve = At(valve_id);
+  if (valve == nullptr) {
+    return;
+  }
+  const ShadowFit before = valve->fit();
+  valve->Step(sample, active);
+  if (valve->fit() != before && valve->fit() != ShadowFit::kCompared) {
     log_.Report(LogId::kShadow, "shadow_not_compared", [&] {
-      return "valve=" + LogValue(valve.valve_id()) +
-             " reason=" + std::string(ShadowFitName(valve.fit())) +
+      return "valve=" + LogValue(valve_id) +
+             " reason=" + std::string(ShadowFitName(valve->fit())) +
              " candidate=" + NameOf(*options_.candidate);
     });
+  }
+}
+
+void ShadowBank::OnSilence(const std::string& valve_id, Silence silence) {
+  ShadowValve* const valve = At(valve_id);
+  if (valve != nullptr && silence == Silence::kEnded) {
+    valve->EndStream();
+  }
+}
+
+void ShadowBank::OnRemoved(const std::string& valve_id, Checkpoint& last) {
+  if (ShadowValve* const valve = At(valve_id)) {
+    valve->TakeCheckpoint(last);
+    --counts_.valves[static_cast<std::size_t>(valve->fit())];
+  }
+  valves_.erase(valve_id);
+}
+
+// Stretches are bounded per hour and valve, so that none is urgent.
+void ShadowBank::TakeCheckpoint(Checkpoint& checkpoint, bool urgent) {
+  for (const auto& [valve_id, valve] : valves_) {
+    if (valve && !urgent) {
+      valve->TakeCheckpoint(checkpoint);
+    }
   }
 }
 

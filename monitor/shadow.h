@@ -71,7 +71,8 @@ class ShadowValve {
   /// As ValveMonitor::Resume().
   void Resume(Accumulator accumulator) { saved_ = std::move(accumulator); }
 
-  /// Processes a sample and the answer of the active set.
+  /// Processes a sample and the answer of the active set, without second
+  /// looks, which the candidate does not get.
   /// @returns the result; nothing if the candidate does not fit or the sample
   ///   is out of order.
   std::optional<ShadowOutcome> Step(const Sample& sample,
@@ -126,34 +127,35 @@ class ShadowValve {
 /// fits: its decisions are only compared. Costs one engine per valve.
 ///
 /// Used by the diagnosis thread, except where noted.
-class ShadowBank {
+class ShadowBank : public ValveListener {
  public:
   /// @throws DataError if the candidate is not usable.
   ShadowBank(ShadowOptions options, ThrottledLog& log);
 
   /// Restores the accumulators of the last checkpoint; those of another
-  /// candidate are ignored. Before the first Add().
+  /// candidate are ignored. Before the first sample.
   void Restore(std::vector<Accumulator> accumulators);
 
-  /// Adds a valve at its first sample. @returns null if the candidate does not
-  /// run on it.
-  ShadowValve* Add(const std::string& valve_id);
-  /// `valve` is not used any more.
-  void Remove(const ShadowValve* valve);
-
-  /// Passes a sample to the candidate, and logs why it does not fit.
-  void Step(ShadowValve& valve, const Sample& sample,
-            const ValveOutcome& active);
+  std::string_view name() const override { return "shadow"; }
+  /// Passes the sample to the candidate, and logs why it does not fit.
+  void OnVerdict(const std::string& valve_id, const Sample& sample,
+                 const ValveOutcome& active) override;
+  void OnSilence(const std::string& valve_id, Silence silence) override;
+  void OnRemoved(const std::string& valve_id, Checkpoint& last) override;
+  void TakeCheckpoint(Checkpoint& checkpoint, bool urgent) override;
 
   /// Thread safe.
   const ShadowCounts& counts() const { return counts_; }
 
  private:
+  ShadowValve* At(const std::string& valve_id);
+
   ShadowOptions options_;
   ThrottledLog& log_;
   EngineParts parts_;
   ShadowCounts counts_;
-  std::vector<std::unique_ptr<ShadowValve>> valves_;
+  // Null: the candidate does not run on the valve.
+  std::unordered_map<std::string, std::unique_ptr<ShadowValve>> valves_;
   std::unordered_map<std::string, Accumulator> saved_;
 };
 

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -86,9 +87,16 @@ class EventSink {
   virtual bool Publish(const FaultEvent& event, bool persisted) = 0;
 };
 
+/// The history does not take a record for its own sake: others it would take.
+class RecordError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// Stores episodes. History thread of the journal. Every call may throw a
 /// std::exception and can then be retried; calls are idempotent except where
-/// noted.
+/// noted. A RecordError is of the record at hand, of the checkpoint, or of what
+/// is buffered; any other exception means that the history is out of order.
 class HistorySink {
  public:
   virtual ~HistorySink() = default;
@@ -96,8 +104,9 @@ class HistorySink {
   /// `batch` one commit: on return everything is on the disk; on failure,
   /// nothing.
   virtual void CommitBatch(const std::function<void()>& batch) = 0;
-  /// Within CommitBatch().
-  virtual void Record(const FaultEvent& event) = 0;
+  /// Within CommitBatch(). @returns whether the event is in the history: false
+  ///   if its episode has ended there, or does not exist.
+  virtual bool Record(const FaultEvent& event) = 0;
   /// Continues an episode that an earlier session left open. In CommitBatch().
   virtual void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) = 0;
   /// Replaces the earlier look at the episode. Within CommitBatch().
@@ -115,6 +124,8 @@ class HistorySink {
   /// Commits what is buffered, and a sign of life; called every second. After a
   /// failure it writes in any case, so that its success proves recovery.
   virtual void Commit() = 0;
+  /// Forgets what is buffered.
+  virtual void DropBuffered() = 0;
 };
 
 /// Stores samples as runs. Recorder thread.
@@ -142,6 +153,11 @@ struct ValveOutcome {
   /// Signals that the model set needs and the sample lacks. Their channels
   /// abstain; if no channel is left, the quality is BAD_INPUT.
   SignalMask missing{0};
+  double period_s{0.0};            ///< The time that the sample stands for.
+  const Verdict* engine{nullptr};  ///< Null: no second look changed `verdict`.
+
+  /// What the engine said, before any second look.
+  const Verdict& observed() const { return engine ? *engine : verdict; }
 };
 
 /// Why a valve sends nothing.
@@ -152,22 +168,34 @@ enum class Silence : std::uint8_t {
   kMonitor,  ///< Its monitor is silent; only on the plant page.
 };
 
-/// Shows the valves to operators. Called by the diagnosis thread; must not
-/// block.
-class LiveSink {
+/// Follows the valves beside diagnosis and journal: the page, the recorder, the
+/// candidate of --shadow, health. Each hook is optional, is called by the
+/// diagnosis thread after the decision vector has been published, and must not
+/// block. One that throws is counted and logged (`part_failed`), and called
+/// again the next time.
+class ValveListener {
  public:
-  virtual ~LiveSink() = default;
-  /// A sample in order, and its result.
-  virtual void Show(const std::string& valve_id, const Sample& sample,
-                    const ValveOutcome& outcome) = 0;
-  /// The valve fell silent, until its next sample.
-  virtual void ShowSilence(const std::string& valve_id, Silence silence) = 0;
+  virtual ~ValveListener() = default;
+  virtual std::string_view name() const = 0;  ///< In the log.
+
+  /// A sample was processed. One out of order (OutOfOrder()) changed nothing:
+  /// the verdict is that of an earlier sample.
+  virtual void OnVerdict(const std::string& /*valve_id*/,
+                         const Sample& /*sample*/,
+                         const ValveOutcome& /*outcome*/) {}
+  /// The valve fell silent (kStale, kEnded), until its next sample.
+  virtual void OnSilence(const std::string& /*valve_id*/, Silence /*silence*/) {
+  }
   /// How far the limits of the valve have followed its drift, by channel of its
   /// model set; several times a second.
-  virtual void ShowDrift(const std::string& /*valve_id*/,
-                         std::span<const FollowedDrift> /*drift*/) {}
-  /// The valve was evicted and is not shown any more.
-  virtual void Remove(const std::string& /*valve_id*/) {}
+  virtual void OnDrift(const std::string& /*valve_id*/,
+                       std::span<const FollowedDrift> /*drift*/) {}
+  /// The valve was evicted. Adds to `last` what is still to be stored of it.
+  virtual void OnRemoved(const std::string& /*valve_id*/,
+                         Checkpoint& /*last*/) {}
+  /// Adds what is to be stored: everything each minute and at the end, and
+  /// several times a second (`urgent`) only what is too much to keep that long.
+  virtual void TakeCheckpoint(Checkpoint& /*checkpoint*/, bool /*urgent*/) {}
 };
 
 }  // namespace fdi::monitor

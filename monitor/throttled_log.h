@@ -38,6 +38,8 @@ enum class LogId : std::uint8_t {
   kUnpersisted = 122,    ///< event_unpersisted
   kPersistence = 123,    ///< persistence_degraded
   kHistoryLost = 124,    ///< history_dropped
+  kRefused = 125,        ///< event_refused
+  kSetAside = 126,       ///< record_set_aside
   kRecordDropped = 131,  ///< record_dropped
   kRecordFailed = 132,   ///< record_failed
   kTransport = 141,      ///< transport_loss
@@ -45,6 +47,7 @@ enum class LogId : std::uint8_t {
   kPairTwin = 152,       ///< pair_rank_taken
   kOperatorSync = 153,   ///< operator_action_waits, operator_action_refused
   kContested = 154,      ///< valves_contested, outside a pair
+  kPartFailed = 155,     ///< part_failed
   kLookDropped = 161,    ///< second_look_dropped
   kLookFailed = 162,     ///< second_look_failed
 };

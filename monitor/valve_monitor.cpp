@@ -108,8 +108,7 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     unassigned_.seq = sample.seq;
     RecordPosition(sample);
     coverage_.Add(sample.stamp_ns, Quality::kUnassigned);
-    health_.Add(sample, unassigned_, nullptr, period_s());
-    return {unassigned_, nullptr, swapped, isolation_held_, 0};
+    return {unassigned_, nullptr, swapped, isolation_held_, 0, period_s()};
   }
   RestoreOnce(sample.source_id);
   // Before the engine: an episode that this sample opens has the old name only
@@ -127,7 +126,6 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     RecordPosition(sample);
     coverage_.Add(sample.stamp_ns, verdict.quality, 1,
                   verdict.intake == Intake::kAccepted);
-    health_.Add(sample, verdict, models_.get(), period_s());
   }
   // A superseded publisher that goes on sending must not end the stream of its
   // successor.
@@ -142,7 +140,8 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   }
   FollowStrengths(verdict, outlet);
   const auto missing = static_cast<SignalMask>(required_ & ~sample.present);
-  return {verdict, models_.get(), swapped, isolation_held_, missing};
+  return {verdict, models_.get(), swapped, isolation_held_,
+          missing, period_s(),    &engine};
 }
 
 // The shorter one of the last two intervals: a gap is no period.
@@ -188,7 +187,6 @@ void ValveMonitor::HoldIsolation(bool hold) {
 
 void ValveMonitor::TakeCheckpoint(Checkpoint& checkpoint) {
   coverage_.DrainInto(id_, period_s(), checkpoint.coverage);
-  health_.DrainInto(id_, checkpoint.health);
   if (engine_ && seen_ && !stale_ && !ended_) {
     checkpoint.accumulators.push_back(
         {id_, source_id_, models_->content_hash, stamp_ns_, engine_->Save()});

@@ -13,7 +13,6 @@
 #include "monitor/episode_names.h"
 #include "monitor/episode_strengths.h"
 #include "monitor/episode_tracker.h"
-#include "monitor/health_book.h"
 #include "monitor/sinks.h"
 
 namespace fdi::monitor {
@@ -45,8 +44,8 @@ class ValveMonitor {
   /// See ModelResolver::IsolationHeld().
   void HoldIsolation(bool hold);
 
-  /// Adds the time and health since the last call and, unless the valve is
-  /// silent, the accumulators.
+  /// Adds the time since the last call and, unless the valve is silent, the
+  /// accumulators.
   void TakeCheckpoint(Checkpoint& checkpoint);
 
   /// Rate limit. A sample that restarts the engine (a gap, another source or
@@ -84,8 +83,8 @@ class ValveMonitor {
 
   void Flush(EpisodeOutlet& outlet) { tracker_.Flush(outlet); }
 
-  /// Rows of time and health since the last TakeCheckpoint().
-  std::size_t book_rows() const { return coverage_.rows() + health_.rows(); }
+  /// Rows of time since the last TakeCheckpoint().
+  std::size_t book_rows() const { return coverage_.rows(); }
   /// Time since the last sample; infinite once the stream has ended.
   TimePoint::duration Silence(TimePoint now) const {
     return ended_ ? TimePoint::duration::max() : now - received_;
@@ -96,10 +95,8 @@ class ValveMonitor {
   /// A sample has been received.
   bool seen() const { return seen_; }
   /// The verdict on the last sample.
-  const Verdict& verdict() const { return answer_ ? *answer_ : observed(); }
-  /// The same before any second look.
-  const Verdict& observed() const {
-    return engine_ ? engine_->verdict() : unassigned_;
+  const Verdict& verdict() const {
+    return answer_ ? *answer_ : engine_ ? engine_->verdict() : unassigned_;
   }
   bool stale() const { return stale_; }
   bool ended() const { return ended_; }
@@ -134,7 +131,6 @@ class ValveMonitor {
   EpisodeTracker tracker_;
   Verdict unassigned_;
   CoverageBook coverage_;
-  HealthBook health_;
   std::optional<Accumulator> saved_;
   std::uint64_t source_id_{0};
   std::int64_t stamp_ns_{0};

@@ -55,27 +55,14 @@ monitor::HttpServerOptions ServerOptions(const ConsoleOptions& options) {
 
 }  // namespace
 
-// Shows the events that went to the bus.
-class Console::Events : public monitor::EventSink {
- public:
-  Events(monitor::EventSink& bus, Console& console)
-      : bus_(bus), console_(console) {}
-
-  bool Publish(const FaultEvent& event, bool persisted) override {
-    const bool sent = bus_.Publish(event, persisted);
-    console_.board_.AddMark(event);
-    if (persisted) {
-      console_.stream_.Wake();
-    } else {
-      console_.stream_.AddUnstored(event);
-    }
-    return sent;
+void Console::OnCommitted(const FaultEvent& event, bool persisted) {
+  board_.AddMark(event);
+  if (persisted) {
+    stream_.Wake();
+  } else {
+    stream_.AddUnstored(event);
   }
-
- private:
-  monitor::EventSink& bus_;
-  Console& console_;
-};
+}
 
 void Console::OnEvent(const FaultEvent& event) {
   board_.AddMark(event);
@@ -109,11 +96,6 @@ Console::Console(const ConsoleOptions& options,
 
 Console::~Console() {
   Close();
-}
-
-monitor::EventSink& Console::Wrap(monitor::EventSink& bus) {
-  events_ = std::make_unique<Events>(bus, *this);
-  return *events_;
 }
 
 void Console::Start(ConsoleSources sources) {

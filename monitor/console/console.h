@@ -47,9 +47,8 @@ class Console {
 
   /// Fed by the pipeline, or from the bus for a plant.
   LiveBoard& live() { return board_; }
-  /// Event sink for the pipeline, in front of `bus`: an event is shown once it
-  /// is on the bus, by which time it is in the history unless that failed.
-  monitor::EventSink& Wrap(monitor::EventSink& bus);
+  /// Shows an event, which is in the history if `persisted`.
+  void OnCommitted(const FaultEvent& event, bool persisted);
 
   /// For a plant: a model set or an event from the bus; call after Start().
   void OnModels(std::shared_ptr<const ModelFacts> models) {
@@ -75,7 +74,6 @@ class Console {
   AdmissionCounts admissions() const { return access_.counts(); }
 
  private:
-  class Events;
   void SetDefaultResponses();
   void RenewTls();
   void LogListenAddress() const;
@@ -89,7 +87,6 @@ class Console {
   LiveStream stream_;
   WorkListCache work_list_;
   std::stop_source stopping_;
-  std::unique_ptr<Events> events_;
   std::unique_ptr<StoredModels> models_;
   std::unique_ptr<AlarmBook> alarms_;
   std::unique_ptr<Api> api_;

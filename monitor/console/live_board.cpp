@@ -220,8 +220,11 @@ void LiveBoard::RecordGap(Slot& slot, const Sample& sample) {
   PushBounded(gaps_, gap, kGapsWaiting);
 }
 
-void LiveBoard::Show(const std::string& valve_id, const Sample& sample,
-                     const monitor::ValveOutcome& outcome) {
+void LiveBoard::OnVerdict(const std::string& valve_id, const Sample& sample,
+                          const monitor::ValveOutcome& outcome) {
+  if (OutOfOrder(outcome.verdict.intake)) {
+    return;
+  }
   const ModelSet* const models = outcome.models;
   Slot& slot = At(valve_id);
   const std::lock_guard lock(slot.mutex);
@@ -271,8 +274,8 @@ void LiveBoard::ShowLocked(Slot& slot, const Sample& sample,
   ++slot.now.version;
 }
 
-void LiveBoard::ShowSilence(const std::string& valve_id,
-                            monitor::Silence silence) {
+void LiveBoard::OnSilence(const std::string& valve_id,
+                          monitor::Silence silence) {
   Slot& slot = At(valve_id);
   const std::lock_guard lock(slot.mutex);
   slot.now.silence = silence;
@@ -280,8 +283,8 @@ void LiveBoard::ShowSilence(const std::string& valve_id,
 }
 
 // The next sample tells that something changed.
-void LiveBoard::ShowDrift(const std::string& valve_id,
-                          std::span<const FollowedDrift> drift) {
+void LiveBoard::OnDrift(const std::string& valve_id,
+                        std::span<const FollowedDrift> drift) {
   Slot& slot = At(valve_id);
   const std::lock_guard lock(slot.mutex);
   slot.ShowDrift(drift);
@@ -296,7 +299,7 @@ void LiveBoard::ShowMonitorSilence(const std::string& valve_id,
   ++slot.now.version;
 }
 
-void LiveBoard::Remove(const std::string& valve_id) {
+void LiveBoard::OnRemoved(const std::string& valve_id, Checkpoint& /*last*/) {
   const std::unique_lock lock(slots_mutex_);
   slots_.erase(valve_id);
 }

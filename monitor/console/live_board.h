@@ -73,22 +73,23 @@ std::string IsolatedFaults(const FaultEvent& event);
 ///
 /// Thread safe. The diagnosis takes two locks per sample, which readers hold
 /// for microseconds: no reader does more than copy under them.
-class LiveBoard : public monitor::LiveSink {
+class LiveBoard : public monitor::ValveListener {
  public:
   LiveBoard();
   ~LiveBoard() override;
   LiveBoard(const LiveBoard&) = delete;
   LiveBoard& operator=(const LiveBoard&) = delete;
 
-  void Show(const std::string& valve_id, const Sample& sample,
-            const monitor::ValveOutcome& outcome) override;
-  void ShowSilence(const std::string& valve_id,
-                   monitor::Silence silence) override;
-  void ShowDrift(const std::string& valve_id,
-                 std::span<const FollowedDrift> drift) override;
-  void Remove(const std::string& valve_id) override;
+  std::string_view name() const override { return "console"; }
+  void OnVerdict(const std::string& valve_id, const Sample& sample,
+                 const monitor::ValveOutcome& outcome) override;
+  void OnSilence(const std::string& valve_id,
+                 monitor::Silence silence) override;
+  void OnDrift(const std::string& valve_id,
+               std::span<const FollowedDrift> drift) override;
+  void OnRemoved(const std::string& valve_id, Checkpoint& last) override;
 
-  /// As Show(), of a verdict that came over the bus without the readings.
+  /// As OnVerdict(), of a verdict that came over the bus without the readings.
   void ShowRemote(const std::string& valve_id, const Verdict& verdict,
                   std::shared_ptr<const ModelFacts> models,
                   const std::string& monitor);

@@ -161,16 +161,11 @@ bool Pair::Publish(const FaultEvent& event, bool persisted) {
   if (held_events_.empty() && Leads()) {
     return !MarkPublishedLocked(own) || events_.Publish(event, persisted);
   }
-  HoldLocked(std::move(own), false);
+  HoldLocked(std::move(own));
   return true;
 }
 
-void Pair::Resend(const FaultEvent& event) {
-  const std::lock_guard lock(mutex_);
-  HoldLocked(event, true);
-}
-
-void Pair::HoldLocked(FaultEvent event, bool resent) {
+void Pair::HoldLocked(FaultEvent event) {
   std::erase_if(unmatched_events_,
                 [&](const HeldEvent& held) { return Same(held.event, event); });
   if (IsPublishedLocked(event)) {
@@ -179,7 +174,7 @@ void Pair::HoldLocked(FaultEvent event, bool resent) {
   if (held_events_.size() >= kMaxHeldEvents) {
     held_events_.pop_front();
   }
-  held_events_.push_back({Clock::now(), std::move(event), resent});
+  held_events_.push_back({Clock::now(), std::move(event)});
 }
 
 bool Pair::IsPublishedLocked(const FaultEvent& event) const {
@@ -341,8 +336,7 @@ void Pair::PublishHeld(TimePoint now) {
   const std::lock_guard lock(mutex_);
   for (const HeldEvent& held : std::exchange(held_events_, {})) {
     if (MarkPublishedLocked(held.event)) {
-      EventSink& out = held.resent ? bus_ : events_;
-      out.Publish(held.event, held.event.persisted);
+      events_.Publish(held.event, held.event.persisted);
     }
   }
 }

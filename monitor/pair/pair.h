@@ -62,10 +62,6 @@ class Pair : public DecisionSink, public EventSink {
     decisions_.Remove(valve_id);
   }
   bool Publish(const FaultEvent& event, bool persisted) override;
-  /// As Publish(), with an event of an earlier session: it goes to the bus
-  /// alone, because its session may have notified others of it. Before the
-  /// first Tick().
-  void Resend(const FaultEvent& event);
 
   /// Receives the states of the others, decides who leads and publishes our
   /// own. Called by the diagnosis thread, several times per patience interval.
@@ -101,7 +97,6 @@ class Pair : public DecisionSink, public EventSink {
   struct HeldEvent {
     TimePoint since;
     FaultEvent event;
-    bool resent{false};  // See Resend().
   };
 
   bool Leads() const { return Clock::now() < lease_until_.load(); }
@@ -114,7 +109,7 @@ class Pair : public DecisionSink, public EventSink {
   void DropCovered(TimePoint now);
   void Adopt(TimePoint now, Pipeline& pipeline);
   void RepeatEvents(TimePoint since);
-  void HoldLocked(FaultEvent event, bool resent);
+  void HoldLocked(FaultEvent event);
   bool IsPublishedLocked(const FaultEvent& event) const;
   bool MarkPublishedLocked(const FaultEvent& event);
 

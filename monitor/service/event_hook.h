@@ -14,7 +14,7 @@
 
 #include "base/log.h"
 #include "base/worker.h"
-#include "monitor/sinks.h"
+#include "diagnosis/records/fault_event.h"
 #include "report/fault_texts.h"
 #include "report/json_output.h"
 
@@ -123,29 +123,6 @@ class EventHook {
   bool stopping_{false};
   Counts counts_;
   Worker worker_;
-};
-
-/// Decorates `bus`: the hook is notified of every event that went to it.
-class OutwardEvents : public EventSink {
- public:
-  OutwardEvents(EventSink& bus, std::unique_ptr<EventDelivery> delivery,
-                EventHookOptions options, report::FaultTexts texts, LogSink log)
-      : bus_(bus),
-        texts_(std::move(texts)),
-        hook_(std::move(delivery), std::move(options), std::move(log)) {}
-
-  bool Publish(const FaultEvent& event, bool persisted) override {
-    const bool sent = bus_.Publish(event, persisted);
-    hook_.Notify(EventJson(event, persisted, texts_));
-    return sent;
-  }
-
-  EventHook& hook() { return hook_; }
-
- private:
-  EventSink& bus_;
-  report::FaultTexts texts_;
-  EventHook hook_;
 };
 
 }  // namespace fdi::monitor

@@ -7,6 +7,26 @@
 #include "monitor/trace.h"
 
 namespace fdi::monitor {
+namespace {
+
+// Runs `call` and tells values that cannot be stored from a file that does not
+// answer now. @throws RecordError, or what `call` throws.
+void TellApart(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const storage::SqliteError& error) {
+    if (error.IsOfValues()) {
+      throw RecordError(error.what());
+    }
+    throw;
+  } catch (const DataError& error) {
+    throw RecordError(error.what());
+  } catch (const std::invalid_argument& error) {
+    throw RecordError(error.what());
+  }
+}
+
+}  // namespace
 
 HistoryStore::HistoryStore(const std::filesystem::path& path, Clock utc_now_ns,
                            LogSink log)
@@ -47,55 +67,25 @@ void HistoryStore::ReportDamage(const std::vector<std::string>& damaged) {
 }
 
 void HistoryStore::CommitBatch(const std::function<void()>& batch) {
-  cause_changes_.clear();
-  writer_.CommitBatch(batch);
-  PublishCauses();
+  TellApart([&] { writer_.CommitBatch(batch); });
 }
 
-void HistoryStore::Record(const FaultEvent& event) {
-  SkipIfNotFound("record", [&] {
-    writer_.Record(event, utc_now_ns_());
-    DetectCauses(event);
-  });
+void HistoryStore::CommitCheckpoint(const Checkpoint& checkpoint) {
+  TellApart([&] { writer_.CommitCheckpoint(checkpoint); });
 }
 
-void HistoryStore::WatchCauses(
-    std::vector<storage::CauseGroup> groups,
-    std::function<void(const storage::CauseChange&)> on_change) {
-  causes_.emplace(writer_.database(), std::move(groups));
-  on_cause_change_ = std::move(on_change);
-  writer_.CommitBatch([this] { cause_changes_ = causes_->EndFinished(); });
-  PublishCauses();
+void HistoryStore::Commit() {
+  TellApart([&] { writer_.Commit(utc_now_ns_()); });
 }
 
-// Called within the transaction that records the event.
-void HistoryStore::DetectCauses(const FaultEvent& event) {
-  if (!causes_) {
-    return;
-  }
-  const std::string episode_id = storage::EpisodeIdText(event.episode_id);
-  std::vector<storage::CauseChange> changes;
-  if (event.transition.kind == TransitionKind::kIsolated ||
-      event.transition.kind == TransitionKind::kReisolated) {
-    changes = causes_->Isolated(episode_id, event.valve_id,
-                                event.transition.stamp_ns);
-  } else if (event.transition.kind == TransitionKind::kClosed) {
-    changes = causes_->Ended(episode_id);
-  }
-  cause_changes_.insert(cause_changes_.end(), changes.begin(), changes.end());
-}
-
-void HistoryStore::PublishCauses() {
-  for (const storage::CauseChange& change : std::exchange(cause_changes_, {})) {
-    const storage::CommonCause& cause = change.cause;
-    log_(LogLevel::kWarning,
-         EventLine("common_cause",
-                   {{"kind", std::string(CauseChangeName(change.kind))},
-                    {"cause", cause.cause_id},
-                    {"group", cause.group},
-                    {"episodes", std::to_string(cause.members.size())}}));
-    on_cause_change_(change);
-  }
+bool HistoryStore::Record(const FaultEvent& event) {
+  bool stored = false;
+  return SkipIfNotFound("record",
+                        [&] {
+                          stored = writer_.Record(event, utc_now_ns_()) ||
+                                   writer_.Has(event);
+                        }) &&
+         stored;
 }
 
 void HistoryStore::Resume(std::uint64_t episode_id, std::int64_t stamp_ns) {
@@ -123,14 +113,17 @@ void HistoryStore::AddTrace(const EpisodeTrace& trace) {
   });
 }
 
-void HistoryStore::SkipIfNotFound(const char* operation,
+// @returns whether it was found.
+bool HistoryStore::SkipIfNotFound(const char* operation,
                                   const std::function<void()>& call) {
   try {
-    call();
+    TellApart(call);
+    return true;
   } catch (const NotFoundError& error) {
     log_(LogLevel::kError,
          EventLine("history_refused",
                    {{"operation", operation}, {"reason", error.what()}}));
+    return false;
   }
 }
 

@@ -3,21 +3,19 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/log.h"
 #include "monitor/sinks.h"
-#include "storage/history/common_cause.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/history_writer.h"
 
 namespace fdi::monitor {
 
-/// history.db as the history of the monitor. Records that the file can never
-/// accept (their episode does not exist) are reported and skipped; any other
-/// operation may fail and is retried by the caller.
+/// history.db as the history of the monitor. Records whose episode does not
+/// exist are reported and skipped; values that the file does not accept are a
+/// RecordError; any other operation may fail and is retried by the caller.
 class HistoryStore : public HistorySink {
  public:
   using Clock = std::function<std::int64_t()>;  ///< UTC now [ns]
@@ -41,39 +39,28 @@ class HistoryStore : public HistorySink {
   /// ones are reported and skipped.
   std::vector<FaultEvent> UnsentEvents();
 
-  /// Looks for common causes in what is recorded from now on. `on_change` is
-  /// called by the history thread after each change has been committed.
-  void WatchCauses(std::vector<storage::CauseGroup> groups,
-                   std::function<void(const storage::CauseChange&)> on_change);
-
   void CommitBatch(const std::function<void()>& batch) override;
-  void Record(const FaultEvent& event) override;
+  bool Record(const FaultEvent& event) override;
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) override;
   void StoreLook(const EpisodeLook& look) override;
   void StoreStrength(const StrengthPoint& point) override;
   void AddTrace(const EpisodeTrace& trace) override;
   void AddGap(const DataGap& gap) override { writer_.AddGap(gap); }
-  void CommitCheckpoint(const Checkpoint& checkpoint) override {
-    writer_.CommitCheckpoint(checkpoint);
-  }
+  void CommitCheckpoint(const Checkpoint& checkpoint) override;
   void MarkSent(const FaultEvent& event) override { writer_.MarkSent(event); }
-  void Commit() override { writer_.Commit(utc_now_ns_()); }
+  void Commit() override;
+  void DropBuffered() override { writer_.DropPending(); }
 
   /// Ends the session cleanly.
   void EndSession() { writer_.EndSession(utc_now_ns_(), true); }
 
  private:
-  void DetectCauses(const FaultEvent& event);
-  void PublishCauses();
   void ReportDamage(const std::vector<std::string>& damaged);
-  void SkipIfNotFound(const char* operation, const std::function<void()>& call);
+  bool SkipIfNotFound(const char* operation, const std::function<void()>& call);
 
   storage::HistoryWriter writer_;
   Clock utc_now_ns_;
   LogSink log_;
-  std::optional<storage::CommonCauseBook> causes_;
-  std::function<void(const storage::CauseChange&)> on_cause_change_;
-  std::vector<storage::CauseChange> cause_changes_;  // Of the current batch.
 };
 
 }  // namespace fdi::monitor

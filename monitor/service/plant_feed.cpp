@@ -119,7 +119,7 @@ void PlantFeed::UpdateSilence(const std::string& valve_id, Valve& valve,
   if (silence == Silence::kMonitor) {
     board_.ShowMonitorSilence(valve_id, monitor.line.heard_ns);
   } else {
-    board_.ShowSilence(valve_id, silence);
+    board_.OnSilence(valve_id, silence);
   }
 }
 

@@ -5,9 +5,10 @@
 // consumers are ready; until then samples queue at the subscriber.
 //
 // Stop: HTTP stops accepting requests, the diagnosis drains the subscriber,
-// journal and recorder store and publish the results, the hook gets a second
-// for its deliveries, the session is closed in the history, and the last status
-// is published. Each step is attempted even if an earlier one failed.
+// recorder and journal store and publish the results, common causes are looked
+// for in the last events, the hook gets a second for its deliveries, the
+// session is closed in the history, and the last status is published. Each step
+// is attempted even if an earlier one failed.
 #include "monitor/service/service.h"
 
 #include <algorithm>
@@ -21,6 +22,8 @@
 #include "base/time_text.h"
 #include "diagnosis/records/partitions.h"
 #include "monitor/bus/dds_options.h"
+#include "monitor/guard.h"
+#include "monitor/health_book.h"
 #include "monitor/service/cause_groups.h"
 #include "monitor/service/shadow.h"
 
@@ -58,25 +61,23 @@ storage::DataDirectory Prepared(const std::filesystem::path& path) {
   return data;
 }
 
-PipelineOptions PipelineOptionsOf(const ServiceOptions& options,
-                                  const storage::DataDirectory& data) {
+PipelineOptions PipelineOptionsOf(const ServiceOptions& options) {
   PipelineOptions pipeline;
-  if (options.shadow) {
-    pipeline.shadow.candidate = LoadCandidate(data.models(), *options.shadow);
-    pipeline.shadow.valve_glob = options.shadow_valves;
-  }
   pipeline.max_valves = options.max_valves;
   pipeline.valve_glob = options.valves;
   pipeline.stale_timeout = Milliseconds(options.stale_timeout_s);
   pipeline.trace.before_s = options.trace_before_s;
   pipeline.second_look = options.second_look;
-  pipeline.recorder.lossless = options.recording == Recording::kLossless;
   return pipeline;
 }
 
 std::vector<Heartbeat::Member> Members(const Pipeline& pipeline,
+                                       const Recorder* recorder,
                                        const Pulse& service) {
   std::vector<Heartbeat::Member> members = pipeline.threads();
+  if (recorder != nullptr) {
+    members.push_back({"recorder", &recorder->pulse()});
+  }
   members.push_back({"service", &service});
   return members;
 }
@@ -142,13 +143,15 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                    : nullptr),
       data_(Prepared(context.options.data_dir)),
       lock_(LockOf(data_), "recording faults"),
-      pipeline_options_(PipelineOptionsOf(options, data_)),
       cause_groups_(CauseGroupsOf(options, data_)),
-      delivery_(
+      hook_(
           options.on_event.empty()
               ? nullptr
-              : MakeEventDelivery(options.on_event,
-                                  Milliseconds(options.on_event_timeout_s))),
+              : std::make_unique<EventHook>(
+                    MakeEventDelivery(options.on_event,
+                                      Milliseconds(options.on_event_timeout_s)),
+                    EventHookOptions{.per_minute = options.on_event_per_minute},
+                    context.log)),
       participant_(DdsOptionsOf(context.options, options.max_valves),
                    context.log, "fdi-monitor"),
       intake_participant_(
@@ -168,13 +171,6 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                  options.lossless_decisions ? MonitorName() : std::string(),
                  publication_stop_.get_token(), Partitions(options)),
       events_(participant_, context.log, Partitions(options)),
-      outward_(
-          delivery_ == nullptr
-              ? nullptr
-              : std::make_unique<OutwardEvents>(
-                    events_, std::move(delivery_),
-                    EventHookOptions{.per_minute = options.on_event_per_minute},
-                    report::LoadFaultTexts(context.options), context.log)),
       status_topic_(participant_),
       samples_(
           intake_participant_,
@@ -182,10 +178,12 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
           idl::Overflow::kOnTheWay,
           ParsePartitions(context.options.partition, true)),
       log_(context.log),
-      pair_(options.pair ? std::make_unique<Pair>(participant_, *options.pair,
-                                                  MonitorName(), decisions_,
-                                                  events_, EventsOut(), log_)
-                         : nullptr),
+      after_commit_(counters_, log_),
+      pair_(options.pair
+                ? std::make_unique<Pair>(participant_, *options.pair,
+                                         MonitorName(), decisions_, events_,
+                                         after_commit_.beyond(), log_)
+                : nullptr),
       operators_(options.pair ? std::make_unique<OperatorSync>(
                                     participant_, *options.pair, MonitorName(),
                                     data_.history(), log_)
@@ -194,27 +192,74 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
               {MonitorName(), options.pair ? options.pair->name : "",
                options.valves, context.options.partition},
               log_),
-      pipeline_(WithDelivery(pipeline_options_), Sinks(), assignment_,
-                {counters_, log_, NowNs}),
-      heartbeat_(Members(pipeline_, service_pulse_)),
+      shadow_(options.shadow ? std::make_unique<ShadowBank>(
+                                   ShadowOptions{LoadCandidate(data_.models(),
+                                                               *options.shadow),
+                                                 options.shadow_valves,
+                                                 {}},
+                                   log_)
+                             : nullptr),
+      recorder_(runs_ ? std::make_unique<Recorder>(
+                            *runs_, MonitorContext{counters_, log_, NowNs},
+                            RecorderOptions{.lossless = options.recording ==
+                                                        Recording::kLossless},
+                            [this](DataGap gap) {
+                              pipeline_.ReportGap(std::move(gap));
+                            })
+                      : nullptr),
+      pipeline_(WithDelivery(PipelineOptionsOf(options)),
+                {pair_ ? static_cast<DecisionSink&>(*pair_) : decisions_,
+                 after_commit_, history_},
+                assignment_, {counters_, log_, NowNs}),
+      heartbeat_(Members(pipeline_, recorder_.get(), service_pulse_)),
       started_ns_(NowNs()),
-      last_status_line_(Clock::now()) {}
+      last_status_line_(Clock::now()) {
+  AttachListeners();
+  ListAfterCommit();
+}
 
 Service::~Service() = default;
 
-// The bus, inside the event hook if there is one.
-EventSink& Service::EventsOut() {
-  return outward_ ? static_cast<EventSink&>(*outward_) : events_;
+// Who follows the valves, in this order.
+void Service::AttachListeners() {
+  pipeline_.Attach(std::make_unique<HealthBooks>());
+  if (shadow_) {
+    pipeline_.Attach(*shadow_);
+  }
+  if (console_) {
+    pipeline_.Attach(console_->live());
+  }
+  if (recorder_) {
+    pipeline_.Attach(*recorder_);  // Last: it may wait for the disk.
+  }
 }
 
-// The event sinks are nested: console, pair, hook, bus, from the outside. The
-// console is outside the pair, so that the page of a standby shows all events;
-// the hook is inside, so that only the leader notifies.
-PipelineSinks Service::Sinks() {
-  EventSink& events = pair_ ? *pair_ : EventsOut();
-  return {pair_ ? static_cast<DecisionSink&>(*pair_) : decisions_,
-          console_ ? console_->Wrap(events) : events, history_, runs_.get(),
-          console_ ? &console_->live() : nullptr};
+// What becomes of an event, in this order. The page of a standby shows all
+// events; beyond the pair is what only the leader tells, at a takeover later.
+void Service::ListAfterCommit() {
+  if (console_) {
+    after_commit_.Add("console", [this](const FaultEvent& event, bool stored) {
+      console_->OnCommitted(event, stored);
+    });
+  }
+  if (!cause_groups_.empty()) {
+    after_commit_.Add("common_causes",
+                      [this](const FaultEvent&, bool) { causes_->Wake(); });
+  }
+  if (pair_) {
+    after_commit_.AddGate(*pair_);
+  }
+  after_commit_.Add(events_);
+  if (hook_) {
+    after_commit_.Add("on_event",
+                      [this, texts = report::LoadFaultTexts(context_.options)](
+                          const FaultEvent& event, bool stored) {
+                        // Its session may have notified of it.
+                        if (!event.resent) {
+                          hook_->Notify(EventJson(event, stored, texts));
+                        }
+                      });
+  }
 }
 
 PipelineOptions Service::WithDelivery(PipelineOptions options) {
@@ -241,23 +286,46 @@ int Service::Run(report::StopSignals& signals) {
   });
   errors.Try([this] { Stop(); });
   errors.Rethrow();
-  const bool incomplete =
-      pipeline_.history_degraded() || pipeline_.recording_degraded();
+  const bool incomplete = pipeline_.history_degraded() || RecordingDegraded();
   return incomplete ? report::kExitData : report::kExitOk;
+}
+
+bool Service::Failed() const {
+  return pipeline_.failed() || diagnosis_.failed() ||
+         (recorder_ && recorder_->failed());
+}
+
+bool Service::RecordingDegraded() const {
+  return recorder_ && recorder_->degraded();
 }
 
 void Service::Start() {
   history_.BeginSession(context_.software, context_.command_line);
-  ResendEvents();
-  WatchCauses();
-  if (outward_) {
-    outward_->hook().Start();
+  if (hook_) {
+    hook_->Start();
   }
+  if (!cause_groups_.empty()) {
+    context_.log(LogLevel::kInfo,
+                 "cause_groups groups=" + std::to_string(cause_groups_.size()));
+    causes_ = std::make_unique<planner::CauseWatch>(
+        data_.history(), cause_groups_,
+        [this](const storage::CauseChange& change) { OnCause(change); },
+        [this](const std::function<void()>& step) {
+          Guarded(counters_, log_, "common_causes", step);
+        });
+    causes_->Start();
+  }
+  ResendEvents();
   if (console_) {
     ServeConsole();
   }
-  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators(),
-                  history_.ShadowAccumulators());
+  if (shadow_) {
+    shadow_->Restore(history_.ShadowAccumulators());
+  }
+  if (recorder_) {
+    recorder_->Start();
+  }
+  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators());
   diagnosis_.Start([this] { Diagnose(); });
   if (operators_) {
     operators_->Start();
@@ -270,31 +338,25 @@ void Service::Start() {
 // Publishes what an earlier session committed but may not have sent.
 void Service::ResendEvents() {
   for (const FaultEvent& event : history_.UnsentEvents()) {
-    if (pair_) {
-      pair_->Resend(event);
-    }
-    if (pair_ || events_.Publish(event, true)) {
+    if (after_commit_.Publish(event, true)) {
       pipeline_.MarkPublished(event);
       counters_.Add(Counter::kEventsResent);
     }
   }
 }
 
-// Causes that ended meanwhile are ended in the history, so this must precede
-// Pipeline::Start(), from which on the connection belongs to the journal.
-void Service::WatchCauses() {
-  if (cause_groups_.empty()) {
-    return;
+void Service::OnCause(const storage::CauseChange& change) {
+  context_.log(
+      LogLevel::kWarning,
+      EventLine("common_cause",
+                {{"kind", std::string(CauseChangeName(change.kind))},
+                 {"cause", change.cause.cause_id},
+                 {"group", change.cause.group},
+                 {"episodes", std::to_string(change.cause.members.size())}}));
+  // Both of a pair find the cause; the leader notifies.
+  if (hook_ && (!pair_ || pair_->status().leads)) {
+    hook_->Notify(CauseJson(change));
   }
-  context_.log(LogLevel::kInfo,
-               "cause_groups groups=" + std::to_string(cause_groups_.size()));
-  history_.WatchCauses(std::move(cause_groups_),
-                       [this](const storage::CauseChange& change) {
-                         // Both of a pair find the cause; the leader notifies.
-                         if (outward_ && (!pair_ || pair_->status().leads)) {
-                           outward_->hook().Notify(CauseJson(change));
-                         }
-                       });
 }
 
 void Service::ServeConsole() {
@@ -310,10 +372,9 @@ void Service::ServeConsole() {
 
 void Service::ServeProbes() {
   const auto readiness = [this] {
-    return Readiness{
-        model_sets_,
-        !pipeline_.history_degraded() && !pipeline_.recording_degraded(),
-        samples_.status().matched};
+    return Readiness{model_sets_,
+                     !pipeline_.history_degraded() && !RecordingDegraded(),
+                     samples_.status().matched};
   };
   http_->Add(ProbePages(heartbeat_, {[this] { return Metrics(); }, readiness}));
   http_->Start();
@@ -386,7 +447,7 @@ void Service::Serve(report::StopSignals& signals) {
     watchdog_.emplace(heartbeat_, std::chrono::microseconds(limit_us / 2),
                       next_tick);
   }
-  while (!pipeline_.failed() && !diagnosis_.failed()) {
+  while (!Failed()) {
     const TimePoint now = Clock::now();
     service_pulse_.Beat();
     if (now >= next_tick) {
@@ -446,14 +507,20 @@ void Service::Tick() {
     log_.Report(LogId::kModelFailure, "models_unreadable",
                 [&reason] { return "reason=" + LogValue(reason); });
   }
-  shares_.Tick([this] { return pipeline_.valve_names(); });
-  ReportLoss();
-  ReportStall();
-  PublishStatus();
+  const auto attempt = [this](std::string_view part, const auto& call) {
+    Guarded(counters_, log_, part, call);
+  };
+  attempt("shares",
+          [this] { shares_.Tick([this] { return pipeline_.valve_names(); }); });
+  attempt("transport", [this] { ReportLoss(); });
+  attempt("heartbeat", [this] { ReportStall(); });
+  attempt("status", [this] { PublishStatus(); });
   if (Clock::now() - last_status_line_ >=
       Milliseconds(options_.status_period_s)) {
     last_status_line_ = Clock::now();
-    context_.log(LogLevel::kInfo, StatusLine(StatusOf(Facts())));
+    attempt("status_line", [this] {
+      context_.log(LogLevel::kInfo, StatusLine(StatusOf(Facts())));
+    });
   }
 }
 
@@ -502,9 +569,9 @@ StatusFacts Service::Facts() const {
           intake_participant_.refused_participants(),
           decisions_.status(),
           pipeline_.journal_backlog(),
-          pipeline_.recorder_backlog(),
+          recorder_ ? recorder_->waiting() : 0,
           pipeline_.history_degraded(),
-          pipeline_.recording_degraded(),
+          RecordingDegraded(),
           heartbeat_.StalledSince(Clock::now() - kStallLimit),
           pair_ ? std::optional(pair_->status()) : std::nullopt,
           shares_.contested()};
@@ -523,8 +590,8 @@ std::string Service::Metrics() const {
     facts.admissions = console_->admissions();
   }
   std::string page = MetricsPage(Facts(), facts);
-  if (const ShadowCounts* counts = pipeline_.shadow_counts()) {
-    page += ShadowMetrics(*counts);
+  if (shadow_) {
+    page += ShadowMetrics(shadow_->counts());
   }
   return page;
 }
@@ -579,8 +646,11 @@ void Service::Stop() {
     operators_->Stop();
   }
   errors.Try([this] { StopDiagnosis(); });
-  if (outward_) {
-    errors.Try([this] { outward_->hook().Stop(kHookPatience); });
+  if (causes_) {
+    errors.Try([this] { causes_->Stop(); });
+  }
+  if (hook_) {
+    errors.Try([this] { hook_->Stop(kHookPatience); });
   }
   errors.Try([this] { history_.EndSession(); });
   errors.Try([this] { PublishStatus(); });
@@ -615,6 +685,10 @@ void Service::StopDiagnosis() {
   }
   FirstError errors;
   errors.Try([this] { diagnosis_.Join(); });
+  // Before the journal, because it may report a gap.
+  if (recorder_) {
+    errors.Try([this] { recorder_->Stop(); });
+  }
   errors.Try([this] { pipeline_.Stop(); });
   errors.Rethrow();
 }

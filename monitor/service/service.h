@@ -11,6 +11,7 @@
 
 #include "base/worker.h"
 #include "idl/endpoint.h"
+#include "monitor/after_commit.h"
 #include "monitor/bus/bus_sinks.h"
 #include "monitor/bus/share_watch.h"
 #include "monitor/console/console.h"
@@ -19,11 +20,14 @@
 #include "monitor/pair/operator_sync.h"
 #include "monitor/pair/pair.h"
 #include "monitor/pipeline.h"
+#include "monitor/recorder.h"
 #include "monitor/service/event_hook.h"
 #include "monitor/service/history_store.h"
 #include "monitor/service/model_assignment.h"
 #include "monitor/service/run_store.h"
 #include "monitor/service/status.h"
+#include "monitor/shadow.h"
+#include "planner/cause_watch.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
 #include "storage/database/data_directory.h"
@@ -83,13 +87,13 @@ class Service {
  private:
   using TimePoint = Heartbeat::TimePoint;
 
-  EventSink& EventsOut();
-  PipelineSinks Sinks();
   PipelineOptions WithDelivery(PipelineOptions options);
+  void AttachListeners();
+  void ListAfterCommit();
   void AnnounceModels(const ModelSet& models);
 
   void Start();
-  void WatchCauses();
+  void OnCause(const storage::CauseChange& change);
   void ResendEvents();
   void ServeConsole();
   void ServeProbes();
@@ -103,6 +107,8 @@ class Service {
   void LoadModels();
   TimePoint FeedWatchdog(TimePoint next_tick);
 
+  bool Failed() const;
+  bool RecordingDegraded() const;
   StatusFacts Facts() const;
   std::string Metrics() const;
   void ReportLoss();
@@ -118,9 +124,8 @@ class Service {
   std::unique_ptr<console::Console> console_;  // Null: no console.
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
-  PipelineOptions pipeline_options_;
   std::vector<storage::CauseGroup> cause_groups_;
-  std::unique_ptr<EventDelivery> delivery_;  // Null: no event hook.
+  std::unique_ptr<EventHook> hook_;  // Null: no event hook.
   idl::Participant participant_;
   idl::Participant intake_participant_;  // See idl::Overflow.
   idl::Publisher<idl::ModelSetInfoMessage> models_topic_;
@@ -132,14 +137,17 @@ class Service {
   std::stop_source publication_stop_;  // Ends waits for slow subscribers.
   BusDecisionSink decisions_;
   BusEventSink events_;
-  std::unique_ptr<OutwardEvents> outward_;  // Null: no event hook.
   idl::Publisher<idl::MonitorStatusMessage> status_topic_;
   idl::Subscriber<idl::ValveSampleMessage> samples_;
   Counters counters_;
   ThrottledLog log_;
+  AfterCommit after_commit_;
   std::unique_ptr<Pair> pair_;               // Null: not in a pair.
   std::unique_ptr<OperatorSync> operators_;  // Set together with pair_.
   ShareWatch shares_;
+  std::unique_ptr<ShadowBank> shadow_;           // Null: no candidate.
+  std::unique_ptr<Recorder> recorder_;           // Set together with runs_.
+  std::unique_ptr<planner::CauseWatch> causes_;  // Null: no groups.
   Pipeline pipeline_;
   Pulse service_pulse_;  // Beaten by the thread of Run().
   Heartbeat heartbeat_;

@@ -153,6 +153,12 @@ bool SqliteError::IsBusy() const {
   return primary == SQLITE_BUSY || primary == SQLITE_LOCKED;
 }
 
+bool SqliteError::IsOfValues() const {
+  const int primary = code_ & 0xFF;
+  return primary == SQLITE_CONSTRAINT || primary == SQLITE_MISMATCH ||
+         primary == SQLITE_TOOBIG || primary == SQLITE_RANGE;
+}
+
 Database::Database(const std::filesystem::path& path, const Schema& schema,
                    Access access)
     : path_(path), access_(access), checks_(schema.checks) {

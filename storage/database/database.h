@@ -53,6 +53,9 @@ class SqliteError : public std::runtime_error {
   int code() const { return code_; }
   /// SQLITE_BUSY or SQLITE_LOCKED: another connection is writing.
   bool IsBusy() const;
+  /// The values are at fault (a constraint, a trigger, type or size), not the
+  /// file: trying again does not help, and other rows can be written.
+  bool IsOfValues() const;
 
  private:
   int code_;

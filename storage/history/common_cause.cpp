@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <set>
 
 #include "base/error.h"
@@ -82,11 +83,62 @@ std::string_view CauseChangeName(CauseChange::Kind kind) {
 
 CommonCauseBook::CommonCauseBook(Database& database,
                                  std::vector<CauseGroup> groups)
-    : database_(database), groups_(std::move(groups)) {
+    : database_(database),
+      groups_(std::move(groups)),
+      last_event_(*database.QueryInt64(sql::last_read_event)) {
   for (const CauseGroup& group : groups_) {
     Require(group.min_valves >= 2 && group.within_ns > 0,
             "a group needs min_valves of at least 2 and a time above 0");
   }
+}
+
+std::vector<CauseChange> CommonCauseBook::Read(int limit) {
+  struct Event {
+    std::int64_t id{0};
+    bool closed{false};
+    std::string episode_id;
+    std::string valve_id;
+    std::int64_t stamp_ns{0};
+  };
+  std::vector<Event> events;
+  Statement rows = database_.Prepare(sql::cause_events);
+  rows.Bind(last_event_, limit);
+  while (rows.Step()) {
+    Event& event = events.emplace_back();
+    rows.Read(0, event.id, event.closed, event.episode_id, event.valve_id,
+              event.stamp_ns);
+    end_due_ = end_due_ || event.closed;
+  }
+  rows.Reset();
+  at_end_ = std::ssize(events) < limit;
+  const bool any = std::ranges::any_of(events, [this](const Event& event) {
+    return std::ranges::any_of(groups_, [&event](const CauseGroup& group) {
+      return group.Has(event.valve_id);
+    });
+  });
+  std::vector<CauseChange> changes;
+  if (any || end_due_) {
+    try {
+      Transaction transaction(database_);
+      for (const Event& event : events) {
+        if (!event.closed) {
+          std::ranges::move(
+              Isolated(event.episode_id, event.valve_id, event.stamp_ns),
+              std::back_inserter(changes));
+        }
+      }
+      std::ranges::move(EndFinished(), std::back_inserter(changes));
+      transaction.Commit();
+      end_due_ = false;
+    } catch (const SqliteError& error) {
+      if (error.IsOfValues() && !events.empty()) {
+        last_event_ = events.front().id;
+      }
+      throw;
+    }
+  }
+  last_event_ = events.empty() ? last_event_ : events.back().id;
+  return changes;
 }
 
 std::vector<CauseChange> CommonCauseBook::Isolated(
@@ -196,20 +248,11 @@ void CommonCauseBook::Insert(const std::string& cause_id,
                 member.valve_id, member.fault, member.isolated_ns);
 }
 
-std::vector<CauseChange> CommonCauseBook::Ended(const std::string& episode_id) {
-  Statement causes = database_.Prepare(sql::open_causes_of_episode);
-  causes.Bind(episode_id);
-  return EndIfFinished(causes);
-}
-
+// Ends causes whose episodes have all ended.
 std::vector<CauseChange> CommonCauseBook::EndFinished() {
-  Statement causes = database_.Prepare(sql::open_causes);
-  return EndIfFinished(causes);
-}
-
-std::vector<CauseChange> CommonCauseBook::EndIfFinished(Statement& causes) {
   // Ids are collected first, because ending a cause changes the table that the
   // query reads.
+  Statement causes = database_.Prepare(sql::open_causes);
   std::vector<std::string> ids;
   while (causes.Step()) {
     ids.push_back(causes.Text(0));

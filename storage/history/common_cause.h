@@ -52,29 +52,32 @@ struct CauseChange {
 /// "OPENED", "GROWN", "ENDED"
 std::string_view CauseChangeName(CauseChange::Kind kind);
 
-/// Detects common causes while episodes are recorded. Once at least min_valves
+/// Detects common causes in the events of a history. Once at least min_valves
 /// valves of a group isolate one of its faults within within_ns of each other,
 /// a cause opens with all of them; while it is open, further such valves of the
 /// group join; it ends when all its episodes have ended.
 ///
-/// All state is in the database, so a restart changes nothing; calls are
-/// idempotent. Each call must be within a transaction.
+/// All state but the place in the events is in the database, and calls are
+/// idempotent: reading an event twice changes nothing.
 class CommonCauseBook {
  public:
+  /// Reads from the first event that may not have been read by an earlier one.
   /// @throws std::invalid_argument for min_valves < 2 or within_ns ≤ 0.
   CommonCauseBook(Database& database, std::vector<CauseGroup> groups);
 
-  /// The episode isolated another fault set at `stamp_ns`.
+  /// Reads further events, at most `limit`, and stores in one transaction what
+  /// follows from them. @returns what changed. @throws SqliteError, DataError;
+  /// the next call then begins at the same event, or one further if what was
+  /// wrong lies in the values.
+  std::vector<CauseChange> Read(int limit = 1000);
+  /// All events have been read.
+  bool at_end() const { return at_end_; }
+
+ private:
   std::vector<CauseChange> Isolated(const std::string& episode_id,
                                     const std::string& valve_id,
                                     std::int64_t stamp_ns);
-  /// The episode has ended.
-  std::vector<CauseChange> Ended(const std::string& episode_id);
-  /// Ends causes whose episodes have ended in the meantime.
   std::vector<CauseChange> EndFinished();
-
- private:
-  std::vector<CauseChange> EndIfFinished(Statement& causes);
   std::optional<CauseChange> Join(const CauseGroup& group,
                                   const std::string& cause_id,
                                   const std::string& episode_id);
@@ -87,6 +90,9 @@ class CommonCauseBook {
 
   Database& database_;
   std::vector<CauseGroup> groups_;
+  std::int64_t last_event_;  // Read so far.
+  bool end_due_{true};       // Causes may have ended before the first event.
+  bool at_end_{false};
 };
 
 /// Settings of ReadCommonCauses().

@@ -249,6 +249,7 @@ FaultEvent ReadUnsent(const Statement& row) {
   event.candidates = IsolatedCandidates(faults, t.factor, t.strength);
   SplitModelSet(model_set, event.model_set, event.model_version);
   event.persisted = true;
+  event.resent = true;
   return event;
 }
 
@@ -379,6 +380,13 @@ bool HistoryWriter::Record(const FaultEvent& event, std::int64_t now_ns) {
   return is_new;
 }
 
+bool HistoryWriter::Has(const FaultEvent& event) {
+  return database_
+      .QueryInt64(sql::has_event, EpisodeIdText(event.episode_id),
+                  event.transition.kind, event.transition.stamp_ns)
+      .has_value();
+}
+
 void HistoryWriter::Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
                            std::int64_t now_ns) {
   const std::string id = EpisodeIdText(episode_id);
@@ -438,6 +446,12 @@ void HistoryWriter::DiscardCommitted() {
   gaps_.clear();
   sent_.clear();
   traces_.DiscardCommitted();
+}
+
+void HistoryWriter::DropPending() {
+  gaps_.clear();
+  sent_.clear();
+  traces_.DropPending();
 }
 
 bool HistoryWriter::HasPending() const {

@@ -65,6 +65,8 @@ class HistoryWriter {
   /// @returns false if it is already recorded, or the episode has ended.
   /// @throws NotFoundError if there is no episode to close.
   bool Record(const FaultEvent& event, std::int64_t now_ns);
+  /// Whether the transition is recorded.
+  bool Has(const FaultEvent& event);
 
   /// Records that an episode left open by a crash continues. @throws
   /// NotFoundError
@@ -110,6 +112,8 @@ class HistoryWriter {
   /// 10 s and immediately after an error. Free if nothing is pending.
   void Commit(std::int64_t now_ns);
   bool HasPending() const;
+  /// Discards what is pending.
+  void DropPending();
 
   /// Committed events that may not have been handed to DDS, in commit order.
   /// Unreadable rows, e.g. with a damaged id, are skipped and described in

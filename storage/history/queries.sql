@@ -115,6 +115,9 @@ SELECT episode_id, ?, ?, ?, nullif(?, ''), ?, ?, ?, nullif(?, ''),
   nullif(?, '')
 FROM episode WHERE episode_id = ? AND ended_ns IS NULL
 ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
+-- name: has_event
+SELECT 1 FROM episode_event
+WHERE episode_id = ? AND kind = ? AND stamp_ns = ?
 -- name: insert_resumed
 INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns)
 VALUES (?, 'RESUMED', ?, ?) ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
@@ -285,9 +288,16 @@ WHERE cause_id = ? ORDER BY m.isolated_ns, m.valve_id
 -- name: open_cause_of_group
 SELECT cause_id FROM common_cause WHERE group_name = ? AND ended_ns IS NULL
 ORDER BY opened_ns DESC
--- name: open_causes_of_episode
-SELECT cause_id FROM common_cause_member JOIN common_cause USING (cause_id)
-WHERE episode_id = ? AND ended_ns IS NULL
+-- What a reader of events has not seen begins behind this one: what was not
+-- marked as sent may not have been read either.
+-- name: last_read_event
+SELECT coalesce((SELECT min(event_id) - 1 FROM event_outbox),
+  (SELECT max(event_id) FROM episode_event), 0)
+-- name: cause_events
+SELECT v.event_id, v.kind = 'CLOSED', v.episode_id, e.valve_id, v.stamp_ns
+FROM episode_event v JOIN episode e USING (episode_id)
+WHERE v.event_id > ? AND v.kind IN ('ISOLATED', 'REISOLATED', 'CLOSED')
+ORDER BY v.event_id LIMIT ?
 -- name: open_causes
 SELECT cause_id FROM common_cause WHERE ended_ns IS NULL
 -- name: causes

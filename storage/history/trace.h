@@ -50,6 +50,8 @@ class TraceWriter {
   void Store();
   /// After the commit: discards the instants of full chunks.
   void DiscardCommitted();
+  /// Discards everything that is not stored.
+  void DropPending() { buffers_.clear(); }
 
  private:
   // The instants of an episode that are not yet in full chunks.

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "monitor/service/history_store.h"
+#include "planner/cause_watch.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/storage/temporary_directory.h"
 
@@ -42,13 +43,24 @@ class CauseGroupsTest : public testing::Test {
         [] { return kStart + 1000 * kSecond; },
         [](LogLevel, std::string_view) {});
     store_->BeginSession("test", "");
-    store_->WatchCauses(
+  }
+  // As much as the watch of a session reads until its end.
+  void Watch() {
+    planner::CauseWatch watch(
+        directory_.path() / "history.db",
         ReadCauseGroups(Write("[[group]]\nname = 'header'\n"
                               "valves = ['A-*']\nfaults = ['f7']\n"
                               "min_valves = 2\nwithin_s = 60\n")),
-        [this](const storage::CauseChange& change) {
-          told_.push_back(change);
+        [this](const storage::CauseChange& change) { told_.push_back(change); },
+        [this](const std::function<void()>& step) {
+          try {
+            step();
+          } catch (const std::exception& error) {
+            failures_.emplace_back(error.what());
+          }
         });
+    watch.Start();
+    watch.Stop();
   }
   FaultEvent Event(const std::string& valve, TransitionKind kind,
                    std::int64_t at_s) const {
@@ -74,6 +86,7 @@ class CauseGroupsTest : public testing::Test {
   std::shared_ptr<const ModelSet> models_{SharedLinearModels()};
   std::optional<HistoryStore> store_;
   std::vector<storage::CauseChange> told_;
+  std::vector<std::string> failures_;
 };
 
 TEST_F(CauseGroupsTest, GroupsAreReadWithTheirDefaults) {
@@ -107,29 +120,54 @@ TEST_F(CauseGroupsTest, CauseIsToldOnceItIsStoredAndOverARestart) {
     Record(valve, TransitionKind::kDetected, 0);
   }
   Record("A-1", TransitionKind::kIsolated, 10);
+  Watch();
   EXPECT_TRUE(told_.empty());
   Open();
-  // The transaction fails: nothing happened.
-  EXPECT_THROW(store_->CommitBatch([this] {
-    store_->Record(Event("A-2", TransitionKind::kIsolated, 20));
-    throw std::runtime_error("disk full");
-  }),
-               std::runtime_error);
-  EXPECT_TRUE(told_.empty());
 
   Record("A-2", TransitionKind::kIsolated, 20);
+  Watch();
   ASSERT_EQ(told_.size(), 1u);
   EXPECT_EQ(told_[0].kind, Kind::kOpened);
   const report::Json json = CauseJson(told_[0]);
   EXPECT_EQ(json["kind"], "COMMON_CAUSE_OPENED");
   EXPECT_EQ(json["valves"], 2);
+  Watch();  // Reads the same events again.
+  EXPECT_EQ(told_.size(), 1u);
 
   Record("A-1", TransitionKind::kClosed, 90);
   Open();
   Record("A-2", TransitionKind::kClosed, 95);
+  Watch();
   ASSERT_EQ(told_.size(), 2u);
   EXPECT_EQ(told_[1].kind, Kind::kEnded);
   EXPECT_EQ(told_[1].cause.ended_ns, kStart + 95 * kSecond);
+  EXPECT_TRUE(failures_.empty());
+}
+
+// What cannot be stored of a cause costs no event.
+TEST_F(CauseGroupsTest, ACauseThatCannotBeStoredIsAFailureOfItsOwn) {
+  Open();
+  {
+    storage::Database file(directory_.path() / "history.db",
+                           storage::HistorySchema(),
+                           storage::Access::kOccasionalWriter);
+    storage::Transaction transaction(file);
+    file.Run(
+        "CREATE TRIGGER no_cause BEFORE INSERT ON common_cause "
+        "BEGIN SELECT RAISE(ABORT, 'no cause'); END");
+    transaction.Commit();
+  }
+  for (const char* valve : {"A-1", "A-2"}) {
+    Record(valve, TransitionKind::kDetected, 0);
+    Record(valve, TransitionKind::kIsolated, 10);
+  }
+  Watch();
+
+  EXPECT_TRUE(told_.empty());
+  ASSERT_FALSE(failures_.empty());
+  EXPECT_THAT(failures_[0], HasSubstr("no cause"));
+  EXPECT_EQ(store_->OpenEpisodes().size(), 2u);
+  EXPECT_EQ(store_->UnsentEvents().size(), 4u);
 }
 
 }  // namespace

@@ -110,7 +110,7 @@ class RestartTest : public testing::Test {
                      const std::string& valve = "V1") {
     FakeBus bus;
     FakeHistory history;
-    Pipeline pipeline(options_, PipelineSinks{bus, bus, history, nullptr},
+    Pipeline pipeline(options_, PipelineSinks{bus, bus, history},
                       std::make_shared<FixedResolver>(WatchedModels()),
                       context_);
     pipeline.Start({}, std::move(kept));
@@ -183,7 +183,7 @@ TEST_F(RestartTest, AHistoryThatFailsGetsAllTimeLater) {
   FakeBus bus;
   FakeHistory history;
   history.broken = true;
-  Pipeline pipeline(options_, PipelineSinks{bus, bus, history, nullptr},
+  Pipeline pipeline(options_, PipelineSinks{bus, bus, history},
                     std::make_shared<FixedResolver>(WatchedModels()), context_);
   pipeline.Start({});
   for (std::uint64_t k = 0; k < 200; ++k) {
@@ -204,7 +204,7 @@ TEST_F(RestartTest, AProvisionalBaselineIsDetectedAndNotNamed) {
   for (const bool provisional : {false, true}) {
     FakeBus bus;
     FakeHistory history;
-    Pipeline pipeline(options_, PipelineSinks{bus, bus, history, nullptr},
+    Pipeline pipeline(options_, PipelineSinks{bus, bus, history},
                       std::make_shared<FixedResolver>(SharedLinearModels()),
                       context_);
     pipeline.Start({});

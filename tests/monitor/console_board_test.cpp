@@ -47,7 +47,8 @@ TEST_F(LiveBoardTest, AnAnswerThatFlapsKeepsItsTrend) {
   Verdict verdict;
   for (std::uint64_t k = 0; k < 500; ++k) {
     verdict.isolated = k / 5 % 2;
-    board_.Show("V1", PlantSample(k), {verdict, models_.get(), false, false});
+    board_.OnVerdict("V1", PlantSample(k),
+                     {verdict, models_.get(), false, false});
   }
 
   EXPECT_EQ(board_.Trend("V1").value().points.size(), 500U);
@@ -104,7 +105,8 @@ TEST_F(LiveBoardTest, AnotherModelSetBeginsTheTrendAnew) {
   const auto other = monitor::SharedLinearModels(0x5678);
   ValveEngine engine(other);
   const Sample sample = PlantSample(50);
-  board_.Show("V1", sample, {engine.Step(sample), other.get(), true, false});
+  board_.OnVerdict("V1", sample,
+                   {engine.Step(sample), other.get(), true, false});
 
   EXPECT_EQ(board_.Trend("V1").value().points.size(), 1U);
   EXPECT_EQ(board_.Trend("V1")->now.models->hash, 0x5678U);
@@ -113,13 +115,14 @@ TEST_F(LiveBoardTest, AnotherModelSetBeginsTheTrendAnew) {
 TEST_F(LiveBoardTest, DriftIsThatOfTheModelSet) {
   Show(0, 5);
   EXPECT_TRUE(std::isnan(board_.Trend("V1")->now.drift_used));
-  board_.ShowDrift("V1", std::array{FollowedDrift{-0.375, -0.5, 0.1, 0.2}});
+  board_.OnDrift("V1", std::array{FollowedDrift{-0.375, -0.5, 0.1, 0.2}});
   EXPECT_EQ(board_.Trend("V1")->now.drift_used, 0.75);
   EXPECT_EQ(board_.Trend("V1")->drift.at(0).mean, -0.375);
   const auto other = monitor::SharedLinearModels(0x5678);
   ValveEngine engine(other);
   const Sample sample = PlantSample(5);
-  board_.Show("V1", sample, {engine.Step(sample), other.get(), true, false});
+  board_.OnVerdict("V1", sample,
+                   {engine.Step(sample), other.get(), true, false});
 
   EXPECT_TRUE(board_.Trend("V1")->drift.empty());
   EXPECT_TRUE(std::isnan(board_.Trend("V1")->now.drift_used));
@@ -128,7 +131,7 @@ TEST_F(LiveBoardTest, DriftIsThatOfTheModelSet) {
 TEST_F(LiveBoardTest, AValveWithoutModelsHasReadingsOnly) {
   Verdict verdict;
   verdict.quality = Quality::kUnassigned;
-  board_.Show("bare", PlantSample(0), {verdict, nullptr, false, false});
+  board_.OnVerdict("bare", PlantSample(0), {verdict, nullptr, false, false});
 
   const LiveTrend trend = board_.Trend("bare").value();
   EXPECT_EQ(trend.now.models, nullptr);
@@ -140,7 +143,7 @@ TEST_F(LiveBoardTest, AValveWithoutModelsHasReadingsOnly) {
 TEST_F(LiveBoardTest, SilenceStandsUntilTheNextSample) {
   Show(0, 5);
   const std::uint64_t before = board_.Trend("V1")->now.version;
-  board_.ShowSilence("V1", monitor::Silence::kStale);
+  board_.OnSilence("V1", monitor::Silence::kStale);
   const ValveState silent = board_.Trend("V1").value().now;
   Show(5, 6);
 

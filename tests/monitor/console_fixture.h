@@ -18,8 +18,8 @@ class BoardTest : public testing::Test {
             std::uint64_t source = 1, const std::string& valve = "V1") {
     for (std::uint64_t k = from; k < to; ++k) {
       const Sample sample = monitor::PlantSample(k, offset, source);
-      board_.Show(valve, sample,
-                  {engine_.Step(sample), models_.get(), false, false});
+      board_.OnVerdict(valve, sample,
+                       {engine_.Step(sample), models_.get(), false, false});
     }
   }
 

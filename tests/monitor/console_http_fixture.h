@@ -21,13 +21,6 @@ namespace fdi::console {
 
 inline constexpr const char* kToken = "0123456789abcdef";
 
-class NoBus : public monitor::EventSink {
- public:
-  bool Publish(const FaultEvent& /*event*/, bool /*persisted*/) override {
-    return true;
-  }
-};
-
 /// The console over real HTTP, beside a history, without a pipeline.
 class ConsoleRoutesTest : public storage::HistoryFixture {
  protected:
@@ -61,7 +54,6 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
                        const std::lock_guard lock(log_mutex_);
                        log_.append(line).append("\n");
                      });
-    events_ = &console_->Wrap(bus_);
     console_->Start({path_, directory_.path() / "models.db", "0.0", kDetected,
                      [] {
                        return MonitorFacts{"OK", {{"received", 7}}, 1};
@@ -87,8 +79,8 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
     for (int k = 0; k < samples; ++k) {
       const Sample sample = monitor::PlantSample(static_cast<std::uint64_t>(k),
                                                  k < 50 ? 0.0 : offset);
-      console_->live().Show(id, sample,
-                            {engine.Step(sample), models.get(), false, false});
+      console_->live().OnVerdict(
+          id, sample, {engine.Step(sample), models.get(), false, false});
     }
   }
 
@@ -121,9 +113,7 @@ class ConsoleRoutesTest : public storage::HistoryFixture {
   std::string IdText() const { return storage::EpisodeIdText(Id()); }
 
   storage::HistoryWriter writer_;
-  NoBus bus_;
   std::optional<Console> console_;
-  monitor::EventSink* events_{nullptr};
   std::mutex log_mutex_;
   std::string log_;
   int port_{0};

@@ -73,7 +73,7 @@ TEST_F(ConsoleRoutesTest, ATrendTellsHowFarTheLimitsHaveFollowedTheValve) {
   Start();
   ShowValve("V1", 3);
   ShowValve("V2", 3);
-  console_->live().ShowDrift(
+  console_->live().OnDrift(
       "V1", std::array{FollowedDrift{-0.25, -0.25, std::log(1.5), std::log(3.0),
                                      monitor::PlantSample(2).stamp_ns, 0}});
 
@@ -99,7 +99,7 @@ TEST_F(ConsoleRoutesTest, AValveThatIsNotJudgedIsNotCalledNormal) {
   const auto models = monitor::SharedLinearModels();
   Verdict verdict;
   verdict.quality = Quality::kBadInput;
-  console_->live().Show(
+  console_->live().OnVerdict(
       "V1", monitor::PlantSample(0),
       {verdict, models.get(), false, false, MaskOf(Signal::kF)});
 

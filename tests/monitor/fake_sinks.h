@@ -109,16 +109,25 @@ class FakeHistory : public HistorySink {
     std::this_thread::sleep_for(commit_time);
     batch();
   }
-  void Record(const FaultEvent& event) override {
+  bool Record(const FaultEvent& event) override {
     notice.Await([this] { return !stuck; });
+    bool taken = true;
     notice.Apply([&] {
       ++attempts;
       FailIfBroken();
+      if (event.valve_id == poison) {
+        throw RecordError("a trigger says no");
+      }
+      taken = event.valve_id != refused;
+      if (!taken) {
+        return;
+      }
       ++recorded[{event.episode_id, event.transition.kind}];
       if (event.transition.kind == TransitionKind::kDetected) {
         detected.push_back(event.transition.detection_stamp_ns);
       }
     });
+    return taken;
   }
   void Resume(std::uint64_t /*id*/, std::int64_t /*stamp*/) override {
     notice.Apply([&] { FailIfBroken(); });
@@ -151,6 +160,9 @@ class FakeHistory : public HistorySink {
   void CommitCheckpoint(const Checkpoint& checkpoint) override {
     notice.Apply([&] {
       FailIfBroken();
+      if (checkpoint_poisoned) {
+        throw RecordError("a day is refused");
+      }
       checkpoint_sum = Merged(std::move(checkpoint_sum), checkpoint);
       ++checkpoints;
     });
@@ -162,12 +174,24 @@ class FakeHistory : public HistorySink {
     });
   }
   void Commit() override {
-    notice.Apply([&] { FailIfBroken(); });
+    notice.Apply([&] {
+      FailIfBroken();
+      if (buffer_poisoned) {
+        throw RecordError("a gap is refused");
+      }
+    });
+  }
+  void DropBuffered() override {
+    notice.Apply([&] { buffer_poisoned = false; });
   }
 
   Notice notice;
   bool broken{false};
   bool stuck{false};
+  bool buffer_poisoned{false};
+  bool checkpoint_poisoned{false};
+  std::string poison;   // A valve whose events fail for their own sake.
+  std::string refused;  // A valve whose events are not taken.
   std::chrono::milliseconds commit_time{0};
   std::atomic<std::chrono::milliseconds> trace_time{};
   int attempts{0};

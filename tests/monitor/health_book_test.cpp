@@ -172,16 +172,23 @@ TEST(HealthBookTest, PartsMergeToTheWholeExactly) {
   EXPECT_EQ(merged.health, Taken(whole));
 }
 
-TEST(HealthBookTest, AMonitorHandsItOverWithItsCheckpoint) {
+TEST(HealthBooksTest, WhatAMonitorSaysIsHandedOverWithTheCheckpoint) {
   const auto models = SharedLinearModels();
   ValveMonitor valve("V1", EngineParts(models), {});
   FakeOutlet outlet;
+  HealthBooks books;
+  const auto give = [&](const Sample& sample) {
+    books.OnVerdict("V1", sample, valve.Step(sample, 1, {}, outlet));
+  };
   for (std::uint64_t k = 0; k < 60; ++k) {
-    valve.Step(PlantSample(k), 1, {}, outlet);
+    give(PlantSample(k));
   }
+  give(PlantSample(5));  // Late: no time.
 
   Checkpoint checkpoint;
-  valve.TakeCheckpoint(checkpoint);
+  books.TakeCheckpoint(checkpoint, true);
+  EXPECT_TRUE(checkpoint.empty());
+  books.TakeCheckpoint(checkpoint, false);
   ASSERT_EQ(checkpoint.health.size(), 1u);
   EXPECT_EQ(checkpoint.health[0].valve_id, "V1");
   EXPECT_EQ(checkpoint.health[0].seen_ms, 60'000);

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "monitor/pipeline.h"
+#include "monitor/recorder.h"
 #include "tests/monitor/fake_sinks.h"
 #include "tests/monitor/linear_models.h"
 
@@ -68,11 +69,16 @@ class PipelineHeartbeatTest : public testing::Test {
   PipelineHeartbeatTest() {
     PipelineOptions options;
     options.journal.commit_period = milliseconds(20);
-    options.recorder.commit_period = milliseconds(20);
     pipeline_ = std::make_unique<Pipeline>(
-        options, PipelineSinks{bus_, bus_, history_, &runs_},
+        options, PipelineSinks{bus_, bus_, history_},
         std::make_shared<FixedResolver>(SharedLinearModels()),
         MonitorContext{counters_, log_, [] { return std::int64_t{1'000}; }});
+    recorder_.emplace(
+        runs_, MonitorContext{counters_, log_, [] { return std::int64_t{0}; }},
+        RecorderOptions{.commit_period = milliseconds(20)},
+        [](const DataGap&) {});
+    pipeline_->Attach(*recorder_);
+    recorder_->Start();
     pipeline_->Start({});
     // The diagnosis thread of a service.
     diagnosis_ = std::jthread([this](const std::stop_token& stop) {
@@ -91,6 +97,11 @@ class PipelineHeartbeatTest : public testing::Test {
     diagnosis_.join();
   }
 
+  Heartbeat Threads() const {
+    std::vector<Heartbeat::Member> threads = pipeline_->threads();
+    threads.push_back({"recorder", &recorder_->pulse()});
+    return Heartbeat(threads);
+  }
   /// Threads that stand still from now on.
   std::vector<std::string_view> Stalled(const Heartbeat& heartbeat) const {
     const TimePoint since = Now() + milliseconds(50);
@@ -103,6 +114,7 @@ class PipelineHeartbeatTest : public testing::Test {
   FakeRuns runs_;
   Counters counters_;
   ThrottledLog log_{{}};
+  std::optional<Recorder> recorder_;
   std::unique_ptr<Pipeline> pipeline_;
   std::uint64_t offered_{0};
   std::atomic<std::uint64_t> wanted_{0};
@@ -110,15 +122,14 @@ class PipelineHeartbeatTest : public testing::Test {
 };
 
 TEST_F(PipelineHeartbeatTest, IdleThreadsBeat) {
-  EXPECT_THAT(Stalled(Heartbeat(pipeline_->threads())), IsEmpty());
+  EXPECT_THAT(Stalled(Threads()), IsEmpty());
 }
 
 TEST_F(PipelineHeartbeatTest, ABusThatHoldsTheDiagnosisUpIsSeen) {
   bus_.notice.Apply([this] { bus_.held = true; });
   wanted_ = 1;
 
-  EXPECT_THAT(Stalled(Heartbeat(pipeline_->threads())),
-              ElementsAre("diagnosis"));
+  EXPECT_THAT(Stalled(Threads()), ElementsAre("diagnosis"));
   bus_.notice.Apply([this] { bus_.held = false; });
 }
 
@@ -126,7 +137,7 @@ TEST_F(PipelineHeartbeatTest, AHistoryThatDoesNotReturnIsSeen) {
   history_.notice.Apply([this] { history_.stuck = true; });
   wanted_ = 80;
 
-  EXPECT_THAT(Stalled(Heartbeat(pipeline_->threads())), ElementsAre("history"));
+  EXPECT_THAT(Stalled(Threads()), ElementsAre("history"));
   history_.notice.Apply([this] { history_.stuck = false; });
 }
 
@@ -134,8 +145,7 @@ TEST_F(PipelineHeartbeatTest, ARecorderThatDoesNotReturnIsSeen) {
   runs_.notice.Apply([this] { runs_.held = true; });
   wanted_ = 1;
 
-  EXPECT_THAT(Stalled(Heartbeat(pipeline_->threads())),
-              ElementsAre("recorder"));
+  EXPECT_THAT(Stalled(Threads()), ElementsAre("recorder"));
   runs_.notice.Apply([this] { runs_.held = false; });
 }
 
@@ -145,9 +155,8 @@ TEST_F(PipelineHeartbeatTest, AHistoryThatFailsIsNotOneThatIsStuck) {
       Eventually([this] { return counters_[Counter::kPersistFailures] > 0; }));
 
   const TimePoint since = Now();
-  EXPECT_TRUE(Eventually([&] {
-    return Heartbeat(pipeline_->threads()).StalledSince(since).empty();
-  }));
+  EXPECT_TRUE(
+      Eventually([&] { return Threads().StalledSince(since).empty(); }));
 }
 
 }  // namespace

@@ -109,5 +109,61 @@ TEST_F(HistoryStoreTest, AnOutageEndsNoEarlierThanItBeginsIfTheClockIsSetBack) {
   EXPECT_EQ(gaps[0].to_ns, now_ns_);
 }
 
+TEST_F(HistoryStoreTest, ARecordOfAnEpisodeThatHasEndedIsRefused) {
+  HistoryStore store = Open();
+  FaultEvent end = Detection("A");
+  end.transition.kind = TransitionKind::kClosed;
+  end.transition.stamp_ns = kStart + 10;
+  FaultEvent late = Detection("A");
+  late.transition.kind = TransitionKind::kReisolated;
+  late.transition.stamp_ns = kStart + 20;
+  store.CommitBatch([&] {
+    EXPECT_TRUE(store.Record(Detection("A")));
+    EXPECT_TRUE(store.Record(end));
+    EXPECT_TRUE(store.Record(Detection("A")));  // It is there.
+    EXPECT_FALSE(store.Record(late));
+    FaultEvent unknown = end;
+    unknown.episode_id = 42;
+    unknown.models = nullptr;
+    EXPECT_FALSE(store.Record(unknown));
+  });
+}
+
+// A trigger stands for all that SQLite refuses of the values themselves.
+TEST_F(HistoryStoreTest, ValuesThatAreRefusedAreToldFromAFileThatFails) {
+  HistoryStore store = Open();
+  const auto execute = [this](std::string_view sql) {
+    storage::Database file(path_, storage::HistorySchema(),
+                           storage::Access::kOccasionalWriter);
+    storage::Transaction transaction(file);
+    file.Run(sql);
+    transaction.Commit();
+  };
+  execute(
+      "CREATE TRIGGER no_a BEFORE INSERT ON episode WHEN NEW.valve_id = 'A' "
+      "BEGIN SELECT RAISE(ABORT, 'not A'); END");
+  execute(
+      "CREATE TRIGGER no_gap BEFORE INSERT ON data_gap "
+      "BEGIN SELECT RAISE(ABORT, 'no gap'); END");
+  const auto record = [&store](const char* valve) {
+    store.CommitBatch([&] { store.Record(Detection(valve)); });
+  };
+
+  EXPECT_THROW(record("A"), RecordError);
+  EXPECT_NO_THROW(record("B"));
+  store.AddGap({"B", kStart, kStart, "stream"});
+  EXPECT_THROW(record("C"), RecordError);
+  store.DropBuffered();
+  EXPECT_NO_THROW(record("C"));
+  execute("ALTER TABLE episode RENAME TO away");
+  try {
+    record("D");
+    FAIL();
+  } catch (const RecordError&) {
+    FAIL() << "the file is broken, not the record";
+  } catch (const storage::SqliteError&) {
+  }
+}
+
 }  // namespace
 }  // namespace fdi::monitor

@@ -7,7 +7,9 @@
 
 #include <gtest/gtest.h>
 
+#include "monitor/health_book.h"
 #include "monitor/pipeline.h"
+#include "monitor/recorder.h"
 #include "tests/monitor/fake_sinks.h"
 #include "tests/monitor/linear_models.h"
 
@@ -24,17 +26,36 @@ class PipelineTest : public testing::Test {
   PipelineTest() {
     options_.journal.retry_period = std::chrono::milliseconds(20);
     options_.journal.commit_period = std::chrono::milliseconds(20);
-    options_.recorder.commit_period = std::chrono::milliseconds(20);
+    recorder_options_.commit_period = std::chrono::milliseconds(20);
   }
 
   void Make(SampleSink* samples = nullptr) {
     pipeline_ = std::make_unique<Pipeline>(
-        options_, PipelineSinks{bus_, bus_, history_, samples, live_},
+        options_, PipelineSinks{bus_, bus_, history_},
         std::make_shared<FixedResolver>(models_, assigned_), context_);
+    pipeline_->Attach(std::make_unique<HealthBooks>());
+    for (ValveListener* listener : listeners_) {
+      pipeline_->Attach(*listener);
+    }
+    if (samples != nullptr) {
+      recorder_ = std::make_unique<Recorder>(
+          *samples, context_, recorder_options_,
+          [this](DataGap gap) { pipeline_->ReportGap(std::move(gap)); });
+      pipeline_->Attach(*recorder_);
+    }
   }
   void Start(SampleSink* samples = nullptr) {
     Make(samples);
+    if (recorder_) {
+      recorder_->Start();
+    }
     pipeline_->Start({});
+  }
+  void Stop() {
+    if (recorder_) {
+      recorder_->Stop();
+    }
+    pipeline_->Stop();
   }
   void Feed(const std::string& valve, std::uint64_t from, std::uint64_t to,
             double offset = 0.0) {
@@ -51,11 +72,12 @@ class PipelineTest : public testing::Test {
   }
 
   PipelineOptions options_;
+  RecorderOptions recorder_options_;
   std::shared_ptr<const ModelSet> models_{SharedLinearModels()};
   std::vector<std::string> assigned_;
   FakeBus bus_;
   FakeHistory history_;
-  LiveSink* live_{nullptr};
+  std::vector<ValveListener*> listeners_;
   Counters counters_;
   std::vector<std::string> lines_;
   ThrottledLog log_{[this](LogLevel, std::string_view line) {
@@ -64,6 +86,7 @@ class PipelineTest : public testing::Test {
     lines_.emplace_back(line);
   }};
   MonitorContext context_{counters_, log_, [] { return std::int64_t{1'000}; }};
+  std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<Pipeline> pipeline_;
 };
 

@@ -11,10 +11,14 @@ namespace {
 
 using testing::ElementsAre;
 
-class FakeLive : public LiveSink {
+class FakeLive : public ValveListener {
  public:
-  void Show(const std::string& valve_id, const Sample& sample,
-            const ValveOutcome& outcome) override {
+  std::string_view name() const override { return "live"; }
+  void OnVerdict(const std::string& valve_id, const Sample& sample,
+                 const ValveOutcome& outcome) override {
+    if (OutOfOrder(outcome.verdict.intake)) {
+      return;
+    }
     notice.Apply([&] {
       shown.push_back(
           valve_id + "/" + std::to_string(sample.seq) +
@@ -23,11 +27,11 @@ class FakeLive : public LiveSink {
           (outcome.missing == 0 ? "" : "/missing"));
     });
   }
-  void ShowSilence(const std::string& valve_id, Silence silence) override {
+  void OnSilence(const std::string& valve_id, Silence silence) override {
     notice.Apply([&] { silences.emplace_back(valve_id, silence); });
   }
-  void ShowDrift(const std::string& valve_id,
-                 std::span<const FollowedDrift> channels) override {
+  void OnDrift(const std::string& valve_id,
+               std::span<const FollowedDrift> channels) override {
     notice.Apply([&] { drift[valve_id] = channels[0]; });
   }
 
@@ -39,7 +43,7 @@ class FakeLive : public LiveSink {
 
 class PipelineLiveTest : public PipelineTest {
  protected:
-  PipelineLiveTest() { live_ = &board_; }
+  PipelineLiveTest() { listeners_ = {&board_}; }
 
   FakeLive board_;
 };
@@ -128,6 +132,42 @@ TEST_F(PipelineLiveTest, ADriftIsShownAndOnceAtItsBoundCountedAndLogged) {
                   "followed=0.05",
                   "drift_at_bound id=M118 valve=V3 channel=X direction=wider "
                   "followed=1.02"));
+}
+
+class FailingListener : public ValveListener {
+ public:
+  std::string_view name() const override { return "failing"; }
+  void OnVerdict(const std::string& /*valve_id*/, const Sample& /*sample*/,
+                 const ValveOutcome& /*outcome*/) override {
+    throw std::runtime_error("no verdicts");
+  }
+  void OnSilence(const std::string& /*valve_id*/,
+                 Silence /*silence*/) override {
+    throw std::runtime_error("no silence");
+  }
+  void TakeCheckpoint(Checkpoint& /*checkpoint*/, bool /*urgent*/) override {
+    throw std::runtime_error("no checkpoint");
+  }
+};
+
+// Neither diagnosis nor journal notice, nor those that are told after it.
+TEST_F(PipelineLiveTest, AListenerThatFailsIsCountedAndStopsNothing) {
+  FailingListener failing;
+  listeners_ = {&failing, &board_};
+  Start();
+  OfferEpisode("V1");
+  ASSERT_TRUE(AwaitEvents(2));
+  pipeline_->OnStreamEnded("V1", 1);
+  pipeline_->Stop();
+
+  EXPECT_EQ(bus_.decisions.size(), 80U);
+  EXPECT_EQ(board_.shown.size(), 80U);
+  EXPECT_EQ(board_.silences.size(), 1U);
+  EXPECT_EQ(history_.recorded.size(), 3U);
+  EXPECT_FALSE(history_.checkpoint_sum.health.empty());
+  EXPECT_GE(counters_[Counter::kPartFailures], 80U + 1U + 1U);
+  EXPECT_THAT(lines_, testing::Contains(testing::StartsWith(
+                          "part_failed id=M155 part=failing reason=")));
 }
 
 }  // namespace

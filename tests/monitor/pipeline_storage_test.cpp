@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <atomic>
 #include <thread>
 
@@ -154,10 +155,111 @@ TEST_F(PipelineStorageTest, ABrokenHistoryStopsNothingAndIsMadeGoodLater) {
   }
 }
 
+TEST_F(PipelineStorageTest, ARecordThatFailsForItsOwnSakeIsSetAside) {
+  history_.poison = "ill";
+  Start();
+  OfferEpisode("ill");
+  OfferEpisode("V1");
+  ASSERT_TRUE(history_.notice.Await([&] { return history_.gaps.size() == 2; }));
+  ASSERT_TRUE(AwaitEvents(4));
+  pipeline_->Stop();
+
+  EXPECT_EQ(history_.recorded.size(), 2U);
+  EXPECT_FALSE(pipeline_->history_degraded());
+  EXPECT_EQ(counters_[Counter::kPersistFailures], 0U);
+  EXPECT_EQ(counters_[Counter::kRecordsSetAside], 2U);
+  EXPECT_EQ(counters_[Counter::kEventsLost], 2U);
+  EXPECT_EQ(counters_[Counter::kEventsUnpersisted], 2U);
+  EXPECT_EQ(history_.gaps[0].reason, "record_set_aside");
+  EXPECT_EQ(history_.gaps[0].valve_id, "ill");
+  EXPECT_THAT(lines_, testing::Contains(
+                          "record_set_aside id=M126 record=DETECTED valve=ill "
+                          "reason=\"a trigger says no\""));
+}
+
+TEST_F(PipelineStorageTest, ARecordThatIsTakenOnceMoreIsNotSetAside) {
+  options_.journal.tries = 1000;
+  history_.poison = "V1";
+  Start();
+  OfferEpisode("V1");
+  ASSERT_TRUE(AwaitEvents(2));
+  history_.notice.Apply([&] { history_.poison.clear(); });
+  ASSERT_TRUE(
+      history_.notice.Await([&] { return history_.recorded.size() == 2; }));
+  pipeline_->Stop();
+
+  EXPECT_EQ(counters_[Counter::kRecordsSetAside], 0U);
+  EXPECT_FALSE(bus_.events[0].second);
+}
+
+TEST_F(PipelineStorageTest, AnEventThatTheHistoryRefusesIsNotCalledPersisted) {
+  history_.refused = "V1";
+  Start();
+  OfferEpisode("V1");
+  OfferEpisode("V2");
+  ASSERT_TRUE(AwaitEvents(4));
+  pipeline_->Stop();
+
+  EXPECT_EQ(counters_[Counter::kEventsRefused], 2U);
+  EXPECT_EQ(counters_[Counter::kEventsUnpersisted], 2U);
+  EXPECT_EQ(std::ranges::count(bus_.events, true,
+                               &std::pair<TransitionKind, bool>::second),
+            2);
+  EXPECT_THAT(
+      lines_,
+      testing::Contains("event_refused id=M125 valve=V1 transition=DETECTED"));
+}
+
+TEST_F(PipelineStorageTest, WhatIsBufferedAndFailsForItsOwnSakeIsDropped) {
+  history_.buffer_poisoned = true;
+  Start();
+  ASSERT_TRUE(history_.notice.Await(
+      [&] { return history_.gaps.size() == 2; }));  // Its own, the outage.
+  OfferEpisode("V1");
+  ASSERT_TRUE(AwaitEvents(2));
+  pipeline_->Stop();
+
+  EXPECT_EQ(history_.recorded.size(), 2U);
+  EXPECT_FALSE(pipeline_->history_degraded());
+  EXPECT_EQ(counters_[Counter::kRecordsSetAside], 1U);
+}
+
+TEST_F(PipelineStorageTest, ACheckpointThatFailsForItsOwnSakeIsDropped) {
+  options_.checkpoint_period = milliseconds(1);
+  history_.checkpoint_poisoned = true;
+  Start();
+  Feed("V1", 0, 50);
+  pipeline_->Poll(std::chrono::steady_clock::now() + milliseconds(5));
+  ASSERT_TRUE(history_.notice.Await(
+      [&] { return counters_[Counter::kRecordsSetAside] == 1; }));
+  history_.notice.Apply([&] { history_.checkpoint_poisoned = false; });
+  Feed("V1", 50, 60);
+  pipeline_->Stop();
+
+  ASSERT_EQ(history_.checkpoint_sum.coverage.size(), 1U);
+  EXPECT_EQ(history_.checkpoint_sum.coverage[0].samples[Quality::kLive], 10U);
+  EXPECT_FALSE(pipeline_->history_degraded());
+}
+
+// Those that find no room are stored all the same; the next session sends them.
+TEST_F(PipelineStorageTest, EventsThatWaitForTheBusAreBounded) {
+  options_.journal.max_records = 10;
+  options_.journal.patience = std::chrono::minutes(1);
+  history_.stuck = true;
+  Start();
+  for (int v = 0; v < 20; ++v) {
+    OfferEpisode(ValveName(v));
+  }
+  EXPECT_GE(counters_[Counter::kEventsUnsent], 20U);
+  history_.notice.Apply([&] { history_.stuck = false; });
+  pipeline_->Stop();
+  EXPECT_LE(bus_.events.size(), 12U);
+}
+
 TEST_F(PipelineStorageTest, GapsEndNoEarlierThanTheyBeginIfTheClockIsSetBack) {
   std::atomic<std::int64_t> now_ns{1'000'000};
   context_.utc_now_ns = [&now_ns] { return --now_ns; };
-  options_.recorder.max_pending = 100;
+  recorder_options_.max_pending = 100;
   history_.broken = true;
   FakeRuns runs;
   runs.broken = true;
@@ -171,7 +273,7 @@ TEST_F(PipelineStorageTest, GapsEndNoEarlierThanTheyBeginIfTheClockIsSetBack) {
       [&] { return counters_[Counter::kRecordDropped] == 300; }));
   runs.notice.Apply([&] { runs.broken = false; });
   ASSERT_TRUE(history_.notice.Await([&] { return history_.gaps.size() == 2; }));
-  pipeline_->Stop();
+  Stop();
 
   for (const DataGap& gap : history_.gaps) {
     EXPECT_LE(gap.from_ns, gap.to_ns) << gap.reason;
@@ -190,15 +292,15 @@ TEST_F(PipelineStorageTest, StoppingWithABrokenHistoryCountsWhatIsLost) {
 }
 
 TEST_F(PipelineStorageTest, ALosslessRecorderHoldsEverySampleInOrder) {
-  options_.recorder.lossless = true;
-  options_.recorder.queue_samples = 8;
+  recorder_options_.lossless = true;
+  recorder_options_.queue_samples = 8;
   FakeRuns runs;
   Start(&runs);
   Feed("V1", 0, 3000);
   pipeline_->OnSample("V1", BadSample(3000), 1);
   pipeline_->OnSample("V1", PlantSample(5), 1);
   pipeline_->OnStreamEnded("V1", 1);
-  pipeline_->Stop();
+  Stop();
 
   ASSERT_EQ(runs.stored.size(), 3002U);
   for (std::size_t k = 0; k < 3000; ++k) {
@@ -213,14 +315,14 @@ TEST_F(PipelineStorageTest, ALosslessRecorderHoldsEverySampleInOrder) {
 }
 
 TEST_F(PipelineStorageTest, ARecorderThatFallsBehindCountsWhatIsMissing) {
-  options_.recorder.queue_samples = 8;
+  recorder_options_.queue_samples = 8;
   FakeRuns runs;
   runs.held = true;
   Start(&runs);
   Feed("V1", 0, 1000);
   ASSERT_TRUE(bus_.notice.Await([&] { return bus_.decisions.size() == 1000; }));
   runs.notice.Apply([&] { runs.held = false; });
-  pipeline_->Stop();
+  Stop();
 
   EXPECT_GT(counters_[Counter::kRecordDropped], 0U);
   EXPECT_EQ(counters_[Counter::kRecorded], runs.stored.size());
@@ -230,22 +332,22 @@ TEST_F(PipelineStorageTest, ARecorderThatFallsBehindCountsWhatIsMissing) {
 
 TEST_F(PipelineStorageTest,
        RecordingThatFailsDropsAndCountsWhileDiagnosisGoesOn) {
-  options_.recorder.lossless = true;
-  options_.recorder.max_pending = 100;
+  recorder_options_.lossless = true;
+  recorder_options_.max_pending = 100;
   FakeRuns runs;
   runs.broken = true;
   Start(&runs);
   Feed("V1", 0, 1000);
-  pipeline_->Stop();
+  Stop();
 
   EXPECT_EQ(bus_.decisions.size(), 1000U);
-  EXPECT_TRUE(pipeline_->recording_degraded());
+  EXPECT_TRUE(recorder_->degraded());
   EXPECT_EQ(counters_[Counter::kRecordDropped], 1000U);
 }
 
 TEST_F(PipelineStorageTest,
        RecordingThatResumesLeavesAGapWhereSamplesAreMissing) {
-  options_.recorder.max_pending = 100;
+  recorder_options_.max_pending = 100;
   FakeRuns runs;
   runs.broken = true;
   Start(&runs);
@@ -255,12 +357,12 @@ TEST_F(PipelineStorageTest,
   runs.notice.Apply([&] { runs.broken = false; });
   ASSERT_TRUE(history_.notice.Await([&] { return history_.gaps.size() == 1; }));
   Feed("V1", 150, 200);
-  pipeline_->Stop();
+  Stop();
 
   EXPECT_EQ(history_.gaps.size(), 1U);
   EXPECT_EQ(history_.gaps[0].reason, "record_dropped");
   EXPECT_EQ(history_.gaps[0].valve_id, "");
-  EXPECT_FALSE(pipeline_->recording_degraded());
+  EXPECT_FALSE(recorder_->degraded());
   EXPECT_EQ(runs.stored.size(), 100U);
 }
 

@@ -153,7 +153,7 @@ TEST_F(PipelineTest, TheRunOfAnEvictedValveEndsAndItsLastVectorGoes) {
     pipeline_->Poll(now);
     pipeline_->OnSample(ValveName(v), PlantSample(0), 1, now);
   }
-  pipeline_->Stop();
+  Stop();
 
   EXPECT_EQ(runs.stored.size(), 3U);
   EXPECT_EQ(runs.ends, 2);
@@ -210,9 +210,10 @@ TEST_F(PipelineTest, NoThreadStartsBeforeStart) {
   const std::size_t before = ThreadCount();
   Make(&runs);
   EXPECT_EQ(ThreadCount(), before);
+  recorder_->Start();
   pipeline_->Start({});
   EXPECT_EQ(ThreadCount(), before + 4);
-  pipeline_->Stop();
+  Stop();
   EXPECT_EQ(ThreadCount(), before);
 }
 
@@ -224,14 +225,14 @@ class BrokenRuns : public FakeRuns {
 
 TEST_F(PipelineTest, WhatAThreadEndsWithIsThrownByStop) {
   BrokenRuns runs;
-  options_.recorder.lossless = true;
-  options_.recorder.queue_samples = 8;
-  options_.recorder.commit_period = milliseconds(0);
+  recorder_options_.lossless = true;
+  recorder_options_.queue_samples = 8;
+  recorder_options_.commit_period = milliseconds(0);
   Start(&runs);
   Feed("V1", 0, 100);  // Nobody makes room any more, and nobody waits.
 
-  EXPECT_THROW(pipeline_->Stop(), int);
-  EXPECT_TRUE(pipeline_->failed());
+  EXPECT_THROW(Stop(), int);
+  EXPECT_TRUE(recorder_->failed());
   EXPECT_EQ(bus_.decisions.size(), 100U);
 }
 
@@ -283,7 +284,8 @@ TEST_F(PipelineTest, EveryCounterHasANameOfItsOwn) {
   std::vector<std::string> names;
   for (const Measure& measure : counters_.Measures()) {
     EXPECT_LE(measure.name.size(), 32U);
-    names.push_back(measure.name);
+    names.push_back(measure.name.empty() ? std::string(measure.family)
+                                         : measure.name);
   }
   std::sort(names.begin(), names.end());
   EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());

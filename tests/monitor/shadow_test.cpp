@@ -39,7 +39,6 @@ class ShadowTest : public testing::Test {
     options.candidate = Shared(std::move(candidate));
     options.limits = limits;
     bank_ = std::make_unique<ShadowBank>(options, log_);
-    valve_ = nullptr;
   }
   // Samples [from, to) of the plant go to both.
   void Feed(std::uint64_t from, std::uint64_t to, double offset = 0.0) {
@@ -50,18 +49,15 @@ class ShadowTest : public testing::Test {
   void Give(const Sample& sample, bool held = false) {
     active_.HoldIsolation(held);
     const Verdict& verdict = active_.Step(sample);
-    bank_->Step(Valve(), sample, {verdict, active_models_.get(), false, held});
+    bank_->OnVerdict("V0", sample,
+                     {verdict, active_models_.get(), false, held});
   }
   std::vector<ShadowDifference> Take() {
     Checkpoint checkpoint;
-    Valve().TakeCheckpoint(checkpoint);
+    bank_->TakeCheckpoint(checkpoint, true);  // Nothing is urgent.
+    EXPECT_TRUE(checkpoint.empty());
+    bank_->TakeCheckpoint(checkpoint, false);
     return checkpoint.shadow;
-  }
-  ShadowValve& Valve() {
-    if (valve_ == nullptr) {
-      valve_ = bank_->Add("V0");
-    }
-    return *valve_;
   }
   std::uint64_t Samples(ShadowOutcome outcome) const {
     return bank_->counts().samples[static_cast<std::size_t>(outcome)];
@@ -76,7 +72,6 @@ class ShadowTest : public testing::Test {
   std::shared_ptr<const ModelSet> active_models_ = SharedLinearModels();
   ValveEngine active_{active_models_};
   std::unique_ptr<ShadowBank> bank_;
-  ShadowValve* valve_{nullptr};
 };
 
 TEST_F(ShadowTest, StretchBeginsWhereTheAnswersPartAndSaysBoth) {
@@ -166,7 +161,7 @@ TEST_F(ShadowTest, EndOfTheStreamEndsStretchAndEpisode) {
   Feed(0, 50);
   Feed(50, 90, kF7Offset);
   active_.EndEpisode(EndReason::kStreamEnded);
-  Valve().EndStream();
+  bank_->OnSilence("V0", Silence::kEnded);
   const std::uint64_t differed = Samples(ShadowOutcome::kDiffered);
   EXPECT_THAT(Take(), SizeIs(1));
 
@@ -212,7 +207,9 @@ TEST_F(ShadowTest, ValveThatIsRemovedIsNotCounted) {
   Feed(0, 30);
   ASSERT_EQ(Valves(ShadowFit::kCompared), 1);
 
-  bank_->Remove(valve_);
+  Checkpoint last;
+  bank_->OnRemoved("V0", last);
+  EXPECT_THAT(last.shadow_accumulators, SizeIs(1));
   EXPECT_EQ(Valves(ShadowFit::kCompared), 0);
 }
 
@@ -220,7 +217,7 @@ TEST_F(ShadowTest, AccumulatorsOfAnotherCandidateCountForNothing) {
   Use(CandidateModels());
   Feed(0, 100);
   Checkpoint checkpoint;
-  Valve().TakeCheckpoint(checkpoint);
+  bank_->TakeCheckpoint(checkpoint, false);
   ASSERT_THAT(checkpoint.shadow_accumulators, SizeIs(1));
   EXPECT_EQ(checkpoint.shadow_accumulators[0].model_hash, 0x9999U);
 
@@ -235,7 +232,8 @@ TEST_F(ShadowTest, AccumulatorsOfAnotherCandidateCountForNothing) {
 class ShadowPipelineTest : public PipelineTest {};
 
 TEST_F(ShadowPipelineTest, CandidateIsKeptAndNeverHeardOfOutside) {
-  options_.shadow.candidate = Shared(CandidateModels());
+  ShadowBank bank({Shared(CandidateModels()), "*", {}}, log_);
+  listeners_ = {&bank};
   Start();
   OfferEpisode("V1");
   ASSERT_TRUE(AwaitEvents(2));  // DETECTED, ISOLATED.
@@ -249,8 +247,7 @@ TEST_F(ShadowPipelineTest, CandidateIsKeptAndNeverHeardOfOutside) {
   EXPECT_EQ(history_.checkpoint_sum.shadow[0].valve_id, "V1");
   EXPECT_EQ(history_.checkpoint_sum.shadow[0].active.fault, "f7");
   EXPECT_THAT(history_.checkpoint_sum.shadow_accumulators, SizeIs(1));
-  ASSERT_NE(pipeline_->shadow_counts(), nullptr);
-  EXPECT_EQ(pipeline_->shadow_counts()->recorded, 1U);
+  EXPECT_EQ(bank.counts().recorded, 1U);
 }
 
 TEST(ShadowMetricsTest, CountsAreFamiliesOfThePage) {
@@ -266,14 +263,6 @@ TEST(ShadowMetricsTest, CountsAreFamiliesOfThePage) {
       AllOf(HasSubstr("fdi_shadow_samples_total{outcome=\"differed\"} 7\n"),
             HasSubstr("fdi_shadow_differences_total{outcome=\"recorded\"} 2\n"),
             HasSubstr("fdi_shadow_valves{fit=\"signals\"} 3\n")));
-}
-
-TEST_F(ShadowPipelineTest, WithoutACandidateNothingIsCompared) {
-  Start();
-  OfferEpisode("V1");
-  pipeline_->Stop();
-  EXPECT_EQ(pipeline_->shadow_counts(), nullptr);
-  EXPECT_THAT(history_.checkpoint_sum.shadow, IsEmpty());
 }
 
 }  // namespace

@@ -336,23 +336,18 @@ TEST_F(ValveMonitorTest, WithoutAModelSetAValveIsListedAndNotDiagnosed) {
 
 // Neither the time since 1970 nor a gap is the period of its samples.
 TEST_F(ValveMonitorTest, WithoutAModelSetASampleStandsForOnePeriod) {
-  const auto seen_ms = [this] {
-    Checkpoint checkpoint;
-    valve_.TakeCheckpoint(checkpoint);
-    std::int64_t sum = 0;
-    for (const HealthHour& hour : checkpoint.health) {
-      sum += hour.seen_ms;
+  const auto seen_s = [this](std::uint64_t from) {
+    double sum = 0.0;
+    for (std::uint64_t k = from; k < from + 10; ++k) {
+      sum += Feed(PlantSample(k)).period_s;
     }
     return sum;
   };
-  Feed(0, 10);
-  ASSERT_EQ(seen_ms(), 10'000);
+  ASSERT_EQ(seen_s(0), 10.0);
 
   ASSERT_TRUE(valve_.Adopt(std::nullopt, notebook_));
-  Feed(10, 20);
-  EXPECT_EQ(seen_ms(), 10'000);
-  Feed(1000, 1010);
-  EXPECT_EQ(seen_ms(), 10'000);
+  EXPECT_EQ(seen_s(10), 10.0);
+  EXPECT_EQ(seen_s(1000), 10.0);
 }
 
 TEST_F(ValveMonitorTest, AnOpenEpisodeGoesOnUnderItsIdAfterARestart) {

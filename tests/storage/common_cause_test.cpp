@@ -33,7 +33,6 @@ class CommonCauseTest : public HistoryFixture {
 
   std::vector<CauseChange> Isolate(const std::string& valve, double at_s,
                                    FaultSet faults = 4) {
-    std::vector<CauseChange> changes;
     writer_->CommitBatch([&] {
       writer_->Record(
           Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve),
@@ -41,21 +40,14 @@ class CommonCauseTest : public HistoryFixture {
       writer_->Record(Event(TransitionKind::kIsolated, at_s, faults, 0.8,
                             EndReason::kNone, valve),
                       kDetected);
-      changes =
-          book_->Isolated(EpisodeIdText(Id(valve)), valve,
-                          kDetected + static_cast<std::int64_t>(at_s * 1e9));
     });
-    return changes;
+    return book_->Read();
   }
   std::vector<CauseChange> Close(const std::string& valve, double at_s) {
-    std::vector<CauseChange> changes;
-    writer_->CommitBatch([&] {
-      writer_->Record(Event(TransitionKind::kClosed, at_s, 4, 0.1,
-                            EndReason::kCleared, valve),
-                      kDetected);
-      changes = book_->Ended(EpisodeIdText(Id(valve)));
-    });
-    return changes;
+    writer_->Record(Event(TransitionKind::kClosed, at_s, 4, 0.1,
+                          EndReason::kCleared, valve),
+                    kDetected);
+    return book_->Read();
   }
   std::vector<CommonCause> Causes() {
     return ReadCommonCauses(writer_->database());
@@ -133,9 +125,7 @@ TEST_F(CommonCauseTest, WhatEndedWhileNobodyLookedIsEndedLater) {
         Event(TransitionKind::kClosed, 90, 4, 0.1, EndReason::kCleared, valve),
         kDetected);
   }
-  std::vector<CauseChange> changes;
-  writer_->CommitBatch([&] { changes = book_->EndFinished(); });
-  EXPECT_EQ(changes.at(0).kind, Kind::kEnded);
+  EXPECT_EQ(book_->Read().at(0).kind, Kind::kEnded);
   EXPECT_EQ(Causes().at(0).ended_ns, kDetected + 90 * kSecond);
 }
 

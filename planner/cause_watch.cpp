@@ -1,0 +1,65 @@
+#include "planner/cause_watch.h"
+
+#include <chrono>
+#include <utility>
+
+namespace fdi::planner {
+namespace {
+
+// An event that was published before its commit wakes nobody afterwards, and a
+// step that failed is repeated.
+constexpr std::chrono::milliseconds kPeriod{1000};
+
+}  // namespace
+
+CauseWatch::CauseWatch(
+    const std::filesystem::path& history,
+    std::vector<storage::CauseGroup> groups,
+    std::function<void(const storage::CauseChange&)> on_change, Guard guard)
+    : database_(history, storage::HistorySchema(),
+                storage::Access::kOccasionalWriter),
+      book_(database_, std::move(groups)),
+      on_change_(std::move(on_change)),
+      guard_(std::move(guard)) {}
+
+void CauseWatch::Start() {
+  worker_.Start([this] { Run(); });
+}
+
+void CauseWatch::Wake() {
+  const std::lock_guard lock(mutex_);
+  woken_ = true;
+  changed_.notify_one();
+}
+
+void CauseWatch::Stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    changed_.notify_one();
+  }
+  worker_.Join();
+}
+
+void CauseWatch::Run() {
+  bool last = false;
+  while (!last) {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait_for(lock, kPeriod, [this] { return woken_ || stopping_; });
+      woken_ = false;
+      last = stopping_;
+    }
+    guard_([this] { ReadAll(); });
+  }
+}
+
+void CauseWatch::ReadAll() {
+  do {
+    for (const storage::CauseChange& change : book_.Read()) {
+      on_change_(change);
+    }
+  } while (!book_.at_end());
+}
+
+}  // namespace fdi::planner
