@@ -164,7 +164,8 @@ toml::table Effective(CLI::App& app) {
     } else if (flag) {
       table.insert_or_assign(key, false);
     } else if (const std::string text = option->get_default_str();
-               !text.empty() && text != "\"\"" && text != "[]") {
+               !text.empty() && text != "\"\"" && text != "[]" &&
+               text != "{}") {  // An empty list, by the version of CLI11.
       const bool quoted = text.size() > 1 && text.front() == '"';
       Insert(table, key, quoted ? text.substr(1, text.size() - 2) : text);
     }

@@ -1,9 +1,16 @@
 #include "report/logging.h"
 
+#include <algorithm>
+#include <climits>
+#include <cstdint>
 #include <memory>
+#include <mutex>
+#include <string>
 
-#include <spdlog/sinks/stdout_sinks.h>
+#include <poll.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include "base/printable.h"
 
@@ -24,16 +31,59 @@ spdlog::level::level_enum ToSpdlog(LogLevel level) {
   return spdlog::level::err;
 }
 
+// Writes to stderr what it takes without waiting. A pipe and a terminal that
+// poll() calls writable take at least PIPE_BUF bytes.
+class NeverWaitingSink : public spdlog::sinks::base_sink<std::mutex> {
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    if (dropped_ > 0) {
+      const std::string text =
+          EventLine("log_lines_dropped", {{"lines", std::to_string(dropped_)}});
+      spdlog::details::log_msg count(message.logger_name, spdlog::level::warn,
+                                     text);
+      if (Write(count)) {
+        dropped_ = 0;
+      }
+    }
+    if (dropped_ > 0 || !Write(message)) {
+      ++dropped_;
+    }
+  }
+  void flush_() override {}
+
+ private:
+  bool Write(const spdlog::details::log_msg& message) {
+    spdlog::memory_buf_t line;
+    formatter_->format(message, line);
+    const char* at = line.data();
+    std::size_t left = line.size();
+    while (left > 0) {
+      pollfd stream{STDERR_FILENO, POLLOUT, 0};
+      if (poll(&stream, 1, 0) != 1 || (stream.revents & POLLOUT) == 0) {
+        return false;
+      }
+      const ssize_t written =
+          write(STDERR_FILENO, at, std::min<std::size_t>(left, PIPE_BUF));
+      if (written <= 0) {
+        return false;
+      }
+      at += written;
+      left -= static_cast<std::size_t>(written);
+    }
+    return true;
+  }
+
+  std::uint64_t dropped_ = 0;
+};
+
 }  // namespace
 
 LogSink MakeStderrSink(LogLevel minimum) {
   auto logger = std::make_shared<spdlog::logger>(
-      "fdi", std::make_shared<spdlog::sinks::stderr_sink_mt>());
+      "fdi", std::make_shared<NeverWaitingSink>());
   logger->set_pattern("%Y-%m-%dT%H:%M:%S.%eZ %l %v",
                       spdlog::pattern_time_type::utc);
   logger->set_level(ToSpdlog(minimum));
-  // Flushed per line: the last line before a crash matters most.
-  logger->flush_on(spdlog::level::debug);
   return [logger](LogLevel level, std::string_view line) {
     const std::string text = Printable(line);  // Prevents forged lines.
     logger->log(ToSpdlog(level), spdlog::string_view_t(text));

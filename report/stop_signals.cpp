@@ -15,12 +15,13 @@
 namespace fdi::report {
 namespace {
 
-constexpr std::array<int, 3> kSignals = {SIGINT, SIGTERM, SIGHUP};
+constexpr std::array<int, 4> kSignals = {SIGINT, SIGTERM, SIGHUP, SIGPIPE};
 
 // A signal handler can only access globals.
 std::atomic<int> g_event{-1};
 std::atomic<bool> g_stop{false};
 std::atomic<bool> g_reload{false};
+std::atomic<bool> g_reloads{false};  // What SIGHUP means.
 std::atomic<bool> g_installed{false};
 std::array<struct sigaction, kSignals.size()> g_previous;
 static_assert(std::atomic<bool>::is_always_lock_free);
@@ -36,7 +37,8 @@ void Wake() noexcept {
 
 extern "C" void FdiOnSignal(int signal) {
   if (signal == SIGHUP) {
-    g_reload = true;
+    // Kernel and shell may both send it when a terminal is closed.
+    (g_reloads ? g_reload : g_stop) = true;
   } else if (g_stop.exchange(true)) {
     _exit(1);  // The orderly stop hangs; exit() is unsafe here.
   }
@@ -45,7 +47,7 @@ extern "C" void FdiOnSignal(int signal) {
 
 }  // namespace
 
-StopSignals::StopSignals() {
+StopSignals::StopSignals(HangUp hang_up) {
   if (g_installed.exchange(true)) {
     throw std::logic_error("StopSignals: one at a time");
   }
@@ -56,13 +58,18 @@ StopSignals::StopSignals() {
   }
   g_stop = false;
   g_reload = false;
+  g_reloads = hang_up == HangUp::kReload;
   // SA_RESTART: other system calls continue; waiters use the descriptor.
   struct sigaction action {};
-  action.sa_handler = &FdiOnSignal;
   action.sa_flags = SA_RESTART;
   sigemptyset(&action.sa_mask);
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    action.sa_handler = kSignals[i] == SIGPIPE ? SIG_IGN : &FdiOnSignal;
     sigaction(kSignals[i], &action, &g_previous[i]);
+    if (kSignals[i] == SIGHUP && hang_up == HangUp::kStop &&
+        g_previous[i].sa_handler == SIG_IGN) {
+      sigaction(SIGHUP, &g_previous[i], nullptr);  // nohup has said so.
+    }
   }
 }
 

@@ -220,7 +220,7 @@ int Run(const RunArguments& arguments, const report::Context& context) {
   }
   // Before the service, so that a signal during its start requests an orderly
   // stop.
-  report::StopSignals signals;
+  report::StopSignals signals(report::StopSignals::HangUp::kReload);
   const report::Context limited{context.options, LimitLog(context.log),
                                 context.software, context.command_line};
   Service service(options, limited);

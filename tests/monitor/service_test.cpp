@@ -78,7 +78,7 @@ class ServiceTest : public testing::Test {
 // is not needed to serve, and only the last one is an error of the session.
 TEST_F(ServiceTest, AStatusThatFailsStopsNothingAndTheSessionEndsInOrder) {
   const report::Context context = Context(std::string(100, 's'));
-  report::StopSignals signals;
+  report::StopSignals signals(report::StopSignals::HangUp::kReload);
   ServiceOptions options;
   options.status_period_s = 0.0;  // A line in the log after each status.
   Service service(options, context);
@@ -122,7 +122,7 @@ TEST_F(ServiceTest, AnErrorAtTheStartLeavesNoThreadOfTheConsole) {
   options.http.emplace();
   options.http->host = options.console->address.host = "127.0.0.1";
   const report::Context context = Context();
-  report::StopSignals signals;
+  report::StopSignals signals(report::StopSignals::HangUp::kReload);
   std::size_t threads_left = 0;
   for (const char* data : {"first", "second"}) {
     global_.data_dir = directory_.path() / data;
@@ -143,7 +143,7 @@ TEST_F(ServiceTest, AnErrorAtTheStartLeavesNoThreadOfTheConsole) {
 // Who asks for a reload wants to know, however often.
 TEST_F(ServiceTest, EveryReloadThatFailsIsALineOfTheLog) {
   const report::Context context = Context();
-  report::StopSignals signals;
+  report::StopSignals signals(report::StopSignals::HangUp::kReload);
   Service service({}, context);
   Execute(global_.data_dir / "models.db", storage::ModelsSchema(),
           "DROP TABLE valve");
@@ -176,7 +176,7 @@ TEST_F(ServiceTest, AReloadThatFailedIsTriedAgain) {
     }
   }
   const report::Context context = Context();
-  report::StopSignals signals;
+  report::StopSignals signals(report::StopSignals::HangUp::kReload);
   Service service({}, context);
   const auto rename = [&](const std::string& from, const std::string& to) {
     Execute(

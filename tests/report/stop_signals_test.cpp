@@ -1,5 +1,7 @@
 #include "report/stop_signals.h"
 
+#include <array>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -38,7 +40,7 @@ TEST(StopSignalsTest, SignalWakesAThreadThatWaits) {
 }
 
 TEST(StopSignalsTest, HangUpIsOneReload) {
-  StopSignals signals;
+  StopSignals signals(StopSignals::HangUp::kReload);
 
   std::raise(SIGHUP);
 
@@ -47,8 +49,40 @@ TEST(StopSignalsTest, HangUpIsOneReload) {
   EXPECT_FALSE(signals.stop_requested());
 }
 
-TEST(StopSignalsTest, StopBehindAReloadIsNotLost) {
+TEST(StopSignalsTest, HangUpStopsWhatHasNothingToReload) {
   StopSignals signals;
+
+  std::raise(SIGHUP);
+  std::raise(SIGHUP);
+
+  EXPECT_EQ(signals.WaitFor(10s), Event::kStop);
+}
+
+TEST(StopSignalsTest, HangUpThatNohupIgnoresStaysIgnored) {
+  const auto previous = std::signal(SIGHUP, SIG_IGN);
+  {
+    StopSignals signals;
+    std::raise(SIGHUP);
+    EXPECT_EQ(signals.WaitFor(0ms), Event::kTimeout);
+  }
+  std::signal(SIGHUP, previous);
+}
+
+TEST(StopSignalsTest, ReaderOfThePipeThatEndsDoesNotEndTheProcess) {
+  StopSignals signals;
+  std::array<int, 2> ends{};
+  ASSERT_EQ(pipe(ends.data()), 0);
+  close(ends[0]);
+
+  EXPECT_EQ(write(ends[1], "x", 1), -1);
+  EXPECT_EQ(errno, EPIPE);
+
+  EXPECT_FALSE(signals.stop_requested());
+  close(ends[1]);
+}
+
+TEST(StopSignalsTest, StopBehindAReloadIsNotLost) {
+  StopSignals signals(StopSignals::HangUp::kReload);
 
   std::raise(SIGHUP);
   std::raise(SIGTERM);

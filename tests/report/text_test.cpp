@@ -1,11 +1,14 @@
 // Tables, suggestions, event lines and strict TOML.
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <limits>
 #include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <unistd.h>
 
 #include "base/error.h"
 #include "base/printable.h"
@@ -134,6 +137,62 @@ TEST(PrintableTest, OnlyLettersReachATerminal) {
                            "\xf4\x90\x80\x80"}) {
     EXPECT_FALSE(IsPrintable(text)) << Printable(text);
   }
+}
+
+// Redirects stderr to a pipe that nobody reads until Read() is called.
+class StalledStderr {
+ public:
+  StalledStderr() : saved_(dup(STDERR_FILENO)) {
+    std::array<int, 2> ends{};
+    EXPECT_EQ(pipe(ends.data()), 0);
+    read_end_ = ends[0];
+    dup2(ends[1], STDERR_FILENO);
+    close(ends[1]);
+  }
+  ~StalledStderr() { Restore(); }
+  StalledStderr(const StalledStderr&) = delete;
+  StalledStderr& operator=(const StalledStderr&) = delete;
+
+  // What is in the pipe by now.
+  std::string Read() const {
+    std::string text;
+    std::array<char, 4096> part{};
+    pollfd entry{read_end_, POLLIN, 0};
+    while (poll(&entry, 1, 0) == 1 && (entry.revents & POLLIN) != 0) {
+      const ssize_t got = read(read_end_, part.data(), part.size());
+      text.append(part.data(), static_cast<std::size_t>(got));
+    }
+    return text;
+  }
+
+ private:
+  void Restore() const {
+    dup2(saved_, STDERR_FILENO);
+    close(saved_);
+    close(read_end_);
+  }
+
+  int saved_;
+  int read_end_ = -1;
+};
+
+TEST(LogSinkTest, StalledReaderCostsLinesAndNoTime) {
+  const StalledStderr stalled;
+  const LogSink sink = MakeStderrSink(LogLevel::kInfo);
+  const std::string line(1000, 'x');
+
+  for (int i = 0; i < 200; ++i) {  // Three times what a pipe holds.
+    sink(LogLevel::kInfo, line);   // Would wait for ever.
+  }
+  const std::string first = stalled.Read();
+  sink(LogLevel::kInfo, "again");
+  const std::string then = stalled.Read();
+
+  const auto kept = std::count(first.begin(), first.end(), '\n');
+  EXPECT_GT(kept, 30);
+  EXPECT_THAT(then, HasSubstr("warning log_lines_dropped lines=" +
+                              std::to_string(200 - kept) + "\n"));
+  EXPECT_THAT(then, HasSubstr(" again\n"));
 }
 
 TEST(LogSinkTest, NoTextMakesALineOrCommandsTheTerminal) {
