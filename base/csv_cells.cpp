@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <map>
 #include <memory>
 #include <ostream>
 #include <utility>
@@ -20,6 +21,8 @@
 namespace fdi {
 namespace {
 
+constexpr std::size_t kUnpackedAlways = 4U << 20U;
+constexpr std::size_t kUnpackedAtMost = 200U << 20U;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 // The CR of a CRLF counts as a blank.
@@ -268,26 +271,84 @@ Digits DigitsOf(std::string_view cell, char& sign) {
   return grouped ? Digits::kThousands : Digits::kNone;
 }
 
-// Separators are compared by (header and row have as many cells, number of
-// cells). The agreement comes first: a semicolon table with decimal commas may
+// Separators are compared by (lines with the most usual number of cells, that
+// number). The agreement comes first: a semicolon table with decimal commas may
 // have more commas than semicolons, but not as many in the header as in the
-// row. Of equal ones the first in the list is taken.
-char FindSeparator(std::string_view header, std::string_view row) {
+// rows. Of equal ones the first in the list is taken.
+char FindSeparator(std::span<const std::string_view> lines) {
   char best = ',';
-  std::pair<bool, std::size_t> most{false, 1};
+  std::pair<std::size_t, std::size_t> most{0, 1};
   for (const char separator : {',', ';', '\t', '|'}) {
-    CsvCells names(separator);
+    std::map<std::size_t, std::size_t> counts;
     CsvCells cells(separator);
-    names.TakeLine(header);
-    cells.TakeLine(row);
-    const std::size_t count = names.cells().size();
-    const std::pair fit{count > 1 && cells.cells().size() == count, count};
-    if (fit > most) {
-      most = fit;
-      best = separator;
+    for (const std::string_view line : lines) {
+      if (cells.TakeLine(line) && cells.cells().size() > 1) {
+        const std::size_t count = cells.cells().size();
+        const std::pair fit{++counts[count], count};
+        if (fit > most) {
+          most = fit;
+          best = separator;
+        }
+      }
     }
   }
   return best;
+}
+
+std::optional<std::string> Ungrouped(std::string_view cell, char thousands) {
+  constexpr std::string_view kNoBreak = "\xC2\xA0";
+  constexpr std::string_view kNarrow = "\xE2\x80\xAF";
+  const auto digit = [&](std::size_t i) {
+    return i < cell.size() &&
+           std::isdigit(static_cast<unsigned char>(cell[i])) != 0;
+  };
+  std::string plain;
+  bool grouped = false;
+  for (std::size_t i = 0; i < cell.size(); ++i) {
+    const std::string_view rest = cell.substr(i);
+    const std::size_t width = rest.starts_with(kNoBreak) ? kNoBreak.size()
+                              : rest.starts_with(kNarrow) ? kNarrow.size()
+                                                          : 1;
+    const bool group = width > 1 || cell[i] == ' ' || cell[i] == '\'' ||
+                       (thousands != '\0' && cell[i] == thousands);
+    if (!group) {
+      plain += cell[i];
+      continue;
+    }
+    const std::size_t next = i + width;
+    if (i == 0 || !digit(i - 1) || !digit(next) || !digit(next + 1) ||
+        !digit(next + 2) || digit(next + 3)) {
+      return std::nullopt;
+    }
+    grouped = true;
+    i += width - 1;
+  }
+  return grouped ? std::optional(plain) : std::nullopt;
+}
+
+std::string PlainText(std::string_view text) {
+  // Letters of two bytes and what stands for each, in upper and lower case.
+  static constexpr std::pair<std::string_view, std::string_view> kLetters[] = {
+      {"ä", "a"}, {"ö", "o"}, {"ü", "u"}, {"ß", "ss"}, {"é", "e"}, {"è", "e"},
+      {"ê", "e"}, {"à", "a"}, {"â", "a"}, {"ç", "c"},  {"ô", "o"}, {"î", "i"},
+      {"á", "a"}, {"í", "i"}, {"ó", "o"}, {"ú", "u"},  {"ñ", "n"}, {"ą", "a"},
+      {"ć", "c"}, {"ę", "e"}, {"ł", "l"}, {"ń", "n"},  {"ś", "s"}, {"ź", "z"},
+      {"ż", "z"}, {"Ä", "a"}, {"Ö", "o"}, {"Ü", "u"},  {"É", "e"}, {"È", "e"},
+      {"À", "a"}, {"Ç", "c"}, {"Ó", "o"}, {"Ł", "l"},  {"Ś", "s"}, {"Ż", "z"},
+      {"Ź", "z"}, {"Ć", "c"}, {"Ę", "e"}, {"Ą", "a"},  {"Á", "a"}, {"Í", "i"}};
+  std::string plain;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto letter =
+        std::ranges::find_if(kLetters, [&](const auto& entry) {
+          return entry.first == text.substr(i, 2);
+        });
+    plain += text.size() - i > 1 && letter != std::end(kLetters)
+                 ? std::string(letter->second)
+                 : std::string(1, static_cast<char>(std::tolower(
+                                      static_cast<unsigned char>(text[i]))));
+    i += text.size() - i > 1 && letter != std::end(kLetters) ? 1U : 0U;
+  }
+  return plain;
 }
 
 // The order of the tests matters. A file in UTF-16 of ASCII text is also valid
@@ -297,6 +358,9 @@ std::string ToUtf8(std::string bytes, const std::string& source) {
   const auto zero_at = [&](std::size_t i) {
     return bytes.size() > i && bytes[i] == '\0';
   };
+  if (zero_at(0) && zero_at(1)) {
+    throw DataError(source + ": is binary, not text: export it as CSV");
+  }
   std::string text;
   if (bytes.starts_with("\xFF\xFE") || zero_at(1)) {
     text = FromUtf16(bytes, false);
@@ -355,6 +419,24 @@ std::string ReadTextFile(const std::filesystem::path& path) {
   int count = 0;
   while ((count = gzread(file.get(), part.data(), part.size())) > 0) {
     bytes.append(part.data(), static_cast<std::size_t>(count));
+    // Ordinary tables shrink to a fifth or a twentieth; a few kilobytes that
+    // unpack to gigabytes are an accident or an attack.
+    const bool is_packed = gzdirect(file.get()) == 0;
+    const z_off_t packed = gzoffset(file.get());  // -1 for a pipe.
+    const std::size_t limit =
+        packed < 0 ? kUnpackedAtMost
+                   : std::clamp(100 * static_cast<std::size_t>(packed),
+                                kUnpackedAlways, kUnpackedAtMost);
+    if (is_packed && bytes.size() > limit) {
+      throw DataError(source + ": unpacks to more than " +
+                      (limit == kUnpackedAtMost ? "200 MiB"
+                                                : "100 times its size") +
+                      "; if it is right, unpack it with gunzip first");
+    }
+    if (is_packed && bytes.size() > kUnpackedAtMost / 8) {
+      // In one step: doubling would need three times the memory at the end.
+      bytes.reserve(kUnpackedAtMost + 2 * part.size());
+    }
   }
   // gzread() returns 0 at the end of a truncated file, too; only gzerror() then
   // says Z_BUF_ERROR.

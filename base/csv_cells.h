@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iosfwd>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,6 +31,12 @@ class CsvCells {
 
   /// Cells of the last complete record.
   const std::vector<std::string>& cells() const { return cells_; }
+  /// Drops empty cells behind the first `count`.
+  void Trim(std::size_t count) {
+    while (cells_.size() > count && cells_.back().empty()) {
+      cells_.pop_back();
+    }
+  }
   /// Whether that record is a blank line.
   bool blank() const { return cells_.size() == 1 && cells_.front().empty(); }
 
@@ -72,15 +79,25 @@ enum class Digits {
 /// @param sign set to the first one in the cell, unless kNone.
 Digits DigitsOf(std::string_view cell, char& sign);
 
-/// Detects the separator of a table: the one that splits `header` and `row`
-/// into the same number of cells, as many as possible.
-char FindSeparator(std::string_view header, std::string_view row);
+/// Detects the separator of a table: the one that splits most of `lines` into
+/// the same number of cells, as many as possible.
+char FindSeparator(std::span<const std::string_view> lines);
+
+/// `cell` without what groups its digits by threes: blanks, ' and `thousands`
+/// (NUL: nothing else). @returns nothing if there is no such group.
+std::optional<std::string> Ungrouped(std::string_view cell, char thousands);
+
+/// `text` in lower case without accents, for comparing words: "Stellgröße" is
+/// "stellgrosse", "Przepływ" is "przeplyw".
+std::string PlainText(std::string_view text);
 
 /// Reads a whole file, or stdin for `-`, as UTF-8 with LF: gzip is
 /// decompressed, UTF-16 (with a byte order mark, or recognised by its zeros) is
 /// converted, and anything that is neither UTF-8 nor UTF-16 is read as Latin-1.
+/// A gzip may unpack to a hundred times its size (4 MiB are always accepted)
+/// and to 200 MiB.
 /// @throws NotFoundError if there is no such file; DataError naming it and its
-///   actual type (folder, spreadsheet, Parquet, damaged gzip, binary).
+///   actual type (folder, spreadsheet, Parquet, damaged gzip, binary) or limit.
 std::string ReadTextFile(const std::filesystem::path& path);
 /// The same for bytes in memory, except for gzip.
 std::string ToUtf8(std::string bytes, const std::string& source);

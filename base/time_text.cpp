@@ -39,8 +39,9 @@ constexpr const char* kTimeForms =
 //     clock   = hh ":" mm [":" ss [("." / ",") 1*DIGIT]] [[" "] ("AM" / "PM")]
 //     offset  = [" "] ("Z" / "UTC" / "GMT" / ("+" / "-") hh [[":"] mm])
 //
-// A year of two digits is accepted only beside the name of a month: in
-// "01-02-03" nothing shows which number is the year.
+// A year of two digits, 1970 to 2069, is accepted beside the name of a month,
+// behind points ("10.03.26") and where the order is said: in "01-02-03" nothing
+// shows which number is the year.
 class Scanner {
  public:
   explicit Scanner(std::string_view text) : rest_(text) {}
@@ -112,11 +113,13 @@ std::optional<int> MonthOf(std::string_view word) {
              : std::nullopt;
 }
 
-// 2026-11-20, 20.11.2026, 20-Nov-2026, 20-Nov-26; 20/11/2026 by `order`.
+// 2026-11-20, 20.11.2026, 20-Nov-2026, 20-Nov-26, 20.11.26; 20/11/2026 and
+// 20/11/26 by `order`.
 bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
   std::size_t digits = 0;
   const auto first = in.Number(&digits);
-  const bool iso = digits == 4;
+  const bool iso =
+      digits == 4 || (digits <= 2 && order == DateOrder::kYearFirst);
   const char separator = in.next();
   if (!first || !in.Take(iso ? "-/." : "./-")) {
     return false;
@@ -126,15 +129,17 @@ bool ScanDate(Scanner& in, DateOrder order, std::tm& fields) {
   if (!month || !in.Take(std::string_view(&separator, 1))) {
     return false;
   }
+  const std::size_t first_digits = digits;
   auto last = in.Number(&digits);
   if (!last) {
     return false;
   }
   auto day = iso ? last : first;
   auto year = iso ? first : last;
-  if (!iso && named && digits == 2) {
-    *year += 2000;
-  } else if (!iso && digits != 4) {
+  const std::size_t year_digits = iso ? first_digits : digits;
+  if (year_digits == 2) {
+    *year += *year < 70 ? 2000 : 1900;
+  } else if (year_digits != 4) {
     return false;
   }
   // Dates with points are taken as day first. With slashes or dashes the order

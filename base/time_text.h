@@ -20,8 +20,8 @@ struct CivilTime {
   std::optional<int> offset_s;  ///< Offset of local time from UTC, if given.
 };
 
-/// Order in dates with slashes, which are ambiguous.
-enum class DateOrder { kNotSaid, kDayFirst, kMonthFirst };
+/// Order in dates with slashes, and in those with years of two digits.
+enum class DateOrder { kNotSaid, kDayFirst, kMonthFirst, kYearFirst };
 
 /// Parses "2026-11-20T14:56:11.5+01:00", "20.11.2026 14:56:11,5", "20-Nov-2026
 /// 14:56", "11/20/2026 2:56:11 PM"; time of day, seconds and offset are

@@ -11,6 +11,8 @@
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "import/layout.h"
+#include "import/tag_map.h"
 
 namespace fdi::importer {
 namespace {
@@ -20,21 +22,12 @@ constexpr double kMaxSeconds = 3.2e9;
 constexpr double kSecondsPerDay = 86400.0;
 /// 1970-01-01 as a spreadsheet day number.
 constexpr double kSerialOf1970 = 25569.0;
+/// 1970-01-01 in units of 100 ns since 1601, and 100 years.
+constexpr std::int64_t kFileTimeOf1970 = 116'444'736'000'000'000;
+constexpr std::int64_t kMaxFileTime = 32'000'000'000'000'000;
 constexpr const char* kSniff =
     "; try: fdi-store runs sniff FILE --map-output tags.toml, then --map "
     "tags.toml";
-
-/// Whether `words`, separated and enclosed by bars, contains `text`, ignoring
-/// case.
-bool IsOneOf(std::string_view text, std::string_view words) {
-  std::string lower(text);
-  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  // A text with a bar of its own could match across two words.
-  return lower.find('|') == std::string::npos &&
-         words.find('|' + lower + '|') != std::string_view::npos;
-}
 
 /// The names that `signal` may have in a header: "F_m3_h or F_t_h".
 std::string ColumnNames(Signal signal) {
@@ -116,42 +109,41 @@ std::vector<std::string> RowOf(const LabelledSample& labelled,
 
 }  // namespace
 
-// What historians, OPC clients and spreadsheets write where there is no value.
-// The words are complete cells, and "-" and "*" are no numbers, so no reading
-// is lost.
-bool IsNoReading(std::string_view cell) {
-  constexpr std::string_view kWords =
-      "|nan|-nan|n/a|na|#n/a|#na|#value!|#ref!|#div/0!|#name?|#num!|#null!|"
-      "null|none|nil|bad|bad input|bad value|bad quality|bad data|i/o timeout|"
-      "io timeout|timeout|no data|no value|no sample|not connect|no result|"
-      "pt created|shutdown|comm fail|comm error|configure|scan off|"
-      "scan timeout|calc failed|under range|over range|underrange|overrange|"
-      "intf shut|offline|invalid|error|fault|missing|-|--|---|?|*|...|"
-      "1.#qnan|-1.#ind|";
-  return cell.empty() || IsOneOf(cell, kWords);
-}
-
-// Told apart by name and size:
+// Told apart by name and size, e.g. 6e8 .. 4e9 s since 1970 are 1989 to 2096:
 //
 //     t_s           elapsed seconds
-//     6e8 .. 4e9    seconds since 1970, 1989 to 2096
+//     6e8 .. 4e9    seconds since 1970, and thousandths to billionths of them
+//     1.22e17 .. 1.6e17    100 ns since 1601, 1987 to 2107
 //     3e4 .. 7e4    days of a spreadsheet, 1982 to 2091
-//     else          elapsed seconds
+//     else          elapsed, in seconds or the unit at the end of the name
 //
 // A whole number between 3e4 and 7e4 is rather a count of seconds than a
 // midnight, and so is any number in a column whose name ends in that unit.
-TimeForm TimeFormOf(std::string_view name, double first) {
+TimeUnit TimeUnitOf(std::string_view name, double first) {
   if (SameName(name, kTimeColumn)) {
-    return TimeForm::kElapsed;
+    return {TimeForm::kElapsed, 1.0};
   }
-  if (first > 6e8 && first < 4e9) {
-    return TimeForm::kUnix;
+  if (first > 1.22e17 && first < 1.6e17) {
+    return {TimeForm::kFileTime, 1e-7};
   }
-  const bool in_seconds =
-      name.ends_with("_s") || name.ends_with("[s]") || name.ends_with("(s)");
-  return first > 3e4 && first < 7e4 && first != std::floor(first) && !in_seconds
-             ? TimeForm::kSerial
-             : TimeForm::kElapsed;
+  for (const double scale : {1.0, 1e-3, 1e-6, 1e-9}) {
+    if (first * scale > 6e8 && first * scale < 4e9) {
+      return {TimeForm::kUnix, scale};
+    }
+  }
+  static constexpr std::pair<const char*, double> kEndings[] = {
+      {"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"min", 60.0}, {"h", 3600.0}};
+  for (const auto& [unit, scale] : kEndings) {
+    const std::string text(unit);
+    if (name.ends_with('_' + text) || name.ends_with('[' + text + ']') ||
+        name.ends_with('(' + text + ')')) {
+      return {TimeForm::kElapsed, scale};
+    }
+  }
+  return {first > 3e4 && first < 7e4 && first != std::floor(first)
+              ? TimeForm::kSerial
+              : TimeForm::kElapsed,
+          1.0};
 }
 
 // With the period T and the step d of two samples, |d - T| < T/2 is accepted:
@@ -197,17 +189,19 @@ void CsvReader::Refuse(const std::string& reason) const {
                   reason);
 }
 
-//     table  = skipped ["sep=" sign] header {row}
+//     table  = skipped ["sep=" sign] header {row / header / comment / marker}
 //     row    = cell {separator cell}          as many cells as the header has
 //     wide:    time [clock] signal ... [mode] [fault strength]
 //     long:    time [clock] tag value [quality]    one reading per row
 //
-// skipped are ColumnMap::skip lines. Blank lines may be anywhere. A record can
-// take several lines, because a quoted cell may contain line breaks: all
-// decisions about the separator come before a record is begun.
-std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
-  ++line_;
-  if (line_ <= options_.map.skip) {
+// skipped are ColumnMap::skip lines, header the names and ColumnMap::header_rows
+// less one further rows. Blank lines may be anywhere. A record can take several
+// lines, because a quoted cell may contain line breaks: all decisions about the
+// separator come before a record is begun.
+std::optional<CsvRow> CsvReader::TakeLine(std::string_view line,
+                                          std::int64_t number) {
+  line_ = number > 0 ? number : line_ + 1;
+  if (line_ <= options_.map.skip && names_.empty()) {
     return std::nullopt;
   }
   if (names_.empty() && !record_.open()) {
@@ -217,19 +211,30 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
       return std::nullopt;
     }
     // A pipe shows the header alone, so its separator is the one that cuts it
-    // into most cells. For whole tables WithSigns() has settled this with the
-    // first row.
+    // into most cells. For whole tables FindLayout() has settled this.
     if (options_.map.separator == '\0' &&
         line.find_first_not_of(" \t\r") != std::string_view::npos) {
-      options_.map.separator = FindSeparator(line, {});
+      options_.map.separator = FindSeparator({&line, 1});
     }
     record_ = CsvCells(options_.map.separator);
+  }
+  if (!record_.open() && line.starts_with('#') && !names_.empty() &&
+      !names_.front().starts_with('#')) {
+    return std::nullopt;
   }
   if (!record_.TakeLine(line) || record_.blank()) {
     return std::nullopt;
   }
   if (names_.empty()) {
     TakeHeader();
+    return std::nullopt;
+  }
+  if (header_left_ > 0) {
+    --header_left_;
+    return std::nullopt;
+  }
+  record_.Trim(names_.size());
+  if (IsMarker()) {
     return std::nullopt;
   }
   if (record_.cells().size() != names_.size()) {
@@ -247,10 +252,16 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
   sample.flow_unit = header_.flow_unit;
   // The tag comes before the time: it selects the clock that TakeTime()
   // continues, and rows of unmapped tags may contain anything.
-  if (tag_column_ && !TakeTagged(sample)) {
+  if (tag_column_ && !options_.scan && !TakeTagged(sample)) {
     return std::nullopt;
   }
-  TakeTime(row);
+  if (!TakeTime(row)) {
+    return std::nullopt;
+  }
+  if (!pending_.empty() && rows_ > 0) {
+    throw DataError(pending_);
+  }
+  pending_.clear();
   sample.seq = rows_++;
   if (!tag_column_) {
     for (const Conversion& c : conversions_) {
@@ -266,23 +277,127 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line) {
   return row;
 }
 
-void CsvReader::Convert(const Conversion& c, Sample& sample) const {
-  std::optional<double> value = Reading(c.column);
+// Rows that hold no reading, before and behind the others or marked as such:
+// the header again, "$RT_OFF$", "[Data]", "Average;;37", a row of units. A word
+// instead of a time between two rows is an error, which shows at the second.
+bool CsvReader::IsMarker() {
+  const std::vector<std::string>& cells = record_.cells();
+  if (cells.front() == header_cells_.front() && cells == header_cells_) {
+    return true;
+  }
+  const auto is_full = [](const std::string& cell) { return !cell.empty(); };
+  if (std::ranges::none_of(cells, is_full)) {
+    return true;
+  }
+  const bool whole = cells.size() == names_.size();
+  if (!whole && std::ranges::count_if(cells, is_full) > 1) {
+    return false;
+  }
+  const std::string& cell =
+      whole && time_column_ ? Cell(*time_column_)
+                            : *std::ranges::find_if(cells, is_full);
+  if (cell.empty()) {
+    // Units and descriptions below the names.
+    return rows_ == 0 && std::ranges::none_of(cells, [&](const auto& c) {
+             return Parsed(c).has_value();
+           });
+  }
+  if (std::string_view("$*#[").find(cell.front()) != std::string_view::npos) {
+    ++markers_;
+    return true;
+  }
+  const auto first = static_cast<unsigned char>(cell.front());
+  if (std::isalpha(first) == 0 && first < 0x80) {
+    return false;
+  }
+  ++markers_;
+  if (pending_.empty()) {
+    pending_ = NoTime(cell);
+  }
+  return true;
+}
+
+// The cell in the unit of the file. Numbers come first, because nearly all cells
+// are; words for "no reading" come before all other forms of a number.
+std::optional<double> CsvReader::Reading(const Conversion& c) {
+  const std::string& cell = Cell(c.column);
+  const char decimal = options_.map.decimal;
+  auto value = ParseNumber(cell, decimal == '\0' ? '.' : decimal);
+  if (!value ? IsNoReading(cell, options_.map.no_reading)
+             : !options_.map.no_reading.empty() &&
+                   std::ranges::find(options_.map.no_reading, cell) !=
+                       options_.map.no_reading.end()) {
+    return std::nullopt;
+  }
   if (!value) {
-    sample.quality[Index(c.signal)] = SignalQuality::kBad;
-    return;
+    value = Parsed(cell);
+  }
+  if (value && (*value < c.mapping.lowest || *value > c.mapping.highest)) {
+    ++beyond_[Index(c.mapping.signal)];
+    return std::nullopt;
   }
   // Skipped for the identity: 0 + 1 * value would lose the sign of −0.
-  if (c.scale != 1.0 || c.offset != 0.0) {
-    value = c.offset + c.scale * *value;
+  if (value && (c.mapping.scale != 1.0 || c.mapping.offset != 0.0)) {
+    value = c.mapping.offset + c.mapping.scale * *value;
   }
-  sample.Set(c.signal, c.sense == Sense::kOpening ? 100.0 - *value : *value);
+  if (!value) {
+    value = WithOwnUnit(c);
+  }
+  return value ? value : Number(c.column);
+}
+
+// "11.1 t/h": the unit of the cell, which a dashboard may change from row to
+// row, instead of that of the map.
+std::optional<double> CsvReader::WithOwnUnit(const Conversion& c) const {
+  const std::string& cell = Cell(c.column);
+  const auto [number, unit] = SplitUnit(cell);
+  const auto value = Parsed(number);
+  if (!value || !IsUnit(unit)) {
+    return std::nullopt;
+  }
+  const auto own = FindUnit(c.mapping.signal, unit);
+  const auto stated = FindUnit(c.mapping.signal, c.mapping.unit);
+  const bool linear = !c.mapping.unit.empty() &&
+                      (!stated || stated->scale != c.mapping.scale ||
+                       stated->offset != c.mapping.offset);
+  if (!own || linear ||
+      (c.mapping.signal == Signal::kF && own->flow_unit != header_.flow_unit)) {
+    Refuse("column " + Quoted(names_[c.column]) + ": " + Quoted(cell) +
+           " is in " + Quoted(unit) + ", expected " +
+           (c.mapping.unit.empty() ? UnitNames(c.mapping.signal).substr(1)
+                                   : c.mapping.unit) +
+           "; try unit under [signal." +
+           std::string(SignalName(c.mapping.signal)) + "] of --map");
+  }
+  return own->scale == 1.0 && own->offset == 0.0
+             ? *value
+             : own->offset + own->scale * *value;
+}
+
+void CsvReader::Convert(const Conversion& c, Sample& sample) {
+  const Signal signal = c.mapping.signal;
+  const SignalQuality quality =
+      c.quality ? QualityAt(*c.quality) : SignalQuality::kGood;
+  std::optional<double> value =
+      quality == SignalQuality::kBad ? std::nullopt : Reading(c);
+  if (!value) {
+    sample.quality[Index(signal)] = SignalQuality::kBad;
+    return;
+  }
+  if (c.mapping.clamped) {
+    value = std::clamp(*value, 0.0, 100.0);
+  }
+  sample.Set(signal,
+             c.mapping.sense == Sense::kOpening ? 100.0 - *value : *value);
+  sample.quality[Index(signal)] = quality;
 }
 
 bool CsvReader::TakeTagged(Sample& sample) {
   const std::string& tag = Cell(*tag_column_);
-  const auto found = std::ranges::find_if(
-      conversions_, [&](const Conversion& c) { return SameName(c.tag, tag); });
+  const auto found =
+      std::ranges::find_if(conversions_, [&](const Conversion& c) {
+        return SameName(c.mapping.column, tag);
+      });
   if (found == conversions_.end()) {
     auto& ignored = header_.ignored_columns;
     if (std::ranges::find(ignored, tag) == ignored.end()) {
@@ -291,50 +406,29 @@ bool CsvReader::TakeTagged(Sample& sample) {
     return false;
   }
   used_[static_cast<std::size_t>(found - conversions_.begin())] = true;
-  tag_ = Index(found->signal);
-  const SignalQuality quality = TaggedQuality();
-  if (quality == SignalQuality::kBad) {
-    sample.quality[Index(found->signal)] = quality;
-    return true;
-  }
   Convert(*found, sample);
-  if (sample.Has(found->signal)) {
-    sample.quality[Index(found->signal)] = quality;
-  }
   return true;
 }
 
-//     quality = word / number      the list `good`, if given, overrides both
-SignalQuality CsvReader::TaggedQuality() const {
-  constexpr std::string_view kGood =
-      "|good|g|ok|raw|good non-specific|0x00000000|";
-  constexpr std::string_view kUncertain =
-      "|uncertain|questionable|substituted|interpolated|";
-  if (!quality_column_) {
-    return SignalQuality::kGood;
+// What is not known is refused: taken as bad it would empty a file in silence,
+// taken as good it would let anything pass.
+SignalQuality CsvReader::QualityAt(std::size_t column) const {
+  const std::string& cell = Cell(column);
+  const auto code = options_.map.quality_codes.find(names_[column]);
+  const auto quality =
+      QualityOf(cell, options_.map.quality,
+                code != options_.map.quality_codes.end()
+                    ? code->second
+                    : QualityCodeOf(names_[column], {{cell, 1}}));
+  if (!quality) {
+    Refuse("column " + Quoted(names_[column]) + ": " + Quoted(cell) +
+           (cell == "0" ? " is good in OPC UA and bad in OPC DA; try good = "
+                          "[\"0\"] or good = [\"192\"]"
+                        : " is no known quality; try good = [" + Quoted(cell) +
+                              "], or uncertain or bad,") +
+           " under [quality] of --map");
   }
-  const std::string& cell = Cell(*quality_column_);
-  const std::vector<std::string>& good = options_.map.long_table->good;
-  if (!good.empty()) {
-    return std::ranges::any_of(good,
-                               [&](const auto& g) { return SameName(g, cell); })
-               ? SignalQuality::kGood
-               : SignalQuality::kBad;
-  }
-  // Numbers are OPC DA quality codes: 192 good, 64 uncertain. 0 is bad there,
-  // but good in OPC UA.
-  const auto number = ParseNumber(cell);
-  if (number && *number == 0.0) {
-    Refuse("column " + Quoted(names_[*quality_column_]) + ": " + Quoted(cell) +
-           " is good in OPC UA and bad in OPC DA; try good = [\"0\"] or good "
-           "= [\"192\"] under [long] of --map");
-  }
-  if (IsOneOf(cell, kGood) || (number && *number >= 192.0)) {
-    return SignalQuality::kGood;
-  }
-  return IsOneOf(cell, kUncertain) || (number && *number >= 64.0)
-             ? SignalQuality::kUncertain
-             : SignalQuality::kBad;
+  return *quality;
 }
 
 void CsvReader::Finish() const {
@@ -344,16 +438,20 @@ void CsvReader::Finish() const {
   if (names_.empty()) {
     throw DataError(options_.source + ": is empty: no header, no rows");
   }
+  if (rows_ == 0 && !pending_.empty()) {
+    throw DataError(pending_);
+  }
   if (rows_ == 0 && !tag_column_) {
     throw DataError(options_.source + ": has a header but no rows");
   }
   for (std::size_t i = 0; i < used_.size(); ++i) {
     if (!used_[i]) {
-      throw DataError(options_.source + ": tag " + Quoted(conversions_[i].tag) +
+      throw DataError(options_.source + ": tag " +
+                      Quoted(conversions_[i].mapping.column) +
                       " does not occur; the others are " +
                       Quoted(Listed(header_.ignored_columns)) +
                       "; try another column under [signal." +
-                      std::string(SignalName(conversions_[i].signal)) +
+                      std::string(SignalName(conversions_[i].mapping.signal)) +
                       "] of --map");
     }
   }
@@ -378,6 +476,11 @@ std::optional<std::size_t> CsvReader::Column(std::string_view name) {
 
 void CsvReader::TakeHeader() {
   names_ = record_.cells();
+  header_cells_ = names_;
+  header_left_ = std::max(options_.map.header_rows - 1, 0);
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    names_[i] = UnnamedAs(names_[i], i);
+  }
   used_.assign(names_.size(), false);
   const ColumnMap& map = options_.map;
   static const std::vector<std::string> kTimes = {"t_s", "time", "timestamp",
@@ -396,23 +499,49 @@ void CsvReader::TakeHeader() {
       quality_column_ = Column(map.long_table->quality);
     }
     CheckLongHeader();
+    if (options_.scan) {
+      return;
+    }
     // From here on `used_` counts tags instead of columns: Finish() reports
     // mapped tags that never occurred.
     used_.assign(map.columns.size(), false);
     for (const ColumnMapping& m : map.columns) {
-      AddSignal(
-          {value_column_, m.signal, m.scale, m.offset, m.sense, m.column});
+      AddSignal(value_column_, m);
+      conversions_.back().quality = quality_column_;
     }
     header_.flow_unit = map.flow_unit.value_or(header_.flow_unit);
+    return;
+  }
+  if (options_.scan) {
+    used_.clear();
+    if (!time_column_) {
+      Refuse("no column of " + Quoted(Listed(names_)) +
+             " holds times; expected 2026-11-20 14:56:11, seconds or the "
+             "like; try column under [time] of --map");
+    }
     return;
   }
   // Mapped columns come first. A name of the contract that the map gives
   // another meaning is then used already, and AddByContract() leaves it alone.
   AddMapped();
   for (std::size_t i = 0; i < names_.size(); ++i) {
-    if (!used_[i] && !AddByContract(i, names_[i]) && !names_[i].empty()) {
+    if (!used_[i] && !AddByContract(i, names_[i]) &&
+        !header_cells_[i].empty()) {
       header_.ignored_columns.push_back(names_[i]);
     }
+  }
+  for (Conversion& c : conversions_) {
+    const auto found = map.quality_of.find(names_[c.column]);
+    const std::string& name = !c.mapping.quality.empty() ? c.mapping.quality
+                              : found != map.quality_of.end()
+                                  ? found->second
+                                  : c.mapping.quality;
+    if (!name.empty() && !(c.quality = Column(name))) {
+      Refuse("missing column " + name + "; the header is " +
+             Quoted(Listed(names_)) + "; try quality under [signal." +
+             std::string(SignalName(c.mapping.signal)) + "] of --map");
+    }
+    std::erase(header_.ignored_columns, name);
   }
   // Emptied, so that Finish() does not take columns for tags.
   used_.clear();
@@ -420,15 +549,15 @@ void CsvReader::TakeHeader() {
   CheckHeader();
 }
 
-void CsvReader::AddSignal(const Conversion& conversion) {
-  if ((header_.signals & MaskOf(conversion.signal)) != 0) {
-    Refuse("column " + Quoted(names_[conversion.column]) + ": signal " +
-           std::string(SignalName(conversion.signal)) +
+void CsvReader::AddSignal(std::size_t column, const ColumnMapping& mapping) {
+  if ((header_.signals & MaskOf(mapping.signal)) != 0) {
+    Refuse("column " + Quoted(names_[column]) + ": signal " +
+           std::string(SignalName(mapping.signal)) +
            " occurs twice; expected once");
   }
   header_.signals =
-      static_cast<SignalMask>(header_.signals | MaskOf(conversion.signal));
-  conversions_.push_back(conversion);
+      static_cast<SignalMask>(header_.signals | MaskOf(mapping.signal));
+  conversions_.push_back({column, mapping});
 }
 
 void CsvReader::AddMapped() {
@@ -437,7 +566,7 @@ void CsvReader::AddMapped() {
       if (m.signal == Signal::kF) {
         header_.flow_unit = *options_.map.flow_unit;
       }
-      AddSignal({*column, m.signal, m.scale, m.offset, m.sense, ""});
+      AddSignal(*column, m);
     }
   }
 }
@@ -470,7 +599,7 @@ bool CsvReader::AddByContract(std::size_t column, std::string_view name) {
       if (known.signal == Signal::kF) {
         header_.flow_unit = known.flow_unit;
       }
-      AddSignal({column, known.signal, 1.0, 0.0, Sense::kClosing, ""});
+      AddSignal(column, {std::string(name), known.signal});
       return true;
     }
   }
@@ -522,7 +651,8 @@ void CsvReader::CheckHeader() const {
     }
   }
   require((header_.signals & (MaskOf(Signal::kX) | MaskOf(Signal::kF))) != 0,
-          "one of X_pct, F_m3_h, F_t_h");
+          "one of X_pct, F_m3_h, F_t_h (position or flow: the command alone, "
+          "or a level, shows nothing about the valve)");
   require(fault_column_ || !strength_column_, "fault (or fault_no)");
   require(strength_column_ || !fault_column_, kStrengthColumn);
   if (!missing.empty()) {
@@ -535,32 +665,37 @@ void CsvReader::CheckHeader() const {
   }
 }
 
-// Words for "no reading" come first, because Number() refuses all that is no
-// number.
-std::optional<double> CsvReader::Reading(std::size_t column) const {
-  return IsNoReading(Cell(column)) ? std::nullopt
-                                   : std::optional(Number(column));
+// Line by line nothing is known of the other rows. A decimal comma is therefore
+// accepted only in cells where it cannot group thousands.
+std::optional<double> CsvReader::Parsed(std::string_view cell) const {
+  const char decimal = options_.map.decimal;
+  char sign = decimal == '\0' ? '.' : decimal;
+  auto value = ParseNumber(cell, sign);
+  if (!value && decimal == '\0' && DigitsOf(cell, sign) == Digits::kDecimal) {
+    value = ParseNumber(cell, sign);
+  }
+  if (!value) {
+    if (const auto plain = Ungrouped(cell, options_.map.thousands)) {
+      value = ParseNumber(*plain, sign);
+    }
+  }
+  return value;
 }
 
 double CsvReader::Number(std::size_t column) const {
   const std::string& cell = Cell(column);
   const char decimal = options_.map.decimal;
   char sign = '.';
-  auto value = ParseNumber(cell, decimal == '\0' ? '.' : decimal);
-  // Line by line nothing is known of the other rows. A decimal comma is
-  // therefore accepted only in cells where it cannot group thousands.
-  if (!value && decimal == '\0' && DigitsOf(cell, sign) == Digits::kDecimal) {
-    value = ParseNumber(cell, sign);
-  }
+  const auto value = Parsed(cell);
   if (!value) {
     const bool other = DigitsOf(cell, sign) != Digits::kNone;
     Refuse("column " + Quoted(names_[column]) + ": " + Quoted(cell) +
            " is not a finite number; expected digits" +
            (decimal == ',' ? " with a decimal comma" : "") +
-           (other ? "; thousands separators are not read: try decimal under "
-                    "[file] of --map, or export without them"
+           (other ? "; try decimal and thousands under [file] of --map"
                   : ", or nothing, NaN, Bad ... where there is no reading; try "
-                    "to correct or empty the cell"));
+                    "to correct or empty the cell, or missing under [file] of "
+                    "--map"));
   }
   return *value;
 }
@@ -614,6 +749,7 @@ FaultTruth CsvReader::Truth() const {
 void CsvReader::FindTimeForm(const std::string& cell) {
   const ColumnMap& map = options_.map;
   time_form_ = map.time_form;
+  time_scale_ = map.time_scale;
   if (time_form_ != TimeForm::kFindOut) {
     return;
   }
@@ -624,26 +760,80 @@ void CsvReader::FindTimeForm(const std::string& cell) {
     time_form_ = TimeForm::kText;
     return;
   }
-  time_form_ = TimeFormOf(name, *number);
+  const TimeUnit unit = TimeUnitOf(name, *number);
+  time_form_ = unit.form;
+  time_scale_ *= unit.scale;
   if (SameName(name, kTimeColumn)) {
     return;
   }
-  if (time_form_ == TimeForm::kSerial) {
-    notes_.push_back("column " + name +
-                     " taken as days of a spreadsheet (guessed; unit = "
-                     "\"serial\" under [time] confirms it)");
-  } else if (time_form_ == TimeForm::kUnix) {
-    notes_.push_back("column " + name +
-                     " taken as seconds since 1970 (guessed; unit = \"unix\" "
-                     "under [time] confirms it)");
-  } else {
-    notes_.push_back("column " + name +
-                     " taken as seconds (guessed; unit = \"s\" under [time] "
-                     "confirms it)");
-  }
+  notes_.push_back("column " + name + " taken as " +
+                   std::string(TimeUnitName({time_form_, time_scale_})) +
+                   " (guessed; unit under [time] confirms it)");
 }
 
-void CsvReader::TakeTime(CsvRow& row) {
+std::string CsvReader::NoTime(const std::string& cell) const {
+  const auto in = [&](DateOrder order) {
+    return ScanTime(cell, order).has_value();
+  };
+  const bool slashed = in(DateOrder::kDayFirst) || in(DateOrder::kMonthFirst);
+  return options_.source + ':' + std::to_string(line_) + ": column " +
+         Quoted(names_[*time_column_]) + ": " + Quoted(cell) +
+         (slashed ? " may be day/month or month/day; try date = \"d/m/y\" "
+                    "or \"m/d/y\" under [time] of --map"
+                  : " is not a time; expected 2026-11-20 14:56:11.5, "
+                    "20.11.2026 14:56:11,5 or the like; try unit under "
+                    "[time] of --map");
+}
+
+// Of text and spreadsheet days; nothing for the second that UTC repeats.
+std::optional<std::int64_t> CsvReader::UtcOf(const std::string& cell) {
+  std::optional<CivilTime> time;
+  if (time_form_ == TimeForm::kText) {
+    time = ScanTime(cell, options_.map.date_order);
+  } else if (const double days = Number(*time_column_);
+             days > 2.0 && days < 130000.0) {
+    // Excel shows times to the millisecond; further digits are rounding
+    // errors.
+    const auto ms = std::llround((days - kSerialOf1970) * kSecondsPerDay * 1e3);
+    // Rounded towards minus infinity, so that the fraction is not negative
+    // before 1970 either.
+    const std::time_t seconds = (ms - ((ms % 1000) + 1000) % 1000) / 1000;
+    time.emplace();
+    gmtime_r(&seconds, &time->fields);
+    time->fraction_ns = (ms - seconds * 1000) * 1'000'000;
+  }
+  if (!time && options_.scan) {
+    ++markers_;  // Perhaps of a tag that is not used.
+    return std::nullopt;
+  }
+  if (!time) {
+    throw DataError(NoTime(cell));
+  }
+  if (time->fields.tm_sec == 60) {
+    notes_.push_back("the row of the leap second " + cell +
+                     " left out: the clock of the bus has no instant for it");
+    return std::nullopt;
+  }
+  if (!time->offset_s && !first_ns_ && options_.map.zone.empty()) {
+    notes_.push_back(
+        "times without a zone taken as local time of this machine "
+        "(guessed; --zone says which)");
+  }
+  // Of an hour that the clock shows twice, the time of the row before decides
+  // which one it is (LocalClock::Utc).
+  std::int64_t& last_ns =
+      last_ns_[tag_column_ ? Cell(*tag_column_) : std::string()];
+  const auto utc = clock_.Utc(*time, last_ns);
+  if (!utc) {
+    Refuse("column " + Quoted(names_[*time_column_]) + ": " + Quoted(cell) +
+           " was never shown in zone '" + clock_.zone() +
+           "' (clocks go forward in spring); try --zone UTC or +01:00");
+  }
+  last_ns = *utc;
+  return utc;
+}
+
+bool CsvReader::TakeTime(CsvRow& row) {
   std::string cell = Cell(*time_column_);
   if (clock_column_) {
     cell += ' ' + Cell(*clock_column_);
@@ -653,65 +843,42 @@ void CsvReader::TakeTime(CsvRow& row) {
   if (time_form_ == TimeForm::kFindOut) {
     FindTimeForm(cell);
   }
-  const std::string column = "column " + Quoted(names_[*time_column_]) + ": ";
   std::int64_t& stamp_ns = row.labelled.sample.stamp_ns;
-  if (time_form_ == TimeForm::kElapsed || time_form_ == TimeForm::kUnix) {
-    row.t_s = Number(*time_column_) * options_.map.time_scale;
+  // Nanoseconds since 1970 have more digits than a double.
+  std::int64_t count = 0;
+  const auto [end, error] =
+      std::from_chars(cell.data(), cell.data() + cell.size(), count);
+  const bool whole = error == std::errc() && end == cell.data() + cell.size();
+  if (time_form_ == TimeForm::kFileTime) {
+    if (!whole || count < kFileTimeOf1970 ||
+        count - kFileTimeOf1970 > kMaxFileTime) {
+      throw DataError(NoTime(cell));
+    }
+    stamp_ns = (count - kFileTimeOf1970) * 100;
+  } else if (time_form_ == TimeForm::kElapsed ||
+             time_form_ == TimeForm::kUnix) {
+    row.t_s = Number(*time_column_) * time_scale_;
     if (std::abs(row.t_s) > kMaxSeconds) {
-      Refuse(column + "time " + NumberText(row.t_s) +
+      Refuse("column " + Quoted(names_[*time_column_]) + ": time " +
+             NumberText(row.t_s) +
              " s is beyond 100 years; try unit under [time] of --map");
     }
-    stamp_ns = std::llround(row.t_s * 1e9) +
-               (time_form_ == TimeForm::kElapsed ? options_.start_ns : 0);
-  } else {
-    std::optional<CivilTime> time;
-    if (time_form_ == TimeForm::kText) {
-      time = ScanTime(cell, options_.map.date_order);
-    } else if (const double days = Number(*time_column_);
-               days > 2.0 && days < 130000.0) {
-      // Excel shows times to the millisecond; further digits are rounding
-      // errors.
-      const auto ms =
-          std::llround((days - kSerialOf1970) * kSecondsPerDay * 1e3);
-      // Rounded towards minus infinity, so that the fraction is not negative
-      // before 1970 either.
-      const std::time_t seconds = (ms - ((ms % 1000) + 1000) % 1000) / 1000;
-      time.emplace();
-      gmtime_r(&seconds, &time->fields);
-      time->fraction_ns = (ms - seconds * 1000) * 1'000'000;
-    }
-    if (!time) {
-      const bool slashed = ScanTime(cell, DateOrder::kDayFirst).has_value() ||
-                           ScanTime(cell, DateOrder::kMonthFirst).has_value();
-      Refuse(column + Quoted(cell) +
-             (slashed ? " may be day/month or month/day; try date = \"d/m/y\" "
-                        "or \"m/d/y\" under [time] of --map"
-                      : " is not a time; expected 2026-11-20 14:56:11.5, "
-                        "20.11.2026 14:56:11,5 or the like; try unit under "
-                        "[time] of --map"));
-    }
-    if (!time->offset_s && !first_ns_ && options_.map.zone.empty()) {
-      notes_.push_back(
-          "times without a zone taken as local time of this machine "
-          "(guessed; --zone says which)");
-    }
-    // Of an hour that the clock shows twice, the time of the row before decides
-    // which one it is (LocalClock::Utc).
-    const auto utc = clock_.Utc(*time, last_ns_[tag_]);
-    if (!utc) {
-      Refuse(column + Quoted(cell) + " was never shown in zone '" +
-             clock_.zone() +
-             "' (clocks go forward in spring); try --zone UTC or +01:00");
-    }
+    stamp_ns = whole && time_form_ == TimeForm::kUnix
+                   ? count * std::llround(time_scale_ * 1e9)
+                   : std::llround(row.t_s * 1e9);
+    stamp_ns += time_form_ == TimeForm::kElapsed ? options_.start_ns : 0;
+  } else if (const auto utc = UtcOf(cell)) {
     stamp_ns = *utc;
+  } else {
+    return false;
   }
   if (!first_ns_) {
     first_ns_ = stamp_ns;
   }
-  last_ns_[tag_] = stamp_ns;
   if (dated()) {
     row.t_s = static_cast<double>(stamp_ns - *first_ns_) * 1e-9;
   }
+  return true;
 }
 
 void WriteCsv(std::ostream& output, std::span<const LabelledSample> samples,

@@ -3,17 +3,22 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <iosfwd>
+#include <limits>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/csv_cells.h"
 #include "base/log.h"
 #include "base/time_text.h"
 #include "diagnosis/sample_series.h"
+#include "import/quality.h"
 
 namespace fdi::importer {
 
@@ -53,6 +58,12 @@ struct ColumnMapping {
   double offset{0.0};
   Sense sense{Sense::kClosing};
   std::string unit{};  ///< Of the cells, as written in the map.
+  /// Column of the quality of a wide table; empty: the one that is found.
+  std::string quality{};
+  /// Cells beyond, which are counts of a broken wire, are no readings.
+  double lowest{-std::numeric_limits<double>::infinity()};
+  double highest{std::numeric_limits<double>::infinity()};
+  bool clamped{false};  ///< To 0..100 %: half of a split range.
 };
 
 /// Format of the time column.
@@ -60,16 +71,22 @@ enum class TimeForm {
   kFindOut,
   kElapsed,  ///< Seconds (after scaling) from CsvOptions::start_ns.
   kUnix,     ///< Seconds (after scaling) since 1970.
+  kFileTime, ///< 100 ns since 1601-01-01.
   kSerial,   ///< Days of a spreadsheet, 25569 being 1970-01-01, in local time.
   kText,     ///< As ScanTime() reads it.
+};
+
+/// Form of a time column, and the unit of its numbers [s].
+struct TimeUnit {
+  TimeForm form{TimeForm::kFindOut};
+  double scale{1.0};
 };
 
 /// A table with one reading per row.
 struct LongTable {
   std::string tag{"tag"};
   std::string value{"value"};
-  std::string quality;            ///< Name of the column; empty: none.
-  std::vector<std::string> good;  ///< Others are bad; empty: usual words.
+  std::string quality;  ///< Name of the column; empty: the one that is found.
 };
 
 /// How a signal is resampled to a fixed period.
@@ -84,7 +101,11 @@ struct Resampling {
 struct ColumnMap {
   char separator{'\0'};      ///< NUL: detected.
   char decimal{'\0'};        ///< NUL: detected.
-  int skip{0};               ///< Lines in front of the header.
+  /// Groups digits, beside blanks and '; NUL: detected.
+  char thousands{'\0'};
+  int skip{0};         ///< Lines in front of the names; 0: detected.
+  int header_rows{0};  ///< Names, then units, ...; 0: detected.
+  std::vector<std::string> no_reading;  ///< Words beside the usual ones.
   std::string time_column;   ///< Empty: t_s, time, timestamp or datetime.
   std::string clock_column;  ///< Time of day, if in a column of its own.
   TimeForm time_form{TimeForm::kFindOut};
@@ -92,6 +113,12 @@ struct ColumnMap {
   DateOrder date_order{DateOrder::kNotSaid};
   std::string zone;  ///< Of times without an offset; empty: the machine's.
   std::optional<LongTable> long_table;
+  QualityWords quality;
+  /// Found by FindLayout(): the column of the quality of a column, and the
+  /// meaning of its numbers.
+  std::map<std::string, std::string> quality_of;
+  std::map<std::string, QualityCode> quality_codes;
+  bool newest_first{false};  ///< Found by FindLayout().
   std::vector<ColumnMapping> columns;
   std::optional<FlowUnit> flow_unit;  ///< Needed if the flow is mapped.
   std::optional<Resampling> resampling;
@@ -105,6 +132,7 @@ struct CsvOptions {
   /// of X, F are always required.
   SignalMask required{kBasicSignals};
   bool split_gaps{false};    ///< A gap starts another run instead of an error.
+  bool scan{false};  ///< Rows have their cells(), of any tag, and no signals.
   double period_s{0.0};      ///< 0: detected.
   std::int64_t start_ns{0};  ///< UTC of t_s = 0, unless times have a date.
   LogSink log;               ///< Receives CsvTable::notes, each as `csv_note`.
@@ -124,6 +152,8 @@ struct CsvTable {
   std::vector<SampleSeries> runs;
   bool dated{false};         ///< The times in the file have a date.
   std::int64_t start_ns{0};  ///< Of t = 0; dated: the first sample.
+  /// The part of CV's range that moves X from end to end, if it is half of it.
+  std::optional<std::pair<double, double>> split_range;
   /// What was detected, converted or filled in, one sentence each.
   std::vector<std::string> notes;
 };
@@ -171,13 +201,16 @@ class CsvReader {
   /// @throws ConfigError if a map has a flow without its unit.
   explicit CsvReader(CsvOptions options);
 
-  /// Processes the next line, without its line break. @returns nothing for the
-  /// header, for blank lines, for an unmapped tag, and while a quoted cell
-  /// continues on the next line.
+  /// Processes the next line, without its line break; `number` is its number if
+  /// lines are left out or in another order. @returns nothing for the header and
+  /// its repetitions, for blank lines and comments (#), for marker and summary
+  /// rows, for an unmapped tag, and while a quoted cell continues on the next
+  /// line.
   /// @throws DataError naming source, line, column, value, what was expected
   ///   and what to try: missing or duplicate column, too few or too many cells,
   ///   not a number, not a time, an unknown fault.
-  std::optional<CsvRow> TakeLine(std::string_view line);
+  std::optional<CsvRow> TakeLine(std::string_view line,
+                                 std::int64_t number = 0);
 
   /// Call after the last line. @throws DataError if there was no row.
   void Finish() const;
@@ -189,21 +222,26 @@ class CsvReader {
     return time_form_ != TimeForm::kElapsed && time_form_ != TimeForm::kFindOut;
   }
   const std::vector<std::string>& notes() const { return notes_; }
+  const std::vector<std::string>& names() const { return names_; }
+  const std::vector<std::string>& cells() const { return record_.cells(); }
+  TimeUnit time_unit() const { return {time_form_, time_scale_}; }
+  /// Whether the header is over.
+  bool in_rows() const { return !names_.empty() && header_left_ == 0; }
+  std::size_t markers() const { return markers_; }
+  /// Cells beyond ColumnMapping::lowest and highest.
+  std::size_t beyond(Signal signal) const { return beyond_[Index(signal)]; }
   [[noreturn]] void Refuse(const std::string& reason) const;
 
  private:
   struct Conversion {
     std::size_t column;
-    Signal signal;
-    double scale;
-    double offset;
-    Sense sense;
-    std::string tag;
+    ColumnMapping mapping;  ///< Of the contract: without a unit.
+    std::optional<std::size_t> quality{};
   };
 
   void TakeHeader();
   std::optional<std::size_t> Column(std::string_view name);
-  void AddSignal(const Conversion& conversion);
+  void AddSignal(std::size_t column, const ColumnMapping& mapping);
   void AddMapped();
   bool AddByContract(std::size_t column, std::string_view name);
   void CheckHeader() const;
@@ -212,13 +250,18 @@ class CsvReader {
     return record_.cells()[column];
   }
   /// The value in the unit of the file; nothing if there is no reading.
-  std::optional<double> Reading(std::size_t column) const;
+  std::optional<double> Reading(const Conversion& conversion);
+  std::optional<double> WithOwnUnit(const Conversion& conversion) const;
+  std::optional<double> Parsed(std::string_view cell) const;
   double Number(std::size_t column) const;
-  void Convert(const Conversion& conversion, Sample& sample) const;
+  void Convert(const Conversion& conversion, Sample& sample);
   bool TakeTagged(Sample& sample);
-  SignalQuality TaggedQuality() const;
+  SignalQuality QualityAt(std::size_t column) const;
+  bool IsMarker();
+  std::string NoTime(const std::string& cell) const;
   void FindTimeForm(const std::string& cell);
-  void TakeTime(CsvRow& row);
+  bool TakeTime(CsvRow& row);
+  std::optional<std::int64_t> UtcOf(const std::string& cell);
   FaultTruth Truth() const;
   ValveMode Mode() const;
 
@@ -226,6 +269,7 @@ class CsvReader {
   LocalClock clock_;
   CsvHeader header_;
   std::vector<std::string> names_;
+  std::vector<std::string> header_cells_;  // As in the file.
   std::vector<std::string> notes_;
   CsvCells record_;
   std::vector<Conversion> conversions_;
@@ -240,12 +284,18 @@ class CsvReader {
   std::optional<std::size_t> mode_column_;
   bool fault_by_number_{false};
   TimeForm time_form_{TimeForm::kFindOut};
+  double time_scale_{1.0};
   std::optional<std::int64_t> first_ns_;
-  // Per tag, because a table may be sorted by tag; a wide table uses the first.
-  std::array<std::int64_t, kSignalCount> last_ns_{};
-  std::size_t tag_{0};
+  // Per tag, because a table may be sorted by tag; a wide table uses "".
+  std::map<std::string, std::int64_t, std::less<>> last_ns_;
   std::uint64_t rows_{0};
   std::int64_t line_{0};
+  int header_left_{0};
+  // Marker rows that were left out, and what is wrong with the last of them if
+  // more rows follow.
+  std::size_t markers_{0};
+  std::array<std::size_t, kSignalCount> beyond_{};
+  std::string pending_{};
 };
 
 /// Reads a whole table (UTF-8, see ReadTextFile()). The sample period is the
@@ -263,16 +313,21 @@ CsvTable ReadCsv(std::string_view text, const CsvOptions& options = {});
 CsvTable ReadCsvFile(const std::filesystem::path& path,
                      CsvOptions options = {});
 
-/// `map` with the separator and decimal sign of the table, where it does not
-/// set them. @throws DataError if the decimal sign is ambiguous.
-ColumnMap WithSigns(std::string_view text, ColumnMap map,
-                    const std::string& source);
-
-/// Whether a cell means "no reading": empty, NaN, Bad, #N/A, ...
-bool IsNoReading(std::string_view cell);
-
 /// The form of a time column, by its name and its first cell, a number.
-TimeForm TimeFormOf(std::string_view name, double first);
+TimeUnit TimeUnitOf(std::string_view name, double first);
+
+/// Lines of `text`, without their breaks.
+std::vector<std::string_view> LinesOf(std::string_view text);
+
+/// Feeds whole tables to `reader`, from the end if they are newest first, and
+/// calls take(row) for each row.
+void ForEachRow(const std::vector<std::string_view>& lines, CsvReader& reader,
+                const std::function<void(CsvRow&&)>& take);
+
+/// Median of the steps of `times_s`, of two middle ones the shorter.
+double MedianStep(const std::vector<double>& times_s);
+/// A usual period within 5 % of `period_s`, else `period_s`.
+double UsualPeriod(double period_s);
 
 /// Writes the CSV contract's columns for the signals that occur; mode if it is
 /// not AUTO throughout; fault and fault_strength if the truth is known. Numbers

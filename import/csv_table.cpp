@@ -10,9 +10,10 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "import/csv.h"
+#include "import/layout.h"
 
-// Whole tables: properties that only all rows reveal, i.e. the decimal sign and
-// the time grid.
+// Whole tables: properties that only all rows reveal, i.e. the form (layout.h),
+// the time grid, and what the readings are like.
 
 namespace fdi::importer {
 namespace {
@@ -29,16 +30,6 @@ std::string PercentText(std::size_t part, std::size_t whole) {
   return text;
 }
 
-std::vector<std::string_view> Lines(std::string_view text) {
-  std::vector<std::string_view> lines;
-  while (!text.empty()) {
-    const std::size_t end = text.find('\n');
-    lines.push_back(text.substr(0, end));
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-  }
-  return lines;
-}
-
 SampleSeries EmptyRun(const CsvHeader& header, double period_s) {
   SampleSeries run;
   run.flow_unit = header.flow_unit;
@@ -48,97 +39,70 @@ SampleSeries EmptyRun(const CsvHeader& header, double period_s) {
   return run;
 }
 
-// Detects the decimal sign from all cells of the table.
-// Every cell is evidence (Digits): "12.34" shows a decimal sign, "1.234" may be
-// a decimal or a thousand, and "1.234.567" has thousands. Contradictions are
-// refused, and so is a table of ambiguous cells only, unless commas separate
-// them and all signs are points: a wrong guess would be off by a factor of
-// 1000.
-char FindDecimal(const std::vector<std::string_view>& lines, std::size_t begin,
-                 char separator, const std::string& source) {
-  struct Seen {
-    std::string cell;
-    std::size_t line{0};
-  };
-  std::map<char, Seen> decimal;
-  std::map<char, Seen> either;
-  CsvCells record(separator);
-  const auto refuse = [&](const Seen& seen, const std::string& reason) {
-    throw DataError(source + ":" + std::to_string(seen.line) + ": " +
-                    Quoted(seen.cell) + reason +
-                    "; try decimal = \".\" or decimal = \",\" under [file] "
-                    "of --map, or export without thousands separators");
-  };
-  for (std::size_t i = begin; i < lines.size(); ++i) {
-    if (!record.TakeLine(lines[i])) {
-      continue;
-    }
-    for (const std::string& cell : record.cells()) {
-      char sign = '.';
-      switch (DigitsOf(cell, sign)) {
-        case Digits::kDecimal:
-          decimal.try_emplace(sign, Seen{cell, i + 1});
-          break;
-        case Digits::kEither:
-          either.try_emplace(sign, Seen{cell, i + 1});
-          break;
-        case Digits::kThousands:
-          refuse({cell, i + 1},
-                 " has thousands separators; expected digits "
-                 "with one decimal sign");
-          break;
-        case Digits::kNone:
-          break;
-      }
-    }
-  }
-  if (decimal.size() == 2) {
-    const Seen& later =
-        decimal['.'].line < decimal[','].line ? decimal[','] : decimal['.'];
-    refuse(later,
-           " and cells above differ in the sign of decimals; expected "
-           "one of point and comma throughout");
-  }
-  if (decimal.empty() && either.size() == 1 &&
-      (separator != ',' || either.contains(','))) {
-    refuse(either.begin()->second,
-           " and all other cells may have decimals or thousands; expected to "
-           "know which");
-  }
-  const char sign = !decimal.empty() ? decimal.begin()->first : '.';
-  const char other = sign == '.' ? ',' : '.';
-  if (either.contains(other)) {
-    refuse(either[other], " seems to have a thousands separator");
-  }
-  return sign;
-}
-
 }  // namespace
 
-ColumnMap WithSigns(std::string_view text, ColumnMap map,
-                    const std::string& source) {
-  const std::vector<std::string_view> lines = Lines(text);
-  // The header and the first row after it; blank lines do not count.
-  std::vector<std::string_view> first;
-  const auto begin = static_cast<std::size_t>(map.skip);
-  for (std::size_t i = begin; i < lines.size() && first.size() < 2; ++i) {
-    if (lines[i].starts_with("sep=") && first.empty()) {
-      map.separator = lines[i].size() > 4 ? lines[i][4] : ',';
-    } else if (lines[i].find_first_not_of(" \t\r") != std::string_view::npos) {
-      first.push_back(lines[i]);
+std::vector<std::string_view> LinesOf(std::string_view text) {
+  std::vector<std::string_view> lines;
+  while (!text.empty()) {
+    const std::size_t end = text.find('\n');
+    lines.push_back(text.substr(0, end));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  }
+  return lines;
+}
+
+// From the end, a clock that goes back in autumn is read in the right order,
+// too.
+void ForEachRow(const std::vector<std::string_view>& lines, CsvReader& reader,
+                const std::function<void(CsvRow&&)>& take) {
+  const std::size_t count = lines.size();
+  std::size_t begin = 0;
+  while (begin < count && reader.options().map.newest_first &&
+         !reader.in_rows()) {
+    reader.TakeLine(lines[begin++]);
+  }
+  for (std::size_t k = begin; k < count; ++k) {
+    const std::size_t at = begin > 0 ? count - 1 - (k - begin) : k;
+    if (auto row =
+            reader.TakeLine(lines[at], static_cast<std::int64_t>(at) + 1)) {
+      take(std::move(*row));
     }
   }
-  first.resize(2);
-  if (map.separator == '\0') {
-    map.separator = FindSeparator(first[0], first[1]);
+}
+
+// Of two middle steps the shorter one: a gap must not become the period of a
+// short table.
+double MedianStep(const std::vector<double>& times_s) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < times_s.size(); ++k) {
+    steps.push_back(times_s[k] - times_s[k - 1]);
   }
-  if (map.decimal == '\0') {
-    map.decimal = FindDecimal(lines, begin, map.separator, source);
+  if (steps.empty()) {
+    return 0.0;
   }
-  return map;
+  const auto middle =
+      steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+double UsualPeriod(double period_s) {
+  for (const double usual : {0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0,
+                             10.0, 12.0, 15.0, 20.0, 30.0, 60.0, 120.0}) {
+    if (std::abs(period_s - usual) < 0.05 * usual) {
+      return usual;
+    }
+  }
+  return period_s;
 }
 
 namespace {
+
+void Drop(Signal signal, Sample& sample) {
+  sample.present = static_cast<SignalMask>(sample.present & ~MaskOf(signal));
+  sample.values[Index(signal)] = 0.0;
+  sample.quality[Index(signal)] = SignalQuality::kBad;
+}
 
 struct TimedReading {
   double t_s;
@@ -150,13 +114,15 @@ struct TimedReading {
 class TableReader {
  public:
   TableReader(std::string_view text, const CsvOptions& options)
-      : lines_(Lines(text)), reader_(Settled(text, options)) {}
+      : lines_(LinesOf(text)), reader_(Settled(lines_, options)) {}
 
   CsvTable Read();
 
  private:
-  static CsvOptions Settled(std::string_view text, CsvOptions options) {
-    options.map = WithSigns(text, std::move(options.map), options.source);
+  static CsvOptions Settled(const std::vector<std::string_view>& lines,
+                            CsvOptions options) {
+    options.map =
+        FindLayout(lines, std::move(options.map), options.source, false).map;
     return options;
   }
   void TakeRows();
@@ -169,8 +135,13 @@ class TableReader {
   void NoteResampling(const std::array<std::size_t, kSignalCount>& filled,
                       std::size_t samples);
   void Resample();
+  void NoteForm();
+  void DropImpossible(const ColumnMapping& mapping);
+  void CheckReadings();
   void CheckValues();
   void CheckPair(Signal signal);
+  void CheckMotion();
+  void NoteSplitRange();
   void Cut();
   [[noreturn]] void RefuseAt(std::int64_t line,
                              const std::string& reason) const {
@@ -200,9 +171,7 @@ CsvTable TableReader::Read() {
   table_.header = reader_.header();
   table_.dated = reader_.dated();
   table_.notes = reader_.notes();
-  if (options().map.decimal == ',') {
-    table_.notes.insert(table_.notes.begin(), "decimal sign: comma (found)");
-  }
+  NoteForm();
   if (!table_.header.ignored_columns.empty()) {
     table_.notes.push_back("not used: " +
                            Listed(table_.header.ignored_columns));
@@ -221,7 +190,9 @@ CsvTable TableReader::Read() {
   }
   CheckOrder();
   CheckValues();
+  CheckReadings();
   FindPeriod();
+  CheckMotion();
   table_.start_ns = table_.dated ? rows_.front().labelled.sample.stamp_ns
                                  : options().start_ns;
   if (options().map.resampling) {
@@ -241,12 +212,35 @@ CsvTable TableReader::Read() {
 }
 
 void TableReader::TakeRows() {
-  for (const std::string_view line : lines_) {
-    if (auto row = reader_.TakeLine(line)) {
-      rows_.push_back(std::move(*row));
-    }
-  }
+  ForEachRow(lines_, reader_,
+             [this](CsvRow&& row) { rows_.push_back(std::move(row)); });
   reader_.Finish();
+}
+
+// What was found out about the form, as far as it is not usual.
+void TableReader::NoteForm() {
+  const ColumnMap& map = options().map;
+  auto note = [this](const std::string& text) {
+    table_.notes.push_back(text);
+  };
+  if (map.decimal == ',') {
+    note("decimal sign: comma (found)");
+  }
+  if (map.thousands != '\0') {
+    note("thousands grouped by " + Quoted({&map.thousands, 1}));
+  }
+  if (map.newest_first) {
+    note("newest row first: read from the end");
+  }
+  if (map.long_table && !map.long_table->quality.empty()) {
+    note("quality: column " + map.long_table->quality);
+  }
+  for (const auto& [column, quality] : map.quality_of) {
+    note("quality of " + column + ": column " + quality);
+  }
+  if (const std::size_t rows = reader_.markers(); rows > 0) {
+    note(std::to_string(rows) + " rows of markers or sums left out");
+  }
 }
 
 // Merges rows of the same instant; a long table may be sorted by tag.
@@ -314,27 +308,17 @@ void TableReader::FindPeriod() {
     throw DataError(options().source +
                     ": one row does not tell the sample period; try --period");
   }
-  std::vector<double> steps;
-  for (std::size_t k = 1; k < rows_.size(); ++k) {
-    steps.push_back(rows_[k].t_s - rows_[k - 1].t_s);
+  std::vector<double> times_s;
+  for (const CsvRow& row : rows_) {
+    times_s.push_back(row.t_s);
   }
-  // Of two middle steps the shorter one: a gap must not become the period of a
-  // short table.
-  const auto middle =
-      steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  period_s_ = *middle;
+  period_s_ = MedianStep(times_s);
   if (IsSteady()) {
     return;
   }
   // Steady tables keep their exact step, however odd. Only steps with jitter
   // are taken for a blurred round period.
-  for (const double round : {0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0,
-                             10.0, 12.0, 15.0, 20.0, 30.0, 60.0, 120.0}) {
-    if (std::abs(period_s_ - round) < 0.05 * round) {
-      period_s_ = round;
-    }
-  }
+  period_s_ = UsualPeriod(period_s_);
 }
 
 // Whether every step is one period, or a gap where gaps are allowed.
@@ -550,6 +534,78 @@ void TableReader::Resample() {
   rows_ = std::move(grid);
 }
 
+// Numbers of a state ("246" for a failed transmitter) among readings.
+void TableReader::DropImpossible(const ColumnMapping& m) {
+  std::map<double, std::size_t> cells;
+  std::size_t count = 0;
+  for (CsvRow& row : rows_) {
+    Sample& sample = row.labelled.sample;
+    if (sample.Has(m.signal) &&
+        !PlausibleRange(m.signal).Contains(sample[m.signal])) {
+      const double value = sample[m.signal];
+      ++cells[((m.sense == Sense::kOpening ? 100.0 - value : value) -
+               m.offset) /
+              m.scale];
+      ++count;
+      Drop(m.signal, sample);
+    }
+  }
+  std::vector<std::string> usual;
+  for (const auto& [cell, times] : cells) {
+    if (usual.size() < 5) {
+      usual.push_back(NumberText(std::round(cell * 1e6) / 1e6));
+    }
+  }
+  table_.notes.push_back(
+      std::string(SignalName(m.signal)) + " = " + m.column + ": " +
+      std::to_string(count) + " cells beyond the range of the signal (" +
+      Listed(usual) + (cells.size() > usual.size() ? ",..." : "") +
+      ") taken as no reading");
+}
+
+// A signal counts as there by its readings: a header alone, or a column that is
+// bad throughout, gives nothing to diagnose.
+void TableReader::CheckReadings() {
+  std::array<std::size_t, kSignalCount> readings{};
+  std::size_t usable = 0;
+  for (const CsvRow& row : rows_) {
+    const Sample& sample = row.labelled.sample;
+    for (std::size_t i = 0; i < kSignalCount; ++i) {
+      readings[i] += sample.Has(static_cast<Signal>(i)) ? 1U : 0U;
+    }
+    usable += sample.Has(Signal::kCv) &&
+                      (sample.Has(Signal::kX) || sample.Has(Signal::kF))
+                  ? 1U
+                  : 0U;
+  }
+  const ColumnMap& map = options().map;
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    const bool needed =
+        ((options().required | MaskOf(Signal::kCv)) & MaskOf(signal)) != 0 &&
+        (table_.header.signals & MaskOf(signal)) != 0;
+    if (needed && readings[i] == 0) {
+      throw DataError(
+          options().source + ": no reading of " +
+          std::string(SignalName(signal)) + " in " +
+          std::to_string(rows_.size()) +
+          " rows: its cells are empty, words for no reading, or of bad quality"
+          "; try good under [quality] of --map, another column, or --signals "
+          "without it");
+    }
+    if (const std::size_t beyond = reader_.beyond(signal); beyond > 0) {
+      table_.notes.push_back(
+          std::string(SignalName(signal)) + ": " + std::to_string(beyond) +
+          " cells beyond `raw` (a broken wire?) taken as no reading");
+    }
+  }
+  if (usable < rows_.size() && !map.resampling && !map.long_table) {
+    table_.notes.push_back(std::to_string(usable) + " of " +
+                           std::to_string(rows_.size()) +
+                           " rows have CV and X or F");
+  }
+}
+
 // A signal that is impossible most of the time was probably converted wrongly.
 void TableReader::CheckValues() {
   for (std::size_t i = 0; i < kSignalCount; ++i) {
@@ -574,9 +630,11 @@ void TableReader::CheckValues() {
       }
     }
     const std::string name(SignalName(signal));
-    // Single impossible readings are left to the diagnosis, which refuses such
-    // samples. A mapped signal is refused, because the map states the
-    // conversion; others are only noted.
+    const auto mapping = std::ranges::find(options().map.columns, signal,
+                                           &ColumnMapping::signal);
+    const bool mapped = mapping != options().map.columns.end();
+    // A mapped signal is refused, because the map states the conversion; others
+    // are only noted, and left to the diagnosis, which refuses such samples.
     if (2 * beyond > count) {
       const std::string what =
           name + " is " + NumberText(first->labelled.sample[signal]) +
@@ -586,12 +644,12 @@ void TableReader::CheckValues() {
           " of the rows; try unit, scale "
           "and span under [signal." +
           name + "] of --map";
-      if (std::ranges::find(options().map.columns, signal,
-                            &ColumnMapping::signal) !=
-          options().map.columns.end()) {
+      if (mapped) {
         RefuseAt(first->line, what);
       }
       table_.notes.push_back(what);
+    } else if (mapped && beyond > 0) {
+      DropImpossible(*mapping);
     }
     if (signal == Signal::kX || signal == Signal::kP2) {
       CheckPair(signal);
@@ -631,6 +689,103 @@ void TableReader::CheckPair(Signal signal) {
   if (signal == Signal::kP2 && 2 * against > count) {
     table_.notes.push_back("P2 is above P1 in " + PercentText(against, count) +
                            " of the rows: are the columns exchanged?");
+  }
+}
+
+// What kind of valve and record this is, where the models are for another one.
+void TableReader::CheckMotion() {
+  constexpr std::size_t kEnough = 60;
+  const SignalMask signals = table_.header.signals;
+  const auto note = [this](std::string text) {
+    table_.notes.push_back(std::move(text));
+  };
+  std::size_t n = 0;
+  std::size_t shut = 0;
+  std::size_t open = 0;
+  std::size_t both = 0;
+  std::size_t same = 0;
+  std::size_t moves = 0;
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    const Sample& s = rows_[k].labelled.sample;
+    if (!s.Has(Signal::kCv)) {
+      continue;
+    }
+    ++n;
+    const double cv = s[Signal::kCv];
+    shut += cv > 98.0 ? 1U : 0U;
+    open += cv < 2.0 ? 1U : 0U;
+    both += s.Has(Signal::kX) ? 1U : 0U;
+    same += s.Has(Signal::kX) && std::abs(s[Signal::kX] - cv) < 5.1e-3 ? 1U
+                                                                       : 0U;
+    moves += k > 0 && rows_[k - 1].labelled.sample.Has(Signal::kCv) &&
+                     rows_[k - 1].labelled.sample[Signal::kCv] != cv
+                 ? 1U
+                 : 0U;
+  }
+  const std::size_t ends = shut + open;
+  if (n >= kEnough && 50 * ends >= 49 * n && 50 * std::min(shut, open) >= n) {
+    note("an open/shut valve: CV is 0 or 100 % in " + PercentText(ends, n) +
+         " of the rows. The models are for control valves, and onboarding "
+         "will not fit it; if CV is a limit switch, map the command of the "
+         "positioner as [signal.CV]");
+  }
+  if (both >= kEnough && 100 * same >= 99 * both && 10 * moves > n) {
+    note("X is a copy of CV in " + PercentText(same, both) +
+         " of the rows: it was not measured, and no fault shows in it. Map the "
+         "position transmitter as [signal.X], or leave [signal.X] out");
+  }
+  if ((signals & MaskOf(Signal::kX)) == 0) {
+    note("no position (X): CV and F show that something is wrong, not whether "
+         "it is the rod, the trim or the flow transmitter, and onboarding "
+         "needs X. Map the position transmitter as [signal.X] if there is one");
+  }
+  if ((signals & MaskOf(Signal::kF)) == 0) {
+    note("no flow (F): CV and X show what the rod does, not what the trim does "
+         "(blocked, worn, leaking). Map the flow as [signal.F] if there is one");
+  }
+  if (period_s_ >= 5.0 && !options().map.resampling) {
+    note("a slow record: one row in " + NumberText(period_s_) +
+         " s, the models want one per second. --resample 1s:linear fills in up "
+         "to 10 s; of a slower record only what stands still can be judged");
+  }
+  NoteSplitRange();
+}
+
+// In % of opening x = a + b u of the command u, where the rod is not at an end:
+// b is 2 if the valve has half of a range to itself. The rod lags, so the
+// strongest of four delays counts.
+void TableReader::NoteSplitRange() {
+  double strongest = 0.0;
+  double slope = 1.0;
+  double begin = 0.0;
+  for (std::size_t lag = 0; lag < 4; ++lag) {
+    CorrelationSums sums;
+    for (std::size_t k = lag; k < rows_.size(); ++k) {
+      const Sample& now = rows_[k].labelled.sample;
+      const Sample& then = rows_[k - lag].labelled.sample;
+      if (now.Has(Signal::kX) && then.Has(Signal::kCv) &&
+          now[Signal::kX] > 5.0 && now[Signal::kX] < 95.0) {
+        sums.Add(100.0 - then[Signal::kCv], 100.0 - now[Signal::kX]);
+      }
+    }
+    const double r = sums.Correlation();
+    if (sums.n >= 60.0 && r > std::max(strongest, 0.8)) {
+      strongest = r;
+      // Divided by r, because the lag flattens the line (total least squares of
+      // equal errors would do the same).
+      slope = std::sqrt((sums.n * sums.yy - sums.y * sums.y) /
+                        (sums.n * sums.xx - sums.x * sums.x));
+      begin = sums.x / sums.n - sums.y / sums.n / slope;
+    }
+  }
+  if (slope > 1.5 && slope < 3.0) {
+    const bool upper = begin > 25.0;
+    table_.split_range = upper ? std::pair(50.0, 100.0) : std::pair(0.0, 50.0);
+    table_.notes.push_back(
+        "X moves " + NumberText(std::round(10.0 * slope) / 10.0) +
+        " times as far as CV: one of two valves on a split range? raw = " +
+        (upper ? "[50, 100]" : "[0, 50]") +
+        " under [signal.CV] of --map says so");
   }
 }
 

@@ -55,6 +55,7 @@ constexpr UnitEntry kSignalUnits[] = {
     {"bar", Quantity::kPressure, {100.0, 0.0, kVolume}},
     {"MPa", Quantity::kPressure, {1000.0, 0.0, kVolume}},
     {"psi", Quantity::kPressure, {6.894757293168, 0.0, kVolume}},
+    {"hPa", Quantity::kPressure, {0.1, 0.0, kVolume}},
     {"kg/cm2", Quantity::kPressure, {98.0665, 0.0, kVolume}},
     {"degC", Quantity::kTemperature, {1.0, 0.0, kVolume}},
     {"degF", Quantity::kTemperature, {5.0 / 9.0, -160.0 / 9.0, kVolume}},
@@ -65,9 +66,14 @@ constexpr UnitEntry kSignalUnits[] = {
     {"l/s", Quantity::kFlow, {3.6, 0.0, kVolume}},
     {"l/h", Quantity::kFlow, {1e-3, 0.0, kVolume}},
     {"gpm", Quantity::kFlow, {0.22712470704, 0.0, kVolume}},  // US gallons
+    {"m3/min", Quantity::kFlow, {60.0, 0.0, kVolume}},
+    {"m3/d", Quantity::kFlow, {1.0 / 24.0, 0.0, kVolume}},
     {"t/h", Quantity::kFlow, {1.0, 0.0, kMass}},
     {"kg/h", Quantity::kFlow, {1e-3, 0.0, kMass}},
     {"kg/s", Quantity::kFlow, {3.6, 0.0, kMass}},
+    {"kg/min", Quantity::kFlow, {0.06, 0.0, kMass}},
+    {"t/d", Quantity::kFlow, {1.0 / 24.0, 0.0, kMass}},
+    {"lb/h", Quantity::kFlow, {0.45359237e-3, 0.0, kMass}},
     {"1", Quantity::kNumber, {1.0, 0.0, kVolume}},
 };
 
@@ -89,7 +95,11 @@ std::string Plain(std::string_view name) {
   if (SameName(plain, "c") || SameName(plain, "f")) {
     plain = "deg" + plain;
   }
-  return SameName(plain, "pct") ? "%" : plain;
+  for (const std::string_view percent :
+       {"pct", "percent", "prozent", "%open", "%opening", "%auf"}) {
+    plain = SameName(plain, percent) ? "%" : plain;
+  }
+  return plain;
 }
 
 void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
@@ -103,8 +113,12 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
                                : std::string(SignalUnit(signal)));
   const auto unit = FindUnit(signal, name == "mA" && percent ? "%" : name);
   if (!unit) {
-    table.Refuse("unit", "unknown unit '" + name + "'; accepted are" +
-                             UnitNames(signal));
+    table.Refuse("unit", (IsGasUnit(name) ? "'" + name + "' is a flow of gas, "
+                                            "and the physics is for water: "
+                                            "leave [signal.F] out, CV and X "
+                                            "still show what the rod does"
+                                          : "unknown unit '" + name + "'") +
+                             "; accepted are" + UnitNames(signal));
   }
   // raw and span are two points of a line, reading = offset + scale · cell:
   //
@@ -114,6 +128,7 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
   // `raw`. Other signals have to state both.
   std::vector<double> raw = table.Numbers("raw");
   std::vector<double> span = table.Numbers("span");
+  const bool counts = !raw.empty() || name == "mA";
   if (name == "mA" && raw.empty()) {
     raw = {4.0, 20.0};
   }
@@ -137,6 +152,20 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
   mapping.scale = unit->scale * scale;
   mapping.offset = unit->offset + unit->scale * offset;
   mapping.unit = name;
+  const bool command = signal == Signal::kCv || signal == Signal::kSp;
+  if (command && name != "mA" && raw.size() == 2 &&
+      std::max(raw[0], raw[1]) <= 100.0 && std::max(raw[0], raw[1]) > 25.0) {
+    mapping.clamped = true;  // Half of a split range, and the valve at its end.
+  } else if (command && raw.empty() && name == "%" && scale > 1.0) {
+    mapping.clamped = true;
+  } else if (counts && raw.size() == 2) {
+    // A card shows a broken wire or a short circuit by counts beyond its range:
+    // 3.6 and 21 mA, 32767. A tenth of the range is left to overrange.
+    const double margin = 0.1 * std::abs(raw[1] - raw[0]);
+    mapping.lowest = std::min(raw[0], raw[1]) - margin;
+    mapping.highest = std::max(raw[0], raw[1]) + margin;
+  }
+  mapping.quality = table.Text("quality").value_or("");
   if (flow) {
     map.flow_unit = unit->flow_unit;
   }
@@ -164,36 +193,50 @@ void ReadSignal(Signal signal, TomlReader table, ColumnMap& map) {
   map.columns.push_back(mapping);
 }
 
+struct TimeName {
+  std::string_view name;
+  TimeUnit unit;
+};
+constexpr TimeName kTimeNames[] = {
+    {"s", {TimeForm::kElapsed, 1.0}},     {"ms", {TimeForm::kElapsed, 1e-3}},
+    {"us", {TimeForm::kElapsed, 1e-6}},   {"ns", {TimeForm::kElapsed, 1e-9}},
+    {"min", {TimeForm::kElapsed, 60.0}},  {"h", {TimeForm::kElapsed, 3600.0}},
+    {"unix", {TimeForm::kUnix, 1.0}},     {"unix ms", {TimeForm::kUnix, 1e-3}},
+    {"unix us", {TimeForm::kUnix, 1e-6}}, {"unix ns", {TimeForm::kUnix, 1e-9}},
+    {"filetime", {TimeForm::kFileTime, 1e-7}},
+    {"serial", {TimeForm::kSerial, 1.0}}, {"text", {TimeForm::kText, 1.0}},
+    {"auto", {TimeForm::kFindOut, 1.0}}};
+
+DateOrder ParseDateOrder(const std::string& text) {
+  if (text != "d/m/y" && text != "m/d/y" && text != "y/m/d") {
+    throw ConfigError("date '" + text + "' is none of d/m/y, m/d/y, y/m/d");
+  }
+  return text == "d/m/y"   ? DateOrder::kDayFirst
+         : text == "m/d/y" ? DateOrder::kMonthFirst
+                           : DateOrder::kYearFirst;
+}
+
 void ReadTime(TomlReader table, ColumnMap& map) {
-  struct Form {
-    std::string_view name;
-    TimeForm form;
-    double scale;
-  };
-  static constexpr Form kForms[] = {
-      {"s", TimeForm::kElapsed, 1.0},     {"ms", TimeForm::kElapsed, 1e-3},
-      {"min", TimeForm::kElapsed, 60.0},  {"h", TimeForm::kElapsed, 3600.0},
-      {"unix", TimeForm::kUnix, 1.0},     {"unix ms", TimeForm::kUnix, 1e-3},
-      {"serial", TimeForm::kSerial, 1.0}, {"text", TimeForm::kText, 1.0},
-      {"auto", TimeForm::kFindOut, 1.0}};
   map.time_column = table.Text("column").value_or("");
   map.clock_column = table.Text("clock").value_or("");
   map.zone = table.Text("zone").value_or("");
   const std::string unit = table.Text("unit").value_or("auto");
-  const auto form = std::ranges::find(kForms, unit, &Form::name);
-  if (form == std::end(kForms)) {
-    table.Refuse("unit", "'" + unit +
-                             "' is none of s, ms, min, h, unix, unix ms, "
-                             "serial, text, auto");
-  }
-  map.time_form = form->form;
-  map.time_scale = form->scale;
-  if (const auto date = table.Text("date")) {
-    if (*date != "d/m/y" && *date != "m/d/y") {
-      table.Refuse("date", "'" + *date + "' is neither d/m/y nor m/d/y");
+  const auto form = std::ranges::find(kTimeNames, unit, &TimeName::name);
+  if (form == std::end(kTimeNames)) {
+    std::string names;
+    for (const TimeName& known : kTimeNames) {
+      names += (names.empty() ? "" : ", ") + std::string(known.name);
     }
-    map.date_order =
-        *date == "d/m/y" ? DateOrder::kDayFirst : DateOrder::kMonthFirst;
+    table.Refuse("unit", "'" + unit + "' is none of " + names);
+  }
+  map.time_form = form->unit.form;
+  map.time_scale = form->unit.scale;
+  if (const auto date = table.Text("date")) {
+    try {
+      map.date_order = ParseDateOrder(*date);
+    } catch (const ConfigError& error) {
+      table.Refuse("date", error.what());
+    }
   }
 }
 
@@ -216,7 +259,11 @@ char ReadSign(TomlReader& table, std::string_view key,
 void ReadFile(TomlReader table, ColumnMap& map) {
   map.separator = ReadSign(table, "separator", ",;|\t");
   map.decimal = ReadSign(table, "decimal", ".,");
+  map.thousands = ReadSign(table, "thousands", ".,");
   map.skip = static_cast<int>(table.Number("skip", 0.0, 1e6).value_or(0.0));
+  map.header_rows =
+      static_cast<int>(table.Number("header", 1.0, 20.0).value_or(0.0));
+  map.no_reading = table.Texts("missing");
   if (const auto resample = table.Text("resample")) {
     try {
       map.resampling = ParseResampling(*resample);
@@ -257,6 +304,44 @@ std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
     }
   }
   return found;
+}
+
+// The digits end before the first character that no number has; the blanks that
+// group thousands have several bytes, whose first ones others share.
+std::pair<std::string_view, std::string_view> SplitUnit(std::string_view cell) {
+  const std::size_t other = cell.find_first_not_of(
+      "+-0123456789.,' \xC2\xA0\xE2\x80\xAF");
+  const std::size_t last = cell.find_last_of("0123456789", other);
+  if (last == std::string_view::npos) {
+    return {{}, cell};
+  }
+  const std::string_view unit = cell.substr(last + 1);
+  return {cell.substr(0, last + 1),
+          unit.substr(std::min(unit.size(), unit.find_first_not_of(' ')))};
+}
+
+bool IsUnit(std::string_view name) {
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    if (FindUnit(static_cast<Signal>(i), name)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool IsGasUnit(std::string_view name) {
+  const std::string plain = PlainText(Plain(name));
+  constexpr std::string_view kUnits[] = {
+      "nm3/h", "nm3/min", "nm3/s", "nm3/d", "knm3/h", "sm3/h", "nl/min",
+      "nl/h",  "sl/min",  "slpm",  "scfm",  "scfh",   "mscfh", "mmscfd"};
+  return std::ranges::find(kUnits, plain) != std::end(kUnits);
+}
+
+std::string_view TimeUnitName(const TimeUnit& unit) {
+  const auto found = std::ranges::find_if(kTimeNames, [&](const auto& known) {
+    return known.unit.form == unit.form && known.unit.scale == unit.scale;
+  });
+  return found == std::end(kTimeNames) ? "auto" : found->name;
 }
 
 std::string UnitNames(Signal signal) {
@@ -312,7 +397,14 @@ ColumnMap ReadTagMap(const std::filesystem::path& path) {
     tall.tag = table->Text("tag").value_or(tall.tag);
     tall.value = table->Text("value").value_or(tall.value);
     tall.quality = table->Text("quality").value_or("");
-    tall.good = table->Texts("good");
+    map.quality.good = table->Texts("good");
+  }
+  if (auto table = file.Table("quality")) {
+    for (std::string& good : table->Texts("good")) {
+      map.quality.good.push_back(std::move(good));
+    }
+    map.quality.uncertain = table->Texts("uncertain");
+    map.quality.bad = table->Texts("bad");
   }
   // The keys of [signal] are data, so they are not known to the reader in
   // advance: each is checked here, and Table() marks it as known for Finish().
@@ -345,6 +437,19 @@ void TableOptions::AddTo(CLI::App& verb) {
                   "are held or interpolated for at most AGE (default: hold, "
                   "ten periods)")
       ->type_name("1s[:hold|linear[:AGE]]");
+  verb.add_option("--decimal", decimal,
+                  "Decimal sign of the file, where it does not show it")
+      ->check(CLI::IsMember({".", ","}))
+      ->type_name("SIGN");
+  verb.add_option("--date", date,
+                  "Order of dates with slashes: d/m/y, m/d/y, y/m/d")
+      ->check(CLI::IsMember({"d/m/y", "m/d/y", "y/m/d"}))
+      ->type_name("ORDER");
+  verb.add_option("--skip", skip,
+                  "Lines in front of the names of the columns (default: as "
+                  "found)")
+      ->check(CLI::Range(0, 1000000))
+      ->type_name("LINES");
 }
 
 // For the zone: the option, then the file, then UTC if `utc`. A zone in the
@@ -359,6 +464,14 @@ ColumnMap TableOptions::Read(bool utc) const {
   if (!resample.empty()) {
     columns.resampling = ParseResampling(resample);
   }
+  if (!decimal.empty()) {
+    columns.decimal = decimal.front();
+    columns.thousands = '\0';
+  }
+  if (!date.empty()) {
+    columns.date_order = ParseDateOrder(date);
+  }
+  columns.skip = skip > 0 ? skip : columns.skip;
   return columns;
 }
 

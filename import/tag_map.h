@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "import/csv.h"
 
@@ -39,16 +40,29 @@ struct UnitConversion {
 std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name);
 /// All units of a signal, for messages.
 std::string UnitNames(Signal signal);
+/// The number and the unit of "11.1 t/h", "-3 °C"; the unit may be empty.
+std::pair<std::string_view, std::string_view> SplitUnit(std::string_view cell);
+/// Whether `name` is a unit of some signal.
+bool IsUnit(std::string_view name);
+/// Whether `name` is a flow of gas at standard conditions: Nm3/h, scfm, ...
+bool IsGasUnit(std::string_view name);
 
-/// Options of every verb that reads tables: --map, --zone, --resample.
+/// The name of a unit of time in a map: "s", "unix ms", "filetime", "serial".
+std::string_view TimeUnitName(const TimeUnit& unit);
+
+/// Options of every verb that reads tables; each overrides the map.
 struct TableOptions {
   std::filesystem::path map;
   std::string zone;
   std::string resample;
+  std::string decimal;
+  std::string date;
+  int skip{0};
 
   void AddTo(CLI::App& verb);
   bool given() const {
-    return !map.empty() || !zone.empty() || !resample.empty();
+    return !map.empty() || !zone.empty() || !resample.empty() ||
+           !decimal.empty() || !date.empty() || skip > 0;
   }
   /// Reads the map, overridden by the other options.
   /// @param utc times without a zone are UTC.

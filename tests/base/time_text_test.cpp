@@ -33,6 +33,22 @@ TEST_F(TimeTextTest, UtcEndsInZAndLocalTimeInItsOffset) {
   EXPECT_EQ(FormatTime(kStampNs, false), "2026-11-20T15:56:11+01:00");
 }
 
+TEST_F(TimeTextTest, YearsOfTwoDigitsNeedPointsAMonthOrAnOrder) {
+  const auto date = [](const char* text, DateOrder order) {
+    const auto time = ScanTime(text, order);
+    return time ? std::to_string(time->fields.tm_year + 1900) + '-' +
+                      std::to_string(time->fields.tm_mon + 1) + '-' +
+                      std::to_string(time->fields.tm_mday)
+                : "none";
+  };
+  EXPECT_EQ(date("3/10/26 09:00:00", DateOrder::kMonthFirst), "2026-3-10");
+  EXPECT_EQ(date("3/10/26 09:00:00", DateOrder::kDayFirst), "2026-10-3");
+  EXPECT_EQ(date("26/3/10 09:00", DateOrder::kYearFirst), "2026-3-10");
+  EXPECT_EQ(date("10.03.99", DateOrder::kNotSaid), "1999-3-10");
+  EXPECT_EQ(date("10-Mar-26 09:00", DateOrder::kNotSaid), "2026-3-10");
+  EXPECT_EQ(date("3/10/26", DateOrder::kNotSaid), "none");
+}
+
 TEST_F(TimeTextTest, DecimalsAreAsManyAsTheStampNeeds) {
   EXPECT_EQ(FormatTime(kStampNs + 500'000'000, true),
             "2026-11-20T14:56:11.500Z");

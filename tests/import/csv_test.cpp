@@ -78,14 +78,19 @@ TEST(CsvTest, ColumnsAreFoundByNameInAnyOrderAndCase) {
 }
 
 TEST(CsvTest, NameAndSizeOfTheFirstCellTellTheFormOfTimes) {
-  EXPECT_EQ(TimeFormOf("t_s", 1.7e9), TimeForm::kElapsed);
-  EXPECT_EQ(TimeFormOf("Time", 46027.4), TimeForm::kSerial);
-  EXPECT_EQ(TimeFormOf("Time", 30000.0), TimeForm::kElapsed);
-  EXPECT_EQ(TimeFormOf("Time", 1.7e9), TimeForm::kUnix);
+  const auto form = [](const char* name, double first) {
+    return TimeUnitOf(name, first).form;
+  };
+  EXPECT_EQ(form("t_s", 1.7e9), TimeForm::kElapsed);
+  EXPECT_EQ(form("Time", 46027.4), TimeForm::kSerial);
+  EXPECT_EQ(form("Time", 30000.0), TimeForm::kElapsed);
+  EXPECT_EQ(form("Time", 1.7e9), TimeForm::kUnix);
   for (const char* name : {"time_s", "Time [s]", "Zeit (s)"}) {
-    EXPECT_EQ(TimeFormOf(name, 30000.5), TimeForm::kElapsed) << name;
-    EXPECT_EQ(TimeFormOf(name, 1.7e9), TimeForm::kUnix) << name;
+    EXPECT_EQ(form(name, 30000.5), TimeForm::kElapsed) << name;
+    EXPECT_EQ(form(name, 1.7e9), TimeForm::kUnix) << name;
   }
+  EXPECT_EQ(TimeUnitOf("Zeit [ms]", 250.0).scale, 1e-3);
+  EXPECT_EQ(TimeUnitOf("ts", 1.7e15).scale, 1e-6);
 }
 
 TEST(CsvTest, TruthNeedsAStrengthOtherThanZero) {
@@ -325,7 +330,9 @@ TEST(CsvTest, RunWithMissingReadingsIsReadBackBitForBit) {
 
 TEST(CsvTest, EmptyAndNanCellsOfASignalAreMissingReadings) {
   const SampleSeries run =
-      Read(std::string(kHeader) + "\n0,1,,3,4,5,6\n1,1,NaN,3,4,5,6").runs.at(0);
+      Read(std::string(kHeader) +
+           "\n0,1,,3,4,5,6\n1,1,NaN,3,4,5,6\n2,1,2,3,4,5,6")
+          .runs.at(0);
 
   EXPECT_FALSE(run.samples[0].sample.Has(Signal::kP1));
   EXPECT_FALSE(run.samples[1].sample.Has(Signal::kP1));
@@ -380,7 +387,7 @@ TEST(CsvTest, WhatIsSkippedTellsNothingAboutTheDecimalSign) {
 // Of a long table in UTF-16, with an hour that clocks show twice.
 TEST(CsvTest, TagsOfALongTableAreResampledAndWhatIsFilledIsMarked) {
   CsvOptions options;
-  options.map.long_table = LongTable{"Tag", "Wert", "Q", {}};
+  options.map.long_table = LongTable{"Tag", "Wert", "Q"};
   options.map.time_column = "Zeit";
   options.map.zone = "Europe/Warsaw";
   options.map.columns = {{"CV", Signal::kCv, 1.0, 0.0, Sense::kOpening, "%"},

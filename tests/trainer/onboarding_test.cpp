@@ -153,6 +153,17 @@ TEST(RecordChecksTest, WrongUnitsAndSensesAreToldApart) {
     EXPECT_NE(refusal.find(words), std::string::npos) << refusal;
   };
   EXPECT_EQ(Refusal([](Sample&) {}), "");
+  refused([](Sample& s) { s.Set(kX, s[kCv]); }, "X is a copy of CV");
+  refused(
+      [](Sample& s) {
+        s.Set(kCv, s.stamp_ns / 60'000'000'000 % 2 == 0 ? 100.0 : 0.0);
+      },
+      "this is an open/shut valve");
+  refused(
+      [](Sample& s) {
+        s.present = static_cast<SignalMask>(s.present & ~MaskOf(kX));
+      },
+      "there is no position (X)");
   refused([](Sample& s) { Scale(s, kCv, 0.01); }, "CV is 0.");
   refused([](Sample& s) { Scale(s, kX, 0.01); }, "scale = 100");
   refused(

@@ -128,6 +128,40 @@ void CheckSense(const Readings& cv, const Readings& x, const Readings& f) {
   }
 }
 
+// Records that no unit makes right: not of a control valve, or not measured.
+void CheckKind(const std::vector<TrainingRun>& runs, const Readings& cv,
+               const Readings& x) {
+  if (!x.measured()) {
+    throw DataError(
+        "there is no position (X), which onboarding needs to tell the rod from "
+        "the trim: map the position transmitter as [signal.X]");
+  }
+  const auto at_end = [](double value) { return value < 2.0 || value > 98.0; };
+  const auto ends = std::ranges::count_if(cv.values, at_end);
+  if (50 * ends > 49 * std::ssize(cv.values) && cv.low < 2.0 &&
+      cv.high > 98.0) {
+    throw DataError(
+        "CV is 0 or 100 % throughout: this is an open/shut valve, and the "
+        "models are for control valves. If CV is a limit switch, map the "
+        "command of the positioner as [signal.CV]");
+  }
+  std::size_t same = 0;
+  for (const TrainingRun& run : runs) {
+    for (const LabelledSample& labelled : run.samples) {
+      const Sample& s = labelled.sample;
+      same += s.Has(Signal::kCv) && s.Has(Signal::kX) &&
+                      s[Signal::kCv] == s[Signal::kX]
+                  ? 1U
+                  : 0U;
+    }
+  }
+  if (cv.deviation > kMinVariation && 100 * same > 99 * x.values.size()) {
+    throw DataError(
+        "X is a copy of CV: it was not measured, and no fault shows in it. Map "
+        "the position transmitter as [signal.X]");
+  }
+}
+
 }  // namespace
 
 void CheckRecords(const std::vector<TrainingRun>& runs) {
@@ -135,6 +169,7 @@ void CheckRecords(const std::vector<TrainingRun>& runs) {
   const Readings x = ReadingsOf(runs, Signal::kX);
   CheckShare(cv);
   CheckShare(x);
+  CheckKind(runs, cv, x);
   CheckPressures(ReadingsOf(runs, Signal::kP1), ReadingsOf(runs, Signal::kP2),
                  ReadingsOf(runs, Signal::kT1));
   CheckSense(cv, x, ReadingsOf(runs, Signal::kF));

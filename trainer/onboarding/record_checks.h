@@ -9,7 +9,8 @@ namespace fdi::trainer {
 
 /// Refuses records whose numbers cannot be those of a valve in the units and
 /// the sense that the project uses (diagnosis/sample.h): CV and X in shares of
-/// one, P1 in bar, T1 in K, P1 below P2, X or F that move against the command.
+/// one, P1 in bar, T1 in K, P1 below P2, X or F that move against the command;
+/// and records without X, with a copy of CV in X, or of an open/shut valve.
 /// @throws DataError with what was seen, what is expected and what to try.
 void CheckRecords(const std::vector<TrainingRun>& runs);
 

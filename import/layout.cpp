@@ -1,0 +1,740 @@
+#include "import/layout.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "base/error.h"
+#include "import/tag_map.h"
+
+namespace fdi::importer {
+namespace {
+
+using Cells = std::vector<std::string>;
+
+/// Rows that the form of a table is found from; signs and words come from all.
+constexpr std::size_t kSampleRows = 200;
+/// Different cells that are counted in a column of words.
+constexpr std::size_t kMaxWords = 500;
+/// Share of the rows that decides.
+constexpr double kMost = 0.9;
+
+struct Record {
+  std::size_t line{0};  ///< Of its first line, from 1.
+  Cells cells;
+};
+
+/// What a column of the sample holds.
+struct Column {
+  std::size_t full{0};
+  std::size_t numbers{0};  ///< Also with a unit.
+  std::size_t dates{0};    ///< Text with a date.
+  std::size_t clocks{0};   ///< "14:56:11" alone.
+  std::vector<double> values;
+  std::map<std::string, std::size_t> words;  ///< In all rows.
+
+  bool Mostly(std::size_t count) const {
+    return full > 0 && static_cast<double>(count) >=
+                           kMost * static_cast<double>(full);
+  }
+};
+
+std::optional<CivilTime> AnyTime(std::string_view cell) {
+  for (const DateOrder order :
+       {DateOrder::kNotSaid, DateOrder::kDayFirst, DateOrder::kMonthFirst,
+        DateOrder::kYearFirst}) {
+    if (auto time = ScanTime(cell, order)) {
+      return time;
+    }
+  }
+  return std::nullopt;
+}
+
+bool IsClock(std::string_view cell) {
+  return cell.find(':') != std::string_view::npos && !cell.empty() &&
+         std::isdigit(static_cast<unsigned char>(cell.front())) != 0 &&
+         ScanTime("2000-01-01 " + std::string(cell)).has_value();
+}
+
+// Before the decimal sign is known: with either sign, and with a unit behind.
+std::optional<double> AnyNumber(std::string_view cell) {
+  for (const char decimal : {'.', ','}) {
+    if (const auto value = ParseNumber(cell, decimal)) {
+      return value;
+    }
+  }
+  const auto [number, unit] = SplitUnit(cell);
+  if (number.empty() || (!unit.empty() && !IsUnit(unit))) {
+    return std::nullopt;
+  }
+  for (const char decimal : {'.', ','}) {
+    const std::string plain =
+        Ungrouped(number, decimal == '.' ? ',' : '.').value_or(
+            std::string(number));
+    if (const auto value = ParseNumber(plain, decimal)) {
+      return value;
+    }
+  }
+  return std::nullopt;
+}
+
+bool IsValue(std::string_view cell) {
+  return AnyNumber(cell).has_value() || AnyTime(cell).has_value() ||
+         IsClock(cell);
+}
+
+bool IsUnitCell(std::string_view cell) {
+  return cell == "-" || cell == "[-]" || IsUnit(cell) || IsGasUnit(cell);
+}
+
+// Reads records from a line on; comments (#) and blank lines do not count.
+template <typename Take>
+void ForEachRecord(std::span<const std::string_view> lines, std::size_t begin,
+                   char separator, const Take& take) {
+  CsvCells reader(separator);
+  std::size_t first = begin;
+  for (std::size_t i = begin; i < lines.size(); ++i) {
+    if (!reader.open()) {
+      first = i;
+      if (lines[i].starts_with('#') || lines[i].starts_with("sep=")) {
+        continue;
+      }
+    }
+    if (reader.TakeLine(lines[i]) && !reader.blank() &&
+        !take(first + 1, reader.cells())) {
+      return;
+    }
+  }
+}
+
+class LayoutFinder {
+ public:
+  LayoutFinder(std::span<const std::string_view> lines, ColumnMap map,
+               const std::string& source, bool choose)
+      : lines_(lines), source_(source), choose_(choose) {
+    layout_.map = std::move(map);
+  }
+
+  Layout Find() {
+    FindSeparatorSign();
+    data_line_ = static_cast<std::size_t>(map().skip) + 1;
+    const bool has_rows = FindHeader();
+    FindDecimal();
+    if (!has_rows) {
+      return std::move(layout_);
+    }
+    FindTimeColumn();
+    CountWords();
+    FindTags();
+    FindQualities();
+    FindDateOrder();
+    FindDirection();
+    return std::move(layout_);
+  }
+
+ private:
+  ColumnMap& map() { return layout_.map; }
+  const std::string& Name(std::size_t c) const { return layout_.names[c]; }
+  std::optional<std::size_t> At(const std::string& name) const {
+    for (std::size_t c = 0; c < layout_.names.size(); ++c) {
+      if (!name.empty() && SameName(layout_.names[c], name)) {
+        return c;
+      }
+    }
+    return std::nullopt;
+  }
+  bool IsNamed(const Cells& cells) const;
+  void FindSeparatorSign();
+  bool FindHeader();
+  void FindTimeColumn();
+  void CountWords();
+  void FindDecimal();
+  void FindTags();
+  void FindQualities();
+  void FindDateOrder();
+  void FindDirection();
+  template <typename Take>
+  void ForEachRow(const Take& take) const {
+    ForEachRecord(lines_, data_line_ - 1, layout_.map.separator,
+                  [&](std::size_t line, const Cells& cells) {
+                    if (cells.size() == columns_.size()) {
+                      take(line, cells);
+                    }
+                    return true;
+                  });
+  }
+
+  std::span<const std::string_view> lines_;
+  const std::string& source_;
+  bool choose_;
+  Layout layout_;
+  std::vector<Record> rows_;  // Of the sample, without the header.
+  std::vector<Column> columns_;
+  std::size_t data_line_{1};
+  std::optional<std::size_t> time_;
+  std::optional<std::size_t> clock_;
+};
+
+void LayoutFinder::FindSeparatorSign() {
+  std::vector<std::string_view> first;
+  for (std::size_t i = static_cast<std::size_t>(map().skip);
+       i < lines_.size() && first.size() < 50; ++i) {
+    if (lines_[i].starts_with("sep=") && first.empty()) {
+      map().separator = lines_[i].size() > 4 ? lines_[i][4] : ',';
+    } else if (!lines_[i].starts_with('#') &&
+               lines_[i].find_first_not_of(" \t\r") != std::string_view::npos) {
+      first.push_back(lines_[i]);
+    }
+  }
+  if (map().separator == '\0') {
+    map().separator = FindSeparator(first);
+  }
+}
+
+// Whether a row has names that the map or the contract knows.
+bool LayoutFinder::IsNamed(const Cells& cells) const {
+  const ColumnMap& map = layout_.map;
+  const auto has = [&](std::string_view name) {
+    return !name.empty() && std::ranges::any_of(cells, [&](const auto& cell) {
+      return SameName(cell, name);
+    });
+  };
+  return has(map.time_column) || has(kTimeColumn) || has("CV_pct") ||
+         (map.long_table && has(map.long_table->value)) ||
+         std::ranges::any_of(map.columns, [&](const ColumnMapping& m) {
+           return !map.long_table && has(m.column);
+         });
+}
+
+// The header ends where the values begin: in the columns that hold numbers and
+// times in most rows, a row of the header holds something else. Its first row
+// with names that are not units counts; titles and comments in front have fewer
+// cells.
+bool LayoutFinder::FindHeader() {
+  std::vector<Record> records;
+  std::map<std::size_t, std::size_t> widths;
+  ForEachRecord(lines_, static_cast<std::size_t>(map().skip), map().separator,
+                [&](std::size_t line, const Cells& cells) {
+                  records.push_back({line, cells});
+                  ++widths[cells.size()];
+                  return records.size() < kSampleRows;
+                });
+  if (records.size() < 2) {
+    return false;
+  }
+  const std::size_t width =
+      std::ranges::max_element(widths, {}, [](const auto& entry) {
+        return entry.second;
+      })->first;
+  std::vector<std::size_t> values(width);
+  std::size_t rows = 0;
+  for (const Record& record : records) {
+    for (std::size_t c = 0; c < width && record.cells.size() == width; ++c) {
+      values[c] += IsValue(record.cells[c]) ? 1U : 0U;
+    }
+    rows += record.cells.size() == width ? 1U : 0U;
+  }
+  const auto is_data = [&](const Record& record) {
+    std::size_t full = 0;
+    std::size_t fits = 0;
+    for (std::size_t c = 0; c < width && record.cells.size() == width; ++c) {
+      if (2 * values[c] > rows && !record.cells[c].empty()) {
+        ++full;
+        fits += IsValue(record.cells[c]) || IsNoReading(record.cells[c]) ? 1U
+                                                                         : 0U;
+      }
+    }
+    return full > 0 && 2 * fits > full;
+  };
+  auto data = std::ranges::find_if(records, is_data);
+  auto names = std::ranges::find_if(
+      records, [&](const Record& record) { return IsNamed(record.cells); });
+  if (names == records.end() && map().skip > 0) {
+    names = records.begin();
+  }
+  if (names != records.end() && data <= names) {
+    data = std::find_if(names + 1, records.end(), is_data);
+  }
+  if (data == records.end()) {
+    return false;  // The reader says what is missing.
+  }
+  const auto is_header = [&](const Record& record) {
+    const auto full = static_cast<std::size_t>(std::ranges::count_if(
+        record.cells, [](const auto& cell) { return !cell.empty(); }));
+    const auto units = static_cast<std::size_t>(
+        std::ranges::count_if(record.cells, IsUnitCell));
+    return 2 * full >= width && record.cells.size() <= width &&
+           2 * units < full;
+  };
+  if (names == records.end()) {
+    names = std::find_if(records.begin(), data, is_header);
+    if (names == data) {
+      throw DataError(source_ + ":" + std::to_string(data->line) +
+                      ": the first row holds values, not names: a header is "
+                      "missing; try to put one line of names in front of it, "
+                      "such as time,tag,value, or names of your own and --map");
+    }
+  }
+  if (map().skip == 0) {
+    map().skip = static_cast<int>(names->line) - 1;
+  }
+  if (map().header_rows > 0) {
+    data = names + std::min<std::ptrdiff_t>(map().header_rows,
+                                            records.end() - names);
+  }
+  map().header_rows = static_cast<int>(data - names);
+  Cells cells = names->cells;
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    layout_.names.push_back(UnnamedAs(cells[c], c));
+  }
+  layout_.about.resize(cells.size());
+  for (auto row = records.begin(); row != data; ++row) {
+    for (std::size_t c = 0;
+         row != names && c < cells.size() && row->cells.size() == cells.size();
+         ++c) {
+      layout_.about[c] += '\n' + row->cells[c];
+    }
+  }
+  columns_.resize(cells.size());
+  if (data == records.end()) {
+    return false;
+  }
+  data_line_ = data->line;
+  for (auto row = data; row != records.end(); ++row) {
+    if (row->cells.size() != columns_.size()) {
+      continue;
+    }
+    for (std::size_t c = 0; c < columns_.size(); ++c) {
+      const std::string& cell = row->cells[c];
+      Column& column = columns_[c];
+      if (cell.empty() || IsNoReading(cell, map().no_reading)) {
+        continue;
+      }
+      ++column.full;
+      column.dates += AnyTime(cell) ? 1U : 0U;
+      column.clocks += IsClock(cell) ? 1U : 0U;
+      if (const auto value = AnyNumber(cell)) {
+        ++column.numbers;
+        column.values.push_back(*value);
+      }
+    }
+    rows_.push_back(std::move(*row));
+  }
+  return true;
+}
+
+// Text with a date comes before numbers of a size that only times have, those
+// before numbers under a name that says so or that grow by equal steps. Of equal
+// ones, what varies and has such a name, then the first.
+void LayoutFinder::FindTimeColumn() {
+  constexpr std::string_view kWords =
+      "time|zeit|date|datum|stamp|fecha|hora|heure|czas|data|epoch|t_s";
+  time_ = At(map().time_column);
+  if (!time_ && map().time_column.empty()) {
+    time_ = At(std::string(kTimeColumn));
+  }
+  int best = 0;
+  for (std::size_t c = 0; c < columns_.size() && !time_; ++c) {
+    const Column& column = columns_[c];
+    const std::string name = PlainText(Name(c));
+    const bool named = HasWord(name, kWords) || name == "t" || name == "ts";
+    const auto differs = [&](const Record& row) {
+      return row.cells[c] != rows_.front().cells[c];
+    };
+    const int varies = std::ranges::any_of(rows_, differs) ? 2 : 0;
+    int score = 0;
+    if (column.Mostly(column.dates)) {
+      score = 40;
+    } else if (column.Mostly(column.numbers) && !column.values.empty()) {
+      const TimeForm form = TimeUnitOf(Name(c), column.values.front()).form;
+      const auto backwards = static_cast<std::size_t>(std::ranges::count_if(
+          column.values, [last = column.values.front()](double t) mutable {
+            return std::exchange(last, t) > t;
+          }));
+      const bool grows =
+          column.values.size() > 1 &&
+          (backwards == 0 || backwards + 1 == column.values.size());
+      score = form == TimeForm::kUnix || form == TimeForm::kFileTime ? 30
+              : named                                               ? 20
+              : grows && c == 0 &&
+                      std::adjacent_find(column.values.begin(),
+                                         column.values.end()) ==
+                          column.values.end()
+                  ? 10
+                  : 0;
+      score = varies > 0 || named ? score : 0;
+    }
+    score += score > 0 ? varies + (named ? 1 : 0) : 0;
+    if (score > best) {
+      best = score;
+      map().time_column = Name(c);
+    }
+  }
+  time_ = time_ ? time_ : At(map().time_column);
+  clock_ = At(map().clock_column);
+  if (!time_ || clock_ || !map().clock_column.empty() || rows_.empty() ||
+      rows_.front().cells[*time_].find(':') != std::string::npos ||
+      !columns_[*time_].Mostly(columns_[*time_].dates)) {
+    return;
+  }
+  for (std::size_t c = 0; c < columns_.size() && !clock_; ++c) {
+    if (columns_[c].Mostly(columns_[c].clocks)) {
+      clock_ = c;
+      map().clock_column = Name(c);
+    }
+  }
+}
+
+// Different cells of the columns that may hold tags or qualities.
+void LayoutFinder::CountWords() {
+  std::vector<std::size_t> counted;
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    const Column& column = columns_[c];
+    const bool words =
+        !column.Mostly(column.numbers) && !SameName(Name(c), kModeColumn) &&
+        !SameName(Name(c), kFaultColumn);
+    if (c != time_ && c != clock_ &&
+        (words || IsQualityColumn(Name(c), {{"0", 1}}))) {
+      counted.push_back(c);
+    }
+  }
+  if (counted.empty()) {
+    return;
+  }
+  ForEachRow([&](std::size_t, const Cells& cells) {
+    for (const std::size_t c : counted) {
+      auto& words = columns_[c].words;
+      if (words.size() < kMaxWords || words.contains(cells[c])) {
+        ++words[cells[c]];
+      }
+    }
+  });
+}
+
+// A table is long if one column has few distinct names, each at many times,
+// beside one of values. A map by hand names tags that are in no header.
+void LayoutFinder::FindTags() {
+  if (map().long_table || !time_) {
+    return;
+  }
+  std::optional<std::size_t> tag;
+  std::size_t most = 0;
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    const auto& words = columns_[c].words;
+    const bool mapped =
+        std::ranges::any_of(map().columns, [&](const ColumnMapping& m) {
+          return !At(m.column) &&
+                 std::ranges::any_of(words, [&](const auto& word) {
+                   return SameName(word.first, m.column);
+                 });
+        });
+    std::size_t rows = 0;
+    for (const auto& [word, count] : words) {
+      rows += count;
+    }
+    const bool names =
+        choose_ && map().columns.empty() && !words.empty() &&
+        words.size() < kMaxWords && words.size() * 10 < rows &&
+        !words.contains("") && !IsQualityColumn(Name(c), words) &&
+        std::ranges::none_of(words,
+                             [](const auto& w) { return IsValue(w.first); });
+    if ((mapped || names) && words.size() > std::max<std::size_t>(most, 1)) {
+      tag = c;
+      most = words.size();
+    }
+  }
+  if (!tag) {
+    return;
+  }
+  std::optional<std::size_t> value;
+  int best = 0;
+  int candidates = 0;
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    const Column& column = columns_[c];
+    if (c == time_ || c == tag || c == clock_ ||
+        !column.Mostly(column.numbers) || column.values.empty() ||
+        IsQualityColumn(Name(c), column.words)) {
+      continue;
+    }
+    const bool named = HasWord(PlainText(Name(c)),
+                               "value|wert|valor|valeur|wartosc|reading|data");
+    const bool varies = std::ranges::any_of(column.values, [&](double v) {
+      return v != column.values.front();
+    });
+    const bool timed = HasWord(PlainText(Name(c)), "time|zeit|stamp|id") ||
+                       TimeUnitOf(Name(c), column.values.front()).form !=
+                           TimeForm::kElapsed;
+    candidates += varies && !timed ? 1 : 0;
+    if (const int score = 1 + (named ? 4 : 0) + (varies && !timed ? 2 : 0);
+        score > best) {
+      best = score;
+      value = c;
+    }
+  }
+  // Beside several columns of values, words are states, not tags.
+  if (value && (candidates == 1 || best >= 5)) {
+    map().long_table = LongTable{Name(*tag), Name(*value), ""};
+  }
+}
+
+// In a wide table a column of quality is that of the columns between it and the
+// one before: of each value beside it, or of all values at the end of the row.
+void LayoutFinder::FindQualities() {
+  std::vector<std::string> values;
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    auto& words = columns_[c].words;
+    const bool stated =
+        map().long_table
+            ? SameName(map().long_table->quality, Name(c))
+            : std::ranges::any_of(map().columns, [&](const auto& m) {
+                return SameName(m.quality, Name(c));
+              });
+    const bool tag = map().long_table && (Name(c) == map().long_table->tag ||
+                                          Name(c) == map().long_table->value);
+    if (c == time_ || c == clock_ || tag) {
+      continue;
+    }
+    // Beside values, numbers under "Status" may as well be a state of the
+    // plant.
+    const bool numbers = columns_[c].Mostly(columns_[c].numbers);
+    const bool state =
+        !map().long_table && numbers &&
+        (HasWord(PlainText(Name(c)), "status") ||
+         QualityCodeOf(Name(c), words) == QualityCode::kUnknown);
+    if (!stated &&
+        (words.empty() || state || !IsQualityColumn(Name(c), words))) {
+      values.push_back(Name(c));
+      continue;
+    }
+    if (words.empty()) {
+      ForEachRow(
+          [&](std::size_t, const Cells& cells) { ++words[cells[c]]; });
+    }
+    QualityCode code = QualityCodeOf(Name(c), words);
+    map().quality_codes[Name(c)] = code;
+    if (map().long_table) {
+      if (map().long_table->quality.empty()) {
+        map().long_table->quality = Name(c);
+      }
+    } else {
+      for (const std::string& name : values) {
+        map().quality_of[name] = Name(c);
+      }
+    }
+    values.clear();
+    // Numbers that two systems read differently: most readings of a plant are
+    // good.
+    if (choose_ && code == QualityCode::kUnknown && map().quality.good.empty()) {
+      const auto usual = std::ranges::max_element(
+          words, {}, [](const auto& word) { return word.second; });
+      if (usual != words.end() && !usual->first.empty() &&
+          !QualityOf(usual->first, {}, code)) {
+        map().quality.good = {usual->first};
+        layout_.choices["good"] =
+            Quoted(usual->first) + " of column " + Name(c) +
+            " is the most usual; the numbers may also mean the opposite";
+      }
+    }
+  }
+}
+
+// The decimal sign and what groups thousands. Every cell is evidence (Digits):
+// "12.34" shows a decimal sign, "1.234" may be a decimal or a thousand, and in
+// "1.234,5" the last sign is the decimal one. Contradictions are refused, and so
+// is a table of ambiguous cells only, unless commas separate them and all signs
+// are points, or something else does and all are commas: a wrong guess would be
+// off by a factor of 1000.
+void LayoutFinder::FindDecimal() {
+  if (map().decimal != '\0') {
+    return;
+  }
+  struct Seen {
+    std::string cell;
+    std::size_t line{0};
+  };
+  std::map<char, Seen> decimal;
+  std::map<char, Seen> either;
+  std::map<char, Seen> grouped;  // By the sign of decimals: "1.234,5" by ','.
+  const auto refuse = [&](const Seen& seen, const std::string& reason) {
+    throw DataError(source_ + ":" + std::to_string(seen.line) + ": " +
+                    Quoted(seen.cell) + reason +
+                    "; try decimal = \".\" or decimal = \",\" under [file] "
+                    "of --map, or --decimal");
+  };
+  ForEachRecord(
+      lines_, data_line_ - 1, map().separator,
+      [&](std::size_t line, const Cells& cells) {
+        for (const std::string& whole : cells) {
+          const bool has_unit =
+              !whole.empty() &&
+              std::isdigit(static_cast<unsigned char>(whole.back())) == 0 &&
+              IsUnit(SplitUnit(whole).second);
+          const std::string cell(has_unit ? SplitUnit(whole).first : whole);
+          char sign = '.';
+          switch (DigitsOf(cell, sign)) {
+            case Digits::kDecimal:
+              decimal.try_emplace(sign, Seen{cell, line});
+              break;
+            case Digits::kEither:
+              either.try_emplace(sign, Seen{cell, line});
+              break;
+            case Digits::kThousands:
+              grouped.try_emplace(sign == '.' ? ',' : '.', Seen{cell, line});
+              break;
+            case Digits::kNone:
+              break;
+          }
+        }
+        return true;
+      });
+  if (decimal.size() == 2 || grouped.size() == 2) {
+    auto& both = decimal.size() == 2 ? decimal : grouped;
+    refuse(both['.'].line < both[','].line ? both[','] : both['.'],
+           " and cells above differ in the sign of decimals; expected "
+           "one of point and comma throughout");
+  }
+  if (!grouped.empty()) {
+    const auto& [sign, seen] = *grouped.begin();
+    if (!decimal.empty() && !decimal.contains(sign)) {
+      refuse(seen, " has thousands separators, and " +
+                       Quoted(decimal.begin()->second.cell) + " in line " +
+                       std::to_string(decimal.begin()->second.line) +
+                       " the same sign for decimals");
+    }
+    map().decimal = sign;
+    map().thousands = sign == '.' ? ',' : '.';
+    return;
+  }
+  if (decimal.empty() && either.size() == 1 && either.contains('.') &&
+      map().separator != ',') {
+    if (!choose_) {
+      refuse(either.begin()->second,
+             " and all other cells may have decimals or thousands; expected "
+             "to know which");
+    }
+    layout_.choices["decimal"] =
+        "every number may have three decimals or thousands";
+  }
+  const bool comma =
+      decimal.empty() && !either.empty() && map().separator != ',' &&
+      !either.contains('.');
+  if (decimal.empty() && either.contains(',') && map().separator == ',') {
+    refuse(either[','],
+           " and all other cells may have decimals or thousands; expected to "
+           "know which");
+  }
+  const char sign = !decimal.empty() ? decimal.begin()->first
+                    : comma          ? ','
+                                     : '.';
+  const char other = sign == '.' ? ',' : '.';
+  if (either.contains(other)) {
+    refuse(either[other], " seems to have a thousands separator");
+  }
+  map().decimal = sign;
+}
+
+// Of dates with slashes or short years: the order in which all of them are
+// dates; else the one with fewer days from the first to the last. In America
+// slashes come without zeros, with AM and PM, or with gallons.
+void LayoutFinder::FindDateOrder() {
+  if (!time_ || map().date_order != DateOrder::kNotSaid || rows_.empty() ||
+      !columns_[*time_].Mostly(columns_[*time_].dates) ||
+      ScanTime(rows_.front().cells[*time_])) {
+    return;
+  }
+  constexpr DateOrder kOrders[] = {DateOrder::kDayFirst, DateOrder::kMonthFirst,
+                                   DateOrder::kYearFirst};
+  struct Fit {
+    std::size_t read{0};
+    std::time_t last{0};
+    double walked_s{0.0};
+  };
+  Fit fits[3];
+  std::size_t rows = 0;
+  bool american = false;
+  ForEachRow([&](std::size_t, const Cells& cells) {
+    const std::string& cell = cells[*time_];
+    if (cell.empty() ||
+        std::isdigit(static_cast<unsigned char>(cell.front())) == 0) {
+      return;
+    }
+    ++rows;
+    american = american || HasWord(PlainText(cell), "am|pm") ||
+               (cell.size() > 1 && cell[1] == '/');
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (const auto time = ScanTime(cell, kOrders[i])) {
+        std::tm fields = time->fields;
+        const std::time_t at = timegm(&fields);
+        fits[i].walked_s +=
+            fits[i].read > 0 ? std::abs(std::difftime(at, fits[i].last)) : 0.0;
+        fits[i].last = at;
+        ++fits[i].read;
+      }
+    }
+  });
+  for (const std::string& name : layout_.names) {
+    american = american || HasWord(PlainText(name), "gpm|psi|degf");
+  }
+  const auto most = [&](std::size_t i) {
+    return static_cast<double>(fits[i].read) >=
+           0.99 * static_cast<double>(rows);
+  };
+  const bool day = most(0);
+  const bool month = most(1);
+  if (day != month) {
+    map().date_order = day ? DateOrder::kDayFirst : DateOrder::kMonthFirst;
+  } else if (!day) {
+    map().date_order = most(2) ? DateOrder::kYearFirst : DateOrder::kNotSaid;
+  } else if (fits[0].walked_s > 10.0 * fits[1].walked_s) {
+    map().date_order = DateOrder::kMonthFirst;
+  } else if (fits[1].walked_s > 10.0 * fits[0].walked_s) {
+    map().date_order = DateOrder::kDayFirst;
+  } else if (choose_) {
+    map().date_order =
+        american ? DateOrder::kMonthFirst : DateOrder::kDayFirst;
+    layout_.choices["date"] =
+        "no day is above 12, so day and month may be exchanged";
+  }
+}
+
+// Of a table of tags, few steps lead from one tag to the next.
+void LayoutFinder::FindDirection() {
+  if (!time_) {
+    return;
+  }
+  std::optional<double> last;
+  std::size_t forwards = 0;
+  std::size_t backwards = 0;
+  for (const Record& row : rows_) {
+    std::string cell = row.cells[*time_];
+    cell += clock_ ? ' ' + row.cells[*clock_] : "";
+    auto at = AnyNumber(cell);
+    if (const auto time = ScanTime(cell, map().date_order)) {
+      std::tm fields = time->fields;
+      at = static_cast<double>(timegm(&fields)) +
+           1e-9 * static_cast<double>(time->fraction_ns);
+    }
+    if (at && last) {
+      forwards += *at > *last ? 1U : 0U;
+      backwards += *at < *last ? 1U : 0U;
+    }
+    last = at ? at : last;
+  }
+  map().newest_first = backwards > 2 && static_cast<double>(backwards) >=
+                                            kMost * static_cast<double>(
+                                                        backwards + forwards);
+}
+
+}  // namespace
+
+std::string UnnamedAs(const std::string& cell, std::size_t index) {
+  return cell.empty() ? "column " + std::to_string(index + 1) : cell;
+}
+
+Layout FindLayout(std::span<const std::string_view> lines, ColumnMap map,
+                  const std::string& source, bool choose) {
+  return LayoutFinder(lines, std::move(map), source, choose).Find();
+}
+
+}  // namespace fdi::importer

@@ -1,0 +1,199 @@
+#include "import/quality.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+
+#include "base/csv_cells.h"
+
+namespace fdi::importer {
+namespace {
+
+// Whole cells, in plain text (PlainText()); a bar before and behind each.
+constexpr std::string_view kGoodWords =
+    "|g|ok|okay|raw|valid|normal|gut|bon|bueno|dobry|0x00000000|";
+constexpr std::string_view kUncertainWords =
+    "|u|questionable|substituted|interpolated|suspect|estimated|doubtful|"
+    "fraglich|unsicher|douteux|dudoso|niepewny|";
+constexpr std::string_view kBadWords =
+    "|b|failed|failure|not connected|not good|stale|out of service|"
+    "schlecht|ungultig|mauvais|malo|zly|";
+// What historians, OPC clients and spreadsheets write where there is no value.
+// The words are complete cells, and "-" and "*" are no numbers, so no reading
+// is lost.
+constexpr std::string_view kNoReading =
+    "|nan|-nan|n/a|na|#n/a|#na|#value!|#ref!|#div/0!|#name?|#num!|#null!|"
+    "null|none|nil|bad|bad input|bad value|bad quality|bad data|i/o timeout|"
+    "io timeout|timeout|no data|no value|no sample|not connect|no result|"
+    "pt created|shutdown|comm fail|comm error|configure|scan off|"
+    "scan timeout|calc failed|under range|over range|underrange|overrange|"
+    "intf shut|offline|invalid|error|fault|missing|-|--|---|?|*|...|"
+    "1.#qnan|-1.#ind|inp outrange|inpoutrange|out of range|outofrange|"
+    "set to bad|calc off|calc timeout|trace off|digital set|arc off-line|"
+    "intf shutdown|not available|unavailable|no good data|no good data for "
+    "calculation|coercion failed|undefined|<null>|(null)|n.a.|k.a.|";
+
+bool IsOneOf(const std::string& plain, std::string_view words) {
+  // A text with a bar of its own could match across two words.
+  return plain.find('|') == std::string::npos &&
+         words.find('|' + plain + '|') != std::string_view::npos;
+}
+
+bool IsListed(std::string_view cell, const std::vector<std::string>& words) {
+  return std::ranges::any_of(
+      words, [&](const std::string& word) { return SameName(word, cell); });
+}
+
+// 0, 192, 0x80000000; nothing for other text.
+std::optional<std::uint32_t> CodeOf(std::string_view cell) {
+  const bool hex = cell.starts_with("0x") || cell.starts_with("0X");
+  cell.remove_prefix(hex ? 2 : 0);
+  std::uint32_t code = 0;
+  const auto [end, error] = std::from_chars(
+      cell.data(), cell.data() + cell.size(), code, hex ? 16 : 10);
+  return !cell.empty() && error == std::errc() &&
+                 end == cell.data() + cell.size()
+             ? std::optional(code)
+             : std::nullopt;
+}
+
+}  // namespace
+
+bool HasWord(std::string_view text, std::string_view words) {
+  while (!words.empty()) {
+    const std::size_t end = std::min(words.find('|'), words.size());
+    if (end > 0 && text.find(words.substr(0, end)) != std::string_view::npos) {
+      return true;
+    }
+    words.remove_prefix(std::min(end + 1, words.size()));
+  }
+  return false;
+}
+
+bool IsNoReading(std::string_view cell, const std::vector<std::string>& more) {
+  return cell.empty() || IsOneOf(PlainText(cell), kNoReading) ||
+         IsListed(cell, more);
+}
+
+// What the map lists comes first. "Good, Non-specific", "GoodNonCascade" and
+// "BadSensorFailure" begin with the word that counts.
+std::optional<SignalQuality> QualityOf(std::string_view cell,
+                                       const QualityWords& words,
+                                       QualityCode code) {
+  if (IsListed(cell, words.good)) {
+    return SignalQuality::kGood;
+  }
+  if (IsListed(cell, words.uncertain)) {
+    return SignalQuality::kUncertain;
+  }
+  if (IsListed(cell, words.bad)) {
+    return SignalQuality::kBad;
+  }
+  const std::string plain = PlainText(cell);
+  if (plain.starts_with("good") || IsOneOf(plain, kGoodWords)) {
+    return SignalQuality::kGood;
+  }
+  if (plain.starts_with("uncertain") || IsOneOf(plain, kUncertainWords)) {
+    return SignalQuality::kUncertain;
+  }
+  if (plain.starts_with("bad") || IsOneOf(plain, kBadWords) ||
+      (!cell.empty() && IsOneOf(plain, kNoReading))) {
+    return SignalQuality::kBad;
+  }
+  auto number = CodeOf(cell);
+  if (plain == "true" || plain == "false") {
+    number = plain == "true" ? 1U : 0U;
+    if (code != QualityCode::kOneIsGood && code != QualityCode::kZeroIsGood) {
+      return std::nullopt;
+    }
+  }
+  if (!number) {
+    return std::nullopt;
+  }
+  if (!words.good.empty()) {
+    return SignalQuality::kBad;
+  }
+  // Grades from good to bad.
+  static constexpr SignalQuality kGrade[] = {SignalQuality::kGood,
+                                             SignalQuality::kUncertain,
+                                             SignalQuality::kBad};
+  switch (code) {
+    case QualityCode::kUnknown:
+      return std::nullopt;
+    case QualityCode::kOpcDa:
+      return *number >= 192  ? SignalQuality::kGood
+             : *number >= 64 ? SignalQuality::kUncertain
+                             : SignalQuality::kBad;
+    case QualityCode::kOpcUa:
+      return kGrade[std::min(*number >> 30U, 2U)];
+    case QualityCode::kGrades:
+      return *number % 4 < 3 && *number < 7 ? std::optional(kGrade[*number % 4])
+                                            : std::nullopt;
+    case QualityCode::kOneIsGood:
+    case QualityCode::kZeroIsGood:
+      return *number > 1 ? std::nullopt
+             : (*number == 1) == (code == QualityCode::kOneIsGood)
+                 ? std::optional(SignalQuality::kGood)
+                 : std::optional(SignalQuality::kBad);
+  }
+  return std::nullopt;
+}
+
+// 0 is good in OPC UA and among grades, and bad in OPC DA; 1 is good for
+// "Validity" and suspect among grades. A number beyond those decides, else the
+// name of the column, else nothing does.
+QualityCode QualityCodeOf(std::string_view column,
+                          const std::map<std::string, std::size_t>& cells) {
+  const std::string plain = PlainText(column);
+  const bool ill = HasWord(
+      plain, "quest|bad|invalid|ungultig|subst|err|fail|fault|suspect|stale");
+  const bool well = !ill && HasWord(plain, "valid|good|ok|gultig|gut");
+  bool all_grades = true;
+  bool beyond_one = false;
+  std::uint32_t highest = 0;
+  for (const auto& [cell, count] : cells) {
+    if (const auto code = CodeOf(cell)) {
+      highest = std::max(highest, *code);
+      all_grades = all_grades && *code < 7 && *code % 4 < 3;
+      beyond_one = beyond_one || *code > 1;
+    }
+  }
+  if (highest >= (1U << 30U)) {
+    return QualityCode::kOpcUa;
+  }
+  if (highest >= 64) {
+    return QualityCode::kOpcDa;
+  }
+  if (well || ill) {
+    return well ? QualityCode::kOneIsGood : QualityCode::kZeroIsGood;
+  }
+  return beyond_one && all_grades ? QualityCode::kGrades
+                                  : QualityCode::kUnknown;
+}
+
+bool IsQualityColumn(std::string_view column,
+                     const std::map<std::string, std::size_t>& cells) {
+  std::size_t words = 0;
+  std::size_t codes = 0;
+  for (const auto& [cell, count] : cells) {
+    const std::string plain = PlainText(cell);
+    if (CodeOf(cell) || plain == "true" || plain == "false") {
+      ++codes;
+    } else if (QualityOf(cell, {}, QualityCode::kUnknown)) {
+      // A word that may also stand for a value tells nothing by itself.
+      words += !IsNoReading(cell) || plain.starts_with("bad") ? 1U : 0U;
+    } else if (!cell.empty()) {
+      return HasWord(PlainText(column), "qual|validity");
+    }
+  }
+  const std::string plain = PlainText(column);
+  const bool named =
+      HasWord(plain,
+              "qual|status|valid|good|quest|subst|isbad|gultig|jakosc|calidad") ||
+      plain.ends_with(".st") || plain.ends_with("_st") ||
+      plain.ends_with(" st");
+  return words > 0 ? codes == 0 || named
+                   : codes > 0 && named && cells.size() <= 16;
+}
+
+}  // namespace fdi::importer

@@ -1,0 +1,1029 @@
+#include "import/sniff.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <span>
+#include <sstream>
+#include <utility>
+
+#include "base/correlation.h"
+#include "base/error.h"
+#include "import/layout.h"
+#include "import/tag_map.h"
+
+namespace fdi::importer {
+namespace {
+
+/// What a name may stand for. Both pressures are kPressure until words or sizes
+/// tell them apart; kValve is the tag of a valve, command or position.
+enum class Role {
+  kCommand,
+  kPosition,
+  kFlow,
+  kUpstream,
+  kDownstream,
+  kPressure,
+  kSupply,
+  kTemperature,
+  kSetpoint,
+  kLevel,
+  kValve,
+};
+
+struct RoleWords {
+  Role role;
+  std::string_view words;  ///< Anywhere in the plain name.
+  std::string_view tokens;  ///< Whole parts of it, with or without the number.
+};
+
+// English, German, French, Spanish, Polish. The order settles names with several
+// words: a "flow setpoint" is a setpoint, a "position output" a command, a
+// "supply pressure" no P1.
+constexpr RoleWords kRoleWords[] = {
+    {Role::kSetpoint,
+     "setpoint|set point|sollwert|consigne|consigna|zadan|fuhrungsgr",
+     "|sp|spt|w|lsp|rsp|"},
+    {Role::kSupply,
+     "supply|instrument air|zuluft|steuerluft|air comprim|alimentation|"
+     "alimentacion|zasilan",
+     "|air|"},
+    {Role::kCommand,
+     "command|demand|output|stellgr|stellwert|stellsig|ansteuer|sortie|salida|"
+     "mando|sterow|sterujac|wyjsci|setpos|manipul",
+     "|op|out|co|cv|mv|cmd|ao|lmn|mn|yout|wyj|"},
+    {Role::kPosition,
+     "position|travel|stem|opening|stellung|ruckmeld|rueckmeld|feedback|"
+     "readback|recopie|ouverture|posicion|apertura|carrera|realiment|polozen|"
+     "pozycj|otwarci|hub|lift|skok|course",
+     "|x|pos|zt|zi|zit|gt|gi|zso|zsc|fb|fbk|rb|rbv|"},
+    {Role::kLevel, "level|fullstand|niveau|nivel|poziom", "|lt|li|lit|"},
+    {Role::kUpstream,
+     "upstream|inlet|vordruck|eingangsdruck|vor ventil|amont|aguas arriba|"
+     "przed zaw",
+     "|p1|"},
+    {Role::kDownstream,
+     "downstream|outlet|nachdruck|hinterdruck|ausgangsdruck|nach ventil|aval|"
+     "aguas abajo|za zaw",
+     "|p2|"},
+    {Role::kPressure, "press|druck|presion|cisnien", ""},
+    {Role::kTemperature, "temp", "|t1|"},
+    {Role::kFlow,
+     "flow|durchfl|menge|strom|debit|caudal|przeplyw|strumien", ""},
+};
+
+/// Units of quantities that no signal has.
+constexpr std::string_view kOtherUnits =
+    "|rpm|1/min|u/min|kw|mw|w|a|v|hz|ph|mm|cm|m|mm/s|us/cm|ms/cm|ntu|ppm|mg/l|"
+    "g/l|kg/m3|m3|t|kg|kwh|mwh|s|min|h|nm|kn|kj/kg|mv|ohm|";
+
+bool IsPercent(Signal signal) {
+  return signal == Signal::kCv || signal == Signal::kX || signal == Signal::kSp;
+}
+
+// Parts between all that is no letter or digit: "17fc", "op" of "17FC.OP".
+std::vector<std::string> Tokens(std::string_view plain) {
+  std::vector<std::string> tokens{""};
+  for (const char c : plain) {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
+      tokens.back() += c;
+    } else if (!tokens.back().empty()) {
+      tokens.emplace_back();
+    }
+  }
+  if (tokens.back().empty()) {
+    tokens.pop_back();
+  }
+  return tokens;
+}
+
+// The first letters in a row: "fv" of "fv17a", "cv" of "03cv".
+std::string Letters(const std::string& token) {
+  const auto is_letter = [](unsigned char c) { return std::isalpha(c) != 0; };
+  const auto begin = std::ranges::find_if(token, is_letter);
+  return {begin, std::find_if_not(begin, token.end(), is_letter)};
+}
+
+bool IsToken(const std::string& token, std::string_view tokens) {
+  return !token.empty() &&
+         tokens.find('|' + token + '|') != std::string_view::npos;
+}
+
+struct NamedUnit {
+  std::string rest;  ///< The name without it.
+  std::string unit;
+};
+
+// A unit in a name: "bar g" of "PT101 [bar g]", "t/h" of "F_t_h", "gpm" of
+// "FLOW 17 GPM", "Nm3/h"; else empty. All signals are asked; "1" is a unit of
+// percentages, but at the end of a name it is a number of a loop, and "F" and
+// "C" are letters of a tag there.
+NamedUnit UnitIn(const std::string& name) {
+  const auto known = [](const std::string& unit, bool in_brackets) {
+    const std::string plain = PlainText(unit);
+    return plain == "ma" || IsGasUnit(unit) ||
+           (in_brackets && IsToken(plain, kOtherUnits)) ||
+           (plain != "1" && (in_brackets || plain.size() > 1 || plain == "%") &&
+            IsUnit(unit));
+  };
+  for (std::size_t open = name.find_first_of("[(");
+       open != std::string::npos; open = name.find_first_of("[(", open + 1)) {
+    const std::size_t close = name.find_first_of("])", open);
+    if (close == std::string::npos) {
+      break;
+    }
+    const std::string unit = name.substr(open + 1, close - open - 1);
+    if (known(unit, true)) {
+      return {name.substr(0, open) + name.substr(close + 1), unit};
+    }
+  }
+  for (std::size_t at = name.find_first_of(" _"); at != std::string::npos;
+       at = name.find_first_of(" _", at + 1)) {
+    std::string unit = name.substr(at + 1);
+    std::ranges::replace(unit, '_', '/');
+    if (known(unit, false)) {
+      return {name.substr(0, at), unit};
+    }
+  }
+  return {name, {}};
+}
+
+// The role that letters of ISA 5.1 (Z position; Y relay or converter) and DIN
+// 19227 (G position) give a tag, from its last part to its first: "fic" of
+// "20.FIC101.PV", "fv" of "AO_FV17".
+std::optional<Role> RoleOfTag(const std::vector<std::string>& tokens) {
+  for (std::size_t i = tokens.size(); i-- > 0;) {
+    const std::string letters = Letters(tokens[i]);
+    // "pv" without a number is the process value of the tag before it.
+    if (letters.empty() || letters.size() > 4 ||
+        (letters == tokens[i] && tokens.size() > 1 &&
+         IsToken(letters, "|pv|iv|val|value|i|a|b|no|st|ai|ao|di|do|db|"))) {
+      continue;
+    }
+    if (letters.ends_with('v') || letters == "ven" || letters == "rv") {
+      return Role::kValve;
+    }
+    switch (letters.front()) {
+      case 'f':
+        return letters.ends_with('y') ? Role::kCommand : Role::kFlow;
+      case 'p':
+        return letters.ends_with('y') ? Role::kCommand : Role::kPressure;
+      case 't':
+        return letters.ends_with('y') ? Role::kCommand : Role::kTemperature;
+      case 'l':
+        return letters.ends_with('y') ? Role::kCommand : Role::kLevel;
+      case 'z':
+      case 'g':
+        return Role::kPosition;
+      default:
+        break;
+    }
+  }
+  return std::nullopt;
+}
+
+struct NameGuess {
+  std::optional<Role> role;
+  bool by_word{false};
+};
+
+// Words first, then the attribute behind a tag (".OP"), then its letters. The
+// output of a transmitter ("FT17.OUT") is what it measures.
+NameGuess RoleOf(const std::string& name, const std::string& about) {
+  const std::string plain = PlainText(name + ' ' + about);
+  const std::vector<std::string> tokens = Tokens(PlainText(name));
+  const auto tag = RoleOfTag(tokens);
+  for (const RoleWords& known : kRoleWords) {
+    if (HasWord(plain, known.words)) {
+      return {known.role, true};
+    }
+  }
+  for (std::size_t i = tokens.size(); i-- > 0;) {
+    const std::string& token = tokens[i];
+    const std::string letters = Letters(token);
+    // "MV101" and "CV7" are valves, "51_03CV" is an attribute.
+    const bool numbered = token.size() > letters.size() &&
+                          std::isalpha(static_cast<unsigned char>(
+                              token.front())) != 0 &&
+                          letters.ends_with('v');
+    for (const RoleWords& known : kRoleWords) {
+      const bool hit = IsToken(token, known.tokens) ||
+                       (!numbered && IsToken(letters, known.tokens));
+      if (hit && known.role == Role::kCommand && tag &&
+          (token == "out" || token == "ao") &&
+          (*tag == Role::kFlow || *tag == Role::kPressure ||
+           *tag == Role::kTemperature || *tag == Role::kLevel) &&
+          std::ranges::any_of(tokens, [&](const std::string& part) {
+            const std::string code = Letters(part);
+            return part != token && code.size() > 1 && code.ends_with('t');
+          })) {
+        return {tag, false};
+      }
+      if (hit) {
+        return {known.role, true};
+      }
+    }
+  }
+  return {tag, false};
+}
+
+std::optional<Signal> SignalOf(Role role) {
+  switch (role) {
+    case Role::kCommand:
+      return Signal::kCv;
+    case Role::kPosition:
+    case Role::kValve:
+      return Signal::kX;
+    case Role::kFlow:
+      return Signal::kF;
+    case Role::kUpstream:
+    case Role::kPressure:
+      return Signal::kP1;
+    case Role::kDownstream:
+      return Signal::kP2;
+    case Role::kSupply:
+      return Signal::kPz;
+    case Role::kTemperature:
+      return Signal::kT1;
+    case Role::kSetpoint:
+      return Signal::kSp;
+    case Role::kLevel:
+      return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+// What all names end with ("F_CV" of "FT.F_CV") or begin with tells them not
+// apart, so it is no evidence.
+std::vector<std::string> DistinctParts(
+    const std::vector<SniffedColumn*>& columns) {
+  std::vector<std::string> names;
+  for (const SniffedColumn* column : columns) {
+    names.push_back(column->name);
+  }
+  constexpr std::string_view kCuts = "./\\:";
+  const auto common = [&](const auto& part) {
+    return names.size() > 1 && !part(names.front()).empty() &&
+           std::ranges::all_of(names, [&](const std::string& name) {
+             return part(name) == part(names.front()) &&
+                    part(name).size() < name.size();
+           });
+  };
+  const auto ending = [&](const std::string& name) {
+    const std::size_t at = name.find_last_of(kCuts);
+    return at == std::string::npos || at == 0 ? std::string()
+                                              : name.substr(at);
+  };
+  const auto beginning = [&](const std::string& name) {
+    const std::size_t at = name.find_first_of(kCuts);
+    return at == std::string::npos || at + 1 == name.size()
+               ? std::string()
+               : name.substr(0, at + 1);
+  };
+  while (common(ending)) {
+    for (std::string& name : names) {
+      name.resize(name.size() - ending(name).size());
+    }
+  }
+  if (common(beginning)) {
+    for (std::string& name : names) {
+      name.erase(0, beginning(name).size());
+    }
+  }
+  return names;
+}
+
+void Say(SniffedColumn& column, const std::string& what) {
+  column.guessed += (column.guessed.empty() ? "" : "; ") + what;
+}
+
+// Whether most values fit a signal in a unit, or without one; sets unit, raw and
+// span. Most, because a few states and outliers are in every export.
+bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit) {
+  const double low = column.Quantile(0.05);
+  const double high = column.Quantile(0.95);
+  const double median = std::abs(column.Quantile(0.5));
+  const bool whole = std::ranges::all_of(
+      column.values, [](double v) { return v == std::floor(v); });
+  column.unit = unit;
+  column.raw.clear();
+  column.span.clear();
+  const bool current = SameName(unit, "mA");
+  const bool counts = unit.empty() && whole && high > 2000.0 && low >= -5000.0 &&
+                      high <= 33000.0;
+  const auto take_raw = [&](double from, double to) {
+    column.raw = {from, to};
+    if (!IsPercent(signal)) {
+      column.span = {0.0, 100.0};
+      Say(column, "span is open: state the range of the transmitter");
+    }
+  };
+  if (!unit.empty() && !current && !FindUnit(signal, unit)) {
+    return false;
+  }
+  if (IsPercent(signal)) {
+    if (current) {
+      return low > 3.0 && high < 21.0;
+    }
+    if (counts) {
+      take_raw(0.0, 27648.0);
+      column.unit = "%";
+      Say(column, "counts of an analog card, 27648 at 100 %");
+      return true;
+    }
+    if (unit.empty()) {
+      const bool share = low >= -0.1 && high <= 1.1;
+      column.unit = share ? "1" : "%";
+      Say(column, share ? "0 to 1 by size" : "% by size");
+    }
+    const auto conversion = FindUnit(signal, column.unit);
+    return conversion && conversion->scale * low > -15.0 &&
+           conversion->scale * high < 115.0;
+  }
+  const bool pressure = signal != Signal::kF && signal != Signal::kT1 &&
+                        signal != Signal::kCvi;
+  if (current || counts) {
+    current ? take_raw(4.0, 20.0) : take_raw(0.0, 27648.0);
+    column.unit = signal == Signal::kF    ? "t/h"
+                  : signal == Signal::kT1 ? "degC"
+                                          : "bar";
+    return true;
+  }
+  if (unit.empty()) {
+    column.unit = signal == Signal::kF ? "m3/h"
+                  : signal == Signal::kT1
+                      ? (median > 250.0 && median < 450.0 ? "K" : "degC")
+                  : pressure ? (median > 2e4     ? "Pa"
+                                : median > 100.0 ? "kPa"
+                                                 : "bar")
+                             : "1";
+    Say(column, signal == Signal::kF ? "the unit is open: no size tells it"
+                                     : "unit by size");
+  }
+  return true;
+}
+
+// Correlation of b with a delayed by 0, 1 or 2 periods, the strongest. The
+// delays allow for the lag of the rod behind the command, and of the flow behind
+// the rod. The sign is kept, because the sense follows from it. Values beyond
+// the range of most others are left out.
+double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
+  const auto usual = [](const SniffedColumn& column) {
+    const double low = column.Quantile(0.05);
+    const double high = column.Quantile(0.95);
+    return std::pair(2.0 * low - high, 2.0 * high - low);
+  };
+  const auto [low_a, high_a] = usual(a);
+  const auto [low_b, high_b] = usual(b);
+  std::map<double, double> at;
+  for (std::size_t k = 0; k < a.values.size(); ++k) {
+    if (a.values[k] >= low_a && a.values[k] <= high_a) {
+      at[a.times_s[k]] = a.values[k];
+    }
+  }
+  double strongest = 0.0;
+  for (int lag = 0; lag <= 2; ++lag) {
+    CorrelationSums sums;
+    for (std::size_t k = static_cast<std::size_t>(lag); k < b.values.size();
+         ++k) {
+      // In a compressed table, the last reading remains valid.
+      const auto after =
+          at.upper_bound(b.times_s[k - static_cast<std::size_t>(lag)]);
+      if (after != at.begin() && b.values[k] >= low_b &&
+          b.values[k] <= high_b) {
+        sums.Add(std::prev(after)->second, b.values[k]);
+      }
+    }
+    const double r = sums.Correlation();
+    strongest = std::abs(r) > std::abs(strongest) ? r : strongest;
+  }
+  return strongest;
+}
+
+class SignalGuess {
+ public:
+  explicit SignalGuess(Sniffed& found) : found_(found) {}
+
+  void Guess() {
+    GuessNames();
+    SettleValves();
+    SettlePressures();
+    for (std::size_t i = 0; i < kSignalCount; ++i) {
+      KeepFirst(static_cast<Signal>(i));
+    }
+    GuessSenses();
+    NoteMissing();
+  }
+
+ private:
+  std::vector<SniffedColumn*> Of(Signal signal) {
+    std::vector<SniffedColumn*> columns;
+    for (SniffedColumn& column : found_.columns) {
+      if (column.signal == signal) {
+        columns.push_back(&column);
+      }
+    }
+    return columns;
+  }
+  void GuessNames();
+  void GuessName(SniffedColumn& column, const std::string& part);
+  void SettleValves();
+  void SettlePressures();
+  void KeepFirst(Signal signal);
+  void GuessSenses();
+  void NoteMissing();
+
+  Sniffed& found_;
+  std::vector<SniffedColumn*> valves_;  // Command or position.
+  std::vector<SniffedColumn*> sure_;    // By a word or the contract.
+};
+
+void SignalGuess::GuessNames() {
+  std::vector<SniffedColumn*> numbers;
+  for (SniffedColumn& column : found_.columns) {
+    // A column that is mostly words is no reading, whatever its name says.
+    if (!column.values.empty() &&
+        2 * (column.values.size() + column.missing) >= column.cells) {
+      numbers.push_back(&column);
+    }
+  }
+  const std::vector<std::string> parts = DistinctParts(numbers);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    GuessName(*numbers[i], parts[i]);
+  }
+}
+
+void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
+  std::string unit = UnitIn(column.name).unit;
+  std::istringstream about(column.about);
+  for (std::string cell; unit.empty() && std::getline(about, cell);) {
+    unit = UnitIn('[' + cell + ']').unit;
+  }
+  for (const SignalColumn& known : kSignalColumns) {
+    if (SameName(known.name, column.name)) {
+      column.signal = known.signal;
+      const bool by_name = !unit.empty() && FindUnit(known.signal, unit);
+      column.unit = by_name ? unit
+                    : known.signal == Signal::kCvi
+                        ? "1"
+                        : std::string(SignalUnit(known.signal));
+      sure_.push_back(&column);
+      return;
+    }
+  }
+  if (column.given) {
+    const ColumnMapping& given = *column.given;
+    column.signal = given.signal;
+    column.unit = given.unit;
+    column.opening = given.sense == Sense::kOpening;
+    Say(column, "given");
+    sure_.push_back(&column);
+    return;
+  }
+  const NameGuess guess = RoleOf(UnitIn(part).rest, column.about);
+  if (IsGasUnit(unit)) {
+    Say(column, "a flow of gas, and the physics is for water");
+    found_.findings.push_back(
+        column.name +
+        " is a flow of gas at standard conditions, and the physics is for "
+        "water: F is left out. CV and X still show what the rod does, as "
+        "--signals CV,X");
+    return;
+  }
+  if (IsToken(PlainText(unit), kOtherUnits)) {
+    return;
+  }
+  std::optional<Role> role = guess.role;
+  // A flow, a pressure or a temperature by its unit alone, also where the name
+  // says otherwise.
+  if (!unit.empty() && !SameName(unit, "mA")) {
+    static constexpr std::pair<Signal, Role> kByUnit[] = {
+        {Signal::kF, Role::kFlow},
+        {Signal::kP1, Role::kPressure},
+        {Signal::kT1, Role::kTemperature}};
+    for (const auto& [signal, by_unit] : kByUnit) {
+      const auto named = role ? SignalOf(*role) : std::nullopt;
+      if (FindUnit(signal, unit) && !(named && FindUnit(*named, unit))) {
+        role = by_unit;
+      }
+    }
+  }
+  if (!role) {
+    return;
+  }
+  if (role == Role::kLevel) {
+    Say(column, "a level");
+    return;
+  }
+  // The current to a positioner; a transmitter with its current in mA.
+  if (SameName(unit, "mA") && role == Role::kValve) {
+    role = Role::kCommand;
+  }
+  const Signal signal = *SignalOf(*role);
+  if (!FitsSignal(column, signal, unit)) {
+    column.unit.clear();
+    column.raw.clear();
+    column.guessed = std::string(SignalName(signal)) +
+                     "? Its unit or its range does not fit";
+    return;
+  }
+  column.signal = signal;
+  if (role == Role::kValve) {
+    valves_.push_back(&column);
+  } else if (guess.by_word) {
+    sure_.push_back(&column);
+  }
+}
+
+// The tag of a valve is its command or its position, whichever is not there
+// yet; alone it is the command, without which nothing can be judged.
+void SignalGuess::SettleValves() {
+  for (SniffedColumn* valve : valves_) {
+    const bool has_command = !Of(Signal::kCv).empty();
+    const bool has_position = Of(Signal::kX).size() > 1;
+    if (!has_command) {
+      valve->signal = Signal::kCv;
+    } else if (has_position &&
+               std::ranges::any_of(Of(Signal::kX), [&](const auto* x) {
+                 return std::ranges::find(valves_, x) == valves_.end();
+               })) {
+      valve->signal.reset();
+    }
+    Say(*valve, "a valve: command or position");
+  }
+}
+
+// The pressure falls in the direction of flow. A column named P2 stays P2.
+void SignalGuess::SettlePressures() {
+  const std::vector<SniffedColumn*> pressures = Of(Signal::kP1);
+  if (pressures.size() != 2 || !Of(Signal::kP2).empty()) {
+    return;
+  }
+  SniffedColumn* low =
+      pressures[0]->Quantile(0.5) < pressures[1]->Quantile(0.5) ? pressures[0]
+                                                                : pressures[1];
+  low->signal = Signal::kP2;
+  for (SniffedColumn* column : pressures) {
+    Say(*column, "P1 is the higher pressure");
+  }
+}
+
+// Of several columns the one with a word for it, else the first.
+void SignalGuess::KeepFirst(Signal signal) {
+  const std::vector<SniffedColumn*> columns = Of(signal);
+  const auto sure = [&](const SniffedColumn* column) {
+    return std::ranges::find(sure_, column) != sure_.end();
+  };
+  const auto best = std::ranges::find_if(columns, sure);
+  const SniffedColumn* kept = best != columns.end()     ? *best
+                              : columns.empty() ? nullptr
+                                                : columns.front();
+  for (SniffedColumn* column : columns) {
+    if (column != kept) {
+      column->signal.reset();
+      column->guessed = "another " + std::string(SignalName(signal)) + "?";
+    }
+  }
+}
+
+// The flow rises with the opening, and follows the rod more closely than it
+// follows the command: X, if there is one, is compared with the flow, and CV
+// with X, with which it correlates more strongly. 0.3 is the limit of
+// onboarding, too (docs/onboarding.md). Without a flow, plants count opening,
+// and the columns of the contract closing.
+void SignalGuess::GuessSenses() {
+  const auto flow = Of(Signal::kF);
+  std::vector<SniffedColumn*> moving = Of(Signal::kX);
+  const auto cv = Of(Signal::kCv);
+  moving.insert(moving.end(), cv.begin(), cv.end());
+  for (SniffedColumn* column : moving) {
+    if (column->given) {
+      continue;
+    }
+    const bool led = column != moving.front();
+    const bool contract = SameName(column->name, "CV_pct") ||
+                          SameName(column->name, "X_pct");
+    const double r = led            ? Correlation(*column, *moving.front())
+                     : flow.empty() ? 0.0
+                                    : Correlation(*column, *flow.front());
+    if (led && std::abs(r) > 0.3) {
+      column->opening = (r >= 0.0) == moving.front()->opening;
+      Say(*column, std::string("moves ") + (r >= 0.0 ? "with" : "against") +
+                       " the rod");
+    } else if (led) {
+      column->opening = moving.front()->opening;
+    } else if (std::abs(r) > 0.3) {
+      column->opening = r > 0.0;
+      Say(*column, r > 0.0 ? "opening: the flow rises with it"
+                           : "closing: the flow falls with it");
+    } else {
+      column->opening = !contract;
+      Say(*column, "the sense is open: no flow tells it");
+    }
+  }
+  for (SniffedColumn* column : Of(Signal::kSp)) {
+    column->opening = !moving.empty() && moving.front()->opening;
+  }
+}
+
+void SignalGuess::NoteMissing() {
+  std::string level;
+  for (const SniffedColumn& column : found_.columns) {
+    if (column.guessed == "a level") {
+      level = column.name;
+    }
+  }
+  if (Of(Signal::kCv).empty()) {
+    found_.findings.push_back(
+        "no command (CV) found: nothing can be judged without it. State its "
+        "column under [signal.CV]");
+  }
+  if (Of(Signal::kX).empty() && Of(Signal::kF).empty()) {
+    found_.findings.push_back(
+        (level.empty() ? std::string()
+                       : level +
+                             " is a level, which is neither the position nor "
+                             "the flow of the valve. ") +
+        "No position (X) and no flow (F) found: the command alone shows "
+        "nothing about the valve. Export the position transmitter or the flow "
+        "behind the valve, and state it under [signal.X] or [signal.F]");
+  }
+}
+
+void AddCell(const std::string& cell, double t_s, const ColumnMap& map,
+             SniffedColumn& column) {
+  ++column.cells;
+  auto value = ParseNumber(cell, map.decimal);
+  if (!value && IsNoReading(cell, map.no_reading)) {
+    ++column.missing;
+    return;
+  }
+  if (!value) {
+    const auto [number, unit] = SplitUnit(cell);
+    value = ParseNumber(
+        Ungrouped(number, map.thousands).value_or(std::string(number)),
+        map.decimal);
+    if (!unit.empty() && !IsUnit(unit)) {
+      value.reset();
+    } else if (value && column.about.empty()) {
+      column.about = '\n' + std::string(unit);
+    }
+  }
+  if (value) {
+    column.times_s.push_back(t_s);
+    column.values.push_back(*value);
+  } else if (column.words.size() < 20 &&
+             std::ranges::find(column.words, cell) == column.words.end()) {
+    column.words.push_back(cell);
+  }
+}
+
+// Period, jitter and gaps, and whether --resample would help.
+void JudgeTiming(std::vector<double> times, Sniffed& found) {
+  // All stamps together, sorted: a long table has each instant once per tag and
+  // may be sorted by tag.
+  std::ranges::sort(times);
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  found.period_s = UsualPeriod(MedianStep(times));
+  std::size_t missing = 0;
+  for (const SniffedColumn& column : found.columns) {
+    missing += column.signal ? column.missing : 0;
+    const double usual = MedianStep(column.times_s);
+    std::size_t odd = 0;
+    for (std::size_t k = 1; k < column.times_s.size(); ++k) {
+      const double step = column.times_s[k] - column.times_s[k - 1];
+      odd += std::abs(step - usual) > 0.6 * usual ? 1U : 0U;
+    }
+    // Readings stored by exception or swinging door come at odd steps. A tag
+    // with such steps in a fifth of its readings is taken as compressed.
+    found.compressed = found.compressed || (found.map.long_table &&
+                                            5 * odd > column.times_s.size());
+  }
+  for (std::size_t k = 1; k < times.size(); ++k) {
+    const double step = times[k] - times[k - 1];
+    if (step > 1.6 * found.period_s) {
+      ++found.gaps;
+      found.longest_gap_s = std::max(found.longest_gap_s, step);
+    } else {
+      found.jitter_s =
+          std::max(found.jitter_s, std::abs(step - found.period_s));
+    }
+  }
+  const bool jitter = found.jitter_s > 0.01 * found.period_s;
+  double period = found.period_s;
+  std::string age;
+  // A compressed tag may be silent for long while its value holds, hence ten
+  // minutes. Slow and short data are resampled to 1 s, because a record with
+  // fewer than 600 samples in a row cannot be onboarded (docs/import.md).
+  if (found.compressed) {
+    age = ":10min";
+    period = std::max(period, 1.0);
+  } else if (period > 1.0 && period <= 10.0 && times.size() < 1200) {
+    period = 1.0;
+    age = ":" + NumberText(3.0 * found.period_s) + "s";
+  } else if (!jitter && missing == 0 && found.gaps == 0) {
+    return;
+  }
+  found.resample = NumberText(period) + "s:linear" + age;
+}
+
+// The columns of a wide table or the tags of a long one, through the reader of
+// the importer.
+void ReadColumns(const std::vector<std::string_view>& lines,
+                 const Layout& layout, const std::string& source,
+                 const std::vector<ColumnMapping>& given, Sniffed& found) {
+  CsvReader reader({.source = source, .map = layout.map, .scan = true});
+  std::map<std::string, SniffedColumn> tags;
+  std::vector<std::size_t> columns;
+  std::vector<double> times;
+  std::size_t tag = 0;
+  std::size_t value = 0;
+  const auto& names = layout.names;
+  const auto& tall = layout.map.long_table;
+  for (std::size_t c = 0; c < names.size(); ++c) {
+    bool form = SameName(names[c], layout.map.time_column) ||
+                SameName(names[c], kTimeColumn) ||
+                SameName(names[c], layout.map.clock_column);
+    for (const auto& [column, quality] : layout.map.quality_of) {
+      form = form || SameName(names[c], quality);
+    }
+    tag = tall && SameName(names[c], tall->tag) ? c : tag;
+    value = tall && SameName(names[c], tall->value) ? c : value;
+    if (!form && !tall) {
+      columns.push_back(c);
+      found.columns.push_back({.name = names[c], .about = layout.about[c]});
+    }
+  }
+  ForEachRow(lines, reader, [&](CsvRow&& row) {
+    const std::vector<std::string>& cells = reader.cells();
+    times.push_back(row.t_s);
+    if (tall) {
+      SniffedColumn& column = tags[cells[tag]];
+      column.name = cells[tag];
+      AddCell(cells[value], row.t_s, layout.map, column);
+    }
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      AddCell(cells[columns[i]], row.t_s, layout.map, found.columns[i]);
+    }
+  });
+  reader.Finish();
+  for (auto& [name, column] : tags) {
+    // Names of markers, such as "$RT_OFF$", are no tags.
+    if (!name.empty() && name.front() != '$') {
+      found.columns.push_back(std::move(column));
+    }
+  }
+  for (SniffedColumn& column : found.columns) {
+    for (const ColumnMapping& m : given) {
+      if (SameName(m.column, column.name)) {
+        column.given = m;
+      }
+    }
+  }
+  found.rows = times.size();
+  found.dated = reader.dated();
+  found.time = reader.time_unit();
+  SignalGuess(found).Guess();
+  JudgeTiming(std::move(times), found);
+}
+
+std::string TomlText(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) {
+      std::array<char, 8> code{};  // A name may have several lines.
+      std::snprintf(code.data(), code.size(), "\\u%04X", c);
+      quoted += code.data();
+    } else {
+      quoted +=
+          c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+    }
+  }
+  return quoted + '"';
+}
+
+std::string TomlList(const std::vector<std::string>& texts) {
+  std::string list;
+  for (const std::string& text : texts) {
+    list += (list.empty() ? "" : ", ") + TomlText(text);
+  }
+  return '[' + list + ']';
+}
+
+std::string TomlPair(const std::vector<double>& pair) {
+  return '[' + NumberText(pair.at(0)) + ", " + NumberText(pair.at(1)) + ']';
+}
+
+// What the importer makes of the table with the guessed signals.
+void ReadWith(std::string_view text, const std::string& source,
+              Sniffed& found) {
+  CsvOptions options{.source = source,
+                     .map = found.map,
+                     .required = 0,
+                     .split_gaps = true};
+  for (const SniffedColumn& column : found.columns) {
+    if (!column.signal) {
+      continue;
+    }
+    if (column.given) {
+      options.map.columns.push_back(*column.given);
+      continue;
+    }
+    ColumnMapping mapping{column.name, *column.signal};
+    const auto unit = FindUnit(*column.signal, column.unit);
+    mapping.scale = unit ? unit->scale : 1.0;
+    mapping.offset = unit ? unit->offset : 0.0;
+    mapping.unit = column.unit;
+    if (SameName(column.unit, "mA") || !column.raw.empty()) {
+      const std::vector<double> raw =
+          column.raw.empty() ? std::vector{4.0, 20.0} : column.raw;
+      const std::vector<double> span =
+          column.span.empty() ? std::vector{0.0, 100.0} : column.span;
+      const double slope = (span[1] - span[0]) / (raw[1] - raw[0]);
+      mapping.offset += mapping.scale * (span[0] - slope * raw[0]);
+      mapping.scale *= slope;
+      mapping.lowest = raw[0] - 0.1 * (raw[1] - raw[0]);
+      mapping.highest = raw[1] + 0.1 * (raw[1] - raw[0]);
+    }
+    mapping.sense = column.opening ? Sense::kOpening : Sense::kClosing;
+    if (column.signal == Signal::kF && unit) {
+      options.map.flow_unit = unit->flow_unit;
+    }
+    options.map.columns.push_back(mapping);
+  }
+  try {
+    const CsvTable table = ReadCsv(text, options);
+    for (const std::string& note : table.notes) {
+      found.findings.push_back(note);
+    }
+    if (table.split_range) {
+      for (SniffedColumn& column : found.columns) {
+        if (column.signal == Signal::kCv && column.raw.empty()) {
+          column.raw = {table.split_range->first, table.split_range->second};
+          Say(column, "half of a split range: X moves twice as far");
+        }
+      }
+    }
+  } catch (const DataError& error) {
+    found.findings.push_back(std::string("refused as it is: ") + error.what());
+  }
+}
+
+}  // namespace
+
+double SniffedColumn::Quantile(double share) const {
+  std::vector<double> sorted = values;
+  const auto at =
+      sorted.begin() +
+      static_cast<std::ptrdiff_t>(share * static_cast<double>(sorted.size() - 1));
+  std::nth_element(sorted.begin(), at, sorted.end());
+  return *at;
+}
+
+Sniffed Sniff(std::string_view text, const std::string& source, ColumnMap map) {
+  const std::vector<std::string_view> lines = LinesOf(text);
+  const std::vector<ColumnMapping> given = map.columns;
+  Layout layout = FindLayout(lines, std::move(map), source, true);
+  layout.map.columns.clear();
+  Sniffed found;
+  found.map = layout.map;
+  for (const auto& [key, reason] : layout.choices) {
+    found.choices.push_back(key + ": " + reason);
+  }
+  ReadColumns(lines, layout, source, given, found);
+  if (found.time.form == TimeForm::kElapsed &&
+      !SameName(found.map.time_column, kTimeColumn) &&
+      found.map.time_form == TimeForm::kFindOut) {
+    found.choices.push_back(
+        "time: nothing but the size of its numbers tells the unit of column " +
+        found.map.time_column);
+  }
+  std::vector<std::string> words;
+  for (const SniffedColumn& column : found.columns) {
+    if (column.signal) {
+      words.insert(words.end(), column.words.begin(), column.words.end());
+    }
+  }
+  std::ranges::sort(words);
+  words.erase(std::unique(words.begin(), words.end()), words.end());
+  if (!words.empty()) {
+    found.map.no_reading.insert(found.map.no_reading.end(), words.begin(),
+                                words.end());
+    found.choices.push_back("missing: " + Listed(words) +
+                            " stand where numbers were expected, and are taken "
+                            "as no readings");
+  }
+  ReadWith(text, source, found);
+  return found;
+}
+
+std::string MapText(const Sniffed& found, const std::string& file) {
+  const ColumnMap& map = found.map;
+  const auto chosen = [&](const std::string& key) {
+    for (const std::string& choice : found.choices) {
+      if (choice.starts_with(key + ": ")) {
+        return "  # choice: " + choice.substr(key.size() + 2) + "\n";
+      }
+    }
+    return std::string("\n");
+  };
+  const auto sign = [](char c) {
+    return TomlText(c == '\t' ? "tab" : std::string(1, c));
+  };
+  std::string text =
+      "# Of " + file +
+      ", by fdi-store runs sniff. Check what is marked as guessed or as a "
+      "choice.\n# docs/import.md explains the keys.\n";
+  for (const std::string& finding : found.findings) {
+    std::string line = finding;
+    std::ranges::replace(line, '\n', ' ');
+    text += "# - " + line + "\n";
+  }
+  text += "\n[file]\nseparator = " + sign(map.separator) +
+          "\ndecimal = " + sign(map.decimal) + chosen("decimal");
+  if (map.thousands != '\0') {
+    text += "thousands = " + sign(map.thousands) + "\n";
+  }
+  if (map.skip > 0) {
+    text += "skip = " + std::to_string(map.skip) + "\n";
+  }
+  if (map.header_rows > 1) {
+    text += "header = " + std::to_string(map.header_rows) + "\n";
+  }
+  if (!map.no_reading.empty()) {
+    text += "missing = " + TomlList(map.no_reading) + chosen("missing");
+  }
+  if (!found.resample.empty()) {
+    text += "resample = " + TomlText(found.resample) + "\n";
+  }
+  text += "\n[time]\ncolumn = " + TomlText(map.time_column) + "\n";
+  if (!map.clock_column.empty()) {
+    text += "clock = " + TomlText(map.clock_column) + "\n";
+  }
+  if (found.time.form != TimeForm::kText) {
+    text += "unit = " + TomlText(std::string(TimeUnitName(found.time))) +
+            chosen("time");
+  }
+  if (map.date_order != DateOrder::kNotSaid) {
+    text += std::string("date = ") +
+            (map.date_order == DateOrder::kDayFirst     ? "\"d/m/y\""
+             : map.date_order == DateOrder::kMonthFirst ? "\"m/d/y\""
+                                                        : "\"y/m/d\"") +
+            chosen("date");
+  }
+  if (found.dated) {
+    text += map.zone.empty() ? "# zone = \"Europe/Warsaw\"\n"
+                             : "zone = " + TomlText(map.zone) + "\n";
+  }
+  if (map.long_table) {
+    text += "\n[long]\ntag = " + TomlText(map.long_table->tag) +
+            "\nvalue = " + TomlText(map.long_table->value) + "\n";
+    if (!map.long_table->quality.empty()) {
+      text += "quality = " + TomlText(map.long_table->quality) + "\n";
+    }
+  }
+  if (!map.quality.good.empty()) {
+    text += "\n[quality]\ngood = " + TomlList(map.quality.good) +
+            chosen("good");
+  }
+  for (const SniffedColumn& column : found.columns) {
+    if (!column.signal) {
+      continue;
+    }
+    text += "\n[signal." + std::string(SignalName(*column.signal)) + "]" +
+            (column.guessed.empty() ? "" : "  # guessed: " + column.guessed) +
+            "\ncolumn = " + TomlText(column.name) + "\nunit = " +
+            TomlText(column.given && SameName(column.unit, "mA")
+                         ? "%"
+                         : column.unit) +
+            "\n";
+    if (column.given) {
+      // In `unit`, as the map of the caller had it.
+      const auto unit =
+          FindUnit(*column.signal, column.unit).value_or(UnitConversion{});
+      text += "scale = " + NumberText(column.given->scale / unit.scale) +
+              "\noffset = " +
+              NumberText((column.given->offset - unit.offset) / unit.scale) +
+              "\n";
+    }
+    if (!column.raw.empty()) {
+      text += "raw = " + TomlPair(column.raw) + "\n";
+    }
+    if (!column.span.empty()) {
+      text += "span = " + TomlPair(column.span) + "\n";
+    }
+    if (column.opening) {
+      text += "sense = \"opening\"\n";
+    }
+    if (const auto quality = map.quality_of.find(column.name);
+        quality != map.quality_of.end()) {
+      text += "quality = " + TomlText(quality->second) + "\n";
+    }
+  }
+  return text;
+}
+
+}  // namespace fdi::importer

@@ -1,0 +1,689 @@
+// Exports of every kind, as their users have them: what sniff writes, the
+// importer reads, and both find the same readings.
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include "base/error.h"
+#include "import/csv.h"
+#include "import/sniff.h"
+#include "import/tag_map.h"
+#include "tests/storage/temporary_directory.h"
+
+namespace fdi::importer {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr std::size_t kRows = 120;
+// date -d 2026-03-10T09:00:00Z +%s
+constexpr std::int64_t kStart = 1'773'133'200;
+
+/// A healthy valve in % of opening: a moving command, a rod that lags behind,
+/// and a flow in t/h that rises with the opening.
+struct Valve {
+  std::array<double, kRows> cv{};
+  std::array<double, kRows> x{};
+  std::array<double, kRows> f{};
+
+  Valve() {
+    double rod = 38.0;
+    for (std::size_t k = 0; k < kRows; ++k) {
+      const auto t = static_cast<double>(k);
+      cv[k] = 38.0 + 7.0 * std::sin(0.7 * t) + 3.0 * std::sin(0.11 * t);
+      rod += 0.6 * (cv[k] - rod);
+      x[k] = rod;
+      f[k] = 0.011 * rod * rod;
+    }
+  }
+};
+const Valve kValve;
+
+std::string Fixed(double value, int decimals = 3) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
+  return text.data();
+}
+
+std::string Comma(double value) {
+  std::string text = Fixed(value);
+  text.replace(text.find('.'), 1, ",");
+  return text;
+}
+
+/// strftime() of row k in UTC.
+std::string Clock(const char* format, std::size_t k,
+                  std::int64_t start = kStart) {
+  const std::time_t at = start + static_cast<std::time_t>(k);
+  std::tm fields{};
+  gmtime_r(&at, &fields);
+  std::array<char, 64> text{};
+  std::strftime(text.data(), text.size(), format, &fields);
+  return text.data();
+}
+std::string Iso(std::size_t k) { return Clock("%Y-%m-%dT%H:%M:%SZ", k); }
+
+using Row = std::function<std::string(std::size_t)>;
+std::string Rows(const Row& row, bool backwards = false) {
+  std::string text;
+  for (std::size_t k = 0; k < kRows; ++k) {
+    text += row(backwards ? kRows - 1 - k : k) + "\n";
+  }
+  return text;
+}
+std::string Plain(std::size_t k) {
+  return Fixed(kValve.cv[k]) + "," + Fixed(kValve.x[k]) + "," +
+         Fixed(kValve.f[k]);
+}
+std::string Wide(const std::string& header, const Row& time) {
+  return header + "\n" +
+         Rows([&](std::size_t k) { return time(k) + "," + Plain(k); });
+}
+/// One reading per row and tag; `cell` gets the row, tag and value.
+std::string Tall(
+    const std::function<std::string(std::size_t, const std::string&, double)>&
+        row,
+    bool by_tag) {
+  std::string text;
+  const std::array<std::pair<const char*, const std::array<double, kRows>*>, 3>
+      tags{{{"17FC.OP", &kValve.cv}, {"17ZT.PV", &kValve.x},
+            {"17FT.PV", &kValve.f}}};
+  for (std::size_t i = 0; i < 3 * kRows; ++i) {
+    const auto& [tag, values] = by_tag ? tags[i / kRows] : tags[i % 3];
+    const std::size_t k = by_tag ? i % kRows : i / 3;
+    text += row(k, tag, (*values)[k]) + "\n";
+  }
+  return text;
+}
+
+struct Kind {
+  const char* name;
+  std::string text;
+  std::set<std::size_t> without_x{};
+  std::set<std::size_t> without_f{};
+  std::int64_t start{kStart};
+  std::size_t samples{kRows};
+};
+
+std::set<std::size_t> Range(std::size_t from, std::size_t to) {
+  std::set<std::size_t> rows;
+  for (std::size_t k = from; k <= to; ++k) {
+    rows.insert(k);
+  }
+  return rows;
+}
+
+std::vector<Kind> Kinds() {
+  const std::string names = "FC17.OUT,ZT17.PV,FT17.PV";
+  const auto count = [](std::int64_t per_second, std::int64_t origin) {
+    return [=](std::size_t k) {
+      return std::to_string((kStart + static_cast<std::int64_t>(k) + origin) *
+                            per_second);
+    };
+  };
+  const auto in = [](std::size_t k, std::size_t from, std::size_t to) {
+    return k >= from && k <= to;
+  };
+  std::vector<Kind> kinds = {
+      {"seconds since 1970", Wide("ts," + names, count(1, 0))},
+      {"milliseconds since 1970", Wide("ts," + names, count(1000, 0))},
+      {"microseconds since 1970", Wide("ts," + names, count(1000000, 0))},
+      {"nanoseconds since 1970", Wide("ts," + names, count(1000000000, 0))},
+      {"100 ns since 1601",
+       Wide("Timestamp," + names, count(10000000, 11644473600))},
+      {"no name above the times",
+       Wide(",17FC.OP,17ZT.PV,17FT.PV",
+            [](std::size_t k) { return Clock("%Y-%m-%d %H:%M:%S", k); })},
+      {"newest first",
+       "time," + names + "\n" +
+           Rows([](std::size_t k) { return Iso(k) + "," + Plain(k); }, true)},
+      {"date and time apart, newest first, sums at the end",
+       "$DATE,$TIME,FV 17 OUT %,FV 17 POS %,FLOW 17 t/h\n" +
+           Rows(
+               [](std::size_t k) {
+                 return Clock("%d.%m.%Y,%H:%M:%S,", k) + Plain(k);
+               },
+               true) +
+           "Average,,37.00,37.00,80.00\nMax,,50,50,120\n"},
+      {"sections, comments and short years",
+       "* exported by station 4\n[Data]\nTag,TimeStamp,Value,DataQuality\n" +
+           Tall(
+               [](std::size_t k, const std::string& tag, double value) {
+                 return tag + Clock(",3/%d/%y %H:%M:%S,", k) + Fixed(value) +
+                        ",Good";
+               },
+               false)},
+      {"names, units and descriptions",
+       "Date;FV6 output;FV6 travel;FT6 flow\n;%;%;t/h\n;to the positioner;of "
+       "the stem;behind the valve\n" +
+           Rows([](std::size_t k) {
+             return Clock("%d.%m.%Y %H:%M:%S;", k) + Comma(kValve.cv[k]) + ";" +
+                    Comma(kValve.x[k]) + ";" + Comma(kValve.f[k]);
+           })},
+      {"units in the cells",
+       "\"Time\",\"FV-17 output\",\"FV-17 travel\",\"FT-17 flow\"\n" +
+           Rows([](std::size_t k) {
+             return Clock("%Y-%m-%d %H:%M:%S,", k) + Fixed(kValve.cv[k]) +
+                    "%," + Fixed(kValve.x[k]) + " %," + Fixed(kValve.f[k]) +
+                    " t/h";
+           })},
+      {"thousands",
+       "Time,FV-17 output [%],FV-17 travel [%],FT-17 flow [kg/h]\n" +
+           Rows([](std::size_t k) {
+             const auto flow = std::llround(1e4 * kValve.f[k]);
+             return Clock("%Y-%m-%d %H:%M:%S,", k) + Fixed(kValve.cv[k]) + "," +
+                    Fixed(kValve.x[k]) + ",\"" + std::to_string(flow / 10000) +
+                    "," + std::to_string(1000 + flow / 10 % 1000).substr(1) +
+                    "." + std::to_string(flow % 10) + "\"";
+           })},
+      {"an annotated table of each tag",
+       [] {
+         std::string text;
+         const std::array<std::pair<const char*, const std::array<double, kRows>*>,
+                          3>
+             tags{{{"FV17.OP", &kValve.cv}, {"FV17.ZT", &kValve.x},
+                   {"FV17.FT", &kValve.f}}};
+         for (const auto& [tag, values] : tags) {
+           text += "#datatype,string,dateTime,dateTime,double,string\n"
+                   "#default,_result,,,,\n,table,_start,_time,_value,_field\n";
+           for (std::size_t k = 0; k < kRows; ++k) {
+             text += ",0," + Iso(0) + "," + Iso(k) + "," +
+                     Fixed((*values)[k]) + "," + tag + "\n";
+           }
+           text += "\n";
+         }
+         return text;
+       }()},
+      {"tags in order, markers, validity",
+       "\"VarName\";\"TimeString\";\"VarValue\";\"Validity\";\"Time_ms\"\n" +
+           Tall(
+               [](std::size_t k, const std::string& tag, double value) {
+                 const bool bad = tag == "17ZT.PV" && k >= 30 && k < 40;
+                 return '"' + tag + "\";\"" +
+                        Clock("%d.%m.%Y %H:%M:%S\";", k) + Comma(value) +
+                        (bad ? ";0;" : ";1;") + "46091416666,667";
+               },
+               true) +
+           "\"$RT_OFF$\";\"10.03.2026 09:12:00\";0;2;46091425000,000\n"
+           "\"$RT_COUNT$\";2162;;;\n",
+       Range(30, 39)},
+      {"grades of quality",
+       "NAME,TS,VALUE,STATUS\n" +
+           Tall(
+               [](std::size_t k, const std::string& tag, double value) {
+                 const bool bad = tag == "17FT.PV" && k >= 50 && k < 60;
+                 return tag + Clock(",%d-%b-%y %H:%M:%S,", k) + Fixed(value) +
+                        (bad ? ",2" : k > 100 ? ",4" : ",0");
+               },
+               false),
+       {},
+       Range(50, 59)},
+      {"true where a reading is bad",
+       "tag,time,value,questionable\n" +
+           Tall(
+               [](std::size_t k, const std::string& tag, double value) {
+                 const bool bad = tag == "17FT.PV" && k >= 50 && k < 60;
+                 return tag + "," + Iso(k) + "," + Fixed(value) +
+                        (bad ? ",true" : ",false");
+               },
+               false),
+       {},
+       Range(50, 59)},
+      {"words of a control system",
+       "Tag,Time,Value,Status\n" +
+           Tall(
+               [](std::size_t k, const std::string& tag, double value) {
+                 const bool bad = tag == "17ZT.PV" && k < 10;
+                 return tag + "," + Iso(k) + "," + Fixed(value) +
+                        (bad ? ",BadSensorFailure" : ",GoodNonCascade");
+               },
+               false),
+       Range(0, 9)},
+      {"quality beside each value",
+       "Time,FIC17/OP.CV,FIC17/OP.ST,FV17/ZT.CV,FV17/ZT.ST,FT17/PV.CV,"
+       "FT17/PV.ST\n" +
+           Rows([&](std::size_t k) {
+             return Iso(k) + "," + Fixed(kValve.cv[k]) + ",Good," +
+                    Fixed(kValve.x[k]) + ",Good," +
+                    (in(k, 40, 49) ? "0.0,Bad" : Fixed(kValve.f[k]) + ",Good");
+           }),
+       {},
+       Range(40, 49)},
+      {"words for no reading",
+       "time,17FC.OP,17ZT.PV,17FT.PV\n" +
+           Rows([&](std::size_t k) {
+             return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
+                    (in(k, 10, 19)   ? "Inp OutRange"
+                     : in(k, 60, 62) ? "Defekt am Geber"
+                                     : Fixed(kValve.x[k])) +
+                    "," + (in(k, 30, 32) ? "Set to Bad" : Fixed(kValve.f[k]));
+           }),
+       [] {
+         auto rows = Range(10, 19);
+         rows.merge(Range(60, 62));
+         return rows;
+       }(),
+       Range(30, 32)},
+      {"numbers of a state",
+       "time,FC2.OP,ZT2.PV,FT2.PV\n" +
+           Rows([&](std::size_t k) {
+             return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
+                    (in(k, 70, 79) ? k < 75 ? "246.000" : "253.000"
+                                   : Fixed(kValve.x[k])) +
+                    "," + Fixed(kValve.f[k]);
+           }),
+       Range(70, 79)},
+      {"blanks between thousands, tabs, decimal commas, brackets",
+       "Zeit\tV 17 [Stellgröße] (%)\tV 17 [Stellung] (%)\tF 17 [Durchfluß] "
+       "(kg/h)\n" +
+           Rows([](std::size_t k) {
+             const auto flow = std::llround(1e3 * kValve.f[k]);
+             return Clock("%d.%m.%Y %H:%M:%S\t", k) + Comma(kValve.cv[k]) +
+                    "\t" + Comma(kValve.x[k]) + "\t" +
+                    std::to_string(flow / 1000) + " " +
+                    std::to_string(1000 + flow % 1000).substr(1) + ",0";
+           })},
+      {"a leap second",
+       [&] {
+         // date -d 2016-12-31T23:59:00Z +%s
+         std::string text = "time," + names + "\n";
+         for (std::size_t k = 0; k < kRows; ++k) {
+           text += Clock("%Y-%m-%dT%H:%M:%SZ,", k, 1'483'228'740) + Plain(k) +
+                   "\n";
+           text += k == 59 ? "2016-12-31T23:59:60Z," + Plain(k) + "\n" : "";
+         }
+         return text;
+       }(),
+       {},
+       {},
+       1'483'228'740},
+  };
+  return kinds;
+}
+
+/// The map that sniff writes, read back as a user's file.
+ColumnMap MapOf(const std::string& text, const ColumnMap& given = {}) {
+  const storage::TemporaryDirectory directory;
+  const auto path = directory.path() / "tags.toml";
+  std::ofstream(path) << MapText(Sniff(text, "plant.csv", given), "plant.csv");
+  return ReadTagMap(path);
+}
+
+ColumnMap Utc() {
+  ColumnMap map;
+  map.zone = "UTC";
+  return map;
+}
+
+std::string Findings(const std::string& text) {
+  const Sniffed found = Sniff(text, "plant.csv", Utc());
+  std::string all;
+  for (const std::string& finding : found.findings) {
+    all += finding + "\n";
+  }
+  return all;
+}
+
+TEST(KindsTest, WhatSniffWritesTheImporterReads) {
+  for (const Kind& kind : Kinds()) {
+    SCOPED_TRACE(kind.name);
+    ColumnMap map;
+    CsvTable table;
+    ASSERT_NO_THROW({
+      map = MapOf(kind.text, Utc());
+      map.resampling.reset();
+      table = ReadCsv(kind.text, {.map = map, .split_gaps = true});
+    });
+
+    ASSERT_EQ(table.runs.size(), 1U);
+    const auto& samples = table.runs[0].samples;
+    EXPECT_EQ(samples.size(), kind.samples);
+    EXPECT_EQ(table.runs[0].period_s, 1.0);
+    EXPECT_EQ(table.start_ns, kind.start * 1'000'000'000);
+    ASSERT_TRUE(table.dated);
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+      const Sample& sample = samples[k].sample;
+      EXPECT_NEAR(100.0 - sample[Signal::kCv], kValve.cv[k], 1e-3) << k;
+      ASSERT_EQ(sample.Has(Signal::kX), !kind.without_x.contains(k)) << k;
+      ASSERT_EQ(sample.Has(Signal::kF), !kind.without_f.contains(k)) << k;
+      if (sample.Has(Signal::kX)) {
+        EXPECT_NEAR(100.0 - sample[Signal::kX], kValve.x[k], 1e-3) << k;
+      }
+      // m3/h where a name states no unit, which sniff marks.
+      if (sample.Has(Signal::kF)) {
+        EXPECT_NEAR(sample[Signal::kF], kValve.f[k], 2e-3) << k;
+      }
+    }
+  }
+}
+
+TEST(KindsTest, AmbiguousDecimalsAndDatesAreMarkedAsChoices) {
+  const std::string points =
+      "Date;FV6 output;FV6 travel;FT6 flow\n" +
+      Rows([](std::size_t k) {
+        return Clock("%d/03/2026 %H:%M:%S;", k) + Fixed(kValve.cv[k]) + ";" +
+               Fixed(kValve.x[k]) + ";" + Fixed(10.0 + kValve.f[k]);
+      });
+  const Sniffed found = Sniff(points, "plant.csv", Utc());
+  EXPECT_EQ(found.map.decimal, '.');
+  EXPECT_THAT(found.choices, Contains(HasSubstr("decimal: ")));
+  EXPECT_THAT(found.choices, Contains(HasSubstr("date: ")));
+  EXPECT_THAT(MapText(found, "plant.csv"),
+              HasSubstr("decimal = \".\"  # choice: every number"));
+
+  ColumnMap given = Utc();
+  given.decimal = '.';
+  given.date_order = DateOrder::kMonthFirst;
+  EXPECT_TRUE(Sniff(points, "plant.csv", given).choices.empty());
+}
+
+TEST(KindsTest, UnknownQualityIsNamedAndRefused) {
+  const std::string text =
+      "Tag,Time,Value,Quality\n" +
+      Tall(
+          [](std::size_t k, const std::string& tag, double value) {
+            return tag + "," + Iso(k) + "," + Fixed(value) +
+                   (k == 3 ? ",Wobbly" : ",Good");
+          },
+          false);
+  const ColumnMap map = MapOf(text);
+  try {
+    ReadCsv(text, {.map = map});
+    FAIL() << "not refused";
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("\"Wobbly\" is no known quality"));
+  }
+  ColumnMap more = map;
+  more.quality.uncertain = {"wobbly"};
+  const auto& sample = ReadCsv(text, {.map = more}).runs[0].samples[3].sample;
+  EXPECT_EQ(sample.quality[Index(Signal::kX)], SignalQuality::kUncertain);
+}
+
+TEST(KindsTest, SignalsAreRequiredByReadingsNotByHeaders) {
+  const std::string text =
+      "time,CV,X,Q\n" + Rows([](std::size_t k) {
+        return Iso(k) + "," + Fixed(kValve.cv[k]) + "," + Fixed(kValve.x[k]) +
+               ",bad";
+      });
+  ColumnMap map;
+  map.columns = {{"CV", Signal::kCv}, {"X", Signal::kX}};
+  map.quality_of = {{"X", "Q"}};
+  try {
+    ReadCsv(text, {.map = map, .required = MaskOf(Signal::kX)});
+    FAIL() << "not refused";
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no reading of CV in 120 rows"));
+  }
+}
+
+TEST(KindsTest, CountsBeyondTheCardAreABrokenWire) {
+  const std::string text =
+      "time,AO_FV17,AI_ZT17,AI_FT17\n" + Rows([](std::size_t k) {
+        const auto counts = [](double percent) {
+          return std::to_string(std::llround(276.48 * percent));
+        };
+        return Iso(k) + "," + counts(kValve.cv[k]) + "," +
+               (k >= 45 && k < 50 ? "32767" : counts(kValve.x[k])) + "," +
+               counts(kValve.f[k]);
+      });
+  const ColumnMap map = MapOf(text);
+  const auto table = ReadCsv(text, {.map = map});
+  const auto& samples = table.runs[0].samples;
+  EXPECT_NEAR(100.0 - samples[44].sample[Signal::kX], kValve.x[44], 0.01);
+  EXPECT_FALSE(samples[45].sample.Has(Signal::kX));
+  EXPECT_FALSE(samples[49].sample.Has(Signal::kX));
+  EXPECT_TRUE(samples[50].sample.Has(Signal::kX));
+  EXPECT_THAT(table.notes, Contains(HasSubstr("5 cells beyond `raw`")));
+}
+
+TEST(KindsTest, UnitsAndRangesBeatLettersOfTags) {
+  struct Tag {
+    const char* name;
+    std::optional<Signal> signal;
+  };
+  const auto guess = [](const std::string& name, double scale, double offset,
+                        const std::string& others = "") {
+    const std::string text =
+        "time," + name + (others.empty() ? "" : "," + others) + "\n" +
+        Rows([&](std::size_t k) {
+          return Iso(k) + "," + Fixed(offset + scale * kValve.x[k]) +
+                 (others.empty() ? "" : "," + Fixed(kValve.cv[k]));
+        });
+    return Sniff(text, "plant.csv", {}).columns[0].signal;
+  };
+  for (const Tag& tag : std::initializer_list<Tag>{
+           {"FIC-101.OP", Signal::kCv},
+           {"17FC.OUT", Signal::kCv},
+           {"FY12", Signal::kCv},
+           {"FV_211", Signal::kCv},
+           {"V17.Stellgröße", Signal::kCv},
+           {"Vanne 12 commande", Signal::kCv},
+           {"Válvula 12 salida", Signal::kCv},
+           {"Zawór 12 sterowanie", Signal::kCv},
+           {"MV101.CMD", Signal::kCv},
+           {"FV-7.ZT", Signal::kX},
+           {"GT 51", Signal::kX},
+           {"V17 Rückmeldung", Signal::kX},
+           {"Vanne 12 recopie", Signal::kX},
+           {"Válvula 12 posición", Signal::kX},
+           {"Zawór 12 położenie", Signal::kX},
+           {"FT101 [t/h]", Signal::kF},
+           {"Durchfluß 3 [m³/h]", Signal::kF},
+           {"débit eau", Signal::kF},
+           {"Caudal 4", Signal::kF},
+           {"Przepływ 5", Signal::kF},
+           {"FIC-101.PV", Signal::kF},
+           {"PT101 [bar]", Signal::kP1},
+           {"Ciśnienie przed zaworem [bar]", Signal::kP1},
+           {"Pression aval [bar]", Signal::kP2},
+           {"TT12 [°C]", Signal::kT1},
+           {"LT7 [%]", std::nullopt},
+           {"LIC7.PV", std::nullopt},
+           {"FT9 [rpm]", std::nullopt},
+           {"FT3 [Nm3/h]", std::nullopt}}) {
+    EXPECT_EQ(guess(tag.name, 1.0, 0.0), tag.signal) << tag.name;
+  }
+  EXPECT_EQ(guess("FV9 I [mA]", 0.16, 4.0), Signal::kCv);
+  EXPECT_EQ(guess("FV-7.PV", 1.0, 0.0, "FIC7.OP"), Signal::kX);
+  EXPECT_EQ(guess("FV-7.PV", 1.0, 0.0, "FV-7.ZT"), Signal::kCv);
+  // Pulses of a flow meter are no opening.
+  EXPECT_EQ(guess("FV-7 position", 1000.5, 0.0), std::nullopt);
+}
+
+TEST(KindsTest, WhatValveAndRecordTheModelsAreNotForIsSaid) {
+  const auto wide = [](const std::string& header,
+                       const std::function<std::string(std::size_t)>& cells) {
+    return "time," + header + "\n" + Rows([&](std::size_t k) {
+             return Iso(k) + "," + cells(k);
+           });
+  };
+  EXPECT_THAT(Findings(wide("MV101.CMD,MV101.ZSO,FIT101 [m3/h]",
+                            [](std::size_t k) {
+                              const bool open = k / 30 % 2 == 1;
+                              return open ? "100,100.0,2.4" : "0,0.0,0.0";
+                            })),
+              HasSubstr("an open/shut valve"));
+  EXPECT_THAT(Findings(wide("FC1.OP,ZT1.PV,FT1 [t/h]",
+                            [](std::size_t k) {
+                              return Fixed(kValve.cv[k]) + "," +
+                                     Fixed(kValve.cv[k]) + "," +
+                                     Fixed(kValve.f[k]);
+                            })),
+              HasSubstr("X is a copy of CV"));
+  EXPECT_THAT(Findings(wide("LIC7.OP [%],LT7 [%]",
+                            [](std::size_t k) {
+                              return Fixed(kValve.cv[k]) + "," +
+                                     Fixed(50.0 + 0.01 * kValve.x[k]);
+                            })),
+              HasSubstr("LT7 [%] is a level"));
+  EXPECT_THAT(Findings(wide("FIC8.OP [%],FT8 [t/h]",
+                            [](std::size_t k) {
+                              return Fixed(kValve.cv[k]) + "," +
+                                     Fixed(kValve.f[k]);
+                            })),
+              HasSubstr("no position (X)"));
+  EXPECT_THAT(Findings(wide("FV3.OP,FV3.ZT,FT3 [Nm3/h]", Plain)),
+              HasSubstr("a flow of gas"));
+  EXPECT_THAT(Findings("time,FC1.OP,ZT1.PV,FT1 [t/h]\n" +
+                       Rows([](std::size_t k) {
+                         return Clock("%Y-%m-%dT%H:%M:%SZ,", 60 * k) + Plain(k);
+                       })),
+              HasSubstr("a slow record: one row in 60 s"));
+  const std::string split =
+      wide("PIC5.OP,PV5A.ZT,FT5A [t/h]", [](std::size_t k) {
+        const double x = k > 100 ? 100.0 : kValve.x[k];
+        return Fixed(k > 100 ? 70.0 : 0.5 * kValve.cv[k]) + "," + Fixed(x) +
+               "," + Fixed(kValve.f[k]);
+      });
+  EXPECT_THAT(Findings(split), HasSubstr("split range"));
+  const ColumnMap map = MapOf(split);
+  const Sample& open = ReadCsv(split, {.map = map}).runs[0].samples[110].sample;
+  EXPECT_EQ(open[Signal::kCv], 0.0) << "fully open, not beyond its range";
+}
+
+// The files of the reference data: what their table says is right.
+TEST(KindsTest, TheReferenceFilesGiveWhatTheirTableSays) {
+  const char* folder = std::getenv("FDI_REFERENCE_DATA");
+  if (folder == nullptr) {
+    GTEST_SKIP() << "FDI_REFERENCE_DATA is not set";
+  }
+  struct File {
+    const char* name;
+    std::size_t samples;
+    std::set<std::size_t> without_x{};
+    std::set<std::size_t> without_f{};
+    const char* zone{"UTC"};
+    const char* says{""};  // Among the findings.
+    std::int64_t start{kStart};
+    double period_s{1.0};
+  };
+  const auto both = [](std::set<std::size_t> a, std::set<std::size_t> b) {
+    a.merge(b);
+    return a;
+  };
+  const std::vector<File> files = {
+      {"a01_wincc_archive", 720, Range(300, 329), {}, "Europe/Berlin"},
+      {"a02_influx_annotated", 720},
+      {"a03_influx1_ns", 720},
+      {"a05_grafana_units", 720},
+      {"a06_thousands", 720},
+      {"a08_wide_quality", 720, {}, Range(400, 459)},
+      {"a09_ip21_status", 720, {}, Range(500, 519)},
+      {"a10_pi_states", 720,
+       both(Range(100, 109), both(Range(350, 352), Range(360, 362))),
+       both(Range(200, 205), Range(260, 263))},
+      {"a11_s7_counts", 720, Range(450, 479)},
+      {"a12_dst_tag_major", 1440, {}, {}, "Europe/Berlin", "",
+       1'792'888'200, 5.0},
+      {"a13_date_time_summary", 720},
+      {"a14_section_two_digit_year", 720},
+      {"a15_filetime", 720},
+      {"a16_epoch_us", 720},
+      {"a18_utf16_brackets", 720, {}, {}, "Europe/Berlin"},
+      {"a19_quality_words_dcs", 700, Range(0, 69), Range(0, 69)},
+      {"b01_split_range", 1500, {}, {}, "UTC", "split range"},
+      {"b03_gas_nm3h", 900, {}, {}, "UTC", "a flow of gas"},
+      {"b05_no_position", 1800, {}, {}, "UTC", "no position (X)"},
+      {"b06_on_off", 1800, {}, {}, "UTC", "an open/shut valve"},
+      {"b07_low_flow_cutoff", 1800},
+      {"b08_state_numbers", 900, both(Range(300, 329), Range(500, 509))},
+      {"b09_units_row", 720},
+      {"b10_supply_lost", 1800},
+  };
+  for (const File& file : files) {
+    SCOPED_TRACE(file.name);
+    const std::string text = ReadTextFile(
+        std::string(folder) + "/cases/" + file.name + ".csv");
+    ColumnMap map = Utc();
+    map.zone = file.zone;
+    std::string findings;
+    for (const auto& finding : Sniff(text, file.name, map).findings) {
+      findings += finding + "\n";
+    }
+    EXPECT_THAT(findings, HasSubstr(file.says));
+    EXPECT_THAT(findings, Not(HasSubstr("refused as it is")));
+    map = MapOf(text, map);
+    map.resampling.reset();
+    CsvTable table;
+    ASSERT_NO_THROW(table = ReadCsv(text, {.map = map}));
+    ASSERT_EQ(table.runs.size(), 1U);
+    const SampleSeries& run = table.runs[0];
+    EXPECT_EQ(run.samples.size(), file.samples);
+    EXPECT_EQ(table.start_ns, file.start * 1'000'000'000);
+    EXPECT_EQ(run.period_s, file.period_s);
+    const bool has_x = (run.signals & MaskOf(Signal::kX)) != 0;
+    const bool has_f = (run.signals & MaskOf(Signal::kF)) != 0;
+    EXPECT_EQ(has_x, std::string(file.name) != "b05_no_position");
+    EXPECT_EQ(has_f, std::string(file.name) != "b03_gas_nm3h");
+    for (std::size_t k = 0; k < run.samples.size(); ++k) {
+      const Sample& sample = run.samples[k].sample;
+      ASSERT_EQ(sample.Has(Signal::kX), has_x && !file.without_x.contains(k))
+          << k;
+      ASSERT_EQ(sample.Has(Signal::kF), has_f && !file.without_f.contains(k))
+          << k;
+    }
+    if (std::string(file.name).starts_with('a') &&
+        std::string(file.name) != "a19_quality_words_dcs") {
+      EXPECT_NEAR(run.samples[0].sample[Signal::kCv], 100.0 - 37.461, 0.01);
+    }
+  }
+  const std::pair<const char*, const char*> refused[] = {
+      {"a17_etl_headerless", "the first row holds values"},
+      {"b04_level_loop", "LT7 [%] is a level"}};
+  for (const auto& [name, says] : refused) {
+    const std::string text =
+        ReadTextFile(std::string(folder) + "/cases/" + name + ".csv");
+    try {
+      std::string findings;
+      for (const auto& finding : Sniff(text, name, Utc()).findings) {
+        findings += finding + "\n";
+      }
+      EXPECT_THAT(findings, HasSubstr(says));
+    } catch (const DataError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(says));
+    }
+  }
+}
+
+TEST(KindsTest, AFileWithoutNamesIsRefusedInOneLine) {
+  try {
+    Sniff(Rows([](std::size_t k) {
+            return Iso(k) + ",P17.FV_OP," + Fixed(kValve.cv[k]);
+          }),
+          "plant.csv", {});
+    FAIL() << "not refused";
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("plant.csv:1: the first row holds "
+                                        "values, not names"));
+  }
+}
+
+TEST(KindsTest, AGzipThatUnpacksToTooMuchIsRefused) {
+  const storage::TemporaryDirectory directory;
+  const auto path = directory.path() / "bomb.csv.gz";
+  gzFile file = gzopen(path.c_str(), "wb9");
+  const std::string rows(1U << 20U, '\n');
+  for (int i = 0; i < 64; ++i) {
+    gzwrite(file, rows.data(), static_cast<unsigned>(rows.size()));
+  }
+  gzclose(file);
+  try {
+    ReadTextFile(path);
+    FAIL() << "not refused";
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("unpacks to more than 100 times"));
+  }
+}
+
+}  // namespace
+}  // namespace fdi::importer
