@@ -2,7 +2,7 @@
 # Installs the Debian packages that are missing and builds Release.
 # Usage: cmake/prepare.sh [programs|tests|package [DEBIAN_PACKAGE...]]
 #   programs   the four programs and the live page (default)
-#   tests      these and the tests
+#   tests      these, the tests, the benchmarks and the studies
 #   package    the programs, and the Debian package in build/package/
 # Installs further packages of Debian, too, if they are named.
 set -euo pipefail
@@ -21,7 +21,7 @@ packages=(
   gnuplot-nox
 )
 for_package=(dpkg-dev file gzip help2man)
-for_tests=(libgtest-dev libgmock-dev cyclonedds-dev cyclonedds-tools chromium
+for_tests=(libgtest-dev libgmock-dev libbenchmark-dev cyclonedds-dev cyclonedds-tools chromium
   libmodbus-dev postgresql make procps iproute2)
 testing=OFF
 packaging=OFF
@@ -67,7 +67,8 @@ fi
 
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-cmake --preset release -DBUILD_TESTING=$testing -DFDI_PACKAGE=$packaging \
+cmake --preset release -DBUILD_TESTING=$testing -DFDI_BENCH=$testing \
+  -DFDI_PACKAGE=$packaging \
   >"$log" 2>&1 || {
   cat "$log" >&2
   exit 1

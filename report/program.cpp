@@ -214,6 +214,24 @@ void Program::AllowCsv(CLI::App& verb, const std::string& description) {
   verb.add_flag("--csv", csv_, description);
 }
 
+void Program::AddRemoved(const std::string& verb, const std::string& name,
+                         const std::string& instead) {
+  removed_[{verb, name}] = instead;
+}
+
+std::optional<std::string> Program::RemovedWord() const {
+  const CLI::App& chosen = Chosen(*app_);
+  const std::string verb = &chosen == app_.get() ? "" : chosen.get_name();
+  for (const std::string& word : app_->remaining(true)) {
+    const std::string name = word.substr(0, word.find('='));
+    if (const auto found = removed_.find({verb, name});
+        found != removed_.end()) {
+      return name + " is gone: " + found->second;
+    }
+  }
+  return std::nullopt;
+}
+
 void Program::AddExamples(std::vector<VerbExamples> examples) {
   SetExamples(*app_, examples);
   std::ranges::move(examples, std::back_inserter(examples_));
@@ -264,8 +282,8 @@ int Program::ParseAndRun(int argc, const char* const* argv) {
         "--config " + (option->count() > 0 ? option->results().front() : "") +
         ": " + error.what());
   } catch (const CLI::ParseError& error) {
-    throw fdi::ConfigError(Explain(*app_, error) + " (see " + app_->get_name() +
-                           " --help)");
+    throw fdi::ConfigError(RemovedWord().value_or(Explain(*app_, error)) +
+                           " (see " + app_->get_name() + " --help)");
   }
   return RunVerb(argc, argv);
 }

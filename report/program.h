@@ -2,9 +2,11 @@
 
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -89,6 +91,11 @@ class Program {
   /// Adds --csv to a verb that returns a Report with a table.
   void AllowCsv(CLI::App& verb, const std::string& description);
 
+  /// A verb or an option of earlier versions, which is refused with what to do
+  /// instead. @param verb that had the option; "" for a verb of the program.
+  void AddRemoved(const std::string& verb, const std::string& name,
+                  const std::string& instead);
+
   /// Appends examples to the help of verbs, groups (both named by path,
   /// "history list") and, for "", the program. Call after adding the verbs.
   /// @throws std::logic_error for an unknown verb.
@@ -120,6 +127,8 @@ class Program {
   int RunVerb(int argc, const char* const* argv);
   int ExitCodeOf(const std::exception& error) const;
   int Print(const Report& report) const;
+  /// What to do instead of the first removed word among those left over.
+  std::optional<std::string> RemovedWord() const;
   void PrintError(const std::string& message) const;
 
   std::unique_ptr<CLI::App> app_;
@@ -128,6 +137,7 @@ class Program {
   bool help_prepared_{false};
   std::vector<Verb> verbs_;
   std::vector<VerbExamples> examples_;
+  std::map<std::pair<std::string, std::string>, std::string> removed_;
   std::vector<std::function<std::optional<int>(const std::exception&)>>
       mappers_;
 };

@@ -41,6 +41,11 @@ struct Column {
   std::function<Tone(const Json& row)> tone{};
   /// Default: columns with numbers are right-aligned, others left-aligned.
   std::optional<Align> align{};
+  /// What the column says, for readers who do not know it. HTML lists the
+  /// meanings below the table.
+  std::string meaning{};
+  /// The id of the picture that HTML links the cell to; empty: none.
+  std::function<std::string(const Json& row)> picture{};
 };
 
 /// How a Report is rendered.
@@ -50,8 +55,8 @@ struct ReportStyle {
 };
 
 /// The result of a verb: a JSON document, and which parts of it the text shows.
-/// A verb fills `document`; text, JSON and CSV follow from it. Returned by the
-/// action of Program::AddVerb(), which prints it in the requested form:
+/// A verb fills `document`; text, JSON, CSV and HTML follow from it. Returned
+/// by the action of Program::AddVerb(), which prints it in the requested form:
 ///
 ///     Report report;
 ///     report.document["runs"] = RunRows(...);
@@ -66,19 +71,29 @@ class Report {
 
   /// Shows the array at `key`, a member of the document or a path "a/b", as a
   /// table. A row is an object. `if_empty` is printed if there is no row.
+  /// Of an object {"f3": {...}, ...} each member is a row, its name the row's
+  /// member "name".
   Report& Table(std::string key, std::vector<Column> columns,
                 std::string if_empty = "");
   /// Shows members of the object at `key` ("" is the document) as aligned
   /// lines "heading:  value".
   Report& Fields(std::string key, std::vector<Column> fields);
-  /// One or more lines in the text output only.
+  /// One or more lines; not in JSON or CSV.
   Report& Line(std::string text);
+  /// A heading above the parts that follow, set off by a blank line.
+  Report& Heading(std::string text);
+  /// An SVG element below its title, in HTML only. `id` is what cells link to.
+  Report& Picture(std::string id, std::string title, std::string svg);
   /// What --csv prints, if not the first table: the members `keys` of the rows
   /// at `key`.
   Report& Csv(std::string key, std::vector<std::string> keys);
 
   /// The text output, in the order in which parts were added.
   void PrintText(std::ostream& out, const ReportStyle& style) const;
+  /// The same parts as a page that needs no script and no other file, readable
+  /// on a light and a dark screen; all columns, whatever their `spare`.
+  void PrintHtml(std::ostream& out, const std::string& title,
+                 bool utc = false) const;
   /// The document.
   void PrintJson(std::ostream& out) const;
   /// One table as WriteCsvLine() writes it: keys as header, raw values.
@@ -95,12 +110,21 @@ class Report {
     std::string key;
     std::vector<Column> fields;
   };
-  using View = std::variant<TableView, FieldsView, std::string>;
-
-  void Print(const TableView& view, std::ostream& out,
-             const ReportStyle& style) const;
-  void Print(const FieldsView& view, std::ostream& out,
-             const ReportStyle& style) const;
+  struct LineView {
+    std::string text;
+  };
+  struct HeadingView {
+    std::string text;
+  };
+  struct PictureView {
+    std::string id;
+    std::string title;
+    std::string svg;
+  };
+  using View =
+      std::variant<TableView, FieldsView, LineView, HeadingView, PictureView>;
+  class TextPrinter;
+  class HtmlPrinter;
 
   std::vector<View> views_;
   std::optional<TableView> csv_;

@@ -30,6 +30,8 @@ const char* ToneCode(Tone tone) {
   switch (tone) {
     case Tone::kPlain:
       return "";
+    case Tone::kGood:
+      return "\x1b[32m";
     case Tone::kAlarm:
       return "\x1b[1;31m";
     case Tone::kWarning:

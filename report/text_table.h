@@ -14,6 +14,7 @@ enum class Align { kLeft, kRight };
 /// Emphasis of a cell; the text always carries the same information.
 enum class Tone {
   kPlain,
+  kGood,     ///< Green.
   kAlarm,    ///< Bold red: needs attention.
   kWarning,  ///< Yellow.
   kQuiet,    ///< Dim.

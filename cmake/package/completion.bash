@@ -57,7 +57,7 @@ _fdi_candidates() {
   local value=${2%%  *} words
   words=$(grep -oE '[a-z0-9-]+(\|[a-z0-9-]+)+' <<<"$2" | head -1)
   case "$1 $value" in
-    *SPEC* | fault\ * | without\ *) _fdi_faults ;;
+    *SPEC* | fault\ *) _fdi_faults ;;
     valve\ * | valves\ *)
       _fdi_listed pattern valves list
       _fdi_listed valve_id history list
@@ -66,7 +66,7 @@ _fdi_candidates() {
     *NAME\[@VERSION\]* | model-set\ * | parent\ * | candidate\ * | shadow\ *)
       _fdi_listed model_set models list
       ;;
-    *ID\[@* | run\ * | runs\ * | train-runs\ *) _fdi_listed run_id runs list ;;
+    *ID\[@* | run\ * | runs\ *) _fdi_listed run_id runs list ;;
     episode\ * | episodes\ *)
       echo last
       _fdi_listed episode_id history list --limit 100

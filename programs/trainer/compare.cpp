@@ -6,7 +6,7 @@
 #include "report/program.h"
 #include "storage/database/data_directory.h"
 #include "storage/models/models.h"
-#include "trainer/evaluation/comparison.h"
+#include "trainer/scoring/comparison.h"
 
 namespace fdi::trainer {
 namespace {

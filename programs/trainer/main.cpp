@@ -12,10 +12,12 @@ int main(int argc, char** argv) {
   fdi::trainer::AddEvaluateVerb(program);
   fdi::trainer::AddCompareVerb(program);
   fdi::trainer::AddShowVerb(program);
-  fdi::trainer::AddInjectVerb(program);
   fdi::trainer::AddOnboardVerb(program);
   fdi::trainer::AddLimitsVerb(program);
   fdi::trainer::AddCoverageVerb(program);
+  program.AddRemoved("", "inject",
+                     "it is fdi-study inject, which the source tree builds "
+                     "with -DFDI_BENCH=ON");
   program.AddExamples(
       {{"",
         {{"Train the paper's observers",

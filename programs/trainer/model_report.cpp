@@ -8,8 +8,8 @@
 #include "diagnosis/fault_catalogue.h"
 #include "storage/models/model_codec.h"
 #include "storage/models/models.h"
-#include "trainer/evaluation/evaluated_run.h"
 #include "trainer/rule_text.h"
+#include "trainer/scoring/evaluated_run.h"
 #include "trainer/statistics.h"
 
 namespace fdi::trainer {

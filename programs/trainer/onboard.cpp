@@ -27,10 +27,10 @@
 #include "trainer/campaign/campaign_runs.h"
 #include "trainer/campaign/file_runs.h"
 #include "trainer/campaign/run_input.h"
-#include "trainer/evaluation/evaluated_run.h"
 #include "trainer/learning/labelled_episodes.h"
 #include "trainer/onboarding/onboarding.h"
 #include "trainer/rule_text.h"
+#include "trainer/scoring/evaluated_run.h"
 #include "trainer/statistics.h"
 
 // The verbs `onboard` and `coverage`: both make difference observers for a

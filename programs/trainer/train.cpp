@@ -11,6 +11,7 @@
 #include "diagnosis/fault_catalogue.h"
 #include "programs/trainer/model_report.h"
 #include "programs/trainer/verbs.h"
+#include "report/help.h"
 #include "report/models/lineage_text.h"
 #include "report/program.h"
 #include "report/progress.h"
@@ -223,9 +224,9 @@ report::Report PlanReport(const LabelPlan& plan) {
     }
   }
   report.Line("next version of " + plan.training.name + ", built on " + parent +
-              "\nruns: " + Joined(plan.runs));
+              "\nruns: " + report::Joined(plan.runs));
   if (!plan.missing.empty()) {
-    report.Line("not in runs.db: " + Joined(plan.missing));
+    report.Line("not in runs.db: " + report::Joined(plan.missing));
   }
   report.Line("").Table("episodes", {{"episode", "episode_id"},
                                      {"valve", "valve_id"},

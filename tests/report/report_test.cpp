@@ -193,5 +193,42 @@ TEST(ReportTest, ProgramPrintsTheReportOfAVerbAsAsked) {
             "prog: error: --csv and --json exclude each other\n");
 }
 
+TEST(ReportTest, HtmlHasThePartsOfTheTextAndEscapesThem) {
+  Report report;
+  report.document["runs"] = {{{"run", "a<b>&\"c\""}, {"share", 0.5}},
+                             {{"run", "d"}, {"share", nullptr}}};
+  report.document["counts"] = {{"f3", {{"f3", 2}}}, {"normal", {{"f3", 0}}}};
+  report.Line("Two\nlines.").Heading("Runs");
+  report.Table("runs",
+               {{.heading = "run",
+                 .key = "run",
+                 .picture = [](const Json&) { return std::string("p"); }},
+                {.heading = "share",
+                 .key = "share",
+                 .format = Format::kPercent,
+                 .spare = 1,
+                 .tone = [](const Json&) { return Tone::kGood; },
+                 .meaning = "of <all>"}});
+  report.Table("counts", {{"truth", "name"}, {"f3", "f3"}});
+  report.Picture("p", "Picture", "<svg></svg>");
+  std::ostringstream out;
+  report.PrintHtml(out, "A & B");
+  EXPECT_THAT(
+      out.str(),
+      AllOf(HasSubstr("<title>A &amp; B</title>"), HasSubstr("<h1>A &amp; B"),
+            HasSubstr("<p>Two\nlines.</p>"), HasSubstr("<h2>Runs</h2>"),
+            HasSubstr("<a href=\"#p\">a&lt;b&gt;&amp;&quot;c&quot;</a>"),
+            HasSubstr("<td class=\"number good\">50.0 %</td>"),
+            HasSubstr("<td class=\"number good\">-</td>"),
+            HasSubstr("<dt>share</dt><dd>of &lt;all&gt;</dd>"),
+            HasSubstr("<h3 id=\"p\">Picture</h3>"), HasSubstr("<svg></svg>")));
+  EXPECT_THAT(out.str(), AllOf(Not(HasSubstr("<script")), HasSubstr(">f3</td>"),
+                               HasSubstr(">normal</td>")));
+  // Headings and rows by name are in the text, too; pictures are not.
+  EXPECT_THAT(TextOf(report),
+              AllOf(HasSubstr("\nRuns\n"), HasSubstr("truth   f3\n"),
+                    HasSubstr("normal   0\n"), Not(HasSubstr("svg"))));
+}
+
 }  // namespace
 }  // namespace fdi::report

@@ -29,7 +29,7 @@ faults=(f18:abrupt@$begin:strength=0.25 f19:abrupt@$begin:strength=0.25
 cp "$FDI_REFERENCE_DATA"/plant/lublin_actuator3_2001-10-11_first40min.csv \
   healthy.csv
 for fault in "${faults[@]}"; do
-  "$bin/fdi-trainer" inject --file healthy.csv --fault "$fault" \
+  "$bin/fdi-study" inject --file healthy.csv --fault "$fault" \
     -o "${fault%%:*}.csv" >inject.log 2>&1 || fail "inject fails"
 done
 

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "tests/programs/trainer/fixture.h"
+#include "tests/study/fixture.h"
 
 namespace fdi::trainer {
 namespace {
 
-class OnboardingTest : public TrainerProgram {
+class OnboardingTest : public study::StudyProgram {
  protected:
   void SetUp() override {
     const char* folder = std::getenv("FDI_REFERENCE_DATA");
@@ -52,10 +52,10 @@ TEST_F(OnboardingTest, FaultsOnARealValveAreSeenAndNamedNarrowly) {
         "f18:abrupt@1800:strength=0.25", "f6:abrupt@1800:strength=0.3",
         "t1:abrupt@1800:strength=0.1"}) {
     SCOPED_TRACE(fault);
-    ASSERT_EQ(
-        Run("inject --file " + Plant() + " --fault " + fault + " -o faulty.csv")
-            .code,
-        0);
+    ASSERT_EQ(Study("inject --file " + Plant() + " --fault " + fault +
+                    " -o faulty.csv")
+                  .code,
+              0);
     const nlohmann::json run = RunJson(
         "evaluate --model-set PLANT --file faulty.csv@1500:")["runs"][0];
     EXPECT_TRUE(run["detected"].get<bool>());

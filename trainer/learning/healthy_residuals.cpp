@@ -7,8 +7,8 @@
 #include "diagnosis/coverage.h"
 #include "diagnosis/observer_bank.h"
 #include "trainer/campaign/run_input.h"
-#include "trainer/evaluation/rescore.h"
 #include "trainer/floor_fit.h"
+#include "trainer/scoring/rescore.h"
 
 namespace fdi::trainer {
 namespace {

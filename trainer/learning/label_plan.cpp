@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
+#include "report/help.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/campaign_fields.h"
@@ -84,7 +85,7 @@ std::string ParentOf(const std::vector<storage::Episode>& episodes) {
   }
   if (sets.size() > 1) {
     throw ConfigError("the labelled episodes are of several model sets (" +
-                      Joined({sets.begin(), sets.end()}) +
+                      report::Joined({sets.begin(), sets.end()}) +
                       "): choose the one to build on with --parent "
                       "NAME[@VERSION]");
   }
@@ -188,14 +189,6 @@ std::string SettingsText(const TrainingOptions& options) {
   return json.dump();
 }
 
-std::string Joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) {
-    text += (text.empty() ? "" : ", ") + word;
-  }
-  return text;
-}
-
 LabelPlan MakeLabelPlan(const LabelRequest& request,
                         const storage::DataDirectory& directory) {
   storage::HistoryReader history(directory.history());
@@ -235,7 +228,8 @@ void RequireTrainable(const LabelPlan& plan, bool drop_missing,
     throw DataError(
         std::to_string(plan.missing.size()) + " of the " +
         std::to_string(plan.parent->training_runs.size()) + " runs that " +
-        parent + " was trained on are not in runs.db: " + Joined(plan.missing) +
+        parent +
+        " was trained on are not in runs.db: " + report::Joined(plan.missing) +
         "; --drop-missing does without "
         "them");
   }

@@ -53,9 +53,6 @@ void RequireTrainable(const LabelPlan& plan, bool drop_missing,
 /// "episode 00c0ffee12345678 of valve LV-1, label true: too short: ..."
 std::string RefusalText(const LabelledEpisode& episode);
 
-/// "a, b"
-std::string Joined(const std::vector<std::string>& words);
-
 /// Stores the samples of the learnt episodes as runs of their own in runs.db,
 /// with the truth that the label implies, so that the training can be repeated
 /// when traces and recorded runs are gone. A run that is there already is used

@@ -12,8 +12,8 @@
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "trainer/campaign/run_input.h"
-#include "trainer/evaluation/rescore.h"
 #include "trainer/rule_text.h"
+#include "trainer/scoring/rescore.h"
 
 namespace fdi::trainer {
 

@@ -410,17 +410,11 @@ TEST_F(JsonDocumentsTest, SimulatorAndTrainerAreOnThePage) {
               "--valve V --duration 300 --parameters paper-operating-point "
               "--fault f19:abrupt@100:strength=0.5 --no-publish --record",
               "fdi-simulator")["sources"][0]["run_id"];
-  const std::string healthy =
-      Printed(page, "run", "--valve W --duration 300 --no-publish --record",
-              "fdi-simulator")["sources"][0]["run_id"];
   Printed(page, "train", "--campaign quick.toml", "fdi-trainer");
   Printed(page, "train", "--campaign quick.toml", "fdi-trainer");
   Printed(page, "show", "quick --rules", "fdi-trainer");
   Printed(page, "evaluate", "--model-set quick@1 --runs " + id, "fdi-trainer");
   Printed(page, "compare", "quick@1 quick@2 --all --runs " + id, "fdi-trainer");
-  Printed(page, "inject",
-          "--run " + healthy + " --fault f6:abrupt@10:strength=0.3 -o f6.csv",
-          "fdi-trainer");
 
   {
     // As if onboarding had made it for the valve.

@@ -77,7 +77,8 @@ TEST_F(AppEvaluateTest, JsonHasTheKeysOfTheContractAndFindsTheFault) {
   EXPECT_THAT(keys, UnorderedElementsAre(
                         "run_id", "fault", "strength", "detected", "t_dt_first",
                         "t_dt", "t_it_first", "t_it", "r_fd", "r_td", "r_fi",
-                        "r_ti", "r_mi", "fs_d", "fs_i", "d_acc", "final_set"));
+                        "r_ti", "r_mi", "fs_d", "fs_i", "d_acc", "final_set",
+                        "t_exact", "episodes", "wrong_isolations"));
   EXPECT_EQ(run["run_id"], id);
   EXPECT_EQ(run["fault"], "f19");
   EXPECT_EQ(run["strength"], 0.5);
@@ -205,7 +206,7 @@ TEST_F(AppEvaluateTest, ValveIsScoredWithTheSetAssignedToIt) {
   const Outcome outcome = Run(call);
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, AllOf(HasSubstr("run_id,fault,strength,detected,"),
-                                 HasSubstr(RunOf(900) + ",normal,0,false,")));
+                                 HasSubstr(RunOf(900) + ",normal,0.0,false,")));
 }
 
 TEST_F(AppEvaluateTest, BadInputIsNamedWithItsExitCode) {
@@ -235,6 +236,26 @@ TEST_F(AppEvaluateTest, BadInputIsNamedWithItsExitCode) {
   EXPECT_EQ(unit.code, 0);
   EXPECT_THAT(unit.err,
               HasSubstr("flow_converted run=" + tonnes + " from=t/h to=m3/h"));
+}
+
+// What earlier versions had answers with what to do instead.
+TEST_F(AppEvaluateTest, RemovedVerbsAndOptionsNameWhatReplacesThem) {
+  const std::vector<std::pair<std::string, std::string>> removed{
+      {"evaluate --model-set quick --history plant --work-orders o.csv",
+       "--history is gone: score each file with --file"},
+      {"evaluate --model-set quick --campaign c.toml --leave-one-out",
+       "fdi-study leave-one-out"},
+      {"evaluate --campaign c.toml --seeds=20", "fdi-study seeds"},
+      {"evaluate --verdicts v.csv --file f.csv", "fdi-study verdicts"},
+      {"evaluate --baseline arx-cusum", "fdi-study baseline"},
+      {"evaluate --model-set quick --without f1", "fdi-study reduce"},
+      {"show quick --pictures pics", "fdi-study pictures"},
+      {"inject --file f.csv --fault f5:abrupt@5", "fdi-study inject"}};
+  for (const auto& [call, instead] : removed) {
+    const Outcome outcome = Run(call);
+    EXPECT_EQ(outcome.code, 2) << call;
+    EXPECT_THAT(outcome.err, HasSubstr(instead)) << call;
+  }
 }
 
 TEST_F(AppEvaluateTest, ShowTellsWhereTheSetCameFromAndItsRulesInWords) {

@@ -36,18 +36,19 @@ class TrainerProgram : public ::testing::Test {
     return text.str();
   }
 
-  Outcome Run(const std::string& arguments,
-              const std::string& data = "data") const {
+  Outcome Run(const std::string& arguments, const std::string& data = "data",
+              const std::string& program = FDI_TRAINER_PROGRAM) const {
     const std::string command = "cd " + directory_.path().string() + " && \"" +
-                                FDI_TRAINER_PROGRAM + "\" --data " + data +
-                                " " + arguments + " >out.txt 2>err.txt";
+                                program + "\" --data " + data + " " +
+                                arguments + " >out.txt 2>err.txt";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, Read("out.txt"),
             Read("err.txt")};
   }
-  nlohmann::json RunJson(const std::string& arguments,
-                         const std::string& data = "data") const {
-    const Outcome outcome = Run(arguments + " --json", data);
+  nlohmann::json RunJson(
+      const std::string& arguments, const std::string& data = "data",
+      const std::string& program = FDI_TRAINER_PROGRAM) const {
+    const Outcome outcome = Run(arguments + " --json", data, program);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return outcome.code == 0 ? nlohmann::json::parse(outcome.out)
                              : nlohmann::json();

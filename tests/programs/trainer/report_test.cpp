@@ -1,4 +1,4 @@
-// Runs the built program: the report, files that are not stored, pictures.
+// Runs the built program: the report, files that are not stored.
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "import/csv.h"
+#include "report/fault_texts.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "tests/programs/trainer/fixture.h"
@@ -170,12 +171,21 @@ TEST_F(AppReportTest, ReportStandsAloneAndShowsEveryRun) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const std::string page = Read("out/index.html");
   EXPECT_THAT(page, AllOf(HasSubstr("a&amp;b.csv"), Not(HasSubstr("a&b.csv"))));
-  EXPECT_THAT(page, HasSubstr("1 of 1 faults detected"));
+  EXPECT_THAT(page, HasSubstr("<th>faults detected</th><td>1 of 1"));
+  // Faults by the names that operators see.
+  const std::string name = report::FaultTexts(FDI_FAULT_TEXTS).Of(19).name;
   EXPECT_THAT(
       page,
       AllOf(HasSubstr("Confusion by fault"), HasSubstr("Confusion by group"),
-            HasSubstr("f19, strength 0.50"), HasSubstr("d_f19 (the fault)"),
+            HasSubstr("f19 " + name + ", strength 0.50"),
+            HasSubstr("final set f19 " + name), HasSubstr("d_f19 (the fault)"),
             HasSubstr("T = 0.7"), HasSubstr("prefers-color-scheme:dark")));
+  // Every index is explained, and measured signals are drawn.
+  for (const char* index : {"t_dt [s]", "r_fd", "d_acc", "final set"}) {
+    EXPECT_THAT(page, HasSubstr("<dt>" + std::string(index) + "</dt><dd>"))
+        << index;
+  }
+  EXPECT_THAT(page, AllOf(HasSubstr("CV, X [%]"), HasSubstr("F measured")));
   EXPECT_THAT(page, AllOf(Not(HasSubstr("<script")), Not(HasSubstr("src=")),
                           Not(HasSubstr("@import")), Not(HasSubstr("url("))));
   // Nothing but links within the page and the name of the SVG namespace.
@@ -234,48 +244,6 @@ TEST_F(AppReportTest, FolderThatCannotBeMadeIsNamed) {
     EXPECT_EQ(Run(call + "closed").code, 3);
     EXPECT_EQ(Run(call + "closed/inner").code, 3);
   }
-}
-
-TEST_F(AppReportTest, PicturesShowEverySetAndEveryMembership) {
-  const json set = RunJson("show quick --rules");
-  const Outcome outcome = Run("show quick --pictures pics");
-
-  ASSERT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_THAT(outcome.err, Not(HasSubstr("residuals_missing")));
-  std::size_t memberships = 0;
-  std::size_t residuals = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(Path("pics"))) {
-    const std::string name = entry.path().filename();
-    const std::string picture = Read("pics/" + name);
-    EXPECT_THAT(picture, HasSubstr("membership [-]")) << name;
-    memberships += name.starts_with("membership_");
-    residuals += name.starts_with("residual_");
-    if (name.starts_with("residual_")) {
-      EXPECT_THAT(picture, AllOf(HasSubstr("residuals in training"),
-                                 HasSubstr("tallest bar")))
-          << name;
-    }
-  }
-  std::size_t regressors = 0;
-  for (const json& channel : set["observers"][0]["channels"]) {
-    regressors += channel["regressors"].size();
-  }
-  EXPECT_EQ(memberships, regressors);
-  EXPECT_EQ(residuals, 4U);  // normal and f19, X and F
-}
-
-TEST_F(AppReportTest, MissingTrainingRunIsNamedAndTheTrapezoidStandsAlone) {
-  const std::string id = NormalRun().info.id;
-  storage::RunStore(Runs(), storage::Access::kOccasionalWriter).Delete(id);
-
-  const Outcome outcome = Run("show quick --pictures pics");
-
-  EXPECT_EQ(outcome.code, 0);
-  EXPECT_THAT(outcome.err,
-              AllOf(HasSubstr("residuals_missing"), HasSubstr(id)));
-  const std::string picture = Read("pics/residual_normal_X.svg");
-  EXPECT_THAT(picture, AllOf(HasSubstr("training runs missing"),
-                             Not(HasSubstr("residuals in training"))));
 }
 
 }  // namespace

@@ -1,0 +1,156 @@
+#include "trainer/scoring/evaluated_run.h"
+
+#include <algorithm>
+#include <set>
+#include <string>
+
+#include "diagnosis/fault_catalogue.h"
+
+namespace fdi::trainer {
+namespace {
+
+std::string Listed(const std::vector<int>& faults, const char* separator) {
+  std::string text;
+  for (const int fault : faults) {
+    text += (text.empty() ? "" : separator) + FaultName(fault);
+  }
+  return text;
+}
+
+std::size_t IndexIn(const std::set<FaultGroup>& sorted,
+                    const FaultGroup& group) {
+  return static_cast<std::size_t>(
+      std::distance(sorted.begin(), sorted.find(group)));
+}
+
+}  // namespace
+
+FaultGroup GroupOf(int fault, const std::vector<FaultGroup>& groups) {
+  for (const FaultGroup& group : groups) {
+    if (std::find(group.begin(), group.end(), fault) != group.end()) {
+      return group;
+    }
+  }
+  return {fault};
+}
+
+std::string SetText(const std::vector<int>& set) {
+  return Listed(set, "|");
+}
+
+std::string GroupsText(const ModelSet& models) {
+  std::string text;
+  for (const FaultGroup& group : models.groups) {
+    text += (text.empty() ? "" : ", ") + SetText(group);
+  }
+  return text.empty() ? "none" : text;
+}
+
+std::string FaultsText(const std::vector<int>& faults) {
+  return faults.empty() ? "none" : Listed(faults, ", ");
+}
+
+bool IsDetected(const EvaluatedRun& run) {
+  return run.indices.fault != 0 ? run.indices.detected
+                                : run.indices.episodes > 0;
+}
+
+const std::vector<int>& Outcome(const EvaluatedRun& run) {
+  return run.indices.fault != 0 ? run.indices.final_set : run.last_set;
+}
+
+double GroupAccuracy(const EvaluatedRun& run,
+                     const std::vector<FaultGroup>& groups) {
+  if (run.indices.fault == 0) {
+    return -1.0;
+  }
+  // A set of several faults of one group is one answer.
+  std::set<FaultGroup> named;
+  for (const int fault : run.indices.final_set) {
+    named.insert(GroupOf(fault, groups));
+  }
+  return named.contains(GroupOf(run.indices.fault, groups))
+             ? 1.0 / static_cast<double>(named.size())
+             : 0.0;
+}
+
+EvaluationFigures FiguresOf(const std::vector<EvaluatedRun>& runs,
+                            const std::vector<FaultGroup>& groups) {
+  EvaluationFigures figures;
+  std::vector<RunIndices> indices;
+  std::vector<double> durations;
+  double accuracy = 0.0;
+  for (const EvaluatedRun& run : runs) {
+    figures.wrong_isolations += run.indices.wrong_isolations;
+    if (!run.has_truth) {
+      ++figures.without_truth;
+      continue;
+    }
+    indices.push_back(run.indices);
+    durations.push_back(run.duration_s);
+    // As Summarise() does by fault: only detected runs enter the mean.
+    const double d_acc = GroupAccuracy(run, groups);
+    figures.contained_group += d_acc > 0.0;
+    figures.exact_group += d_acc == 1.0;
+    accuracy += run.indices.detected ? d_acc : 0.0;
+  }
+  figures.summary = Summarise(indices, durations);
+  if (figures.summary.detected > 0) {
+    figures.mean_d_acc_group = accuracy / figures.summary.detected;
+  }
+  return figures;
+}
+
+std::vector<EvaluatedRun> RunsOf(const FaultGroup& group,
+                                 const std::vector<EvaluatedRun>& runs) {
+  std::vector<EvaluatedRun> chosen;
+  std::copy_if(runs.begin(), runs.end(), std::back_inserter(chosen),
+               [&](const EvaluatedRun& run) {
+                 return run.has_truth &&
+                        std::find(group.begin(), group.end(),
+                                  run.indices.fault) != group.end();
+               });
+  return chosen;
+}
+
+ConfusionMatrix BuildConfusion(const std::vector<EvaluatedRun>& runs,
+                               const std::vector<FaultGroup>& groups) {
+  // Every group that was true has a row and a column, every other group that
+  // was named a column. Of the last two columns the first counts runs that were
+  // detected without a fault being named, the second those without an alarm.
+  std::set<FaultGroup> rows;
+  std::set<FaultGroup> columns;
+  for (const EvaluatedRun& run : runs) {
+    if (run.has_truth) {
+      rows.insert(GroupOf(run.indices.fault, groups));
+      for (const int fault : Outcome(run)) {
+        columns.insert(GroupOf(fault, groups));
+      }
+      if (run.indices.fault != 0) {
+        columns.insert(GroupOf(run.indices.fault, groups));
+      }
+    }
+  }
+  ConfusionMatrix matrix;
+  matrix.rows.assign(rows.begin(), rows.end());
+  matrix.columns.assign(columns.begin(), columns.end());
+  matrix.counts.assign(rows.size(), std::vector<double>(columns.size() + 2));
+  for (const EvaluatedRun& run : runs) {
+    if (!run.has_truth) {
+      continue;
+    }
+    std::vector<double>& counts =
+        matrix.counts[IndexIn(rows, GroupOf(run.indices.fault, groups))];
+    const std::vector<int>& outcome = Outcome(run);
+    if (outcome.empty()) {
+      counts[columns.size() + (IsDetected(run) ? 0 : 1)] += 1.0;
+    }
+    for (const int fault : outcome) {
+      counts[IndexIn(columns, GroupOf(fault, groups))] +=
+          1.0 / static_cast<double>(outcome.size());
+    }
+  }
+  return matrix;
+}
+
+}  // namespace fdi::trainer
