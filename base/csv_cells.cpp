@@ -306,7 +306,7 @@ std::optional<std::string> Ungrouped(std::string_view cell, char thousands) {
   bool grouped = false;
   for (std::size_t i = 0; i < cell.size(); ++i) {
     const std::string_view rest = cell.substr(i);
-    const std::size_t width = rest.starts_with(kNoBreak) ? kNoBreak.size()
+    const std::size_t width = rest.starts_with(kNoBreak)  ? kNoBreak.size()
                               : rest.starts_with(kNarrow) ? kNarrow.size()
                                                           : 1;
     const bool group = width > 1 || cell[i] == ' ' || cell[i] == '\'' ||
@@ -338,10 +338,9 @@ std::string PlainText(std::string_view text) {
       {"Ź", "z"}, {"Ć", "c"}, {"Ę", "e"}, {"Ą", "a"},  {"Á", "a"}, {"Í", "i"}};
   std::string plain;
   for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto letter =
-        std::ranges::find_if(kLetters, [&](const auto& entry) {
-          return entry.first == text.substr(i, 2);
-        });
+    const auto letter = std::ranges::find_if(kLetters, [&](const auto& entry) {
+      return entry.first == text.substr(i, 2);
+    });
     plain += text.size() - i > 1 && letter != std::end(kLetters)
                  ? std::string(letter->second)
                  : std::string(1, static_cast<char>(std::tolower(
@@ -428,10 +427,10 @@ std::string ReadTextFile(const std::filesystem::path& path) {
                    : std::clamp(100 * static_cast<std::size_t>(packed),
                                 kUnpackedAlways, kUnpackedAtMost);
     if (is_packed && bytes.size() > limit) {
-      throw DataError(source + ": unpacks to more than " +
-                      (limit == kUnpackedAtMost ? "200 MiB"
-                                                : "100 times its size") +
-                      "; if it is right, unpack it with gunzip first");
+      throw DataError(
+          source + ": unpacks to more than " +
+          (limit == kUnpackedAtMost ? "200 MiB" : "100 times its size") +
+          "; if it is right, unpack it with gunzip first");
     }
     if (is_packed && bytes.size() > kUnpackedAtMost / 8) {
       // In one step: doubling would need three times the memory at the end.

@@ -93,7 +93,8 @@ namespace {
 // as many brackets, would overflow the stack. Keys and nesting are therefore
 // bounded before anything is parsed. Outside of text and comments,
 //
-//     parts = dots since the last of  = , { } [ ] LF      nesting = open { and [
+//     parts = dots since the last of  = , { } [ ] LF      nesting = open { and
+//     [
 void CheckDepth(std::string_view text, const std::string& name) {
   constexpr std::size_t kMaxBytes = 16U << 20U;
   constexpr int kMaxParts = 16;
@@ -113,10 +114,8 @@ void CheckDepth(std::string_view text, const std::string& name) {
       i = std::min(text.find('\n', i), text.size()) - 1;
     } else if (c == '"' || c == '\'') {
       const std::string_view rest = text.substr(i);
-      const std::string quote(rest.size() > 2 && rest[1] == c && rest[2] == c
-                                  ? 3
-                                  : 1,
-                              c);
+      const std::string quote(
+          rest.size() > 2 && rest[1] == c && rest[2] == c ? 3 : 1, c);
       // To the closing quote; in a text between " a backslash escapes it.
       for (i += quote.size();
            i < text.size() && !text.substr(i).starts_with(quote) &&
@@ -130,8 +129,7 @@ void CheckDepth(std::string_view text, const std::string& name) {
       if (++parts > kMaxParts) {
         refuse("a key has more than " + std::to_string(kMaxParts) + " parts");
       }
-    } else if (std::string_view("=,{}[]\n").find(c) !=
-               std::string_view::npos) {
+    } else if (std::string_view("=,{}[]\n").find(c) != std::string_view::npos) {
       parts = 1;
       line += c == '\n' ? 1 : 0;
       nesting += c == '{' || c == '[' ? 1 : c == '}' || c == ']' ? -1 : 0;

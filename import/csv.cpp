@@ -194,10 +194,10 @@ void CsvReader::Refuse(const std::string& reason) const {
 //     wide:    time [clock] signal ... [mode] [fault strength]
 //     long:    time [clock] tag value [quality]    one reading per row
 //
-// skipped are ColumnMap::skip lines, header the names and ColumnMap::header_rows
-// less one further rows. Blank lines may be anywhere. A record can take several
-// lines, because a quoted cell may contain line breaks: all decisions about the
-// separator come before a record is begun.
+// skipped are ColumnMap::skip lines, header the names and
+// ColumnMap::header_rows less one further rows. Blank lines may be anywhere. A
+// record can take several lines, because a quoted cell may contain line breaks:
+// all decisions about the separator come before a record is begun.
 std::optional<CsvRow> CsvReader::TakeLine(std::string_view line,
                                           std::int64_t number) {
   line_ = number > 0 ? number : line_ + 1;
@@ -293,9 +293,9 @@ bool CsvReader::IsMarker() {
   if (!whole && std::ranges::count_if(cells, is_full) > 1) {
     return false;
   }
-  const std::string& cell =
-      whole && time_column_ ? Cell(*time_column_)
-                            : *std::ranges::find_if(cells, is_full);
+  const std::string& cell = whole && time_column_
+                                ? Cell(*time_column_)
+                                : *std::ranges::find_if(cells, is_full);
   if (cell.empty()) {
     // Units and descriptions below the names.
     return rows_ == 0 && std::ranges::none_of(cells, [&](const auto& c) {
@@ -317,8 +317,8 @@ bool CsvReader::IsMarker() {
   return true;
 }
 
-// The cell in the unit of the file. Numbers come first, because nearly all cells
-// are; words for "no reading" come before all other forms of a number.
+// The cell in the unit of the file. Numbers come first, because nearly all
+// cells are; words for "no reading" come before all other forms of a number.
 std::optional<double> CsvReader::Reading(const Conversion& c) {
   const std::string& cell = Cell(c.column);
   const char decimal = options_.map.decimal;
@@ -357,9 +357,9 @@ std::optional<double> CsvReader::WithOwnUnit(const Conversion& c) const {
   }
   const auto own = FindUnit(c.mapping.signal, unit);
   const auto stated = FindUnit(c.mapping.signal, c.mapping.unit);
-  const bool linear = !c.mapping.unit.empty() &&
-                      (!stated || stated->scale != c.mapping.scale ||
-                       stated->offset != c.mapping.offset);
+  const bool linear =
+      !c.mapping.unit.empty() && (!stated || stated->scale != c.mapping.scale ||
+                                  stated->offset != c.mapping.offset);
   if (!own || linear ||
       (c.mapping.signal == Signal::kF && own->flow_unit != header_.flow_unit)) {
     Refuse("column " + Quoted(names_[c.column]) + ": " + Quoted(cell) +
@@ -394,10 +394,9 @@ void CsvReader::Convert(const Conversion& c, Sample& sample) {
 
 bool CsvReader::TakeTagged(Sample& sample) {
   const std::string& tag = Cell(*tag_column_);
-  const auto found =
-      std::ranges::find_if(conversions_, [&](const Conversion& c) {
-        return SameName(c.mapping.column, tag);
-      });
+  const auto found = std::ranges::find_if(
+      conversions_,
+      [&](const Conversion& c) { return SameName(c.mapping.column, tag); });
   if (found == conversions_.end()) {
     auto& ignored = header_.ignored_columns;
     if (std::ranges::find(ignored, tag) == ignored.end()) {
@@ -500,6 +499,7 @@ void CsvReader::TakeHeader() {
     }
     CheckLongHeader();
     if (options_.scan) {
+      used_.clear();
       return;
     }
     // From here on `used_` counts tags instead of columns: Finish() reports

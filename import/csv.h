@@ -69,11 +69,11 @@ struct ColumnMapping {
 /// Format of the time column.
 enum class TimeForm {
   kFindOut,
-  kElapsed,  ///< Seconds (after scaling) from CsvOptions::start_ns.
-  kUnix,     ///< Seconds (after scaling) since 1970.
-  kFileTime, ///< 100 ns since 1601-01-01.
-  kSerial,   ///< Days of a spreadsheet, 25569 being 1970-01-01, in local time.
-  kText,     ///< As ScanTime() reads it.
+  kElapsed,   ///< Seconds (after scaling) from CsvOptions::start_ns.
+  kUnix,      ///< Seconds (after scaling) since 1970.
+  kFileTime,  ///< 100 ns since 1601-01-01.
+  kSerial,    ///< Days of a spreadsheet, 25569 being 1970-01-01, in local time.
+  kText,      ///< As ScanTime() reads it.
 };
 
 /// Form of a time column, and the unit of its numbers [s].
@@ -99,8 +99,8 @@ struct Resampling {
 /// Content of `--map tags.toml`, `--zone` and `--resample`. Signals that are
 /// not mapped are still found by their names in the CSV contract.
 struct ColumnMap {
-  char separator{'\0'};      ///< NUL: detected.
-  char decimal{'\0'};        ///< NUL: detected.
+  char separator{'\0'};  ///< NUL: detected.
+  char decimal{'\0'};    ///< NUL: detected.
   /// Groups digits, beside blanks and '; NUL: detected.
   char thousands{'\0'};
   int skip{0};         ///< Lines in front of the names; 0: detected.
@@ -131,7 +131,7 @@ struct CsvOptions {
   /// Required columns; with a map, those of the map instead. Time, CV and one
   /// of X, F are always required.
   SignalMask required{kBasicSignals};
-  bool split_gaps{false};    ///< A gap starts another run instead of an error.
+  bool split_gaps{false};  ///< A gap starts another run instead of an error.
   bool scan{false};  ///< Rows have their cells(), of any tag, and no signals.
   double period_s{0.0};      ///< 0: detected.
   std::int64_t start_ns{0};  ///< UTC of t_s = 0, unless times have a date.
@@ -202,10 +202,10 @@ class CsvReader {
   explicit CsvReader(CsvOptions options);
 
   /// Processes the next line, without its line break; `number` is its number if
-  /// lines are left out or in another order. @returns nothing for the header and
-  /// its repetitions, for blank lines and comments (#), for marker and summary
-  /// rows, for an unmapped tag, and while a quoted cell continues on the next
-  /// line.
+  /// lines are left out or in another order. @returns nothing for the header
+  /// and its repetitions, for blank lines and comments (#), for marker and
+  /// summary rows, for an unmapped tag, and while a quoted cell continues on
+  /// the next line.
   /// @throws DataError naming source, line, column, value, what was expected
   ///   and what to try: missing or duplicate column, too few or too many cells,
   ///   not a number, not a time, an unknown fault.

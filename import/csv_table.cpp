@@ -220,9 +220,7 @@ void TableReader::TakeRows() {
 // What was found out about the form, as far as it is not usual.
 void TableReader::NoteForm() {
   const ColumnMap& map = options().map;
-  auto note = [this](const std::string& text) {
-    table_.notes.push_back(text);
-  };
+  auto note = [this](const std::string& text) { table_.notes.push_back(text); };
   if (map.decimal == ',') {
     note("decimal sign: comma (found)");
   }
@@ -715,8 +713,8 @@ void TableReader::CheckMotion() {
     shut += cv > 98.0 ? 1U : 0U;
     open += cv < 2.0 ? 1U : 0U;
     both += s.Has(Signal::kX) ? 1U : 0U;
-    same += s.Has(Signal::kX) && std::abs(s[Signal::kX] - cv) < 5.1e-3 ? 1U
-                                                                       : 0U;
+    same +=
+        s.Has(Signal::kX) && std::abs(s[Signal::kX] - cv) < 5.1e-3 ? 1U : 0U;
     moves += k > 0 && rows_[k - 1].labelled.sample.Has(Signal::kCv) &&
                      rows_[k - 1].labelled.sample[Signal::kCv] != cv
                  ? 1U
@@ -735,13 +733,15 @@ void TableReader::CheckMotion() {
          "position transmitter as [signal.X], or leave [signal.X] out");
   }
   if ((signals & MaskOf(Signal::kX)) == 0) {
-    note("no position (X): CV and F show that something is wrong, not whether "
-         "it is the rod, the trim or the flow transmitter, and onboarding "
-         "needs X. Map the position transmitter as [signal.X] if there is one");
+    note(
+        "no position (X): CV and F show that something is wrong, not whether "
+        "it is the rod, the trim or the flow transmitter, and onboarding "
+        "needs X. Map the position transmitter as [signal.X] if there is one");
   }
   if ((signals & MaskOf(Signal::kF)) == 0) {
-    note("no flow (F): CV and X show what the rod does, not what the trim does "
-         "(blocked, worn, leaking). Map the flow as [signal.F] if there is one");
+    note(
+        "no flow (F): CV and X show what the rod does, not what the trim does "
+        "(blocked, worn, leaking). Map the flow as [signal.F] if there is one");
   }
   if (period_s_ >= 5.0 && !options().map.resampling) {
     note("a slow record: one row in " + NumberText(period_s_) +

@@ -35,8 +35,8 @@ struct Column {
   std::map<std::string, std::size_t> words;  ///< In all rows.
 
   bool Mostly(std::size_t count) const {
-    return full > 0 && static_cast<double>(count) >=
-                           kMost * static_cast<double>(full);
+    return full > 0 &&
+           static_cast<double>(count) >= kMost * static_cast<double>(full);
   }
 };
 
@@ -69,9 +69,8 @@ std::optional<double> AnyNumber(std::string_view cell) {
     return std::nullopt;
   }
   for (const char decimal : {'.', ','}) {
-    const std::string plain =
-        Ungrouped(number, decimal == '.' ? ',' : '.').value_or(
-            std::string(number));
+    const std::string plain = Ungrouped(number, decimal == '.' ? ',' : '.')
+                                  .value_or(std::string(number));
     if (const auto value = ParseNumber(plain, decimal)) {
       return value;
     }
@@ -241,8 +240,8 @@ bool LayoutFinder::FindHeader() {
     for (std::size_t c = 0; c < width && record.cells.size() == width; ++c) {
       if (2 * values[c] > rows && !record.cells[c].empty()) {
         ++full;
-        fits += IsValue(record.cells[c]) || IsNoReading(record.cells[c]) ? 1U
-                                                                         : 0U;
+        fits +=
+            IsValue(record.cells[c]) || IsNoReading(record.cells[c]) ? 1U : 0U;
       }
     }
     return full > 0 && 2 * fits > full;
@@ -280,8 +279,8 @@ bool LayoutFinder::FindHeader() {
     map().skip = static_cast<int>(names->line) - 1;
   }
   if (map().header_rows > 0) {
-    data = names + std::min<std::ptrdiff_t>(map().header_rows,
-                                            records.end() - names);
+    data = names +
+           std::min<std::ptrdiff_t>(map().header_rows, records.end() - names);
   }
   map().header_rows = static_cast<int>(data - names);
   Cells cells = names->cells;
@@ -325,8 +324,8 @@ bool LayoutFinder::FindHeader() {
 }
 
 // Text with a date comes before numbers of a size that only times have, those
-// before numbers under a name that says so or that grow by equal steps. Of equal
-// ones, what varies and has such a name, then the first.
+// before numbers under a name that says so or that grow by equal steps. Of
+// equal ones, what varies and has such a name, then the first.
 void LayoutFinder::FindTimeColumn() {
   constexpr std::string_view kWords =
       "time|zeit|date|datum|stamp|fecha|hora|heure|czas|data|epoch|t_s";
@@ -355,14 +354,14 @@ void LayoutFinder::FindTimeColumn() {
       const bool grows =
           column.values.size() > 1 &&
           (backwards == 0 || backwards + 1 == column.values.size());
-      score = form == TimeForm::kUnix || form == TimeForm::kFileTime ? 30
-              : named                                               ? 20
-              : grows && c == 0 &&
-                      std::adjacent_find(column.values.begin(),
-                                         column.values.end()) ==
-                          column.values.end()
-                  ? 10
-                  : 0;
+      score =
+          form == TimeForm::kUnix || form == TimeForm::kFileTime ? 30
+          : named                                                ? 20
+          : grows && c == 0 &&
+                  std::adjacent_find(column.values.begin(),
+                                     column.values.end()) == column.values.end()
+              ? 10
+              : 0;
       score = varies > 0 || named ? score : 0;
     }
     score += score > 0 ? varies + (named ? 1 : 0) : 0;
@@ -391,9 +390,9 @@ void LayoutFinder::CountWords() {
   std::vector<std::size_t> counted;
   for (std::size_t c = 0; c < columns_.size(); ++c) {
     const Column& column = columns_[c];
-    const bool words =
-        !column.Mostly(column.numbers) && !SameName(Name(c), kModeColumn) &&
-        !SameName(Name(c), kFaultColumn);
+    const bool words = !column.Mostly(column.numbers) &&
+                       !SameName(Name(c), kModeColumn) &&
+                       !SameName(Name(c), kFaultColumn);
     if (c != time_ && c != clock_ &&
         (words || IsQualityColumn(Name(c), {{"0", 1}}))) {
       counted.push_back(c);
@@ -459,12 +458,11 @@ void LayoutFinder::FindTags() {
     }
     const bool named = HasWord(PlainText(Name(c)),
                                "value|wert|valor|valeur|wartosc|reading|data");
-    const bool varies = std::ranges::any_of(column.values, [&](double v) {
-      return v != column.values.front();
-    });
-    const bool timed = HasWord(PlainText(Name(c)), "time|zeit|stamp|id") ||
-                       TimeUnitOf(Name(c), column.values.front()).form !=
-                           TimeForm::kElapsed;
+    const bool varies = std::ranges::any_of(
+        column.values, [&](double v) { return v != column.values.front(); });
+    const bool timed =
+        HasWord(PlainText(Name(c)), "time|zeit|stamp|id") ||
+        TimeUnitOf(Name(c), column.values.front()).form != TimeForm::kElapsed;
     candidates += varies && !timed ? 1 : 0;
     if (const int score = 1 + (named ? 4 : 0) + (varies && !timed ? 2 : 0);
         score > best) {
@@ -498,18 +496,16 @@ void LayoutFinder::FindQualities() {
     // Beside values, numbers under "Status" may as well be a state of the
     // plant.
     const bool numbers = columns_[c].Mostly(columns_[c].numbers);
-    const bool state =
-        !map().long_table && numbers &&
-        (HasWord(PlainText(Name(c)), "status") ||
-         QualityCodeOf(Name(c), words) == QualityCode::kUnknown);
+    const bool state = !map().long_table && numbers &&
+                       (HasWord(PlainText(Name(c)), "status") ||
+                        QualityCodeOf(Name(c), words) == QualityCode::kUnknown);
     if (!stated &&
         (words.empty() || state || !IsQualityColumn(Name(c), words))) {
       values.push_back(Name(c));
       continue;
     }
     if (words.empty()) {
-      ForEachRow(
-          [&](std::size_t, const Cells& cells) { ++words[cells[c]]; });
+      ForEachRow([&](std::size_t, const Cells& cells) { ++words[cells[c]]; });
     }
     QualityCode code = QualityCodeOf(Name(c), words);
     map().quality_codes[Name(c)] = code;
@@ -525,7 +521,8 @@ void LayoutFinder::FindQualities() {
     values.clear();
     // Numbers that two systems read differently: most readings of a plant are
     // good.
-    if (choose_ && code == QualityCode::kUnknown && map().quality.good.empty()) {
+    if (choose_ && code == QualityCode::kUnknown &&
+        map().quality.good.empty()) {
       const auto usual = std::ranges::max_element(
           words, {}, [](const auto& word) { return word.second; });
       if (usual != words.end() && !usual->first.empty() &&
@@ -541,10 +538,10 @@ void LayoutFinder::FindQualities() {
 
 // The decimal sign and what groups thousands. Every cell is evidence (Digits):
 // "12.34" shows a decimal sign, "1.234" may be a decimal or a thousand, and in
-// "1.234,5" the last sign is the decimal one. Contradictions are refused, and so
-// is a table of ambiguous cells only, unless commas separate them and all signs
-// are points, or something else does and all are commas: a wrong guess would be
-// off by a factor of 1000.
+// "1.234,5" the last sign is the decimal one. Contradictions are refused, and
+// so is a table of ambiguous cells only, unless commas separate them and all
+// signs are points, or something else does and all are commas: a wrong guess
+// would be off by a factor of 1000.
 void LayoutFinder::FindDecimal() {
   if (map().decimal != '\0') {
     return;
@@ -616,9 +613,8 @@ void LayoutFinder::FindDecimal() {
     layout_.choices["decimal"] =
         "every number may have three decimals or thousands";
   }
-  const bool comma =
-      decimal.empty() && !either.empty() && map().separator != ',' &&
-      !either.contains('.');
+  const bool comma = decimal.empty() && !either.empty() &&
+                     map().separator != ',' && !either.contains('.');
   if (decimal.empty() && either.contains(',') && map().separator == ',') {
     refuse(either[','],
            " and all other cells may have decimals or thousands; expected to "
@@ -691,8 +687,7 @@ void LayoutFinder::FindDateOrder() {
   } else if (fits[1].walked_s > 10.0 * fits[0].walked_s) {
     map().date_order = DateOrder::kDayFirst;
   } else if (choose_) {
-    map().date_order =
-        american ? DateOrder::kMonthFirst : DateOrder::kDayFirst;
+    map().date_order = american ? DateOrder::kMonthFirst : DateOrder::kDayFirst;
     layout_.choices["date"] =
         "no day is above 12, so day and month may be exchanged";
   }
@@ -721,9 +716,9 @@ void LayoutFinder::FindDirection() {
     }
     last = at ? at : last;
   }
-  map().newest_first = backwards > 2 && static_cast<double>(backwards) >=
-                                            kMost * static_cast<double>(
-                                                        backwards + forwards);
+  map().newest_first =
+      backwards > 2 && static_cast<double>(backwards) >=
+                           kMost * static_cast<double>(backwards + forwards);
 }
 
 }  // namespace

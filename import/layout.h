@@ -21,10 +21,10 @@ struct Layout {
   std::map<std::string, std::string> choices;
 };
 
-/// Finds what `map` does not set: separator, rows of the header, time column and
-/// its order, decimal sign, thousands, order of dates, columns of tags, values
-/// and quality. All rows are evidence; what a few rows of a long table say
-/// decides nothing.
+/// Finds what `map` does not set: separator, rows of the header, time column
+/// and its order, decimal sign, thousands, order of dates, columns of tags,
+/// values and quality. All rows are evidence; what a few rows of a long table
+/// say decides nothing.
 /// @param choose what the evidence leaves open is chosen and named in
 ///   Layout::choices; otherwise it is left open, or refused.
 /// @throws DataError if there is no header, or if the decimal sign is

@@ -114,9 +114,8 @@ std::optional<SignalQuality> QualityOf(std::string_view cell,
     return SignalQuality::kBad;
   }
   // Grades from good to bad.
-  static constexpr SignalQuality kGrade[] = {SignalQuality::kGood,
-                                             SignalQuality::kUncertain,
-                                             SignalQuality::kBad};
+  static constexpr SignalQuality kGrade[] = {
+      SignalQuality::kGood, SignalQuality::kUncertain, SignalQuality::kBad};
   switch (code) {
     case QualityCode::kUnknown:
       return std::nullopt;
@@ -188,8 +187,9 @@ bool IsQualityColumn(std::string_view column,
   }
   const std::string plain = PlainText(column);
   const bool named =
-      HasWord(plain,
-              "qual|status|valid|good|quest|subst|isbad|gultig|jakosc|calidad") ||
+      HasWord(
+          plain,
+          "qual|status|valid|good|quest|subst|isbad|gultig|jakosc|calidad") ||
       plain.ends_with(".st") || plain.ends_with("_st") ||
       plain.ends_with(" st");
   return words > 0 ? codes == 0 || named

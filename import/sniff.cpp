@@ -36,13 +36,13 @@ enum class Role {
 
 struct RoleWords {
   Role role;
-  std::string_view words;  ///< Anywhere in the plain name.
+  std::string_view words;   ///< Anywhere in the plain name.
   std::string_view tokens;  ///< Whole parts of it, with or without the number.
 };
 
-// English, German, French, Spanish, Polish. The order settles names with several
-// words: a "flow setpoint" is a setpoint, a "position output" a command, a
-// "supply pressure" no P1.
+// English, German, French, Spanish, Polish. The order settles names with
+// several words: a "flow setpoint" is a setpoint, a "position output" a
+// command, a "supply pressure" no P1.
 constexpr RoleWords kRoleWords[] = {
     {Role::kSetpoint,
      "setpoint|set point|sollwert|consigne|consigna|zadan|fuhrungsgr",
@@ -71,8 +71,8 @@ constexpr RoleWords kRoleWords[] = {
      "|p2|"},
     {Role::kPressure, "press|druck|presion|cisnien", ""},
     {Role::kTemperature, "temp", "|t1|"},
-    {Role::kFlow,
-     "flow|durchfl|menge|strom|debit|caudal|przeplyw|strumien", ""},
+    {Role::kFlow, "flow|durchfl|menge|strom|debit|caudal|przeplyw|strumien",
+     ""},
 };
 
 /// Units of quantities that no signal has.
@@ -129,8 +129,8 @@ NamedUnit UnitIn(const std::string& name) {
            (plain != "1" && (in_brackets || plain.size() > 1 || plain == "%") &&
             IsUnit(unit));
   };
-  for (std::size_t open = name.find_first_of("[(");
-       open != std::string::npos; open = name.find_first_of("[(", open + 1)) {
+  for (std::size_t open = name.find_first_of("[("); open != std::string::npos;
+       open = name.find_first_of("[(", open + 1)) {
     const std::size_t close = name.find_first_of("])", open);
     if (close == std::string::npos) {
       break;
@@ -205,10 +205,10 @@ NameGuess RoleOf(const std::string& name, const std::string& about) {
     const std::string& token = tokens[i];
     const std::string letters = Letters(token);
     // "MV101" and "CV7" are valves, "51_03CV" is an attribute.
-    const bool numbered = token.size() > letters.size() &&
-                          std::isalpha(static_cast<unsigned char>(
-                              token.front())) != 0 &&
-                          letters.ends_with('v');
+    const bool numbered =
+        token.size() > letters.size() &&
+        std::isalpha(static_cast<unsigned char>(token.front())) != 0 &&
+        letters.ends_with('v');
     for (const RoleWords& known : kRoleWords) {
       const bool hit = IsToken(token, known.tokens) ||
                        (!numbered && IsToken(letters, known.tokens));
@@ -274,8 +274,7 @@ std::vector<std::string> DistinctParts(
   };
   const auto ending = [&](const std::string& name) {
     const std::size_t at = name.find_last_of(kCuts);
-    return at == std::string::npos || at == 0 ? std::string()
-                                              : name.substr(at);
+    return at == std::string::npos || at == 0 ? std::string() : name.substr(at);
   };
   const auto beginning = [&](const std::string& name) {
     const std::size_t at = name.find_first_of(kCuts);
@@ -300,8 +299,8 @@ void Say(SniffedColumn& column, const std::string& what) {
   column.guessed += (column.guessed.empty() ? "" : "; ") + what;
 }
 
-// Whether most values fit a signal in a unit, or without one; sets unit, raw and
-// span. Most, because a few states and outliers are in every export.
+// Whether most values fit a signal in a unit, or without one; sets unit, raw
+// and span. Most, because a few states and outliers are in every export.
 bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit) {
   const double low = column.Quantile(0.05);
   const double high = column.Quantile(0.95);
@@ -312,8 +311,8 @@ bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit) {
   column.raw.clear();
   column.span.clear();
   const bool current = SameName(unit, "mA");
-  const bool counts = unit.empty() && whole && high > 2000.0 && low >= -5000.0 &&
-                      high <= 33000.0;
+  const bool counts = unit.empty() && whole && high > 2000.0 &&
+                      low >= -5000.0 && high <= 33000.0;
   const auto take_raw = [&](double from, double to) {
     column.raw = {from, to};
     if (!IsPercent(signal)) {
@@ -343,8 +342,8 @@ bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit) {
     return conversion && conversion->scale * low > -15.0 &&
            conversion->scale * high < 115.0;
   }
-  const bool pressure = signal != Signal::kF && signal != Signal::kT1 &&
-                        signal != Signal::kCvi;
+  const bool pressure =
+      signal != Signal::kF && signal != Signal::kT1 && signal != Signal::kCvi;
   if (current || counts) {
     current ? take_raw(4.0, 20.0) : take_raw(0.0, 27648.0);
     column.unit = signal == Signal::kF    ? "t/h"
@@ -367,9 +366,9 @@ bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit) {
 }
 
 // Correlation of b with a delayed by 0, 1 or 2 periods, the strongest. The
-// delays allow for the lag of the rod behind the command, and of the flow behind
-// the rod. The sign is kept, because the sense follows from it. Values beyond
-// the range of most others are left out.
+// delays allow for the lag of the rod behind the command, and of the flow
+// behind the rod. The sign is kept, because the sense follows from it. Values
+// beyond the range of most others are left out.
 double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
   const auto usual = [](const SniffedColumn& column) {
     const double low = column.Quantile(0.05);
@@ -547,7 +546,7 @@ void SignalGuess::SettleValves() {
     if (!has_command) {
       valve->signal = Signal::kCv;
     } else if (has_position &&
-               std::ranges::any_of(Of(Signal::kX), [&](const auto* x) {
+               std::ranges::any_of(Of(Signal::kX), [&](SniffedColumn* x) {
                  return std::ranges::find(valves_, x) == valves_.end();
                })) {
       valve->signal.reset();
@@ -562,9 +561,9 @@ void SignalGuess::SettlePressures() {
   if (pressures.size() != 2 || !Of(Signal::kP2).empty()) {
     return;
   }
-  SniffedColumn* low =
-      pressures[0]->Quantile(0.5) < pressures[1]->Quantile(0.5) ? pressures[0]
-                                                                : pressures[1];
+  SniffedColumn* low = pressures[0]->Quantile(0.5) < pressures[1]->Quantile(0.5)
+                           ? pressures[0]
+                           : pressures[1];
   low->signal = Signal::kP2;
   for (SniffedColumn* column : pressures) {
     Say(*column, "P1 is the higher pressure");
@@ -574,13 +573,13 @@ void SignalGuess::SettlePressures() {
 // Of several columns the one with a word for it, else the first.
 void SignalGuess::KeepFirst(Signal signal) {
   const std::vector<SniffedColumn*> columns = Of(signal);
-  const auto sure = [&](const SniffedColumn* column) {
+  const auto sure = [&](SniffedColumn* column) {
     return std::ranges::find(sure_, column) != sure_.end();
   };
   const auto best = std::ranges::find_if(columns, sure);
-  const SniffedColumn* kept = best != columns.end()     ? *best
-                              : columns.empty() ? nullptr
-                                                : columns.front();
+  const SniffedColumn* kept = best != columns.end() ? *best
+                              : columns.empty()     ? nullptr
+                                                    : columns.front();
   for (SniffedColumn* column : columns) {
     if (column != kept) {
       column->signal.reset();
@@ -604,15 +603,15 @@ void SignalGuess::GuessSenses() {
       continue;
     }
     const bool led = column != moving.front();
-    const bool contract = SameName(column->name, "CV_pct") ||
-                          SameName(column->name, "X_pct");
+    const bool contract =
+        SameName(column->name, "CV_pct") || SameName(column->name, "X_pct");
     const double r = led            ? Correlation(*column, *moving.front())
                      : flow.empty() ? 0.0
                                     : Correlation(*column, *flow.front());
     if (led && std::abs(r) > 0.3) {
       column->opening = (r >= 0.0) == moving.front()->opening;
-      Say(*column, std::string("moves ") + (r >= 0.0 ? "with" : "against") +
-                       " the rod");
+      Say(*column,
+          std::string("moves ") + (r >= 0.0 ? "with" : "against") + " the rod");
     } else if (led) {
       column->opening = moving.front()->opening;
     } else if (std::abs(r) > 0.3) {
@@ -643,10 +642,10 @@ void SignalGuess::NoteMissing() {
   }
   if (Of(Signal::kX).empty() && Of(Signal::kF).empty()) {
     found_.findings.push_back(
-        (level.empty() ? std::string()
-                       : level +
-                             " is a level, which is neither the position nor "
-                             "the flow of the valve. ") +
+        (level.empty()
+             ? std::string()
+             : level + " is a level, which is neither the position nor "
+                       "the flow of the valve. ") +
         "No position (X) and no flow (F) found: the command alone shows "
         "nothing about the valve. Export the position transmitter or the flow "
         "behind the valve, and state it under [signal.X] or [signal.F]");
@@ -820,10 +819,8 @@ std::string TomlPair(const std::vector<double>& pair) {
 // What the importer makes of the table with the guessed signals.
 void ReadWith(std::string_view text, const std::string& source,
               Sniffed& found) {
-  CsvOptions options{.source = source,
-                     .map = found.map,
-                     .required = 0,
-                     .split_gaps = true};
+  CsvOptions options{
+      .source = source, .map = found.map, .required = 0, .split_gaps = true};
   for (const SniffedColumn& column : found.columns) {
     if (!column.signal) {
       continue;
@@ -877,8 +874,8 @@ void ReadWith(std::string_view text, const std::string& source,
 double SniffedColumn::Quantile(double share) const {
   std::vector<double> sorted = values;
   const auto at =
-      sorted.begin() +
-      static_cast<std::ptrdiff_t>(share * static_cast<double>(sorted.size() - 1));
+      sorted.begin() + static_cast<std::ptrdiff_t>(
+                           share * static_cast<double>(sorted.size() - 1));
   std::nth_element(sorted.begin(), at, sorted.end());
   return *at;
 }
@@ -986,20 +983,20 @@ std::string MapText(const Sniffed& found, const std::string& file) {
     }
   }
   if (!map.quality.good.empty()) {
-    text += "\n[quality]\ngood = " + TomlList(map.quality.good) +
-            chosen("good");
+    text +=
+        "\n[quality]\ngood = " + TomlList(map.quality.good) + chosen("good");
   }
   for (const SniffedColumn& column : found.columns) {
     if (!column.signal) {
       continue;
     }
-    text += "\n[signal." + std::string(SignalName(*column.signal)) + "]" +
-            (column.guessed.empty() ? "" : "  # guessed: " + column.guessed) +
-            "\ncolumn = " + TomlText(column.name) + "\nunit = " +
-            TomlText(column.given && SameName(column.unit, "mA")
-                         ? "%"
-                         : column.unit) +
-            "\n";
+    text +=
+        "\n[signal." + std::string(SignalName(*column.signal)) + "]" +
+        (column.guessed.empty() ? "" : "  # guessed: " + column.guessed) +
+        "\ncolumn = " + TomlText(column.name) + "\nunit = " +
+        TomlText(column.given && SameName(column.unit, "mA") ? "%"
+                                                             : column.unit) +
+        "\n";
     if (column.given) {
       // In `unit`, as the map of the caller had it.
       const auto unit =

@@ -13,18 +13,18 @@ namespace fdi::importer {
 struct SniffedColumn {
   std::string name;
   std::string about;  ///< Units and descriptions below the name.
-  std::vector<double> times_s;
-  std::vector<double> values;
+  std::vector<double> times_s{};
+  std::vector<double> values{};
   std::size_t cells{0};
   std::size_t missing{0};
-  std::vector<std::string> words;  ///< Neither numbers nor known words.
-  std::optional<ColumnMapping> given;  ///< By the caller's map.
-  std::optional<Signal> signal;
-  std::string unit;
-  std::vector<double> raw;   ///< Cells that are `span`; empty: as they are.
-  std::vector<double> span;  ///< In `unit`.
+  std::vector<std::string> words{};      ///< Neither numbers nor known words.
+  std::optional<ColumnMapping> given{};  ///< By the caller's map.
+  std::optional<Signal> signal{};
+  std::string unit{};
+  std::vector<double> raw{};   ///< Cells that are `span`; empty: as they are.
+  std::vector<double> span{};  ///< In `unit`.
   bool opening{false};
-  std::string guessed;  ///< Reasons, and what is uncertain.
+  std::string guessed{};  ///< Reasons, and what is uncertain.
 
   /// Quantile of the values, which are not empty; `share` in [0, 1].
   double Quantile(double share) const;
@@ -51,8 +51,8 @@ struct Sniffed {
 };
 
 /// Analyses a table with the reader of the importer. What `map` sets is taken
-/// over, its signals, too; other signals are guessed from units, ranges, words and ISA 5.1 letters, in
-/// this order of weight.
+/// over, its signals, too; other signals are guessed from units, ranges, words
+/// and ISA 5.1 letters, in this order of weight.
 /// @throws DataError if there is no header, no column of times or no row.
 Sniffed Sniff(std::string_view text, const std::string& source, ColumnMap map);
 

@@ -113,12 +113,14 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
                                : std::string(SignalUnit(signal)));
   const auto unit = FindUnit(signal, name == "mA" && percent ? "%" : name);
   if (!unit) {
-    table.Refuse("unit", (IsGasUnit(name) ? "'" + name + "' is a flow of gas, "
-                                            "and the physics is for water: "
-                                            "leave [signal.F] out, CV and X "
-                                            "still show what the rod does"
-                                          : "unknown unit '" + name + "'") +
-                             "; accepted are" + UnitNames(signal));
+    table.Refuse("unit",
+                 (IsGasUnit(name) ? "'" + name +
+                                        "' is a flow of gas, "
+                                        "and the physics is for water: "
+                                        "leave [signal.F] out, CV and X "
+                                        "still show what the rod does"
+                                  : "unknown unit '" + name + "'") +
+                     "; accepted are" + UnitNames(signal));
   }
   // raw and span are two points of a line, reading = offset + scale · cell:
   //
@@ -197,15 +199,20 @@ struct TimeName {
   std::string_view name;
   TimeUnit unit;
 };
-constexpr TimeName kTimeNames[] = {
-    {"s", {TimeForm::kElapsed, 1.0}},     {"ms", {TimeForm::kElapsed, 1e-3}},
-    {"us", {TimeForm::kElapsed, 1e-6}},   {"ns", {TimeForm::kElapsed, 1e-9}},
-    {"min", {TimeForm::kElapsed, 60.0}},  {"h", {TimeForm::kElapsed, 3600.0}},
-    {"unix", {TimeForm::kUnix, 1.0}},     {"unix ms", {TimeForm::kUnix, 1e-3}},
-    {"unix us", {TimeForm::kUnix, 1e-6}}, {"unix ns", {TimeForm::kUnix, 1e-9}},
-    {"filetime", {TimeForm::kFileTime, 1e-7}},
-    {"serial", {TimeForm::kSerial, 1.0}}, {"text", {TimeForm::kText, 1.0}},
-    {"auto", {TimeForm::kFindOut, 1.0}}};
+constexpr TimeName kTimeNames[] = {{"s", {TimeForm::kElapsed, 1.0}},
+                                   {"ms", {TimeForm::kElapsed, 1e-3}},
+                                   {"us", {TimeForm::kElapsed, 1e-6}},
+                                   {"ns", {TimeForm::kElapsed, 1e-9}},
+                                   {"min", {TimeForm::kElapsed, 60.0}},
+                                   {"h", {TimeForm::kElapsed, 3600.0}},
+                                   {"unix", {TimeForm::kUnix, 1.0}},
+                                   {"unix ms", {TimeForm::kUnix, 1e-3}},
+                                   {"unix us", {TimeForm::kUnix, 1e-6}},
+                                   {"unix ns", {TimeForm::kUnix, 1e-9}},
+                                   {"filetime", {TimeForm::kFileTime, 1e-7}},
+                                   {"serial", {TimeForm::kSerial, 1.0}},
+                                   {"text", {TimeForm::kText, 1.0}},
+                                   {"auto", {TimeForm::kFindOut, 1.0}}};
 
 DateOrder ParseDateOrder(const std::string& text) {
   if (text != "d/m/y" && text != "m/d/y" && text != "y/m/d") {
@@ -309,8 +316,8 @@ std::optional<UnitConversion> FindUnit(Signal signal, std::string_view name) {
 // The digits end before the first character that no number has; the blanks that
 // group thousands have several bytes, whose first ones others share.
 std::pair<std::string_view, std::string_view> SplitUnit(std::string_view cell) {
-  const std::size_t other = cell.find_first_not_of(
-      "+-0123456789.,' \xC2\xA0\xE2\x80\xAF");
+  const std::size_t other =
+      cell.find_first_not_of("+-0123456789.,' \xC2\xA0\xE2\x80\xAF");
   const std::size_t last = cell.find_last_of("0123456789", other);
   if (last == std::string_view::npos) {
     return {{}, cell};
@@ -437,9 +444,14 @@ void TableOptions::AddTo(CLI::App& verb) {
                   "are held or interpolated for at most AGE (default: hold, "
                   "ten periods)")
       ->type_name("1s[:hold|linear[:AGE]]");
-  verb.add_option("--decimal", decimal,
-                  "Decimal sign of the file, where it does not show it")
-      ->check(CLI::IsMember({".", ","}))
+  verb.add_option(
+          "--decimal", decimal,
+          "Decimal sign of the file, a point or a comma, where the file "
+          "does not show it")
+      ->check([](const std::string& sign) {
+        return sign == "." || sign == "," ? std::string()
+                                          : sign + " not in {.,}";
+      })
       ->type_name("SIGN");
   verb.add_option("--date", date,
                   "Order of dates with slashes: d/m/y, m/d/y, y/m/d")
@@ -449,6 +461,7 @@ void TableOptions::AddTo(CLI::App& verb) {
                   "Lines in front of the names of the columns (default: as "
                   "found)")
       ->check(CLI::Range(0, 1000000))
+      ->default_str("")
       ->type_name("LINES");
 }
 

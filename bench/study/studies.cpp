@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "bench/study/study_detectors.h"
 #include "diagnosis/fault_catalogue.h"
 #include "report/progress.h"
 #include "report/stop_signals.h"

@@ -41,7 +41,7 @@ struct FaultEvent {
   int model_version{0};
   std::uint64_t model_hash{0};
   bool persisted{false};  ///< Committed to the history before it was published.
-  bool resent{false};  ///< Of an earlier session. Neither stored nor sent.
+  bool resent{false};     ///< Of an earlier session. Neither stored nor sent.
   /// The model set that made the transition; null if an earlier session made
   /// it. Neither stored nor sent.
   std::shared_ptr<const ModelSet> models{};

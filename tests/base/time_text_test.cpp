@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "tests/storage/message_of.h"
 
-namespace fdi::report {
+namespace fdi {
 namespace {
 
 // date -u -d 2026-11-20T14:56:11Z +%s
@@ -131,4 +131,4 @@ TEST_F(TimeTextTest, DurationsForPeopleCarryTwoUnitsAtMost) {
 }
 
 }  // namespace
-}  // namespace fdi::report
+}  // namespace fdi

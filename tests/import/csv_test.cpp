@@ -13,7 +13,7 @@
 #include "base/error.h"
 #include "tests/storage/temporary_directory.h"
 
-namespace fdi::report {
+namespace fdi::importer {
 namespace {
 
 using ::testing::AllOf;
@@ -439,4 +439,4 @@ TEST(CsvTest, FilesThatCannotBeReadAreNamedWithTheReason) {
 }
 
 }  // namespace
-}  // namespace fdi::report
+}  // namespace fdi::importer

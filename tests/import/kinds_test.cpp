@@ -71,7 +71,9 @@ std::string Clock(const char* format, std::size_t k,
   std::strftime(text.data(), text.size(), format, &fields);
   return text.data();
 }
-std::string Iso(std::size_t k) { return Clock("%Y-%m-%dT%H:%M:%SZ", k); }
+std::string Iso(std::size_t k) {
+  return Clock("%Y-%m-%dT%H:%M:%SZ", k);
+}
 
 using Row = std::function<std::string(std::size_t)>;
 std::string Rows(const Row& row, bool backwards = false) {
@@ -90,13 +92,13 @@ std::string Wide(const std::string& header, const Row& time) {
          Rows([&](std::size_t k) { return time(k) + "," + Plain(k); });
 }
 /// One reading per row and tag; `cell` gets the row, tag and value.
-std::string Tall(
-    const std::function<std::string(std::size_t, const std::string&, double)>&
-        row,
-    bool by_tag) {
+std::string Tall(const std::function<
+                     std::string(std::size_t, const std::string&, double)>& row,
+                 bool by_tag) {
   std::string text;
   const std::array<std::pair<const char*, const std::array<double, kRows>*>, 3>
-      tags{{{"17FC.OP", &kValve.cv}, {"17ZT.PV", &kValve.x},
+      tags{{{"17FC.OP", &kValve.cv},
+            {"17ZT.PV", &kValve.x},
             {"17FT.PV", &kValve.f}}};
   for (std::size_t i = 0; i < 3 * kRows; ++i) {
     const auto& [tag, values] = by_tag ? tags[i / kRows] : tags[i % 3];
@@ -189,16 +191,18 @@ std::vector<Kind> Kinds() {
       {"an annotated table of each tag",
        [] {
          std::string text;
-         const std::array<std::pair<const char*, const std::array<double, kRows>*>,
-                          3>
-             tags{{{"FV17.OP", &kValve.cv}, {"FV17.ZT", &kValve.x},
+         const std::array<
+             std::pair<const char*, const std::array<double, kRows>*>, 3>
+             tags{{{"FV17.OP", &kValve.cv},
+                   {"FV17.ZT", &kValve.x},
                    {"FV17.FT", &kValve.f}}};
          for (const auto& [tag, values] : tags) {
-           text += "#datatype,string,dateTime,dateTime,double,string\n"
-                   "#default,_result,,,,\n,table,_start,_time,_value,_field\n";
+           text +=
+               "#datatype,string,dateTime,dateTime,double,string\n"
+               "#default,_result,,,,\n,table,_start,_time,_value,_field\n";
            for (std::size_t k = 0; k < kRows; ++k) {
-             text += ",0," + Iso(0) + "," + Iso(k) + "," +
-                     Fixed((*values)[k]) + "," + tag + "\n";
+             text += ",0," + Iso(0) + "," + Iso(k) + "," + Fixed((*values)[k]) +
+                     "," + tag + "\n";
            }
            text += "\n";
          }
@@ -209,9 +213,9 @@ std::vector<Kind> Kinds() {
            Tall(
                [](std::size_t k, const std::string& tag, double value) {
                  const bool bad = tag == "17ZT.PV" && k >= 30 && k < 40;
-                 return '"' + tag + "\";\"" +
-                        Clock("%d.%m.%Y %H:%M:%S\";", k) + Comma(value) +
-                        (bad ? ";0;" : ";1;") + "46091416666,667";
+                 return '"' + tag + "\";\"" + Clock("%d.%m.%Y %H:%M:%S\";", k) +
+                        Comma(value) + (bad ? ";0;" : ";1;") +
+                        "46091416666,667";
                },
                true) +
            "\"$RT_OFF$\";\"10.03.2026 09:12:00\";0;2;46091425000,000\n"
@@ -223,7 +227,9 @@ std::vector<Kind> Kinds() {
                [](std::size_t k, const std::string& tag, double value) {
                  const bool bad = tag == "17FT.PV" && k >= 50 && k < 60;
                  return tag + Clock(",%d-%b-%y %H:%M:%S,", k) + Fixed(value) +
-                        (bad ? ",2" : k > 100 ? ",4" : ",0");
+                        (bad       ? ",2"
+                         : k > 100 ? ",4"
+                                   : ",0");
                },
                false),
        {},
@@ -260,14 +266,13 @@ std::vector<Kind> Kinds() {
        {},
        Range(40, 49)},
       {"words for no reading",
-       "time,17FC.OP,17ZT.PV,17FT.PV\n" +
-           Rows([&](std::size_t k) {
-             return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
-                    (in(k, 10, 19)   ? "Inp OutRange"
-                     : in(k, 60, 62) ? "Defekt am Geber"
-                                     : Fixed(kValve.x[k])) +
-                    "," + (in(k, 30, 32) ? "Set to Bad" : Fixed(kValve.f[k]));
-           }),
+       "time,17FC.OP,17ZT.PV,17FT.PV\n" + Rows([&](std::size_t k) {
+         return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
+                (in(k, 10, 19)   ? "Inp OutRange"
+                 : in(k, 60, 62) ? "Defekt am Geber"
+                                 : Fixed(kValve.x[k])) +
+                "," + (in(k, 30, 32) ? "Set to Bad" : Fixed(kValve.f[k]));
+       }),
        [] {
          auto rows = Range(10, 19);
          rows.merge(Range(60, 62));
@@ -275,14 +280,13 @@ std::vector<Kind> Kinds() {
        }(),
        Range(30, 32)},
       {"numbers of a state",
-       "time,FC2.OP,ZT2.PV,FT2.PV\n" +
-           Rows([&](std::size_t k) {
-             return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
-                    (in(k, 70, 79) ? k < 75 ? "246.000" : "253.000"
-                                   : Fixed(kValve.x[k])) +
-                    "," + Fixed(kValve.f[k]);
-           }),
-       Range(70, 79)},
+       "time,FC2.OP,ZT2.PV,FT2.PV\n" + Rows([&](std::size_t k) {
+         return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
+                (in(k, 70, 74) ? k < 72 ? "246.000" : "253.000"
+                               : Fixed(kValve.x[k])) +
+                "," + Fixed(kValve.f[k]);
+       }),
+       Range(70, 74)},
       {"blanks between thousands, tabs, decimal commas, brackets",
        "Zeit\tV 17 [Stellgröße] (%)\tV 17 [Stellung] (%)\tF 17 [Durchfluß] "
        "(kg/h)\n" +
@@ -298,8 +302,8 @@ std::vector<Kind> Kinds() {
          // date -d 2016-12-31T23:59:00Z +%s
          std::string text = "time," + names + "\n";
          for (std::size_t k = 0; k < kRows; ++k) {
-           text += Clock("%Y-%m-%dT%H:%M:%SZ,", k, 1'483'228'740) + Plain(k) +
-                   "\n";
+           text +=
+               Clock("%Y-%m-%dT%H:%M:%SZ,", k, 1'483'228'740) + Plain(k) + "\n";
            text += k == 59 ? "2016-12-31T23:59:60Z," + Plain(k) + "\n" : "";
          }
          return text;
@@ -369,8 +373,7 @@ TEST(KindsTest, WhatSniffWritesTheImporterReads) {
 
 TEST(KindsTest, AmbiguousDecimalsAndDatesAreMarkedAsChoices) {
   const std::string points =
-      "Date;FV6 output;FV6 travel;FT6 flow\n" +
-      Rows([](std::size_t k) {
+      "Date;FV6 output;FV6 travel;FT6 flow\n" + Rows([](std::size_t k) {
         return Clock("%d/03/2026 %H:%M:%S;", k) + Fixed(kValve.cv[k]) + ";" +
                Fixed(kValve.x[k]) + ";" + Fixed(10.0 + kValve.f[k]);
       });
@@ -410,11 +413,10 @@ TEST(KindsTest, UnknownQualityIsNamedAndRefused) {
 }
 
 TEST(KindsTest, SignalsAreRequiredByReadingsNotByHeaders) {
-  const std::string text =
-      "time,CV,X,Q\n" + Rows([](std::size_t k) {
-        return Iso(k) + "," + Fixed(kValve.cv[k]) + "," + Fixed(kValve.x[k]) +
-               ",bad";
-      });
+  const std::string text = "time,CV,X,Q\n" + Rows([](std::size_t k) {
+                             return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
+                                    Fixed(kValve.x[k]) + ",bad";
+                           });
   ColumnMap map;
   map.columns = {{"CV", Signal::kCv}, {"X", Signal::kX}};
   map.quality_of = {{"X", "Q"}};
@@ -503,9 +505,8 @@ TEST(KindsTest, UnitsAndRangesBeatLettersOfTags) {
 TEST(KindsTest, WhatValveAndRecordTheModelsAreNotForIsSaid) {
   const auto wide = [](const std::string& header,
                        const std::function<std::string(std::size_t)>& cells) {
-    return "time," + header + "\n" + Rows([&](std::size_t k) {
-             return Iso(k) + "," + cells(k);
-           });
+    return "time," + header + "\n" +
+           Rows([&](std::size_t k) { return Iso(k) + "," + cells(k); });
   };
   EXPECT_THAT(Findings(wide("MV101.CMD,MV101.ZSO,FIT101 [m3/h]",
                             [](std::size_t k) {
@@ -534,11 +535,11 @@ TEST(KindsTest, WhatValveAndRecordTheModelsAreNotForIsSaid) {
               HasSubstr("no position (X)"));
   EXPECT_THAT(Findings(wide("FV3.OP,FV3.ZT,FT3 [Nm3/h]", Plain)),
               HasSubstr("a flow of gas"));
-  EXPECT_THAT(Findings("time,FC1.OP,ZT1.PV,FT1 [t/h]\n" +
-                       Rows([](std::size_t k) {
-                         return Clock("%Y-%m-%dT%H:%M:%SZ,", 60 * k) + Plain(k);
-                       })),
-              HasSubstr("a slow record: one row in 60 s"));
+  EXPECT_THAT(
+      Findings("time,FC1.OP,ZT1.PV,FT1 [t/h]\n" + Rows([](std::size_t k) {
+                 return Clock("%Y-%m-%dT%H:%M:%SZ,", 60 * k) + Plain(k);
+               })),
+      HasSubstr("a slow record: one row in 60 s"));
   const std::string split =
       wide("PIC5.OP,PV5A.ZT,FT5A [t/h]", [](std::size_t k) {
         const double x = k > 100 ? 100.0 : kValve.x[k];
@@ -571,6 +572,10 @@ TEST(KindsTest, TheReferenceFilesGiveWhatTheirTableSays) {
     a.merge(b);
     return a;
   };
+  std::set<std::size_t> tens;  // The first ten rows of each hundred.
+  for (std::size_t k = 0; k < 700; k += 100) {
+    tens.merge(Range(k, k + 9));
+  }
   const std::vector<File> files = {
       {"a01_wincc_archive", 720, Range(300, 329), {}, "Europe/Berlin"},
       {"a02_influx_annotated", 720},
@@ -583,14 +588,20 @@ TEST(KindsTest, TheReferenceFilesGiveWhatTheirTableSays) {
        both(Range(100, 109), both(Range(350, 352), Range(360, 362))),
        both(Range(200, 205), Range(260, 263))},
       {"a11_s7_counts", 720, Range(450, 479)},
-      {"a12_dst_tag_major", 1440, {}, {}, "Europe/Berlin", "",
-       1'792'888'200, 5.0},
+      {"a12_dst_tag_major",
+       1440,
+       {},
+       {},
+       "Europe/Berlin",
+       "",
+       1'792'888'200,
+       5.0},
       {"a13_date_time_summary", 720},
       {"a14_section_two_digit_year", 720},
       {"a15_filetime", 720},
       {"a16_epoch_us", 720},
       {"a18_utf16_brackets", 720, {}, {}, "Europe/Berlin"},
-      {"a19_quality_words_dcs", 700, Range(0, 69), Range(0, 69)},
+      {"a19_quality_words_dcs", 700, tens, tens},
       {"b01_split_range", 1500, {}, {}, "UTC", "split range"},
       {"b03_gas_nm3h", 900, {}, {}, "UTC", "a flow of gas"},
       {"b05_no_position", 1800, {}, {}, "UTC", "no position (X)"},
@@ -602,8 +613,8 @@ TEST(KindsTest, TheReferenceFilesGiveWhatTheirTableSays) {
   };
   for (const File& file : files) {
     SCOPED_TRACE(file.name);
-    const std::string text = ReadTextFile(
-        std::string(folder) + "/cases/" + file.name + ".csv");
+    const std::string text =
+        ReadTextFile(std::string(folder) + "/cases/" + file.name + ".csv");
     ColumnMap map = Utc();
     map.zone = file.zone;
     std::string findings;
