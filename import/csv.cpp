@@ -198,6 +198,7 @@ void CsvReader::Refuse(const std::string& reason) const {
 // ColumnMap::header_rows less one further rows. Blank lines may be anywhere. A
 // record can take several lines, because a quoted cell may contain line breaks:
 // all decisions about the separator come before a record is begun.
+// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 std::optional<CsvRow> CsvReader::TakeLine(std::string_view line,
                                           std::int64_t number) {
   line_ = number > 0 ? number : line_ + 1;
@@ -473,6 +474,7 @@ std::optional<std::size_t> CsvReader::Column(std::string_view name) {
   return found;
 }
 
+// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 void CsvReader::TakeHeader() {
   names_ = record_.cells();
   header_cells_ = names_;

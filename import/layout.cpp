@@ -210,6 +210,7 @@ bool LayoutFinder::IsNamed(const Cells& cells) const {
 // times in most rows, a row of the header holds something else. Its first row
 // with names that are not units counts; titles and comments in front have fewer
 // cells.
+// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 bool LayoutFinder::FindHeader() {
   std::vector<Record> records;
   std::map<std::size_t, std::size_t> widths;
@@ -542,6 +543,7 @@ void LayoutFinder::FindQualities() {
 // so is a table of ambiguous cells only, unless commas separate them and all
 // signs are points, or something else does and all are commas: a wrong guess
 // would be off by a factor of 1000.
+// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 void LayoutFinder::FindDecimal() {
   if (map().decimal != '\0') {
     return;

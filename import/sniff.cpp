@@ -455,6 +455,7 @@ void SignalGuess::GuessNames() {
   }
 }
 
+// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
   std::string unit = UnitIn(column.name).unit;
   std::istringstream about(column.about);
@@ -917,6 +918,7 @@ Sniffed Sniff(std::string_view text, const std::string& source, ColumnMap map) {
   return found;
 }
 
+// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 std::string MapText(const Sniffed& found, const std::string& file) {
   const ColumnMap& map = found.map;
   const auto chosen = [&](const std::string& key) {

@@ -155,11 +155,11 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
   mapping.offset = unit->offset + unit->scale * offset;
   mapping.unit = name;
   const bool command = signal == Signal::kCv || signal == Signal::kSp;
-  if (command && name != "mA" && raw.size() == 2 &&
-      std::max(raw[0], raw[1]) <= 100.0 && std::max(raw[0], raw[1]) > 25.0) {
+  const bool half = name != "mA" && raw.size() == 2 &&
+                    std::max(raw[0], raw[1]) <= 100.0 &&
+                    std::max(raw[0], raw[1]) > 25.0;
+  if (command && (half || (raw.empty() && name == "%" && scale > 1.0))) {
     mapping.clamped = true;  // Half of a split range, and the valve at its end.
-  } else if (command && raw.empty() && name == "%" && scale > 1.0) {
-    mapping.clamped = true;
   } else if (counts && raw.size() == 2) {
     // A card shows a broken wire or a short circuit by counts beyond its range:
     // 3.6 and 21 mA, 32767. A tenth of the range is left to overrange.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <exception>
 #include <optional>
-#include <ranges>
 #include <string>
 #include <utility>
 
@@ -294,6 +293,14 @@ bool Journal::WriteRecords() {
   }
 }
 
+void Journal::ReportRefused(const FaultEvent& event) {
+  counters_.Add(Counter::kEventsRefused);
+  log_.Report(LogId::kRefused, "event_refused", [&event] {
+    return "valve=" + LogValue(event.valve_id) +
+           " transition=" + std::string(TransitionName(event.transition.kind));
+  });
+}
+
 // Commits events, resumptions, looks and strengths together; gaps and marks are
 // buffered only after that succeeded, so that a retry does not buffer them
 // twice. A record that fails for its own sake leaves the batch.
@@ -332,7 +339,8 @@ bool Journal::WriteBatch(std::vector<const Record*> batch, int failures) {
     while (!commit_the_others()) {
     }
   });
-  const auto set_stages = [this](const auto& records, bool stored) {
+  const auto set_stages = [this](const std::vector<const Record*>& records,
+                                 bool stored) {
     const std::lock_guard lock(mutex_);
     for (const Record* record : records) {
       if (const auto* event = std::get_if<PendingEvent>(record)) {
@@ -340,21 +348,19 @@ bool Journal::WriteBatch(std::vector<const Record*> batch, int failures) {
       }
     }
   };
-  set_stages(std::views::keys(failed), false);
+  std::vector<const Record*> unstored = refused;
+  for (const auto& [record, reason] : failed) {
+    unstored.push_back(record);
+  }
+  set_stages(unstored, false);
   if (!committed) {
     set_stages(batch, false);
     return false;
   }
   for (const Record* record : refused) {
-    const FaultEvent& event = std::get<PendingEvent>(*record)->event;
-    counters_.Add(Counter::kEventsRefused);
-    log_.Report(LogId::kRefused, "event_refused", [&event] {
-      return "valve=" + LogValue(event.valve_id) + " transition=" +
-             std::string(TransitionName(event.transition.kind));
-    });
+    ReportRefused(std::get<PendingEvent>(*record)->event);
     std::erase(batch, record);
   }
-  set_stages(refused, false);
   set_stages(batch, true);
   for (const auto& [record, reason] : failed) {
     if (failures + 1 >= options_.tries) {
@@ -364,6 +370,11 @@ bool Journal::WriteBatch(std::vector<const Record*> batch, int failures) {
       retry_deferred_at_ = Clock::now() + options_.retry_period;
     }
   }
+  return Buffer(batch);
+}
+
+// Gaps and marks.
+bool Journal::Buffer(const std::vector<const Record*>& batch) {
   return Attempt([&] {
     for (const Record* record : batch) {
       if (const auto* gap = std::get_if<DataGap>(record)) {

@@ -134,6 +134,8 @@ class Journal : public EpisodeOutlet {
   void Write();
   bool WriteWaiting();
   bool WriteRecords();
+  void ReportRefused(const FaultEvent& event);
+  bool Buffer(const std::vector<const Record*>& batch);
   bool WriteBatch(std::vector<const Record*> batch, int failures = 0);
   bool Store(const Record& record);
   bool RetryDeferred();

@@ -44,6 +44,8 @@ class FakeLive : public ValveListener {
 class PipelineLiveTest : public PipelineTest {
  protected:
   PipelineLiveTest() { listeners_ = {&board_}; }
+  // The board has to outlive the pipeline.
+  ~PipelineLiveTest() override { pipeline_.reset(); }
 
   FakeLive board_;
 };
