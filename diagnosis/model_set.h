@@ -196,6 +196,10 @@ struct ModelSet {
 /// A set of faults as bits: bit i stands for ModelSet::faults[i].
 using FaultSet = std::uint64_t;
 
+constexpr bool Has(FaultSet faults, std::size_t bit) {
+  return (faults >> bit & 1U) != 0;
+}
+
 /// Appends the findings of the floor, if there is one, to the faults.
 void AddFindings(ModelSet& models);
 

@@ -64,9 +64,9 @@ std::string CoverageReasonsName(CoverageReasons reasons) {
 }
 
 std::string_view TransitionName(TransitionKind kind) {
-  return NameOf(
-      kind, std::array<std::string_view, 5>{"DETECTED", "ISOLATED",
-                                            "REISOLATED", "CLEARED", "CLOSED"});
+  return NameOf(kind, std::array<std::string_view, 6>{"DETECTED", "ISOLATED",
+                                                      "REISOLATED", "CLEARED",
+                                                      "CLOSED", "CHANGED"});
 }
 
 std::string_view EndReasonName(EndReason reason) {

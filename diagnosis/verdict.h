@@ -2,11 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "diagnosis/model_set.h"
+#include "diagnosis/severity.h"
 
 namespace fdi {
 
@@ -79,6 +81,7 @@ enum class TransitionKind : std::uint8_t {
   kReisolated,
   kCleared,
   kClosed,
+  kChanged,  ///< The priority rose. On the bus: kReisolated, the same faults.
 };
 
 enum class EndReason : std::uint8_t {
@@ -107,6 +110,9 @@ struct Transition {
   double factor{0.0};    ///< Largest of the set, or else of any fault.
   double strength{0.0};  ///< Estimated, of the fault with that factor, or the
                          ///< likeliest one by physics; 0 until isolated.
+  double lowest{0.0};    ///< Ends of its 95 % interval, equal if not known.
+  double highest{0.0};   ///<
+  std::optional<Severity> severity{};  ///< Nothing: heard on the bus.
   EndReason reason{EndReason::kNone};  ///< Of kClosed.
   Unknown unknown{Unknown::kNone};     ///< As in the verdict at that time.
   Layer layer{Layer::kObservers};      ///< What named `faults`.

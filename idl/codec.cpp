@@ -41,6 +41,7 @@ FDI_LAST(FlowUnit::kTPerHour, v1::FlowUnit::FLOW_T_PER_H)
 FDI_LAST(Intake::kPeriod, v1::Intake::INTAKE_PERIOD)
 FDI_LAST(Quality::kUnassigned, v1::Quality::QUALITY_UNASSIGNED)
 FDI_LAST(State::kIsolated, v1::State::STATE_ISOLATED)
+// TransitionKind::kChanged is not on the wire: see OnTheBus().
 FDI_LAST(TransitionKind::kClosed, v1::Transition::TRANSITION_CLOSED)
 FDI_LAST(EndReason::kUnknown, v1::EndReason::END_UNKNOWN)
 FDI_LAST(Health::kFailing, v1::Health::HEALTH_FAILING)

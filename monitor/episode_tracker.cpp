@@ -54,18 +54,24 @@ void EpisodeTracker::Adopt(const FaultEvent& event) {
   }
 }
 
+// TryRecovery() follows RecordGap(), which needs to know whether any sample
+// came before.
+void EpisodeTracker::Advance(const Sample& sample, const Verdict& engine,
+                             const ModelSet& models, EpisodeOutlet& outlet) {
+  if (!OutOfOrder(engine.intake)) {
+    RecordGap(sample, engine, models, outlet);
+    TryRecovery(sample, models, outlet);
+  }
+}
+
+// The trace takes the sample before the transitions, so that what they write
+// includes it.
 void EpisodeTracker::Step(const Sample& sample, const Verdict& verdict,
                           const std::shared_ptr<const ModelSet>& models,
                           EpisodeOutlet& outlet) {
   if (OutOfOrder(verdict.intake)) {
     return;
   }
-  // TryRecovery() precedes the transitions, because a detection resumes what it
-  // has not closed. It follows RecordGap(), which needs to know whether any
-  // sample came before. The trace takes the sample before the transitions, so
-  // that what they write includes it.
-  RecordGap(sample, verdict, *models, outlet);
-  TryRecovery(sample, *models, outlet);
   const int channels = static_cast<int>(models->channels.size());
   const int faults = static_cast<int>(models->faults.size());
   // Push() would restart the trace and lose what is not written yet.
@@ -172,6 +178,7 @@ void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
   event.transition.faults = episode.faults;
   event.transition.reason = reason;
   event.transition.layer = episode.layer;
+  event.transition.severity = episode.severity;
   if (!episode.candidates.empty()) {
     event.transition.factor = episode.candidates.front().factor;
     event.transition.strength = episode.candidates.front().strength;
@@ -183,91 +190,54 @@ void EpisodeTracker::CloseRecovered(EndReason reason, std::int64_t stamp_ns,
   outlet.OnEvent(std::move(event));
 }
 
-void EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
+bool EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
                            EpisodeOutlet& outlet) {
   open_ = Open{};
   open_->source_id = verdict.source_id;
   open_->trace_until_ns = transition.stamp_ns + Ns(options_.after_detection_s);
-  // Whatever rules a resumption out, TryRecovery() has already applied.
+  // Whatever rules a resumption out, Advance() has already applied.
   if (recovered_) {
     open_->episode_id = recovered_->episode_id;
     open_->detection_stamp_ns = recovered_->detection_stamp_ns;
-    open_->isolated = recovered_->isolated;
     open_->faults = recovered_->faults;
     open_->candidates = recovered_->candidates;
-    open_->resumed = true;
     outlet.OnResumed(*recovered_, verdict.stamp_ns);
     recovered_.reset();
-    return;
+    return true;
   }
   open_->detection_stamp_ns = transition.detection_stamp_ns;
   open_->episode_id =
       EpisodeId(valve_id_, verdict.source_id, transition.detection_stamp_ns);
+  return false;
 }
 
 void EpisodeTracker::Take(const Transition& transition, const Verdict& verdict,
                           const std::shared_ptr<const ModelSet>& models,
                           EpisodeOutlet& outlet) {
-  Transition recorded = transition;
-  if (transition.kind == TransitionKind::kDetected) {
-    Begin(transition, verdict, outlet);
-    // The earlier session has reported the detection.
-    if (open_->resumed) {
-      return;
-    }
+  // The earlier session has reported the detection of what goes on.
+  if (transition.kind == TransitionKind::kDetected &&
+      Begin(transition, verdict, outlet)) {
+    return;
   }
   if (!open_) {
     return;
   }
-  const bool ends = EndsEpisode(transition);
-  const bool keeps = KeepsName(transition, *models);
   if (transition.kind == TransitionKind::kIsolated) {
     open_->trace_until_ns =
         transition.stamp_ns + Ns(options_.after_isolation_s);
-    // What is the first name to the engine, which may have restarted, need not
-    // be that of the episode.
-    recorded.kind = open_->isolated ? TransitionKind::kReisolated
-                                    : TransitionKind::kIsolated;
-    open_->isolated = true;
   }
-  if (keeps && !ends) {
-    return;
-  }
-  if (keeps) {
-    recorded.faults = open_->faults;
-  } else {
+  // At its end the factors do not concern this episode any more: they are those
+  // of a normal valve, or of the next source.
+  if (!EndsEpisode(transition)) {
     open_->faults = transition.faults;
-    // The factors do not always concern this episode: where it is superseded,
-    // they are those of the next source, and where it ends without a name,
-    // those of a normal valve.
-    if (transition.reason != EndReason::kSuperseded &&
-        !(ends && transition.faults == 0)) {
-      open_->candidates = CandidatesOf(*models, verdict, transition.faults);
+    open_->candidates = CandidatesOf(*models, verdict, transition.faults);
+    // What the observers hold likely beside is refuted by the simulation.
+    if (transition.layer == Layer::kPhysics) {
+      std::erase_if(open_->candidates,
+                    [](const FaultCandidate& each) { return !each.isolated; });
     }
   }
-  // What the observers hold likely beside is refuted by the simulation.
-  if (transition.layer == Layer::kPhysics) {
-    std::erase_if(open_->candidates,
-                  [](const FaultCandidate& each) { return !each.isolated; });
-  }
-  Emit(recorded, models, outlet);
-}
-
-// Whether the episode was resumed under this name, or under a fault of which
-// the floor alone finds a sign so far.
-bool EpisodeTracker::KeepsName(const Transition& transition,
-                               const ModelSet& models) {
-  if (transition.kind == TransitionKind::kDetected || !open_->resumed ||
-      !open_->isolated || open_->renamed) {
-    return false;
-  }
-  const FaultSet known = ~FindingsOf(models);
-  const bool finding =
-      transition.faults != 0 && (transition.faults & known) == 0;
-  const bool nothing = transition.faults == 0 && EndsEpisode(transition);
-  open_->renamed = !finding && !nothing;
-  return transition.faults == open_->faults || nothing ||
-         (finding && (open_->faults & known) != 0);
+  Emit(transition, models, outlet);
 }
 
 // An episode without a name keeps the faults that could explain it last; none
@@ -323,11 +293,7 @@ void EpisodeTracker::End(const Transition& closed,
                          const std::shared_ptr<const ModelSet>& models,
                          EpisodeOutlet& outlet) {
   if (open_) {
-    Transition recorded = closed;
-    if (KeepsName(closed, *models)) {
-      recorded.faults = open_->faults;
-    }
-    Emit(recorded, models, outlet);
+    Emit(closed, models, outlet);
   }
 }
 

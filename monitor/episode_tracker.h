@@ -34,6 +34,8 @@ class EpisodeOutlet {
   virtual void OnLook(EpisodeLook look) = 0;
   virtual void OnStrength(StrengthPoint point) = 0;
   virtual void OnGap(DataGap gap) = 0;
+  /// The valve was judged, and is normal.
+  virtual void OnNormal(const std::string& valve_id, std::int64_t stamp_ns) = 0;
   /// An episode of an earlier session goes on.
   virtual void OnResumed(const OpenEpisode& episode, std::int64_t stamp_ns) = 0;
 };
@@ -44,8 +46,7 @@ class EpisodeOutlet {
 /// An episode that an earlier session left open is resumed, under its old id,
 /// if the same source goes on and is detected abnormal again within the first
 /// minute (or twice the settling time, if that is longer); else it is closed
-/// with `unknown`. It keeps the fault that it was named after until a fault is
-/// named again: what the floor finds meanwhile is no name for it.
+/// with `unknown`. What it is called, EpisodeName says.
 class EpisodeTracker {
  public:
   EpisodeTracker(std::string valve_id, const TraceOptions& options);
@@ -57,7 +58,13 @@ class EpisodeTracker {
   /// open episode is to be resumed here, or has ended.
   void Adopt(const FaultEvent& event);
 
-  /// Takes a sample and what the engine with `models` said about it.
+  /// The next sample and what the engine with `models` said about it: the gap
+  /// before it, and whether recovering() may still go on. Comes before the
+  /// episode is named, which depends on that.
+  void Advance(const Sample& sample, const Verdict& engine,
+               const ModelSet& models, EpisodeOutlet& outlet);
+
+  /// The same sample, and the verdict with the name that counts.
   void Step(const Sample& sample, const Verdict& verdict,
             const std::shared_ptr<const ModelSet>& models,
             EpisodeOutlet& outlet);
@@ -83,7 +90,10 @@ class EpisodeTracker {
   /// Hands over evidence that is not written yet; for an orderly stop.
   void Flush(EpisodeOutlet& outlet);
 
-  bool recovering() const { return recovered_.has_value(); }
+  /// What is to be resumed; null: nothing is.
+  const OpenEpisode* recovering() const {
+    return recovered_ ? &*recovered_ : nullptr;
+  }
   std::size_t trace_bytes() const { return trace_.bytes(); }
 
  private:
@@ -92,11 +102,8 @@ class EpisodeTracker {
     std::uint64_t source_id{0};
     std::int64_t detection_stamp_ns{0};  // of the record, not of the engine
     std::int64_t trace_until_ns{0};
-    bool isolated{false};
-    bool resumed{false};
-    bool renamed{false};  // Since it was resumed.
     bool tracing{true};
-    FaultSet faults{0};  // isolated last
+    FaultSet faults{0};  // Its name.
     std::vector<FaultCandidate> candidates;
   };
 
@@ -109,9 +116,9 @@ class EpisodeTracker {
   void Take(const Transition& transition, const Verdict& verdict,
             const std::shared_ptr<const ModelSet>& models,
             EpisodeOutlet& outlet);
-  void Begin(const Transition& transition, const Verdict& verdict,
+  // @returns whether it resumes an episode.
+  bool Begin(const Transition& transition, const Verdict& verdict,
              EpisodeOutlet& outlet);
-  bool KeepsName(const Transition& transition, const ModelSet& models);
   void FollowUnknown(const Verdict& verdict, const ModelSet& models);
   void Emit(Transition transition,
             const std::shared_ptr<const ModelSet>& models,

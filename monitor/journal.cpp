@@ -157,6 +157,11 @@ void Journal::OnStrength(StrengthPoint point) {
   AddLocked(point);
 }
 
+void Journal::OnNormal(const std::string& valve_id, std::int64_t stamp_ns) {
+  const std::lock_guard lock(mutex_);
+  AddLocked(Normal{valve_id, stamp_ns});
+}
+
 void Journal::OnGap(DataGap gap) {
   counters_.Add(Counter::kGaps);
   log_.Report(
@@ -397,6 +402,8 @@ bool Journal::Store(const Record& record) {
     history_.StoreLook(*look);
   } else if (const auto* point = std::get_if<StrengthPoint>(&record)) {
     history_.StoreStrength(*point);
+  } else if (const auto* normal = std::get_if<Normal>(&record)) {
+    history_.ConfirmNormal(normal->valve_id, normal->stamp_ns);
   }
   return true;
 }
@@ -431,6 +438,10 @@ void Journal::SetAside(const Record& record, const std::string& reason) {
     what = "RESUMED";
     where.valve_id = resumed->valve_id;
     where.from_ns = where.to_ns = resumed->stamp_ns;
+  } else if (const auto* normal = std::get_if<Normal>(&record)) {
+    what = "normal";
+    where.valve_id = normal->valve_id;
+    where.from_ns = where.to_ns = normal->stamp_ns;
   }
   counters_.Add(Counter::kRecordsSetAside);
   log_.Report(

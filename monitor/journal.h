@@ -73,6 +73,7 @@ class Journal : public EpisodeOutlet {
   void OnLook(EpisodeLook look) override;
   void OnStrength(StrengthPoint point) override;
   void OnGap(DataGap gap) override;
+  void OnNormal(const std::string& valve_id, std::int64_t stamp_ns) override;
   void OnResumed(const OpenEpisode& episode, std::int64_t stamp_ns) override;
   /// `event` was published before Start(): marks it as sent once that is due.
   void MarkPublished(const FaultEvent& event);
@@ -115,11 +116,15 @@ class Journal : public EpisodeOutlet {
     std::int64_t stamp_ns;
     std::string valve_id;
   };
+  struct Normal {
+    std::string valve_id;
+    std::int64_t stamp_ns;
+  };
   struct Sent {  // The event is on the bus.
     PendingEvent pending;
   };
   using Record = std::variant<PendingEvent, Resumption, EpisodeLook,
-                              StrengthPoint, DataGap, Sent>;
+                              StrengthPoint, Normal, DataGap, Sent>;
 
   struct Deferred {  // Failed for its own sake so many times.
     Record record;

@@ -55,6 +55,28 @@ std::string ThreeDigits(double value) {
 
 }  // namespace
 
+LookReport LookReportOf(const MonitorContext& context) {
+  return [context](LookFate fate, const std::string& whose,
+                   std::string_view reason) {
+    switch (fate) {
+      case LookFate::kTaken:
+        context.counters.Add(Counter::kLooks);
+        break;
+      case LookFate::kDropped:
+        context.counters.Add(Counter::kLooksDropped);
+        context.log.Report(LogId::kLookDropped, "second_look_dropped",
+                           [&whose] { return whose; });
+        break;
+      case LookFate::kFailed:
+        context.counters.Add(Counter::kLooksFailed);
+        context.log.Report(LogId::kLookFailed, "second_look_failed", [&] {
+          return whose + " reason=" + LogValue(reason);
+        });
+        break;
+    }
+  };
+}
+
 Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
                    std::shared_ptr<const ModelResolver> resolver,
                    const MonitorContext& context)
@@ -65,8 +87,9 @@ Pipeline::Pipeline(PipelineOptions options, PipelineSinks sinks,
       counters_(context.counters),
       log_(context.log),
       journal_(sinks.history, sinks.events, context, options_.journal),
-      looks_(options_.second_look ? std::make_unique<LookWorker>(context_)
-                                  : nullptr) {}
+      looks_(options_.second_look
+                 ? std::make_unique<LookWorker>(LookReportOf(context_))
+                 : nullptr) {}
 
 Pipeline::~Pipeline() {
   try {
@@ -272,7 +295,8 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
             "valve_seen valve=" + LogValue(id) + " model_set=" +
                 (parts ? NameOf(parts->plan->models()) : "none"));
   auto valve = std::make_unique<Valve>(
-      Valve{ValveMonitor(id, parts, options_.trace, looks_.get()),
+      Valve{ValveMonitor(id, parts, options_.trace, looks_.get(),
+                         options_.severities),
             reserved_.erase(id) > 0});
   valve->monitor.HoldIsolation(resolver_->IsolationHeld(id));
   if (const auto open = recovered_.find(id); open != recovered_.end()) {
@@ -372,6 +396,8 @@ void Pipeline::Adopt(FaultEvent event) {
     return;
   }
   event.models = parts->plan->shared_models();
+  // Severities are not on the bus.
+  event.transition.severity = SeverityOf(event, *options_.severities);
   journal_.OnEvent(event);
   if (const auto found = by_id_.find(event.valve_id); found != by_id_.end()) {
     found->second->monitor.Adopt(event);

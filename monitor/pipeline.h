@@ -17,7 +17,7 @@
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
 #include "monitor/journal.h"
-#include "monitor/look_worker.h"
+#include "monitor/names/look_worker.h"
 #include "monitor/sinks.h"
 #include "monitor/throttled_log.h"
 #include "monitor/valve_monitor.h"
@@ -40,7 +40,13 @@ struct PipelineOptions {
   std::chrono::milliseconds checkpoint_period{60'000};
   JournalOptions journal;
   bool second_look{true};  ///< By simulation, for model sets with physics.
+  /// By which episodes get their severity; without bands all are medium.
+  std::shared_ptr<const SeverityCatalogue> severities{
+      std::make_shared<const SeverityCatalogue>()};
 };
+
+/// Counts and logs what becomes of second looks; for LookWorker.
+LookReport LookReportOf(const MonitorContext& context);
 
 /// Receivers of the results; all outlive the pipeline.
 struct PipelineSinks {

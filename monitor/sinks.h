@@ -100,9 +100,9 @@ class RecordError : public std::runtime_error {
 class HistorySink {
  public:
   virtual ~HistorySink() = default;
-  /// Makes the calls of Record(), Resume(), StoreLook() and StoreStrength() in
-  /// `batch` one commit: on return everything is on the disk; on failure,
-  /// nothing.
+  /// Makes the calls of Record(), Resume(), StoreLook(), StoreStrength() and
+  /// ConfirmNormal() in `batch` one commit: on return everything is on the
+  /// disk; on failure, nothing.
   virtual void CommitBatch(const std::function<void()>& batch) = 0;
   /// Within CommitBatch(). @returns whether the event is in the history: false
   ///   if its episode has ended there, or does not exist.
@@ -113,6 +113,10 @@ class HistorySink {
   virtual void StoreLook(const EpisodeLook& look) = 0;
   /// Within CommitBatch().
   virtual void StoreStrength(const StrengthPoint& point) = 0;
+  /// The valve was judged normal: so is what ended only with its data. Within
+  /// CommitBatch().
+  virtual void ConfirmNormal(const std::string& valve_id,
+                             std::int64_t stamp_ns) = 0;
   /// Buffers. Evidence of an unknown episode is dropped.
   virtual void AddTrace(const EpisodeTrace& trace) = 0;
   /// Buffers.

@@ -25,11 +25,13 @@ std::shared_ptr<const ModelSet> ModelsOf(
 
 ValveMonitor::ValveMonitor(const std::string& id,
                            const std::optional<EngineParts>& parts,
-                           const TraceOptions& options, LookWorker* looks)
+                           const TraceOptions& options, LookWorker* looks,
+                           std::shared_ptr<const SeverityCatalogue> severities)
     : id_(id),
       models_(ModelsOf(parts)),
       required_(parts ? parts->plan->required() : 0),
       looks_(looks),
+      severities_(std::move(severities)),
       tracker_(id, options) {
   if (parts) {
     engine_.emplace(*parts);
@@ -39,23 +41,13 @@ ValveMonitor::ValveMonitor(const std::string& id,
   unassigned_.residuals.fill(std::numeric_limits<double>::quiet_NaN());
 }
 
-void ValveMonitor::Recover(const OpenEpisode& episode) {
-  tracker_.Recover(episode);
-  // The tracker keeps a name until the engine isolates a fault. One by physics
-  // outranks the engine and has to last until a look answers.
-  if (names_ && episode.layer == Layer::kPhysics &&
-      episode.model_hash == models_->content_hash) {
-    names_->SetInheritedName(episode.faults);
-  }
-}
-
 void ValveMonitor::NameEpisodes() {
   LookWorker::Physics physics;
   if (looks_ != nullptr && models_ != nullptr) {
     physics = looks_->PhysicsOf(*models_);
   }
-  names_ = physics ? std::make_unique<EpisodeNames>(id_, models_,
-                                                    std::move(physics), *looks_)
+  names_ = models_ ? std::make_unique<EpisodeNames>(
+                         id_, models_, std::move(physics), looks_, severities_)
                    : nullptr;
 }
 
@@ -111,16 +103,17 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     return {unassigned_, nullptr, swapped, isolation_held_, 0, period_s()};
   }
   RestoreOnce(sample.source_id);
-  // Before the engine: an episode that this sample opens has the old name only
-  // if the tracker still waits to resume one.
-  if (names_ && !tracker_.recovering() && !engine_->episode_open()) {
-    names_->SetInheritedName(std::nullopt);
-  }
+  const bool was_open = engine_->episode_open();
   const Verdict& engine = engine_->Step(sample);
-  const Verdict& verdict =
-      names_ ? names_->Step(sample, engine, isolation_held_) : engine;
+  tracker_.Advance(sample, engine, *models_, outlet);
+  // An episode that this sample opens has the old name only if it resumes that
+  // episode.
+  if (!was_open) {
+    names_->Inherit(tracker_.recovering());
+  }
+  const Verdict& verdict = names_->Step(sample, engine, isolation_held_);
   // From the next sample on; the verdict on this one stands.
-  engine_->Suspect(names_ && names_->suspects());
+  engine_->Suspect(names_->suspects());
   answer_ = &verdict;
   if (CountsAsTime(verdict)) {
     RecordPosition(sample);
@@ -135,10 +128,9 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
   // First the tracker, which opens the episode that looks and strengths belong
   // to.
   tracker_.Step(sample, verdict, models_, outlet);
-  if (names_) {
-    tracker_.Take(names_->TakeLook(), outlet);
-  }
-  FollowStrengths(verdict, outlet);
+  tracker_.Take(names_->TakeLook(), outlet);
+  tracker_.Take(names_->TakeStrengths(), outlet);
+  ConfirmNormal(verdict, outlet);
   const auto missing = static_cast<SignalMask>(required_ & ~sample.present);
   return {verdict, models_.get(), swapped, isolation_held_,
           missing, period_s(),    &engine};
@@ -156,18 +148,17 @@ void ValveMonitor::MeasurePeriod(std::int64_t stamp_ns) {
   unassigned_interval_ns_ = interval_ns;
 }
 
-void ValveMonitor::FollowStrengths(const Verdict& verdict,
-                                   EpisodeOutlet& outlet) {
-  const bool by_physics = names_ && names_->by_physics();
-  if (strengths_.Step(verdict, !by_physics)) {
-    if (by_physics) {
-      names_->RequestGrowth();
-    } else {
-      tracker_.Take(strengths_.Observed(*models_), outlet);
-    }
-  }
-  if (names_) {
-    tracker_.Take(names_->TakeStrengths(), outlet);
+// An alarm whose data ended stays until the valve is seen to be normal: for as
+// many samples as end an episode, once after each start or end of the stream.
+void ValveMonitor::ConfirmNormal(const Verdict& verdict,
+                                 EpisodeOutlet& outlet) {
+  if (verdict.detected || tracker_.recovering() != nullptr) {
+    normal_samples_ = 0;
+  } else if (verdict.intake == Intake::kAccepted &&
+             verdict.quality == Quality::kLive &&
+             normal_samples_ < models_->decision.clearing_samples &&
+             ++normal_samples_ == models_->decision.clearing_samples) {
+    outlet.OnNormal(id_, verdict.stamp_ns);
   }
 }
 
@@ -244,7 +235,6 @@ bool ValveMonitor::Adopt(const std::optional<EngineParts>& parts,
   // it. answer_ may point into names_, which is replaced.
   models_ = std::move(models);
   answer_ = nullptr;
-  strengths_ = {};
   // By models_, which has to be the new set here.
   NameEpisodes();
   required_ = parts ? parts->plan->required() : SignalMask{0};
@@ -301,6 +291,7 @@ void ValveMonitor::Close(EndReason reason, EpisodeOutlet& outlet) {
   if (!engine_) {
     return;
   }
+  normal_samples_ = 0;
   const std::optional<Transition> closed = engine_->EndEpisode(reason);
   // It may be the verdict of names_, which still shows the episode.
   answer_ = nullptr;
@@ -310,7 +301,7 @@ void ValveMonitor::Close(EndReason reason, EpisodeOutlet& outlet) {
 }
 
 void ValveMonitor::End(const Transition& closed, EpisodeOutlet& outlet) {
-  tracker_.End(names_ ? names_->End(closed) : closed, models_, outlet);
+  tracker_.End(names_->End(closed), models_, outlet);
 }
 
 }  // namespace fdi::monitor

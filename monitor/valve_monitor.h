@@ -10,9 +10,8 @@
 #include "diagnosis/followed_drift.h"
 #include "diagnosis/valve_engine.h"
 #include "monitor/checkpoint.h"
-#include "monitor/episode_names.h"
-#include "monitor/episode_strengths.h"
 #include "monitor/episode_tracker.h"
+#include "monitor/names/episode_names.h"
 #include "monitor/sinks.h"
 
 namespace fdi::monitor {
@@ -28,11 +27,14 @@ class ValveMonitor {
   /// @param parts of the model set; nothing: none is assigned.
   /// @param looks performs second looks if the model set has physics, and
   ///   outlives this; null: none.
+  /// @param severities by which episodes get their priority.
   ValveMonitor(const std::string& id, const std::optional<EngineParts>& parts,
-               const TraceOptions& options, LookWorker* looks = nullptr);
+               const TraceOptions& options, LookWorker* looks = nullptr,
+               std::shared_ptr<const SeverityCatalogue> severities =
+                   std::make_shared<const SeverityCatalogue>());
 
   /// Call before the first Step().
-  void Recover(const OpenEpisode& episode);
+  void Recover(const OpenEpisode& episode) { tracker_.Recover(episode); }
 
   /// See EpisodeTracker::Adopt().
   void Adopt(const FaultEvent& event) { tracker_.Adopt(event); }
@@ -102,7 +104,7 @@ class ValveMonitor {
   bool ended() const { return ended_; }
   bool episode_open() const { return engine_ && engine_->episode_open(); }
   /// An episode of an earlier session or another monitor may go on here.
-  bool recovering() const { return tracker_.recovering(); }
+  bool recovering() const { return tracker_.recovering() != nullptr; }
   /// How far its limits have followed a drift, by channel of models().
   void ReadDrift(std::vector<FollowedDrift>& drift) const;
   std::size_t trace_bytes() const { return tracker_.trace_bytes(); }
@@ -116,7 +118,7 @@ class ValveMonitor {
   void Close(EndReason reason, EpisodeOutlet& outlet);
   void End(const Transition& closed, EpisodeOutlet& outlet);
   void NameEpisodes();
-  void FollowStrengths(const Verdict& verdict, EpisodeOutlet& outlet);
+  void ConfirmNormal(const Verdict& verdict, EpisodeOutlet& outlet);
   void RestoreOnce(std::uint64_t source_id);
   double period_s() const;
 
@@ -125,9 +127,9 @@ class ValveMonitor {
   SignalMask required_{0};  // By models_.
   std::optional<ValveEngine> engine_;
   LookWorker* looks_;
-  std::unique_ptr<EpisodeNames> names_;  // Null: no second looks.
+  std::shared_ptr<const SeverityCatalogue> severities_;
+  std::unique_ptr<EpisodeNames> names_;  // Null: no model set.
   const Verdict* answer_{nullptr};       // On the last sample.
-  EpisodeStrengths strengths_;
   EpisodeTracker tracker_;
   Verdict unassigned_;
   CoverageBook coverage_;
@@ -135,6 +137,9 @@ class ValveMonitor {
   std::uint64_t source_id_{0};
   std::int64_t stamp_ns_{0};
   bool isolation_held_{false};
+  // Normal samples since nothing was open here, up to what a valve needs to be
+  // normal again.
+  int normal_samples_{0};
   // Without a model set: the period of the samples, and the last interval.
   std::int64_t unassigned_period_ns_{1'000'000'000};
   std::optional<std::int64_t> unassigned_interval_ns_;

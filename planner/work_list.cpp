@@ -25,7 +25,7 @@ constexpr double kOtherReasons = 0.25;
 constexpr double kRepetition = 0.1;
 constexpr double kMaxRepetition = 2.0;
 
-double Points(report::Severity severity) {
+double Points(Severity severity) {
   return std::ldexp(1.0, static_cast<int>(severity));  // 1, 2, 4, 8
 }
 
@@ -157,7 +157,10 @@ void AddEpisode(const Episode& episode, const report::FaultTexts& texts,
     place = reasons.insert(reasons.end(), FaultReason{});
     place->fault = fault;
   }
-  place->words = texts.Words(fault, episode.strength);
+  // A label that names another fault has no stored priority.
+  place->words =
+      texts.Words(fault, episode.strength,
+                  fault == episode.fault ? episode.priority : std::nullopt);
   place->strength = episode.strength;
   place->factor = episode.peak_factor;
   ++place->episodes;
@@ -310,7 +313,7 @@ double WeightOf(const FaultReason& reason, const WorkOptions& options) {
 
 double WeightOf(const LimitTrend& reason, const WorkOptions& options) {
   using Answer = HealthForecast::Answer;
-  const double points = Points(report::Severity::kHigh);
+  const double points = Points(Severity::kHigh);
   if (reason.forecast.answer == Answer::kReached) {
     return points;
   }

@@ -322,8 +322,10 @@ std::vector<Alarm> PlantReader::AlarmList(std::int64_t now_ns,
   // ended.
   filter.state = EpisodeState::kOpen;
   add_newest(List(filter));
+  filter.state = EpisodeState::kAny;
+  add_newest(ListWhere(" AND e.unconfirmed_ns IS NOT NULL", filter));
   if (std::ssize(episodes) < limit) {
-    filter.state = EpisodeState::kUnacked;
+    filter.state = EpisodeState::kAlarmReturnedUnacked;
     add_newest(ListWhere(" AND e.end_reason IS NOT NULL", filter));
   }
   std::ranges::stable_sort(episodes, std::greater{}, by_time);

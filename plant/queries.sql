@@ -57,8 +57,10 @@ UNION ALL SELECT 'session', '', session_id FROM monitor_session
 SELECT e.episode_id, e.valve_id, e.source_id, e.detected_ns, e.isolated_ns,
   e.cleared_ns, e.ended_ns, e.end_reason, e.fault, e.fault_bits, e.peak_factor,
   e.strength, e.unknown_kind, e.layer, e.model_set, e.model_hash, e.flow_unit,
-  e.channels, e.faults, e.label, e.acked_by, e.acked_ns, e.session_id
-FROM (SELECT DISTINCT key FROM batch WHERE item IN ('episode', 'trace')) c
+  e.channels, e.faults, e.label, e.acked_by, e.acked_ns, e.session_id,
+  e.lowest, e.highest, e.priority, e.worst_strength, e.unconfirmed_ns
+FROM (SELECT DISTINCT key FROM batch
+      WHERE item IN ('episode', 'trace', 'strength')) c
   CROSS JOIN episode e ON e.episode_id = c.key
 -- name: episode_fault
 SELECT f.episode_id, f.fault, f.fault_bit, f.first_ns, f.held, f.detected_ns
@@ -67,7 +69,7 @@ WHERE c.item = 'episode'
 -- name: episode_event
 SELECT v.episode_id, v.kind, v.stamp_ns, v.event_id, v.recorded_ns, v.faults,
   v.fault_bits, v.factor, v.strength, v.reason, v.layer, v.value, v.who,
-  v.comment, v.origin
+  v.comment, v.origin, v.priority
 FROM batch c CROSS JOIN episode_event v ON v.episode_id = c.key
 WHERE c.item = 'episode'
 -- name: episode_trace
@@ -171,7 +173,7 @@ SELECT shipped_ns FROM fdi.monitor WHERE monitor_id = $1 FOR UPDATE
 -- Nobody can acknowledge it where it was. Its stamps may be ahead of the clock.
 -- name: end_moved
 UPDATE fdi.episode SET ended_ns = greatest($3, detected_ns),
-  end_reason = 'superseded', fault = coalesce(fault, 'unknown'),
+  end_reason = 'superseded', unconfirmed_ns = NULL, fault = coalesce(fault, 'unknown'),
   acked_ns = coalesce(acked_ns, $3),
   acked_by = coalesce(acked_by, 'fdi-store valves move')
 WHERE monitor_id = $1 AND episode_id = $2 AND ended_ns IS NULL
@@ -182,15 +184,17 @@ UPDATE fdi.monitor SET shipped_ns = $2 WHERE monitor_id = $1
 -- name: protected_in_plant
 SELECT count(*) FROM fdi.episode
 WHERE ended_ns IS NULL OR acked_by IS NULL OR label IS NOT NULL
+  OR unconfirmed_ns IS NOT NULL
 -- name: old_in_plant
 SELECT count(*), min(detected_ns), max(detected_ns) FROM fdi.episode
 WHERE ended_ns < $1 AND acked_by IS NOT NULL AND label IS NULL
+  AND unconfirmed_ns IS NULL
 -- name: prune_plant
 WITH gone AS (
   DELETE FROM fdi.episode WHERE (episode_id, monitor_id) IN (
     SELECT episode_id, monitor_id FROM fdi.episode
     WHERE ended_ns < $1 AND acked_by IS NOT NULL AND label IS NULL
-      AND fdi.utc(detected_ns) <= fdi.utc($1)
+      AND unconfirmed_ns IS NULL AND fdi.utc(detected_ns) <= fdi.utc($1)
     ORDER BY fdi.utc(detected_ns) LIMIT 5000)
   RETURNING episode_id AS e, monitor_id AS m),
 f AS (DELETE FROM fdi.episode_fault USING gone
@@ -228,7 +232,8 @@ SELECT * FROM (
     (SELECT max(last_ns) FROM episode_trace t
      WHERE (t.episode_id, t.monitor_id) = (e.episode_id, e.monitor_id)),
     e.session_id, e.fault_bits, e.strength, e.unknown_kind, e.layer,
-    e.flow_unit, e.channels, e.faults, e.host, e.monitor
+    e.flow_unit, e.channels, e.faults, e.lowest, e.highest, e.worst_strength,
+    e.priority, e.unconfirmed_ns, e.host, e.monitor
   FROM episode e
   WHERE {episodes}
   ORDER BY utc(e.detected_ns) DESC, e.valve_id DESC LIMIT {limit}) l

@@ -22,8 +22,6 @@ constexpr std::array<std::string_view, 4> kDisciplines{"operator", "instrument",
 constexpr std::array<std::string_view, 4> kNamur{"maintenance required",
                                                  "out of specification",
                                                  "check function", "failure"};
-constexpr std::array<std::string_view, 4> kSeverities{"low", "medium", "high",
-                                                      "critical"};
 
 std::string KeyOf(int fault) {
   return fault == 0 ? std::string(kUnknown) : FaultName(fault);
@@ -56,8 +54,12 @@ E Choice(const TomlReader& table, std::string_view key, const std::string& word,
 }
 
 // [[f1.severity]] from = 0.3, level = "high": each band goes up to the next.
-std::vector<SeverityBand> ReadBands(TomlReader& table) {
-  std::vector<SeverityBand> bands;
+SeverityBands ReadBands(TomlReader& table) {
+  std::array<std::string_view, kSeverityCount> names;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    names[i] = SeverityName(static_cast<Severity>(i));
+  }
+  SeverityBands bands;
   for (TomlReader& row : table.Tables("severity")) {
     const auto from = row.Number("from", 0.0, 1.0);
     const auto level = row.Text("level");
@@ -67,8 +69,7 @@ std::vector<SeverityBand> ReadBands(TomlReader& table) {
     if (bands.empty() ? *from != 0.0 : *from <= bands.back().from) {
       table.Refuse("severity", "bands begin at 0 and ascend");
     }
-    bands.push_back(
-        {*from, Choice<Severity>(row, "level", *level, kSeverities)});
+    bands.push_back({*from, Choice<Severity>(row, "level", *level, names)});
   }
   return bands;
 }
@@ -109,22 +110,6 @@ std::string_view NamurName(NamurClass namur) {
   return kNamur[static_cast<std::size_t>(namur)];
 }
 
-std::string_view SeverityName(Severity severity) {
-  return kSeverities[static_cast<std::size_t>(severity)];
-}
-
-Severity FaultText::SeverityAt(double strength) const {
-  // A failed estimate counts as the smallest fault, not as the most severe one.
-  const double size = std::isfinite(strength) ? std::abs(strength) : 0.0;
-  Severity level = bands.front().level;
-  for (const SeverityBand& band : bands) {
-    if (size >= band.from) {
-      level = band.level;
-    }
-  }
-  return level;
-}
-
 // Requires every key for every fault; Override() then rejects unknown ones.
 FaultTexts::FaultTexts(const std::filesystem::path& path) {
   TomlReader file(path);
@@ -163,7 +148,8 @@ const FaultText& FaultTexts::Of(int fault) const {
   return text->second;
 }
 
-FaultWords FaultTexts::Words(std::string_view answer, double strength) const {
+FaultWords FaultTexts::Words(std::string_view answer, double strength,
+                             std::optional<std::int64_t> priority) const {
   FaultWords words;
   std::vector<Discipline> disciplines;
   // "f3|f6": faults that the diagnosis cannot distinguish.
@@ -178,16 +164,27 @@ FaultWords FaultTexts::Words(std::string_view answer, double strength) const {
       disciplines.push_back(text.discipline);
     }
     words.namur = std::max(words.namur, text.namur);
-    words.severity = std::max(words.severity, text.SeverityAt(strength));
+    words.severity = std::max(words.severity, SeverityAt(text.bands, strength));
     if (bar == answer.size()) {
       break;
     }
     answer.remove_prefix(bar + 1);
   }
+  if (priority) {
+    words.severity = SeverityOf(*priority).value_or(words.severity);
+  }
   for (const Discipline discipline : disciplines) {
     AppendTo(words.discipline, "|", DisciplineName(discipline));
   }
   return words;
+}
+
+SeverityCatalogue FaultTexts::Severities() const {
+  SeverityCatalogue severities;
+  for (const auto& [fault, text] : texts_) {
+    severities[fault] = text.bands;
+  }
+  return severities;
 }
 
 FaultTexts LoadFaultTexts(const GlobalOptions& options) {

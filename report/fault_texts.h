@@ -3,11 +3,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/severity.h"
 #include "report/global_options.h"
 #include "report/json_output.h"
 
@@ -27,17 +29,9 @@ enum class NamurClass : std::uint8_t {
   kCheckFunction,
   kFailure
 };
-enum class Severity : std::uint8_t { kLow, kMedium, kHigh, kCritical };
 
 std::string_view DisciplineName(Discipline discipline);  ///< "air", ...
 std::string_view NamurName(NamurClass namur);            ///< "failure", ...
-std::string_view SeverityName(Severity severity);        ///< "critical", ...
-
-/// The severity from |strength| `from` on, in 0..1.
-struct SeverityBand {
-  double from{0.0};
-  Severity level{Severity::kMedium};
-};
 
 /// Texts about a fault for operators and planners.
 struct FaultText {
@@ -45,9 +39,7 @@ struct FaultText {
   std::string check;  ///< How to tell it from similar faults in the field.
   Discipline discipline{Discipline::kInstrument};
   NamurClass namur{NamurClass::kCheckFunction};
-  std::vector<SeverityBand> bands;  ///< Ascending, the first from 0.
-
-  Severity SeverityAt(double strength) const;
+  SeverityBands bands;
 };
 
 /// A diagnosis in plain words. For faults that cannot be distinguished, the
@@ -81,7 +73,13 @@ class FaultTexts {
   /// @param answer as in fault_history: "f19", "f3|f6", "unknown", or empty;
   ///   other names count as unknown.
   /// @param strength estimated; the sign is ignored.
-  FaultWords Words(std::string_view answer, double strength) const;
+  /// @param priority of the alarm as it is stored, which tells the severity;
+  ///   nothing: that of the gravest fault at `strength`.
+  FaultWords Words(std::string_view answer, double strength,
+                   std::optional<std::int64_t> priority = {}) const;
+
+  /// What the monitor needs to say how bad a fault is.
+  SeverityCatalogue Severities() const;
 
  private:
   std::map<int, FaultText> texts_;  // [0]: unknown

@@ -24,6 +24,26 @@ std::vector<FaultCandidate> CandidatesOf(const ModelSet& models,
   return candidates;
 }
 
+Severity SeverityOf(const FaultEvent& event,
+                    const SeverityCatalogue& catalogue) {
+  const auto at = [&catalogue](int fault, double strength) {
+    const auto bands = catalogue.find(fault);
+    return SeverityAt(
+        bands == catalogue.end() ? SeverityBands{} : bands->second, strength);
+  };
+  if (event.transition.severity) {
+    return *event.transition.severity;
+  }
+  std::optional<Severity> gravest;
+  for (const FaultCandidate& candidate : event.candidates) {
+    if (candidate.isolated) {
+      const Severity severity = at(candidate.fault, candidate.strength);
+      gravest = std::max(gravest.value_or(severity), severity);
+    }
+  }
+  return gravest.value_or(at(0, 0.0));
+}
+
 OpenEpisode OpenEpisodeOf(const FaultEvent& event) {
   const Transition& transition = event.transition;
   OpenEpisode episode;
@@ -37,6 +57,7 @@ OpenEpisode OpenEpisodeOf(const FaultEvent& event) {
                        &FaultCandidate::isolated);
   episode.isolated = transition.faults != 0;
   episode.layer = transition.layer;
+  episode.severity = transition.severity;
   episode.model_set = event.model_set;
   episode.model_version = event.model_version;
   episode.model_hash = event.model_hash;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,17 @@ struct FaultEvent {
   FIELD(episode_id)                   \
   FIELD(model_set) FIELD(model_version) FIELD(model_hash) FIELD(persisted)
 
+/// The kind as it is on the bus, whose types cannot grow: a rise of priority is
+/// an isolation of the same faults.
+constexpr TransitionKind OnTheBus(TransitionKind kind) {
+  return kind == TransitionKind::kChanged ? TransitionKind::kReisolated : kind;
+}
+
+/// How bad the episode is by `event`: as its transition says, or else as the
+/// gravest of the faults that it is named after.
+Severity SeverityOf(const FaultEvent& event,
+                    const SeverityCatalogue& catalogue);
+
 /// An episode that the last session left open.
 struct OpenEpisode {
   std::string valve_id;
@@ -65,7 +77,8 @@ struct OpenEpisode {
   FaultSet faults{0};                      ///< The last isolated set, if any.
   std::vector<FaultCandidate> candidates;  ///< Its members.
   bool isolated{false};
-  Layer layer{Layer::kObservers};  ///< What named them.
+  Layer layer{Layer::kObservers};    ///< What named them.
+  std::optional<Severity> severity;  ///< As last stored.
   std::string model_set;
   int model_version{0};
   std::uint64_t model_hash{0};

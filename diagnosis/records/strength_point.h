@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "diagnosis/verdict.h"
 
@@ -15,6 +16,9 @@ struct StrengthPoint {
   double lowest{0.0};              ///< Ends of its 95 % interval [-].
   double highest{0.0};             ///<
   Layer layer{Layer::kObservers};  ///< What estimated it.
+  /// Of the fault whose strength is that of the episode: how bad the episode is
+  /// by now. Not part of the curve.
+  std::optional<Severity> severity{};
 
   bool operator==(const StrengthPoint&) const = default;
 };

@@ -171,7 +171,9 @@ bool BusEventSink::Send(const FaultEvent& message) {
                    {"episode", storage::EpisodeIdText(message.episode_id)},
                    {"persisted", message.persisted ? "true" : "false"}}));
   }
-  return publisher_.Write(message) == idl::WriteResult::kSent;
+  FaultEvent sent = message;
+  sent.transition.kind = OnTheBus(sent.transition.kind);
+  return publisher_.Write(sent) == idl::WriteResult::kSent;
 }
 
 }  // namespace fdi::monitor

@@ -13,20 +13,30 @@ namespace {
 using storage::Alarm;
 using storage::AlarmState;
 
-void AddTo(ValveAlarm& valve, const Alarm& alarm) {
+void AddTo(ValveAlarm& valve, const Alarm& alarm,
+           const report::FaultTexts& texts) {
+  const storage::Episode& e = alarm.episode;
   valve.unacked |= alarm.state == AlarmState::kUnacked ||
                    alarm.state == AlarmState::kReturnedUnacked;
-  if (!alarm.episode.ended_ns) {
-    valve.since_ns = alarm.episode.detected_ns;
-    valve.episode = alarm.episode.episode_id;
+  // What is open takes the place of what its data left unconfirmed.
+  if (!e.ended_ns || (e.unconfirmed_ns && valve.episode.empty())) {
+    valve.since_ns = e.detected_ns;
+    valve.episode = e.episode_id;
+    valve.severity =
+        texts.Words(e.fault.value_or("unknown"), e.strength, e.priority)
+            .severity;
+    valve.strength = e.isolated_ns ? std::optional(e.strength) : std::nullopt;
+    valve.unconfirmed_ns = e.unconfirmed_ns;
+    valve.fault = e.fault.value_or("");
   }
 }
 
 AlarmBook::ByValveMap ByValveOf(const std::vector<Alarm>& alarms,
-                                const std::vector<storage::Shelf>& shelves) {
+                                const std::vector<storage::Shelf>& shelves,
+                                const report::FaultTexts& texts) {
   AlarmBook::ByValveMap by_valve;
   for (const Alarm& alarm : alarms) {
-    AddTo(by_valve[alarm.episode.valve_id], alarm);
+    AddTo(by_valve[alarm.episode.valve_id], alarm, texts);
   }
   for (const storage::Shelf& shelf : shelves) {
     std::optional<std::int64_t>& until =
@@ -100,7 +110,7 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
   for (const storage::Shelf& shelf : shelves) {
     earliest_shelf_end_ns_ = std::min(earliest_shelf_end_ns_, shelf.until_ns);
   }
-  ByValveMap stored = ByValveOf(alarms, shelves);
+  ByValveMap stored = ByValveOf(alarms, shelves, texts_);
   const std::lock_guard lock(mutex_);
   rows_ = std::move(rows);
   stored_ = std::move(stored);
@@ -115,7 +125,7 @@ std::vector<Json> AlarmBook::Read(storage::History& history,
 void AlarmBook::Combine() {
   auto by_valve = std::make_shared<ByValveMap>(stored_);
   for (const auto& [id, alarm] : unstored_) {
-    AddTo((*by_valve)[alarm.episode.valve_id], alarm);
+    AddTo((*by_valve)[alarm.episode.valve_id], alarm, texts_);
   }
   by_valve_ = std::move(by_valve);
 }

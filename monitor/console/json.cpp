@@ -112,6 +112,10 @@ Json Rounded(double value, int decimals) {
   return rounded == 0.0 ? 0.0 : rounded;  // No "-0.0".
 }
 
+Json Rounded(const std::optional<double>& value, int decimals) {
+  return value ? Rounded(*value, decimals) : Json();
+}
+
 Json TextOrNull(const std::string& text) {
   return text.empty() ? Json() : Json(text);
 }
@@ -139,7 +143,13 @@ Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
       {"missing", std::move(missing)},
       {"faults", FaultsOf(valve)},
       {"factor", named ? Rounded(valve.factor, kFactorDecimals) : Json()},
-      {"strength", named ? Rounded(valve.strength, kFactorDecimals) : Json()},
+      {"strength",
+       named ? Rounded(alarm.strength.value_or(valve.strength), kFactorDecimals)
+             : Json()},
+      {"severity",
+       alarm.severity ? Json(SeverityName(*alarm.severity)) : Json()},
+      {"unconfirmed_ms", Ms(alarm.unconfirmed_ns)},
+      {"fault", TextOrNull(alarm.fault)},
       {"d0", Rounded(valve.d0, kFactorDecimals)},
       {"drift_used", Rounded(valve.drift_used, kFactorDecimals)},
       {"stamp_ms", MsOrNull(valve.stamp_ns)},
@@ -274,7 +284,7 @@ Json ShelfJson(const storage::Shelf& shelf) {
 Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {
   const storage::Episode& e = alarm.episode;
   const report::FaultWords words =
-      texts.Words(e.fault.value_or("unknown"), e.strength);
+      texts.Words(e.fault.value_or("unknown"), e.strength, e.priority);
   Json json{{"episode", e.episode_id},
             {"valve", e.valve_id},
             {"fault", TextOrNull(e.fault)},
@@ -289,11 +299,16 @@ Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {
             {"end_reason", TextOrNull(e.end_reason)},
             {"peak_factor", Rounded(e.peak_factor, kFactorDecimals)},
             {"strength", Rounded(e.strength, kFactorDecimals)},
+            {"lowest", Rounded(e.lowest, kFactorDecimals)},
+            {"highest", Rounded(e.highest, kFactorDecimals)},
+            {"worst_strength", Rounded(e.worst_strength, kFactorDecimals)},
+            {"unconfirmed_ms", Ms(e.unconfirmed_ns)},
             {"label", TextOrNull(e.label)},
             {"acked_by", TextOrNull(e.acked_by)},
             {"acked_ms", Ms(e.acked_ns)},
             {"model_set", e.model_set},
-            {"severity", report::SeverityName(words.severity)},
+            {"severity", SeverityName(words.severity)},
+            {"priority", PriorityOf(words.severity)},
             {"discipline", words.discipline},
             {"namur", report::NamurName(words.namur)},
             {"name", words.name},
@@ -323,6 +338,9 @@ storage::Alarm AlarmOf(const FaultEvent& event) {
   e.detected_ns = transition.detection_stamp_ns;
   e.peak_factor = transition.factor;
   e.strength = transition.strength;
+  if (transition.severity) {
+    e.priority = PriorityOf(*transition.severity);
+  }
   e.model_set = event.model_set + "@" + std::to_string(event.model_version);
   if (const std::string faults = IsolatedFaults(event); !faults.empty()) {
     e.fault = faults;

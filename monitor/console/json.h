@@ -21,6 +21,7 @@ Json Ms(std::int64_t stamp_ns);
 Json Ms(const std::optional<std::int64_t>& stamp_ns);
 /// Rounded to `decimals`; null if it is not finite.
 Json Rounded(double value, int decimals);
+Json Rounded(const std::optional<double>& value, int decimals);
 /// Null if the text is empty or missing.
 Json TextOrNull(const std::string& text);
 Json TextOrNull(const std::optional<std::string>& text);
@@ -31,6 +32,11 @@ struct ValveAlarm {
   std::string episode;  ///< Empty: none is open.
   bool unacked{false};
   std::optional<std::int64_t> shelved_until_ns;
+  // Of the active alarm.
+  std::optional<Severity> severity;
+  std::optional<double> strength;  ///< Nothing: it has no name.
+  std::optional<std::int64_t> unconfirmed_ns;
+  std::string fault;  ///< Empty: it has no name.
 
   bool operator==(const ValveAlarm&) const = default;
 };

@@ -58,7 +58,7 @@ constexpr std::size_t kEventsPerValve = 16;  // The writer's DDS history depth.
 
 bool Same(const FaultEvent& a, const FaultEvent& b) {
   return a.episode_id == b.episode_id &&
-         a.transition.kind == b.transition.kind &&
+         OnTheBus(a.transition.kind) == OnTheBus(b.transition.kind) &&
          a.transition.stamp_ns == b.transition.stamp_ns;
 }
 

@@ -45,7 +45,8 @@ report::Json EventJson(const FaultEvent& event, bool persisted,
   // For an event without a fault the catalogue says "unlike any known fault",
   // which is wrong while known faults may still explain it.
   const bool named = !fault.empty() || t.unknown == Unknown::kOutsideKnown;
-  const report::FaultWords words = texts.Words(fault, t.strength);
+  const report::FaultWords words =
+      texts.Words(fault, t.strength, PriorityOf(t.severity));
   const bool closed = t.kind == TransitionKind::kClosed;
   return {{"kind", std::string(TransitionName(t.kind))},
           {"valve_id", event.valve_id},
@@ -54,6 +55,7 @@ report::Json EventJson(const FaultEvent& event, bool persisted,
           {"fault", fault.empty() ? report::Json() : report::Json(fault)},
           {"name", named ? report::Json(words.name) : report::Json()},
           {"severity", std::string(SeverityName(words.severity))},
+          {"priority", PriorityOf(words.severity)},
           {"discipline", words.discipline},
           {"namur", std::string(NamurName(words.namur))},
           {"check", named ? report::Json(words.check) : report::Json()},

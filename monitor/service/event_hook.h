@@ -61,6 +61,7 @@ struct EventHookOptions {
 };
 
 /// {"kind", "valve_id", "episode_id", "stamp_utc", "fault", "name", "severity",
+/// "priority",
 /// "discipline", "namur", "check", "factor", "strength", "reason", "model_set",
 /// "persisted"}; missing values are null. Without a fault, name and check are
 /// null too, until the event is known to lie outside all known faults.

@@ -44,6 +44,10 @@ class HistoryStore : public HistorySink {
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns) override;
   void StoreLook(const EpisodeLook& look) override;
   void StoreStrength(const StrengthPoint& point) override;
+  void ConfirmNormal(const std::string& valve_id,
+                     std::int64_t stamp_ns) override {
+    writer_.ConfirmNormal(valve_id, stamp_ns);
+  }
   void AddTrace(const EpisodeTrace& trace) override;
   void AddGap(const DataGap& gap) override { writer_.AddGap(gap); }
   void CommitCheckpoint(const Checkpoint& checkpoint) override;

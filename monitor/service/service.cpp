@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <functional>
 #include <utility>
 
@@ -26,6 +27,8 @@
 #include "monitor/health_book.h"
 #include "monitor/service/cause_groups.h"
 #include "monitor/service/shadow.h"
+#include "report/fault_texts.h"
+#include "storage/history/history_reader.h"
 
 namespace fdi::monitor {
 namespace {
@@ -95,6 +98,8 @@ std::filesystem::path LockOf(const storage::DataDirectory& data) {
   std::filesystem::path path = data.history();
   return path += ".lock";
 }
+
+constexpr std::int64_t kMaxCountedAlarms = 100'000;
 
 // The reader never frees the slot of a valve while its publisher is alive, so
 // it needs more slots than the pipeline, which does free them.
@@ -265,6 +270,8 @@ void Service::ListAfterCommit() {
 PipelineOptions Service::WithDelivery(PipelineOptions options) {
   // A standby publishes nothing itself: its events are delivered once it has
   // heard them from the leader.
+  options.severities = std::make_shared<const SeverityCatalogue>(
+      report::LoadFaultTexts(context_.options).Severities());
   options.journal.acknowledged = [this](milliseconds patience) {
     return (!pair_ || pair_->AllEventsCovered()) &&
            events_.WaitForAcknowledged(patience);
@@ -588,6 +595,13 @@ std::string Service::Metrics() const {
       facts.requests[outcome] += count;
     }
     facts.admissions = console_->admissions();
+  }
+  try {
+    storage::HistoryReader history(data_.history());
+    facts.alarms =
+        storage::CountAlarms(history.AlarmList(NowNs(), kMaxCountedAlarms));
+  } catch (const std::exception&) {
+    // Without the history nobody can tell; fdi_persistence_degraded says so.
   }
   std::string page = MetricsPage(Facts(), facts);
   if (shadow_) {

@@ -94,6 +94,22 @@ void AddAdmissions(const console::AdmissionCounts& counts, Exposition& page) {
   }
 }
 
+void AddAlarms(const storage::AlarmCounts& counts, Exposition& page) {
+  const auto add = [&page](const auto& by_severity) {
+    for (std::size_t i = 0; i < by_severity.size(); ++i) {
+      page.Value(by_severity[i],
+                 {"priority", SeverityName(static_cast<Severity>(i))});
+    }
+  };
+  page.Family("fdi_alarms_active", Type::kGauge,
+              "Alarms that are active and not shelved");
+  add(counts.active);
+  page.Family("fdi_alarms_unacknowledged", Type::kGauge,
+              "Alarms that nobody has acknowledged, active or returned to "
+              "normal, and that are not shelved");
+  add(counts.unacked);
+}
+
 std::vector<Measure> ConsoleMeasures(const MetricsFacts& facts) {
   constexpr std::string_view kStreams = "fdi_console_streams_total";
   constexpr std::string_view kTokens = "fdi_console_token_failures_total";
@@ -378,6 +394,9 @@ std::string MetricsPage(const StatusFacts& status, const MetricsFacts& facts) {
   page.Add(MeasuresOf(status));
   AddDatabases(facts.data, page);
   AddThreads(facts.threads, page);
+  if (facts.alarms) {
+    AddAlarms(*facts.alarms, page);
+  }
   if (facts.streams) {
     page.Add(ConsoleMeasures(facts));
     AddAdmissions(facts.admissions, page);

@@ -19,6 +19,7 @@
 #include "monitor/pair/pair.h"
 #include "monitor/pipeline.h"
 #include "storage/database/data_directory.h"
+#include "storage/history/alarm.h"
 
 // The state of the monitor: on the bus, in the log, over HTTP.
 
@@ -82,6 +83,8 @@ struct MetricsFacts {
   std::uint64_t board_bytes{0};                    ///< Of the console.
   console::AdmissionCounts admissions{};           ///< Of the console.
   HttpServer::Counts requests{};
+  /// Nothing: the history does not tell.
+  std::optional<storage::AlarmCounts> alarms{};
 };
 
 /// All metrics in the Prometheus text format.

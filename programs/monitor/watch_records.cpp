@@ -102,6 +102,23 @@ WatchRecord WatchRecords::RecordOf(const idl::DecisionMessage& message) const {
           line};
 }
 
+// On the bus, a rise of priority is an isolation of the same faults.
+TransitionKind WatchRecords::KindOf(const FaultEvent& message) {
+  constexpr std::size_t kMaxEpisodes = 10'000;
+  const Transition& t = message.transition;
+  const auto before = names_of_episodes_.find(message.episode_id);
+  const bool same = t.kind == TransitionKind::kReisolated &&
+                    before != names_of_episodes_.end() &&
+                    before->second == t.faults;
+  if (t.kind == TransitionKind::kClosed ||
+      names_of_episodes_.size() >= kMaxEpisodes) {
+    names_of_episodes_.erase(message.episode_id);
+  } else {
+    names_of_episodes_[message.episode_id] = t.faults;
+  }
+  return same ? TransitionKind::kChanged : t.kind;
+}
+
 void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
   const Transition& t = message.transition;
   std::string faults;
@@ -117,7 +134,7 @@ void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
                           {"isolated", candidate.isolated}});
   }
   faults = faults.empty() ? "unknown" : faults;
-  const std::string kind(TransitionName(t.kind));
+  const std::string kind(TransitionName(KindOf(message)));
   const std::string reason(EndReasonName(t.reason));
   sink_({{{"topic", "FaultEvent"},
           {"valve_id", message.valve_id},
@@ -135,6 +152,7 @@ void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
           {"persisted", message.persisted}},
          Start(t.stamp_ns, message.valve_id) + " EVENT " + kind + " " + faults +
              UnknownReason(message) + " factor=" + FormatNumber(t.factor, 2) +
+             " strength=" + FormatNumber(t.strength, 2) +
              " episode=" + Hex(message.episode_id) +
              (t.reason == EndReason::kNone ? "" : " reason=" + reason) +
              (message.persisted ? "" : " NOT_PERSISTED")});

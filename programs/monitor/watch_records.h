@@ -3,6 +3,7 @@
 #include <deque>
 #include <functional>
 #include <string>
+#include <unordered_map>
 
 #include "base/printable.h"
 #include "programs/monitor/bus_view.h"
@@ -43,11 +44,13 @@ class WatchRecords {
 
  private:
   WatchRecord RecordOf(const idl::DecisionMessage& message) const;
+  TransitionKind KindOf(const FaultEvent& message);
   std::string Start(std::int64_t stamp_ns, const std::string& who) const;
 
   bool utc_;
   const std::function<void(WatchRecord)> sink_;
   ModelNames names_;
+  std::unordered_map<std::uint64_t, FaultSet> names_of_episodes_;  // Open ones.
   std::deque<std::pair<Clock::time_point, idl::DecisionMessage>> waiting_;
 };
 

@@ -123,24 +123,34 @@ std::string Hex(std::uint64_t value) {
 
 const std::vector<std::string>& EpisodeKeys() {
   static const std::vector<std::string> keys = {
-      "episode_id",  "valve_id", "detected_utc", "isolated_utc",
-      "cleared_utc", "fault",    "peak_factor",  "model_set",
-      "end_reason",  "label",    "acked_by"};
+      "episode_id",     "valve_id", "detected_utc", "isolated_utc",
+      "cleared_utc",    "fault",    "peak_factor",  "model_set",
+      "end_reason",     "label",    "acked_by",     "strength",
+      "worst_strength", "severity", "priority",     "unconfirmed_utc"};
   return keys;
 }
 
 Json EpisodeJson(const Episode& episode) {
-  return {{"episode_id", episode.episode_id},
-          {"valve_id", episode.valve_id},
-          {"detected_utc", episode.detected_utc},
-          {"isolated_utc", TextJson(episode.isolated_utc)},
-          {"cleared_utc", TextJson(episode.cleared_utc)},
-          {"fault", TextJson(episode.fault)},
-          {"peak_factor", episode.peak_factor},
-          {"model_set", episode.model_set},
-          {"end_reason", TextJson(episode.end_reason)},
-          {"label", TextJson(episode.label)},
-          {"acked_by", TextJson(episode.acked_by)}};
+  const auto severity = episode.priority ? SeverityOf(*episode.priority)
+                                         : std::optional<Severity>();
+  return {
+      {"episode_id", episode.episode_id},
+      {"valve_id", episode.valve_id},
+      {"detected_utc", episode.detected_utc},
+      {"isolated_utc", TextJson(episode.isolated_utc)},
+      {"cleared_utc", TextJson(episode.cleared_utc)},
+      {"fault", TextJson(episode.fault)},
+      {"peak_factor", episode.peak_factor},
+      {"model_set", episode.model_set},
+      {"end_reason", TextJson(episode.end_reason)},
+      {"label", TextJson(episode.label)},
+      {"acked_by", TextJson(episode.acked_by)},
+      {"strength", episode.isolated_ns ? NumberJson(episode.strength) : Json()},
+      {"worst_strength",
+       episode.worst_strength ? NumberJson(*episode.worst_strength) : Json()},
+      {"severity", severity ? Json(SeverityName(*severity)) : Json()},
+      {"priority", severity ? Json(PriorityOf(*severity)) : Json()},
+      {"unconfirmed_utc", TimeJson(episode.unconfirmed_ns)}};
 }
 
 Json ShelfJson(const Shelf& shelf) {

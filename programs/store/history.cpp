@@ -106,7 +106,9 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       {"fault", "fault"},
       TextColumn(
           "which is", [of](const Json& row) { return of(row).fault_name; }, 2),
-      {"peak [-]", "peak_factor", Format::kPlain, 3, 4},
+      {"severity", "severity", Format::kPlain, 0, 3},
+      {"strength [-]", "strength", Format::kPlain, 3, 4},
+      {"peak [-]", "peak_factor", Format::kPlain, 3, 9},
       TextColumn(
           "isolated after",
           [of](const Json& row) { return of(row).isolated_after; }, 5,
@@ -134,6 +136,7 @@ Json HistoryEntryJson(const HistoryEntry& event) {
           {"faults", TextJson(event.faults)},
           {"factor", by_hand ? Json() : NumberJson(event.factor)},
           {"strength", by_hand ? Json() : NumberJson(event.strength)},
+          {"priority", event.priority ? Json(*event.priority) : Json()},
           {"reason", TextJson(event.reason)},
           {"layer", TextJson(event.layer)},
           {"who", TextJson(event.who)},
@@ -150,6 +153,11 @@ bool ByPhysics(const std::string& layer) {
 
 std::string NoteText(const HistoryEntry& event) {
   if (event.who.empty()) {
+    if (const auto severity = event.priority && event.kind == "CHANGED"
+                                  ? SeverityOf(*event.priority)
+                                  : std::nullopt) {
+      return "now " + std::string(SeverityName(*severity));
+    }
     return ByPhysics(event.layer) ? kByPhysics : event.reason;
   }
   return event.value + (event.value.empty() ? "" : " ") + "by " + event.who +
@@ -318,6 +326,9 @@ std::string FaultLine(const Episode& e, const std::string& name) {
 
 std::string AlarmLine(const Alarm& alarm, const Context& context) {
   std::string line(AlarmStateName(alarm.state));
+  if (const auto since = alarm.episode.unconfirmed_ns) {
+    line += ", not confirmed since " + TimeText(since, context);
+  }
   if (alarm.shelf) {
     const Shelf& shelf = *alarm.shelf;
     line += ", shelved by " + shelf.who + " until " +
@@ -327,39 +338,53 @@ std::string AlarmLine(const Alarm& alarm, const Context& context) {
   return line;
 }
 
+// "0.42 (0.38 to 0.46), 0.55 at its worst"
+std::string StrengthLine(const Episode& e) {
+  if (!e.isolated_ns) {
+    return "-";
+  }
+  std::string line = e.lowest && e.highest
+                         ? IntervalText(e.strength, *e.lowest, *e.highest, 3)
+                         : report::FormatNumber(e.strength, 3);
+  if (e.worst_strength && *e.worst_strength != e.strength) {
+    line += ", " + report::FormatNumber(*e.worst_strength, 3) + " at its worst";
+  }
+  return line;
+}
+
 std::vector<Column> EpisodeFields(const Alarm& alarm, const Context& context) {
   const Episode& e = alarm.episode;
-  const report::FaultWords words = report::LoadFaultTexts(context.options)
-                                       .Words(e.fault.value_or(""), e.strength);
+  const report::FaultWords words =
+      report::LoadFaultTexts(context.options)
+          .Words(e.fault.value_or(""), e.strength, e.priority);
   const auto when = [&](std::optional<std::int64_t> stamp_ns) {
     return TimeText(stamp_ns, context) +
            (stamp_ns ? ", after " + After(e.detected_ns, stamp_ns) : "");
   };
-  return {
-      {"episode", "episode_id"},
-      {"valve", "valve_id"},
-      {"source", "source_id"},
-      TextField("fault", FaultLine(e, words.name)),
-      TextField("check", words.check),
-      TextField("severity", std::string(SeverityName(words.severity)) + " (" +
-                                words.discipline + "; NAMUR NE 107 " +
-                                std::string(NamurName(words.namur)) + ")"),
-      TextField("alarm", AlarmLine(alarm, context)),
-      {"detected", "detected_utc", Format::kTime},
-      TextField("isolated", when(e.isolated_ns)),
-      TextField("cleared", when(e.cleared_ns)),
-      TextField("ended", TimeText(e.ended_ns, context) + " " +
-                             e.end_reason.value_or("(open)")),
-      {"peak factor", "peak_factor", Format::kPlain, 3},
-      TextField("strength", e.fault ? report::FormatNumber(e.strength, 3) +
-                                          " when it was named"
-                                    : "-"),
-      TextField("model set", e.model_set + " " + Hex(e.model_hash)),
-      {"label", "label"},
-      {"acked by", "acked_by"},
-      TextColumn("trace", [](const Json& episode) {
-        return episode["trace_instants"].dump() + " instants";
-      })};
+  return {{"episode", "episode_id"},
+          {"valve", "valve_id"},
+          {"source", "source_id"},
+          TextField("fault", FaultLine(e, words.name)),
+          TextField("check", words.check),
+          TextField("severity",
+                    std::string(SeverityName(words.severity)) + ", priority " +
+                        std::to_string(PriorityOf(words.severity)) + " (" +
+                        words.discipline + "; NAMUR NE 107 " +
+                        std::string(NamurName(words.namur)) + ")"),
+          TextField("alarm", AlarmLine(alarm, context)),
+          {"detected", "detected_utc", Format::kTime},
+          TextField("isolated", when(e.isolated_ns)),
+          TextField("cleared", when(e.cleared_ns)),
+          TextField("ended", TimeText(e.ended_ns, context) + " " +
+                                 e.end_reason.value_or("(open)")),
+          {"peak factor", "peak_factor", Format::kPlain, 3},
+          TextField("strength", StrengthLine(e)),
+          TextField("model set", e.model_set + " " + Hex(e.model_hash)),
+          {"label", "label"},
+          {"acked by", "acked_by"},
+          TextColumn("trace", [](const Json& episode) {
+            return episode["trace_instants"].dump() + " instants";
+          })};
 }
 
 struct ShowOptions {
@@ -377,7 +402,8 @@ Report ShowEpisode(const ShowOptions& options, const Context& context) {
   report.document.update(
       {{"source_id", Hex(e.source_id)},
        {"model_hash", Hex(e.model_hash)},
-       {"strength", NumberJson(e.strength)},
+       {"lowest", e.lowest ? NumberJson(*e.lowest) : Json()},
+       {"highest", e.highest ? NumberJson(*e.highest) : Json()},
        {"unknown_kind", TextJson(e.unknown_kind)},
        {"layer", TextJson(e.layer)},
        {"ended_utc", TimeJson(e.ended_ns)},

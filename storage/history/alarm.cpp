@@ -125,8 +125,16 @@ AlarmState AlarmStateOf(bool active, bool acknowledged, bool shelved) {
 }
 
 AlarmState AlarmStateOf(const Episode& episode, bool shelved) {
-  const bool active = !episode.ended_ns && !episode.cleared_ns;
-  return AlarmStateOf(active, episode.acked_by.has_value(), shelved);
+  const bool active =
+      episode.unconfirmed_ns || (!episode.ended_ns && !episode.cleared_ns);
+  // Where the data ended, an alarm has not returned to normal. It is over once
+  // somebody has acknowledged that, or the next episode has taken its place.
+  const bool no_return = !active && !episode.cleared_ns &&
+                         (episode.end_reason == "stream_ended" ||
+                          episode.end_reason == "stale_timeout" ||
+                          episode.end_reason == "unknown");
+  return AlarmStateOf(active, episode.acked_by.has_value() || no_return,
+                      shelved);
 }
 
 std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,
@@ -157,6 +165,26 @@ std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,
     alarms.push_back(std::move(alarm));
   }
   return alarms;
+}
+
+AlarmCounts CountAlarms(const std::vector<Alarm>& alarms) {
+  AlarmCounts counts;
+  for (const Alarm& alarm : alarms) {
+    if (alarm.shelf) {
+      continue;
+    }
+    const Severity severity = SeverityOf(alarm.episode.priority.value_or(0))
+                                  .value_or(Severity::kMedium);
+    const auto i = static_cast<std::size_t>(severity);
+    const AlarmState state = alarm.state;
+    counts.active[i] +=
+        state == AlarmState::kUnacked || state == AlarmState::kAcked ? 1 : 0;
+    counts.unacked[i] +=
+        state == AlarmState::kUnacked || state == AlarmState::kReturnedUnacked
+            ? 1
+            : 0;
+  }
+  return counts;
 }
 
 std::vector<Shelf> ReadShelves(Database& database,

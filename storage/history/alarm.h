@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "diagnosis/records/fields.h"
+#include "diagnosis/severity.h"
 #include "storage/database/database.h"
 #include "storage/history/episode.h"
 
@@ -42,8 +44,10 @@ bool IsActive(const Shelf& shelf, std::int64_t now_ns);
 bool Covers(const Shelf& shelf, const Episode& episode);
 
 /// States of an alarm in ANSI/ISA-18.2-2016 (IEC 62682), alarm state
-/// transition diagram. An episode is the alarm; its condition has returned to
-/// normal once it was cleared or has ended for another reason.
+/// transition diagram. An episode is the alarm. Its condition has returned to
+/// normal once it was cleared or has ended; where only the data ended, once the
+/// valve was judged normal again. Until then it stays active
+/// (Episode::unconfirmed_ns).
 enum class AlarmState {
   kUnacked,          ///< Active, not acknowledged.
   kAcked,            ///< Active, acknowledged.
@@ -71,6 +75,15 @@ struct Alarm {
 std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,
                             const std::vector<Shelf>& shelves,
                             std::int64_t now_ns);
+
+/// Alarms that are not shelved, by Severity. Those of earlier versions, which
+/// have none, count as medium.
+struct AlarmCounts {
+  std::array<std::uint64_t, kSeverityCount> active{};
+  std::array<std::uint64_t, kSeverityCount> unacked{};  ///< Active or not.
+};
+
+AlarmCounts CountAlarms(const std::vector<Alarm>& alarms);
 
 /// Settings of ComputeAlarmStatistics().
 ///

@@ -33,6 +33,7 @@ struct HistoryEntry {
   std::string who;
   std::string comment;
   std::string origin;  ///< Where an operator action came from.
+  std::optional<std::int64_t> priority;  ///< Of the alarm from then on.
   std::uint64_t episode_id{0};
 };
 
@@ -70,6 +71,14 @@ struct Episode {
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
   std::vector<std::string> channels;  ///< Of the trace.
   std::vector<std::string> faults;    ///< Of the trace, by index.
+  std::optional<double> lowest;  ///< Ends of the 95 % interval of strength.
+  std::optional<double> highest;
+  /// The largest strength since it has its name, whatever its sign.
+  std::optional<double> worst_strength;
+  /// 1 (critical) to 4 (low), as of now; null from earlier versions.
+  std::optional<std::int64_t> priority;
+  /// The data ended then, and the fault has not been seen to be gone since.
+  std::optional<std::int64_t> unconfirmed_ns;
 };
 
 /// One run of the monitor process.
@@ -143,13 +152,14 @@ struct CoverageTime {
 
 FDI_FIELDS(fdi::storage::HistoryEntry, event_id, kind, stamp_ns, recorded_ns,
            faults, fault_bits, factor, strength, reason, layer, value, who,
-           comment, origin)
+           comment, origin, priority)
 
 FDI_FIELDS(fdi::storage::Episode, episode_id, valve_id, detected_utc,
            isolated_utc, cleared_utc, fault, peak_factor, model_set, end_reason,
            label, acked_by, source_id, model_hash, detected_ns, isolated_ns,
            cleared_ns, ended_ns, acked_ns, trace_end_ns, session_id, fault_bits,
-           strength, unknown_kind, layer, flow_unit, channels, faults)
+           strength, unknown_kind, layer, flow_unit, channels, faults, lowest,
+           highest, worst_strength, priority, unconfirmed_ns)
 
 FDI_FIELDS(fdi::storage::MonitorSession, session_id, start_ns, alive_ns,
            stop_ns, clean, software, config)

@@ -144,6 +144,7 @@ std::uint64_t HistoryEditor::Acknowledge(std::string_view id,
   const std::uint64_t episode_id = ResolveEpisode(database_, id);
   const std::string episode = EpisodeIdText(episode_id);
   database_.Run(sql::acknowledge, checked.who, checked.now_ns, episode);
+  database_.Run(sql::end_by_hand, episode, checked.now_ns);
   AddNote(database_, episode, "ACK", std::nullopt, checked);
   transaction.Commit();
   return episode_id;
@@ -184,6 +185,7 @@ bool HistoryEditor::AdoptNote(const OperatorAction& action) {
     database_.Run(sql::adopt_label, value, episode, action.stamp_ns);
   } else if (fresh) {
     database_.Run(sql::adopt_ack, note.who, action.stamp_ns, episode);
+    database_.Run(sql::end_by_hand, episode, action.stamp_ns);
   }
   transaction.Commit();
   return fresh;

@@ -26,8 +26,11 @@ bool HasFaultFilter(const EpisodeFilter& filter) {
 
 bool IsOpen(EpisodeState state) {
   return state == EpisodeState::kOpen || state == EpisodeState::kDetected ||
-         state == EpisodeState::kIsolated ||
-         state == EpisodeState::kAlarmUnacked ||
+         state == EpisodeState::kIsolated;
+}
+
+bool IsActive(EpisodeState state) {
+  return state == EpisodeState::kAlarmUnacked ||
          state == EpisodeState::kAlarmAcked;
 }
 
@@ -57,9 +60,16 @@ std::string_view FaultCondition(const EpisodeFilter& filter) {
 
 // " AND ..." for the state; empty for any.
 std::string StateCondition(EpisodeState state) {
-  constexpr const char* kActive = "e.ended_ns IS NULL AND e.cleared_ns IS NULL";
-  constexpr const char* kReturned =
+  // As AlarmStateOf() says.
+  constexpr const char* kActive =
+      "(e.ended_ns IS NULL OR e.unconfirmed_ns IS NOT NULL) AND "
+      "(e.unconfirmed_ns IS NOT NULL OR e.cleared_ns IS NULL)";
+  constexpr const char* kInactive =
+      "e.unconfirmed_ns IS NULL AND "
       "coalesce(e.cleared_ns, e.ended_ns) IS NOT NULL";
+  constexpr const char* kReturned =
+      " AND (e.cleared_ns IS NOT NULL OR e.end_reason NOT IN "
+      "('stream_ended', 'stale_timeout', 'unknown'))";
   constexpr const char* kAcked = " AND e.acked_by IS NOT NULL";
   constexpr const char* kUnacked = " AND e.acked_by IS NULL";
   std::string open = " AND e.ended_ns IS NULL";
@@ -81,9 +91,10 @@ std::string StateCondition(EpisodeState state) {
     case EpisodeState::kAlarmAcked:
       return std::string(" AND ") + kActive + kAcked;
     case EpisodeState::kAlarmReturnedUnacked:
-      return std::string(kUnacked) + " AND " + kReturned;
+      return std::string(kUnacked) + " AND " + kInactive + kReturned;
     case EpisodeState::kAlarmNormal:
-      return std::string(kAcked) + " AND " + kReturned;
+      return std::string(" AND ") + kInactive + " AND NOT (e.acked_by IS NULL" +
+             kReturned + ")";
     case EpisodeState::kAlarmShelved:
       return " AND " + std::string(sql::is_shelved);
   }
@@ -92,12 +103,14 @@ std::string StateCondition(EpisodeState state) {
 
 // INDEXED BY is an error where the index cannot be used. The partial indexes
 // can be used only if the query repeats their condition: ended_ns IS NULL for
-// episode_open, acked_by IS NULL for episode_unacked. So the states of IsOpen()
-// and IsUnacked() must have that in StateCondition().
+// episode_open, acked_by IS NULL for episode_unacked, the first line of kActive
+// for episode_active. So the states of IsOpen(), IsUnacked() and IsActive()
+// must have that in StateCondition().
 const char* IndexFor(const EpisodeFilter& filter) {
   return IsExact(filter)            ? "episode_by_valve"
          : filter.fault == kUnknown ? "episode_by_fault"
          : IsOpen(filter.state)     ? "episode_open"
+         : IsActive(filter.state)   ? "episode_active"
          : IsUnacked(filter.state)  ? "episode_unacked"
                                     : "episode_by_time";
 }

@@ -13,13 +13,14 @@
 #include "storage/history/history_database.h"
 #include "storage/history/shadow.h"
 #include "storage/history/sql.h"
+#include "storage/history/strength.h"
 
 namespace fdi::storage {
 
 template <>
 struct EnumText<TransitionKind> {
   static constexpr auto name = TransitionName;
-  static constexpr auto last = TransitionKind::kClosed;
+  static constexpr auto last = TransitionKind::kChanged;
 };
 
 namespace sql = history_sql;
@@ -39,8 +40,14 @@ bool IsIsolation(TransitionKind kind) {
          kind == TransitionKind::kReisolated;
 }
 
-bool Has(FaultSet faults, std::size_t bit) {
-  return (faults >> bit & 1U) != 0;
+// Whether nothing says that the fault is gone: only the data ended.
+bool LeavesUnconfirmed(EndReason reason) {
+  return reason == EndReason::kStreamEnded ||
+         reason == EndReason::kStaleTimeout || reason == EndReason::kUnknown;
+}
+
+std::optional<Severity> ReadSeverity(const Statement& row, int column) {
+  return row.IsNull(column) ? std::nullopt : SeverityOf(row.Int64(column));
 }
 
 EndReason ReasonOf(std::string_view name) {
@@ -89,7 +96,7 @@ Entry InsertEpisode(Database& database, const FaultEvent& event,
             t.detection_stamp_ns, Finite(t.factor), Finite(t.strength),
             models.name + "@" + std::to_string(models.version),
             models.content_hash, FlowUnitName(models.flow_unit),
-            JoinNames(channels), JoinNames(entry.names))
+            JoinNames(channels), JoinNames(entry.names), PriorityOf(t.severity))
       .Run();
   return entry;
 }
@@ -106,6 +113,7 @@ Entry EndOfStored(Database& database, const FaultEvent& event) {
   t.unknown = Unknown::kNone;
   row.Read(0, t.faults, t.factor, t.strength, t.detection_stamp_ns,
            entry.names);
+  t.severity = ReadSeverity(row, 5);
   return entry;
 }
 
@@ -117,7 +125,7 @@ void StoreIsolation(Database& database, const Entry& entry) {
   // with held = 1 are in the present set.
   database.Cached(sql::set_isolated)
       .Bind(t.stamp_ns, names.empty() ? "unknown" : names, t.faults,
-            Finite(t.factor), Finite(t.strength), LayerName(t.layer), entry.id)
+            Finite(t.factor), LayerName(t.layer), entry.id)
       .Run();
   database.Cached(sql::release_faults).Bind(entry.id).Run();
   for (std::size_t bit = 0; bit < entry.names.size(); ++bit) {
@@ -138,7 +146,7 @@ bool StoreEvent(Database& database, const Entry& entry) {
             t.faults, t.factor, t.strength,
             closed ? EndReasonName(t.reason) : std::string_view(),
             IsIsolation(t.kind) ? LayerName(t.layer) : std::string_view(),
-            entry.id)
+            PriorityOf(t.severity), entry.id)
       .Run();
   // Nothing else is changed unless the event is new, so that repeating it after
   // an error does no harm. Triggers insert into `change` meanwhile; SQLite
@@ -156,13 +164,25 @@ bool StoreEvent(Database& database, const Entry& entry) {
   }
   if (IsIsolation(t.kind)) {
     StoreIsolation(database, entry);
+  }
+  if (IsIsolation(t.kind) || t.kind == TransitionKind::kChanged) {
+    // Before the new priority replaces the one that was acknowledged.
+    database.Cached(sql::raise_alarm)
+        .Bind(entry.id, t.kind == TransitionKind::kChanged,
+              PriorityOf(t.severity), entry.recorded_ns)
+        .Run();
+    StoreStrengthNow(database, entry.id, {t.strength, t.lowest, t.highest},
+                     t.severity);
   } else if (t.kind == TransitionKind::kCleared) {
     database.Cached(sql::set_cleared).Bind(t.stamp_ns, entry.id).Run();
   } else if (closed) {
     const bool cleared = t.reason == EndReason::kCleared;
     database.Cached(sql::set_ended)
         .Bind(t.stamp_ns, EndReasonName(t.reason),
-              cleared ? std::optional(t.stamp_ns) : std::nullopt, entry.id)
+              cleared ? std::optional(t.stamp_ns) : std::nullopt,
+              LeavesUnconfirmed(t.reason) ? std::optional(t.stamp_ns)
+                                          : std::nullopt,
+              entry.id)
         .Run();
   }
   return true;
@@ -246,6 +266,7 @@ FaultEvent ReadUnsent(const Statement& row) {
            t.detection_stamp_ns, t.faults, t.factor, t.strength, reason, faults,
            model_set, event.model_hash);
   t.reason = reason.empty() ? EndReason::kNone : ReasonOf(reason);
+  t.severity = ReadSeverity(row, 14);
   event.candidates = IsolatedCandidates(faults, t.factor, t.strength);
   SplitModelSet(model_set, event.model_set, event.model_version);
   event.persisted = true;
@@ -273,6 +294,7 @@ OpenEpisode ReadOpen(const Statement& row) {
     }
   }
   episode.candidates = IsolatedCandidates(isolated, factor, strength);
+  episode.severity = ReadSeverity(row, 13);
   SplitModelSet(model_set, episode.model_set, episode.model_version);
   return episode;
 }
@@ -373,6 +395,11 @@ bool HistoryWriter::Record(const FaultEvent& event, std::int64_t now_ns) {
                       : EndOfStored(database_, event);
     entry.recorded_ns = now_ns;
     is_new = StoreEvent(database_, entry);
+    if (is_new && t.kind == TransitionKind::kDetected) {
+      database_.Cached(sql::end_unconfirmed)
+          .Bind(event.valve_id, entry.id)
+          .Run();
+    }
   });
   if (IsIsolation(t.kind)) {
     traces_.SetIsolated(event.episode_id, t.faults);
@@ -385,6 +412,13 @@ bool HistoryWriter::Has(const FaultEvent& event) {
       .QueryInt64(sql::has_event, EpisodeIdText(event.episode_id),
                   event.transition.kind, event.transition.stamp_ns)
       .has_value();
+}
+
+void HistoryWriter::ConfirmNormal(const std::string& valve_id,
+                                  std::int64_t stamp_ns) {
+  CommitBatch([&] {
+    database_.Cached(sql::confirm_normal).Bind(stamp_ns, valve_id).Run();
+  });
 }
 
 void HistoryWriter::Resume(std::uint64_t episode_id, std::int64_t stamp_ns,

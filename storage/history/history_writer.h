@@ -73,12 +73,16 @@ class HistoryWriter {
   void Resume(std::uint64_t episode_id, std::int64_t stamp_ns,
               std::int64_t now_ns);
 
+  /// The valve was judged normal: so is what ended with its data.
+  void ConfirmNormal(const std::string& valve_id, std::int64_t stamp_ns);
+
   /// Replaces the result of an earlier second look at the episode.
   /// @throws NotFoundError
   void StoreLook(const EpisodeLook& look);
 
   /// Stores how strong a fault of the episode was, instead of what was known of
-  /// the same fault at the same stamp. @throws NotFoundError
+  /// the same fault at the same stamp; with a severity also how strong and how
+  /// bad the episode is now. @throws NotFoundError
   void StoreStrength(const StrengthPoint& point);
 
   /// Buffers instants of an episode in order of arrival: those before detection

@@ -10,7 +10,8 @@ SELECT v.episode_id, v.valve_id, v.detected_utc, v.isolated_utc,
   e.cleared_ns, e.ended_ns, e.acked_ns,
   (SELECT max(last_ns) FROM episode_trace t
    WHERE t.episode_id = e.episode_id), e.session_id, e.fault_bits, e.strength,
-  e.unknown_kind, e.layer, e.flow_unit, e.channels, e.faults
+  e.unknown_kind, e.layer, e.flow_unit, e.channels, e.faults, e.lowest,
+  e.highest, e.worst_strength, e.priority, e.unconfirmed_ns
 FROM episode e CROSS JOIN fault_history v USING (episode_id)
 WHERE
 -- name: newest_episode
@@ -21,12 +22,15 @@ WHERE episode_id >= ?1 AND episode_id < ?1 || 'g' LIMIT 2
 -- name: alarm_list
 e.episode_id IN (
   SELECT episode_id FROM (
-    SELECT episode_id FROM episode INDEXED BY episode_open
-    WHERE ended_ns IS NULL ORDER BY detected_ns DESC, valve_id DESC LIMIT ?1)
+    SELECT episode_id FROM episode INDEXED BY episode_active
+    WHERE ended_ns IS NULL OR unconfirmed_ns IS NOT NULL
+    ORDER BY detected_ns DESC, valve_id DESC LIMIT ?1)
   UNION ALL
   SELECT episode_id FROM (
-    SELECT episode_id FROM episode INDEXED BY episode_unacked
-    WHERE acked_by IS NULL AND ended_ns IS NOT NULL
+    SELECT episode_id FROM episode e INDEXED BY episode_unacked
+    WHERE acked_by IS NULL AND ended_ns IS NOT NULL AND unconfirmed_ns IS NULL
+      AND (cleared_ns IS NOT NULL OR
+           end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown'))
     ORDER BY detected_ns DESC, valve_id DESC LIMIT ?1)
   LIMIT ?1)
 ORDER BY e.detected_ns DESC, e.valve_id DESC
@@ -68,16 +72,28 @@ FROM episode e INDEXED BY episode_statistics
 WHERE (e.ended_ns IS NULL OR e.ended_ns >= ?2) AND e.detected_ns < ?3 AND
 -- name: insert_episode
 INSERT INTO episode (episode_id, session_id, valve_id, source_id, detected_ns,
-  peak_factor, strength, model_set, model_hash, flow_unit, channels, faults)
-VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
+  peak_factor, strength, model_set, model_hash, flow_unit, channels, faults,
+  priority)
+VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
 ON CONFLICT (episode_id) DO NOTHING
 -- name: faults_of_episode
-SELECT fault_bits, peak_factor, strength, detected_ns, faults
+SELECT fault_bits, peak_factor, strength, detected_ns, faults, priority
 FROM episode WHERE episode_id = ?
 -- name: set_isolated
 UPDATE episode SET isolated_ns = coalesce(isolated_ns, ?), fault = ?,
-  fault_bits = ?, peak_factor = ?, strength = ?, layer = ?
+  fault_bits = ?, peak_factor = ?, layer = ?, worst_strength = NULL
 WHERE episode_id = ?
+-- Parameters: strength, ends of its interval, priority, episode.
+-- name: set_strength
+UPDATE episode SET strength = ?1, lowest = ?2, highest = ?3, priority = ?4,
+  worst_strength = iif(abs(?1) > abs(coalesce(worst_strength, 0)), ?1,
+    coalesce(worst_strength, ?1))
+WHERE episode_id = ?5
+-- A higher priority has to be acknowledged again. ?2: it did rise, if what it was
+-- is not known.
+-- name: raise_alarm
+UPDATE episode SET acked_by = NULL, acked_ns = NULL, raised_ns = ?4
+WHERE episode_id = ?1 AND coalesce(priority > ?3, ?2)
 -- name: release_faults
 UPDATE episode_fault SET held = 0 WHERE episode_id = ?
 -- name: hold_fault
@@ -91,28 +107,46 @@ UPDATE episode SET unknown_kind = ? WHERE episode_id = ?
 UPDATE episode SET cleared_ns = ? WHERE episode_id = ?
 -- name: set_ended
 UPDATE episode SET ended_ns = ?, end_reason = ?,
-  fault = coalesce(fault, 'unknown'), cleared_ns = coalesce(cleared_ns, ?)
+  fault = coalesce(fault, 'unknown'), cleared_ns = coalesce(cleared_ns, ?),
+  unconfirmed_ns = ?
 WHERE episode_id = ?
+-- The next episode of a valve takes the place of what was not confirmed.
+-- name: end_unconfirmed
+UPDATE episode SET unconfirmed_ns = NULL
+WHERE valve_id = ? AND unconfirmed_ns IS NOT NULL AND episode_id <> ?
+-- The valve was judged, and is normal.
+-- name: confirm_normal
+UPDATE episode SET cleared_ns = max(?1, ended_ns), unconfirmed_ns = NULL
+WHERE valve_id = ?2 AND unconfirmed_ns IS NOT NULL
+-- Somebody acknowledged it at ?2, knowing of its end.
+-- name: end_by_hand
+UPDATE episode SET unconfirmed_ns = NULL
+WHERE episode_id = ?1 AND unconfirmed_ns IS NOT NULL AND ?2 >= coalesce(
+  (SELECT max(recorded_ns) FROM episode_event
+   WHERE episode_id = ?1 AND kind = 'CLOSED'), 0)
 -- name: raise_peak
 UPDATE episode SET peak_factor = max(peak_factor, ?1)
 WHERE episode_id = ?2 AND peak_factor < ?1
--- The columns make an OpenEpisode; the candidates are made of the last three.
+-- The columns make an OpenEpisode. Evidence ends long before the episode: the
+-- last sample that a session saw of a valve is that of its accumulators.
 -- name: open_episodes
 SELECT episode_id, valve_id, source_id, detected_ns,
   max(detected_ns, coalesce(isolated_ns, 0), coalesce(
     (SELECT max(last_ns) FROM episode_trace t
-     WHERE t.episode_id = e.episode_id), 0)),
+     WHERE t.episode_id = e.episode_id), 0), coalesce(
+    (SELECT stamp_ns FROM accumulator a
+     WHERE a.valve_id = e.valve_id AND a.source_id = e.source_id), 0)),
   fault_bits, isolated_ns IS NOT NULL, layer, model_set, model_hash, faults,
-  peak_factor, strength
+  peak_factor, strength, priority
 FROM episode e WHERE ended_ns IS NULL ORDER BY detected_ns, valve_id
 
 -- ---- Events.
 -- Nothing is inserted if the event is there already, or its episode has ended.
 -- name: insert_event
 INSERT INTO episode_event (episode_id, kind, stamp_ns, recorded_ns, faults,
-  fault_bits, factor, strength, reason, layer)
+  fault_bits, factor, strength, reason, layer, priority)
 SELECT episode_id, ?, ?, ?, nullif(?, ''), ?, ?, ?, nullif(?, ''),
-  nullif(?, '')
+  nullif(?, ''), ?
 FROM episode WHERE episode_id = ? AND ended_ns IS NULL
 ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
 -- name: has_event
@@ -132,6 +166,7 @@ WHERE episode_id = ? AND acked_by IS NULL
 -- name: adopt_ack
 UPDATE episode SET acked_by = ?1, acked_ns = ?2
 WHERE episode_id = ?3 AND (acked_ns IS NULL OR acked_ns > ?2)
+  AND (raised_ns IS NULL OR raised_ns < ?2)
 -- name: adopt_label
 UPDATE episode SET label = ?1
 WHERE episode_id = ?2 AND NOT EXISTS (
@@ -155,7 +190,7 @@ DELETE FROM event_outbox WHERE event_id = (
 -- name: unsent_events
 SELECT v.event_id, v.episode_id, v.kind, e.valve_id, e.source_id, v.stamp_ns,
   e.detected_ns, v.fault_bits, v.factor, v.strength, v.reason, v.faults,
-  e.model_set, e.model_hash
+  e.model_set, e.model_hash, v.priority
 FROM event_outbox o JOIN episode_event v USING (event_id)
   JOIN episode e USING (episode_id)
 ORDER BY v.event_id
@@ -345,7 +380,7 @@ SELECT rowid, detected_ns, (SELECT
   FROM episode_trace t WHERE t.episode_id = e.episode_id)
 FROM episode e
 WHERE detected_ns >= ?1 AND ended_ns < ?2 AND acked_by IS NOT NULL
-  AND label IS NULL AND NOT EXISTS (
+  AND unconfirmed_ns IS NULL AND label IS NULL AND NOT EXISTS (
     SELECT 1 FROM event_outbox JOIN episode_event v USING (event_id)
     WHERE v.episode_id = e.episode_id)
   AND NOT EXISTS (SELECT 1 FROM ship_cursor WHERE copied_ns < e.detected_ns)
@@ -357,6 +392,7 @@ ORDER BY detected_ns LIMIT ?3
 -- name: protected_episodes
 SELECT count(*) FROM episode e WHERE NOT (
   ended_ns IS NOT NULL AND acked_by IS NOT NULL AND label IS NULL
+  AND unconfirmed_ns IS NULL
   AND NOT EXISTS (
     SELECT 1 FROM event_outbox JOIN episode_event v USING (event_id)
     WHERE v.episode_id = e.episode_id)
@@ -426,10 +462,12 @@ WHERE excluded.stamp_ns > shadow_accumulator.stamp_ns
 INSERT OR IGNORE INTO episode (episode_id, valve_id, source_id, detected_ns,
   isolated_ns, cleared_ns, fault_bits, peak_factor, strength, model_set,
   model_hash, flow_unit, channels, faults, label, acked_by, acked_ns,
-  unknown_kind, fault, layer)
+  unknown_kind, fault, layer, lowest, highest, priority, worst_strength,
+  raised_ns)
 SELECT episode_id, valve_id, source_id, detected_ns, isolated_ns, cleared_ns,
   fault_bits, peak_factor, strength, model_set, model_hash, flow_unit,
-  channels, faults, label, acked_by, acked_ns, unknown_kind, fault, layer
+  channels, faults, label, acked_by, acked_ns, unknown_kind, fault, layer,
+  lowest, highest, priority, worst_strength, raised_ns
 FROM source.episode WHERE valve_id = ? AND ended_ns IS NULL
 -- name: copy_open_faults
 INSERT OR IGNORE INTO episode_fault
@@ -438,9 +476,10 @@ WHERE e.valve_id = ? AND e.ended_ns IS NULL
 -- name: copy_open_events
 INSERT OR IGNORE INTO episode_event (episode_id, kind, stamp_ns, recorded_ns,
   faults, fault_bits, factor, strength, reason, value, who, comment, origin,
-  layer)
+  layer, priority)
 SELECT s.episode_id, s.kind, s.stamp_ns, s.recorded_ns, s.faults, s.fault_bits,
-  s.factor, s.strength, s.reason, s.value, s.who, s.comment, s.origin, s.layer
+  s.factor, s.strength, s.reason, s.value, s.who, s.comment, s.origin, s.layer,
+  s.priority
 FROM source.episode_event s JOIN source.episode e USING (episode_id)
 WHERE e.valve_id = ? AND e.ended_ns IS NULL ORDER BY s.event_id
 -- name: copy_open_outbox

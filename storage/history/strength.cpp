@@ -1,5 +1,6 @@
 #include "storage/history/strength.h"
 
+#include <cmath>
 #include <string>
 
 #include "base/error.h"
@@ -10,6 +11,18 @@
 
 namespace fdi::storage {
 namespace sql = history_sql;
+
+void StoreStrengthNow(Database& database, const std::string& episode_id,
+                      const Estimate& now, std::optional<Severity> severity) {
+  const auto end = [&now](double value) {
+    return now.has_interval() ? std::optional(value) : std::nullopt;
+  };
+  // NaN would be bound as NULL, which the column refuses.
+  database.Cached(sql::set_strength)
+      .Bind(std::isfinite(now.strength) ? now.strength : 0.0, end(now.lowest),
+            end(now.highest), PriorityOf(severity), episode_id)
+      .Run();
+}
 
 void HistoryWriter::StoreStrength(const StrengthPoint& point) {
   const std::string id = EpisodeIdText(point.episode_id);
@@ -22,6 +35,11 @@ void HistoryWriter::StoreStrength(const StrengthPoint& point) {
         .Bind(id, FaultName(point.fault), point.stamp_ns, point.strength,
               point.lowest, point.highest, LayerName(point.layer))
         .Run();
+    if (point.severity) {
+      StoreStrengthNow(database_, id,
+                       {point.strength, point.lowest, point.highest},
+                       point.severity);
+    }
   });
 }
 

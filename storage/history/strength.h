@@ -1,12 +1,20 @@
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "diagnosis/records/growth.h"
 #include "diagnosis/records/strength_point.h"
+#include "diagnosis/severity.h"
+#include "storage/database/database.h"
 #include "storage/history/episode.h"
 
 namespace fdi::storage {
+
+/// How strong and how bad an episode is now. Within a transaction.
+void StoreStrengthNow(Database& database, const std::string& episode_id,
+                      const Estimate& now, std::optional<Severity> severity);
 
 /// How the faults that name the episode develop, as far as `strengths` of it
 /// tell, in the order of its name.

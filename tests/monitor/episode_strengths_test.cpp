@@ -1,4 +1,4 @@
-#include "monitor/episode_strengths.h"
+#include "monitor/names/episode_strengths.h"
 
 #include <cmath>
 #include <vector>
@@ -16,34 +16,43 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 class EpisodeStrengthsTest : public testing::Test {
  protected:
   // Second k of an episode that was detected at 0.
-  bool Step(int k, FaultSet isolated, double strength, bool observed = true) {
+  StrengthDue Step(int k, FaultSet isolated, double strength,
+                   bool observed = true) {
     Verdict verdict;
     verdict.stamp_ns = k * kSecond;
     verdict.detected = true;
-    verdict.isolated = isolated;
     verdict.strengths.fill(strength);
     if (k == 0) {
       verdict.transitions[0] = {TransitionKind::kDetected, 0, 0};
       verdict.transition_count = 1;
     }
-    return strengths_.Step(verdict, observed);
+    return strengths_.Step(verdict, isolated, observed);
   }
 
   EpisodeStrengths strengths_;
   ModelSet models_{LinearModels()};
 };
 
-TEST_F(EpisodeStrengthsTest, ItIsTimeAtAgesHalfAsMuchAgainEach) {
+TEST_F(EpisodeStrengthsTest, ItIsTimeAtAgesHalfAsMuchAgainEachThenHourly) {
   std::vector<int> times;
-  for (int k = 0; k < 2000; ++k) {
-    if (Step(k, 0b10, 0.5)) {
+  for (int k = 0; k < 20'000; ++k) {
+    if (Step(k, 0b10, 0.5) == StrengthDue::kPoint) {
       times.push_back(k);
     }
   }
-  EXPECT_EQ(times, (std::vector{450, 675, 1013, 1519}));
+  EXPECT_EQ(times, (std::vector{450, 675, 1013, 1519, 2279, 3418, 5126, 7689,
+                                11'289, 14'889, 18'489}));
   Verdict over;
   over.stamp_ns = 10'000 * kSecond;
-  EXPECT_FALSE(strengths_.Step(over, true));
+  EXPECT_EQ(strengths_.Step(over, 0b10, true), StrengthDue::kNothing);
+}
+
+TEST_F(EpisodeStrengthsTest, EveryMinuteIsTold) {
+  int minutes = 0;
+  for (int k = 0; k < 301; ++k) {
+    minutes += Step(k, 0b10, 0.5) == StrengthDue::kMinute ? 1 : 0;
+  }
+  EXPECT_EQ(minutes, 5);
 }
 
 // In whole minutes 0.41 to 0.47: their mean is 0.44, their deviation

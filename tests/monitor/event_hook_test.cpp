@@ -371,9 +371,17 @@ TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
   EXPECT_EQ(json["fault"], "f7");
   EXPECT_EQ(json["name"], texts.Of(7).name);
   EXPECT_EQ(json["severity"], "critical");
+  EXPECT_EQ(json["priority"], 1);
   EXPECT_EQ(json["episode_id"], "00000000000000ab");
   EXPECT_EQ(json["stamp_utc"], "1970-01-01T00:00:00.005Z");
   EXPECT_TRUE(json["reason"].is_null());
+
+  event.transition.kind = TransitionKind::kChanged;
+  event.transition.severity = Severity::kHigh;  // As the monitor says.
+  const report::Json changed = EventJson(event, true, texts);
+  EXPECT_EQ(changed["kind"], "CHANGED");
+  EXPECT_EQ(changed["severity"], "high");
+  EXPECT_EQ(changed["priority"], 2);
 }
 
 // Only once no known fault explains it any more.

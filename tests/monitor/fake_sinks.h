@@ -144,6 +144,13 @@ class FakeHistory : public HistorySink {
       strengths.push_back(point);
     });
   }
+  void ConfirmNormal(const std::string& valve_id,
+                     std::int64_t /*stamp_ns*/) override {
+    notice.Apply([&] {
+      FailIfBroken();
+      normal.push_back(valve_id);
+    });
+  }
   void AddTrace(const EpisodeTrace& trace) override {
     std::this_thread::sleep_for(trace_time.load());
     notice.Apply([&] {
@@ -198,6 +205,7 @@ class FakeHistory : public HistorySink {
   std::map<std::pair<std::uint64_t, TransitionKind>, int> recorded;
   std::map<std::uint64_t, EpisodeLook> looks;
   std::vector<StrengthPoint> strengths;
+  std::vector<std::string> normal;
   std::vector<DataGap> gaps;
   Checkpoint checkpoint_sum;
   int checkpoints{0};
@@ -221,6 +229,7 @@ class FakeOutlet : public EpisodeOutlet {
   void OnLook(EpisodeLook /*look*/) override {}
   void OnStrength(StrengthPoint /*point*/) override {}
   void OnGap(DataGap /*gap*/) override {}
+  void OnNormal(const std::string& /*valve*/, std::int64_t /*ns*/) override {}
   void OnResumed(const OpenEpisode& /*episode*/,
                  std::int64_t /*stamp_ns*/) override {}
 };

@@ -9,9 +9,10 @@
 #include <gtest/gtest.h>
 
 #include "monitor/counters.h"
-#include "monitor/episode_names.h"
 #include "monitor/episode_tracker.h"
-#include "monitor/look_worker.h"
+#include "monitor/names/episode_names.h"
+#include "monitor/names/look_worker.h"
+#include "monitor/pipeline.h"
 #include "monitor/throttled_log.h"
 #include "tests/monitor/fake_sinks.h"
 #include "tests/monitor/linear_models.h"
@@ -117,6 +118,7 @@ class SecondLookTest : public testing::Test {
 
   const Verdict& Step(std::uint64_t k) {
     const Sample sample = SampleOf(rows_.at(k), k);
+    tracker_.Advance(sample, engine_, *models_, outlet_);
     const Verdict& verdict = names_.Step(sample, engine_, held_);
     tracker_.Step(sample, verdict, models_, outlet_);
     tracker_.Take(names_.TakeLook(), outlet_);
@@ -144,10 +146,11 @@ class SecondLookTest : public testing::Test {
   std::vector<std::string> lines_;
   ThrottledLog log_{
       [this](LogLevel, std::string_view line) { lines_.emplace_back(line); }};
-  LookWorker worker_{{counters_, log_, [] { return std::int64_t{0}; }}, 3};
+  LookWorker worker_{
+      LookReportOf({counters_, log_, [] { return std::int64_t{0}; }}), 3};
   std::shared_ptr<const ModelSet> models_{Models()};
   LookWorker::Physics physics_{worker_.PhysicsOf(*models_)};
-  EpisodeNames names_{"V1", models_, physics_, worker_};
+  EpisodeNames names_{"V1", models_, physics_, &worker_};
   EpisodeTracker tracker_{"V1", {}};
   EventList outlet_;
   std::vector<RecordRow> rows_{
@@ -386,7 +389,7 @@ TEST_F(SecondLookTest, AResumedEpisodeKeepsItsNameUntilALookAnswers) {
   Feed(0, kAtOnce - 40);
   tracker_ = EpisodeTracker("V1", {});
   tracker_.Recover(open);
-  names_.SetInheritedName(open.faults);
+  names_.Inherit(&open);
   Feed(kAtOnce - 40, kFirstLook + 1);
   worker_.Start();
   ASSERT_TRUE(AwaitLooks(1));

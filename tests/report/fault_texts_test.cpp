@@ -51,8 +51,8 @@ TEST_F(FaultTextsTest, SeverityFollowsTheSizeOfTheStrength) {
                         "[f19]\nseverity = [{from = 0.0, level = 'low'},"
                         "{from = 0.5, level = 'critical'}]"));
 
-  EXPECT_EQ(texts_.Of(19).SeverityAt(0.49), Severity::kLow);
-  EXPECT_EQ(texts_.Of(19).SeverityAt(-0.5), Severity::kCritical);
+  EXPECT_EQ(SeverityAt(texts_.Of(19).bands, 0.49), Severity::kLow);
+  EXPECT_EQ(SeverityAt(texts_.Of(19).bands, -0.5), Severity::kCritical);
 }
 
 TEST_F(FaultTextsTest, OverrideLeavesWhatItDoesNotName) {

@@ -104,6 +104,82 @@ TEST_F(HistoryEditorTest, AnAlarmLeavesTheListEndedAndAcknowledged) {
   EXPECT_EQ(alarms[1].state, AlarmState::kReturnedUnacked);
 }
 
+// LV-1 and LV-2 were cleared; "open" is active until its data end.
+class UnconfirmedTest : public HistoryEditorTest {
+ protected:
+  void EndData(EndReason reason = EndReason::kStaleTimeout) {
+    writer_.Record(Event(TransitionKind::kClosed, 120, 0, 0.3, reason, "open"),
+                   now_);
+  }
+  Alarm Find() {
+    HistoryReader reader(path_);
+    return reader.Alarms({reader.Show(IdText("open"))}, now_).front();
+  }
+};
+
+class EndOfDataTest : public UnconfirmedTest,
+                      public testing::WithParamInterface<EndReason> {};
+
+TEST_P(EndOfDataTest, IsNoReturnToNormal) {
+  EndData(GetParam());
+  EXPECT_EQ(Find().state, AlarmState::kUnacked);
+  EXPECT_EQ(Find().episode.unconfirmed_ns, kDetected + 120 * kSecond);
+  EXPECT_THAT(Listed(), ElementsAre("open", "LV-2", "LV-1"));
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmUnacked), 1U);
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmReturnedUnacked), 2U);
+
+  editor_.Acknowledge(IdText("open"), By("anna", now_ + 1));
+  EXPECT_EQ(Find().state, AlarmState::kNormal);
+  EXPECT_THAT(Listed(), ElementsAre("LV-2", "LV-1"));
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmNormal), 1U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Reasons, EndOfDataTest,
+                         testing::Values(EndReason::kStreamEnded,
+                                         EndReason::kStaleTimeout,
+                                         EndReason::kUnknown));
+
+TEST_F(UnconfirmedTest, WhatWasAcknowledgedBeforeStaysToo) {
+  editor_.Acknowledge(IdText("open"), By("anna", now_ - 1));
+  EndData(EndReason::kStreamEnded);
+  EXPECT_EQ(Find().state, AlarmState::kAcked);
+  EXPECT_THAT(Listed(), ElementsAre("open", "LV-2", "LV-1"));
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmAcked), 1U);
+  OperatorAction same;  // From the other of a pair.
+  same.episode_id = Id("open");
+  same.stamp_ns = now_ - 2;
+  same.who = "anna";
+  same.origin = "test";
+  EXPECT_TRUE(editor_.Adopt(same));
+  EXPECT_EQ(Find().state, AlarmState::kAcked);
+
+  editor_.Acknowledge(IdText("open"), By("jan", now_ + 1));
+  EXPECT_EQ(Find().state, AlarmState::kNormal);
+  EXPECT_EQ(Find().episode.acked_by, "anna");
+}
+
+TEST_F(UnconfirmedTest, OnlyAValveThatIsJudgedNormalHasReturned) {
+  EndData(EndReason::kStaleTimeout);
+  writer_.ConfirmNormal("LV-1", kDetected + 500 * kSecond);
+  EXPECT_EQ(Find().state, AlarmState::kUnacked);
+  writer_.ConfirmNormal("open", kDetected + 500 * kSecond);
+  EXPECT_EQ(Find().state, AlarmState::kReturnedUnacked);
+  EXPECT_EQ(Find().episode.cleared_ns, kDetected + 500 * kSecond);
+  EXPECT_EQ(Find().episode.end_reason, "stale_timeout");
+}
+
+TEST_F(UnconfirmedTest, TheNextEpisodeOfTheValveTakesItsPlace) {
+  EndData(EndReason::kStaleTimeout);
+  FaultEvent next =
+      Event(TransitionKind::kDetected, 500, 0, 0.3, EndReason::kNone, "open");
+  next.episode_id = 99;
+  writer_.Record(next, now_);
+  EXPECT_EQ(Find().state, AlarmState::kNormal);
+  EXPECT_EQ(Listed().size(), 3U) << "LV-1, LV-2 and the next one";
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmNormal), 1U);
+  EXPECT_EQ(CountOf(EpisodeState::kAlarmUnacked), 1U);
+}
+
 TEST_F(HistoryEditorTest, StatesOfTheStandardCanBeAskedFor) {
   editor_.Acknowledge(IdText("LV-1"), By("anna", now_));
   editor_.Shelve("LV-2", std::nullopt, now_ + kSecond, By("anna", now_));

@@ -76,7 +76,7 @@ TEST_F(HistoryQueryTest, AlarmsAndTheirFiguresWalkIndexes) {
   EXPECT_THAT(PlanOf(AlarmSpanQuery({})),
               HasSubstr("COVERING INDEX episode_statistics"));
   const std::string plan = PlanOf(AlarmListQuery());
-  EXPECT_THAT(plan, HasSubstr("episode_open"));
+  EXPECT_THAT(plan, HasSubstr("episode_active"));
   EXPECT_THAT(plan, HasSubstr("episode_unacked"));
   EXPECT_THAT(plan, Not(HasSubstr("SCAN e\n")));
 }

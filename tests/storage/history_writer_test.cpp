@@ -41,10 +41,12 @@ TEST_F(HistoryWriterTest, ViewHasTheColumnsOfTheContractInOrder) {
     columns.push_back(row.ColumnName(c));
   }
 
-  EXPECT_THAT(columns,
-              ElementsAre("episode_id", "valve_id", "detected_utc",
-                          "isolated_utc", "cleared_utc", "fault", "peak_factor",
-                          "model_set", "end_reason", "label", "acked_by"));
+  EXPECT_THAT(
+      columns,
+      ElementsAre("episode_id", "valve_id", "detected_utc", "isolated_utc",
+                  "cleared_utc", "fault", "peak_factor", "model_set",
+                  "end_reason", "label", "acked_by", "strength",
+                  "worst_strength", "severity", "priority", "unconfirmed_utc"));
 }
 
 TEST_F(HistoryWriterTest, FaultIsNullUntilIsolatedAndUnknownIfItNeverWas) {
@@ -270,6 +272,143 @@ TEST_F(HistoryWriterTest, AnEpisodeThatIsNotThereSpoilsNothingBesideIt) {
   });
 
   EXPECT_EQ(Sql("SELECT count(*) FROM episode"), "1");
+}
+
+// A flow error that grows from 2.5 % on.
+class GrowingAlarmTest : public HistoryWriterTest {
+ protected:
+  FaultEvent At(Kind kind, double after_s, double strength, Severity severity) {
+    FaultEvent event =
+        Event(kind, after_s, kind == Kind::kDetected ? 0 : 0b100, 0.8);
+    event.transition.strength = strength;
+    event.transition.lowest = strength - 0.01;
+    event.transition.highest = strength + 0.01;
+    event.transition.severity = severity;
+    return event;
+  }
+  GrowingAlarmTest() {
+    writer_.Record(At(Kind::kDetected, 0, 0.0, Severity::kMedium), kDetected);
+    writer_.Record(At(Kind::kIsolated, 20, 0.025, Severity::kMedium),
+                   kDetected + 20 * kSecond);
+    editor_.Acknowledge("last", By("anna", kDetected + 30 * kSecond));
+  }
+  StrengthPoint Point(int after_s, double strength, Severity severity) const {
+    return {Id(),
+            kDetected + after_s * kSecond,
+            19,
+            strength,
+            strength - 0.01,
+            strength + 0.01,
+            Layer::kObservers,
+            severity};
+  }
+  Episode Shown() { return HistoryReader(path_).Show("last"); }
+
+  HistoryWriter writer_{path_};
+  HistoryEditor editor_{path_};
+};
+
+TEST_F(GrowingAlarmTest, ItsStrengthIsThatOfNowAndItsWorstIsKept) {
+  writer_.StoreStrength(Point(500, 0.2, Severity::kMedium));
+  EXPECT_EQ(Shown().strength, 0.2);
+  EXPECT_EQ(Shown().lowest, 0.19);
+  writer_.StoreStrength(Point(900, 0.1, Severity::kMedium));
+  EXPECT_EQ(Shown().strength, 0.1);
+  EXPECT_EQ(Shown().worst_strength, 0.2);
+  EXPECT_EQ(Shown().acked_by, "anna");
+  StrengthPoint other = Point(901, 0.9, Severity::kLow);
+  other.severity
+      .reset();  // Not of the fault that the name has its strength of.
+  writer_.StoreStrength(other);
+  EXPECT_EQ(Shown().strength, 0.1);
+  EXPECT_EQ(Sql("SELECT strength || ' ' || worst_strength || ' ' || severity ||"
+                " ' ' || priority FROM fault_history"),
+            "0.1 0.2 medium 3");
+}
+
+TEST_F(GrowingAlarmTest, AHigherPriorityHasToBeAcknowledgedAgain) {
+  const std::int64_t rose = kDetected + 7200 * kSecond;
+  EXPECT_TRUE(
+      writer_.Record(At(Kind::kChanged, 7000, 0.9, Severity::kCritical), rose));
+  EXPECT_EQ(Shown().acked_by, std::nullopt);
+  EXPECT_EQ(Shown().acked_ns, std::nullopt);
+  EXPECT_EQ(Shown().priority, 1);
+  EXPECT_EQ(Shown().strength, 0.9);
+  EXPECT_EQ(Shown().fault, "f19");
+  const auto events = HistoryReader(path_).Events(Id());
+  EXPECT_EQ(events.back().kind, "CHANGED");
+  EXPECT_EQ(events.back().priority, 1);
+  EXPECT_EQ(writer_.UnsentEvents().back().transition.severity,
+            Severity::kCritical);
+  EXPECT_EQ(writer_.OpenEpisodes().at(0).severity, Severity::kCritical);
+
+  OperatorAction before;  // It comes late from the other of a pair.
+  before.episode_id = Id();
+  before.stamp_ns = rose - 1;
+  before.who = "jan";
+  before.origin = "test";
+  EXPECT_TRUE(editor_.Adopt(before));
+  EXPECT_EQ(Shown().acked_by, std::nullopt);
+  editor_.Acknowledge("last", By("jan", rose + 1));
+  EXPECT_EQ(Shown().acked_by, "jan");
+}
+
+TEST_F(GrowingAlarmTest, AnotherNameHasToBeAcknowledgedAgainIfItIsWorse) {
+  writer_.Record(At(Kind::kReisolated, 40, 0.1, Severity::kMedium), kDetected);
+  EXPECT_EQ(Shown().acked_by, "anna");
+  writer_.Record(At(Kind::kReisolated, 50, 0.1, Severity::kLow), kDetected);
+  EXPECT_EQ(Shown().acked_by, "anna");
+  writer_.Record(At(Kind::kReisolated, 60, 0.1, Severity::kHigh), kDetected);
+  EXPECT_EQ(Shown().acked_by, std::nullopt);
+}
+
+// The evidence of an episode ends ten minutes after its isolation.
+TEST_F(GrowingAlarmTest, WhatIsLeftOpenWasKnownUpToTheLastSample) {
+  EXPECT_EQ(writer_.OpenEpisodes().at(0).last_stamp_ns,
+            kDetected + 20 * kSecond);
+  const std::int64_t last = kDetected + 72 * 3600 * kSecond;
+  Checkpoint checkpoint;
+  checkpoint.accumulators.push_back(
+      {"LV-1", kSource, models_.content_hash, last, {}});
+  writer_.CommitCheckpoint(checkpoint);
+  EXPECT_EQ(writer_.OpenEpisodes().at(0).last_stamp_ns, last);
+}
+
+TEST_F(HistoryWriterTest, AHistoryOfVersion10KeepsItsAlarms) {
+  Schema older = HistorySchema();
+  older.migrations.resize(10);
+  {
+    Database database(path_, older, Access::kWriter);
+    Transaction transaction(database);
+    const std::string episode =
+        "INSERT INTO episode (episode_id, valve_id, source_id, detected_ns, "
+        "isolated_ns, ended_ns, end_reason, fault, fault_bits, peak_factor, "
+        "strength, model_set, model_hash, flow_unit, channels, faults) VALUES ";
+    const std::string rest = "'f7', 1, 0.5, 0.25, 'm@1', 1, 'm3/h', 'X', 'f7')";
+    database.Run(episode +
+                 "('000000000000000a', 'A', 1, 10, 20, 30, "
+                 "'stream_ended', " +
+                 rest);
+    database.Run(episode +
+                 "('000000000000000b', 'A', 1, 40, 50, 60, "
+                 "'stale_timeout', " +
+                 rest);
+    database.Run(episode +
+                 "('000000000000000c', 'C', 1, 11, 21, 31, "
+                 "'cleared', " +
+                 rest);
+    transaction.Commit();
+  }
+  const HistoryWriter migrate(path_);
+  HistoryReader reader(path_);
+  std::vector<std::string> states;
+  for (const Alarm& alarm : reader.Alarms(reader.List(), 100)) {
+    states.emplace_back(AlarmStateName(alarm.state));
+  }
+  // The second episode of A has taken the place of the first.
+  EXPECT_EQ(states, (std::vector<std::string>{"NORMAL", "RTN_UNACK", "UNACK"}));
+  EXPECT_EQ(reader.List().at(0).worst_strength, 0.25);
+  EXPECT_EQ(reader.List().at(0).priority, std::nullopt);
 }
 
 TEST_F(HistoryWriterTest, SameGapTwiceIsOneGap) {

@@ -664,7 +664,7 @@ TEST_F(ShipTest, TheVerbsReadThePlant) {
   same("worklist --valve 'LV-*' --discipline instrument" + since);
   const Outcome list =
       Store("history list --limit 1 --csv --from '" + Url() + "' --monitor a");
-  EXPECT_THAT(list.out, HasSubstr("acked_by,host,monitor\n"));
+  EXPECT_THAT(list.out, HasSubstr("unconfirmed_utc,host,monitor\n"));
   EXPECT_THAT(list.out, HasSubstr(",a\n"));
   EXPECT_THAT(Store("history list --from '" + Url() + "' --monitor b").out,
               HasSubstr("no episode matches"));

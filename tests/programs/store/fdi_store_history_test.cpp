@@ -28,7 +28,8 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
               testing::UnorderedElementsAre(
                   "episode_id", "valve_id", "detected_utc", "isolated_utc",
                   "cleared_utc", "fault", "peak_factor", "model_set",
-                  "end_reason", "label", "acked_by"));
+                  "end_reason", "label", "acked_by", "strength",
+                  "worst_strength", "severity", "priority", "unconfirmed_utc"));
   EXPECT_EQ(episode["fault"], "f7");
   EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
   EXPECT_TRUE(episode["cleared_utc"].is_null());
@@ -268,7 +269,7 @@ TEST_F(FdiStoreHistoryTest, DoctorFindsASoundDirectorySound) {
   EXPECT_EQ(report["sound"], true);
   ASSERT_EQ(report["databases"].size(), 3U);
   EXPECT_EQ(report["databases"][0]["present"], false);
-  EXPECT_EQ(report["databases"][2]["version"], 10);
+  EXPECT_EQ(report["databases"][2]["version"], 11);
   EXPECT_EQ(report["databases"][2]["figures"]["open_episodes"], 1);
   EXPECT_EQ(report["databases"][2]["figures"]["unsent_events"], 2);
 }

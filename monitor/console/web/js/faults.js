@@ -29,24 +29,8 @@ export function faultTitle(fault) {
 
 const kPriority = {critical: 1, high: 2, medium: 3, low: 4};
 
-/** Priority of a fault of the catalogue at a strength (0..1). */
-function priorityAt(fault, strength) {
-  const size = Math.abs(strength ?? 0);
-  const bands = store.faults.get(fault)?.severity ?? [];
-  return kPriority[bands.filter((band) => band.from <= size).at(-1)?.level] ??
-      kPriority.medium;
-}
-
-/**
- * 1 (critical) to 4 (low). Of a set of faults that cannot be told apart it is
- * that of the gravest, in a tile as in the alarm list.
- */
-export function priorityOf(row) {
-  if (row.severity) return kPriority[row.severity] ?? kPriority.medium;
-  const own = members(row.fault ?? row.faults?.join('|'));
-  return Math.min(...(own.length > 0 ? own : ['unknown']).map((fault) =>
-    priorityAt(fault, row.strength)));
-}
+/** 1 (critical) to 4 (low), as the monitor says. */
+export const priorityOf = (row) => kPriority[row.severity] ?? kPriority.medium;
 
 export const priorityNames =
     ['', 'critical', 'high priority', 'medium priority', 'low priority'];
@@ -74,6 +58,10 @@ export function compareAlarms(a, b) {
   return group(a) - group(b) || priorityOf(a) - priorityOf(b) ||
       b.detected_ms - a.detected_ms || (a.episode < b.episode ? -1 : 1);
 }
+
+/** Of an alarm whose data ended; empty otherwise. */
+export const unconfirmedText = ({unconfirmed_ms: since}) =>
+  since ? `not confirmed since ${timeText(since)}` : '';
 
 /** NE 107 class in words. */
 export const namurText = (name) => name ? plain(name) : '–';
@@ -109,7 +97,8 @@ export function qualityText({quality, stamp_ms: stamp, reasons, missing,
 }
 
 const kMarkWords = {
-  REISOLATED: 'isolated anew', ACK: 'acknowledged', LABEL: 'labelled',
+  REISOLATED: 'isolated anew', CHANGED: 'priority rose', ACK: 'acknowledged',
+  LABEL: 'labelled',
 };
 export const markWord = (kind) =>
   kMarkWords[String(kind).toUpperCase()] ?? plain(kind);

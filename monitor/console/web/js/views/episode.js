@@ -8,7 +8,8 @@ import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, errorNote, factList, h, replace, setText} from '../dom.js';
 import {faultTitle, groupName, layerText, markWord, members, namurText,
-  priorityNames, priorityOf, prioritySign, stateWord} from '../faults.js';
+  priorityNames, priorityOf, prioritySign, stateWord, unconfirmedText}
+  from '../faults.js';
 import {durationText, factorText, percentText, zoneName} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
@@ -19,7 +20,7 @@ import {View} from './view.js';
 const kEndWords = {
   cleared: 'normal again', stream_ended: 'the publisher ended its stream',
   stale_timeout: 'no samples for too long', model_changed: 'model set changed',
-  superseded: 'superseded', unknown: 'the monitor died in it',
+  superseded: 'superseded', unknown: 'the monitor was down in it',
 };
 
 function facts({episode: row, model_hash: hash}) {
@@ -30,7 +31,8 @@ function facts({episode: row, model_hash: hash}) {
         [faultTitle(row.fault), layerText(row.layer)]
             .filter(Boolean).join(', '))],
     ['Priority', priorityNames[priorityOf(row)]],
-    ['State', `${stateWord(row.state)}; ${groupName(row).toLowerCase()}`],
+    ['State', [`${stateWord(row.state)}; ${groupName(row).toLowerCase()}`,
+      unconfirmedText(row)].filter(Boolean).join(', ')],
     ['Detected', timeCell(row.detected_ms)],
     ['Isolated', row.isolated_ms === null ? '–' : h('span', {},
         timeCell(row.isolated_ms), `, ${durationText(
@@ -40,7 +42,8 @@ function facts({episode: row, model_hash: hash}) {
     ['End', row.end_reason ? kEndWords[row.end_reason] ?? row.end_reason :
       'still open'],
     ['Peak factor', factorText(row.peak_factor)],
-    ['Strength when named', percentText(row.strength)],
+    ['Strength now', percentText(row.strength)],
+    ['At its worst', percentText(row.worst_strength)],
     ['For', row.discipline ?? '–'],
     ['NE 107', namurText(row.namur)],
     ['Label', labelText(row.label)],

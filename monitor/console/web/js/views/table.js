@@ -2,7 +2,7 @@
 
 import {h} from '../dom.js';
 import {faultName, faultTitle, groupName, members, namurText, priorityOf,
-  priorityNames, prioritySign} from '../faults.js';
+  priorityNames, prioritySign, unconfirmedText} from '../faults.js';
 import {durationText, factorText, percentText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
@@ -70,14 +70,16 @@ export function labelText(label) {
   return label === 'false' ? 'false alarm' : `was ${faultTitle(label)}`;
 }
 
-// Who has acknowledged or shelved it, and when.
+// Since when nothing says that it lasts, and who has acknowledged or shelved it.
 function personText(row) {
   if (row.shelved) {
     const {until_ms: until, who, comment} = row.shelved;
     return `until ${timeText(until)} by ${who}` +
         (comment ? `: ${comment}` : '');
   }
-  return row.acked_by ? `${row.acked_by}, ${timeText(row.acked_ms)}` : '';
+  return [unconfirmedText(row),
+    row.acked_by && `${row.acked_by}, ${timeText(row.acked_ms)}`]
+      .filter(Boolean).join('; ');
 }
 
 export const valveLink = (valve) => h('a', {href: link('valve', valve)}, valve);

@@ -3,14 +3,17 @@
 import {drawSparkline} from '../charts/sparkline.js';
 import {h, setText} from '../dom.js';
 import {faultName, faultTitle, inAlarm, priorityNames, priorityOf,
-  prioritySign, qualityText, stateWord} from '../faults.js';
+  prioritySign, qualityText, stateWord, unconfirmedText} from '../faults.js';
 import {clockText, factorText} from '../format.js';
 import {link} from '../route.js';
+
+// A fault, or one that was there when the data ended.
+const isAlarm = (tile) => inAlarm(tile) || Boolean(tile.unconfirmed_ms);
 
 /** How bad it is: [class, priority]; smaller is worse. */
 export function rankOf(tile) {
   const shelved = tile.shelved_until_ms !== null;
-  if (inAlarm(tile)) {
+  if (isAlarm(tile)) {
     return [shelved ? 2 : tile.unacked ? 0 : 1, priorityOf(tile)];
   }
   return [tile.unacked ? 3 : tile.quality === 'LIVE' ? 5 : 4, 0];
@@ -21,6 +24,9 @@ function whatText(tile) {
     return 'Fault detected, not isolated yet';
   }
   if (inAlarm(tile)) return faultName(tile.faults.join('|'));
+  if (tile.unconfirmed_ms) {
+    return `${faultName(tile.fault)}, ${unconfirmedText(tile)}`;
+  }
   if (tile.unacked) return 'Returned, unacknowledged';
   return tile.state === 'NOT_JUDGED' ? 'Not judged' : '';
 }
@@ -49,7 +55,7 @@ export class Tile {
   }
 
   update(tile) {
-    const alarm = inAlarm(tile);
+    const alarm = isAlarm(tile);
     const [rank, priority] = rankOf(tile);
     const what = whatText(tile);
     const quality = qualityText(tile) || (tile.monitor ?? '');
@@ -64,7 +70,8 @@ export class Tile {
     setText(this.#spoken, alarm ? `, ${priorityNames[priority]}, ` +
       stateWord(tile.state) + (tile.unacked ? ', unacknowledged' : '') :
       what ? '' : ', normal');
-    this.#what.title = alarm ? faultTitle(tile.faults.join('|')) : '';
+    this.#what.title = alarm ?
+      faultTitle(inAlarm(tile) ? tile.faults.join('|') : tile.fault) : '';
     drawSparkline(this.#canvas, tile.spark ?? [], this.color);
   }
 

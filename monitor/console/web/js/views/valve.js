@@ -7,7 +7,7 @@ import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
 import {driftLines} from '../drift.js';
 import {faultName, faultTitle, inAlarm, priorityNames, priorityOf,
-  prioritySign, qualityText, stateWord} from '../faults.js';
+  prioritySign, qualityText, stateWord, unconfirmedText} from '../faults.js';
 import {durationText, factorText, numberText, percentText, timeText}
   from '../format.js';
 import {link} from '../route.js';
@@ -28,7 +28,9 @@ function stateLine(tile) {
   const quality = [reason && h('span', {class: 'tag dashed'}, reason),
     tile.monitor && h('span', {class: 'tag'}, `monitor ${tile.monitor}`)];
   if (!inAlarm(tile)) {
-    return [h('span', {class: 'tag'}, stateWord(tile.state)), quality];
+    return [h('span', {class: 'tag'}, stateWord(tile.state)), quality,
+      tile.unconfirmed_ms ? h('a', {href: link('episode', tile.episode)},
+          `${faultTitle(tile.fault)}: ${unconfirmedText(tile)}`) : null];
   }
   const priority = priorityOf(tile);
   return [

@@ -1,4 +1,4 @@
-#include "monitor/look_worker.h"
+#include "monitor/names/look_worker.h"
 
 #include <algorithm>
 #include <exception>
@@ -8,8 +8,6 @@
 #include <unistd.h>
 
 #include "base/printable.h"
-#include "monitor/counters.h"
-#include "monitor/throttled_log.h"
 
 namespace fdi::monitor {
 
@@ -27,7 +25,9 @@ LookWorker::Physics LookWorker::PhysicsOf(const ModelSet& models) const {
     return std::make_shared<const simulator::ValvePhysics>(
         simulator::PhysicsFrom(models.physics));
   } catch (const std::exception& error) {
-    ReportFailure("model_set=" + NameOf(models), error.what());
+    report_(LookFate::kFailed,
+            "model_set=" + models.name + "@" + std::to_string(models.version),
+            error.what());
     return nullptr;
   }
 }
@@ -58,9 +58,7 @@ std::future<LookWorker::Answer> LookWorker::Submit(std::string valve_id,
     arrival_.notify_one();
   } else {
     look.answer.set_value(std::nullopt);
-    context_.counters.Add(Counter::kLooksDropped);
-    context_.log.Report(LogId::kLookDropped, "second_look_dropped",
-                        [&look] { return "valve=" + LogValue(look.valve_id); });
+    report_(LookFate::kDropped, "valve=" + LogValue(look.valve_id), "");
   }
   return answer;
 }
@@ -96,7 +94,9 @@ void LookWorker::TakeLooks() {
     Answer answer = Take(look);
     const bool taken = answer.has_value();
     look.answer.set_value(std::move(answer));
-    context_.counters.Add(Counter::kLooks, taken ? 1 : 0);
+    if (taken) {
+      report_(LookFate::kTaken, "valve=" + LogValue(look.valve_id), "");
+    }
     lock.lock();
   }
 }
@@ -105,16 +105,10 @@ LookWorker::Answer LookWorker::Take(const Look& look) const {
   try {
     return simulator::TakeLook(*look.physics, look.task, stop_.get_token());
   } catch (const std::exception& error) {
-    ReportFailure("valve=" + LogValue(look.valve_id), error.what());
+    report_(LookFate::kFailed, "valve=" + LogValue(look.valve_id),
+            error.what());
     return std::nullopt;
   }
-}
-
-void LookWorker::ReportFailure(const std::string& whose,
-                               const char* reason) const {
-  context_.counters.Add(Counter::kLooksFailed);
-  context_.log.Report(LogId::kLookFailed, "second_look_failed",
-                      [&] { return whose + " reason=" + LogValue(reason); });
 }
 
 }  // namespace fdi::monitor

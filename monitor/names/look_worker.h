@@ -2,20 +2,31 @@
 
 #include <condition_variable>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "base/worker.h"
 #include "diagnosis/model_set.h"
-#include "monitor/sinks.h"
 #include "simulator/second_look/episode_looks.h"
 
 namespace fdi::monitor {
+
+/// What became of a look.
+enum class LookFate : std::uint8_t { kTaken, kDropped, kFailed };
+
+/// Is told of each look; called by any thread. @param whose "valve=V1" or
+/// "model_set=NAME@1". @param reason of a failure.
+using LookReport = std::function<void(LookFate, const std::string& whose,
+                                      std::string_view reason)>;
 
 /// Takes second looks at episodes on a thread of its own, in the order in which
 /// they were asked for. A look costs up to some seconds of processor time: the
@@ -30,8 +41,8 @@ class LookWorker {
   /// Nothing: the look was dropped, replaced or failed.
   using Answer = std::optional<simulator::LookAnswer>;
 
-  explicit LookWorker(const MonitorContext& context, std::size_t capacity = 64)
-      : context_(context), capacity_(capacity) {}
+  explicit LookWorker(LookReport report, std::size_t capacity = 64)
+      : report_(std::move(report)), capacity_(capacity) {}
   ~LookWorker();
   LookWorker(const LookWorker&) = delete;
   LookWorker& operator=(const LookWorker&) = delete;
@@ -67,9 +78,8 @@ class LookWorker {
   std::deque<Look>& First();
   void TakeLooks();
   Answer Take(const Look& look) const;
-  void ReportFailure(const std::string& whose, const char* reason) const;
 
-  MonitorContext context_;
+  const LookReport report_;
   // 27 kB each: what 2000 valves that start at once ask for.
   static constexpr std::size_t kMaxRoutineLooks = 2000;
   const std::size_t capacity_;

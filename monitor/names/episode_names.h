@@ -11,33 +11,37 @@
 
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/strength_point.h"
-#include "diagnosis/verdict.h"
-#include "monitor/look_worker.h"
+#include "monitor/names/episode_name.h"
+#include "monitor/names/episode_strengths.h"
+#include "monitor/names/look_worker.h"
 #include "simulator/second_look/episode_looks.h"
 
 namespace fdi::monitor {
 
-/// Names the episodes of one valve: as its engine does, with the memory of
-/// simulator::ObserversMemory, until a second look has an answer. While one
-/// counts, it is the name, and what the engine isolates meanwhile is not; see
-/// simulator::LookBook. So what leaves the monitor is what `fdi-trainer
-/// evaluate` scores. Routine looks may open an episode that the engine does not
-/// see.
+/// The episodes of one valve and what EpisodeName calls them: asks for second
+/// looks and for strengths when they are due, and gives it the answers. So what
+/// leaves the monitor is what `fdi-trainer evaluate` scores. Routine looks may
+/// open an episode that the engine does not see.
 class EpisodeNames {
  public:
-  /// @param worker outlives this.
+  /// @param physics null: no looks are taken. @param worker outlives this; null
+  ///   only without physics.
   EpisodeNames(std::string valve_id, std::shared_ptr<const ModelSet> models,
-               LookWorker::Physics physics, LookWorker& worker);
+               LookWorker::Physics physics, LookWorker* worker,
+               std::shared_ptr<const SeverityCatalogue> severities =
+                   std::make_shared<const SeverityCatalogue>());
 
-  /// `faults`, by an earlier session's look, name the episode that goes on
-  /// until a look of this session has an answer; nothing: none goes on.
-  void SetInheritedName(std::optional<FaultSet> faults) { inherited_ = faults; }
+  /// See EpisodeName::Inherit().
+  void Inherit(const OpenEpisode* episode) { name_.Inherit(episode); }
 
   /// Takes a sample and the verdict of the engine. @param held nothing is to be
   /// named; see ModelResolver::IsolationHeld().
-  /// @returns the verdict with the name that counts; stands as long as `engine`
-  ///   and until the next call.
+  /// @returns the verdict with the name that counts; stands until the next
+  ///   call.
   const Verdict& Step(const Sample& sample, const Verdict& engine, bool held);
+
+  /// What the open episode is called as of the last Step().
+  const EpisodeNow& now() const { return name_.now(); }
 
   /// Whether the engine should have an episode: ValveEngine::Suspect().
   bool suspects() const { return suspects_; }
@@ -48,16 +52,12 @@ class EpisodeNames {
     return std::exchange(look_, std::nullopt);
   }
 
-  /// A look gave the open episode its name.
-  bool by_physics() const { return by_physics_; }
-
   /// Asks how strong the faults are that the episode is named after by a look
-  /// of this session, if it is. TakeStrengths() has the answer at some later
-  /// time; it changes no name.
+  /// of this session, if it is; called when that is due. The answer comes at
+  /// some later Step() and changes no name.
   void RequestGrowth();
 
-  /// The strengths that looks have found since the last call, but for the id of
-  /// their episode.
+  /// The strengths found since the last call, but for the id of their episode.
   std::vector<StrengthPoint> TakeStrengths() {
     return std::exchange(strength_points_, {});
   }
@@ -80,44 +80,36 @@ class EpisodeNames {
     std::future<LookWorker::Answer> answer;
   };
 
-  const simulator::LookAnswer* AnswerTo(const Verdict& engine, bool held);
+  void StepLooks(const Sample& sample, const Verdict& engine, bool held);
+  std::optional<EpisodeName::Look> LookThatCounts(const Verdict& engine);
+  void FollowStrengths(const Verdict& engine);
+  bool HasMoved(const std::vector<StrengthPoint>& points) const;
   void RequestLook(simulator::LookTask task);
   void CollectAnswers();
   void CollectGrowth();
   void RecordStrengths(const simulator::LookAnswer& answer);
   void RecordStrength(const simulator::Explanation& e, std::int64_t stamp_ns);
   std::int64_t PeriodNs() const;
-  void Name(const simulator::LookAnswer& answer,
-            const std::vector<int>& faults);
-  void SetName(FaultSet faults, Unknown unknown);
   EpisodeLook RecordOf(const simulator::LookAnswer& answer) const;
-  void EmitNameChange();
-  void WriteName(Transition& transition) const;
   void Reset();
+  void ForgetEpisode();
 
   std::string valve_id_;
   std::shared_ptr<const ModelSet> models_;
   LookWorker::Physics physics_;
   LookWorker* worker_;
+  EpisodeName name_;
+  EpisodeStrengths strengths_;
   std::optional<simulator::ValveLooks> looks_;  // Made anew at an end.
   std::deque<PendingLook> pending_looks_;
-  std::optional<FaultSet> inherited_;
-  std::int64_t stamp_ns_{0};
   std::int64_t detection_ns_{0};
   bool suspects_{false};
   // Of the open episode.
-  bool own_{false};         // Its name was not the engine's, once at least.
-  bool by_physics_{false};  // An answer counts.
-  FaultSet faults_{0};      // Its name,
-  Layer layer_{Layer::kObservers};
-  // and what the look estimated, by fault index, likeliest first.
-  std::vector<std::pair<std::size_t, double>> strengths_;
   std::int64_t look_ns_{0};  // Of the look that counts, its last row.
   std::optional<EpisodeLook> look_;
   std::vector<simulator::Explanation> known_;  // What it is named after.
   std::deque<PendingGrowth> pending_growth_;
   std::vector<StrengthPoint> strength_points_;
-  Verdict verdict_;  // With that name.
 };
 
 }  // namespace fdi::monitor

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <vector>
 
@@ -12,18 +11,26 @@
 
 namespace fdi::monitor {
 
+/// What is due of the strengths of an open episode.
+enum class StrengthDue : std::uint8_t {
+  kNothing,
+  kMinute,  ///< Another minute of readings is complete.
+  kPoint,   ///< It is time to note how strong its faults are.
+};
+
 /// Says when it is time to note how strong the faults of an open episode are:
-/// 450 s after its detection, then at 1.5 times the age each, which are 19
-/// points in a month. Gives what the observers say.
+/// 450 s after its detection, then at 1.5 times the age each, but an hour later
+/// at most. Gives what the observers say.
 class EpisodeStrengths {
  public:
-  /// The next verdict, with the name that counts. @param observed the observers
-  /// gave it. @returns whether it is time.
-  bool Step(const Verdict& verdict, bool observed);
+  /// The next verdict of the engine, and the faults that the episode is named
+  /// after. @param observed the observers tell how strong they are.
+  StrengthDue Step(const Verdict& engine, FaultSet named, bool observed);
 
   /// Of the faults that the observers have isolated for three minutes or more,
   /// the mean of their estimates in the last seven. Estimates of neighbouring
-  /// samples hang together: the interval is that of the means of minutes.
+  /// samples hang together: the interval is that of the means of minutes, of
+  /// which the one that has just begun is none.
   /// @param models that the verdicts are of.
   std::vector<StrengthPoint> Observed(const ModelSet& models) const;
 
@@ -36,10 +43,10 @@ class EpisodeStrengths {
   // Of an isolated fault, by index.
   struct Track {
     std::size_t bit;
-    std::deque<Minute> minutes{};
+    std::vector<Minute> minutes{};  // Seven at most.
   };
 
-  void UpdateTracks(const Verdict& verdict);
+  bool UpdateTracks(const Verdict& engine, FaultSet named);
 
   std::optional<std::int64_t> detection_ns_{};  // Of the open episode.
   std::int64_t next_age_ns_{0};

@@ -1,8 +1,9 @@
-#include "monitor/episode_strengths.h"
+#include "monitor/names/episode_strengths.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "base/time_units.h"
 #include "diagnosis/fault_catalogue.h"
@@ -15,71 +16,73 @@ constexpr std::int64_t kFirstAge = 450 * kNsPerSecond;
 constexpr std::size_t kMaxMinutes = 7;
 constexpr std::size_t kMinMinutes = 3;
 
-bool Has(FaultSet faults, std::size_t bit) {
-  return (faults >> bit & 1U) != 0;
-}
-
 }  // namespace
 
-bool EpisodeStrengths::Step(const Verdict& verdict, bool observed) {
-  for (const Transition& transition : verdict.Transitions()) {
+StrengthDue EpisodeStrengths::Step(const Verdict& engine, FaultSet named,
+                                   bool observed) {
+  for (const Transition& transition : engine.Transitions()) {
     if (transition.kind == TransitionKind::kDetected) {
       detection_ns_ = transition.detection_stamp_ns;
       next_age_ns_ = kFirstAge;
       tracks_.clear();
     }
   }
-  if (!verdict.detected) {
+  if (!engine.detected) {
     detection_ns_.reset();
   }
   if (!detection_ns_ || !observed) {
     tracks_.clear();
   }
-  if (!detection_ns_ || verdict.intake != Intake::kAccepted) {
-    return false;
+  if (!detection_ns_ || engine.intake != Intake::kAccepted) {
+    return StrengthDue::kNothing;
   }
-  stamp_ns_ = verdict.stamp_ns;
-  if (observed) {
-    UpdateTracks(verdict);
-  }
+  stamp_ns_ = engine.stamp_ns;
+  const bool minute = observed && UpdateTracks(engine, named);
   const std::int64_t age_ns = stamp_ns_ - *detection_ns_;
   const bool due = age_ns >= next_age_ns_;
   while (age_ns >= next_age_ns_) {
-    next_age_ns_ += next_age_ns_ / 2;
+    next_age_ns_ += std::min(next_age_ns_ / 2, kNsPerHour);
   }
-  return due;
+  return due      ? StrengthDue::kPoint
+         : minute ? StrengthDue::kMinute
+                  : StrengthDue::kNothing;
 }
 
-void EpisodeStrengths::UpdateTracks(const Verdict& verdict) {
-  std::erase_if(tracks_, [&](const Track& track) {
-    return !Has(verdict.isolated, track.bit);
-  });
-  for (std::size_t bit = 0; verdict.isolated >> bit != 0; ++bit) {
-    if (!Has(verdict.isolated, bit)) {
+// @returns whether a minute of a fault has become complete.
+bool EpisodeStrengths::UpdateTracks(const Verdict& engine, FaultSet named) {
+  bool complete = false;
+  std::erase_if(tracks_,
+                [&](const Track& track) { return !Has(named, track.bit); });
+  for (std::size_t bit = 0; named >> bit != 0; ++bit) {
+    if (!Has(named, bit)) {
       continue;
     }
     auto track = std::ranges::find(tracks_, bit, &Track::bit);
     if (track == tracks_.end()) {
       track = tracks_.insert(track, Track{bit});
     }
-    std::deque<Minute>& minutes = track->minutes;
+    std::vector<Minute>& minutes = track->minutes;
     if (minutes.empty() ||
-        verdict.stamp_ns - minutes.back().first_ns >= kNsPerMinute) {
-      minutes.push_back({verdict.stamp_ns});
+        engine.stamp_ns - minutes.back().first_ns >= kNsPerMinute) {
+      complete = complete || !minutes.empty();
+      minutes.push_back({engine.stamp_ns});
     }
-    minutes.back().sum += verdict.strengths[bit];
+    minutes.back().sum += engine.strengths[bit];
     ++minutes.back().samples;
     if (minutes.size() > kMaxMinutes) {
-      minutes.pop_front();
+      minutes.erase(minutes.begin());
     }
   }
+  return complete;
 }
 
 std::vector<StrengthPoint> EpisodeStrengths::Observed(
     const ModelSet& models) const {
   constexpr double kBothSides = 0.975;
   std::vector<StrengthPoint> points;
-  for (const auto& [bit, minutes] : tracks_) {
+  for (const auto& [bit, all] : tracks_) {
+    const bool begun = all.size() > kMinMinutes && all.back().samples == 1;
+    const std::span minutes(all.begin(), all.size() - (begun ? 1 : 0));
     const auto n = static_cast<double>(minutes.size());
     if (minutes.size() < kMinMinutes || !IsFault(models.faults[bit])) {
       continue;

@@ -1,114 +1,135 @@
-#include "monitor/episode_names.h"
+#include "monitor/names/episode_names.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 namespace fdi::monitor {
 namespace {
 
-bool IsIsolation(const Transition& transition) {
-  return transition.kind == TransitionKind::kIsolated ||
-         transition.kind == TransitionKind::kReisolated;
-}
-
-void DropIsolations(Verdict& verdict) {
-  const auto begin = verdict.transitions.begin();
-  const auto kept =
-      std::remove_if(begin, begin + verdict.transition_count, IsIsolation);
-  verdict.transition_count = static_cast<int>(kept - begin);
-}
+// Smaller changes of a strength are not worth a row of the history.
+constexpr double kMinMove = 0.02;
 
 }  // namespace
 
 EpisodeNames::EpisodeNames(std::string valve_id,
                            std::shared_ptr<const ModelSet> models,
-                           LookWorker::Physics physics, LookWorker& worker)
+                           LookWorker::Physics physics, LookWorker* worker,
+                           std::shared_ptr<const SeverityCatalogue> severities)
     : valve_id_(std::move(valve_id)),
       models_(std::move(models)),
       physics_(std::move(physics)),
-      worker_(&worker),
-      looks_(std::in_place, *physics_) {}
+      worker_(worker),
+      name_(models_, std::move(severities)) {
+  Reset();
+}
 
 const Verdict& EpisodeNames::Step(const Sample& sample, const Verdict& engine,
                                   bool held) {
-  // A late sample must not date a change of the name.
-  if (!OutOfOrder(engine.intake)) {
-    stamp_ns_ = sample.stamp_ns;
-  }
-  // The looks see the verdict of the engine, not the name that counts: their
-  // own answers would otherwise become what the observers say.
-  auto due = looks_->Step(sample, engine);
   for (const Transition& transition : engine.Transitions()) {
     detection_ns_ = transition.detection_stamp_ns;
+    if (transition.kind == TransitionKind::kDetected) {
+      ForgetEpisode();
+    }
   }
+  EpisodeName::Inputs inputs{engine, engine.isolated, {}, physics_ != nullptr};
+  const bool in_order = !OutOfOrder(engine.intake);
+  if (looks_) {
+    StepLooks(sample, engine, held);
+    if (engine.detected && !held && in_order) {
+      inputs.look = LookThatCounts(engine);
+      inputs.remembered = looks_->Observed(*models_, engine.isolated);
+    }
+  }
+  name_.Step(inputs);
+  if (!engine.detected) {
+    ForgetEpisode();
+  }
+  if (in_order) {
+    FollowStrengths(engine);
+  }
+  return name_.verdict();
+}
+
+// The looks see the verdict of the engine, not the name that counts: their own
+// answers would otherwise become what the observers say.
+void EpisodeNames::StepLooks(const Sample& sample, const Verdict& engine,
+                             bool held) {
+  auto due = looks_->Step(sample, engine);
   if (due && !held) {
     RequestLook(std::move(*due));
   }
-  CollectAnswers();
-  CollectGrowth();
+  if (!OutOfOrder(engine.intake)) {
+    CollectAnswers();
+    CollectGrowth();
+  }
   suspects_ = looks_->suspects() && !held;
-  const simulator::LookAnswer* answer = AnswerTo(engine, held);
-  const auto named =
+}
+
+// An answer counts until the next one does, but is recorded once. Faults that
+// the model set does not have cannot be recorded and stay out.
+std::optional<EpisodeName::Look> EpisodeNames::LookThatCounts(
+    const Verdict& engine) {
+  const simulator::LookAnswer* answer = looks_->Answer();
+  const auto names =
       answer != nullptr
           ? simulator::NamesOf(
                 *answer, simulator::ObserversName(*models_, engine.isolated))
-          : std::optional<std::vector<int>>();
-  const bool inherited = inherited_ && engine.detected && !held;
-  const FaultSet observed =
-      held ? engine.isolated : looks_->Observed(*models_, engine.isolated);
-  // Usually nothing differs from the engine, and its verdict of 2.5 kB is not
-  // copied. Once the name has differed, the transitions of the engine no longer
-  // describe what was reported, so they are replaced until the episode ends
-  // (own_).
-  if (!named && !inherited && !own_ && observed == engine.isolated) {
-    faults_ = engine.isolated;
-    layer_ = Layer::kObservers;
-    return engine;
+          : std::nullopt;
+  if (!names) {
+    return std::nullopt;
   }
-  verdict_ = engine;
-  DropIsolations(verdict_);
-  if (!engine.detected) {  // It ends under the name that it had.
-    for (const auto& [bit, strength] : strengths_) {
-      verdict_.strengths[bit] = strength;
-    }
-    for (Transition& transition : verdict_.transitions) {
-      WriteName(transition);
-    }
-    Reset();
-    return verdict_;
+  if (std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
+    look_ = RecordOf(*answer);
+    RecordStrengths(*answer);
   }
-  own_ = true;
-  by_physics_ = named || inherited;
-  strengths_.clear();
-  if (named) {
-    Name(*answer, *named);
-    // An answer counts until the next one does, but is recorded once.
-    if (std::exchange(look_ns_, answer->stamp_ns) != answer->stamp_ns) {
-      look_ = RecordOf(*answer);
-      RecordStrengths(*answer);
+  EpisodeName::Look look;
+  look.outside = answer->outcome == simulator::LookOutcome::kNoneFits;
+  for (const simulator::Explanation& e : answer->faults) {
+    const int index = FaultIndex(*models_, e.fault);
+    if (index >= 0 && std::ranges::count(*names, e.fault) > 0) {
+      look.faults.push_back(
+          {static_cast<std::size_t>(index), {e.strength, e.lowest, e.highest}});
     }
-  } else if (inherited) {
-    SetName(*inherited_, Unknown::kTooEarly);
-  } else if (observed != engine.isolated) {
-    SetName(observed, Unknown::kTooEarly);
   }
-  EmitNameChange();
-  return verdict_;
+  return look;
 }
 
-// The one that counts at this sample, if any.
-const simulator::LookAnswer* EpisodeNames::AnswerTo(const Verdict& engine,
-                                                    bool held) {
-  if (!engine.detected || held) {
-    return nullptr;
+// What is told of the strengths is stored: at its times, and where a fault has
+// moved since. Looks tell those of a name that is theirs.
+void EpisodeNames::FollowStrengths(const Verdict& engine) {
+  const EpisodeNow& now = name_.now();
+  const bool by_look = now.source == NameSource::kLook ||
+                       (now.source == NameSource::kRestart && looks_ &&
+                        now.layer == Layer::kPhysics);
+  const StrengthDue due =
+      strengths_.Step(engine, now.faults, engine.detected && !by_look);
+  if (by_look && due == StrengthDue::kPoint) {
+    RequestGrowth();
+  } else if (!by_look && due != StrengthDue::kNothing) {
+    auto points = strengths_.Observed(*models_);
+    if (due == StrengthDue::kPoint || HasMoved(points)) {
+      std::ranges::move(points, std::back_inserter(strength_points_));
+    }
   }
-  const simulator::LookAnswer* answer = looks_->Answer();
-  if (answer != nullptr) {
-    inherited_.reset();
-  }
-  return answer;
+  name_.Follow(strength_points_);
+}
+
+// Whether a fault of the name is not as strong any more as it is said to be.
+bool EpisodeNames::HasMoved(const std::vector<StrengthPoint>& points) const {
+  return std::ranges::any_of(points, [this](const StrengthPoint& point) {
+    const auto& named = name_.now().estimates;
+    const auto found = std::ranges::find_if(named, [&](const NamedFault& n) {
+      return models_->faults[n.bit] == point.fault;
+    });
+    return found != named.end() &&
+           std::abs(point.strength - found->estimate.strength) >= kMinMove &&
+           (point.strength < found->estimate.lowest ||
+            point.strength > found->estimate.highest ||
+            !found->estimate.has_interval());
+  });
 }
 
 // The rows, up to 27 kB, go to the worker; only what Enter() needs is kept.
@@ -212,24 +233,6 @@ std::int64_t EpisodeNames::PeriodNs() const {
   return std::llround(models_->sample_period_s * 1e9);
 }
 
-// Faults that the model set does not have cannot be recorded and stay out.
-void EpisodeNames::Name(const simulator::LookAnswer& answer,
-                        const std::vector<int>& faults) {
-  FaultSet set = 0;
-  for (const simulator::Explanation& e : answer.faults) {
-    const int index = FaultIndex(*models_, e.fault);
-    if (index >= 0 && std::ranges::count(faults, e.fault) > 0) {
-      const auto bit = static_cast<std::size_t>(index);
-      strengths_.emplace_back(bit, e.strength);
-      verdict_.strengths[bit] = e.strength;
-      set |= FaultSet{1} << bit;
-    }
-  }
-  // Without a name, either no hypothesis fits, or more than four faults do.
-  const bool outside = answer.outcome == simulator::LookOutcome::kNoneFits;
-  SetName(set, outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
-}
-
 EpisodeLook EpisodeNames::RecordOf(const simulator::LookAnswer& answer) const {
   EpisodeLook look;
   look.period_ns = PeriodNs();
@@ -250,78 +253,34 @@ EpisodeLook EpisodeNames::RecordOf(const simulator::LookAnswer& answer) const {
   return look;
 }
 
-// `unknown`: why there is none, if there is none.
-void EpisodeNames::SetName(FaultSet faults, Unknown unknown) {
-  verdict_.isolated = faults;
-  verdict_.state = faults != 0 ? State::kIsolated : State::kDetected;
-  verdict_.unknown = faults != 0 ? Unknown::kNone : unknown;
-}
-
-// Another name than before is a transition.
-void EpisodeNames::EmitNameChange() {
-  if (verdict_.isolated == faults_) {
-    return;
-  }
-  Transition changed;
-  changed.kind =
-      faults_ == 0 ? TransitionKind::kIsolated : TransitionKind::kReisolated;
-  changed.stamp_ns = stamp_ns_;
-  changed.detection_stamp_ns = detection_ns_;
-  changed.unknown = verdict_.unknown;
-  faults_ = verdict_.isolated;
-  layer_ = by_physics_ ? Layer::kPhysics : Layer::kObservers;
-  WriteName(changed);
-  verdict_.transitions[static_cast<std::size_t>(verdict_.transition_count++)] =
-      changed;
-}
-
-void EpisodeNames::WriteName(Transition& transition) const {
-  transition.faults = faults_;
-  transition.unknown = faults_ != 0 ? Unknown::kNone : transition.unknown;
-  transition.layer = layer_;
-  transition.factor = 0.0;
-  transition.strength = 0.0;
-  for (std::size_t i = 0; i < models_->faults.size(); ++i) {
-    if ((faults_ == 0 || (faults_ >> i & 1U) != 0) &&
-        verdict_.fault_factors[i] >= transition.factor) {
-      transition.factor = verdict_.fault_factors[i];
-      transition.strength = faults_ == 0 ? 0.0 : verdict_.strengths[i];
-    }
-  }
-  if (by_physics_ && !strengths_.empty()) {
-    transition.strength = strengths_.front().second;
-  }
-}
-
 Transition EpisodeNames::End(Transition closed) {
-  if (own_) {
-    WriteName(closed);
-  }
-  // ValveLooks learns of an end from verdicts, and this one is in none. Unlike
-  // those of std::async, the futures of promises do not block in their
-  // destructors.
-  looks_.emplace(*physics_);
-  suspects_ = false;
-  pending_looks_.clear();
+  closed = name_.End(closed);
   Reset();
   return closed;
+}
+
+// ValveLooks learns of an end from verdicts, and one from outside is in none.
+// Unlike those of std::async, the futures of promises do not block in their
+// destructors.
+void EpisodeNames::Reset() {
+  if (physics_) {
+    looks_.emplace(*physics_);
+  }
+  suspects_ = false;
+  pending_looks_.clear();
+  strengths_ = {};
+  ForgetEpisode();
 }
 
 // pending_looks_ stays: ValveLooks ignores answers to an episode that has
 // ended, and routine looks go on. Answers for growth carry no episode and would
 // be recorded with the next one.
-void EpisodeNames::Reset() {
-  own_ = false;
-  by_physics_ = false;
-  faults_ = 0;
-  layer_ = Layer::kObservers;
-  strengths_.clear();
+void EpisodeNames::ForgetEpisode() {
   look_ns_ = 0;
   look_.reset();
   known_.clear();
   pending_growth_.clear();
   strength_points_.clear();
-  inherited_.reset();
 }
 
 }  // namespace fdi::monitor

@@ -1,0 +1,292 @@
+#include "monitor/names/episode_name.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace fdi::monitor {
+namespace {
+
+bool NamesFaults(const Transition& transition) {
+  return transition.kind == TransitionKind::kIsolated ||
+         transition.kind == TransitionKind::kReisolated;
+}
+
+FaultSet SetOf(const std::vector<NamedFault>& faults) {
+  FaultSet set = 0;
+  for (const NamedFault& fault : faults) {
+    set |= FaultSet{1} << fault.bit;
+  }
+  return set;
+}
+
+}  // namespace
+
+EpisodeName::EpisodeName(std::shared_ptr<const ModelSet> models,
+                         std::shared_ptr<const SeverityCatalogue> severities)
+    : models_(std::move(models)),
+      severities_(std::move(severities)),
+      findings_(FindingsOf(*models_)) {
+  Reset();
+}
+
+void EpisodeName::Inherit(const OpenEpisode* episode) {
+  if (episode == nullptr) {
+    inherited_.reset();
+  } else {
+    inherited_ = *episode;
+  }
+}
+
+const Verdict& EpisodeName::Step(const Inputs& inputs) {
+  // Usually there is no episode, and the verdict of 2.5 kB is not copied.
+  if (!open_ && inputs.engine.transition_count == 0) {
+    current_ = &inputs.engine;
+    return *current_;
+  }
+  current_ = &verdict_;
+  verdict_ = inputs.engine;
+  verdict_.transition_count = 0;
+  // In order: from a new source, one sample ends an episode and opens another.
+  for (Transition transition : inputs.engine.Transitions()) {
+    // Those that name faults are left out: Announce() has those of the name.
+    if (NamesFaults(transition)) {
+      continue;
+    }
+    detection_ns_ = transition.detection_stamp_ns;
+    if (transition.kind == TransitionKind::kDetected) {
+      Begin();
+      transition.severity = now_.severity;
+    } else if (open_) {
+      WriteName(transition);
+    }
+    verdict_
+        .transitions[static_cast<std::size_t>(verdict_.transition_count++)] =
+        transition;
+    if (transition.kind == TransitionKind::kClosed) {
+      Reset();
+    }
+  }
+  // A sample out of order must not date a change of the name: that comes with
+  // the next one.
+  if (open_ && !OutOfOrder(inputs.engine.intake)) {
+    const Choice choice = Choose(inputs);
+    now_.unknown = choice.unknown;
+    now_.source = choice.source;
+    if (choice.faults != now_.faults) {
+      Rename(choice, inputs);
+    }
+  }
+  if (open_) {
+    WriteVerdict();
+  }
+  return verdict_;
+}
+
+void EpisodeName::Begin() {
+  const std::optional<OpenEpisode> inherited = std::move(inherited_);
+  Reset();
+  inherited_ = inherited;
+  open_ = true;
+  named_ = inherited_ && inherited_->isolated;
+}
+
+EpisodeName::Choice EpisodeName::Choose(const Inputs& inputs) {
+  if (inputs.look) {
+    inherited_.reset();
+    const FaultSet faults = SetOf(inputs.look->faults);
+    return {faults,
+            faults != 0            ? Unknown::kNone
+            : inputs.look->outside ? Unknown::kOutsideKnown
+                                   : Unknown::kTooEarly,
+            NameSource::kLook, Layer::kPhysics};
+  }
+  if (InheritedStands(inputs)) {
+    return {inherited_->faults,
+            inherited_->faults != 0 ? Unknown::kNone : Unknown::kTooEarly,
+            NameSource::kRestart, inherited_->layer};
+  }
+  inherited_.reset();
+  return OfObservers(inputs);
+}
+
+EpisodeName::Choice EpisodeName::OfObservers(const Inputs& inputs) const {
+  const FaultSet faults = inputs.remembered;
+  if (faults == 0) {
+    // Where the engine has a name, its memory holds too many for one.
+    return {0,
+            inputs.engine.isolated == 0 ? inputs.engine.unknown
+                                        : Unknown::kTooEarly,
+            NameSource::kNone, Layer::kObservers};
+  }
+  const bool floor = (faults & ~findings_) == 0;
+  return {faults, Unknown::kNone,
+          floor ? NameSource::kFloor : NameSource::kObservers,
+          Layer::kObservers};
+}
+
+bool EpisodeName::InheritedStands(const Inputs& inputs) const {
+  if (!inherited_ || !inherited_->isolated) {
+    return false;
+  }
+  if (inherited_->layer == Layer::kPhysics && inputs.can_look) {
+    return true;
+  }
+  const FaultSet observed = inputs.engine.isolated;
+  const bool finding = observed != 0 && (observed & ~findings_) == 0;
+  return observed == 0 || (finding && (inherited_->faults & ~findings_) != 0);
+}
+
+void EpisodeName::Rename(const Choice& choice, const Inputs& inputs) {
+  now_.faults = choice.faults;
+  now_.layer = choice.layer;
+  Estimates(inputs);
+  now_.severity =
+      now_.estimates.empty() ? SeverityAt(BandsOf(0), 0.0) : Severity::kLow;
+  for (NamedFault& named : now_.estimates) {
+    named.severity = SeverityAt(BandsOf(models_->faults[named.bit]),
+                                named.estimate.strength);
+    now_.severity = std::max(now_.severity, named.severity);
+  }
+  // The session that an inherited name comes from has announced it.
+  if (choice.source == NameSource::kRestart) {
+    announced_ = inherited_->severity.value_or(now_.severity);
+    now_.severity = announced_;
+    for (NamedFault& named : now_.estimates) {
+      named.severity = std::min(named.severity, announced_);
+    }
+    if (!now_.estimates.empty()) {
+      now_.estimates.front().severity = announced_;
+    }
+  } else {
+    Announce(named_ ? TransitionKind::kReisolated : TransitionKind::kIsolated);
+  }
+  named_ = true;
+}
+
+// Of a new name: what the look found, what the earlier session knew, or else
+// what the observers estimate, likeliest first.
+void EpisodeName::Estimates(const Inputs& inputs) {
+  now_.estimates.clear();
+  if (now_.source == NameSource::kLook) {
+    now_.estimates = inputs.look->faults;
+    return;
+  }
+  const Verdict& engine = inputs.engine;
+  std::vector<double> factors = {engine.fault_factors.begin(),
+                                 engine.fault_factors.end()};
+  for (std::size_t bit = 0; bit < models_->faults.size(); ++bit) {
+    if (!Has(now_.faults, bit)) {
+      continue;
+    }
+    double strength = engine.strengths[bit];
+    if (now_.source == NameSource::kRestart) {
+      const auto& before = inherited_->candidates;
+      const auto known = std::ranges::find(before, models_->faults[bit],
+                                           &FaultCandidate::fault);
+      // As of the last point of that session, with its likeliest fault first.
+      if (known != before.end()) {
+        strength = known->strength;
+        factors[bit] = static_cast<double>(before.end() - known);
+      }
+    }
+    now_.estimates.push_back({bit, {strength, strength, strength}});
+  }
+  std::ranges::stable_sort(now_.estimates, [&](const auto& a, const auto& b) {
+    return factors[a.bit] > factors[b.bit];
+  });
+}
+
+const SeverityBands& EpisodeName::BandsOf(int fault) const {
+  static const SeverityBands kNone;
+  const auto found = severities_->find(fault);
+  return found == severities_->end() ? kNone : found->second;
+}
+
+void EpisodeName::Follow(std::span<StrengthPoint> points) {
+  if (!open_) {
+    return;
+  }
+  for (NamedFault& named : now_.estimates) {
+    const int fault = models_->faults[named.bit];
+    for (const StrengthPoint& point : points) {
+      if (point.fault == fault) {
+        named.estimate = {point.strength, point.lowest, point.highest};
+        named.severity =
+            SeverityNow(BandsOf(fault), named.severity, named.estimate);
+      }
+    }
+  }
+  if (now_.estimates.empty()) {
+    return;
+  }
+  now_.severity =
+      std::ranges::max(now_.estimates, {}, &NamedFault::severity).severity;
+  const int first = models_->faults[now_.estimates.front().bit];
+  for (StrengthPoint& point : points) {
+    if (point.fault == first) {
+      point.severity = now_.severity;
+    }
+  }
+  if (now_.severity > announced_) {
+    Announce(TransitionKind::kChanged);
+  }
+  WriteVerdict();
+}
+
+void EpisodeName::Announce(TransitionKind kind) {
+  Transition transition;
+  transition.kind = kind;
+  transition.stamp_ns = verdict_.stamp_ns;
+  transition.detection_stamp_ns = detection_ns_;
+  transition.unknown = now_.unknown;
+  WriteName(transition);
+  announced_ = now_.severity;
+  verdict_.transitions[static_cast<std::size_t>(verdict_.transition_count++)] =
+      transition;
+}
+
+// The factor is the largest of the name, or else of any fault.
+void EpisodeName::WriteName(Transition& transition) const {
+  transition.faults = now_.faults;
+  transition.unknown = now_.faults != 0 ? Unknown::kNone : transition.unknown;
+  transition.layer = now_.layer;
+  transition.severity = now_.severity;
+  transition.factor = 0.0;
+  for (std::size_t i = 0; i < models_->faults.size(); ++i) {
+    if (now_.faults == 0 || Has(now_.faults, i)) {
+      transition.factor =
+          std::max(transition.factor, verdict_.fault_factors[i]);
+    }
+  }
+  const Estimate strength = now_.strength();
+  transition.strength = strength.strength;
+  transition.lowest = strength.lowest;
+  transition.highest = strength.highest;
+}
+
+void EpisodeName::WriteVerdict() {
+  verdict_.isolated = now_.faults;
+  verdict_.state = now_.faults != 0 ? State::kIsolated : State::kDetected;
+  verdict_.unknown = now_.faults != 0 ? Unknown::kNone : now_.unknown;
+  for (const NamedFault& named : now_.estimates) {
+    verdict_.strengths[named.bit] = named.estimate.strength;
+  }
+}
+
+Transition EpisodeName::End(Transition closed) {
+  if (open_) {
+    WriteName(closed);
+  }
+  Reset();
+  return closed;
+}
+
+void EpisodeName::Reset() {
+  inherited_.reset();
+  open_ = false;
+  named_ = false;
+  now_ = {};
+  now_.severity = announced_ = SeverityAt(BandsOf(0), 0.0);
+}
+
+}  // namespace fdi::monitor

@@ -1,0 +1,136 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "diagnosis/records/fault_event.h"
+#include "diagnosis/records/strength_point.h"
+#include "diagnosis/severity.h"
+#include "diagnosis/verdict.h"
+
+namespace fdi::monitor {
+
+/// What gave an episode its name.
+enum class NameSource : std::uint8_t {
+  kNone,       ///< It has no name.
+  kFloor,      ///< Limits alone found it.
+  kObservers,  ///< The observers, or what they named before.
+  kLook,       ///< A simulation of the valve.
+  kRestart,    ///< An earlier session, whose name still stands.
+};
+
+/// How strong one fault of a name is.
+struct NamedFault {
+  std::size_t bit{0};  ///< Index in the model set.
+  Estimate estimate{};
+  Severity severity{Severity::kMedium};
+};
+
+/// An episode as of now: the only place that says what it is called, how strong
+/// it is and how bad.
+struct EpisodeNow {
+  FaultSet faults{0};               ///< Empty: no name.
+  Unknown unknown{Unknown::kNone};  ///< Why there is none.
+  NameSource source{NameSource::kNone};
+  Layer layer{Layer::kObservers};       ///< What named `faults` first.
+  std::vector<NamedFault> estimates{};  ///< One a fault, likeliest first.
+  /// The gravest of `faults`, each at its own strength.
+  Severity severity{Severity::kMedium};
+
+  Estimate strength() const {
+    return estimates.empty() ? Estimate{} : estimates.front().estimate;
+  }
+};
+
+/// Decides what the open episode of one valve is called, from one sample to the
+/// next. The inputs, the strongest first:
+///
+/// 1. a second look whose answer counts (simulator::LookBook);
+/// 2. the name that an earlier session left: one by a look until a look of this
+///    session has an answer; another one until the observers name a fault, for
+///    which the floor is not enough;
+/// 3. the observers, with their memory, and the floor until they have a name.
+///
+/// The engine is an input and never changed: its transitions that name a fault
+/// are replaced by those of the name. A name that gets more severe than it was
+/// when it was last announced is announced again (TransitionKind::kChanged).
+///
+/// A state machine: no thread, no clock.
+class EpisodeName {
+ public:
+  /// The answer of a second look.
+  struct Look {
+    std::vector<NamedFault> faults;  ///< Likeliest first; empty: no name.
+    bool outside{false};             ///< No hypothesis fits.
+  };
+
+  struct Inputs {
+    const Verdict& engine;
+    FaultSet remembered{0};  ///< engine.isolated with the observers' memory.
+    std::optional<Look> look{};
+    bool can_look{false};  ///< Looks are taken at this valve.
+  };
+
+  EpisodeName(std::shared_ptr<const ModelSet> models,
+              std::shared_ptr<const SeverityCatalogue> severities);
+  EpisodeName(const EpisodeName&) = delete;
+  EpisodeName& operator=(const EpisodeName&) = delete;
+
+  /// `episode`, left by an earlier session, is the one that the next detection
+  /// continues; null: none is.
+  void Inherit(const OpenEpisode* episode);
+
+  /// The next sample. @returns the verdict with the name that counts; stands as
+  ///   long as the engine's and until the next call.
+  const Verdict& Step(const Inputs& inputs);
+
+  /// How strong faults of the name are by now; others are ignored. It is this
+  /// that tells whether the name gets more severe: the transition is added to
+  /// verdict(). Points of the first fault get the severity of the name.
+  void Follow(std::span<StrengthPoint> points);
+
+  /// The engine was made to end its episode. @returns `closed` with the name.
+  Transition End(Transition closed);
+
+  /// As the last Step() returned it, with what Follow() has added.
+  const Verdict& verdict() const { return *current_; }
+  const EpisodeNow& now() const { return now_; }
+
+ private:
+  struct Choice {
+    FaultSet faults{0};
+    Unknown unknown{Unknown::kNone};
+    NameSource source{NameSource::kNone};
+    Layer layer{Layer::kObservers};
+  };
+
+  void Begin();
+  Choice Choose(const Inputs& inputs);
+  Choice OfObservers(const Inputs& inputs) const;
+  bool InheritedStands(const Inputs& inputs) const;
+  void Rename(const Choice& choice, const Inputs& inputs);
+  void Estimates(const Inputs& inputs);
+  const SeverityBands& BandsOf(int fault) const;
+  void Announce(TransitionKind kind);
+  void WriteName(Transition& transition) const;
+  void WriteVerdict();
+  void Reset();
+
+  std::shared_ptr<const ModelSet> models_;
+  std::shared_ptr<const SeverityCatalogue> severities_;
+  FaultSet findings_;  // Bits of what the floor finds.
+  std::optional<OpenEpisode> inherited_;
+  std::int64_t detection_ns_{0};
+  bool open_{false};
+  bool named_{false};  // The episode has had a name.
+  Severity announced_{Severity::kMedium};
+  EpisodeNow now_;
+  Verdict verdict_;  // With the name.
+  const Verdict* current_{&verdict_};
+};
+
+}  // namespace fdi::monitor
