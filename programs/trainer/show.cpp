@@ -14,6 +14,7 @@
 #include "storage/database/data_directory.h"
 #include "storage/models/models.h"
 #include "trainer/campaign/campaign_fields.h"
+#include "trainer/learning/labelled_episodes.h"
 #include "trainer/rule_text.h"
 #include "trainer/scoring/evaluated_run.h"
 
