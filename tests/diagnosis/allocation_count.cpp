@@ -48,10 +48,10 @@ void operator delete(void* memory, std::size_t /*size*/,
   std::free(memory);
 }
 
-namespace fdi::testing {
+namespace fdi::tests {
 
 long AllocationCount() {
   return allocations;
 }
 
-}  // namespace fdi::testing
+}  // namespace fdi::tests

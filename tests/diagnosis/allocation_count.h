@@ -1,8 +1,8 @@
 #pragma once
 
-namespace fdi::testing {
+namespace fdi::tests {
 
 /// Calls of operator new in this program so far.
 long AllocationCount();
 
-}  // namespace fdi::testing
+}  // namespace fdi::tests

@@ -16,8 +16,8 @@
 namespace fdi {
 namespace {
 
-using testing::kNoise;
-using testing::LinearModel;
+using tests::kNoise;
+using tests::LinearModel;
 
 constexpr double kP1 = 3550.0;
 constexpr double kP2 = 2650.0;
@@ -32,7 +32,7 @@ ChannelObserver Constant(Signal output, double value) {
 
 // The linear plant with its inputs held against their normal band.
 ModelSet OperatedPlant() {
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   models.channels.push_back({"T1", Signal::kT1, -5.0, 5.0});
   models.channels.push_back({"P1", Signal::kP1, -200.0, 200.0});
   models.channels.push_back({"P2", Signal::kP2, -200.0, 200.0});
@@ -89,7 +89,7 @@ struct Outcome {
 
 Outcome Follow(ValveEngine& engine, int begin, int end,
                const History& history) {
-  testing::Noise noise(static_cast<std::uint64_t>(begin + 1));
+  tests::Noise noise(static_cast<std::uint64_t>(begin + 1));
   Outcome outcome;
   for (int k = begin; k < end; ++k) {
     Sample sample = At(k, history(k));
@@ -193,7 +193,7 @@ TEST(CoverageTest, OpenValveIsParkedOnlyWithoutPressure) {
 TEST(CoverageTest, StrokeTestInAutomaticModeIsNoFault) {
   ValveEngine engine = Engine();
   const std::vector<double> strokes{0, 25, 50, 75, 100, 75, 50, 25, 0};
-  testing::Noise noise(1);
+  tests::Noise noise(1);
   double x = 60.0;
   for (int k = 0; k < 2500; ++k) {
     Process process;

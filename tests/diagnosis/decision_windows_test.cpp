@@ -66,7 +66,7 @@ class ClearingWindowTest : public ::testing::Test {
     }
   }
 
-  ModelSet models_ = testing::LinearPlant();  // t_c = 20, threshold 2
+  ModelSet models_ = tests::LinearPlant();  // t_c = 20, threshold 2
   ClearingWindow window_{models_};
 };
 
@@ -104,7 +104,7 @@ TEST_F(ClearingWindowTest, NormalFactorHoldsItBack) {
 // CV swings by 20 until a fault is detected at sample 200 and by `swing` from
 // sample 300 on, where the fault is gone. @returns when it clears, 0 if never.
 int ClearsAt(double swing_before, const std::function<double(int)>& cv_after) {
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   models.decision.clearing_samples = 60;
   ClearingWindow window(models);
   const std::array<double, 2> residuals{};

@@ -14,12 +14,12 @@
 namespace fdi {
 namespace {
 
-using testing::AddF6;
-using testing::Noise;
-using testing::PlantSample;
-using testing::Seen;
-using testing::SharedPlant;
-using testing::StepRange;
+using tests::AddF6;
+using tests::Noise;
+using tests::PlantSample;
+using tests::Seen;
+using tests::SharedPlant;
+using tests::StepRange;
 
 // A shift of one deviation passes no threshold, its mean does.
 TEST(DetectionTest, WindowFindsWhatNoThresholdSees) {
@@ -27,7 +27,7 @@ TEST(DetectionTest, WindowFindsWhatNoThresholdSees) {
   for (const bool watched : {false, true}) {
     if (watched) {
       models.channels[1].windows = {
-          {50, -0.6 * testing::kNoise, 0.6 * testing::kNoise, 3.0}};
+          {50, -0.6 * tests::kNoise, 0.6 * tests::kNoise, 3.0}};
     }
     ValveEngine engine(std::make_shared<const ModelSet>(models));
     Noise noise(5);
@@ -35,7 +35,7 @@ TEST(DetectionTest, WindowFindsWhatNoThresholdSees) {
     EXPECT_TRUE(StepRange(engine, 0, 300, add).transitions.empty());
     const Seen seen = StepRange(engine, 300, 600, [&](Sample& s) {
       noise.Add(s);
-      AddF6(s, testing::kNoise / 20.0);
+      AddF6(s, tests::kNoise / 20.0);
     });
     EXPECT_EQ(!seen.transitions.empty(), watched);
   }
@@ -47,7 +47,7 @@ TEST(DetectionTest, EnergyOfAWindowIsWatchedUpwards) {
   models.channels[1].lower_threshold = -100.0;
   models.channels[1].upper_threshold = 100.0;
   models.channels[1].windows = {
-      {50, -10.0, 10.0, std::log(1.5 * testing::kNoise)}};
+      {50, -10.0, 10.0, std::log(1.5 * tests::kNoise)}};
   ValveEngine engine(std::make_shared<const ModelSet>(models));
   Noise noise(6);
   const auto add = [&](Sample& s) { noise.Add(s); };
@@ -109,7 +109,7 @@ TEST(DetectionTest, LimitOnEnergyFollowsTheExcitation) {
   EXPECT_FALSE(detects(1.0, 2.0, 0.14));
 }
 
-constexpr double kLimit = 0.6 * testing::kNoise;  // on the mean of F
+constexpr double kLimit = 0.6 * tests::kNoise;  // on the mean of F
 constexpr int kHour = 3600;
 
 std::shared_ptr<const ModelSet> DriftingPlant(const DriftLimits& drift) {
@@ -117,7 +117,7 @@ std::shared_ptr<const ModelSet> DriftingPlant(const DriftLimits& drift) {
   models.channels[1].lower_threshold = -100.0;
   models.channels[1].upper_threshold = 100.0;
   models.channels[1].windows = {
-      {100, -kLimit, kLimit, std::log(1.5 * testing::kNoise)}};
+      {100, -kLimit, kLimit, std::log(1.5 * tests::kNoise)}};
   models.channels[1].drift = drift;
   return std::make_shared<const ModelSet>(models);
 }
@@ -296,8 +296,8 @@ TEST(DriftTest, NothingIsLearntDuringAnEpisode) {
 // Had the fault been learnt, the repaired valve would be abnormal.
 TEST(DriftTest, FaultIsNotLearnt) {
   ModelSet models = *DriftingPlant(kFollowed);
-  models.channels[1].lower_threshold = -4.0 * testing::kNoise;
-  models.channels[1].upper_threshold = 4.0 * testing::kNoise;
+  models.channels[1].lower_threshold = -4.0 * tests::kNoise;
+  models.channels[1].upper_threshold = 4.0 * tests::kNoise;
   ValveEngine engine(std::make_shared<const ModelSet>(models));
   Noise noise(10);
   const auto healthy = [&](Sample& s) { noise.Add(s); };

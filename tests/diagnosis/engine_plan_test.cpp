@@ -15,7 +15,7 @@
 namespace fdi {
 namespace {
 
-using testing::SharedPlant;
+using tests::SharedPlant;
 
 TEST(EnginePlansTest, OneModelSetHasOnePlanWhileItIsUsed) {
   EnginePlans plans;
@@ -34,7 +34,7 @@ TEST(EnginePlansTest, OneModelSetHasOnePlanWhileItIsUsed) {
 
 TEST(EnginePlansTest, UnusableModelSetIsRefused) {
   EnginePlans plans;
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   models.observers.clear();
   EXPECT_THROW(plans.For(std::make_shared<const ModelSet>(models)), DataError);
   EXPECT_THROW(plans.For(nullptr), std::invalid_argument);
@@ -43,9 +43,9 @@ TEST(EnginePlansTest, UnusableModelSetIsRefused) {
 // Valve v at time k: every third has a fault, every fourth misses samples,
 // every fifth has no flow.
 Sample ValveSample(std::size_t v, std::uint64_t k) {
-  Sample sample = testing::PlantSample(k, 10.0 + static_cast<double>(v % 7));
+  Sample sample = tests::PlantSample(k, 10.0 + static_cast<double>(v % 7));
   if (v % 3 == 1 && k > 40) {
-    testing::AddF6(sample, 0.7);
+    tests::AddF6(sample, 0.7);
   }
   if (v % 5 == 4) {
     sample.present =

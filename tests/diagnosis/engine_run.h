@@ -7,7 +7,7 @@
 #include "diagnosis/valve_engine.h"
 #include "tests/diagnosis/linear_plant.h"
 
-namespace fdi::testing {
+namespace fdi::tests {
 
 inline constexpr int kSettled = kMaxLag;  ///< Samples before LIVE.
 
@@ -41,4 +41,4 @@ inline std::int64_t StampOf(int k) {
   return PlantSample(static_cast<std::uint64_t>(k)).stamp_ns;
 }
 
-}  // namespace fdi::testing
+}  // namespace fdi::tests

@@ -10,8 +10,8 @@
 namespace fdi {
 namespace {
 
-using testing::LinearPlant;
-using testing::PlantSample;
+using tests::LinearPlant;
+using tests::PlantSample;
 
 // An episode of a valve that reads as in normal operation, with factors set by
 // hand: stuck transmitters are certain, so that their faults have the factor 1
@@ -87,7 +87,7 @@ TEST_F(EpisodeTest, ANameThatIsGivenUpSaysWhy) {
   models.observers.resize(1);
   models.faults.clear();
   for (int fault = 1; fault <= 6; ++fault) {
-    models.observers.push_back(testing::F6(1.0));
+    models.observers.push_back(tests::F6(1.0));
     models.observers.back().fault = fault;
     models.faults.push_back(fault);
   }

@@ -22,7 +22,7 @@ constexpr double kDp = 900.0;
 
 // The linear plant with a rod that takes 1 to 3 s. F = 100 exp(-2 X) at kDp.
 ModelSet FlooredPlant() {
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   FloorLimits& floor = models.floor.emplace();
   floor.quick = {1.0, 100.0};
   floor.slow = {0.4, 8.0};
@@ -55,7 +55,7 @@ struct Valve {
   SignalQuality quality{SignalQuality::kGood};  // of X and F
 };
 
-Sample At(int k, const Valve& valve) {
+Sample ValveAt(int k, const Valve& valve) {
   Sample sample;
   sample.stamp_ns = (k + 1LL) * 1'000'000'000;
   sample.source_id = 7;
@@ -78,7 +78,7 @@ std::vector<int> FirstFindings(const std::function<Valve(int)>& history,
   const std::size_t offset = models.faults.size() - Floor::kTests;
   std::vector<int> first(Floor::kTests, -1);
   for (int k = 0; k < samples; ++k) {
-    floor.Push(At(k, history(k)));
+    floor.Push(ValveAt(k, history(k)));
     for (std::size_t i = 0; i < Floor::kTests; ++i) {
       const bool found = (floor.findings() >> (offset + i) & 1U) != 0;
       first[i] = first[i] < 0 && found ? k : first[i];
@@ -204,10 +204,10 @@ TEST(FloorTest, HoldsInAutoOnlyAndNeverWithoutLimits) {
               return Valve{90.0, 10.0, 100.0, ValveMode::kManual};
             }),
             kNothing);
-  const ModelSet models = testing::LinearPlant();
+  const ModelSet models = tests::LinearPlant();
   Floor floor(models);
   for (int k = 0; k < 100; ++k) {
-    floor.Push(At(k, {90.0, 10.0}));
+    floor.Push(ValveAt(k, {90.0, 10.0}));
     EXPECT_EQ(floor.findings(), 0U);
   }
 }
@@ -232,7 +232,7 @@ Followed Engine(const ModelSet& models, int samples,
   ValveEngine engine(std::make_shared<const ModelSet>(models));
   Followed followed;
   for (int k = 0; k < samples; ++k) {
-    const Verdict& verdict = engine.Step(At(k, history(k)));
+    const Verdict& verdict = engine.Step(ValveAt(k, history(k)));
     followed.qualities.push_back(verdict.quality);
     for (const Transition& transition : verdict.Transitions()) {
       followed.transitions.push_back(transition);
@@ -262,7 +262,7 @@ TEST(FloorTest, OpensAnEpisodeBeforeTheObserversMay) {
 // the trained range: f6 is named all the same. Sets of before wait outside.
 TEST(FloorTest, AbnormalValveStaysJudgedWhateverItsCommandDoes) {
   for (const bool floored : {false, true}) {
-    ModelSet models = floored ? FlooredPlant() : testing::LinearPlant();
+    ModelSet models = floored ? FlooredPlant() : tests::LinearPlant();
     models.validity.cv = {40.0, 60.0};
     models.validity.cv_step = 10.0;
     const Followed seen = Engine(models, 200, [](int k) {
@@ -301,7 +301,7 @@ TEST(FloorTest, MoreThanFourFaultsAreNoName) {
     models.observers.resize(1);
     models.faults.clear();
     for (int fault = 1; fault <= faults; ++fault) {
-      models.observers.push_back(testing::F6(1.0));
+      models.observers.push_back(tests::F6(1.0));
       models.observers.back().fault = fault;
       models.faults.push_back(fault);
     }

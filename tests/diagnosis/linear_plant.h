@@ -11,7 +11,7 @@
 /// A plant whose residuals can be told by hand. X = CV; F = 100 − CV without
 /// fault; f6 adds 20 s to F, f3 adds s (20 + 0.4 (CV − 50)): the same at
 /// CV = 50, another slope. f1 takes 20 s from X.
-namespace fdi::testing {
+namespace fdi::tests {
 
 inline constexpr double kNoise = 0.5;  // of both outputs
 
@@ -132,4 +132,4 @@ class Noise {
   std::mt19937_64 engine_;
 };
 
-}  // namespace fdi::testing
+}  // namespace fdi::tests

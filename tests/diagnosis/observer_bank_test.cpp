@@ -11,11 +11,11 @@
 namespace fdi {
 namespace {
 
-using testing::LinearModel;
+using tests::LinearModel;
 
 // X̂(k) = 0.5 X̂(k−1) + 0.5 CV(k−1), parallel or on the measured past.
 ModelSet FirstOrder(bool parallel) {
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   ChannelObserver channel = LinearModel(Signal::kX, 1.0, 0.0);
   channel.model.parallel = parallel;
   channel.model.regressors = {{Signal::kX, 1}, {Signal::kCv, 1}};
@@ -133,10 +133,10 @@ TEST(ObserverBankTest, PredictionStaysWithinTheOutputLimits) {
 }
 
 TEST(ObserverBankTest, ExtrapolationIsWhatTheRangeWouldHaveKept) {
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   models.observers[0].channels[1].model.regressor_max = {60.0};
   ObserverBank bank(models);
-  Sample sample = testing::PlantSample(0);
+  Sample sample = tests::PlantSample(0);
   sample.Set(Signal::kCv, 75.0);
   bank.Initialise(sample);
   bank.Step(sample);

@@ -134,9 +134,9 @@ class RandomModels {
 };
 
 // The same equations, one model after the other, on samples kept in full.
-class Reference {
+class ReferenceBank {
  public:
-  explicit Reference(const ModelSet& models) : models_(models) {
+  explicit ReferenceBank(const ModelSet& models) : models_(models) {
     past_.resize(models.observers.size(),
                  std::vector<std::vector<double>>(models.channels.size()));
   }
@@ -229,7 +229,7 @@ Sample RandomSample(std::mt19937_64& random) {
   EXPECT_EQ(std::bit_cast<std::uint64_t>(a), std::bit_cast<std::uint64_t>(b)) \
       << "observer " << o << ", channel " << c
 
-void ExpectSame(const ObserverBank& bank, const Reference& reference) {
+void ExpectSame(const ObserverBank& bank, const ReferenceBank& reference) {
   std::vector<double> factors(kObservers);
   bank.Score(factors);
   for (std::size_t o = 0; o < kObservers; ++o) {
@@ -261,7 +261,7 @@ TEST_P(ObserverKernelsTest, HaveTheBitsOfOneModelAfterTheOther) {
     const ModelSet models = RandomModels(seed).Make();
     Validate(models);
     ObserverBank bank(std::make_shared<const ObserverPlan>(models), GetParam());
-    Reference reference(models);
+    ReferenceBank reference(models);
     std::mt19937_64 random(seed);
     for (int k = 0; k < 50; ++k) {
       const Sample sample = RandomSample(random);

@@ -12,17 +12,17 @@
 namespace fdi {
 namespace {
 
-using testing::AddF6;
-using testing::Noise;
-using testing::PlantSample;
+using tests::AddF6;
+using tests::Noise;
+using tests::PlantSample;
 
 constexpr int kWindow = 200;
 
 std::shared_ptr<const ModelSet> WatchedPlant(std::uint64_t content_hash = 42) {
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   models.content_hash = content_hash;
   models.channels[1].windows = {
-      {kWindow, -0.8 * testing::kNoise, 0.8 * testing::kNoise, 3.0}};
+      {kWindow, -0.8 * tests::kNoise, 0.8 * tests::kNoise, 3.0}};
   return std::make_shared<const ModelSet>(std::move(models));
 }
 
@@ -31,7 +31,7 @@ Sample Drifting(int k, Noise& noise) {
   Sample sample = PlantSample(static_cast<std::uint64_t>(k));
   noise.Add(sample);
   if (k >= 400) {
-    AddF6(sample, testing::kNoise / 20.0);
+    AddF6(sample, tests::kNoise / 20.0);
   }
   return sample;
 }

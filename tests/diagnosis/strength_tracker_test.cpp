@@ -14,11 +14,11 @@
 namespace fdi {
 namespace {
 
-using testing::AddF3;
-using testing::AddF6;
-using testing::LinearPlant;
-using testing::Noise;
-using testing::PlantSample;
+using tests::AddF3;
+using tests::AddF6;
+using tests::LinearPlant;
+using tests::Noise;
+using tests::PlantSample;
 
 constexpr std::size_t kF3First = 3;  // observers of LinearPlant()
 constexpr std::size_t kF6First = 5;

@@ -10,14 +10,14 @@
 namespace fdi {
 namespace {
 
-using testing::LinearModel;
-using testing::PlantSample;
+using tests::LinearModel;
+using tests::PlantSample;
 
 constexpr int kLimit = 100;
 
 // The linear plant with a channel T1, and its fault: 20 degC too much.
 ModelSet HeatedPlant() {
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   models.channels.push_back({"T1", Signal::kT1, -5.0, 5.0});
   for (Observer& observer : models.observers) {
     observer.channels.push_back(LinearModel(Signal::kT1, 0.0, 100.0));

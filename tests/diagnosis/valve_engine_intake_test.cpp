@@ -11,13 +11,13 @@
 namespace fdi {
 namespace {
 
-using testing::AddF6;
-using testing::FullF6;
-using testing::kSettled;
-using testing::PlantSample;
-using testing::Seen;
-using testing::SharedPlant;
-using testing::StepRange;
+using tests::AddF6;
+using tests::FullF6;
+using tests::kSettled;
+using tests::PlantSample;
+using tests::Seen;
+using tests::SharedPlant;
+using tests::StepRange;
 
 TEST(ValveEngineIntakeTest, RepeatedAndLateSamplesChangeNothing) {
   ValveEngine engine(SharedPlant());

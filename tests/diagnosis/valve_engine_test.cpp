@@ -14,15 +14,15 @@
 namespace fdi {
 namespace {
 
-using testing::AddF3;
-using testing::AddF6;
-using testing::FullF6;
-using testing::Noise;
-using testing::PlantSample;
-using testing::Seen;
-using testing::SharedPlant;
-using testing::StampOf;
-using testing::StepRange;
+using tests::AddF3;
+using tests::AddF6;
+using tests::FullF6;
+using tests::Noise;
+using tests::PlantSample;
+using tests::Seen;
+using tests::SharedPlant;
+using tests::StampOf;
+using tests::StepRange;
 
 TEST(ValveEngineTest, NormalOperationOpensNoEpisode) {
   ValveEngine engine(SharedPlant());
@@ -46,7 +46,7 @@ void DrawWrongly(Sample& sample, bool marked) {
 
 TEST(ValveEngineTest, WhatIsUncertainOpensNoEpisodeAndHidesNone) {
   for (const bool marked : {false, true}) {
-    ModelSet models = testing::LinearPlant();
+    ModelSet models = tests::LinearPlant();
     models.decision.detection_samples = 1;
     ValveEngine engine(std::make_shared<const ModelSet>(models));
     const Seen healthy =
@@ -261,7 +261,7 @@ TEST(ValveEngineTest, ASuspectValveHasAnEpisodeThatDoesNotClear) {
 }
 
 TEST(ValveEngineTest, ValveThatStandsStillAfterwardsStaysInItsEpisode) {
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   models.decision.clearing_samples = 60;
   ValveEngine engine(std::make_shared<const ModelSet>(models));
   StepRange(engine, 0, 100);
@@ -340,15 +340,15 @@ TEST(ValveEngineTest, StepDoesNotAllocate) {
       AddF3(samples.back(), 0.6);
     }
   }
-  const long before = testing::AllocationCount();
+  const long before = tests::AllocationCount();
   for (const Sample& sample : samples) {
     engine.Step(sample);
   }
-  EXPECT_EQ(testing::AllocationCount() - before, 0);
+  EXPECT_EQ(tests::AllocationCount() - before, 0);
 }
 
 TEST(ValveEngineTest, UnusableModelSetIsRefused) {
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   models.channels[0].upper_threshold = -1.0;
   EXPECT_THROW(ValveEngine(std::make_shared<const ModelSet>(models)),
                DataError);

@@ -9,6 +9,7 @@
 #include "monitor/service/history_store.h"
 #include "planner/cause_watch.h"
 #include "tests/monitor/linear_models.h"
+#include "tests/monitor/test_support.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::monitor {
@@ -17,7 +18,6 @@ namespace {
 using testing::HasSubstr;
 using Kind = storage::CauseChange::Kind;
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kStart = 1'700'000'000 * kSecond;
 
 class CauseGroupsTest : public testing::Test {

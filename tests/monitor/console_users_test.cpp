@@ -18,7 +18,7 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-constexpr const char* kPassword = "correct horse";
+constexpr const char* kFirstPassword = "correct horse";
 
 class UsersFileTest : public testing::Test {
  protected:
@@ -42,7 +42,7 @@ class UsersFileTest : public testing::Test {
 };
 
 TEST_F(UsersFileTest, AUserIsAddedChangedAndRemoved) {
-  StoreUser(file_, "anna", User{Role::kEngineer, HashPassword(kPassword)});
+  StoreUser(file_, "anna", User{Role::kEngineer, HashPassword(kFirstPassword)});
   EXPECT_EQ(mode(), 0600U);
   Write("# the night shift\n" + Text() + "bo:view:*");
   StoreUser(file_, "bo", User{Role::kAcknowledge, "*"});
@@ -54,7 +54,7 @@ TEST_F(UsersFileTest, AUserIsAddedChangedAndRemoved) {
   EXPECT_EQ(users.at("bo").role, Role::kAcknowledge);
   EXPECT_EQ(users.at("c.d@plant").role, Role::kView);
   EXPECT_THAT(users.at("anna").hash, StartsWith("$y$"));
-  EXPECT_TRUE(PasswordFits(kPassword, users.at("anna").hash));
+  EXPECT_TRUE(PasswordFits(kFirstPassword, users.at("anna").hash));
   EXPECT_FALSE(PasswordFits("correct horsf", users.at("anna").hash));
 
   StoreUser(file_, "anna", std::nullopt);
@@ -131,9 +131,9 @@ TEST(PasswordTest, TooShortOnesAndControlCharactersAreRefused) {
   EXPECT_THROW(HashPassword("7 bytes"), ConfigError);
   EXPECT_THROW(HashPassword(std::string(257, 'x')), ConfigError);
   EXPECT_THROW(HashPassword("correct\x03horse"), ConfigError);
-  const std::string hash = HashPassword(kPassword);
-  EXPECT_NE(hash, HashPassword(kPassword));
-  EXPECT_FALSE(PasswordFits(kPassword + std::string("\0x", 2), hash));
+  const std::string hash = HashPassword(kFirstPassword);
+  EXPECT_NE(hash, HashPassword(kFirstPassword));
+  EXPECT_FALSE(PasswordFits(kFirstPassword + std::string("\0x", 2), hash));
   EXPECT_FALSE(PasswordFits("*", "*"));
   EXPECT_FALSE(PasswordFits("*0", "*"));
 }
@@ -147,7 +147,7 @@ class LoginsTest : public testing::Test {
   }
   std::optional<Visitor> Visit() { return logins_.OfSession(session_, now_); }
 
-  const User anna_{Role::kEngineer, HashPassword(kPassword)};
+  const User anna_{Role::kEngineer, HashPassword(kFirstPassword)};
   Logins logins_{{{"anna", anna_}, {"proxied", {}}}};
   std::string session_;
   Logins::Clock::time_point now_{std::chrono::hours(1)};
@@ -155,12 +155,12 @@ class LoginsTest : public testing::Test {
 
 TEST_F(LoginsTest, OnlyTheRightPasswordOpensASession) {
   EXPECT_EQ(LogIn("anna", "correct horsf"), Outcome::kWrong);
-  EXPECT_EQ(LogIn("nobody", kPassword), Outcome::kWrong);
+  EXPECT_EQ(LogIn("nobody", kFirstPassword), Outcome::kWrong);
   EXPECT_EQ(LogIn("proxied", "*"), Outcome::kWrong);
   EXPECT_EQ(session_, "");
   EXPECT_FALSE(Visit());
 
-  ASSERT_EQ(LogIn("anna", kPassword), Outcome::kAdmitted);
+  ASSERT_EQ(LogIn("anna", kFirstPassword), Outcome::kAdmitted);
   ASSERT_TRUE(Visit());
   EXPECT_EQ(Visit()->name, "anna");
   EXPECT_EQ(Visit()->role, Role::kEngineer);
@@ -173,14 +173,14 @@ TEST_F(LoginsTest, GuessesAreSlowedByAddress) {
   for (int i = 0; i < 5; ++i) {
     EXPECT_EQ(LogIn("anna", "no"), Outcome::kWrong);
   }
-  EXPECT_EQ(LogIn("anna", kPassword), Outcome::kTooMany);
-  EXPECT_EQ(LogIn("anna", kPassword, "10.0.0.2"), Outcome::kAdmitted);
+  EXPECT_EQ(LogIn("anna", kFirstPassword), Outcome::kTooMany);
+  EXPECT_EQ(LogIn("anna", kFirstPassword, "10.0.0.2"), Outcome::kAdmitted);
   now_ += std::chrono::seconds(1);
-  EXPECT_EQ(LogIn("anna", kPassword), Outcome::kAdmitted);
+  EXPECT_EQ(LogIn("anna", kFirstPassword), Outcome::kAdmitted);
 }
 
 TEST_F(LoginsTest, ASessionEndsHalfAnHourAfterItsLastUse) {
-  LogIn("anna", kPassword);
+  LogIn("anna", kFirstPassword);
   now_ += std::chrono::minutes(29);
   EXPECT_TRUE(Visit());
   now_ += std::chrono::minutes(29);
@@ -191,29 +191,29 @@ TEST_F(LoginsTest, ASessionEndsHalfAnHourAfterItsLastUse) {
 }
 
 TEST_F(LoginsTest, ASessionEndsWithThePasswordOrTheUser) {
-  LogIn("anna", kPassword);
+  LogIn("anna", kFirstPassword);
   logins_.Take({{"anna", {Role::kView, anna_.hash}}});
   ASSERT_TRUE(Visit());
   EXPECT_EQ(Visit()->role, Role::kView);
   logins_.Take({{"anna", {Role::kView, HashPassword("another one")}}});
   EXPECT_FALSE(Visit());
   logins_.Take({{"anna", anna_}});
-  LogIn("anna", kPassword);
+  LogIn("anna", kFirstPassword);
   logins_.Take({});
   EXPECT_FALSE(Visit());
 }
 
 TEST_F(LoginsTest, TheSessionBeyondSixtyFourTakesThePlaceOfTheIdlest) {
-  LogIn("anna", kPassword);
+  LogIn("anna", kFirstPassword);
   const std::string first = session_;
   now_ += std::chrono::seconds(1);
-  LogIn("anna", kPassword);
+  LogIn("anna", kFirstPassword);
   const std::string second = session_;
   now_ += std::chrono::seconds(1);
   logins_.OfSession(first, now_);
   for (int i = 0; i < 63; ++i) {
     now_ += std::chrono::seconds(1);
-    LogIn("anna", kPassword);
+    LogIn("anna", kFirstPassword);
   }
   EXPECT_EQ(logins_.sessions(), 64U);
   EXPECT_TRUE(logins_.OfSession(first, now_));

@@ -7,11 +7,10 @@
 
 #include "diagnosis/fault_catalogue.h"
 #include "tests/monitor/linear_models.h"
+#include "tests/monitor/test_support.h"
 
 namespace fdi::monitor {
 namespace {
-
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 class EpisodeStrengthsTest : public testing::Test {
  protected:

@@ -9,11 +9,11 @@
 #include "monitor/valve_monitor.h"
 #include "tests/monitor/fake_sinks.h"
 #include "tests/monitor/linear_models.h"
+#include "tests/monitor/test_support.h"
 
 namespace fdi::monitor {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kHour = 3600 * kSecond;
 
 Sample At(std::int64_t stamp_ns, double cv, double x) {

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/monitor/pipeline_fixture.h"
+#include "tests/monitor/test_support.h"
 
 namespace fdi::monitor {
 namespace {
@@ -195,12 +196,6 @@ TEST_F(PipelineTest, AModelSetThatCannotBeHadLeavesTheValveUnassigned) {
 
   EXPECT_EQ(bus_.decisions.size(), 5U);
   EXPECT_EQ(counters_[Counter::kModelFailures], 1U);
-}
-
-std::size_t ThreadCount() {
-  using std::filesystem::directory_iterator;
-  return static_cast<std::size_t>(std::distance(
-      directory_iterator("/proc/self/task"), directory_iterator{}));
 }
 
 // What runs before Start() may use the connections of the sinks.

@@ -16,6 +16,7 @@
 #include "monitor/throttled_log.h"
 #include "tests/monitor/fake_sinks.h"
 #include "tests/monitor/linear_models.h"
+#include "tests/monitor/test_support.h"
 #include "tests/simulator/recorded_valve.h"
 
 namespace fdi::monitor {
@@ -29,7 +30,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::uint64_t kAtOnce = kLeadIn + 2;  // Row of the detection.
 constexpr std::uint64_t kFirstLook = kAtOnce + 40;
 constexpr std::uint64_t kCounts = kFirstLook + 10;

@@ -20,6 +20,7 @@
 #include "tests/idl/test_domain.h"
 #include "tests/monitor/fake_sinks.h"
 #include "tests/monitor/linear_models.h"
+#include "tests/monitor/test_support.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::monitor {
@@ -29,12 +30,6 @@ using testing::Contains;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
-
-std::size_t ThreadCount() {
-  using std::filesystem::directory_iterator;
-  return static_cast<std::size_t>(std::distance(
-      directory_iterator("/proc/self/task"), directory_iterator{}));
-}
 
 // The service in this process, over DDS on loopback.
 class ServiceTest : public testing::Test {

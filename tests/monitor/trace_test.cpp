@@ -5,11 +5,10 @@
 #include <gtest/gtest.h>
 
 #include "tests/monitor/linear_models.h"
+#include "tests/monitor/test_support.h"
 
 namespace fdi::monitor {
 namespace {
-
-constexpr std::int64_t kSecond = 1'000'000'000;
 
 Verdict SomeVerdict(double residual, double factor) {
   Verdict verdict;

@@ -18,7 +18,7 @@ using storage::TemporaryDirectory;
 using testing::HasSubstr;
 
 template <typename Action>
-std::string MessageOf(const Action& action) {
+std::string ErrorOf(const Action& action) {
   try {
     action();
   } catch (const DataError& error) {
@@ -34,10 +34,10 @@ TEST(OutputFolderTest, FolderIsMadeOnlyWithinOneThatIsThere) {
   EnsureFolder(folder);
   EXPECT_TRUE(std::filesystem::is_directory(folder));
   EXPECT_THAT(
-      MessageOf([&] { EnsureFolder(directory.path() / "no" / "report"); }),
+      ErrorOf([&] { EnsureFolder(directory.path() / "no" / "report"); }),
       HasSubstr("there is no folder " + (directory.path() / "no").string()));
   std::ofstream(directory.path() / "file") << "x";
-  EXPECT_THAT(MessageOf([&] { EnsureFolder(directory.path() / "file"); }),
+  EXPECT_THAT(ErrorOf([&] { EnsureFolder(directory.path() / "file"); }),
               HasSubstr((directory.path() / "file").string()));
 }
 
@@ -49,7 +49,7 @@ TEST(OutputFolderTest, FolderWithoutPermissionIsNamed) {
   const auto folder = directory.path() / "closed";
   EnsureFolder(folder);
   std::filesystem::permissions(folder, std::filesystem::perms::owner_read);
-  EXPECT_THAT(MessageOf([&] { EnsureFolder(folder); }),
+  EXPECT_THAT(ErrorOf([&] { EnsureFolder(folder); }),
               HasSubstr(folder.string()));
   std::filesystem::permissions(folder, std::filesystem::perms::owner_all);
 }
@@ -57,7 +57,7 @@ TEST(OutputFolderTest, FolderWithoutPermissionIsNamed) {
 TEST(OutputFolderTest, FileThatCannotBeWrittenIsNamedAndLeavesNoPart) {
   const TemporaryDirectory directory;
   std::filesystem::create_directory(directory.path() / "taken");
-  EXPECT_THAT(MessageOf([&] { WriteFile(directory.path() / "taken", "x"); }),
+  EXPECT_THAT(ErrorOf([&] { WriteFile(directory.path() / "taken", "x"); }),
               HasSubstr((directory.path() / "taken").string()));
   EXPECT_FALSE(std::filesystem::exists(directory.path() / "taken.part"));
 }

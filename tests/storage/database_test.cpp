@@ -20,12 +20,12 @@ using ::testing::HasSubstr;
 constexpr std::string_view kFirst =
     "CREATE TABLE t (id INTEGER PRIMARY KEY, v REAL, s TEXT, b BLOB) STRICT;"
     "CREATE TABLE child (parent INTEGER NOT NULL REFERENCES t (id)) STRICT;";
-constexpr std::string_view kSecond =
+constexpr std::string_view kSecondVersion =
     "ALTER TABLE t ADD COLUMN extra INTEGER;"
     "UPDATE t SET extra = id * 10;";
 
 Schema SchemaOf(int version, std::int32_t id = 0x1234) {
-  Schema schema{"test", id, Synchronous::kNormal, {kFirst, kSecond}};
+  Schema schema{"test", id, Synchronous::kNormal, {kFirst, kSecondVersion}};
   schema.migrations.resize(static_cast<std::size_t>(version));
   return schema;
 }

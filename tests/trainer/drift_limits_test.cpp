@@ -22,11 +22,11 @@ Condition ConditionOf(const Observer& observer, std::uint64_t trained) {
   }
   condition.validation.emplace_back();
   for (std::uint64_t k = 0; k < 500; ++k) {
-    Sample sample = testing::PlantSample(k);
+    Sample sample = tests::PlantSample(k);
     if (observer.fault == 6) {
-      testing::AddF6(sample, observer.strength);
+      tests::AddF6(sample, observer.strength);
     } else if (observer.fault == 3) {
-      testing::AddF3(sample, observer.strength);
+      tests::AddF3(sample, observer.strength);
     } else if (observer.fault == 1) {
       sample.values[Index(Signal::kX)] -= 20.0 * observer.strength;
     }
@@ -42,7 +42,7 @@ class DriftLimitsTest : public ::testing::TestWithParam<std::uint64_t> {};
 // At full strength f1 takes 20 from X, f3 and f6 add 20 to F: 12 beyond a limit
 // of 8. Nothing lowers F or raises X.
 TEST_P(DriftLimitsTest, HalfOfWhatAFaultPassesItsLimitByIsLeft) {
-  ModelSet models = testing::LinearPlant();
+  ModelSet models = tests::LinearPlant();
   std::vector<Condition> conditions;
   for (const Observer& observer : models.observers) {
     conditions.push_back(ConditionOf(observer, GetParam()));

@@ -50,10 +50,10 @@ storage::StoredRun PlantRun(int seconds, std::uint64_t seed,
   run.info.run.valve_id = "LV1";
   run.info.run.source_id = 7;
   run.info.run.start_ns = start_ns;
-  fdi::testing::Noise noise(seed);
+  fdi::tests::Noise noise(seed);
   for (int k = 0; k < seconds; ++k) {
     const auto at = static_cast<std::size_t>(k);
-    Sample sample = fdi::testing::PlantSample(at);
+    Sample sample = fdi::tests::PlantSample(at);
     sample.stamp_ns += start_ns;
     noise.Add(sample);
     if (change) {
@@ -80,7 +80,7 @@ ModelSet WithLimitsOf(const ModelSet& models, const storage::StoredRun& run) {
 
 // As onboarding makes it of two hours.
 ModelSet TwoHourSet() {
-  ModelSet models = fdi::testing::LinearPlant();
+  ModelSet models = fdi::tests::LinearPlant();
   models.name = "LV1";
   models.preset = "onboard";
   models.created_ns = kMadeNs;
@@ -232,7 +232,7 @@ TEST_F(AppLimitsTest, AFaultOnTheSameRecordIsStillFoundAndNamed) {
 
   storage::StoredRun faulty = run;
   for (std::size_t k = 2000; k < faulty.samples.size(); ++k) {
-    fdi::testing::AddF6(faulty.samples[k].sample, 1.0);
+    fdi::tests::AddF6(faulty.samples[k].sample, 1.0);
   }
   const std::vector<Indication> found = Score(Load("LV1@2"), faulty);
   EXPECT_FALSE(found[1999].detected);
@@ -381,7 +381,7 @@ TEST(LimitsTest, FaultsThatWouldNotBeSeenAnyMoreAreNamed) {
   };
   std::vector<Sample> samples;
   for (std::uint64_t k = 0; k < 400; ++k) {
-    samples.push_back(fdi::testing::PlantSample(k));
+    samples.push_back(fdi::tests::PlantSample(k));
   }
   const auto f6 = [&] {
     const auto faults = CompareVisibility(before, after, samples);
