@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 namespace fdi {
 namespace {
@@ -288,6 +289,8 @@ void Episode::Open(std::int64_t stamp_ns, Verdict& verdict) {
   age_ = 0;
   without_fault_ = 0;
   contender_run_ = 0;
+  proven_run_ = 0;
+  early_ = false;
   Emit(TransitionKind::kDetected, detection_stamp_ns_, verdict);
 }
 
@@ -308,12 +311,7 @@ void Episode::NameFloor(Verdict& verdict) {
   if (isolation_held_ || named || (floor_ & ~verdict.isolated) == 0) {
     return;
   }
-  const bool first = verdict.state == State::kDetected;
-  verdict.state = State::kIsolated;
-  verdict.isolated = floor_;
-  verdict.unknown = Unknown::kNone;
-  Emit(first ? TransitionKind::kIsolated : TransitionKind::kReisolated,
-       verdict.stamp_ns, verdict);
+  Name(floor_, verdict);
 }
 
 FaultSet Episode::FactorsFrom(double threshold, const Verdict& verdict) const {
@@ -347,6 +345,35 @@ FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
   return joined;
 }
 
+// Wald's sequential test: before t_k, the one fault that is left once the
+// likelihood ratio to every other one and to normal operation is more than
+// m/α, with m faults, so that a wrong name has at most the probability α where
+// the models are right. What they err in the first moments of a fault, its next
+// samples have to bear out.
+FaultSet Episode::Proven(const Verdict& verdict) {
+  const DecisionParameters& decision = models_->decision;
+  if (decision.early_error <= 0.0 || isolation_.full()) {
+    return 0;
+  }
+  const double rivals = static_cast<double>(models_->faults.size());
+  const FaultSet left =
+      faults_.Unrefuted(std::log(rivals / decision.early_error));
+  const bool one = std::popcount(left) == 1 &&
+                   left == FactorsFrom(decision.isolation_threshold, verdict);
+  proven_run_ = !one ? 0 : left == proven_ ? proven_run_ + 1 : 1;
+  proven_ = left;
+  return proven_run_ > decision.detection_samples ? left : 0;
+}
+
+void Episode::Name(FaultSet faults, Verdict& verdict) {
+  const bool first = verdict.state == State::kDetected;
+  verdict.state = State::kIsolated;
+  verdict.isolated = faults;
+  verdict.unknown = Unknown::kNone;
+  Emit(first ? TransitionKind::kIsolated : TransitionKind::kReisolated,
+       verdict.stamp_ns, verdict);
+}
+
 void Episode::Isolate(Verdict& verdict) {
   const double threshold = models_->decision.isolation_threshold;
   // Before any return, so that the window is full when a hold ends or the valve
@@ -355,6 +382,13 @@ void Episode::Isolate(Verdict& verdict) {
   FaultSet supported = isolation_.Supported();
   if (isolation_held_ || verdict.normal_factor >= threshold) {
     contender_run_ = 0;
+    return;
+  }
+  const FaultSet proven = Proven(verdict);
+  if (supported == 0 && (proven & ~verdict.isolated) != 0) {
+    supported = WithGroups(proven, verdict);
+    early_ = true;
+    Name(supported, verdict);
     return;
   }
   if (supported == 0) {
@@ -366,16 +400,14 @@ void Episode::Isolate(Verdict& verdict) {
   if (models_->floor && std::popcount(supported) > kMaxFaultSetSize) {
     supported = floor_;
   }
-  // The first fault replaces findings of the floor at once.
-  if ((verdict.isolated & ~floor_names_) == 0) {
+  // The first fault replaces findings of the floor at once, and the first set
+  // of equation (6) a name that came before it.
+  const bool early = std::exchange(early_, false);
+  if ((verdict.isolated & ~floor_names_) == 0 ||
+      (early && supported != verdict.isolated)) {
     if ((supported & ~floor_names_) != 0) {
-      const bool first = verdict.state == State::kDetected;
-      verdict.state = State::kIsolated;
-      verdict.isolated = supported;
-      verdict.unknown = Unknown::kNone;
       contender_run_ = 0;
-      Emit(first ? TransitionKind::kIsolated : TransitionKind::kReisolated,
-           verdict.stamp_ns, verdict);
+      Name(supported, verdict);
     }
     return;
   }

@@ -31,6 +31,8 @@ class IsolationWindow {
   /// The supported set; empty until the window is full.
   FaultSet Supported() const;
 
+  bool full() const { return filled_ == length_; }
+
  private:
   int length_;
   int needed_;
@@ -143,7 +145,9 @@ class Episode {
  private:
   void ApplyEvidence(Verdict& verdict) const;
   void Open(std::int64_t stamp_ns, Verdict& verdict);
+  FaultSet Proven(const Verdict& verdict);
   void Isolate(Verdict& verdict);
+  void Name(FaultSet faults, Verdict& verdict);
   void NameFloor(Verdict& verdict);
   void ApplyFloorFindings(const Findings& findings, Verdict& verdict) const;
   void JudgeUnknown(Verdict& verdict);
@@ -165,6 +169,9 @@ class Episode {
   bool begun_{false};      // gathering of evidence has begun
   int age_{0};             // samples since the detection
   int without_fault_{0};   // samples since some factor reached T/2
+  FaultSet proven_{0};     // the only fault that is not refuted
+  int proven_run_{0};      // samples in a row
+  bool early_{false};      // isolated before t_k
   FaultSet contender_{0};  // candidate to replace the isolated set
   int contender_run_{0};   // samples that supported it and no other since
 };

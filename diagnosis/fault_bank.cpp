@@ -136,4 +136,18 @@ void FaultBank::ApplyEvidence(Verdict& verdict) const {
   }
 }
 
+FaultSet FaultBank::Unrefuted(double margin) const {
+  const double best = BestEvidence();
+  if (best - trained_.total(0) < margin) {
+    return 0;
+  }
+  FaultSet unrefuted = 0;
+  for (const StrengthTracker& tracker : trackers_) {
+    if (best - tracker.evidence(trained_) - allowance_ < margin) {
+      unrefuted |= FaultSet{1} << tracker.path().fault_index;
+    }
+  }
+  return unrefuted;
+}
+
 }  // namespace fdi

@@ -50,6 +50,10 @@ class FaultBank {
   /// Applies the evidence so far to the factors set by Score().
   void ApplyEvidence(Verdict& verdict) const;
 
+  /// The faults that the evidence does not refute: L_best − L_f − a < `margin`;
+  /// nothing while it does not refute normal operation.
+  FaultSet Unrefuted(double margin) const;
+
  private:
   double BestEvidence() const;
   void UpdateEffect(const ObserverBank& bank);

@@ -43,6 +43,8 @@ void ValidateDecision(const ModelSet& models) {
         "evidence window must be in 2..1e6 samples");
   Check(p.evidence_core >= 0.0 && p.evidence_support > p.evidence_core, models,
         "evidence support must be beyond its core");
+  Check(p.early_error >= 0.0 && p.early_error <= 0.1, models,
+        "probability of a wrong early name must be in [0, 0.1]");
   Check(p.interpolation_allowance >= 0.0 && p.interpolation_allowance <= 1.0,
         models, "interpolation allowance must be in [0, 1]");
 }

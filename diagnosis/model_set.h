@@ -113,6 +113,9 @@ struct DecisionParameters {
   /// What interpolation between observers may cost a fault in the comparison:
   /// this share of how far normal operation is behind; see FaultBank. 0: none.
   double interpolation_allowance{0.0};
+  /// α: a fault is isolated before t_k where the probability of a wrong name is
+  /// less; see Episode::Proven(). 0: never before t_k.
+  double early_error{0.0};
 };
 
 /// How often in a row a transmitter may repeat one reading; 0: not watched. See

@@ -4,6 +4,9 @@
 namespace fdi::trainer {
 namespace {
 
+// Of names before t_k (docs/method.md, 6).
+constexpr double kEarlyError = 1e-3;
+
 TrainingOptions Paper() {
   using enum Signal;
   TrainingOptions options;
@@ -45,6 +48,7 @@ TrainingOptions Paper() {
   // With four or five regressors and m = 2 the partition tends to the trivial
   // one, and with it the model to a linear one.
   options.fit.rules.fit.clustering.fuzziness = 1.5;
+  options.decision.early_error = kEarlyError;
   return options;
 }
 
@@ -118,6 +122,7 @@ TrainingOptions Extended() {
   options.decision.evidence_core = 4.0;
   options.decision.evidence_support = 10.0;
   options.decision.interpolation_allowance = 0.04;
+  options.decision.early_error = kEarlyError;
   options.decision.reisolation_samples = 60;
   options.fit.rules.both_methods = true;
   // As if every regressor had noise of 1 % of its deviation: lags of a smooth

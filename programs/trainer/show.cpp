@@ -42,7 +42,8 @@ std::string DecisionText(const DecisionParameters& d) {
          std::to_string(d.settling_samples) + " samples; evidence over " +
          Text(d.evidence_window) + " samples, core " + Text(d.evidence_core) +
          ", support " + Text(d.evidence_support) +
-         ", interpolation allowance " + Text(d.interpolation_allowance);
+         ", interpolation allowance " + Text(d.interpolation_allowance) +
+         ", early error " + Text(d.early_error);
 }
 
 std::string TrainingRunsText(const ModelSet& models) {

@@ -22,9 +22,10 @@ namespace fdi::storage {
 //
 //   file    = "FDIM" format:uint32 length:uint64 payload crc:uint32
 //   format  = 3, + 1 with physics, + 2 with a floor, + 4 with drift limits,
-//             + 8 with an interpolation allowance
+//             + 8 with an interpolation allowance, + 16 with names before t_k
 //   payload = the fields of ModelSet in the order of Fields() below, the floor
 //             last; then [physics: list] [drift: of each channel] [allowance]
+//             [early_error]
 //
 // The CRC-32 covers all bytes before it. Encoding: a double as its 64 bits; int
 // as int32; int64 unchanged; bool and enumerations as uint8; a text as uint32
@@ -40,8 +41,10 @@ constexpr std::uint32_t kWithPhysics = 1;
 constexpr std::uint32_t kWithFloor = 2;
 constexpr std::uint32_t kWithDrift = 4;
 constexpr std::uint32_t kWithAllowance = 8;
-constexpr std::uint32_t kLastFormat =
-    kFormat + kWithPhysics + kWithFloor + kWithDrift + kWithAllowance;
+constexpr std::uint32_t kWithEarlyNames = 16;
+constexpr std::uint32_t kLastFormat = kFormat + kWithPhysics + kWithFloor +
+                                      kWithDrift + kWithAllowance +
+                                      kWithEarlyNames;
 constexpr std::uint32_t kMaxPhysics = 256;
 constexpr std::size_t kFrame =
     2 * sizeof(std::uint32_t) + sizeof(std::uint64_t) + sizeof(std::uint32_t);
@@ -181,8 +184,8 @@ void Fields(A& a, T& decision) {
   auto& [isolation_threshold, detection_samples, isolation_samples,
          isolation_fraction, join_fraction, reisolation_samples,
          clearing_samples, settling_samples, evidence_window, evidence_core,
-         evidence_support, interpolation_allowance] = decision;
-  // interpolation_allowance is appended behind the fields.
+         evidence_support, interpolation_allowance, early_error] = decision;
+  // The last two are appended behind the fields.
   a(isolation_threshold, detection_samples, isolation_samples,
     isolation_fraction, join_fraction, reisolation_samples, clearing_samples,
     settling_samples, evidence_window, evidence_core, evidence_support);
@@ -352,11 +355,16 @@ std::vector<std::byte> EncodeModelSet(const ModelSet& models) {
   if (allowance > 0.0) {
     payload(allowance);
   }
+  const double early_error = models.decision.early_error;
+  if (early_error > 0.0) {
+    payload(early_error);
+  }
   ByteWriter writer;
   writer.Put(kMagic);
   writer.Put(kFormat + (models.physics.empty() ? 0U : kWithPhysics) +
              (models.floor ? kWithFloor : 0U) + (drifts ? kWithDrift : 0U) +
-             (allowance > 0.0 ? kWithAllowance : 0U));
+             (allowance > 0.0 ? kWithAllowance : 0U) +
+             (early_error > 0.0 ? kWithEarlyNames : 0U));
   writer.Put(static_cast<std::uint64_t>(payload.writer.size()));
   writer.Append(payload.writer.view().data(), payload.writer.size());
   writer.Put(Checksum(writer.view()));
@@ -400,6 +408,9 @@ ModelSet DecodeModelSet(std::span<const std::byte> bytes,
   }
   if (((format - kFormat) & kWithAllowance) != 0) {
     decoder(models.decision.interpolation_allowance);
+  }
+  if (((format - kFormat) & kWithEarlyNames) != 0) {
+    decoder(models.decision.early_error);
   }
   payload.ExpectEnd();
   models.content_hash = ContentHash(models);  // Of what is stored.

@@ -354,5 +354,41 @@ TEST(ValveEngineTest, UnusableModelSetIsRefused) {
                DataError);
 }
 
+// f3 and f6 are told apart by the command: at 50 % they are the same.
+TEST(ValveEngineTest, AFaultIsNamedOnceAllOthersAreRefuted) {
+  for (const double swing : {20.0, 0.0}) {
+    for (const double error : {1e-3, 0.0}) {
+      ModelSet models = tests::LinearPlant();
+      models.decision.isolation_samples = 30;
+      models.decision.early_error = error;
+      ValveEngine engine(std::make_shared<const ModelSet>(models));
+      Noise noise(4);
+      std::vector<Transition> transitions;
+      for (std::uint64_t k = 0; k < 240; ++k) {
+        Sample sample = PlantSample(k, swing);
+        noise.Add(sample);
+        if (k >= 205) {
+          AddF6(sample, 1.0);
+        }
+        for (const Transition& t : engine.Step(sample).Transitions()) {
+          transitions.push_back(t);
+        }
+      }
+      ASSERT_EQ(transitions.size(), 2U);
+      const Transition& isolated = transitions[1];
+      const double seconds =
+          static_cast<double>(isolated.stamp_ns - isolated.detection_stamp_ns) *
+          1e-9;
+      EXPECT_EQ(isolated.faults, swing > 0.0 ? 0b100U : 0b110U);
+      if (swing > 0.0 && error > 0.0) {
+        EXPECT_LE(seconds, 15.0);
+        EXPECT_GE(seconds, 2.0) << "the next samples have to bear it out";
+      } else {
+        EXPECT_GE(seconds, 29.0);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace fdi

@@ -66,6 +66,14 @@ TEST(ModelCodecTest, InterpolationAllowanceReadsBackInItsOwnFormat) {
             0.0);
 }
 
+TEST(ModelCodecTest, NamesBeforeTkReadBackInTheirOwnFormat) {
+  ModelSet models = RandomModelSet("valve", 5);
+  models.decision.early_error = 1e-3;
+  const auto bytes = EncodeModelSet(models);
+  EXPECT_EQ(bytes[4], std::byte{19});
+  EXPECT_EQ(DecodeModelSet(bytes, "test").decision.early_error, 1e-3);
+}
+
 TEST(ModelCodecTest, EveryFieldReadsBackBitForBit) {
   ModelSet models = RandomModelSet("valve", 5);
   models.observers[2].channels[1].model.parallel = false;
@@ -223,7 +231,7 @@ TEST(ModelCodecTest, RefusalsNameThePlaceAndTheReason) {
   auto older = bytes;
   older[4] = std::byte{2};
   EXPECT_THAT(Refusal(WithValidChecksum(older)),
-              HasSubstr("format version 2, this program reads 3 to 18"));
+              HasSubstr("format version 2, this program reads 3 to 34"));
   EXPECT_THAT(Refusal({}), HasSubstr("is not a model set"));
   // The length of the name stands first in the payload, after 16 bytes.
   auto huge = bytes;

@@ -20,6 +20,7 @@ void VisitDecision(DecisionParameters& d, Visitor&& visit) {
   visit("evidence_core", d.evidence_core, 0.0, 1e6);
   visit("evidence_support", d.evidence_support, 1e-6, 1e6);
   visit("interpolation_allowance", d.interpolation_allowance, 0.0, 1.0);
+  visit("early_error", d.early_error, 0.0, 0.1);
 }
 
 template <typename Visitor>
