@@ -198,44 +198,10 @@ void CsvReader::Refuse(const std::string& reason) const {
 // ColumnMap::header_rows less one further rows. Blank lines may be anywhere. A
 // record can take several lines, because a quoted cell may contain line breaks:
 // all decisions about the separator come before a record is begun.
-// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 std::optional<CsvRow> CsvReader::TakeLine(std::string_view line,
                                           std::int64_t number) {
   line_ = number > 0 ? number : line_ + 1;
-  if (line_ <= options_.map.skip && names_.empty()) {
-    return std::nullopt;
-  }
-  if (names_.empty() && !record_.open()) {
-    // Spreadsheets write the separator into a line of its own.
-    if (line.starts_with("sep=") && line.size() >= 5) {
-      options_.map.separator = line[4];
-      return std::nullopt;
-    }
-    // A pipe shows the header alone, so its separator is the one that cuts it
-    // into most cells. For whole tables FindLayout() has settled this.
-    if (options_.map.separator == '\0' &&
-        line.find_first_not_of(" \t\r") != std::string_view::npos) {
-      options_.map.separator = FindSeparator({&line, 1});
-    }
-    record_ = CsvCells(options_.map.separator);
-  }
-  if (!record_.open() && line.starts_with('#') && !names_.empty() &&
-      !names_.front().starts_with('#')) {
-    return std::nullopt;
-  }
-  if (!record_.TakeLine(line) || record_.blank()) {
-    return std::nullopt;
-  }
-  if (names_.empty()) {
-    TakeHeader();
-    return std::nullopt;
-  }
-  if (header_left_ > 0) {
-    --header_left_;
-    return std::nullopt;
-  }
-  record_.Trim(names_.size());
-  if (IsMarker()) {
+  if (!EndsRow(line)) {
     return std::nullopt;
   }
   if (record_.cells().size() != names_.size()) {
@@ -276,6 +242,50 @@ std::optional<CsvRow> CsvReader::TakeLine(std::string_view line,
     row.labelled.truth = Truth();
   }
   return row;
+}
+
+// Whether `line` ends a row of readings. Header and markers are taken here.
+bool CsvReader::EndsRow(std::string_view line) {
+  if (line_ <= options_.map.skip && names_.empty()) {
+    return false;
+  }
+  if (names_.empty() && !record_.open() && !BeginsHeader(line)) {
+    return false;
+  }
+  if (!record_.open() && line.starts_with('#') && !names_.empty() &&
+      !names_.front().starts_with('#')) {
+    return false;
+  }
+  if (!record_.TakeLine(line) || record_.blank()) {
+    return false;
+  }
+  if (names_.empty()) {
+    TakeHeader();
+    return false;
+  }
+  if (header_left_ > 0) {
+    --header_left_;
+    return false;
+  }
+  record_.Trim(names_.size());
+  return !IsMarker();
+}
+
+// Settles the separator, unless `line` does nothing but state it.
+bool CsvReader::BeginsHeader(std::string_view line) {
+  // Spreadsheets write the separator into a line of its own.
+  if (line.starts_with("sep=") && line.size() >= 5) {
+    options_.map.separator = line[4];
+    return false;
+  }
+  // A pipe shows the header alone, so its separator is the one that cuts it
+  // into most cells. For whole tables FindLayout() has settled this.
+  if (options_.map.separator == '\0' &&
+      line.find_first_not_of(" \t\r") != std::string_view::npos) {
+    options_.map.separator = FindSeparator({&line, 1});
+  }
+  record_ = CsvCells(options_.map.separator);
+  return true;
 }
 
 // Rows that hold no reading, before and behind the others or marked as such:
@@ -474,7 +484,6 @@ std::optional<std::size_t> CsvReader::Column(std::string_view name) {
   return found;
 }
 
-// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 void CsvReader::TakeHeader() {
   names_ = record_.cells();
   header_cells_ = names_;
@@ -494,24 +503,7 @@ void CsvReader::TakeHeader() {
     clock_column_ = Column(map.clock_column);
   }
   if (map.long_table) {
-    tag_column_ = Column(map.long_table->tag);
-    value_column_ = Column(map.long_table->value).value_or(names_.size());
-    if (!map.long_table->quality.empty()) {
-      quality_column_ = Column(map.long_table->quality);
-    }
-    CheckLongHeader();
-    if (options_.scan) {
-      used_.clear();
-      return;
-    }
-    // From here on `used_` counts tags instead of columns: Finish() reports
-    // mapped tags that never occurred.
-    used_.assign(map.columns.size(), false);
-    for (const ColumnMapping& m : map.columns) {
-      AddSignal(value_column_, m);
-      conversions_.back().quality = quality_column_;
-    }
-    header_.flow_unit = map.flow_unit.value_or(header_.flow_unit);
+    TakeLongHeader();
     return;
   }
   if (options_.scan) {
@@ -532,12 +524,44 @@ void CsvReader::TakeHeader() {
       header_.ignored_columns.push_back(names_[i]);
     }
   }
+  AddQualities();
+  // Emptied, so that Finish() does not take columns for tags.
+  used_.clear();
+  header_.has_truth = fault_column_ || strength_column_;
+  CheckHeader();
+}
+
+void CsvReader::TakeLongHeader() {
+  const ColumnMap& map = options_.map;
+  tag_column_ = Column(map.long_table->tag);
+  value_column_ = Column(map.long_table->value).value_or(names_.size());
+  if (!map.long_table->quality.empty()) {
+    quality_column_ = Column(map.long_table->quality);
+  }
+  CheckLongHeader();
+  if (options_.scan) {
+    used_.clear();
+    return;
+  }
+  // From here on `used_` counts tags instead of columns: Finish() reports
+  // mapped tags that never occurred.
+  used_.assign(map.columns.size(), false);
+  for (const ColumnMapping& m : map.columns) {
+    AddSignal(value_column_, m);
+    conversions_.back().quality = quality_column_;
+  }
+  header_.flow_unit = map.flow_unit.value_or(header_.flow_unit);
+}
+
+// The column of the quality of each signal, by the map or as it was found.
+void CsvReader::AddQualities() {
+  const auto& found_for = options_.map.quality_of;
   for (Conversion& c : conversions_) {
-    const auto found = map.quality_of.find(names_[c.column]);
-    const std::string& name = !c.mapping.quality.empty() ? c.mapping.quality
-                              : found != map.quality_of.end()
-                                  ? found->second
-                                  : c.mapping.quality;
+    std::string name = c.mapping.quality;
+    if (const auto found = found_for.find(names_[c.column]);
+        name.empty() && found != found_for.end()) {
+      name = found->second;
+    }
     if (!name.empty() && !(c.quality = Column(name))) {
       Refuse("missing column " + name + "; the header is " +
              Quoted(Listed(names_)) + "; try quality under [signal." +
@@ -545,10 +569,6 @@ void CsvReader::TakeHeader() {
     }
     std::erase(header_.ignored_columns, name);
   }
-  // Emptied, so that Finish() does not take columns for tags.
-  used_.clear();
-  header_.has_truth = fault_column_ || strength_column_;
-  CheckHeader();
 }
 
 void CsvReader::AddSignal(std::size_t column, const ColumnMapping& mapping) {

@@ -239,7 +239,11 @@ class CsvReader {
     std::optional<std::size_t> quality{};
   };
 
+  bool EndsRow(std::string_view line);
+  bool BeginsHeader(std::string_view line);
   void TakeHeader();
+  void TakeLongHeader();
+  void AddQualities();
   std::optional<std::size_t> Column(std::string_view name);
   void AddSignal(std::size_t column, const ColumnMapping& mapping);
   void AddMapped();

@@ -107,6 +107,29 @@ void ForEachRecord(std::span<const std::string_view> lines, std::size_t begin,
   }
 }
 
+/// What the first rows of a table have in common.
+struct RowShape {
+  explicit RowShape(const std::vector<Record>& records);
+  bool IsData(const Record& record) const;
+  bool IsHeader(const Record& record) const;
+
+  std::size_t width{0};  ///< Of most rows.
+  std::vector<bool> holds_values;
+};
+
+/// A cell that shows the sign of decimals, and where it is.
+struct SignCell {
+  std::string cell;
+  std::size_t line{0};
+};
+
+/// The first cells that show each sign, by the sign of decimals.
+struct Signs {
+  std::map<char, SignCell> decimal;
+  std::map<char, SignCell> either;
+  std::map<char, SignCell> grouped;  ///< "1.234,5" by ','.
+};
+
 class LayoutFinder {
  public:
   LayoutFinder(std::span<const std::string_view> lines, ColumnMap map,
@@ -146,9 +169,15 @@ class LayoutFinder {
   bool IsNamed(const Cells& cells) const;
   void FindSeparatorSign();
   bool FindHeader();
+  void TakeNames(std::span<const Record> header, std::size_t at);
+  void TakeSampleRow(const Record& record);
   void FindTimeColumn();
   void CountWords();
   void FindDecimal();
+  Signs FindSigns() const;
+  void TakeGrouped(const Signs& signs);
+  [[noreturn]] void RefuseSign(const SignCell& seen,
+                               const std::string& reason) const;
   void FindTags();
   void FindQualities();
   void FindDateOrder();
@@ -206,47 +235,62 @@ bool LayoutFinder::IsNamed(const Cells& cells) const {
          });
 }
 
+RowShape::RowShape(const std::vector<Record>& records) {
+  std::map<std::size_t, std::size_t> widths;
+  for (const Record& record : records) {
+    ++widths[record.cells.size()];
+  }
+  width = std::ranges::max_element(widths, {}, [](const auto& entry) {
+            return entry.second;
+          })->first;
+  std::vector<std::size_t> values(width);
+  for (const Record& record : records) {
+    for (std::size_t c = 0; c < width && record.cells.size() == width; ++c) {
+      values[c] += IsValue(record.cells[c]) ? 1U : 0U;
+    }
+  }
+  for (const std::size_t count : values) {
+    holds_values.push_back(2 * count > widths[width]);
+  }
+}
+
+bool RowShape::IsData(const Record& record) const {
+  std::size_t full = 0;
+  std::size_t fits = 0;
+  for (std::size_t c = 0; c < width && record.cells.size() == width; ++c) {
+    const std::string& cell = record.cells[c];
+    if (holds_values[c] && !cell.empty()) {
+      ++full;
+      fits += IsValue(cell) || IsNoReading(cell) ? 1U : 0U;
+    }
+  }
+  return full > 0 && 2 * fits > full;
+}
+
+bool RowShape::IsHeader(const Record& record) const {
+  const auto full = static_cast<std::size_t>(std::ranges::count_if(
+      record.cells, [](const auto& cell) { return !cell.empty(); }));
+  const auto units =
+      static_cast<std::size_t>(std::ranges::count_if(record.cells, IsUnitCell));
+  return 2 * full >= width && record.cells.size() <= width && 2 * units < full;
+}
+
 // The header ends where the values begin: in the columns that hold numbers and
 // times in most rows, a row of the header holds something else. Its first row
 // with names that are not units counts; titles and comments in front have fewer
 // cells.
-// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 bool LayoutFinder::FindHeader() {
   std::vector<Record> records;
-  std::map<std::size_t, std::size_t> widths;
   ForEachRecord(lines_, static_cast<std::size_t>(map().skip), map().separator,
                 [&](std::size_t line, const Cells& cells) {
                   records.push_back({line, cells});
-                  ++widths[cells.size()];
                   return records.size() < kSampleRows;
                 });
   if (records.size() < 2) {
     return false;
   }
-  const std::size_t width =
-      std::ranges::max_element(widths, {}, [](const auto& entry) {
-        return entry.second;
-      })->first;
-  std::vector<std::size_t> values(width);
-  std::size_t rows = 0;
-  for (const Record& record : records) {
-    for (std::size_t c = 0; c < width && record.cells.size() == width; ++c) {
-      values[c] += IsValue(record.cells[c]) ? 1U : 0U;
-    }
-    rows += record.cells.size() == width ? 1U : 0U;
-  }
-  const auto is_data = [&](const Record& record) {
-    std::size_t full = 0;
-    std::size_t fits = 0;
-    for (std::size_t c = 0; c < width && record.cells.size() == width; ++c) {
-      if (2 * values[c] > rows && !record.cells[c].empty()) {
-        ++full;
-        fits +=
-            IsValue(record.cells[c]) || IsNoReading(record.cells[c]) ? 1U : 0U;
-      }
-    }
-    return full > 0 && 2 * fits > full;
-  };
+  const RowShape shape(records);
+  const auto is_data = [&](const Record& r) { return shape.IsData(r); };
   auto data = std::ranges::find_if(records, is_data);
   auto names = std::ranges::find_if(
       records, [&](const Record& record) { return IsNamed(record.cells); });
@@ -259,16 +303,9 @@ bool LayoutFinder::FindHeader() {
   if (data == records.end()) {
     return false;  // The reader says what is missing.
   }
-  const auto is_header = [&](const Record& record) {
-    const auto full = static_cast<std::size_t>(std::ranges::count_if(
-        record.cells, [](const auto& cell) { return !cell.empty(); }));
-    const auto units = static_cast<std::size_t>(
-        std::ranges::count_if(record.cells, IsUnitCell));
-    return 2 * full >= width && record.cells.size() <= width &&
-           2 * units < full;
-  };
   if (names == records.end()) {
-    names = std::find_if(records.begin(), data, is_header);
+    names = std::find_if(records.begin(), data,
+                         [&](const Record& r) { return shape.IsHeader(r); });
     if (names == data) {
       throw DataError(source_ + ":" + std::to_string(data->line) +
                       ": the first row holds values, not names: a header is "
@@ -284,44 +321,54 @@ bool LayoutFinder::FindHeader() {
            std::min<std::ptrdiff_t>(map().header_rows, records.end() - names);
   }
   map().header_rows = static_cast<int>(data - names);
-  Cells cells = names->cells;
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    layout_.names.push_back(UnnamedAs(cells[c], c));
-  }
-  layout_.about.resize(cells.size());
-  for (auto row = records.begin(); row != data; ++row) {
-    for (std::size_t c = 0;
-         row != names && c < cells.size() && row->cells.size() == cells.size();
-         ++c) {
-      layout_.about[c] += '\n' + row->cells[c];
-    }
-  }
-  columns_.resize(cells.size());
+  const auto at = static_cast<std::size_t>(names - records.begin());
+  const auto rows = static_cast<std::size_t>(data - records.begin());
+  TakeNames(std::span(records).first(rows), at);
   if (data == records.end()) {
     return false;
   }
   data_line_ = data->line;
-  for (auto row = data; row != records.end(); ++row) {
-    if (row->cells.size() != columns_.size()) {
-      continue;
-    }
-    for (std::size_t c = 0; c < columns_.size(); ++c) {
-      const std::string& cell = row->cells[c];
-      Column& column = columns_[c];
-      if (cell.empty() || IsNoReading(cell, map().no_reading)) {
-        continue;
-      }
-      ++column.full;
-      column.dates += AnyTime(cell) ? 1U : 0U;
-      column.clocks += IsClock(cell) ? 1U : 0U;
-      if (const auto value = AnyNumber(cell)) {
-        ++column.numbers;
-        column.values.push_back(*value);
-      }
-    }
-    rows_.push_back(std::move(*row));
+  for (const Record& record : std::span(records).subspan(rows)) {
+    TakeSampleRow(record);
   }
   return true;
+}
+
+// Of the rows in front of the values: `at` holds the names, the others what is
+// about them.
+void LayoutFinder::TakeNames(std::span<const Record> header, std::size_t at) {
+  const std::size_t width = header[at].cells.size();
+  columns_.resize(width);
+  layout_.about.resize(width);
+  for (std::size_t c = 0; c < width; ++c) {
+    layout_.names.push_back(UnnamedAs(header[at].cells[c], c));
+    for (std::size_t row = 0; row < header.size(); ++row) {
+      if (row != at && header[row].cells.size() == width) {
+        layout_.about[c] += '\n' + header[row].cells[c];
+      }
+    }
+  }
+}
+
+void LayoutFinder::TakeSampleRow(const Record& record) {
+  if (record.cells.size() != columns_.size()) {
+    return;
+  }
+  for (std::size_t c = 0; c < columns_.size(); ++c) {
+    const std::string& cell = record.cells[c];
+    Column& column = columns_[c];
+    if (cell.empty() || IsNoReading(cell, map().no_reading)) {
+      continue;
+    }
+    ++column.full;
+    column.dates += AnyTime(cell) ? 1U : 0U;
+    column.clocks += IsClock(cell) ? 1U : 0U;
+    if (const auto value = AnyNumber(cell)) {
+      ++column.numbers;
+      column.values.push_back(*value);
+    }
+  }
+  rows_.push_back(record);
 }
 
 // Text with a date comes before numbers of a size that only times have, those
@@ -543,26 +590,53 @@ void LayoutFinder::FindQualities() {
 // so is a table of ambiguous cells only, unless commas separate them and all
 // signs are points, or something else does and all are commas: a wrong guess
 // would be off by a factor of 1000.
-// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 void LayoutFinder::FindDecimal() {
   if (map().decimal != '\0') {
     return;
   }
-  struct Seen {
-    std::string cell;
-    std::size_t line{0};
-  };
-  std::map<char, Seen> decimal;
-  std::map<char, Seen> either;
-  std::map<char, Seen> grouped;  // By the sign of decimals: "1.234,5" by ','.
-  const auto refuse = [&](const Seen& seen, const std::string& reason) {
-    throw DataError(source_ + ":" + std::to_string(seen.line) + ": " +
-                    Quoted(seen.cell) + reason +
-                    "; try decimal = \".\" or decimal = \",\" under [file] "
-                    "of --map, or --decimal");
-  };
+  const Signs signs = FindSigns();
+  const auto& [decimal, either, grouped] = signs;
+  if (decimal.size() == 2 || grouped.size() == 2) {
+    const auto& both = decimal.size() == 2 ? decimal : grouped;
+    const bool point_first = both.at('.').line < both.at(',').line;
+    RefuseSign(both.at(point_first ? ',' : '.'),
+               " and cells above differ in the sign of decimals; expected "
+               "one of point and comma throughout");
+  }
+  if (!grouped.empty()) {
+    TakeGrouped(signs);
+    return;
+  }
+  constexpr const char* kUnknown =
+      " and all other cells may have decimals or thousands; expected to know "
+      "which";
+  if (decimal.empty() && either.size() == 1 && either.contains('.') &&
+      map().separator != ',') {
+    if (!choose_) {
+      RefuseSign(either.begin()->second, kUnknown);
+    }
+    layout_.choices["decimal"] =
+        "every number may have three decimals or thousands";
+  }
+  const bool comma = decimal.empty() && !either.empty() &&
+                     map().separator != ',' && !either.contains('.');
+  if (decimal.empty() && either.contains(',') && map().separator == ',') {
+    RefuseSign(either.at(','), kUnknown);
+  }
+  const char sign = !decimal.empty() ? decimal.begin()->first
+                    : comma          ? ','
+                                     : '.';
+  const char other = sign == '.' ? ',' : '.';
+  if (either.contains(other)) {
+    RefuseSign(either.at(other), " seems to have a thousands separator");
+  }
+  map().decimal = sign;
+}
+
+Signs LayoutFinder::FindSigns() const {
+  Signs signs;
   ForEachRecord(
-      lines_, data_line_ - 1, map().separator,
+      lines_, data_line_ - 1, layout_.map.separator,
       [&](std::size_t line, const Cells& cells) {
         for (const std::string& whole : cells) {
           const bool has_unit =
@@ -573,13 +647,14 @@ void LayoutFinder::FindDecimal() {
           char sign = '.';
           switch (DigitsOf(cell, sign)) {
             case Digits::kDecimal:
-              decimal.try_emplace(sign, Seen{cell, line});
+              signs.decimal.try_emplace(sign, SignCell{cell, line});
               break;
             case Digits::kEither:
-              either.try_emplace(sign, Seen{cell, line});
+              signs.either.try_emplace(sign, SignCell{cell, line});
               break;
             case Digits::kThousands:
-              grouped.try_emplace(sign == '.' ? ',' : '.', Seen{cell, line});
+              signs.grouped.try_emplace(sign == '.' ? ',' : '.',
+                                        SignCell{cell, line});
               break;
             case Digits::kNone:
               break;
@@ -587,49 +662,28 @@ void LayoutFinder::FindDecimal() {
         }
         return true;
       });
-  if (decimal.size() == 2 || grouped.size() == 2) {
-    auto& both = decimal.size() == 2 ? decimal : grouped;
-    refuse(both['.'].line < both[','].line ? both[','] : both['.'],
-           " and cells above differ in the sign of decimals; expected "
-           "one of point and comma throughout");
-  }
-  if (!grouped.empty()) {
-    const auto& [sign, seen] = *grouped.begin();
-    if (!decimal.empty() && !decimal.contains(sign)) {
-      refuse(seen, " has thousands separators, and " +
-                       Quoted(decimal.begin()->second.cell) + " in line " +
-                       std::to_string(decimal.begin()->second.line) +
-                       " the same sign for decimals");
-    }
-    map().decimal = sign;
-    map().thousands = sign == '.' ? ',' : '.';
-    return;
-  }
-  if (decimal.empty() && either.size() == 1 && either.contains('.') &&
-      map().separator != ',') {
-    if (!choose_) {
-      refuse(either.begin()->second,
-             " and all other cells may have decimals or thousands; expected "
-             "to know which");
-    }
-    layout_.choices["decimal"] =
-        "every number may have three decimals or thousands";
-  }
-  const bool comma = decimal.empty() && !either.empty() &&
-                     map().separator != ',' && !either.contains('.');
-  if (decimal.empty() && either.contains(',') && map().separator == ',') {
-    refuse(either[','],
-           " and all other cells may have decimals or thousands; expected to "
-           "know which");
-  }
-  const char sign = !decimal.empty() ? decimal.begin()->first
-                    : comma          ? ','
-                                     : '.';
-  const char other = sign == '.' ? ',' : '.';
-  if (either.contains(other)) {
-    refuse(either[other], " seems to have a thousands separator");
+  return signs;
+}
+
+// Cells with both signs leave no doubt, unless others contradict them.
+void LayoutFinder::TakeGrouped(const Signs& signs) {
+  const auto& [sign, seen] = *signs.grouped.begin();
+  if (!signs.decimal.empty() && !signs.decimal.contains(sign)) {
+    const SignCell& other = signs.decimal.begin()->second;
+    RefuseSign(seen, " has thousands separators, and " + Quoted(other.cell) +
+                         " in line " + std::to_string(other.line) +
+                         " the same sign for decimals");
   }
   map().decimal = sign;
+  map().thousands = sign == '.' ? ',' : '.';
+}
+
+void LayoutFinder::RefuseSign(const SignCell& seen,
+                              const std::string& reason) const {
+  throw DataError(source_ + ":" + std::to_string(seen.line) + ": " +
+                  Quoted(seen.cell) + reason +
+                  "; try decimal = \".\" or decimal = \",\" under [file] "
+                  "of --map, or --decimal");
 }
 
 // Of dates with slashes or short years: the order in which all of them are
