@@ -256,6 +256,38 @@ std::optional<Signal> SignalOf(Role role) {
   return std::nullopt;
 }
 
+// The unit in the name of a column, or in the rows below it.
+std::string StatedUnit(const SniffedColumn& column) {
+  std::string unit = UnitIn(column.name).unit;
+  std::istringstream about(column.about);
+  for (std::string cell; unit.empty() && std::getline(about, cell);) {
+    unit = UnitIn('[' + cell + ']').unit;
+  }
+  return unit;
+}
+
+// A flow, a pressure or a temperature by its unit alone, also where the name
+// says otherwise.
+std::optional<Role> RoleByUnit(std::optional<Role> role,
+                               const std::string& unit) {
+  if (SameName(unit, "mA")) {
+    // The current to a positioner; a transmitter with its current in mA.
+    return role == Role::kValve ? Role::kCommand : role;
+  }
+  static constexpr std::pair<Signal, Role> kByUnit[] = {
+      {Signal::kF, Role::kFlow},
+      {Signal::kP1, Role::kPressure},
+      {Signal::kT1, Role::kTemperature}};
+  for (const auto& [signal, by_unit] : kByUnit) {
+    const auto named = role ? SignalOf(*role) : std::nullopt;
+    if (!unit.empty() && FindUnit(signal, unit) &&
+        !(named && FindUnit(*named, unit))) {
+      role = by_unit;
+    }
+  }
+  return role;
+}
+
 // What all names end with ("F_CV" of "FT.F_CV") or begin with tells them not
 // apart, so it is no evidence.
 std::vector<std::string> DistinctParts(
@@ -299,59 +331,103 @@ void Say(SniffedColumn& column, const std::string& what) {
   column.guessed += (column.guessed.empty() ? "" : "; ") + what;
 }
 
+/// Outliers that decide nothing, and readings that may be codes of a state.
+constexpr double kMaxOutliers = 0.05;
+constexpr double kMaxCoded = 0.2;
+constexpr std::size_t kMaxCodes = 4;
+constexpr std::size_t kMinRepeats = 3;
+
+// Whether the readings lie in [low, high], but for a few outliers and a few
+// numbers that repeat, such as -9999 or 32767: codes of a state. Readings that
+// vary less than what lies beyond are no readings beside codes.
+bool IsWithin(const SniffedColumn& column, double low, double high) {
+  std::map<double, std::size_t> within;
+  std::map<double, std::size_t> beyond;
+  for (const double value : column.values) {
+    ++(value >= low && value <= high ? within : beyond)[value];
+  }
+  std::size_t coded = 0;
+  std::size_t outliers = 0;
+  std::size_t codes = 0;
+  for (const auto& [value, count] : beyond) {
+    const bool code = count >= kMinRepeats;
+    codes += code ? 1U : 0U;
+    (code ? coded : outliers) += count;
+  }
+  const auto total = static_cast<double>(column.values.size());
+  return within.size() > codes && codes <= kMaxCodes &&
+         static_cast<double>(outliers) <= kMaxOutliers * total &&
+         static_cast<double>(coded) <= kMaxCoded * total;
+}
+
+// The range of a percentage in the numbers of the file.
+std::pair<double, double> PercentRange(const std::string& unit) {
+  const auto conversion = FindUnit(Signal::kX, unit);
+  const double scale = conversion ? conversion->scale : 1.0;
+  return {-15.0 / scale, 115.0 / scale};
+}
+
+// Whether most values fit a percentage in a unit, or without one; sets the unit
+// where none is stated.
+bool FitsPercent(SniffedColumn& column) {
+  if (SameName(column.unit, "mA")) {
+    return IsWithin(column, 3.0, 21.0);
+  }
+  if (column.unit.empty()) {
+    // What may be a percentage is no code beside shares.
+    const auto count = [&](double low, double high) {
+      return std::ranges::count_if(
+          column.values, [&](double v) { return v >= low && v <= high; });
+    };
+    const bool share = IsWithin(column, -0.1, 1.1) &&
+                       20 * count(-0.1, 1.1) >= 19 * count(-15.0, 115.0);
+    column.unit = share ? "1" : "%";
+    Say(column, share ? "0 to 1 by size" : "% by size");
+  }
+  const auto [low, high] = PercentRange(column.unit);
+  return IsWithin(column, low, high);
+}
+
+// Whether the numbers are those of an analog card, 27648 at 100 %.
+bool AreCounts(const SniffedColumn& column) {
+  return std::ranges::all_of(column.values,
+                             [](double v) { return v == std::floor(v); }) &&
+         IsWithin(column, -5000.0, 33000.0) &&
+         !IsWithin(column, -5000.0, 2000.0);
+}
+
 // Whether most values fit a signal in a unit, or without one; sets unit, raw
 // and span. Most, because a few states and outliers are in every export.
 bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit) {
-  const double low = column.Quantile(0.05);
-  const double high = column.Quantile(0.95);
   const double median = std::abs(column.Quantile(0.5));
-  const bool whole = std::ranges::all_of(
-      column.values, [](double v) { return v == std::floor(v); });
   column.unit = unit;
   column.raw.clear();
   column.span.clear();
   const bool current = SameName(unit, "mA");
-  const bool counts = unit.empty() && whole && high > 2000.0 &&
-                      low >= -5000.0 && high <= 33000.0;
-  const auto take_raw = [&](double from, double to) {
-    column.raw = {from, to};
-    if (!IsPercent(signal)) {
-      column.span = {0.0, 100.0};
-      Say(column, "span is open: state the range of the transmitter");
-    }
-  };
   if (!unit.empty() && !current && !FindUnit(signal, unit)) {
     return false;
   }
-  if (IsPercent(signal)) {
-    if (current) {
-      return low > 3.0 && high < 21.0;
-    }
-    if (counts) {
-      take_raw(0.0, 27648.0);
+  const bool counts = unit.empty() && AreCounts(column);
+  if (IsPercent(signal) && !counts) {
+    return FitsPercent(column);
+  }
+  if (current || counts) {
+    column.raw = current ? std::vector{4.0, 20.0} : std::vector{0.0, 27648.0};
+    if (IsPercent(signal)) {
       column.unit = "%";
       Say(column, "counts of an analog card, 27648 at 100 %");
       return true;
     }
-    if (unit.empty()) {
-      const bool share = low >= -0.1 && high <= 1.1;
-      column.unit = share ? "1" : "%";
-      Say(column, share ? "0 to 1 by size" : "% by size");
-    }
-    const auto conversion = FindUnit(signal, column.unit);
-    return conversion && conversion->scale * low > -15.0 &&
-           conversion->scale * high < 115.0;
-  }
-  const bool pressure =
-      signal != Signal::kF && signal != Signal::kT1 && signal != Signal::kCvi;
-  if (current || counts) {
-    current ? take_raw(4.0, 20.0) : take_raw(0.0, 27648.0);
+    column.span = {0.0, 100.0};
+    Say(column, "span is open: state the range of the transmitter");
     column.unit = signal == Signal::kF    ? "t/h"
                   : signal == Signal::kT1 ? "degC"
                                           : "bar";
     return true;
   }
   if (unit.empty()) {
+    const bool pressure =
+        signal != Signal::kF && signal != Signal::kT1 && signal != Signal::kCvi;
     column.unit = signal == Signal::kF ? "m3/h"
                   : signal == Signal::kT1
                       ? (median > 250.0 && median < 450.0 ? "K" : "degC")
@@ -365,18 +441,35 @@ bool FitsSignal(SniffedColumn& column, Signal signal, const std::string& unit) {
   return true;
 }
 
+// The range beyond which readings are outliers or codes: of a percentage that
+// of its unit; else three quartile distances from the quartiles, or, where that
+// would leave out more than a few, the middle 90 % and as much on either side.
+std::pair<double, double> UsualRange(const SniffedColumn& column) {
+  if (column.signal && IsPercent(*column.signal) && !column.given) {
+    if (!column.raw.empty()) {
+      const double margin = 0.15 * (column.raw[1] - column.raw[0]);
+      return {column.raw[0] - margin, column.raw[1] + margin};
+    }
+    return SameName(column.unit, "mA") ? std::pair(3.0, 21.0)
+                                       : PercentRange(column.unit);
+  }
+  const double lower = column.Quantile(0.25);
+  const double upper = column.Quantile(0.75);
+  const double reach = 3.0 * (upper - lower);
+  if (IsWithin(column, lower - reach, upper + reach)) {
+    return {lower - reach, upper + reach};
+  }
+  const double low = column.Quantile(0.05);
+  const double high = column.Quantile(0.95);
+  return {2.0 * low - high, 2.0 * high - low};
+}
+
 // Correlation of b with a delayed by 0, 1 or 2 periods, the strongest. The
 // delays allow for the lag of the rod behind the command, and of the flow
-// behind the rod. The sign is kept, because the sense follows from it. Values
-// beyond the range of most others are left out.
+// behind the rod. The sign is kept, because the sense follows from it.
 double Correlation(const SniffedColumn& a, const SniffedColumn& b) {
-  const auto usual = [](const SniffedColumn& column) {
-    const double low = column.Quantile(0.05);
-    const double high = column.Quantile(0.95);
-    return std::pair(2.0 * low - high, 2.0 * high - low);
-  };
-  const auto [low_a, high_a] = usual(a);
-  const auto [low_b, high_b] = usual(b);
+  const auto [low_a, high_a] = UsualRange(a);
+  const auto [low_b, high_b] = UsualRange(b);
   std::map<double, double> at;
   for (std::size_t k = 0; k < a.values.size(); ++k) {
     if (a.values[k] >= low_a && a.values[k] <= high_a) {
@@ -429,6 +522,7 @@ class SignalGuess {
   }
   void GuessNames();
   void GuessName(SniffedColumn& column, const std::string& part);
+  bool TakeKnown(SniffedColumn& column, const std::string& unit);
   void SettleValves();
   void SettlePressures();
   void KeepFirst(Signal signal);
@@ -455,13 +549,8 @@ void SignalGuess::GuessNames() {
   }
 }
 
-// NOLINTNEXTLINE(readability-function-size): one decision after the other.
-void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
-  std::string unit = UnitIn(column.name).unit;
-  std::istringstream about(column.about);
-  for (std::string cell; unit.empty() && std::getline(about, cell);) {
-    unit = UnitIn('[' + cell + ']').unit;
-  }
+// A name of the contract, or a column of the caller's map.
+bool SignalGuess::TakeKnown(SniffedColumn& column, const std::string& unit) {
   for (const SignalColumn& known : kSignalColumns) {
     if (SameName(known.name, column.name)) {
       column.signal = known.signal;
@@ -471,7 +560,7 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
                         ? "1"
                         : std::string(SignalUnit(known.signal));
       sure_.push_back(&column);
-      return;
+      return true;
     }
   }
   if (column.given) {
@@ -481,9 +570,15 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
     column.opening = given.sense == Sense::kOpening;
     Say(column, "given");
     sure_.push_back(&column);
+  }
+  return column.given.has_value();
+}
+
+void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
+  const std::string unit = StatedUnit(column);
+  if (TakeKnown(column, unit)) {
     return;
   }
-  const NameGuess guess = RoleOf(UnitIn(part).rest, column.about);
   if (IsGasUnit(unit)) {
     Say(column, "a flow of gas, and the physics is for water");
     found_.findings.push_back(
@@ -493,34 +588,14 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
         "--signals CV,X");
     return;
   }
-  if (IsToken(PlainText(unit), kOtherUnits)) {
-    return;
-  }
-  std::optional<Role> role = guess.role;
-  // A flow, a pressure or a temperature by its unit alone, also where the name
-  // says otherwise.
-  if (!unit.empty() && !SameName(unit, "mA")) {
-    static constexpr std::pair<Signal, Role> kByUnit[] = {
-        {Signal::kF, Role::kFlow},
-        {Signal::kP1, Role::kPressure},
-        {Signal::kT1, Role::kTemperature}};
-    for (const auto& [signal, by_unit] : kByUnit) {
-      const auto named = role ? SignalOf(*role) : std::nullopt;
-      if (FindUnit(signal, unit) && !(named && FindUnit(*named, unit))) {
-        role = by_unit;
-      }
-    }
-  }
-  if (!role) {
+  const NameGuess guess = RoleOf(UnitIn(part).rest, column.about);
+  const std::optional<Role> role = RoleByUnit(guess.role, unit);
+  if (!role || IsToken(PlainText(unit), kOtherUnits)) {
     return;
   }
   if (role == Role::kLevel) {
     Say(column, "a level");
     return;
-  }
-  // The current to a positioner; a transmitter with its current in mA.
-  if (SameName(unit, "mA") && role == Role::kValve) {
-    role = Role::kCommand;
   }
   const Signal signal = *SignalOf(*role);
   if (!FitsSignal(column, signal, unit)) {
@@ -817,6 +892,99 @@ std::string TomlPair(const std::vector<double>& pair) {
   return '[' + NumberText(pair.at(0)) + ", " + NumberText(pair.at(1)) + ']';
 }
 
+// The end of a line that may be a choice.
+std::string Choice(const Sniffed& found, const std::string& key) {
+  for (const std::string& choice : found.choices) {
+    if (choice.starts_with(key + ": ")) {
+      return "  # choice: " + choice.substr(key.size() + 2) + "\n";
+    }
+  }
+  return "\n";
+}
+
+std::string FileToml(const Sniffed& found) {
+  const ColumnMap& map = found.map;
+  const auto sign = [](char c) {
+    return TomlText(c == '\t' ? "tab" : std::string(1, c));
+  };
+  std::string text = "\n[file]\nseparator = " + sign(map.separator) +
+                     "\ndecimal = " + sign(map.decimal) +
+                     Choice(found, "decimal");
+  if (map.thousands != '\0') {
+    text += "thousands = " + sign(map.thousands) + "\n";
+  }
+  if (map.skip > 0) {
+    text += "skip = " + std::to_string(map.skip) + "\n";
+  }
+  if (map.header_rows > 1) {
+    text += "header = " + std::to_string(map.header_rows) + "\n";
+  }
+  if (!map.no_reading.empty()) {
+    text += "missing = " + TomlList(map.no_reading) + Choice(found, "missing");
+  }
+  if (!found.resample.empty()) {
+    text += "resample = " + TomlText(found.resample) + "\n";
+  }
+  return text;
+}
+
+std::string TimeToml(const Sniffed& found) {
+  const ColumnMap& map = found.map;
+  std::string text = "\n[time]\ncolumn = " + TomlText(map.time_column) + "\n";
+  if (!map.clock_column.empty()) {
+    text += "clock = " + TomlText(map.clock_column) + "\n";
+  }
+  if (found.time.form != TimeForm::kText) {
+    text += "unit = " + TomlText(std::string(TimeUnitName(found.time))) +
+            Choice(found, "time");
+  }
+  if (map.date_order != DateOrder::kNotSaid) {
+    text += std::string("date = ") +
+            (map.date_order == DateOrder::kDayFirst     ? "\"d/m/y\""
+             : map.date_order == DateOrder::kMonthFirst ? "\"m/d/y\""
+                                                        : "\"y/m/d\"") +
+            Choice(found, "date");
+  }
+  if (found.dated) {
+    text += map.zone.empty() ? "# zone = \"Europe/Warsaw\"\n"
+                             : "zone = " + TomlText(map.zone) + "\n";
+  }
+  return text;
+}
+
+std::string SignalToml(const ColumnMap& map, const SniffedColumn& column) {
+  std::string text =
+      "\n[signal." + std::string(SignalName(*column.signal)) + "]" +
+      (column.guessed.empty() ? "" : "  # guessed: " + column.guessed) +
+      "\ncolumn = " + TomlText(column.name) + "\nunit = " +
+      TomlText(column.given && SameName(column.unit, "mA") ? "%"
+                                                           : column.unit) +
+      "\n";
+  if (column.given) {
+    // In `unit`, as the map of the caller had it.
+    const auto unit =
+        FindUnit(*column.signal, column.unit).value_or(UnitConversion{});
+    text += "scale = " + NumberText(column.given->scale / unit.scale) +
+            "\noffset = " +
+            NumberText((column.given->offset - unit.offset) / unit.scale) +
+            "\n";
+  }
+  if (!column.raw.empty()) {
+    text += "raw = " + TomlPair(column.raw) + "\n";
+  }
+  if (!column.span.empty()) {
+    text += "span = " + TomlPair(column.span) + "\n";
+  }
+  if (column.opening) {
+    text += "sense = \"opening\"\n";
+  }
+  if (const auto quality = map.quality_of.find(column.name);
+      quality != map.quality_of.end()) {
+    text += "quality = " + TomlText(quality->second) + "\n";
+  }
+  return text;
+}
+
 // What the importer makes of the table with the guessed signals.
 void ReadWith(std::string_view text, const std::string& source,
               Sniffed& found) {
@@ -918,20 +1086,7 @@ Sniffed Sniff(std::string_view text, const std::string& source, ColumnMap map) {
   return found;
 }
 
-// NOLINTNEXTLINE(readability-function-size): one decision after the other.
 std::string MapText(const Sniffed& found, const std::string& file) {
-  const ColumnMap& map = found.map;
-  const auto chosen = [&](const std::string& key) {
-    for (const std::string& choice : found.choices) {
-      if (choice.starts_with(key + ": ")) {
-        return "  # choice: " + choice.substr(key.size() + 2) + "\n";
-      }
-    }
-    return std::string("\n");
-  };
-  const auto sign = [](char c) {
-    return TomlText(c == '\t' ? "tab" : std::string(1, c));
-  };
   std::string text =
       "# Of " + file +
       ", by fdi-store runs sniff. Check what is marked as guessed or as a "
@@ -941,85 +1096,20 @@ std::string MapText(const Sniffed& found, const std::string& file) {
     std::ranges::replace(line, '\n', ' ');
     text += "# - " + line + "\n";
   }
-  text += "\n[file]\nseparator = " + sign(map.separator) +
-          "\ndecimal = " + sign(map.decimal) + chosen("decimal");
-  if (map.thousands != '\0') {
-    text += "thousands = " + sign(map.thousands) + "\n";
-  }
-  if (map.skip > 0) {
-    text += "skip = " + std::to_string(map.skip) + "\n";
-  }
-  if (map.header_rows > 1) {
-    text += "header = " + std::to_string(map.header_rows) + "\n";
-  }
-  if (!map.no_reading.empty()) {
-    text += "missing = " + TomlList(map.no_reading) + chosen("missing");
-  }
-  if (!found.resample.empty()) {
-    text += "resample = " + TomlText(found.resample) + "\n";
-  }
-  text += "\n[time]\ncolumn = " + TomlText(map.time_column) + "\n";
-  if (!map.clock_column.empty()) {
-    text += "clock = " + TomlText(map.clock_column) + "\n";
-  }
-  if (found.time.form != TimeForm::kText) {
-    text += "unit = " + TomlText(std::string(TimeUnitName(found.time))) +
-            chosen("time");
-  }
-  if (map.date_order != DateOrder::kNotSaid) {
-    text += std::string("date = ") +
-            (map.date_order == DateOrder::kDayFirst     ? "\"d/m/y\""
-             : map.date_order == DateOrder::kMonthFirst ? "\"m/d/y\""
-                                                        : "\"y/m/d\"") +
-            chosen("date");
-  }
-  if (found.dated) {
-    text += map.zone.empty() ? "# zone = \"Europe/Warsaw\"\n"
-                             : "zone = " + TomlText(map.zone) + "\n";
-  }
-  if (map.long_table) {
-    text += "\n[long]\ntag = " + TomlText(map.long_table->tag) +
-            "\nvalue = " + TomlText(map.long_table->value) + "\n";
-    if (!map.long_table->quality.empty()) {
-      text += "quality = " + TomlText(map.long_table->quality) + "\n";
+  text += FileToml(found) + TimeToml(found);
+  if (const auto& tall = found.map.long_table) {
+    text += "\n[long]\ntag = " + TomlText(tall->tag) +
+            "\nvalue = " + TomlText(tall->value) + "\n";
+    if (!tall->quality.empty()) {
+      text += "quality = " + TomlText(tall->quality) + "\n";
     }
   }
-  if (!map.quality.good.empty()) {
-    text +=
-        "\n[quality]\ngood = " + TomlList(map.quality.good) + chosen("good");
+  if (const auto& good = found.map.quality.good; !good.empty()) {
+    text += "\n[quality]\ngood = " + TomlList(good) + Choice(found, "good");
   }
   for (const SniffedColumn& column : found.columns) {
-    if (!column.signal) {
-      continue;
-    }
-    text +=
-        "\n[signal." + std::string(SignalName(*column.signal)) + "]" +
-        (column.guessed.empty() ? "" : "  # guessed: " + column.guessed) +
-        "\ncolumn = " + TomlText(column.name) + "\nunit = " +
-        TomlText(column.given && SameName(column.unit, "mA") ? "%"
-                                                             : column.unit) +
-        "\n";
-    if (column.given) {
-      // In `unit`, as the map of the caller had it.
-      const auto unit =
-          FindUnit(*column.signal, column.unit).value_or(UnitConversion{});
-      text += "scale = " + NumberText(column.given->scale / unit.scale) +
-              "\noffset = " +
-              NumberText((column.given->offset - unit.offset) / unit.scale) +
-              "\n";
-    }
-    if (!column.raw.empty()) {
-      text += "raw = " + TomlPair(column.raw) + "\n";
-    }
-    if (!column.span.empty()) {
-      text += "span = " + TomlPair(column.span) + "\n";
-    }
-    if (column.opening) {
-      text += "sense = \"opening\"\n";
-    }
-    if (const auto quality = map.quality_of.find(column.name);
-        quality != map.quality_of.end()) {
-      text += "quality = " + TomlText(quality->second) + "\n";
+    if (column.signal) {
+      text += SignalToml(found.map, column);
     }
   }
   return text;

@@ -282,11 +282,11 @@ std::vector<Kind> Kinds() {
       {"numbers of a state",
        "time,FC2.OP,ZT2.PV,FT2.PV\n" + Rows([&](std::size_t k) {
          return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
-                (in(k, 70, 74) ? k < 72 ? "246.000" : "253.000"
+                (in(k, 70, 79) ? k < 75 ? "246.000" : "253.000"
                                : Fixed(kValve.x[k])) +
                 "," + Fixed(kValve.f[k]);
        }),
-       Range(70, 74)},
+       Range(70, 79)},
       {"blanks between thousands, tabs, decimal commas, brackets",
        "Zeit\tV 17 [Stellgröße] (%)\tV 17 [Stellung] (%)\tF 17 [Durchfluß] "
        "(kg/h)\n" +
@@ -426,6 +426,53 @@ TEST(KindsTest, SignalsAreRequiredByReadingsNotByHeaders) {
   } catch (const DataError& error) {
     EXPECT_THAT(error.what(), HasSubstr("no reading of CV in 120 rows"));
   }
+}
+
+// A fifth of the readings of X and F are codes, and two are outliers.
+TEST(KindsTest, StateCodesAndOutliersDecideNothing) {
+  const auto guess = [](const std::string& names, const Row& x, const Row& f) {
+    const Sniffed found =
+        Sniff("time," + names + "\n" + Rows([&](std::size_t k) {
+                return Iso(k) + "," + Fixed(kValve.cv[k]) + "," +
+                       (k % 5 == 2 ? x(k) : Fixed(kValve.x[k])) + "," +
+                       (k % 5 == 4 ? f(k) : Fixed(kValve.f[k]));
+              }),
+              "plant.csv", Utc());
+    EXPECT_EQ(found.columns[0].signal, Signal::kCv) << names;
+    EXPECT_EQ(found.columns[1].signal, Signal::kX) << names;
+    EXPECT_EQ(found.columns[2].signal, Signal::kF) << names;
+    EXPECT_EQ(found.columns[1].unit, "%") << names;
+    EXPECT_TRUE(found.columns[0].opening && found.columns[1].opening) << names;
+    EXPECT_TRUE(found.columns[1].raw.empty()) << names;
+  };
+  const auto outlier = [](std::size_t k, const std::string& code) {
+    return k == 52 || k == 84 ? "1e7" : code;
+  };
+  guess(
+      "FC2.OP,ZT2.PV,FT2 [t/h]",
+      [&](std::size_t k) { return outlier(k, k < 60 ? "-9999" : "32767"); },
+      [&](std::size_t k) { return outlier(k, "-9999"); });
+  // Far on the other side of zero than the readings.
+  guess(
+      "FC2.OP,ZT2.PV,FT2.PV", [&](std::size_t) { return "-32768"; },
+      [&](std::size_t) { return "9999"; });
+}
+
+// Numbers that are no codes: what a valve does in a fifth of the time counts.
+TEST(KindsTest, RarePositionsAreNotTakenForCodes) {
+  const auto unit = [](const Row& x) {
+    const std::string text =
+        "time,FC2.OP,ZT2.PV,FT2.PV\n" + Rows([&](std::size_t k) {
+          return Iso(k) + "," + Fixed(kValve.cv[k]) + "," + x(k) + "," +
+                 Fixed(kValve.f[k]);
+        });
+    return Sniff(text, "plant.csv", Utc()).columns[1].unit;
+  };
+  EXPECT_EQ(unit([](std::size_t k) {
+              return k % 5 == 0 ? "100" : Fixed(0.01 * kValve.x[k]);
+            }),
+            "%");
+  EXPECT_EQ(unit([](std::size_t k) { return Fixed(0.01 * kValve.x[k]); }), "1");
 }
 
 TEST(KindsTest, CountsBeyondTheCardAreABrokenWire) {
@@ -610,6 +657,7 @@ TEST(KindsTest, TheReferenceFilesGiveWhatTheirTableSays) {
       {"b08_state_numbers", 900, both(Range(300, 329), Range(500, 509))},
       {"b09_units_row", 720},
       {"b10_supply_lost", 1800},
+      {"b13_flow_95_t_h", 1501, {}, {}, "UTC", "", 0},
   };
   for (const File& file : files) {
     SCOPED_TRACE(file.name);
