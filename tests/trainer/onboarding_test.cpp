@@ -190,13 +190,19 @@ TEST(RecordChecksTest, SimulationHasToBeBetterThanNone) {
       RunOf({"r", SimulateHealthy(Lublin(), 900.0, 3)})};
   simulator::FittedParameter kv{"trim.kv_m3_h", 100.0, 120.0, 30.0,
                                 480.0,          0.01,  true};
-  EXPECT_NO_THROW(CheckFit(runs, {0.5, 0.2, 0.0, 0.0}, {kv}));
-  EXPECT_THROW(CheckFit(runs, {30.0, 0.2, 0.0, 0.0}, {kv}), DataError);
-  EXPECT_THROW(CheckFit(runs, {0.5, 30.0, 0.0, 0.0}, {kv}), DataError);
+  EXPECT_NO_THROW(CheckFit(runs, {0.5, 0.2, 0.0, 0.0}, {kv}, 40.0));
+  EXPECT_THROW(CheckFit(runs, {30.0, 0.2, 0.0, 0.0}, {kv}, 40.0), DataError);
+  EXPECT_THROW(CheckFit(runs, {0.5, 30.0, 0.0, 0.0}, {kv}, 40.0), DataError);
   kv.value = 480.0;
-  EXPECT_THROW(CheckFit(runs, {0.5, 0.2, 0.0, 0.0}, {kv}), DataError);
+  EXPECT_THROW(CheckFit(runs, {0.5, 0.2, 0.0, 0.0}, {kv}, 40.0), DataError);
   kv.identified = false;
-  EXPECT_NO_THROW(CheckFit(runs, {0.5, 0.2, 0.0, 0.0}, {kv}));
+  EXPECT_NO_THROW(CheckFit(runs, {0.5, 0.2, 0.0, 0.0}, {kv}, 40.0));
+  try {
+    CheckFit(runs, {0.5, 30.0, 0.0, 0.0}, {kv}, 2.0);
+    FAIL() << "not refused";
+  } catch (const DataError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("type ends at 2 t/h"));
+  }
 }
 
 // Models of a few faults; what a table says of a fault that is as plain as

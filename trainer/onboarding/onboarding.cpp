@@ -500,6 +500,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
                     ? InUnit(options.type, runs.front().flow_unit)
                     : options.type;
   result.signals = signals;
+  const double meter_end = result.type.parameters.instruments.flow.high;
   if (options.fit) {
     Part(progress, 0.0, kFitShare)(0.0, "fitting the physical parameters");
     OnboardingOptions fit = options;
@@ -508,9 +509,9 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
     result.type.parameters = result.fit->parameters;
     result.type.interpolated_command = result.fit->interpolated_command;
     result.type.command_delay = result.fit->command_delay;
-    CheckFit(runs, result.fit->fitted, result.fit->values);
+    CheckFit(runs, result.fit->fitted, result.fit->values, meter_end);
   } else {
-    CheckFit(runs, Compare(runs, result.type), {});
+    CheckFit(runs, Compare(runs, result.type), {}, meter_end);
   }
   const FaultSynthesizer synthesize(result.type);
   const std::vector<FaultCondition> faults = OnboardingFaults(signals);
@@ -520,8 +521,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   result.models =
       result.transferred
           ? TransferDifferenceSet(*options.of_type, runs, training, part)
-          : TrainDifferenceSet(runs, faults, std::ref(synthesize),
-                               result.type.parameters.instruments.flow.high,
+          : TrainDifferenceSet(runs, faults, std::ref(synthesize), meter_end,
                                training, part);
   result.models.physics = Physics(result.type, runs);
   result.channels = FitsOf(result.models, runs);

@@ -162,6 +162,24 @@ void CheckKind(const std::vector<TrainingRun>& runs, const Readings& cv,
   }
 }
 
+// What explains a flow that is not simulated: the flow meter of the type ends
+// before the readings do. Else empty.
+std::string BeyondMeter(const std::vector<TrainingRun>& runs, const Readings& f,
+                        double meter_end) {
+  const auto beyond = std::ranges::count_if(
+      f.values, [&](double value) { return value > meter_end; });
+  if (20 * beyond <= std::ssize(f.values)) {
+    return {};
+  }
+  const std::string unit(
+      FlowUnitName(runs.front().samples.front().sample.flow_unit));
+  return "F goes up to " + Text(f.high) + ' ' + unit +
+         ", and the flow meter of the valve's type ends at " + Text(meter_end) +
+         ' ' + unit +
+         ": state the range of this one as flow = { low = 0, high = ... } "
+         "under [instruments] of --type FILE.toml. With the present range, ";
+}
+
 }  // namespace
 
 void CheckRecords(const std::vector<TrainingRun>& runs) {
@@ -177,10 +195,13 @@ void CheckRecords(const std::vector<TrainingRun>& runs) {
 
 void CheckFit(const std::vector<TrainingRun>& runs,
               const simulator::RecordFit& simulation,
-              const std::vector<simulator::FittedParameter>& parameters) {
-  const auto refuse = [](const char* what, double error, double naive,
-                         const char* model, const char* unit) {
-    throw DataError("the simulated valve follows the record worse than " +
+              const std::vector<simulator::FittedParameter>& parameters,
+              double meter_end) {
+  const Readings f = ReadingsOf(runs, Signal::kF);
+  const auto refuse = [&](const char* what, double error, double naive,
+                          const char* model, const char* unit) {
+    throw DataError(BeyondMeter(runs, f, meter_end) +
+                    "the simulated valve follows the record worse than " +
                     std::string(model) + " does: " + what + " RMSE " +
                     Text(error) + " instead of " + Text(naive) + unit +
                     ". Check units and sense of all columns, and that the "
@@ -190,7 +211,6 @@ void CheckFit(const std::vector<TrainingRun>& runs,
   };
   const Readings cv = ReadingsOf(runs, Signal::kCv);
   const Readings x = ReadingsOf(runs, Signal::kX);
-  const Readings f = ReadingsOf(runs, Signal::kF);
   double squares = 0.0;
   for (std::size_t k = 0; k < x.values.size(); ++k) {
     squares += (x.values[k] - cv.values[k]) * (x.values[k] - cv.values[k]);

@@ -17,9 +17,11 @@ void CheckRecords(const std::vector<TrainingRun>& runs);
 /// Refuses a simulation that follows the records worse than X = CV and F = its
 /// mean do, and fitted parameters that stand at the bound of their search:
 /// what faults do to such a valve is not known.
+/// @param meter_end highest reading of the type's flow meter [unit of F].
 /// @throws DataError likewise.
 void CheckFit(const std::vector<TrainingRun>& runs,
               const simulator::RecordFit& simulation,
-              const std::vector<simulator::FittedParameter>& parameters);
+              const std::vector<simulator::FittedParameter>& parameters,
+              double meter_end);
 
 }  // namespace fdi::trainer
