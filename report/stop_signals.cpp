@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -25,6 +26,36 @@ std::atomic<bool> g_reloads{false};  // What SIGHUP means.
 std::atomic<bool> g_installed{false};
 std::array<struct sigaction, kSignals.size()> g_previous;
 static_assert(std::atomic<bool>::is_always_lock_free);
+
+bool HasControllingTerminal() {
+  const int file =
+      open("/dev/tty", O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (file >= 0) {
+    close(file);
+  }
+  return file >= 0;  // ENXIO after a hang-up, or if there never was one.
+}
+
+// stdin, stdout and stderr that are terminals, and the controlling one.
+using Terminals = std::array<bool, 4>;
+
+Terminals FindTerminals() {
+  // isatty() fails with EIO after a hang-up.
+  return {isatty(0) == 1, isatty(1) == 1, isatty(2) == 1,
+          HasControllingTerminal()};
+}
+
+Terminals g_terminals{};  // At the start; none under nohup.
+
+bool HasLostTerminal() {
+  const Terminals now = FindTerminals();
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    if (g_terminals[i] && !now[i]) {
+      return true;
+    }
+  }
+  return false;
+}
 
 // Makes the descriptor readable. A handler may interrupt code that has not read
 // its errno yet.
@@ -59,6 +90,7 @@ StopSignals::StopSignals(HangUp hang_up) {
   g_stop = false;
   g_reload = false;
   g_reloads = hang_up == HangUp::kReload;
+  g_terminals = FindTerminals();
   // SA_RESTART: other system calls continue; waiters use the descriptor.
   struct sigaction action {};
   action.sa_flags = SA_RESTART;
@@ -66,9 +98,11 @@ StopSignals::StopSignals(HangUp hang_up) {
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
     action.sa_handler = kSignals[i] == SIGPIPE ? SIG_IGN : &FdiOnSignal;
     sigaction(kSignals[i], &action, &g_previous[i]);
-    if (kSignals[i] == SIGHUP && hang_up == HangUp::kStop &&
-        g_previous[i].sa_handler == SIG_IGN) {
-      sigaction(SIGHUP, &g_previous[i], nullptr);  // nohup has said so.
+    if (kSignals[i] == SIGHUP && g_previous[i].sa_handler == SIG_IGN) {
+      g_terminals = {};  // nohup has said so.
+      if (hang_up == HangUp::kStop) {
+        sigaction(SIGHUP, &g_previous[i], nullptr);
+      }
     }
   }
 }
@@ -90,6 +124,10 @@ StopSignals::Event StopSignals::WaitFor(std::chrono::milliseconds timeout) {
   while (true) {
     if (g_stop) {
       return Event::kStop;  // The descriptor stays readable for others.
+    }
+    if (g_reload && HasLostTerminal()) {
+      g_stop = true;
+      continue;
     }
     if (g_reload.exchange(false)) {
       // The reload is consumed, so the descriptor must not stay readable,

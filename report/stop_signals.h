@@ -6,8 +6,9 @@ namespace fdi::report {
 
 /// While an object exists, SIGINT and SIGTERM request an orderly stop, and a
 /// second one ends the process at once (exit code 1). SIGHUP requests a reload
-/// or, from a program that has nothing to reload, a stop: its terminal has been
-/// closed. SIGPIPE is ignored: a reader of the output that ends must not end
+/// or a stop: from a program that has nothing to reload, and if the terminal on
+/// which the program was started is gone by then (nohup ignores that; a service
+/// has none). SIGPIPE is ignored: a reader of the output that ends must not end
 /// the work. One object at a time; the destructor restores the previous
 /// handlers.
 class StopSignals {

@@ -5,10 +5,14 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <functional>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include <gtest/gtest.h>
+#include <pty.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 namespace fdi::report {
@@ -66,6 +70,42 @@ TEST(StopSignalsTest, HangUpThatNohupIgnoresStaysIgnored) {
     EXPECT_EQ(signals.WaitFor(0ms), Event::kTimeout);
   }
   std::signal(SIGHUP, previous);
+}
+
+// What a program in a terminal of its own gets once `hang_up` was called.
+Event EventInTerminal(sighandler_t before,
+                      const std::function<void(int&, pid_t)>& hang_up) {
+  int terminal = -1;
+  const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
+  if (child == 0) {
+    std::signal(SIGHUP, before);
+    StopSignals signals(StopSignals::HangUp::kReload);
+    [[maybe_unused]] const auto said = write(STDOUT_FILENO, "r", 1);
+    _exit(static_cast<int>(signals.WaitFor(15s)));
+  }
+  char ready = 0;
+  EXPECT_EQ(read(terminal, &ready, 1), 1);
+  hang_up(terminal, child);
+  int status = 0;
+  EXPECT_EQ(waitpid(child, &status, 0), child);
+  if (terminal >= 0) {
+    close(terminal);
+  }
+  EXPECT_TRUE(WIFEXITED(status));
+  return static_cast<Event>(WEXITSTATUS(status));
+}
+
+TEST(StopSignalsTest, HangUpOfTheTerminalStopsWhatReloads) {
+  const auto close_terminal = [](int& terminal, pid_t) {
+    close(std::exchange(terminal, -1));
+  };
+  EXPECT_EQ(EventInTerminal(SIG_DFL, close_terminal), Event::kStop);
+  // nohup
+  EXPECT_EQ(EventInTerminal(SIG_IGN, close_terminal), Event::kReload);
+  // kill -HUP, while the terminal is there
+  EXPECT_EQ(
+      EventInTerminal(SIG_DFL, [](int&, pid_t pid) { kill(pid, SIGHUP); }),
+      Event::kReload);
 }
 
 TEST(StopSignalsTest, ReaderOfThePipeThatEndsDoesNotEndTheProcess) {
