@@ -302,10 +302,15 @@ ExclusiveLock LockOf(const DataDirectory& data) {
   return {path += ".lock", "recording faults; stop it to move valves"};
 }
 
-// Ids in models.db and history.db that match the glob.
+// The valve of that id, or else those in models.db and history.db whose ids
+// match the glob: "V[1]" is both, and as a glob it means V1.
 std::vector<std::string> ValvesToMove(ModelStore& models, Database& history,
                                       const std::string& glob) {
-  std::vector<std::string> valves = ValvesInProgress(history, glob);
+  std::vector<std::string> valves = ValvesInProgress(history, GlobOf(glob));
+  if (!valves.empty()) {
+    return valves;
+  }
+  valves = ValvesInProgress(history, glob);
   for (const ValveEntry& entry : models.Valves()) {
     if (entry.pattern.find_first_of("*?[") == std::string::npos &&
         GlobMatches(glob, entry.pattern)) {
