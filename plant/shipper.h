@@ -55,6 +55,8 @@ class Shipper {
   ///   on behind it.
   Shipped Ship();
 
+  /// Whether history.db is still the file that was opened.
+  bool InPlace() const { return history_.InPlace(); }
   const PlantDatabase& plant() const { return plant_; }
 
  private:

@@ -1,5 +1,6 @@
 #include "monitor/service/history_store.h"
 
+#include <stdexcept>
 #include <utility>
 
 #include "base/error.h"
@@ -34,6 +35,7 @@ HistoryStore::HistoryStore(const std::filesystem::path& path, Clock utc_now_ns,
 
 void HistoryStore::BeginSession(const std::string& software,
                                 const std::string& config) {
+  session_ = {software, config};
   const std::int64_t now_ns = utc_now_ns_();
   const storage::SessionStart start =
       writer_.BeginSession(now_ns, software, config);
@@ -67,25 +69,71 @@ void HistoryStore::ReportDamage(const std::vector<std::string>& damaged) {
 }
 
 void HistoryStore::CommitBatch(const std::function<void()>& batch) {
-  TellApart([&] { writer_.CommitBatch(batch); });
+  InPlace([&] { writer_.CommitBatch(batch); });
 }
 
 void HistoryStore::CommitCheckpoint(const Checkpoint& checkpoint) {
-  TellApart([&] { writer_.CommitCheckpoint(checkpoint); });
+  InPlace([&] { writer_.CommitCheckpoint(checkpoint); });
 }
 
 void HistoryStore::Commit() {
-  TellApart([&] { writer_.Commit(utc_now_ns_()); });
+  InPlace([&] { writer_.Commit(utc_now_ns_()); });
+}
+
+// Runs `call` on the file that has the name of ours.
+void HistoryStore::InPlace(const std::function<void()>& call) {
+  moved_ = writer_.Refresh() || moved_;
+  if (!moved_) {
+    TellApart(call);
+    return;
+  }
+  if (session_) {
+    BeginSession(std::string(session_->first), std::string(session_->second));
+  }
+  try {
+    TellApart([&] {
+      writer_.CommitBatch([&] {
+        for (const auto& [id, events] : open_) {
+          for (const FaultEvent& event : events) {
+            writer_.Record(event, utc_now_ns_());
+          }
+        }
+      });
+    });
+  } catch (const RecordError& error) {
+    log_(LogLevel::kError,
+         EventLine("history_refused",
+                   {{"operation", "reopen"}, {"reason", error.what()}}));
+  }
+  for (const auto& [id, events] : open_) {
+    for (const FaultEvent& event : events) {
+      writer_.MarkSent(event);
+    }
+  }
+  moved_ = false;
+  throw std::runtime_error(writer_.database().path().string() +
+                           " was deleted or replaced: the file that has its "
+                           "name now lacks what only the old one had");
 }
 
 bool HistoryStore::Record(const FaultEvent& event) {
   bool stored = false;
-  return SkipIfNotFound("record",
-                        [&] {
-                          stored = writer_.Record(event, utc_now_ns_()) ||
-                                   writer_.Has(event);
-                        }) &&
-         stored;
+  SkipIfNotFound("record", [&] {
+    stored = writer_.Record(event, utc_now_ns_()) || writer_.Has(event);
+  });
+  const TransitionKind kind = event.transition.kind;
+  if (kind == TransitionKind::kClosed) {
+    open_.erase(event.episode_id);
+  } else if (stored) {
+    std::vector<FaultEvent>& events = open_[event.episode_id];
+    if (kind != TransitionKind::kChanged && kind != TransitionKind::kCleared) {
+      events.clear();
+    } else if (events.size() > 1) {
+      events.pop_back();
+    }
+    events.push_back(event);
+  }
+  return stored;
 }
 
 void HistoryStore::Resume(std::uint64_t episode_id, std::int64_t stamp_ns) {
@@ -113,17 +161,14 @@ void HistoryStore::AddTrace(const EpisodeTrace& trace) {
   });
 }
 
-// @returns whether it was found.
-bool HistoryStore::SkipIfNotFound(const char* operation,
+void HistoryStore::SkipIfNotFound(const char* operation,
                                   const std::function<void()>& call) {
   try {
     TellApart(call);
-    return true;
   } catch (const NotFoundError& error) {
     log_(LogLevel::kError,
          EventLine("history_refused",
                    {{"operation", operation}, {"reason", error.what()}}));
-    return false;
   }
 }
 

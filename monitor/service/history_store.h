@@ -3,7 +3,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/log.h"
@@ -16,6 +19,9 @@ namespace fdi::monitor {
 /// history.db as the history of the monitor. Records whose episode does not
 /// exist are reported and skipped; values that the file does not accept are a
 /// RecordError; any other operation may fail and is retried by the caller.
+/// If the file is deleted or replaced while it is open, the next operation
+/// fails once; by then a session and the open episodes are in the file that has
+/// its name, which is made anew if there is none.
 class HistoryStore : public HistorySink {
  public:
   using Clock = std::function<std::int64_t()>;  ///< UTC now [ns]
@@ -59,12 +65,17 @@ class HistoryStore : public HistorySink {
   void EndSession() { writer_.EndSession(utc_now_ns_(), true); }
 
  private:
+  void InPlace(const std::function<void()>& call);
   void ReportDamage(const std::vector<std::string>& damaged);
-  bool SkipIfNotFound(const char* operation, const std::function<void()>& call);
+  void SkipIfNotFound(const char* operation, const std::function<void()>& call);
 
   storage::HistoryWriter writer_;
   Clock utc_now_ns_;
   LogSink log_;
+  std::optional<std::pair<std::string, std::string>> session_;  // As begun.
+  bool moved_{false};  // Into a file that does not have what follows yet.
+  // Of each episode the last event that names it, and the last one.
+  std::map<std::uint64_t, std::vector<FaultEvent>> open_;
 };
 
 }  // namespace fdi::monitor

@@ -1,6 +1,7 @@
 #include "monitor/service/run_store.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
 namespace fdi::monitor {
@@ -100,6 +101,11 @@ void RunStore::End(const std::string& valve_id, Stream& stream) {
 }
 
 void RunStore::Commit() {
+  if (recorder_.Refresh()) {
+    throw std::runtime_error(recorder_.database().path().string() +
+                             " was deleted or replaced: recording goes on in "
+                             "the file that has its name now");
+  }
   recorder_.Commit();
 }
 
@@ -114,6 +120,7 @@ void RunStore::Close() {
     }
   }
   valves_.clear();
+  recorder_.Refresh();
   recorder_.Close();
 }
 

@@ -1,10 +1,15 @@
 // fdi-store doctor, backup, migrate, prune: the files of the data directory.
+#include <chrono>
+#include <thread>
+
 #include "base/error.h"
 #include "programs/store/verbs.h"
+#include "storage/database/locks.h"
 #include "storage/history/history_database.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/retention.h"
 #include "storage/models/models.h"
+#include "storage/runs/run_rows.h"
 #include "storage/runs/runs.h"
 
 namespace fdi::storage {
@@ -81,6 +86,71 @@ Json Examine(const File& file) {
   return finding;
 }
 
+// A monitor that runs and does not write into the file of this name: its own
+// was deleted or replaced, and it cannot open this one.
+std::optional<std::string> MonitorElsewhere(const DataDirectory& data) {
+  constexpr std::int64_t kSilenceNs = 60'000'000'000;
+  std::filesystem::path lock = data.history();
+  const auto holder = ExclusiveLock::HolderOf(lock += ".lock");
+  if (!holder) {
+    return std::nullopt;
+  }
+  std::int64_t alive_ns = 0;
+  if (Exists(data.history())) {
+    Database history(data.history(), HistorySchema(), Access::kReader);
+    alive_ns = history
+                   .QueryInt64(
+                       "SELECT max(alive_ns) FROM monitor_session WHERE "
+                       "stop_ns IS NULL")
+                   .value_or(0);
+  }
+  if (alive_ns > NowNs() - kSilenceNs) {
+    return std::nullopt;
+  }
+  return "process " + *holder +
+         " records faults, and nothing of it is here since " +
+         std::to_string(kSilenceNs / 1'000'000'000) +
+         " s: was the file deleted or replaced? Its log says why";
+}
+
+// The same for recorders, whose rows come a moment after their locks.
+std::optional<std::string> RecorderElsewhere(const DataDirectory& data) {
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    std::vector<std::int64_t> alive = RecorderLiveness::Alive(data.runs());
+    if (Exists(data.runs())) {
+      Database runs(data.runs(), RunsSchema(), Access::kReader);
+      std::erase_if(alive, [&](std::int64_t id) {
+        return runs
+            .QueryInt64("SELECT 1 FROM recorder WHERE recorder_id = ?", id)
+            .has_value();
+      });
+    }
+    if (alive.empty()) {
+      return std::nullopt;
+    }
+    std::this_thread::sleep_for(std::chrono::seconds(attempt == 0 ? 2 : 0));
+  }
+  return "a recorder runs, and is not in this file: was the file deleted or "
+         "replaced while it was open?";
+}
+
+// What the files of the data directory do not show by themselves.
+void AddElsewhere(const DataDirectory& data, Json& databases) {
+  for (Json& finding : databases) {
+    try {
+      const auto trouble =
+          finding["name"] == "runs.db"      ? RecorderElsewhere(data)
+          : finding["name"] == "history.db" ? MonitorElsewhere(data)
+                                            : std::nullopt;
+      if (trouble) {
+        finding["troubles"].push_back(*trouble);
+      }
+    } catch (const std::runtime_error&) {
+      // Examine() has said what is wrong with the file.
+    }
+  }
+}
+
 // "12 episodes, 1 open_episodes"
 std::string FiguresText(const Json& finding) {
   std::string text;
@@ -113,7 +183,8 @@ Report Doctor(const NoOptions&, const Context& context) {
   if (!Exists(data.path)) {
     throw DataError("no data directory " + data.path.string());
   }
-  const Json databases = Rows(FilesOf(data), Examine);
+  Json databases = Rows(FilesOf(data), Examine);
+  AddElsewhere(data, databases);
   Report report;
   report.Table("databases", {{"file", "name"},
                              NumberColumn("version", "version", 1),

@@ -1,12 +1,9 @@
 // fdi-store ship: copies the history to the plant history in PostgreSQL.
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <set>
 #include <thread>
 
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/error.h"
@@ -67,15 +64,6 @@ Report ShipReport(const ShipOptions& options, const std::string& plant,
                       "nothing was new");
 }
 
-// A history that was restored from a backup is another file of that name.
-std::pair<dev_t, ino_t> FileId(const std::filesystem::path& file) {
-  struct stat facts {};
-  if (stat(file.c_str(), &facts) != 0) {
-    throw DataError("database " + file.string() + ": " + std::strerror(errno));
-  }
-  return {facts.st_dev, facts.st_ino};
-}
-
 // Reports each reason once until shipping works again; pauses double up to five
 // minutes. No cleanup is needed on a signal: a kill loses nothing.
 [[noreturn]] void ShipForEver(const ShipOptions& options,
@@ -87,17 +75,15 @@ std::pair<dev_t, ino_t> FileId(const std::filesystem::path& file) {
   }
   const DataDirectory data = DataOf(context);
   std::optional<Shipper> shipper;
-  std::pair<dev_t, ino_t> shipped;
   std::set<std::string> said;
   auto pause = every;
   while (true) {
     std::string failure;
     try {
-      const auto file = FileId(data.history());
-      if (!shipper || file != shipped) {
+      // A history that was restored from a backup is another file.
+      if (!shipper || !shipper->InPlace()) {
         shipper.emplace(data, options.url,
                         ShipSource{options.host, options.monitor});
-        shipped = file;
       }
       shipper->Ship();
     } catch (const DataError& error) {

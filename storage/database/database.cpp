@@ -9,6 +9,7 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <fcntl.h>
 #include <sqlite3.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/error.h"
@@ -159,9 +160,22 @@ bool SqliteError::IsOfValues() const {
          primary == SQLITE_TOOBIG || primary == SQLITE_RANGE;
 }
 
+OpenFiles::OpenFiles(std::filesystem::path database)
+    : path_(std::move(database)),
+      database_(IdOf("")),
+      wal_(IdOf("-wal")),
+      gate_(IdOf(".gate")) {}
+
+OpenFiles::Id OpenFiles::IdOf(const char* suffix) const {
+  struct stat facts {};
+  return stat((path_.string() + suffix).c_str(), &facts) == 0
+             ? Id({facts.st_dev, facts.st_ino})
+             : std::nullopt;
+}
+
 Database::Database(const std::filesystem::path& path, const Schema& schema,
                    Access access)
-    : path_(path), access_(access), checks_(schema.checks) {
+    : path_(path), schema_(schema), access_(access) {
   CheckReachable(path, access);
   if (access != Access::kReader) {
     gate_ = std::make_unique<WriteGate>(path);
@@ -176,19 +190,55 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
                         ", the version read here: run `fdi-store migrate`");
     }
     Configure(schema);
-    return;
+  } else {
+    // Under the gate, so that two writers that open a new file do not both
+    // create it.
+    const GateHolder holder(*gate_, path);
+    version_ = CheckIdentity(schema);
+    Configure(schema);
+    if (version_ < static_cast<int>(schema.migrations.size())) {
+      Migrate(schema, version_);
+    }
   }
-  // Under the gate, so that two writers that open a new file do not both
-  // create it.
-  const GateHolder holder(*gate_, path);
-  version_ = CheckIdentity(schema);
-  Configure(schema);
-  if (version_ < static_cast<int>(schema.migrations.size())) {
-    Migrate(schema, version_);
-  }
+  // A connection that has read in WAL mode keeps its WAL until it is closed.
+  connection_->execAndGet("PRAGMA user_version");
+  files_ = OpenFiles(path);
 }
 
 Database::~Database() = default;
+
+bool Database::Refresh() {
+  if (files_.InPlace()) {
+    return false;
+  }
+  if (files_.HasDatabase() && !files_.HasWal()) {
+    Refuse(path_,
+           "its -wal was deleted or replaced, and others cannot read "
+           "what it held: end every program that has the file open");
+  }
+  // Another database would take our WAL for its own.
+  if (files_.LeftWal()) {
+    if (access_ == Access::kReader) {
+      Refuse(path_,
+             "was deleted or replaced, and the -wal beside it is the old one");
+    }
+    for (const char* suffix : {"-wal", "-shm"}) {
+      std::filesystem::path left = path_;
+      std::error_code ignored;
+      std::filesystem::remove(left += suffix, ignored);
+    }
+  }
+  // SQLite leaves the files of these names alone when it closes one that is no
+  // longer in place.
+  Database fresh(path_, schema_, access_);
+  cached_.clear();  // Before the connection that they belong to.
+  std::swap(version_, fresh.version_);
+  std::swap(migration_backup_, fresh.migration_backup_);
+  std::swap(gate_, fresh.gate_);
+  std::swap(connection_, fresh.connection_);
+  std::swap(files_, fresh.files_);
+  return true;
+}
 
 void Database::Execute(const std::string& script) {
   SqliteCall(script, [&] { connection_->exec(script); });
@@ -416,7 +466,7 @@ std::vector<std::string> Database::Check() {
       findings.push_back("row " + keys.Text(1) + " of table " + keys.Text(0) +
                          " has no parent in " + keys.Text(2));
     }
-    for (const std::string_view check : checks_) {
+    for (const std::string_view check : schema_.checks) {
       Statement rows = Prepare(check);
       while (rows.Step()) {
         findings.push_back(rows.Text(0));
@@ -589,6 +639,12 @@ void Transaction::Commit() {
   database_.Execute("COMMIT");
   open_ = false;
   database_.gate_->Leave();
+  if (!database_.files_.InPlace()) {
+    throw SqliteError(SQLITE_READONLY_DBMOVED,
+                      database_.path().string() +
+                          " was deleted or replaced while it was open: what "
+                          "was written is not in the file of this name");
+  }
 }
 
 Snapshot::Snapshot(Database& database) : database_(database) {

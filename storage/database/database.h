@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace SQLite {
@@ -210,6 +211,34 @@ class Statement {
   bool writes_{false};
 };
 
+/// The files of a database as they were opened, to notice that one was deleted
+/// or replaced. SQLite itself does not: what it then writes is in no file that
+/// anybody else can open. A copy that overwrites a file in place is not
+/// noticed.
+class OpenFiles {
+ public:
+  OpenFiles() = default;
+  explicit OpenFiles(std::filesystem::path database);
+
+  /// Whether all are still the files of these names.
+  bool InPlace() const { return HasDatabase() && HasWal() && HasGate(); }
+  bool HasDatabase() const { return IdOf("") == database_; }
+  bool HasWal() const { return !wal_ || IdOf("-wal") == wal_; }
+  /// Whether our WAL lies beside another database, or none.
+  bool LeftWal() const { return wal_ && HasWal() && !HasDatabase(); }
+
+ private:
+  /// Device and inode; nothing if there is no such file.
+  using Id = std::optional<std::pair<std::uint64_t, std::uint64_t>>;
+  bool HasGate() const { return !gate_ || IdOf(".gate") == gate_; }
+  Id IdOf(const char* suffix) const;
+
+  std::filesystem::path path_;
+  Id database_;
+  Id wal_;
+  Id gate_;
+};
+
 /// One connection to one of the three databases. Not thread safe: it may be
 /// handed over, e.g. to a thread started later, but concurrent use by two
 /// threads corrupts its statements.
@@ -250,6 +279,13 @@ class Database {
   std::int64_t LastInsertRowid() const;
   /// Rows changed by the last INSERT, UPDATE or DELETE.
   int Changes() const;
+  /// Opens the file of this name again, with its schema if it is new, if the
+  /// one that is open was deleted or replaced. Programs that keep a file open
+  /// for long call this at least every second, outside any transaction.
+  /// Statements from Prepare() must not outlive it. @returns whether it did.
+  /// @throws as the constructor; the next call tries again.
+  bool Refresh();
+  bool InPlace() const { return files_.InPlace(); }
   /// Changes whenever another connection has committed since the last call.
   std::int64_t DataVersion();
 
@@ -289,12 +325,13 @@ class Database {
   void Execute(const std::string& script);
 
   std::filesystem::path path_;
+  Schema schema_;
   Access access_;
   int version_{0};
-  std::vector<std::string_view> checks_;
   std::optional<std::filesystem::path> migration_backup_;
   std::unique_ptr<WriteGate> gate_;  // Null for a reader.
   std::unique_ptr<SQLite::Database> connection_;
+  OpenFiles files_;
   std::map<std::string, Statement, std::less<>> cached_;
 };
 
@@ -308,6 +345,8 @@ class Transaction {
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
 
+  /// @throws SqliteError also if the file was deleted or replaced meanwhile, in
+  ///   which case nothing is in the file of that name. See Database::Refresh().
   void Commit();
 
  private:

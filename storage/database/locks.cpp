@@ -3,7 +3,6 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <string>
 #include <thread>
 #include <utility>
 
@@ -52,6 +51,20 @@ ExclusiveLock::ExclusiveLock(const std::filesystem::path& path,
     [[maybe_unused]] const ssize_t written =
         pwrite(file_, pid.data(), pid.size(), 0);
   }
+}
+
+std::optional<std::string> ExclusiveLock::HolderOf(
+    const std::filesystem::path& path) {
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) {
+    return std::nullopt;
+  }
+  std::optional<std::string> holder;
+  if (flock(file, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    holder = ReadOwner(file);
+  }
+  close(file);
+  return holder;
 }
 
 ExclusiveLock::~ExclusiveLock() {

@@ -2,6 +2,8 @@
 
 #include <chrono>
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <string_view>
 
 namespace fdi::storage {
@@ -17,6 +19,8 @@ class ExclusiveLock {
   ///   lock is taken; naming path and reason if the file cannot be opened.
   ExclusiveLock(const std::filesystem::path& path, std::string_view purpose);
   ~ExclusiveLock();
+  /// The pid of the holder; nothing if the lock is free.
+  static std::optional<std::string> HolderOf(const std::filesystem::path& path);
   ExclusiveLock(ExclusiveLock&& other) noexcept;
   ExclusiveLock& operator=(ExclusiveLock&& other) noexcept;
   ExclusiveLock(const ExclusiveLock&) = delete;

@@ -100,6 +100,9 @@ std::vector<CauseChange> CommonCauseBook::Read(int limit) {
     std::string valve_id;
     std::int64_t stamp_ns{0};
   };
+  if (database_.Refresh()) {
+    last_event_ = *database_.QueryInt64(sql::last_read_event);
+  }
   std::vector<Event> events;
   Statement rows = database_.Prepare(sql::cause_events);
   rows.Bind(last_event_, limit);

@@ -165,6 +165,7 @@ std::uint64_t HistoryEditor::Label(std::string_view id, std::string_view label,
 }
 
 bool HistoryEditor::Adopt(const OperatorAction& action) {
+  database_.Refresh();
   return action.kind == OperatorActionKind::kShelve ? AdoptShelf(action)
                                                     : AdoptNote(action);
 }

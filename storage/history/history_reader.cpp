@@ -297,7 +297,9 @@ std::vector<std::string> HistoryReader::HealthValves(const std::string& glob) {
 
 // data_version changes when another connection commits.
 std::string HistoryReader::Version() {
-  return std::to_string(database_.DataVersion());
+  reopened_ += database_.Refresh() ? 1 : 0;
+  return std::to_string(reopened_) + '.' +
+         std::to_string(database_.DataVersion());
 }
 
 }  // namespace fdi::storage

@@ -37,6 +37,7 @@ class HistoryReader : public History {
       std::optional<std::int64_t> in_force_at_ns = {}) override;
   std::vector<HealthHour> Health(const HealthFilter& filter) override;
   std::vector<std::string> HealthValves(const std::string& glob) override;
+  /// Opens the file of this name again if it was deleted or replaced.
   std::string Version() override;
 
   std::vector<MonitorSession> Sessions();
@@ -44,6 +45,7 @@ class HistoryReader : public History {
 
  private:
   Database database_;
+  int reopened_{0};
 };
 
 /// The episodes of the filter's valves and fault that overlap its time, ordered

@@ -325,6 +325,15 @@ auto ReadUndamaged(Statement& rows, const std::string& what, Read read,
 HistoryWriter::HistoryWriter(const std::filesystem::path& path)
     : database_(path, HistorySchema(), Access::kWriter) {}
 
+bool HistoryWriter::Refresh() {
+  if (!database_.Refresh()) {
+    return false;
+  }
+  traces_.DropPending();
+  session_id_.reset();
+  return true;
+}
+
 SessionStart HistoryWriter::BeginSession(std::int64_t now_ns,
                                          const std::string& software,
                                          const std::string& config) {

@@ -47,6 +47,11 @@ class HistoryWriter {
   /// Creates or migrates the file. @throws DataError, SqliteError as Database.
   explicit HistoryWriter(const std::filesystem::path& path);
 
+  /// Goes on in the file of this name if the one that is open was deleted or
+  /// replaced (Database::Refresh()), without its session and pending evidence.
+  /// @returns whether it did: call BeginSession() then.
+  bool Refresh();
+
   /// Closes sessions that were left open, as not clean. Commits.
   SessionStart BeginSession(std::int64_t now_ns, const std::string& software,
                             const std::string& config);

@@ -33,6 +33,9 @@ OperatorLog::OperatorLog(const std::filesystem::path& path)
     : database_(path, HistorySchema(), Access::kReader) {}
 
 std::vector<OperatorAction> OperatorLog::Next(std::int64_t since_ns) {
+  if (database_.Refresh()) {
+    Rewind();
+  }
   const std::int64_t version = database_.DataVersion();
   if (version == data_version_) {
     return {};

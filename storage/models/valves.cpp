@@ -330,6 +330,10 @@ ChangeCounter::ChangeCounter(const std::filesystem::path& path)
       generation_(store_.Generation()) {}
 
 bool ChangeCounter::Changed() {
+  if (store_.database().Refresh()) {
+    data_version_ = -1;
+    generation_ = -1;  // Of no file.
+  }
   // data_version is read before the generation, here and in the constructor. A
   // commit between the two then costs one needless look at the next call; in
   // the other order it would never be noticed.

@@ -52,20 +52,44 @@ void Recover(Database& database, const RecorderLiveness& liveness,
 RunRecorder::RunRecorder(const std::filesystem::path& path,
                          const RunRecorderOptions& options)
     : chunk_samples_(static_cast<std::size_t>(options.chunk_samples)),
-      database_(path, RunsSchema(), Access::kWriter),
-      liveness_(path) {
+      database_(path, RunsSchema(), Access::kWriter) {
   Require(options.chunk_samples >= 1 &&
               options.chunk_samples <= static_cast<int>(kMaxChunkSamples),
           "chunk_samples is in 1..65536");
+  Announce();
+}
+
+void RunRecorder::Announce() {
+  liveness_.emplace(database_.path());
   Transaction transaction(database_);
-  Recover(database_, liveness_, chunk_samples_);
+  Recover(database_, *liveness_, chunk_samples_);
   database_.Run(sql::insert_recorder, getpid(), UtcNow());
-  recorder_id_ = database_.LastInsertRowid();
+  const std::int64_t id = database_.LastInsertRowid();
   // The id is locked before the commit makes it visible, so nobody takes this
   // recorder for dead. Ids are never given twice (AUTOINCREMENT), so a locked
   // byte stands for one recorder.
-  liveness_.Claim(recorder_id_);
+  liveness_->Claim(id);
   transaction.Commit();
+  recorder_id_ = id;
+}
+
+bool RunRecorder::Refresh() {
+  moved_ = database_.Refresh() || moved_;
+  if (!moved_) {
+    return false;
+  }
+  Announce();
+  for (auto& [key, active] : runs_) {
+    active.id = NewRunId();
+    active.committed = {.threshold = chunk_samples_};
+    active.hints = {};
+    active.moved = active.pending.empty();
+    if (!active.moved) {
+      active.run.start_ns = active.pending.front().sample.stamp_ns;
+    }
+  }
+  moved_ = false;
+  return true;
 }
 
 RunRecorder::Key RunRecorder::Begin(const NewRun& run) {
@@ -97,6 +121,9 @@ const std::string& RunRecorder::Id(Key key) const {
 
 void RunRecorder::Append(Key key, const StoredSample& sample) {
   ActiveRun& active = Active(key);
+  if (std::exchange(active.moved, false)) {
+    active.run.start_ns = sample.sample.stamp_ns;
+  }
   active.pending.push_back(sample);
   ++pending_;
   Touch(key, active);
@@ -182,6 +209,10 @@ void RunRecorder::Close() {
 // Writes what is pending of a run. @returns its state after the commit.
 RunRecorder::Committed RunRecorder::Store(ActiveRun& active) {
   Committed after = active.committed;
+  if (active.moved) {  // Nothing of the run is in this file.
+    after.ended = active.end_asked;
+    return after;
+  }
   if (after.run_id == 0) {
     after.run_id = InsertRun(database_, active.id, active.run, recorder_id_);
   }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -48,6 +49,11 @@ class RunRecorder {
   /// Ends a run: the next Commit() compacts it and marks it complete.
   void End(Key run);
 
+  /// Goes on in the file of this name if the one that is open was deleted or
+  /// replaced (Database::Refresh()): there, each run begins with its first
+  /// sample that was not committed, under another id. @returns whether it did.
+  bool Refresh();
+
   /// Commits everything pending. After an error it is still pending: retry or
   /// drop it. @throws SqliteError
   void Commit();
@@ -81,8 +87,10 @@ class RunRecorder {
     ChunkHints hints;
     bool end_asked{false};
     bool dirty{false};
+    bool moved{false};  // By Refresh(), and without a sample since.
   };
 
+  void Announce();
   ActiveRun& Active(Key key);
   void Touch(Key key, ActiveRun& active);
   Committed Store(ActiveRun& active);
@@ -90,8 +98,9 @@ class RunRecorder {
 
   std::size_t chunk_samples_;
   Database database_;
-  RecorderLiveness liveness_;
+  std::optional<RecorderLiveness> liveness_;
   std::int64_t recorder_id_{0};
+  bool moved_{false};  // Into a file that does not know this recorder yet.
   Key next_key_{0};
   std::unordered_map<Key, ActiveRun> runs_;
   std::vector<Key> dirty_;  // Runs with something to commit.

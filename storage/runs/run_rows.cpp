@@ -89,6 +89,25 @@ bool RecorderLiveness::IsAlive(const std::filesystem::path& database,
   return alive;
 }
 
+std::vector<std::int64_t> RecorderLiveness::Alive(
+    const std::filesystem::path& database) {
+  std::vector<std::int64_t> ids;
+  const int file = open(LivePath(database).c_str(), O_RDONLY | O_CLOEXEC);
+  struct flock lock = ByteLock(0);
+  while (file >= 0) {
+    lock.l_type = F_WRLCK;
+    lock.l_len = 0;  // To the end: the first one that is locked.
+    lock.l_pid = 0;
+    if (fcntl(file, F_OFD_GETLK, &lock) != 0 || lock.l_type == F_UNLCK) {
+      close(file);
+      break;
+    }
+    ids.push_back(lock.l_start);
+    lock.l_start += 1;
+  }
+  return ids;
+}
+
 std::string NewRunId() {
   static constexpr char kDigits[] = "0123456789abcdef";
   std::random_device random;

@@ -32,6 +32,8 @@ class RecorderLiveness {
 
   /// Like IsAlive(), for callers without write permission on the file.
   static bool IsAlive(const std::filesystem::path& database, std::int64_t id);
+  /// The ids that are claimed.
+  static std::vector<std::int64_t> Alive(const std::filesystem::path& database);
 
  private:
   std::filesystem::path path_;

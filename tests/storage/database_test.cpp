@@ -268,6 +268,79 @@ TEST_F(DatabaseTest, AReaderCanCopyTheFile) {
 
 // Two processes that add to one row: without the gate and BEGIN IMMEDIATE an
 // update would be lost or refused.
+TEST_F(DatabaseTest, ADeletedFileTakesNoCommitAndIsMadeAnew) {
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  Insert(database, 1);
+  EXPECT_FALSE(database.Refresh());
+  for (const char* name : {"test.db", "test.db-wal", "test.db-shm"}) {
+    std::filesystem::remove(directory_.path() / name);
+  }
+
+  try {
+    Insert(database, 2);
+    FAIL() << "stored into no file";
+  } catch (const SqliteError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("was deleted or replaced"));
+    EXPECT_FALSE(error.IsOfValues());
+  }
+  EXPECT_TRUE(database.Refresh());
+  EXPECT_FALSE(database.Refresh());
+  Insert(database, 3);
+
+  Database reader(file_, SchemaOf(1), Access::kReader);
+  EXPECT_EQ(reader.QueryInt64("SELECT sum(id) FROM t"), 3);
+}
+
+// As with `mv backup.db test.db`: SQLite would take the WAL for the backup's.
+TEST_F(DatabaseTest, AFileThatReplacesItIsReadWithoutTheOldWal) {
+  const auto backup = directory_.path() / "backup.db";
+  {
+    Database database(backup, SchemaOf(1), Access::kWriter);
+    Insert(database, 7);
+  }
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  Database reader(file_, SchemaOf(1), Access::kReader);
+  Insert(database, 1);
+  ASSERT_GT(database.WalBytes(), 0U);
+  std::filesystem::rename(backup, file_);
+
+  EXPECT_THROW(reader.Refresh(), DataError);
+  EXPECT_TRUE(database.Refresh());
+  Insert(database, 8);
+  EXPECT_TRUE(reader.Refresh());
+
+  for (Database* each : {&database, &reader}) {
+    EXPECT_EQ(each->QueryInt64("SELECT sum(id) FROM t"), 15);
+    EXPECT_TRUE(each->Check().empty());
+  }
+}
+
+// Other connections would have to be closed for the file to be read again.
+TEST_F(DatabaseTest, WithoutItsWalADatabaseTakesNothing) {
+  {
+    Database database(file_, SchemaOf(1), Access::kWriter);
+    Insert(database, 1);
+    std::filesystem::remove(directory_.path() / "test.db-wal");
+    EXPECT_THROW(Insert(database, 2), SqliteError);
+    EXPECT_THROW(database.Refresh(), DataError);
+  }
+  Database database(file_, SchemaOf(1), Access::kWriter);
+  EXPECT_EQ(database.QueryInt64("SELECT min(id) FROM t"), 1);
+}
+
+// A backup is not in WAL mode.
+TEST_F(DatabaseTest, ABackupTakesCommits) {
+  const auto backup = directory_.path() / "backup.db";
+  {
+    Database database(file_, SchemaOf(1), Access::kWriter);
+    Insert(database, 1);
+    database.BackupTo(backup);
+  }
+  Database database(backup, SchemaOf(1), Access::kWriter);
+  Insert(database, 2);
+  EXPECT_EQ(database.QueryInt64("SELECT sum(id) FROM t"), 3);
+}
+
 TEST_F(DatabaseTest, WritersOfTwoProcessesTakeTurns) {
   constexpr int kRounds = 100;
   {

@@ -1,6 +1,8 @@
 // Runs the built program on a history: list, show, ack, export, doctor, backup.
 #include <gmock/gmock.h>
 
+#include "storage/database/locks.h"
+#include "storage/runs/run_recorder.h"
 #include "tests/programs/store/store_program_fixture.h"
 
 namespace fdi::storage {
@@ -168,6 +170,64 @@ TEST_F(FdiStoreHistoryTest, AShelvedAlarmSaysSoUntilItIsTakenOff) {
   EXPECT_EQ(Store("history shelve LV-1 --for 91d").code, 2);
   EXPECT_THAT(Store("history shelve LV-11").err,
               HasSubstr("warning valve_unknown valve=LV-11 did_you_mean=LV-1"));
+}
+
+// As a pattern, V[1] means V1.
+TEST_F(FdiStoreHistoryTest, AnIdThatLooksLikeAPatternIsAnId) {
+  {
+    HistoryWriter writer(path_);
+    for (const char* valve : {"V[1]", "V1", "V2"}) {
+      writer.Record(
+          Event(TransitionKind::kDetected, 0, 0, 0.3, EndReason::kNone, valve),
+          kDetected);
+    }
+    writer.EndSession(kDetected, true);
+  }
+  const auto left = [this] {
+    std::vector<std::string> valves;
+    for (const json& episode : StoreJson("history list")["episodes"]) {
+      valves.push_back(episode["valve_id"]);
+    }
+    return valves;
+  };
+  EXPECT_EQ(StoreJson("history shelve 'V[1]' --for 1h")["shelf"][0]["valve_id"],
+            "V[1]");
+  const json shelved = StoreJson("history list --state shelved")["episodes"];
+  ASSERT_EQ(shelved.size(), 1U);
+  EXPECT_EQ(shelved[0]["valve_id"], "V[1]");
+
+  const auto moved = StoreJson("valves move 'V[1]' --to there")["valves"];
+
+  ASSERT_EQ(moved.size(), 1U);
+  EXPECT_EQ(moved[0]["valve_id"], "V[1]");
+  EXPECT_THAT(left(), testing::UnorderedElementsAre("LV-1", "V1", "V2"));
+  // No valve of that id is left: a pattern.
+  EXPECT_EQ(StoreJson("valves move 'V[1]' --to there")["valves"].size(), 1U);
+  EXPECT_THAT(left(), testing::UnorderedElementsAre("LV-1", "V2"));
+}
+
+// What a monitor holds that goes on without being in the file.
+TEST_F(FdiStoreHistoryTest, DoctorSaysWhatIsRecordedElsewhere) {
+  EXPECT_EQ(Store("doctor").code, 0);
+  {
+    const ExclusiveLock lock(directory_.path() / "history.db.lock", "testing");
+    const Outcome outcome = Store("doctor");
+    EXPECT_EQ(outcome.code, 3);
+    EXPECT_THAT(outcome.out, HasSubstr("history.db: process "));
+    EXPECT_THAT(outcome.out, HasSubstr("nothing of it is here"));
+
+    HistoryWriter writer(path_);
+    writer.BeginSession(UtcNow(), "test", "");
+    EXPECT_EQ(Store("doctor").code, 0);
+  }
+  RunRecorder recorder(directory_.path() / "runs.db");
+  EXPECT_EQ(Store("doctor").code, 0);
+  for (const char* name : {"runs.db", "runs.db-wal", "runs.db-shm"}) {
+    std::filesystem::remove(directory_.path() / name);
+  }
+  EXPECT_THAT(Store("doctor").out, HasSubstr("a recorder runs"));
+  EXPECT_TRUE(recorder.Refresh());
+  EXPECT_EQ(Store("doctor").code, 0);
 }
 
 TEST_F(FdiStoreHistoryTest, SlipsOfThePenAreSuggested) {
