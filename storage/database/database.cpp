@@ -73,14 +73,41 @@ void Glob(sqlite3_context* context, int /*count*/, sqlite3_value** values) {
   sqlite3_result_int(context, GlobMatches(text(0), text(1)) ? 1 : 0);
 }
 
+std::filesystem::path WalPath(std::filesystem::path database) {
+  return database += "-wal";
+}
+
+// Whether a reader must do without SQLite's shared memory, and can: the file is
+// open nowhere, because whoever has it open has a WAL beside it.
+bool IsImmutable(const std::filesystem::path& path, Access access) {
+  const auto folder = path.has_parent_path() ? path.parent_path() : ".";
+  std::error_code error;
+  return access == Access::kReader && ::access(folder.c_str(), W_OK) != 0 &&
+         !std::filesystem::exists(WalPath(path), error) && !error;
+}
+
+// file:PATH?immutable=1, with the signs escaped that mean something in a URI.
+std::string ImmutableUri(const std::filesystem::path& path) {
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(path).string()) {
+    uri += c == '%'   ? "%25"
+           : c == '?' ? "%3f"
+           : c == '#' ? "%23"
+                      : std::string(1, c);
+  }
+  return uri + "?immutable=1";
+}
+
 std::unique_ptr<SQLite::Database> Connect(const std::filesystem::path& path,
-                                          Access access) {
-  const int flags = access == Access::kReader
+                                          Access access, bool immutable) {
+  const int flags = immutable ? SQLite::OPEN_READONLY | SQLite::OPEN_URI
+                    : access == Access::kReader
                         ? SQLite::OPEN_READONLY
                         : SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE;
   try {
     auto connection = std::make_unique<SQLite::Database>(
-        path.string(), flags, static_cast<int>(kWritePatience.count()));
+        immutable ? ImmutableUri(path) : path.string(), flags,
+        static_cast<int>(kWritePatience.count()));
     connection->createFunction("glob", 2, true, nullptr, Glob);
     return connection;
   } catch (const SQLite::Exception& error) {
@@ -180,7 +207,8 @@ Database::Database(const std::filesystem::path& path, const Schema& schema,
   if (access != Access::kReader) {
     gate_ = std::make_unique<WriteGate>(path);
   }
-  connection_ = Connect(path, access);
+  const bool immutable = IsImmutable(path, access);
+  connection_ = Connect(path, access, immutable);
   if (access == Access::kReader) {
     version_ = CheckIdentity(schema);
     const int current = static_cast<int>(schema.migrations.size());

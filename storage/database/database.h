@@ -247,7 +247,9 @@ class OpenFiles {
 class Database {
  public:
   /// Opens `path`. Writers create it (not its folder) and migrate it forward in
-  /// one transaction, after saving a copy of an older file beside it.
+  /// one transaction, after saving a copy of an older file beside it. A reader
+  /// that may not write to the folder, as SQLite's shared memory needs, reads a
+  /// file that nobody has open, which is one without a WAL, as immutable.
   /// @throws DataError naming file and reason: folder missing, no permission,
   ///   not a database, another application_id, a newer version (naming both),
   ///   or, for a reader, an older version.

@@ -341,6 +341,44 @@ TEST_F(DatabaseTest, ABackupTakesCommits) {
   EXPECT_EQ(database.QueryInt64("SELECT sum(id) FROM t"), 3);
 }
 
+// A member of the group that may read the folder, but not write to it: SQLite
+// wants to make its shared memory there.
+TEST_F(DatabaseTest, WhatNobodyHasOpenIsReadWithoutWriting) {
+  using std::filesystem::perms;
+  const auto folder = directory_.path() / "50%?#";
+  std::filesystem::create_directory(folder);
+  {
+    Database database(folder / "test.db", SchemaOf(1), Access::kWriter);
+    Insert(database, 7);
+  }
+  ASSERT_FALSE(std::filesystem::exists(folder / "test.db-wal"));
+  const perms reading = perms::all & ~(perms::owner_write | perms::group_write |
+                                       perms::others_write);
+  std::filesystem::permissions(directory_.path(), reading);
+  std::filesystem::permissions(folder, reading);
+
+  const pid_t child = fork();
+  if (child == 0) {
+    constexpr uid_t kNobody = 65534;
+    if (getuid() == 0 && setuid(kNobody) != 0) {
+      _exit(3);
+    }
+    try {
+      Database reader(folder / "test.db", SchemaOf(1), Access::kReader);
+      _exit(reader.QueryInt64("SELECT sum(id) FROM t") == 7 ? 0 : 1);
+    } catch (const std::exception&) {
+      _exit(2);
+    }
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  std::filesystem::permissions(directory_.path(), perms::owner_all);
+  std::filesystem::permissions(folder, perms::owner_all);
+
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
 TEST_F(DatabaseTest, WritersOfTwoProcessesTakeTurns) {
   constexpr int kRounds = 100;
   {
