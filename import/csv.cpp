@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -28,6 +29,16 @@ constexpr std::int64_t kMaxFileTime = 32'000'000'000'000'000;
 constexpr const char* kSniff =
     "; try: fdi-store runs sniff FILE --map-output tags.toml, then --map "
     "tags.toml";
+
+/// Whether `words`, in lower case and between bars, contain `cell` in any case.
+bool IsModeWord(std::string_view cell, std::string_view words) {
+  std::string lower(cell);
+  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return lower.find('|') == std::string::npos &&
+         words.find('|' + lower + '|') != std::string_view::npos;
+}
 
 /// The names that `signal` may have in a header: "F_m3_h or F_t_h".
 std::string ColumnNames(Signal signal) {
@@ -609,7 +620,11 @@ bool CsvReader::AddByContract(std::size_t column, std::string_view name) {
     strength_column_ = column;
     return true;
   }
-  if (SameName(name, kModeColumn)) {
+  const bool is_mode =
+      options_.map.mode_column.empty()
+          ? SameName(name, kModeColumn) || SameName(name, kAutoColumn)
+          : SameName(name, options_.map.mode_column);
+  if (is_mode) {
     if (mode_column_) {
       Refuse("column " + Quoted(name) + " is there twice");
     }
@@ -724,12 +739,31 @@ double CsvReader::Number(std::size_t column) const {
 
 ValveMode CsvReader::Mode() const {
   const std::string_view cell = record_.cells()[*mode_column_];
-  const std::optional<ValveMode> mode = ParseValveMode(cell);
-  if (!mode) {
-    Refuse("column " + Quoted(names_[*mode_column_]) + ": " + Quoted(cell) +
-           " is none of " + std::string(kValveModeNames));
+  if (const std::optional<ValveMode> mode = ParseValveMode(cell)) {
+    return *mode;
   }
-  return *mode;
+  // In cascade the controller acts, too; what tracks or is local does not.
+  if (IsModeWord(cell, "|aut|a|cas|cascade|rcas|c|")) {
+    return ValveMode::kAuto;
+  }
+  if (IsModeWord(cell, "|man|m|iman|imanual|lo|rout|track|trk|local|")) {
+    return ValveMode::kManual;
+  }
+  if (IsModeWord(cell, "|oos|o/s|off|")) {
+    return ValveMode::kOutOfService;
+  }
+  // Numbers of modes differ between systems, except in a column of this name.
+  const std::string& name = names_[*mode_column_];
+  if (SameName(name, kAutoColumn) && IsModeWord(cell, "|1|1.0|true|yes|on|")) {
+    return ValveMode::kAuto;
+  }
+  if (SameName(name, kAutoColumn) && IsModeWord(cell, "|0|0.0|false|no|")) {
+    return ValveMode::kManual;
+  }
+  Refuse("column " + Quoted(name) + ": " + Quoted(cell) + " is none of " +
+         std::string(kValveModeNames) +
+         ", AUT, CAS, RCAS, MAN, IMAN, LO, OOS; try these words, or 1 and 0 in "
+         "a column named auto");
 }
 
 FaultTruth CsvReader::Truth() const {

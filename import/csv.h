@@ -45,6 +45,8 @@ inline constexpr std::array<SignalColumn, kSignalCount + 1> kSignalColumns{{
 
 inline constexpr std::string_view kTimeColumn = "t_s";
 inline constexpr std::string_view kModeColumn = "mode";
+/// 1 where the loop is in automatic, else 0; instead of kModeColumn.
+inline constexpr std::string_view kAutoColumn = "auto";
 inline constexpr std::string_view kFaultColumn = "fault";
 inline constexpr std::string_view kFaultNumberColumn = "fault_no";
 inline constexpr std::string_view kStrengthColumn = "fault_strength";
@@ -120,6 +122,7 @@ struct ColumnMap {
   std::map<std::string, QualityCode> quality_codes;
   bool newest_first{false};  ///< Found by FindLayout().
   std::vector<ColumnMapping> columns;
+  std::string mode_column;            ///< Empty: mode or auto, if there is one.
   std::optional<FlowUnit> flow_unit;  ///< Needed if the flow is mapped.
   std::optional<Resampling> resampling;
 };
@@ -133,7 +136,13 @@ struct CsvOptions {
   SignalMask required{kBasicSignals};
   bool split_gaps{false};  ///< A gap starts another run instead of an error.
   bool scan{false};  ///< Rows have their cells(), of any tag, and no signals.
-  double period_s{0.0};      ///< 0: detected.
+  double period_s{0.0};  ///< 0: detected.
+  /// What is impossible for a valve is refused. Not for a loop, whose PV may be
+  /// anything.
+  bool check_values{true};
+  /// Leave out, with a note, a row with the time of the row before it, which
+  /// exports in pieces have where two pieces meet; otherwise an error.
+  bool skip_repeats{false};
   std::int64_t start_ns{0};  ///< UTC of t_s = 0, unless times have a date.
   LogSink log;               ///< Receives CsvTable::notes, each as `csv_note`.
 };
@@ -190,9 +199,10 @@ class StepCheck {
 /// Header: t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h (or F_t_h), in any
 /// order and case; optional SP_pct,CVI,Ps_kPa,Pz_kPa; optional truth: fault
 /// (f1..f19, t1, p1, p2, normal) or fault_no (0..22) with fault_strength, where
-/// only a non-zero strength marks a fault; optional mode (kValveModeNames; AUTO
-/// if the column is missing). Further columns are ignored. docs/import.md has
-/// the rest: other names, forms of time, separators, long tables.
+/// only a non-zero strength marks a fault; optional mode (kValveModeNames, or
+/// the words of controllers, CAS, MAN, ...; AUTO if the column is missing).
+/// Further columns are ignored. docs/import.md has the rest: other names, forms
+/// of time, separators, long tables.
 ///
 /// A signal whose cell is empty or means "no reading" (Bad, I/O Timeout, #N/A,
 /// ...) is missing from that sample, with quality BAD.

@@ -170,7 +170,8 @@ CsvTable TableReader::Read() {
   TakeRows();
   table_.header = reader_.header();
   table_.dated = reader_.dated();
-  table_.notes = reader_.notes();
+  table_.notes.insert(table_.notes.begin(), reader_.notes().begin(),
+                      reader_.notes().end());
   NoteForm();
   if (!table_.header.ignored_columns.empty()) {
     table_.notes.push_back("not used: " +
@@ -189,10 +190,14 @@ CsvTable TableReader::Read() {
     JoinTags();
   }
   CheckOrder();
-  CheckValues();
+  if (options().check_values) {
+    CheckValues();
+  }
   CheckReadings();
   FindPeriod();
-  CheckMotion();
+  if (options().check_values) {
+    CheckMotion();
+  }
   table_.start_ns = table_.dated ? rows_.front().labelled.sample.stamp_ns
                                  : options().start_ns;
   if (options().map.resampling) {
@@ -212,9 +217,21 @@ CsvTable TableReader::Read() {
 }
 
 void TableReader::TakeRows() {
-  ForEachRow(lines_, reader_,
-             [this](CsvRow&& row) { rows_.push_back(std::move(row)); });
+  std::size_t repeated = 0;
+  ForEachRow(lines_, reader_, [&](CsvRow&& row) {
+    if (options().skip_repeats && !rows_.empty() &&
+        rows_.back().labelled.sample.stamp_ns == row.labelled.sample.stamp_ns) {
+      ++repeated;
+    } else {
+      rows_.push_back(std::move(row));
+    }
+  });
   reader_.Finish();
+  if (repeated > 0) {
+    table_.notes.push_back(std::to_string(repeated) +
+                           " rows have the time of the row before them and are "
+                           "left out");
+  }
 }
 
 // What was found out about the form, as far as it is not usual.

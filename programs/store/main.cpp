@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
   fdi::storage::AddMaintenanceVerbs(program);
   fdi::storage::AddKeysVerbs(program);
   fdi::storage::AddShipVerb(program);
+  fdi::storage::AddAuditVerb(program);
   program.AddExamples(fdi::storage::Examples());
   return program.Run(argc, argv);
 }

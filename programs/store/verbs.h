@@ -46,6 +46,7 @@ void AddPlannerVerbs(report::Program& program);  ///< faults, health, worklist
 void AddMaintenanceVerbs(report::Program& program);
 void AddKeysVerbs(report::Program& program);
 void AddShipVerb(report::Program& program);
+void AddAuditVerb(report::Program& program);
 
 /// Examples for --help and the manual pages.
 std::vector<report::VerbExamples> Examples();

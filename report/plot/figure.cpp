@@ -72,7 +72,9 @@ Range RangeOf(const Figure& figure) {
   include(figure.x);
   for (const Panel& panel : figure.panels) {
     for (const Series& series : panel.series) {
-      include(series.x);
+      if (!panel.own_axis) {
+        include(series.x);
+      }
     }
   }
   // gnuplot refuses an axis of no length, which a single point would give.
@@ -175,7 +177,7 @@ class ScriptWriter {
     double top = Top();
     for (std::size_t p = 0; p < figure_.panels.size(); ++p) {
       DrawPanel(p, top);
-      top += figure_.panels[p].height + kPanelGap;
+      top += figure_.panels[p].height + GapBelow(p);
     }
     out_ << "unset multiplot\nset output\n";
     return out_.str();
@@ -187,10 +189,19 @@ class ScriptWriter {
   }
   double Height() const {
     double height = Top() + kBottom;
-    for (const Panel& panel : figure_.panels) {
-      height += panel.height + kPanelGap;
+    for (std::size_t p = 0; p < figure_.panels.size(); ++p) {
+      height += figure_.panels[p].height + GapBelow(p);
     }
     return height;
+  }
+  // Whether the time axis ends below this panel, because an axis of its own
+  // follows.
+  bool IsLastOnAxis(std::size_t p) const {
+    return p + 1 == figure_.panels.size() || figure_.panels[p + 1].own_axis;
+  }
+  double GapBelow(std::size_t p) const {
+    return p + 1 < figure_.panels.size() && IsLastOnAxis(p) ? kBottom
+                                                            : kPanelGap;
   }
   double Right() const { return figure_.width - figure_.legend_width; }
   std::string ScreenX(double from_left) const {
@@ -248,8 +259,9 @@ class ScriptWriter {
         out_ << Block(p, s) << " << EOD\n";
         // Bars are never thinned: gnuplot takes their width from the space
         // between them.
-        PointWriter(figure_, series[s], unit_.seconds, out_)
-            .Write(series[s].shape == Shape::kBars
+        const bool own = figure_.panels[p].own_axis.has_value();
+        PointWriter(figure_, series[s], own ? 1.0 : unit_.seconds, out_)
+            .Write(own || series[s].shape == Shape::kBars
                        ? std::numeric_limits<std::size_t>::max()
                        : figure_.groups);
         out_ << "EOD\n";
@@ -323,7 +335,7 @@ class ScriptWriter {
 
   void DrawPanel(std::size_t p, double top) {
     const Panel& panel = figure_.panels[p];
-    const bool last = p + 1 == figure_.panels.size();
+    const bool last = IsLastOnAxis(p);
     const bool strip = panel.series.empty();
     if (p == 0) {
       Names();
@@ -332,7 +344,9 @@ class ScriptWriter {
            << kFirstStemTag + static_cast<int>(marks_.size()) << "] arrow i\n";
     }
     // Bands through all panels are labelled only in the first one.
-    Shade(figure_.bands, p == 0);
+    if (!panel.own_axis) {
+      Shade(figure_.bands, p == 0);
+    }
     Shade(panel.bands, true);
     out_ << "set tmargin at screen " << ScreenY(top)
          << "\nset bmargin at screen " << ScreenY(top + panel.height)
@@ -354,7 +368,16 @@ class ScriptWriter {
     } else {
       out_ << "set yrange [*:*]\nset offsets 0,0,graph 0.06,graph 0.06\n";
     }
-    out_ << "set xlabel " << GnuplotText(last ? XLabel() : "") << '\n';
+    if (panel.own_axis) {
+      // Neither marks nor bands of the other axis belong here.
+      out_ << "unset arrow\nset xrange [" << GnuplotNumber(panel.own_axis->from)
+           << ':' << GnuplotNumber(panel.own_axis->to) << "]\n";
+    }
+    out_ << "set xlabel "
+         << GnuplotText(panel.own_axis ? panel.own_label
+                        : last         ? XLabel()
+                                       : "")
+         << '\n';
     PlotCommand(p);
     out_ << "set offsets\n";
   }

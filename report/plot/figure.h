@@ -90,9 +90,13 @@ struct Panel {
   std::vector<Band> bands{};         ///< In this panel only.
   std::vector<std::string> notes{};  ///< Lines of text below the legend.
   double height{200.0};              ///< [px]
+  /// A horizontal axis of its own, for the last panel: one variable over
+  /// another. Its series have their own x, in any order.
+  std::optional<Range> own_axis{};
+  std::string own_label{};  ///< Of that axis, with unit.
 };
 
-/// Panels above each other on one horizontal axis.
+/// Panels above each other on one horizontal axis, but see Panel::own_axis.
 struct Figure {
   std::string title;
   std::string subtitle{};

@@ -17,6 +17,7 @@ namespace fdi::importer {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -138,6 +139,43 @@ TEST(CsvTest, ModeIsAnOptionalColumn) {
   EXPECT_THAT(Refusal(std::string(kHeader) + ",Mode\n0,1,2,3,4,5,6,HAND"),
               AllOf(HasSubstr("\"HAND\" is none of AUTO, MANUAL"),
                     HasSubstr("plant.csv:2:")));
+}
+
+TEST(CsvTest, ModesHaveTheWordsOfControllersOrAColumnOfOnesAndZeros) {
+  const std::string rows =
+      "t_s,CV_pct,P1_kPa,P2_kPa,T1_degC,X_pct,F_m3_h,mode\n"
+      "0,1,2,3,4,5,6,cas\n1,1,2,3,4,5,6,Man\n2,1,2,3,4,5,6,OOS\n";
+  const auto words = Read(rows).runs.at(0).samples;
+  EXPECT_EQ(words[0].sample.mode, ValveMode::kAuto);
+  EXPECT_EQ(words[1].sample.mode, ValveMode::kManual);
+  EXPECT_EQ(words[2].sample.mode, ValveMode::kOutOfService);
+  const std::string ones =
+      std::string(kHeader) + ",auto\n0,1,2,3,4,5,6,1\n1,1,2,3,4,5,6,0\n";
+  const auto numbers = Read(ones).runs.at(0).samples;
+  EXPECT_EQ(numbers[0].sample.mode, ValveMode::kAuto);
+  EXPECT_EQ(numbers[1].sample.mode, ValveMode::kManual);
+  // Elsewhere nobody knows which number is which mode.
+  EXPECT_THAT(Refusal(std::string(kHeader) + ",mode\n0,1,2,3,4,5,6,1"),
+              HasSubstr("\"1\" is none of AUTO, MANUAL"));
+  CsvOptions named;
+  named.map.mode_column = "MD";
+  EXPECT_EQ(Read(std::string(kHeader) + ",MD\n0,1,2,3,4,5,6,MAN\n"
+                                        "1,1,2,3,4,5,6,MAN",
+                 named)
+                .runs.at(0)
+                .samples[0]
+                .sample.mode,
+            ValveMode::kManual);
+}
+
+TEST(CsvTest, RowsWithTheTimeOfTheRowBeforeAreLeftOutOnRequest) {
+  const std::string text = Table({"0", "1", "1", "2"});
+  EXPECT_THAT(Refusal(text), HasSubstr("stands still"));
+  CsvOptions options;
+  options.skip_repeats = true;
+  const CsvTable table = Read(text, options);
+  EXPECT_EQ(table.runs.at(0).samples.size(), 3U);
+  EXPECT_THAT(table.notes, Contains(HasSubstr("1 rows have the time")));
 }
 
 TEST(CsvTest, RefusalsNameFileLineColumnAndReason) {

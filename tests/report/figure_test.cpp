@@ -151,6 +151,30 @@ TEST(FigureScriptTest, StripsBarsStepsAndNotesAreDrawn) {
   EXPECT_EQ(DrawFigure(figure, Format::kPng).substr(1, 3), "PNG");
 }
 
+TEST(FigureScriptTest, TheLastPanelMayHaveAnAxisOfItsOwn) {
+  if (!HaveGnuplot()) {
+    GTEST_SKIP() << "gnuplot is not installed";
+  }
+  Figure figure;
+  figure.is_time = true;
+  figure.x_label = "time";
+  figure.x = {0, 60, 120};
+  figure.panels = {{.label = "PV", .series = {{.title = "PV", .y = {1, 2, 1}}}},
+                   {.label = "PV",
+                    .series = {{.title = "samples",
+                                .y = {1, 2, 1},
+                                .x = {5050, 5000, 5025},
+                                .shape = Shape::kPoints}},
+                    .own_axis = Range{4990, 5060},
+                    .own_label = "OP [%]"}};
+
+  const std::string svg = DrawFigure(figure, Format::kSvg);
+
+  EXPECT_THAT(svg, HasSubstr("time [s]"));
+  EXPECT_THAT(svg, HasSubstr("OP [%]"));
+  EXPECT_THAT(svg, HasSubstr("5020"));  // Not in the unit of the time.
+}
+
 TEST(FigureScriptTest, OnlyPngAndSvgInAFolderThatIsThere) {
   EXPECT_THAT(MessageOf<ConfigError>([] { DrawFigure({}, "x.bmp"); }),
               HasSubstr("accepted endings are .png and .svg"));

@@ -1,5 +1,6 @@
 // Runs the built program: exit codes, messages, JSON keys, nothing stored.
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 #include <gmock/gmock.h>
@@ -32,6 +33,77 @@ TEST_F(FdiStoreTest, ImportedRunIsListedAndExportedAsItWas) {
   EXPECT_EQ(listed["runs"][0]["run_id"], id);
   EXPECT_EQ(Store("runs export " + id).out, header_ + Rows(5));
   EXPECT_EQ(Store("runs export " + id + "@1:3").out, header_ + Rows(2, 1));
+}
+
+// A valve of play 3 % in a flow loop whose set point steps; the loop's own
+// words for its signals, and a stretch in manual.
+std::string StickyLoop(double band) {
+  std::string text = "Time,FIC7.OP,FIC7.PV,FIC7.SP,FIC7.MODE\n";
+  double op = 50.0;
+  double stem = 50.0;
+  double flow = 50.0;
+  double last = 0.0;
+  for (int k = 0; k < 800; ++k) {
+    const double sp = k / 120 % 2 == 0 ? 50.0 : 53.0;
+    const double e = sp - flow;
+    op += 0.5 * (e - last) + 0.1 * e;
+    last = e;
+    stem = std::clamp(stem, op - 0.5 * band, op + 0.5 * band);
+    flow += 0.4 * (stem - flow) + 0.02 * std::sin(1e4 * k * k);
+    text += std::to_string(10 * k) + ',' + std::to_string(op) + ',' +
+            std::to_string(3.0 * flow) + ',' + std::to_string(3.0 * sp) +
+            (k < 760 ? ",CAS\n" : ",MAN\n");
+  }
+  return text;
+}
+
+TEST_F(FdiStoreTest, AuditJudgesLoopsAndGoesOnAfterWhatItCannotRead) {
+  Write("FIC7.csv", StickyLoop(3.0));
+  Write("FIC8.csv", StickyLoop(0.0));
+  Write("words.csv", "t_s,OP,PV,mode\n0,1,2,AUTO\n10,1,2,HAND\n");
+  Write("no_pv.csv", "t_s,OP,flow\n0,1,2\n10,1,2\n");
+
+  const json audit =
+      StoreJson("audit FIC8.csv FIC7.csv words.csv no_pv.csv gone.csv");
+
+  ASSERT_EQ(audit["windows"].size(), 2U);
+  const json& sticky = audit["windows"][0];
+  EXPECT_EQ(sticky["loop"], "FIC7");
+  EXPECT_EQ(sticky["service"], "F");
+  EXPECT_EQ(sticky["samples"], 760);
+  EXPECT_EQ(sticky["verdict"], "stiction");
+  EXPECT_EQ(sticky["certainty"], "sure");
+  EXPECT_NEAR(sticky["band_pct"].get<double>(), 3.0, 1.0);
+  EXPECT_EQ(audit["windows"][1]["verdict"], "undetermined");
+  ASSERT_EQ(audit["skipped"].size(), 3U);
+  EXPECT_THAT(audit["skipped"][0]["reason"], HasSubstr("\"HAND\" is none of"));
+  EXPECT_THAT(audit["skipped"][1]["reason"], HasSubstr("try --pv COLUMN"));
+  EXPECT_THAT(Store("audit").err, HasSubstr("nothing to read"));
+}
+
+TEST_F(FdiStoreTest, AuditSaysWhatIsUnusualAndWhatToType) {
+  Write("FIC7.csv", StickyLoop(3.0));
+  EXPECT_TRUE(StoreJson("audit FIC7.csv")["windows"][0]["hint"].is_null());
+  const json exchanged =
+      StoreJson("audit FIC7.csv --op FIC7.PV --pv FIC7.OP")["windows"][0];
+  EXPECT_EQ(exchanged["verdict"], "undetermined");
+  EXPECT_THAT(exchanged["hint"], HasSubstr("try --op and --pv"));
+  std::string minutes = "t_s,OP,PV\n";
+  std::string constant = minutes;
+  for (int k = 0; k < 100; ++k) {
+    const std::string op = std::to_string(50.0 + 3.0 * std::sin(0.3 * k));
+    minutes += std::to_string(60 * k) + ',' + op + ',' +
+               std::to_string(40.0 + std::cos(0.3 * k)) + '\n';
+    constant += std::to_string(k) + ',' + op + ",4\n";
+  }
+  Write("minutes.csv", minutes);
+  Write("constant.csv", constant);
+  const json windows = StoreJson("audit minutes.csv constant.csv")["windows"];
+  ASSERT_EQ(windows.size(), 2U);
+  EXPECT_EQ(windows[0]["verdict"], "no_response");
+  EXPECT_THAT(windows[0]["hint"], HasSubstr("always 4.00; try --pv"));
+  EXPECT_EQ(windows[1]["sample_period_s"], 60.0);
+  EXPECT_THAT(windows[1]["hint"], HasSubstr("try --sp COLUMN"));
 }
 
 // Not m3/h: that would be stored without a word.

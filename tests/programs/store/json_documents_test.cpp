@@ -1,5 +1,6 @@
 // docs/json.md and the programs say the same: every key that a verb prints is
 // documented, and every documented key is printed by some verb.
+#include <cmath>
 #include <map>
 #include <regex>
 #include <set>
@@ -308,6 +309,17 @@ TEST_F(JsonDocumentsTest, ProgramsAndPageHaveTheSameKeys) {
   const std::string id =
       Printed(page, "runs import", "a.csv --valve LV-1")["run_id"];
   Printed(page, "runs sniff", "a.csv --map-output tags.toml");
+  // Two loops with one period, and a file that is too short.
+  for (const char* loop : {"FIC1.csv", "FIC2.csv"}) {
+    std::string text = "t_s,OP,PV,SP,auto\n";
+    for (int k = 0; k < 200; ++k) {
+      const double wave = std::sin(0.3 * k);
+      text += std::to_string(10 * k) + ',' + std::to_string(50.0 + wave) + ',' +
+              std::to_string(50.0 + 2.0 * wave) + ",50,1\n";
+    }
+    Write(loop, text);
+  }
+  Printed(page, "audit", "a.csv FIC1.csv FIC2.csv");
   Printed(page, "runs label", id + "@0:1 f7");
   Printed(page, "runs list");
   Printed(page, "runs show", id);

@@ -1,0 +1,412 @@
+#include "diagnosis/loop/audit.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <span>
+#include <utility>
+
+#include <Eigen/Dense>
+
+#include "base/correlation.h"
+#include "base/error.h"
+#include "diagnosis/loop/play.h"
+
+namespace fdi::loop {
+namespace {
+
+// Thresholds of the method; set on simulation and public windows, not fitted.
+constexpr double kGap = 0.15;
+constexpr double kExplained = 0.3;
+constexpr double kPredictionGain = 3.0;   // LLR of a sure verdict.
+constexpr double kConvincingGain = 10.0;  // LLR that makes up for the gap.
+constexpr double kUnclearGain = 20.0;     // LLR that calls for a closer look.
+constexpr double kRegular = 1.0;
+constexpr double kSinusoid = 0.6;      // Shapes below are sines.
+constexpr double kOverwhelming = 0.8;  // G that no sinusoid explains.
+constexpr double kGoodFit = 0.8;       // r² of a controller's own oscillation.
+constexpr double kIntegral = 0.3;      // r² of increments of an integral.
+constexpr double kAntiphase = -0.5;
+constexpr double kPoorFit = 0.1;  // r² of a disturbance's.
+// A good valve with positioner has a dead band of 0.25 to 0.5 %.
+constexpr double kGoodBand = 0.25;
+constexpr double kHalf = 0.5;   // G of a play between OP and X.
+constexpr double kMoves = 1.0;  // Of OP, which calls for an answer [%].
+constexpr std::size_t kFrozenSamples = 300;
+constexpr double kBlock_s = 30.0;  // Of the second witness.
+
+double Mean(std::span<const double> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) /
+         static_cast<double>(values.size());
+}
+
+std::vector<double> BlockMeans(std::span<const double> values,
+                               std::size_t block) {
+  std::vector<double> means;
+  for (std::size_t k = 0; k + block <= values.size(); k += block) {
+    means.push_back(Mean(values.subspan(k, block)));
+  }
+  return means;
+}
+
+Window Thinned(const Window& window, std::size_t block) {
+  Window thin = window;
+  thin.period_s *= static_cast<double>(block);
+  for (auto series : {&Window::op, &Window::pv, &Window::sp, &Window::x}) {
+    thin.*series = BlockMeans(window.*series, block);
+  }
+  return thin;
+}
+
+std::vector<double> Errors(const Window& window) {
+  std::vector<double> errors(window.pv.size());
+  const double level = window.sp.empty() ? Mean(window.pv) : 0.0;
+  for (std::size_t k = 0; k < errors.size(); ++k) {
+    errors[k] = (window.sp.empty() ? level : window.sp[k]) - window.pv[k];
+  }
+  return errors;
+}
+
+struct ControllerFit {
+  int sign{1};
+  double r2{0.0};
+};
+
+// dOP = Kc de + Ki e + c: a controller acts against the error, so that the
+// larger of its two parts has the sign of the process gain.
+ControllerFit FitController(const Window& window) {
+  const std::vector<double> e = Errors(window);
+  const auto rows = static_cast<Eigen::Index>(e.size()) - 1;
+  Eigen::MatrixX3d inputs(rows, 3);
+  Eigen::VectorXd output(rows);
+  for (Eigen::Index r = 0; r < rows; ++r) {
+    const auto k = static_cast<std::size_t>(r) + 1;
+    inputs.row(r) << e[k] - e[k - 1], e[k], 1.0;
+    output(r) = window.op[k] - window.op[k - 1];
+  }
+  const Eigen::Vector3d gains = inputs.colPivHouseholderQr().solve(output);
+  const Eigen::RowVector3d mean = inputs.colwise().mean();
+  const Eigen::RowVector3d spread = (inputs.rowwise() - mean).colwise().norm();
+  const double p = gains(0) * spread(0);
+  const double i = gains(1) * spread(1);
+  const double total = (output.array() - output.mean()).matrix().squaredNorm();
+  ControllerFit fit;
+  fit.sign = (std::abs(p) > std::abs(i) ? p : i) < 0.0 ? -1 : 1;
+  if (total > 0.0) {
+    fit.r2 = 1.0 - (output - inputs * gains).squaredNorm() / total;
+  }
+  return fit;
+}
+
+// The distance of the means of two series, of the sum of their spreads.
+double Distance(std::span<const double> a, std::span<const double> b) {
+  const auto spread = [](std::span<const double> values) {
+    const double mean = Mean(values);
+    double squares = 0.0;
+    for (const double v : values) {
+      squares += (v - mean) * (v - mean);
+    }
+    return std::sqrt(squares / static_cast<double>(values.size()));
+  };
+  const double off = std::abs(Mean(a) - Mean(b));
+  return off > 0.0 ? off / (spread(a) + spread(b)) : 0.0;
+}
+
+bool IsExchanged(const Window& window, double controller) {
+  if (window.sp.empty() || Distance(window.pv, window.sp) <= 1.0 ||
+      Distance(window.op, window.sp) >= 1.0) {
+    return false;
+  }
+  Window other;
+  other.op = window.pv;
+  other.pv = window.op;
+  other.sp = window.sp;
+  return FitController(other).r2 > controller;
+}
+
+// Of an OP that is no percentage, the ends are not known.
+double ShareAtLimit(std::span<const double> op) {
+  if (!IsPercent(op)) {
+    return 0.0;
+  }
+  const auto at =
+      std::ranges::count_if(op, [](double u) { return u <= 0.5 || u >= 99.5; });
+  return static_cast<double>(at) / static_cast<double>(op.size());
+}
+
+// The longest run of equal readings in which OP moves by 1 % or more.
+std::size_t LongestRepeat(const Window& window) {
+  std::size_t longest = 0;
+  std::size_t begin = 0;
+  for (std::size_t k = 1; k <= window.pv.size(); ++k) {
+    if (k < window.pv.size() && window.pv[k] == window.pv[begin]) {
+      continue;
+    }
+    if (k - begin > longest &&
+        RangeOf(std::span(window.op).subspan(begin, k - begin)) >= kMoves) {
+      longest = k - begin;
+    }
+    begin = k;
+  }
+  return longest;
+}
+
+// The longest one-way run of the smoothed OP in which SP - PV has one sign in
+// 95 % of the samples and PV moves by less than 5 % of its mean [% of OP].
+double UnansweredRun(const Window& window) {
+  const std::vector<double> errors = Errors(window);
+  const std::size_t n = errors.size();
+  constexpr std::size_t kSide = 3;  // Samples on either side of the mean.
+  std::vector<double> op(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::size_t from = k - std::min(k, kSide);
+    const std::size_t to = std::min(n, k + kSide + 1);
+    op[k] = Mean(std::span(window.op).subspan(from, to - from));
+  }
+  double longest = 0.0;
+  for (std::size_t begin = 0; begin + 1 < n;) {
+    const bool up = op[begin + 1] > op[begin];
+    std::size_t end = begin + 1;
+    while (end + 1 < n && (op[end + 1] > op[end]) == up &&
+           op[end + 1] != op[end]) {
+      ++end;
+    }
+    const double run = std::abs(op[end] - op[begin]);
+    const std::span e = std::span(errors).subspan(begin, end - begin + 1);
+    const auto positive = static_cast<double>(
+        std::ranges::count_if(e, [](double v) { return v > 0.0; }));
+    const double share = positive / static_cast<double>(e.size());
+    const double mean = std::abs(Mean(e));
+    if (run > longest && std::max(share, 1.0 - share) >= 0.95 && mean > 0.0 &&
+        std::abs(window.pv[end] - window.pv[begin]) < 0.05 * mean) {
+      longest = run;
+    }
+    begin = end;
+  }
+  return longest;
+}
+
+double MovingShare(std::span<const double> values) {
+  if (values.size() < 2) {
+    return 0.0;
+  }
+  std::size_t moves = 0;
+  for (std::size_t k = 1; k < values.size(); ++k) {
+    moves += values[k] != values[k - 1] ? 1U : 0U;
+  }
+  return static_cast<double>(moves) / static_cast<double>(values.size() - 1);
+}
+
+bool IsRegular(const Evidence& evidence) {
+  return evidence.oscillation && evidence.oscillation->regularity > kRegular;
+}
+
+bool IsSinusoid(const Evidence& evidence) {
+  return IsRegular(evidence) && evidence.oscillation->shape < kSinusoid;
+}
+
+// Where set-point steps move OP far beyond the band, a straight line explains
+// most of PV and leaves no room for the gap. There a play has to explain most
+// of the rest, and to predict.
+bool IsPlay(const Evidence& e) {
+  if (!e.fit || e.fit->band < kGoodBand) {
+    return false;
+  }
+  const double explained = e.fit->explained();
+  if (IsSinusoid(e) && explained < kOverwhelming) {
+    return false;
+  }
+  return (e.fit->gap() > kGap && explained > kExplained) ||
+         (explained > kOverwhelming && e.prediction_gain > kConvincingGain);
+}
+
+}  // namespace
+
+bool IsPercent(std::span<const double> op) {
+  return std::ranges::all_of(op,
+                             [](double u) { return u >= -10.0 && u <= 110.0; });
+}
+
+std::string_view VerdictName(Verdict verdict) {
+  constexpr std::array<std::string_view, kVerdictCount> kNames{
+      "undetermined", "stiction",  "no_response", "frozen",
+      "saturated",    "quantised", "tuning",      "external"};
+  return kNames[static_cast<std::size_t>(verdict)];
+}
+
+namespace {
+
+struct Finding {
+  Verdict verdict{Verdict::kUndetermined};
+  bool sure{false};
+  std::string_view reason;
+};
+
+// With X: it is read off X, whose only input is OP.
+Finding JudgePosition(const Evidence& e) {
+  if (e.distinct_answer == 1 && e.op_range >= kMoves) {
+    return {Verdict::kNoResponse, true, "OP moves and the position stands"};
+  }
+  if (e.fit && e.fit->band >= kGoodBand && e.fit->explained() > kHalf) {
+    return {Verdict::kStiction, true, "the position follows OP through a play"};
+  }
+  return {Verdict::kUndetermined, false,
+          "the position follows OP without a play"};
+}
+
+Finding JudgePlay(const Evidence& e) {
+  if (!IsPlay(e) || e.prediction_gain <= 0.0) {
+    return {};
+  }
+  return e.prediction_gain > kPredictionGain
+             ? Finding{Verdict::kStiction, true,
+                       "a play explains PV and predicts it"}
+             : Finding{Verdict::kStiction, false,
+                       "a play explains PV and hardly predicts it better"};
+}
+
+// Against the controller: in antiphase, or, where PV is known to follow OP,
+// with no relation that a controller could have made.
+bool IsFromOutside(const Window& window, const Evidence& e) {
+  return e.correlation < kAntiphase ||
+         (window.integrating == false && e.fit->linear < kPoorFit);
+}
+
+Finding JudgeOscillation(const Window& window, const Evidence& e) {
+  if (!IsRegular(e) || !e.fit) {
+    return {};
+  }
+  const double linear =
+      window.integrating == true ? e.increments : e.fit->linear;
+  if (linear > kGoodFit) {
+    return {Verdict::kTuning, false,
+            "a regular oscillation in which PV follows OP in a straight line"};
+  }
+  if (window.integrating != true && IsSinusoid(e) && IsFromOutside(window, e)) {
+    return {Verdict::kExternal, false,
+            "a regular sinusoid in which OP works against PV"};
+  }
+  return {};
+}
+
+// The first cause that holds, from those that leave nothing else to see to
+// those that need a sound record.
+Finding Judge(const Window& window, const Evidence& e) {
+  if (e.samples < kMinSamples) {
+    return {Verdict::kUndetermined, false, "too few samples"};
+  }
+  if (e.op_range <= 0.0) {
+    return {Verdict::kUndetermined, false, "OP stands still"};
+  }
+  if (!window.x.empty()) {
+    return JudgePosition(e);
+  }
+  if (e.exchanged) {
+    return {Verdict::kUndetermined, false,
+            "SP stays at OP and not at PV, as if the two were exchanged"};
+  }
+  if (e.distinct_answer == 1 && e.op_range < kMoves) {
+    return {Verdict::kUndetermined, false, "PV stands and OP hardly moves"};
+  }
+  if (e.distinct_answer == 1 || e.unanswered >= 5.0) {
+    return {Verdict::kNoResponse, true,
+            "OP moves and PV does not answer: stuck, shut, isolated, or a dead "
+            "transmitter"};
+  }
+  if (e.longest_repeat > kFrozenSamples) {
+    return {Verdict::kFrozen, true, "PV repeats one reading while OP moves"};
+  }
+  if (e.at_limit > 0.05) {
+    return {Verdict::kSaturated, true, "OP is at an end of its range"};
+  }
+  if (e.distinct_answer < 20) {
+    return {Verdict::kQuantised, true, "PV has too few values"};
+  }
+  if (!e.integrates) {
+    if (const Finding play = JudgePlay(e);
+        play.verdict != Verdict::kUndetermined) {
+      return play;
+    }
+  }
+  if (const Finding cause = JudgeOscillation(window, e);
+      cause.verdict != Verdict::kUndetermined) {
+    return cause;
+  }
+  if (e.integrates) {
+    return {Verdict::kUndetermined, false,
+            "PV follows the integral of OP, which looks like a play: measure X "
+            "or a flow, or step OP in manual"};
+  }
+  if (IsPlay(e)) {
+    return {Verdict::kUndetermined, false,
+            "a play explains PV but does not predict it"};
+  }
+  if (e.prediction_gain > kUnclearGain) {
+    return {Verdict::kUndetermined, false,
+            "tuning or stiction: a play predicts PV but does not explain it"};
+  }
+  return {Verdict::kUndetermined, false, "nothing stands out"};
+}
+
+}  // namespace
+
+Audit AuditWindow(const Window& window) {
+  const std::size_t n = window.op.size();
+  Require(window.period_s > 0.0, "the period of a window is positive");
+  Require(window.pv.size() == n, "a window has as many PV as OP");
+  for (const auto* series : {&window.op, &window.pv, &window.sp, &window.x}) {
+    Require(series->empty() || series->size() == n,
+            "the series of a window have one length");
+    Require(
+        std::ranges::all_of(*series, [](double v) { return std::isfinite(v); }),
+        "the values of a window are finite");
+  }
+  Audit audit;
+  Evidence& e = audit.evidence;
+  e.samples = n;
+  if (n >= kMinSamples) {
+    e.op_range = RangeOf(window.op);
+    e.at_limit = ShareAtLimit(window.op);
+    e.sp_moves = MovingShare(window.sp);
+    const auto& answer = window.x.empty() ? window.pv : window.x;
+    e.distinct_answer = std::set<double>(answer.begin(), answer.end()).size();
+    e.longest_repeat = LongestRepeat(window);
+    e.unanswered = window.sp.empty() ? 0.0 : UnansweredRun(window);
+    e.oscillation = FindOscillation(window.op);
+    const ControllerFit controller = FitController(window);
+    e.controller = controller.r2;
+    e.exchanged = IsExchanged(window, controller.r2);
+    e.gain_sign = window.gain_sign != 0 ? window.gain_sign : controller.sign;
+    std::size_t block = 1;
+    if (e.oscillation && e.oscillation->period > 90.0 && n > 1500) {
+      block = std::max<std::size_t>(1, static_cast<std::size_t>(std::min(
+                                           e.oscillation->period / 40.0,
+                                           static_cast<double>(n) / 750.0)));
+    }
+    const Window thin = Thinned(window, block);
+    const bool by_x = !thin.x.empty();
+    e.fit = FitPlay(thin.op, by_x ? thin.x : thin.pv, by_x ? 1 : e.gain_sign);
+    // Of the second witness.
+    const auto more = static_cast<std::size_t>(
+        std::max(1.0, std::round(kBlock_s / window.period_s)));
+    e.prediction_gain = PlayPredictionGain(BlockMeans(window.op, more),
+                                           BlockMeans(window.pv, more));
+    e.increments = FitIncrements(thin.op, thin.pv, e.gain_sign);
+    e.integrates = window.integrating.value_or(
+        e.fit && e.increments > kIntegral && e.increments > e.fit->linear);
+    CorrelationSums sums;
+    for (std::size_t k = 0; k < n; ++k) {
+      sums.Add(window.op[k] - window.op[0], window.pv[k] - window.pv[0]);
+    }
+    e.correlation = e.gain_sign * sums.Correlation();
+  }
+  const Finding finding = Judge(window, e);
+  audit.verdict = finding.verdict;
+  audit.sure = finding.sure;
+  audit.reason = finding.reason;
+  return audit;
+}
+
+}  // namespace fdi::loop

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diagnosis/loop/oscillation.h"
+#include "diagnosis/loop/play_fit.h"
+
+/// The audit of a control loop from its ordinary records: no model, no position
+/// needed. docs/loops.md says how to read its verdicts.
+namespace fdi::loop {
+
+/// Windows with fewer samples are not judged.
+inline constexpr std::size_t kMinSamples = 60;
+
+/// One stretch of one loop in automatic, without gaps: N samples each.
+struct Window {
+  double period_s{1.0};
+  std::vector<double> op;  ///< Controller output [% of its span].
+  std::vector<double> pv;  ///< Controlled variable [its own unit].
+  std::vector<double> sp;  ///< Set point [as pv]; empty: it stood still.
+  std::vector<double> x;   ///< Position [% of travel]; empty: not measured.
+  /// Sign of the process gain; 0: taken from what the controller does.
+  int gain_sign{0};
+  /// Whether PV is a level or another integral of the flow, if that is known.
+  std::optional<bool> integrating;
+};
+
+enum class Verdict : std::uint8_t {
+  kUndetermined,
+  kStiction,
+  kNoResponse,  ///< OP winds up and PV does not follow.
+  kFrozen,      ///< The reading of PV repeats.
+  kSaturated,   ///< OP is at an end of its range.
+  kQuantised,   ///< PV has too few values.
+  kTuning,      ///< The controller makes the oscillation.
+  kExternal,    ///< The oscillation comes from outside the loop.
+};
+inline constexpr std::size_t kVerdictCount = 8;
+
+/// "undetermined", "stiction", "no_response", ...
+std::string_view VerdictName(Verdict verdict);
+
+/// What is known of a window. Shares are of its samples.
+struct Evidence {
+  std::size_t samples{0};
+  int gain_sign{0};
+  /// r² of dOP on de and e: that OP is the output of the controller of PV.
+  double controller{0.0};
+  double op_range{0.0};  ///< Largest − smallest OP [%].
+  double at_limit{0.0};  ///< Share with OP within 0.5 % of 0 or 100 %.
+  double sp_moves{0.0};  ///< Share in which SP changes: a cascade above 0.5.
+  std::size_t distinct_answer{0};  ///< Values of X, else of PV.
+  std::size_t longest_repeat{0};   ///< Equal readings of PV while OP moves.
+  double unanswered{0.0};  ///< Longest one-way run of OP without answer [%].
+  std::optional<Oscillation> oscillation;  ///< Of OP; period in samples.
+  std::optional<PlayFit> fit;              ///< PV, or X, over OP.
+  double prediction_gain{0.0};             ///< LLR, the second witness.
+  double increments{0.0};                  ///< r² of PV as the integral of OP.
+  double correlation{0.0};  ///< Of OP and PV, times the sign of the gain.
+  bool integrates{false};   ///< As known, else by the increments.
+  /// OP and PV seem exchanged: SP stays at OP and not at PV, and the
+  /// controller's law fits better the other way round.
+  bool exchanged{false};
+};
+
+struct Audit {
+  Verdict verdict{Verdict::kUndetermined};
+  bool sure{false};         ///< Of stiction: two witnesses, or X, agree.
+  std::string_view reason;  ///< One sentence.
+  Evidence evidence;
+};
+
+/// Whether `op` can be % of its span: within -10 to 110.
+bool IsPercent(std::span<const double> op);
+
+/// Judges a window:
+///
+/// - stiction, if a play of at least 0.25 % explains PV much better than a
+///   straight line (gap > 0.15 and G > 0.3, or G > 0.8 and LLR > 10;
+///   FitPlay()), no regular sinusoid does, and a play also predicts PV better
+///   (PlayPredictionGain(): LLR > 0 likely, LLR > 3 sure). Where X is measured,
+///   if a play explains half of what a straight line leaves of X over OP.
+/// - the other causes by what is left: see Verdict and docs/loops.md.
+///
+/// Of an integrating loop a play is never concluded from PV, because the
+/// integral's quarter period looks like one.
+///
+/// @throws std::invalid_argument if the series differ in length, a value is not
+///   finite, or the period is not positive.
+Audit AuditWindow(const Window& window);
+
+}  // namespace fdi::loop

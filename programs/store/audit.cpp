@@ -1,0 +1,694 @@
+// fdi-store audit: judges control loops from their ordinary records.
+#include "diagnosis/loop/audit.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <filesystem>
+#include <iterator>
+#include <span>
+
+#include "base/csv_cells.h"
+#include "base/error.h"
+#include "import/csv.h"
+#include "import/layout.h"
+#include "import/tag_map.h"
+#include "programs/store/verbs.h"
+#include "report/plot/loop_figure.h"
+#include "storage/runs/runs.h"
+
+namespace fdi::storage {
+namespace {
+
+using loop::Verdict;
+using report::Column;
+using report::Format;
+using report::Tone;
+
+struct AuditOptions {
+  std::vector<std::string> files;
+  std::vector<std::string> runs;
+  std::string valve;
+  std::string op;
+  std::string pv;
+  std::string sp;
+  std::string x;
+  std::string mode;
+  std::string service;
+  bool ignore_x{false};
+  double period_s{0.0};
+  double window_s{7200.0};
+  std::string plot;
+  importer::TableOptions table;
+};
+
+// A signal of a loop, and the names that it has in exports: alone, or behind
+// the tag of the loop ("FIC101.OP").
+struct Role {
+  Signal signal;
+  const char* option;
+  std::string AuditOptions::*column;
+  std::vector<const char*> names;
+};
+const std::array<Role, 4>& Roles() {
+  static const std::array<Role, 4> roles{{
+      {Signal::kCv,
+       "--op",
+       &AuditOptions::op,
+       {"OP_pct", "OP", "CV_pct", "CV", "CO", "OUT", "MV"}},
+      {Signal::kF,
+       "--pv",
+       &AuditOptions::pv,
+       {"PV", "F_t_h", "F_m3_h", "F", "MEAS"}},
+      {Signal::kSp, "--sp", &AuditOptions::sp, {"SP", "SV", "SETPOINT"}},
+      {Signal::kX, "--x", &AuditOptions::x, {"X_pct", "X", "ZT", "POS"}},
+  }};
+  return roles;
+}
+
+bool IsNamed(std::string_view column, std::string_view name) {
+  if (SameName(column, name)) {
+    return true;
+  }
+  if (column.size() <= name.size() + 1 ||
+      !SameName(column.substr(column.size() - name.size()), name)) {
+    return false;
+  }
+  return std::string_view("./: ").find(
+             column[column.size() - name.size() - 1]) != std::string_view::npos;
+}
+
+// The column of a role: as the user says, else the only one with a usual name.
+std::optional<std::string> ColumnOf(const Role& role,
+                                    const AuditOptions& options,
+                                    const std::vector<std::string>& header,
+                                    const std::string& source) {
+  if (const std::string& asked = options.*(role.column); !asked.empty()) {
+    return asked;
+  }
+  for (const char* name : role.names) {
+    std::vector<std::string> found;
+    std::ranges::copy_if(
+        header, std::back_inserter(found),
+        [name](const std::string& column) { return IsNamed(column, name); });
+    if (found.size() > 1) {
+      throw DataError(source + ": columns " + Quoted(Listed(found)) +
+                      " may each be it; try " + role.option +
+                      " with one of them");
+    }
+    if (found.size() == 1) {
+      return found.front();
+    }
+  }
+  return std::nullopt;
+}
+
+struct LoopRecord {
+  std::string loop;
+  std::string source;
+  bool dated{false};
+  bool has_sp{true};
+  int gain_sign{0};
+  std::vector<SampleSeries> stretches;
+};
+
+// A readable set of columns becomes a map, so that the project's one reader
+// reads loops, too.
+importer::ColumnMap LoopMap(const std::string& text,
+                            const AuditOptions& options,
+                            const std::string& source) {
+  importer::ColumnMap map = options.table.Read(false);
+  map.mode_column = options.mode;
+  if (!map.columns.empty() || map.long_table) {
+    return map;
+  }
+  const std::vector<std::string> header =
+      importer::FindLayout(importer::LinesOf(text), map, source, false).names;
+  for (const Role& role : Roles()) {
+    if (role.signal == Signal::kX && options.ignore_x) {
+      continue;
+    }
+    if (const auto column = ColumnOf(role, options, header, source)) {
+      map.columns.push_back({*column, role.signal});
+    } else if (role.signal == Signal::kCv || role.signal == Signal::kF) {
+      throw DataError(source + ": no column for " + (role.option + 2) +
+                      "; the header is " + Quoted(Listed(header)) + "; try " +
+                      role.option + " COLUMN");
+    }
+  }
+  // PV keeps its own unit: nothing here depends on it.
+  map.flow_unit = FlowUnit::kM3PerHour;
+  return map;
+}
+
+LoopRecord ReadLoop(const std::string& file, const AuditOptions& options,
+                    const Context& context) {
+  const std::string text = ReadTextFile(file);
+  importer::CsvOptions csv;
+  csv.source = file;
+  csv.map = LoopMap(text, options, file);
+  csv.split_gaps = true;
+  csv.check_values = false;
+  csv.skip_repeats = true;
+  csv.log = context.log;
+  csv.period_s = options.period_s;
+  importer::CsvTable table = importer::ReadCsv(text, csv);
+  // A lost sample or two would cut a window that is long enough otherwise.
+  if (table.runs.size() > 1 && !csv.map.resampling) {
+    const double period_s = table.runs.front().period_s;
+    csv.map.resampling = importer::Resampling{period_s, false, 3.0 * period_s};
+    table = importer::ReadCsv(text, csv);
+  }
+  LoopRecord record;
+  record.loop = std::filesystem::path(file).stem().string();
+  record.source = file;
+  record.dated = table.dated;
+  const bool contract = std::ranges::any_of(
+      csv.map.columns, [](const importer::ColumnMapping& m) {
+        return SameName(m.column, "CV_pct");
+      });
+  // The contract's CV is % of closing: flow falls with it.
+  record.gain_sign = contract ? -1 : 0;
+  record.stretches = std::move(table.runs);
+  return record;
+}
+
+LoopRecord ReadRun(const std::string& selector, bool ignore_x,
+                   RunStore& store) {
+  const StoredRun run = store.Load(selector);
+  LoopRecord record;
+  record.loop = run.info.run.valve_id;
+  record.source = "run " + run.info.id;
+  record.dated = true;
+  record.gain_sign = -1;
+  // The set point of a valve's loop is in % and its PV is not in the record.
+  record.has_sp = false;
+  for (const StoredSample& stored : run.samples) {
+    if (stored.intake != Intake::kAccepted) {
+      continue;
+    }
+    auto& stretches = record.stretches;
+    const std::int64_t step_ns =
+        stretches.empty() ? 0
+                          : stored.sample.stamp_ns -
+                                stretches.back().samples.back().sample.stamp_ns;
+    if (stretches.empty() ||
+        static_cast<double>(step_ns) > 1.5e9 * run.info.run.period_s) {
+      stretches.emplace_back().period_s = run.info.run.period_s;
+    }
+    Sample sample = stored.sample;
+    if (ignore_x) {
+      sample.present =
+          static_cast<SignalMask>(sample.present & ~MaskOf(Signal::kX));
+    }
+    stretches.back().samples.push_back({sample, {}});
+  }
+  return record;
+}
+
+bool IsJudged(const Sample& sample) {
+  return sample.mode == ValveMode::kAuto && sample.Has(Signal::kCv) &&
+         (sample.Has(Signal::kF) || sample.Has(Signal::kX));
+}
+
+using Samples = std::span<const LabelledSample>;
+
+// Stretches in automatic with readings of OP and PV.
+std::vector<Samples> Stretches(const SampleSeries& series) {
+  std::vector<Samples> stretches;
+  const Samples all(series.samples);
+  for (std::size_t begin = 0; begin < all.size();) {
+    const auto is = [](const LabelledSample& s) { return IsJudged(s.sample); };
+    const auto from = static_cast<std::size_t>(
+        std::find_if(all.begin() + static_cast<std::ptrdiff_t>(begin),
+                     all.end(), is) -
+        all.begin());
+    const auto to = static_cast<std::size_t>(
+        std::find_if_not(all.begin() + static_cast<std::ptrdiff_t>(from),
+                         all.end(), is) -
+        all.begin());
+    if (to > from) {
+      stretches.push_back(all.subspan(from, to - from));
+    }
+    begin = std::max(to, begin + 1);
+  }
+  return stretches;
+}
+
+// Where a window ends that begins at 0 and should have `length` samples: at the
+// step of SP nearest to that end, if one is within half a window, so that a new
+// operating point begins a new window. Steps inside a window stay: by moving OP
+// they show a play that is hidden at rest.
+std::size_t EndOfWindow(Samples rest, std::size_t length) {
+  if (2 * rest.size() <= 3 * length) {
+    return rest.size();
+  }
+  std::size_t end = length;
+  std::size_t nearest = length / 2;
+  for (std::size_t k = length / 2 + 1; k < length + length / 2; ++k) {
+    const std::size_t off = k > length ? k - length : length - k;
+    if (off < nearest &&
+        rest[k].sample[Signal::kSp] != rest[k - 1].sample[Signal::kSp]) {
+      nearest = off;
+      end = k;
+    }
+  }
+  return end;
+}
+
+std::vector<double> Series(Samples samples, Signal signal) {
+  std::vector<double> values;
+  for (const LabelledSample& labelled : samples) {
+    if (!labelled.sample.Has(signal)) {
+      return {};
+    }
+    values.push_back(labelled.sample[signal]);
+  }
+  return values;
+}
+
+// The first letter of the tag's function letters: L of "20LIC101_0405".
+char ServiceOf(const std::string& name) {
+  constexpr std::string_view kFunctions = "ICTVRYASDQK";
+  for (std::size_t i = 0; i < name.size();) {
+    std::size_t end = i;
+    while (end < name.size() &&
+           std::isupper(static_cast<unsigned char>(name[end])) != 0) {
+      ++end;
+    }
+    const std::string_view letters = std::string_view(name).substr(i, end - i);
+    if (letters.size() >= 2 && letters.size() <= 4 &&
+        letters.substr(1).find_first_not_of(kFunctions) ==
+            std::string_view::npos) {
+      return letters.front();
+    }
+    i = std::max(end, i + 1);
+  }
+  std::string lower = name;
+  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return lower.find("level") != std::string::npos ? 'L' : '\0';
+}
+
+struct Judged {
+  std::string loop;
+  std::string source;
+  std::optional<std::int64_t> start_ns;
+  double from_s{0.0};
+  char service{'\0'};
+  loop::Window window;
+  loop::Audit audit;
+  std::string hint;
+};
+
+// The loop of `part`; nothing if neither PV nor X is there throughout.
+std::optional<loop::Window> WindowOf(Samples part, double period_s,
+                                     char service, const LoopRecord& record) {
+  loop::Window window;
+  window.period_s = period_s;
+  window.op = Series(part, Signal::kCv);
+  window.x = Series(part, Signal::kX);
+  window.pv = Series(part, Signal::kF);
+  if (window.pv.empty()) {
+    window.pv = window.x;
+  }
+  if (window.pv.empty()) {
+    return std::nullopt;
+  }
+  if (record.has_sp) {
+    window.sp = Series(part, Signal::kSp);
+  }
+  window.gain_sign = record.gain_sign;
+  // F over CV of a stored valve is no integral, whatever the loop is.
+  if (record.gain_sign != 0) {
+    window.integrating = false;
+  } else if (service != '\0' && service != 'T') {
+    window.integrating = service == 'L';
+  }
+  return window;
+}
+
+// What the user may want to change, from what was seen; empty: nothing.
+std::string HintOf(const Judged& one, bool has_sp) {
+  const loop::Evidence& e = one.audit.evidence;
+  if (e.exchanged) {
+    return "OP and PV seem exchanged; try --op and --pv the other way round";
+  }
+  if (!loop::IsPercent(one.window.op)) {
+    const auto [low, high] = std::ranges::minmax_element(one.window.op);
+    return "OP goes from " + report::FormatNumber(*low, 2) + " to " +
+           report::FormatNumber(*high, 2) +
+           ", which is not % of its span: band and range are in its own unit";
+  }
+  if (e.distinct_answer == 1) {
+    return "always " + report::FormatNumber(one.window.pv.front(), 2) +
+           "; try --pv if that is another signal";
+  }
+  if (one.window.sp.empty() && one.window.x.empty() && has_sp) {
+    return "SP is not there throughout and taken as constant; try --sp COLUMN";
+  }
+  if (e.integrates && !one.window.integrating) {
+    return "if PV is no level, try --service F";
+  }
+  return {};
+}
+
+void JudgeRecord(const LoopRecord& record, const AuditOptions& options,
+                 std::vector<Judged>& judged, Json& skipped) {
+  const char service =
+      options.service.empty()
+          ? ServiceOf(record.loop)
+          : static_cast<char>(std::toupper(
+                static_cast<unsigned char>(options.service.front())));
+  std::size_t short_ones = 0;
+  const std::size_t before = judged.size();
+  std::optional<std::int64_t> first_ns;
+  for (const SampleSeries& series : record.stretches) {
+    const auto length = std::max<std::size_t>(
+        6 * loop::kMinSamples,
+        static_cast<std::size_t>(options.window_s / series.period_s));
+    for (Samples rest : Stretches(series)) {
+      first_ns = first_ns.value_or(rest.front().sample.stamp_ns);
+      while (!rest.empty()) {
+        const Samples part = rest.first(EndOfWindow(rest, length));
+        rest = rest.subspan(part.size());
+        auto window = WindowOf(part, series.period_s, service, record);
+        if (part.size() < loop::kMinSamples || !window) {
+          ++short_ones;
+          continue;
+        }
+        const std::int64_t begin_ns = part.front().sample.stamp_ns;
+        Judged one;
+        one.loop = record.loop;
+        one.source = record.source;
+        one.service = service;
+        one.from_s = static_cast<double>(begin_ns - *first_ns) * 1e-9;
+        if (record.dated) {
+          one.start_ns = begin_ns;
+        }
+        one.window = std::move(*window);
+        one.audit = loop::AuditWindow(one.window);
+        one.hint = HintOf(one, record.has_sp);
+        judged.push_back(std::move(one));
+      }
+    }
+  }
+  if (judged.size() == before || short_ones > 0) {
+    skipped.push_back(
+        {{"source", record.source},
+         {"reason",
+          (judged.size() == before
+               ? std::string("no window in AUTO with OP and PV has ")
+               : std::to_string(short_ones) + " stretches have fewer than ") +
+              std::to_string(loop::kMinSamples) +
+              " samples between changes of mode, gaps and missing readings"}});
+  }
+}
+
+Json Optional(bool known, double value) {
+  return known ? NumberJson(value) : Json(nullptr);
+}
+
+Json JudgedJson(const Judged& one) {
+  const loop::Evidence& e = one.audit.evidence;
+  const loop::PlayFit fit = e.fit.value_or(loop::PlayFit{});
+  const loop::Oscillation wave = e.oscillation.value_or(loop::Oscillation{});
+  const double period_s = one.window.period_s;
+  const bool is_stiction = one.audit.verdict == Verdict::kStiction;
+  return {
+      {"loop", one.loop},
+      {"source", one.source},
+      {"start_utc", TimeJson(one.start_ns)},
+      {"from_s", one.from_s},
+      {"samples", e.samples},
+      {"sample_period_s", period_s},
+      {"service",
+       one.service == '\0' ? Json(nullptr) : Json(std::string(1, one.service))},
+      {"verdict", loop::VerdictName(one.audit.verdict)},
+      {"certainty", !is_stiction     ? Json(nullptr)
+                    : one.audit.sure ? Json("sure")
+                                     : Json("likely")},
+      {"reason", one.audit.reason},
+      {"hint", one.hint.empty() ? Json(nullptr) : Json(one.hint)},
+      {"read_off", one.window.x.empty() ? "PV" : "X"},
+      {"integrates", e.integrates},
+      {"band_pct", Optional(e.fit.has_value(), fit.band)},
+      {"band_low_pct", Optional(e.fit.has_value(), fit.band_low)},
+      {"band_high_pct", Optional(e.fit.has_value(), fit.band_high)},
+      {"period_s", Optional(e.oscillation.has_value(), wave.period * period_s)},
+      {"regularity", Optional(e.oscillation.has_value(), wave.regularity)},
+      {"shape", Optional(e.oscillation.has_value(), wave.shape)},
+      {"fit_linear", Optional(e.fit.has_value(), fit.linear)},
+      {"fit_play", Optional(e.fit.has_value(), fit.play)},
+      {"gap", Optional(e.fit.has_value(), fit.gap())},
+      {"explained", Optional(e.fit.has_value(), fit.explained())},
+      {"prediction_gain", e.prediction_gain},
+      {"gain_sign", e.gain_sign},
+      {"controller_fit", e.controller},
+      {"op_range_pct", e.op_range},
+      {"at_limit", e.at_limit},
+      {"sp_moves", Optional(!one.window.sp.empty(), e.sp_moves)},
+      {"distinct", e.distinct_answer},
+      {"longest_repeat_s", static_cast<double>(e.longest_repeat) * period_s},
+      {"unanswered_pct", e.unanswered}};
+}
+
+// What needs somebody first comes first; wide bands before narrow ones.
+int RankOf(const Judged& one) {
+  switch (one.audit.verdict) {
+    case Verdict::kNoResponse:
+      return 0;
+    case Verdict::kFrozen:
+      return 1;
+    case Verdict::kStiction:
+      return one.audit.sure ? 2 : 3;
+    case Verdict::kSaturated:
+      return 4;
+    case Verdict::kTuning:
+      return 5;
+    case Verdict::kExternal:
+      return 6;
+    case Verdict::kQuantised:
+      return 7;
+    case Verdict::kUndetermined:
+      break;
+  }
+  return 8;
+}
+
+void Rank(std::vector<Judged>& judged) {
+  const auto band = [](const Judged& one) {
+    return one.audit.evidence.fit ? one.audit.evidence.fit->band : 0.0;
+  };
+  std::ranges::stable_sort(judged, [&](const Judged& a, const Judged& b) {
+    const int rank_a = RankOf(a);
+    const int rank_b = RankOf(b);
+    return rank_a != rank_b ? rank_a < rank_b : band(a) > band(b);
+  });
+}
+
+// Loops that oscillate regularly with periods within 5 % of one another: one
+// cause, perhaps, in the loop among them that is sticky or badly tuned.
+Json CommonPeriods(const std::vector<Judged>& judged) {
+  struct Wave {
+    double period_s;
+    std::string loop;
+  };
+  std::vector<Wave> waves;
+  for (const Judged& one : judged) {
+    if (const auto& wave = one.audit.evidence.oscillation;
+        wave && wave->regularity > 1.0) {
+      waves.push_back({wave->period * one.window.period_s, one.loop});
+    }
+  }
+  std::ranges::sort(waves, {}, &Wave::period_s);
+  Json groups = Json::array();
+  for (std::size_t i = 0; i < waves.size();) {
+    std::size_t end = i;
+    std::vector<std::string> loops;
+    double sum_s = 0.0;
+    for (;
+         end < waves.size() && waves[end].period_s <= 1.05 * waves[i].period_s;
+         ++end) {
+      sum_s += waves[end].period_s;
+      if (std::ranges::find(loops, waves[end].loop) == loops.end()) {
+        loops.push_back(waves[end].loop);
+      }
+    }
+    if (loops.size() > 1) {
+      groups.push_back({{"period_s", sum_s / static_cast<double>(end - i)},
+                        {"loops", loops}});
+    }
+    i = end;
+  }
+  return groups;
+}
+
+// PATH.png for one window; PATH-1.png, PATH-2.png, ... by rank for more.
+void DrawAll(const std::vector<Judged>& judged, const std::string& path,
+             Report& report) {
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    std::filesystem::path file(path);
+    if (judged.size() > 1) {
+      file.replace_filename(file.stem().string() + "-" + std::to_string(i + 1) +
+                            file.extension().string());
+    }
+    plot::DrawFigure(
+        plot::LoopFigure(judged[i].loop, judged[i].window, judged[i].audit),
+        file);
+    report.document["files"].push_back(file.string());
+    report.Line(judged[i].loop + " is drawn to " + file.string());
+  }
+}
+
+void ReadRuns(const AuditOptions& options, const Context& context,
+              std::vector<LoopRecord>& records) {
+  if (options.runs.empty() && options.valve.empty()) {
+    return;
+  }
+  RunStore store(DataOf(context).runs());
+  std::vector<std::string> ids = options.runs;
+  if (!options.valve.empty()) {
+    RunFilter filter;
+    filter.valve_glob = options.valve;
+    for (const RunInfo& info : store.List(filter)) {
+      ids.push_back(info.id);
+    }
+    if (ids.empty()) {
+      throw NotFoundError("no run of a valve " + Quoted(options.valve) +
+                          "; fdi-store runs list shows what there is");
+    }
+  }
+  for (const std::string& id : ids) {
+    records.push_back(ReadRun(id, options.ignore_x, store));
+  }
+}
+
+Column BandColumn() {
+  Column column{"band [% of OP]", "band_pct"};
+  column.align = report::Align::kRight;
+  column.text = [](const Json& row) -> std::string {
+    if (row["certainty"].is_null()) {
+      return "-";
+    }
+    return report::FormatNumber(row["band_pct"].get<double>(), 2) + " (" +
+           report::FormatNumber(row["band_low_pct"].get<double>(), 2) + ".." +
+           report::FormatNumber(row["band_high_pct"].get<double>(), 2) + ")";
+  };
+  return column;
+}
+
+Report AuditLoops(const AuditOptions& options, const Context& context) {
+  if (options.files.empty() && options.runs.empty() && options.valve.empty()) {
+    throw ConfigError("audit: nothing to read; try FILE, --runs or --valve");
+  }
+  if (!options.plot.empty()) {
+    plot::FormatOf(options.plot);
+  }
+  std::vector<Judged> judged;
+  Json skipped = Json::array();
+  // One file that cannot be read does not keep the others from being judged.
+  for (const std::string& file : options.files) {
+    try {
+      JudgeRecord(ReadLoop(file, options, context), options, judged, skipped);
+    } catch (const DataError& error) {
+      skipped.push_back({{"source", file}, {"reason", error.what()}});
+    } catch (const NotFoundError& error) {
+      skipped.push_back({{"source", file}, {"reason", error.what()}});
+    }
+  }
+  std::vector<LoopRecord> records;
+  ReadRuns(options, context, records);
+  for (const LoopRecord& record : records) {
+    JudgeRecord(record, options, judged, skipped);
+  }
+  Rank(judged);
+  Report report;
+  report.document["windows"] = Rows(judged, JudgedJson);
+  report.document["common_periods"] = CommonPeriods(judged);
+  report.document["skipped"] = skipped;
+  report.document["files"] = Json::array();
+  Column verdict{"verdict", "verdict"};
+  verdict.text = [](const Json& row) {
+    const std::string name = row["verdict"];
+    return row["certainty"].is_null()
+               ? name
+               : name + ", " + row["certainty"].get<std::string>();
+  };
+  verdict.tone = [](const Json& row) {
+    const std::string name = row["verdict"];
+    return name == "undetermined"       ? Tone::kQuiet
+           : row["certainty"] == "sure" ? Tone::kAlarm
+                                        : Tone::kWarning;
+  };
+  report
+      .Table("windows",
+             {{"loop", "loop"},
+              {"from [s]", "from_s", Format::kPlain, 0, 4},
+              verdict,
+              BandColumn(),
+              {"G [-]", "explained", Format::kPlain, 2, 2},
+              {"LLR [-]", "prediction_gain", Format::kPlain, 1, 2},
+              {"period [s]", "period_s", Format::kPlain, 0, 3},
+              {"r [-]", "regularity", Format::kPlain, 1, 3},
+              {"reason", "reason", Format::kPlain, 2, 1}},
+             "no window could be judged")
+      .Csv("windows", {"loop", "source", "start_utc", "from_s", "samples",
+                       "verdict", "certainty", "band_pct", "band_low_pct",
+                       "band_high_pct", "period_s", "regularity", "shape",
+                       "gap", "explained", "prediction_gain", "reason"});
+  if (!report.document["common_periods"].empty()) {
+    report.Line("").Table("common_periods",
+                          {{"common period [s]", "period_s", Format::kPlain, 0},
+                           {"loops", "loops"}});
+  }
+  if (!skipped.empty()) {
+    report.Line("").Table("skipped",
+                          {{"not judged", "source"}, {"reason", "reason"}});
+  }
+  if (!options.plot.empty()) {
+    DrawAll(judged, options.plot, report);
+  }
+  if (judged.empty()) {
+    report.exit_code = report::kExitData;
+  }
+  return report;
+}
+
+}  // namespace
+
+void AddAuditVerb(report::Program& program) {
+  auto [verb, options] = AddVerb(
+      program, program.root(), "audit",
+      "Judge control loops from OP, PV, SP and mode: stiction, tuning, ...",
+      AuditLoops);
+  verb.add_option("file", options.files, "CSV files, one loop each");
+  verb.add_option("--runs", options.runs, "Stored runs: ID, ID@from:to");
+  verb.add_option("--valve", options.valve,
+                  "All stored runs of these valves: 'FV-1*'");
+  verb.add_option("--op", options.op, "Column of the controller output [%]");
+  verb.add_option("--pv", options.pv, "Column of the controlled variable");
+  verb.add_option("--sp", options.sp, "Column of the set point [as PV]");
+  verb.add_option("--x", options.x, "Column of the position [%]");
+  verb.add_option("--mode", options.mode,
+                  "Column of the mode (mode, or auto with 1 and 0)");
+  verb.add_flag("--ignore-x", options.ignore_x,
+                "Judge PV although the position is there");
+  verb.add_option("--service", options.service,
+                  "F, P, T, A, or L for levels and what else integrates "
+                  "(default: letters of the tag)")
+      ->check(CLI::IsMember({"F", "P", "T", "A", "L"}, CLI::ignore_case));
+  verb.add_option("--period", options.period_s,
+                  "Sample period in s (0: the most usual step)")
+      ->check(CLI::NonNegativeNumber);
+  verb.add_option("--window", options.window_s,
+                  "Length of a window in s; at least 360 samples")
+      ->check(CLI::PositiveNumber);
+  verb.add_option("--plot", options.plot,
+                  "Draw each window to FILE.png or FILE.svg");
+  options.table.AddTo(verb);
+  program.AllowCsv(verb, "One line per window");
+}
+
+}  // namespace fdi::storage

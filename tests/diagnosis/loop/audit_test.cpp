@@ -1,0 +1,229 @@
+#include "diagnosis/loop/audit.h"
+
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/loop/play.h"
+#include "tests/diagnosis/loop/closed_loop.h"
+
+namespace fdi::loop {
+namespace {
+
+constexpr int kLoops = 80;
+
+// Share of `loop` called stiction, over seeds 1, 2, ...
+double StictionShare(const ClosedLoop& loop, bool say_level = true) {
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= kLoops; ++seed) {
+    Window window = Simulate(loop, seed);
+    if (!say_level) {
+      window.integrating.reset();
+    }
+    found += AuditWindow(window).verdict == Verdict::kStiction ? 1 : 0;
+  }
+  return static_cast<double>(found) / kLoops;
+}
+
+constexpr std::array kSound{LoopState::kHealthy, LoopState::kSluggish,
+                            LoopState::kTight, LoopState::kExternalSine};
+
+TEST(AuditTest, CallsFewSoundFlowLoopsSticky) {
+  for (const LoopState state : kSound) {
+    double sum = 0.0;
+    for (const bool steps : {false, true}) {
+      for (const double noise : {0.02, 0.1}) {
+        ClosedLoop loop;
+        loop.state = state;
+        loop.noise = noise;
+        loop.steps = steps;
+        const double share = StictionShare(loop);
+        sum += share / 4.0;
+        std::cout << "state " << static_cast<int>(state) << ", noise " << noise
+                  << (steps ? ", steps" : "") << ": " << share << '\n';
+      }
+    }
+    EXPECT_LE(sum, 0.05) << static_cast<int>(state);
+  }
+}
+
+TEST(AuditTest, FindsBandsFromTwoPercentWithSetPointSteps) {
+  for (const double band : {2.0, 3.0, 4.0}) {
+    for (const double noise : {0.02, 0.1}) {
+      ClosedLoop loop;
+      loop.state = LoopState::kSticky;
+      loop.band = band;
+      loop.noise = noise;
+      loop.steps = true;
+      const double with = StictionShare(loop);
+      loop.steps = false;
+      std::cout << "band " << band << ", noise " << noise << ": " << with
+                << " with steps, " << StictionShare(loop) << " without\n";
+      EXPECT_GE(with, 0.6);
+    }
+  }
+}
+
+TEST(AuditTest, CallsNoLevelLoopSticky) {
+  for (const LoopState state : kSound) {
+    for (const bool steps : {false, true}) {
+      ClosedLoop loop;
+      loop.state = state;
+      loop.level = true;
+      loop.steps = steps;
+      EXPECT_EQ(StictionShare(loop), 0.0) << static_cast<int>(state);
+      // Nor where nobody says that it is one.
+      const double unsaid = StictionShare(loop, false);
+      std::cout << "level unsaid, state " << static_cast<int>(state)
+                << (steps ? ", steps: " : ": ") << unsaid << '\n';
+      EXPECT_LE(unsaid, 0.05) << static_cast<int>(state);
+    }
+  }
+}
+
+TEST(AuditTest, IsSureOnlyWherePredictionAgrees) {
+  ClosedLoop loop;
+  loop.state = LoopState::kSticky;
+  loop.band = 3.0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Audit audit = AuditWindow(Simulate(loop, seed));
+    if (audit.verdict == Verdict::kStiction) {
+      EXPECT_EQ(audit.sure, audit.evidence.prediction_gain > 3.0);
+      EXPECT_GT(audit.evidence.prediction_gain, 0.0);
+    }
+  }
+}
+
+TEST(AuditTest, ReadsStictionOffThePosition) {
+  ClosedLoop loop;
+  loop.level = true;
+  Window window = Simulate(loop, 3);
+  window.x = window.op;
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kUndetermined);
+  const auto [low, high] = std::ranges::minmax_element(window.op);
+  const double band = 0.5 * (*high - *low);
+  window.x = PlayOf(window.op, band, window.op[0]);
+  const Audit audit = AuditWindow(window);
+  EXPECT_EQ(audit.verdict, Verdict::kStiction);
+  EXPECT_TRUE(audit.sure);
+  EXPECT_NEAR(audit.evidence.fit->band, band, 0.05 * (*high - *low));
+  window.x.assign(window.x.size(), 40.0);
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kNoResponse);
+}
+
+Window Ramp() {
+  Window window;
+  window.period_s = 10.0;
+  for (int k = 0; k < 400; ++k) {
+    window.op.push_back(20.0 + 0.1 * k);
+    window.pv.push_back(30.0 + 0.001 * std::sin(k));
+    window.sp.push_back(35.0);
+  }
+  return window;
+}
+
+TEST(AuditTest, SeesThatNothingAnswers) {
+  EXPECT_EQ(AuditWindow(Ramp()).verdict, Verdict::kNoResponse);
+  Window dead = Ramp();
+  dead.sp.clear();
+  dead.pv.assign(dead.pv.size(), 3.5e-44);
+  EXPECT_EQ(AuditWindow(dead).verdict, Verdict::kNoResponse);
+}
+
+TEST(AuditTest, SeesAFrozenReading) {
+  Window window = Simulate({}, 5);
+  for (std::size_t k = 200; k < 520; ++k) {
+    window.pv[k] = window.pv[199];
+    window.op[k] = 50.0 + (k % 7 < 3 ? 2.0 : -2.0);
+  }
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kFrozen);
+}
+
+TEST(AuditTest, SeesSaturationAndCoarseReadings) {
+  Window window = Simulate({}, 5);
+  Window full = window;
+  for (std::size_t k = 100; k < 150; ++k) {
+    full.op[k] = 100.0;
+  }
+  EXPECT_EQ(AuditWindow(full).verdict, Verdict::kSaturated);
+  for (double& pv : window.pv) {
+    pv = std::round(pv * 5.0) / 5.0;
+  }
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kQuantised);
+}
+
+TEST(AuditTest, SeesThatOpAndPvAreExchanged) {
+  Window window = Simulate({}, 5);
+  for (double& sp : window.sp) {
+    sp *= 3.0;
+  }
+  for (double& pv : window.pv) {
+    pv *= 3.0;
+  }
+  EXPECT_FALSE(AuditWindow(window).evidence.exchanged);
+  std::swap(window.op, window.pv);
+  const Audit audit = AuditWindow(window);
+  EXPECT_TRUE(audit.evidence.exchanged);
+  EXPECT_EQ(audit.verdict, Verdict::kUndetermined);
+}
+
+TEST(AuditTest, KnowsNoEndsOfAnOutputThatIsNoPercentage) {
+  Window window = Simulate({}, 5);
+  for (double& op : window.op) {
+    op *= 8.0;  // A master's, in the unit of its slave's set point.
+  }
+  EXPECT_FALSE(IsPercent(window.op));
+  EXPECT_EQ(AuditWindow(window).evidence.at_limit, 0.0);
+}
+
+Window Oscillating(double phase, double op_shift = 0.0) {
+  Window window;
+  window.period_s = 10.0;
+  window.gain_sign = 1;
+  for (int k = 0; k < 720; ++k) {
+    const double angle = 2.0 * std::numbers::pi * k / 24.0;
+    window.op.push_back(50.0 + op_shift + 2.0 * std::sin(angle));
+    window.pv.push_back(50.0 + std::sin(angle + phase) +
+                        1e-3 * std::sin(13.0 * k * k));
+    window.sp.push_back(50.0);
+  }
+  return window;
+}
+
+TEST(AuditTest, TellsTuningFromADisturbance) {
+  const Audit tuning = AuditWindow(Oscillating(-0.2));
+  EXPECT_EQ(tuning.verdict, Verdict::kTuning);
+  EXPECT_NEAR(tuning.evidence.oscillation->period, 24.0, 0.1);
+  const Audit external = AuditWindow(Oscillating(std::numbers::pi));
+  EXPECT_EQ(external.verdict, Verdict::kExternal);
+}
+
+TEST(AuditTest, AnswersUndeterminedForTooLittle) {
+  Window window = Simulate({}, 1);
+  for (auto series : {&Window::op, &Window::pv, &Window::sp}) {
+    (window.*series).resize(kMinSamples - 1);
+  }
+  EXPECT_EQ(AuditWindow(window).verdict, Verdict::kUndetermined);
+  Window still = Simulate({}, 1);
+  still.op.assign(still.op.size(), 50.0);
+  EXPECT_EQ(AuditWindow(still).verdict, Verdict::kUndetermined);
+}
+
+TEST(AuditTest, RefusesWhatIsNoWindow) {
+  Window window = Simulate({}, 1);
+  window.pv.pop_back();
+  EXPECT_THROW(AuditWindow(window), std::invalid_argument);
+  window = Simulate({}, 1);
+  window.op[3] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(AuditWindow(window), std::invalid_argument);
+  window = Simulate({}, 1);
+  window.period_s = 0.0;
+  EXPECT_THROW(AuditWindow(window), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace fdi::loop
