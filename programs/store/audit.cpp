@@ -173,8 +173,7 @@ LoopRecord ReadLoop(const std::string& file, const AuditOptions& options,
   return record;
 }
 
-LoopRecord ReadRun(const std::string& selector, bool ignore_x,
-                   RunStore& store) {
+LoopRecord ReadRun(const std::string& selector, RunStore& store) {
   const StoredRun run = store.Load(selector);
   LoopRecord record;
   record.loop = run.info.run.valve_id;
@@ -196,12 +195,7 @@ LoopRecord ReadRun(const std::string& selector, bool ignore_x,
         static_cast<double>(step_ns) > 1.5e9 * run.info.run.period_s) {
       stretches.emplace_back().period_s = run.info.run.period_s;
     }
-    Sample sample = stored.sample;
-    if (ignore_x) {
-      sample.present =
-          static_cast<SignalMask>(sample.present & ~MaskOf(Signal::kX));
-    }
-    stretches.back().samples.push_back({sample, {}});
+    stretches.back().samples.push_back({stored.sample, {}});
   }
   return record;
 }
@@ -304,11 +298,14 @@ struct Judged {
 
 // The loop of `part`; nothing if neither PV nor X is there throughout.
 std::optional<loop::Window> WindowOf(Samples part, double period_s,
-                                     char service, const LoopRecord& record) {
+                                     char service, const LoopRecord& record,
+                                     bool ignore_x) {
   loop::Window window;
   window.period_s = period_s;
   window.op = Series(part, Signal::kCv);
-  window.x = Series(part, Signal::kX);
+  if (!ignore_x) {
+    window.x = Series(part, Signal::kX);
+  }
   window.pv = Series(part, Signal::kF);
   if (window.pv.empty()) {
     window.pv = window.x;
@@ -373,7 +370,8 @@ void JudgeRecord(const LoopRecord& record, const AuditOptions& options,
       while (!rest.empty()) {
         const Samples part = rest.first(EndOfWindow(rest, length));
         rest = rest.subspan(part.size());
-        auto window = WindowOf(part, series.period_s, service, record);
+        auto window =
+            WindowOf(part, series.period_s, service, record, options.ignore_x);
         if (part.size() < loop::kMinSamples || !window) {
           ++short_ones;
           continue;
@@ -561,7 +559,7 @@ void ReadRuns(const AuditOptions& options, const Context& context,
     }
   }
   for (const std::string& id : ids) {
-    records.push_back(ReadRun(id, options.ignore_x, store));
+    records.push_back(ReadRun(id, store));
   }
 }
 
