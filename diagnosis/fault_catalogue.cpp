@@ -114,6 +114,15 @@ std::optional<Signal> TransmitterOf(int fault) {
   return IsFault(fault) ? FaultFactsOf(fault).transmitter : std::nullopt;
 }
 
+bool HasNegative(int fault) {
+  constexpr int kFriction = 4;
+  return FaultFactsOf(fault).is_signed && fault != kFriction;
+}
+
+bool IsVisibleIn(int fault, SignalMask signals) {
+  return (FaultFactsOf(fault).visible_in & signals) != 0;
+}
+
 int RequireFault(std::string_view name) {
   if (const auto fault = ParseFault(name)) {
     return *fault;

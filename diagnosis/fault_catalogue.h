@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <iterator>
 #include <optional>
 #include <string>
@@ -11,40 +12,150 @@
 
 namespace fdi {
 
+/// What a fault changes first.
+enum class ActsOn : std::uint8_t {
+  kRod,          ///< Actuator, positioner or a stop: X, and F with it.
+  kFlow,         ///< The flow at the same X.
+  kFlowReading,  ///< The reading of F alone.
+  kInputs,       ///< P1, P2 or T1, or the readings of them.
+};
+
+/// How the effect grows with the strength.
+enum class Onset : std::uint8_t {
+  kGradual,
+  kStop,       ///< None until the rod meets a stop.
+  kThreshold,  ///< None until the force lacks, and little more beyond.
+};
+
+/// When one fault is taken for another of its `look_alikes`.
+enum class Alike : std::uint8_t {
+  kNever,
+  kWithinItsSize,  ///< Their effects have one shape; only the size tells.
+  kWhileWeak,      ///< As long as both effects are within the model's error.
+  kUnfit,  ///< Where no fault explains the record as a healthy valve is.
+};
+
+inline constexpr SignalMask kRodSignals =
+    static_cast<SignalMask>(MaskOf(Signal::kX) | MaskOf(Signal::kF));
+
 struct FaultFacts {
-  std::string_view name;         ///< "f1"; "t1", "p1", "p2" for transmitters.
-  std::string_view description;  ///< "valve clogging".
-  std::string_view paper_name;   ///< "F1".."F5", or empty.
-  bool is_signed;                ///< Strength in [-1, 1], else in [0, 1].
+  std::string_view name;          ///< "f1"; "t1", "p1", "p2" for transmitters.
+  std::string_view description;   ///< "valve clogging".
+  std::string_view paper_name{};  ///< "F1".."F5", or empty.
+  bool is_signed{false};          ///< Strength in [-1, 1], else in [0, 1].
   /// The signal of the faulty transmitter.
   std::optional<Signal> transmitter{};
+  ActsOn acts_on{ActsOn::kRod};
+  /// Basic signals of which one has to be measured to see the fault.
+  SignalMask visible_in{kRodSignals};
+  Onset onset{Onset::kGradual};
+  /// Weaker than a simulation of X and F errs.
+  bool weak{false};
+  /// Needs a medium that can evaporate.
+  bool of_liquids{false};
+  /// The signal whose reading is not what acts on the valve.
+  std::optional<Signal> hides{};
+  Alike alike{Alike::kNever};
+  std::array<int, 2> look_alikes{};  ///< Numbers of faults; 0: none.
 };
 
 /// All faults, numbered by position from 1 on. Models, databases and messages
 /// contain these numbers, so new faults are appended.
 inline constexpr FaultFacts kFaultCatalogue[] = {
-    {"f1", "valve clogging", "F1", false},
-    {"f2", "plug or seat sedimentation", "", false},
-    {"f3", "plug or seat erosion", "F2", false},
-    {"f4", "increased friction of valve or bushing", "", true},
-    {"f5", "external leakage", "", false},
-    {"f6", "internal leakage", "F3", false},
-    {"f7", "medium evaporation or critical flow", "F4", false},
-    {"f8", "twisted piston rod", "", false},
-    {"f9", "housing or terminals leak air", "", false},
-    {"f10", "diaphragm perforation", "", false},
-    {"f11", "spring fault", "", false},
-    {"f12", "electro-pneumatic transducer fault", "", true},
-    {"f13", "rod displacement sensor fault", "", true},
-    {"f14", "positioner pressure sensor fault", "", true},
-    {"f15", "positioner feedback fault", "", false},
-    {"f16", "supply pressure drop", "", false},
-    {"f17", "unexpected pressure change across the valve", "", true},
-    {"f18", "bypass valve open", "", false},
-    {"f19", "flow sensor fault", "F5", true},
-    {"t1", "temperature transmitter fault", "", true, Signal::kT1},
-    {"p1", "inlet pressure transmitter fault", "", true, Signal::kP1},
-    {"p2", "outlet pressure transmitter fault", "", true, Signal::kP2},
+    {.name = "f1",
+     .description = "valve clogging",
+     .paper_name = "F1",
+     .onset = Onset::kStop,
+     .alike = Alike::kUnfit,
+     .look_alikes = {10, 16}},
+    {.name = "f2",
+     .description = "plug or seat sedimentation",
+     .alike = Alike::kWhileWeak,
+     .look_alikes = {5}},
+    {.name = "f3", .description = "plug or seat erosion", .paper_name = "F2"},
+    {.name = "f4",
+     .description = "increased friction of valve or bushing",
+     .is_signed = true},
+    {.name = "f5",
+     .description = "external leakage",
+     .acts_on = ActsOn::kFlow,
+     .visible_in = MaskOf(Signal::kF),
+     .alike = Alike::kWhileWeak,
+     .look_alikes = {2}},
+    {.name = "f6",
+     .description = "internal leakage",
+     .paper_name = "F3",
+     .acts_on = ActsOn::kFlow,
+     .visible_in = MaskOf(Signal::kF),
+     .alike = Alike::kWithinItsSize,
+     .look_alikes = {18}},
+    {.name = "f7",
+     .description = "medium evaporation or critical flow",
+     .paper_name = "F4",
+     .acts_on = ActsOn::kInputs,
+     .of_liquids = true,
+     .hides = Signal::kT1},
+    {.name = "f8", .description = "twisted piston rod", .weak = true},
+    {.name = "f9", .description = "housing or terminals leak air"},
+    {.name = "f10",
+     .description = "diaphragm perforation",
+     .onset = Onset::kThreshold,
+     .alike = Alike::kUnfit,
+     .look_alikes = {1, 16}},
+    {.name = "f11", .description = "spring fault"},
+    {.name = "f12",
+     .description = "electro-pneumatic transducer fault",
+     .is_signed = true},
+    {.name = "f13",
+     .description = "rod displacement sensor fault",
+     .is_signed = true},
+    {.name = "f14",
+     .description = "positioner pressure sensor fault",
+     .is_signed = true,
+     .visible_in = 0},
+    {.name = "f15", .description = "positioner feedback fault"},
+    {.name = "f16",
+     .description = "supply pressure drop",
+     .onset = Onset::kThreshold,
+     .alike = Alike::kUnfit,
+     .look_alikes = {1, 10}},
+    {.name = "f17",
+     .description = "unexpected pressure change across the valve",
+     .is_signed = true,
+     .acts_on = ActsOn::kInputs},
+    {.name = "f18",
+     .description = "bypass valve open",
+     .acts_on = ActsOn::kFlow,
+     .visible_in = MaskOf(Signal::kF),
+     .alike = Alike::kWithinItsSize,
+     .look_alikes = {6}},
+    {.name = "f19",
+     .description = "flow sensor fault",
+     .paper_name = "F5",
+     .is_signed = true,
+     .acts_on = ActsOn::kFlowReading,
+     .visible_in = MaskOf(Signal::kF)},
+    {.name = "t1",
+     .description = "temperature transmitter fault",
+     .is_signed = true,
+     .transmitter = Signal::kT1,
+     .acts_on = ActsOn::kInputs,
+     .visible_in = MaskOf(Signal::kT1),
+     .hides = Signal::kT1},
+    {.name = "p1",
+     .description = "inlet pressure transmitter fault",
+     .is_signed = true,
+     .transmitter = Signal::kP1,
+     .acts_on = ActsOn::kInputs,
+     .visible_in = MaskOf(Signal::kP1),
+     .hides = Signal::kP1},
+    {.name = "p2",
+     .description = "outlet pressure transmitter fault",
+     .is_signed = true,
+     .transmitter = Signal::kP2,
+     .acts_on = ActsOn::kInputs,
+     .visible_in = MaskOf(Signal::kP2),
+     .hides = Signal::kP2},
 };
 
 /// Findings of the floor (diagnosis/floor.h): implausible readings, whatever
@@ -67,6 +178,8 @@ inline constexpr int kFirstFinding = 201;
 inline constexpr int kLastFinding =
     kFirstFinding + static_cast<int>(std::size(kFindingCatalogue)) - 1;
 
+inline constexpr int kDiaphragmPerforation = 10;
+inline constexpr int kSupplyDrop = 16;
 inline constexpr int kTemperatureTransmitterFault = 20;
 inline constexpr int kInletPressureTransmitterFault = 21;
 inline constexpr int kOutletPressureTransmitterFault = 22;
@@ -75,7 +188,9 @@ inline constexpr int kShutFlow = 202;
 inline constexpr int kExcessFlow = 203;
 inline constexpr int kPositionStuck = 204;
 inline constexpr int kFlowStuck = 205;
-static_assert(kFaultCatalogue[kTemperatureTransmitterFault - 1].name == "t1" &&
+static_assert(kFaultCatalogue[kDiaphragmPerforation - 1].name == "f10" &&
+              kFaultCatalogue[kSupplyDrop - 1].name == "f16" &&
+              kFaultCatalogue[kTemperatureTransmitterFault - 1].name == "t1" &&
               kFaultCatalogue[kOutletPressureTransmitterFault - 1].name ==
                   "p2" &&
               kFlowStuck == kLastFinding);
@@ -119,6 +234,13 @@ std::optional<int> ParseFinding(std::string_view name);
 
 /// The signal of the faulty transmitter, for transmitter faults.
 std::optional<Signal> TransmitterOf(int fault);
+
+/// A negative strength of `fault` has an effect of its own: less play than a
+/// valve has cannot be seen.
+bool HasNegative(int fault);
+
+/// `fault` can be seen in one of `signals`.
+bool IsVisibleIn(int fault, SignalMask signals);
 
 /// For messages: " (did you mean 'f19'?)", or "" if `name` is not close to the
 /// name of a fault or to one of `others`.
