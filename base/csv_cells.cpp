@@ -226,15 +226,6 @@ std::string Quoted(std::string_view text) {
   return '"' + std::string(text.substr(0, 60)) + '"';
 }
 
-// std::to_chars without a precision gives the shortest digits that read back as
-// the same double, at most 24 characters.
-std::string NumberText(double value) {
-  std::array<char, 32> digits;
-  const auto end =
-      std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  return {digits.data(), end};
-}
-
 std::string Listed(const std::vector<std::string>& names) {
   std::string list;
   for (const std::string& name : names) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <charconv>
 #include <filesystem>
 #include <iosfwd>
 #include <optional>
@@ -60,8 +62,14 @@ class CsvCells {
 /// Parses a finite number and nothing else; a leading "+" is allowed.
 std::optional<double> ParseNumber(std::string_view text, char decimal = '.');
 
-/// The shortest text that round-trips to the same double.
-std::string NumberText(double value);
+/// The shortest text that round-trips to the same number.
+template <typename Number>
+std::string NumberText(Number value) {
+  std::array<char, 32> digits;  // A double takes 24 at most.
+  const auto end =
+      std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+  return {digits.data(), end};
+}
 
 /// For messages: the text in quotes, truncated to 60 characters.
 std::string Quoted(std::string_view text);

@@ -21,3 +21,12 @@
 #define FDI_EXPAND_4(...) \
   FDI_EXPAND_1(FDI_EXPAND_1(FDI_EXPAND_1(FDI_EXPAND_1(__VA_ARGS__))))
 #define FDI_EXPAND_1(...) __VA_ARGS__
+
+/// FDI_VISITABLE(Scatter, sd, slow_sd) defines VisitFields(scatter, visit),
+/// which calls visit("sd", scatter.sd) and so on, in this order.
+#define FDI_VISITABLE(STRUCT, ...)                   \
+  template <typename Visitor>                        \
+  void VisitFields(STRUCT& value, Visitor&& visit) { \
+    FDI_FOR_EACH(FDI_VISIT_FIELD, __VA_ARGS__)       \
+  }
+#define FDI_VISIT_FIELD(FIELD) visit(#FIELD, value.FIELD);

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "base/error.h"
+
 namespace fdi {
 
 /// Reads a TOML file in which every key must be known: each getter marks its
@@ -50,6 +52,15 @@ class TomlReader {
   /// @throws ConfigError at `key`: "file:line: key: message".
   [[noreturn]] void Refuse(std::string_view key,
                            std::string_view message) const;
+  /// Runs `read`; a ConfigError from it is reported at the place of `key`.
+  template <typename Read>
+  void At(std::string_view key, Read&& read) const {
+    try {
+      read();
+    } catch (const ConfigError& error) {
+      Refuse(key, error.what());
+    }
+  }
   /// @throws ConfigError naming the first key that no getter has read, and
   ///   those of its table that were read.
   void Finish() const;

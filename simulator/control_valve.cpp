@@ -18,7 +18,8 @@ constexpr double kMinSupplyGauge = 120e3;  // Below, the relay gives no air.
 
 ValveDynamics::ValveDynamics(const ValveParameters& parameters)
     : parameters_(parameters),
-      has_integral_(std::isfinite(parameters.positioner.integral_time_s)) {
+      has_integral_(std::isfinite(parameters.positioner.integral_time_s)),
+      air_closes_(parameters.actuator.spring == SpringAction::kToOpen) {
   SetEffects({});
 }
 
@@ -29,8 +30,9 @@ void ValveDynamics::SetEffects(const FaultEffects& effects) {
   supply_pa_ = a.ambient_pressure_pa + (gauge < kMinSupplyGauge ? 0.0 : gauge);
   // A stop that moves inwards takes the rod along. The actuator's position z
   // stays as it is, because the stops of the rod do not limit it.
-  rod_limit_ = effects.upper_stop_factor;
-  rod_ = std::clamp(rod_, 0.0, rod_limit_);
+  rod_low_ = air_closes_ ? 0.0 : 1.0 - effects.upper_stop_factor;
+  rod_high_ = air_closes_ ? effects.upper_stop_factor : 1.0;
+  rod_ = std::clamp(rod_, rod_low_, rod_high_);
 }
 
 ProcessInputs ValveDynamics::Effective(const ProcessInputs& inputs) const {
@@ -38,8 +40,11 @@ ProcessInputs ValveDynamics::Effective(const ProcessInputs& inputs) const {
   effective.inlet_pressure_pa *= effects_.inlet_factor;
   effective.outlet_pressure_pa *= effects_.outlet_factor;
   if (effects_.temperature_rise_c > 0.0) {
-    effective.temperature_c = std::min(
-        inputs.temperature_c + effects_.temperature_rise_c, kMaxTemperatureC);
+    // Steam may be hotter than that already.
+    effective.temperature_c =
+        std::max(inputs.temperature_c,
+                 std::min(inputs.temperature_c + effects_.temperature_rise_c,
+                          kMaxTemperatureC));
   }
   return effective;
 }
@@ -49,22 +54,25 @@ void ValveDynamics::SetInputs(const ProcessInputs& from,
   const ProcessInputs start = Effective(from);
   const ProcessInputs end = Effective(to);
   inputs_ = nullptr;
-  command_ = start.command;
+  command_ = Closing(start.command);
   inlet_pa_ = start.inlet_pressure_pa;
   inlet_slope_ = (end.inlet_pressure_pa - inlet_pa_) / duration_s;
   outlet_pa_ = start.outlet_pressure_pa;
   outlet_slope_ = (end.outlet_pressure_pa - outlet_pa_) / duration_s;
-  vapour_pa_ = VapourPressure(start.temperature_c);
+  vapour_pa_ = VapourPressure(parameters_.medium, start.temperature_c);
 }
 
 void ValveDynamics::FollowInputs(const InputFunction& inputs, double time_s) {
   inputs_ = inputs;
-  vapour_pa_ = VapourPressure(Effective(inputs(time_s)).temperature_c);
+  vapour_pa_ = VapourPressure(parameters_.medium,
+                              Effective(inputs(time_s)).temperature_c);
 }
 
 ProcessInputs ValveDynamics::InputsAt(double t) const {
   if (inputs_) {
-    return Effective(inputs_(t));
+    ProcessInputs inputs = Effective(inputs_(t));
+    inputs.command = Closing(inputs.command);
+    return inputs;
   }
   ProcessInputs inputs;
   inputs.command = command_;
@@ -76,7 +84,7 @@ ProcessInputs ValveDynamics::InputsAt(double t) const {
 double ValveDynamics::PlayWidth() const {
   const double width =
       std::max(0.0, parameters_.actuator.play_fraction + effects_.play_offset);
-  return width * (1.0 + effects_.play_slope * (1.0 - rod_));
+  return width * (1.0 + effects_.play_slope * (1.0 - Closing(rod_)));
 }
 
 // Backlash of width w between the actuator z and the rod y, then the rod's
@@ -90,13 +98,13 @@ double ValveDynamics::PlayWidth() const {
 // the very restart that it causes, and CVODE would miss it there.
 double ValveDynamics::Rod(double z) const {
   const double half = 0.5 * PlayWidth();
-  return std::clamp(std::clamp(rod_, z - half, z + half), 0.0, rod_limit_);
+  return std::clamp(std::clamp(rod_, z - half, z + half), rod_low_, rod_high_);
 }
 
 // The positioner sees the angle of the lever. The play of f15 is in series with
 // that of the rod and has a memory of its own.
 double ValveDynamics::Feedback(double rod) const {
-  const double reading = LeverAngle(rod * effects_.position_reading_factor);
+  const double reading = LeverAngle(Reading(rod));
   const double half = 0.5 * effects_.feedback_play;
   return half > 0.0 ? std::clamp(feedback_, reading - half, reading + half)
                     : reading;
@@ -108,8 +116,8 @@ void ValveDynamics::Commit(const double* x) {
 }
 
 void ValveDynamics::Align(double z) {
-  rod_ = std::clamp(z, 0.0, rod_limit_);
-  feedback_ = LeverAngle(rod_ * effects_.position_reading_factor);
+  rod_ = std::clamp(z, rod_low_, rod_high_);
+  feedback_ = LeverAngle(Reading(rod_));
 }
 
 double ValveDynamics::ChamberPressureOf(const double* x) const {
@@ -129,8 +137,8 @@ double ValveDynamics::ChargeFor(double pressure_pa, double z) const {
          1.0;
 }
 
-double ValveDynamics::OpeningForce(double t, double z) const {
-  return OpeningForce(InputsAt(t), z);
+double ValveDynamics::ForceOnAir(double t, double z) const {
+  return ForceOnAir(InputsAt(t), z);
 }
 
 // What the chamber has to balance at rest, from (14):
@@ -138,17 +146,19 @@ double ValveDynamics::OpeningForce(double t, double z) const {
 //   K (z + x0) + (P1m - P2) A0 / Km - m g,   P1m = max(P1, Pv)
 //
 // The spring acts on the actuator z; Km is that of the plug, which follows the
-// rod.
-double ValveDynamics::OpeningForce(const ProcessInputs& inputs,
-                                   double z) const {
+// rod. The flow acts with the spring, as it has to where that alone shuts the
+// valve: to open where it opens, to close where it closes.
+double ValveDynamics::ForceOnAir(const ProcessInputs& inputs, double z) const {
   const ActuatorParameters& a = parameters_.actuator;
   const double inlet = std::max(inputs.inlet_pressure_pa, vapour_pa_);
   const double spring = a.spring_rate_n_m * effects_.spring_factor *
                         (z * a.stroke_m + a.spring_preload_m);
-  return spring +
-         FlowForce(inlet - inputs.outlet_pressure_pa, a.plug_area_m2,
-                   RecoveryCoefficient(Rod(z) + effects_.plug_offset)) -
-         a.moving_mass_kg * kGravity;
+  const double flow =
+      FlowForce(inlet - inputs.outlet_pressure_pa, a.plug_area_m2,
+                RecoveryCoefficient(parameters_.trim,
+                                    Closing(Rod(z)) + effects_.plug_offset));
+  const double weight = a.moving_mass_kg * kGravity;
+  return air_closes_ ? spring + flow - weight : spring + flow + weight;
 }
 
 double ValveDynamics::BreakAwayForce() const {
@@ -164,7 +174,7 @@ double ValveDynamics::NetForce(const ProcessInputs& inputs,
   const ActuatorParameters& a = parameters_.actuator;
   return (ChamberPressureOf(x) - a.ambient_pressure_pa) * a.diaphragm_area_m2 *
              effects_.area_factor -
-         OpeningForce(inputs, x[kActuatorState]);
+         ForceOnAir(inputs, x[kActuatorState]);
 }
 
 // de/dt for the derivative action. With e = c2 - a, the angle a = 1/2 + (3/pi)
@@ -177,8 +187,7 @@ double ValveDynamics::NetForce(const ProcessInputs& inputs,
 double ValveDynamics::ErrorRate(const double* x) const {
   const double tau = parameters_.positioner.filter_time_s;
   const double rod = Rod(x[kActuatorState]);
-  const double sine =
-      std::clamp(rod * effects_.position_reading_factor - 0.5, -0.999, 0.999);
+  const double sine = std::clamp(Reading(rod) - 0.5, -0.999, 0.999);
   const double lever = 3.0 / (std::numbers::pi * std::sqrt(1.0 - sine * sine)) *
                        effects_.position_reading_factor;
   const double rod_rate = rod == rod_ ? 0.0 : x[kVelocityState];
@@ -295,28 +304,54 @@ void ValveDynamics::Roots(double t, const double* x, double* g) const noexcept {
   }
 }
 
+namespace {
+
 // (12) for the trim and for the bypass in parallel, each choked by its own Km.
 // The internal leak (opening_offset) is added behind the characteristic, so it
 // passes flow even where the trim is shut.
-double FlowM3PerHour(const TrimParameters& trim, const FaultEffects& effects,
-                     const ProcessInputs& effective, double rod,
-                     double bypass_opening) {
-  const MediumState medium =
-      MediumAt(effective.inlet_pressure_pa, effective.outlet_pressure_pa,
-               effective.temperature_c);
+double FlowThrough(const Trim& trim, const MediumState& medium,
+                   const FaultEffects& effects, double rod,
+                   double bypass_opening) {
   const double plug = rod + effects.plug_offset;
   const double opening = Opening(trim, plug) + effects.opening_offset;
   const double bypass =
       std::clamp(bypass_opening + effects.bypass_opening, 0.0, 1.0);
   const double through_trim =
       Flow(trim.kv_m3_h * effects.kv_factor, opening,
-           EffectivePressureDrop(medium, RecoveryCoefficient(plug)),
+           EffectivePressureDrop(medium, RecoveryCoefficient(trim, plug),
+                                 trim.choked_pressure_ratio),
            medium.density_kg_m3);
   const double through_bypass = Flow(
       trim.bypass_kv_m3_h, bypass,
-      EffectivePressureDrop(medium, BypassRecoveryCoefficient(1.0 - bypass)),
+      EffectivePressureDrop(medium, BypassRecoveryCoefficient(1.0 - bypass),
+                            trim.choked_pressure_ratio),
       medium.density_kg_m3);
   return (through_trim + through_bypass) * (1.0 - effects.external_loss);
+}
+
+MediumState MediumFor(const ValveParameters& valve,
+                      const ProcessInputs& effective) {
+  return MediumAt(valve.medium, effective.inlet_pressure_pa,
+                  effective.outlet_pressure_pa, effective.temperature_c);
+}
+
+}  // namespace
+
+double FlowM3PerHour(const ValveParameters& valve, const FaultEffects& effects,
+                     const ProcessInputs& effective, double rod,
+                     double bypass_opening) {
+  return FlowThrough(valve.trim, MediumFor(valve, effective), effects, rod,
+                     bypass_opening);
+}
+
+double FlowOf(const ValveParameters& valve, const FaultEffects& effects,
+              const ProcessInputs& effective, double rod,
+              double bypass_opening) {
+  const MediumState medium = MediumFor(valve, effective);
+  return FlowInUnit(
+      valve.instruments.flow_unit,
+      FlowThrough(valve.trim, medium, effects, rod, bypass_opening),
+      medium.density_kg_m3);
 }
 
 namespace {
@@ -375,7 +410,7 @@ double ControlValve::Impl::RestingPosition(double wanted,
   const ActuatorParameters& a = dynamics_.parameters().actuator;
   const double highest = dynamics_.SupplyPressure() - a.ambient_pressure_pa;
   const auto needed = [&](double z) {
-    return dynamics_.OpeningForce(0.0, z) / a.diaphragm_area_m2;
+    return dynamics_.ForceOnAir(0.0, z) / a.diaphragm_area_m2;
   };
   // Where the bounded pressure does not suffice, bisection finds the position
   // that it holds: unless the flow is reversed, the force of spring and flow
@@ -398,11 +433,12 @@ void ControlValve::Impl::Settle(const ProcessInputs& inputs) {
   const PositionerParameters& p = dynamics_.parameters().positioner;
   // The transducer's table with dead zone is 0 at this signal.
   const double rest_signal = p.transducer_dead_zone ? -0.04 : 0.0;
-  const double command = std::clamp(inputs.command, 0.0, 1.0);
+  const double command =
+      std::clamp(dynamics_.Closing(inputs.command), 0.0, 1.0);
   // Kp (CV - angle) = rest_signal, with the integral at 0.
   const double angle = std::clamp(command - rest_signal / p.gain, 0.0, 1.0);
   double gauge_pa = 0.0;
-  // The opening force depends on the rod, and so on the play: align first.
+  // That force depends on the rod, and so on the play: align first.
   double z = LeverPosition(angle);
   for (int i = 0; i < 3; ++i) {
     dynamics_.Align(z);
@@ -596,8 +632,8 @@ ValveState ControlValve::state() const {
   const double rod = dynamics.Rod(x[kActuatorState]);
   const double ambient_mass = a.ambient_pressure_pa * a.chamber_volume_m3 /
                               (287.0 * a.air_temperature_k);
-  return {rod,
-          x[kActuatorState],
+  return {dynamics.Closing(rod),
+          dynamics.Closing(x[kActuatorState]),
           x[kVelocityState],
           dynamics.ChamberPressureOf(x),
           ambient_mass * (1.0 + x[kChargeState]),
@@ -613,9 +649,18 @@ double ControlValve::FlowM3PerHour(const ProcessInputs& inputs,
                                    double bypass_opening) const {
   const ValveDynamics& dynamics = impl_->dynamics_;
   return simulator::FlowM3PerHour(
-      dynamics.parameters().trim, dynamics.effects(),
-      dynamics.Effective(inputs), dynamics.Rod(impl_->x()[kActuatorState]),
+      dynamics.parameters(), dynamics.effects(), dynamics.Effective(inputs),
+      dynamics.Closing(dynamics.Rod(impl_->x()[kActuatorState])),
       bypass_opening);
+}
+
+double ControlValve::Flow(const ProcessInputs& inputs,
+                          double bypass_opening) const {
+  const ValveDynamics& dynamics = impl_->dynamics_;
+  return FlowOf(dynamics.parameters(), dynamics.effects(),
+                dynamics.Effective(inputs),
+                dynamics.Closing(dynamics.Rod(impl_->x()[kActuatorState])),
+                bypass_opening);
 }
 
 ProcessInputs ControlValve::Effective(const ProcessInputs& inputs) const {

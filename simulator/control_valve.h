@@ -35,6 +35,11 @@ enum class Motion { kFree, kRising, kFalling, kHeld, kResting };
 ///   n' = R T mdot / (P0 V0)
 ///   c1' = (CV - c1) / tau,   c2' = (c1 - c2) / tau
 ///   N = m g - K (x + x0) + (Pc - P0) A - (P1m - P2) A0 / Km
+///
+/// x is the travel that the air causes: X of a valve whose spring opens it, 1 -
+/// X of one whose spring closes it. The flow acts with the spring; where that
+/// closes, m g does, too.
+///
 ///   mdot by the air relay with if = transducer(clamp((17))), minus leaks
 ///
 /// Spring and play act on the actuator's position; the chamber volume (15), the
@@ -71,8 +76,13 @@ class ValveDynamics final : public OdeSystem {
   /// Ends of the actuator's travel; those of the rod are 0 and its limit.
   double LowStop() const { return parameters_.actuator.lowest_travel; }
   double HighStop() const { return parameters_.actuator.highest_travel; }
-  /// Rod position behind the play for an actuator position z.
+  /// Rod position behind the play for an actuator position z, along the
+  /// travel that the air causes.
   double Rod(double z) const;
+  /// X for a rod position along the travel that the air causes, and back.
+  double Closing(double travel) const {
+    return air_closes_ ? travel : 1.0 - travel;
+  }
   /// Updates rod and feedback after an accepted step.
   void Commit(const double* x);
   /// Sets rod and feedback to z, without play.
@@ -83,9 +93,9 @@ class ValveDynamics final : public OdeSystem {
   /// Friction at rest, slightly above F_f: if both were equal, creeping would
   /// alternate between motion and rest forever [N].
   double BreakAwayForce() const;
-  /// Force of spring, weight and flow towards opening, at actuator position z
+  /// Force of spring, weight and flow against the air, at actuator position z
   /// and time t [N].
-  double OpeningForce(double t, double z) const;
+  double ForceOnAir(double t, double z) const;
   double Feedback(double rod) const;
   /// if of (17) in [-1, 1], the input of the transducer.
   double Signal(const double* x) const;
@@ -97,9 +107,14 @@ class ValveDynamics final : public OdeSystem {
   const ValveParameters& parameters() const { return parameters_; }
 
  private:
-  // Command and pressures at time t, with fault effects.
+  // What the position transmitter makes of the rod, along the same travel.
+  double Reading(double rod) const {
+    return Closing(Closing(rod) * effects_.position_reading_factor);
+  }
+  // Command, along the travel that the air causes, and pressures at time t,
+  // with fault effects.
   ProcessInputs InputsAt(double t) const;
-  double OpeningForce(const ProcessInputs& inputs, double z) const;
+  double ForceOnAir(const ProcessInputs& inputs, double z) const;
   double NetForce(const ProcessInputs& inputs, const double* x) const;
   double RelayFlow(double chamber_pa, double drive) const;
   double AirMassRate(double chamber_pa, double signal) const;
@@ -107,11 +122,13 @@ class ValveDynamics final : public OdeSystem {
 
   ValveParameters parameters_;
   bool has_integral_;
+  bool air_closes_;
   FaultEffects effects_;
   Motion motion_{Motion::kFree};
   std::optional<double> held_signal_;
   double supply_pa_{0.0};
-  double rod_limit_{1.0};
+  double rod_low_{0.0};
+  double rod_high_{1.0};
   double rod_{0.0};
   double feedback_{0.0};
   InputFunction inputs_;  // Empty if the command is held.
@@ -124,13 +141,18 @@ class ValveDynamics final : public OdeSystem {
   double vapour_pa_{0.0};
 };
 
-/// Flow through trim and bypass [m3/h] with the rod at `rod`; `effective` has
-/// the fault effects applied.
-double FlowM3PerHour(const TrimParameters& trim, const FaultEffects& effects,
+/// Flow through trim and bypass [m3/h at the inlet] with the rod at `rod`;
+/// `effective` has the fault effects applied.
+double FlowM3PerHour(const ValveParameters& valve, const FaultEffects& effects,
                      const ProcessInputs& effective, double rod,
                      double bypass_opening);
+/// The same in the flow unit of the valve's instruments.
+double FlowOf(const ValveParameters& valve, const FaultEffects& effects,
+              const ProcessInputs& effective, double rod,
+              double bypass_opening);
 
-/// Mechanical state. Fractions of the stroke; 0 open, 1 closed.
+/// Mechanical state. Fractions of the stroke; 0 open, 1 closed for rod and
+/// actuator.
 struct ValveState {
   double rod;                  ///< Position y of rod and plug, behind the play.
   double actuator;             ///< Position z of the actuator, before the play.
@@ -188,9 +210,11 @@ class ControlValve final {
   /// closing, equation (14), under the last inputs of Advance().
   double NetForce() const;
 
-  /// Flow through trim and bypass [m3/h], with fault effects.
+  /// Flow through trim and bypass, with fault effects, in m3/h at the inlet and
+  /// in the unit of the instruments.
   double FlowM3PerHour(const ProcessInputs& inputs,
                        double bypass_opening) const;
+  double Flow(const ProcessInputs& inputs, double bypass_opening) const;
   ProcessInputs Effective(const ProcessInputs& inputs) const;
 
   const CvodeIntegrator& integrator() const;

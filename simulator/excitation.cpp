@@ -121,7 +121,8 @@ void ValidateOne(const OperatingPointExcitation& e) {
   RequireRange("operating-point.cv_pct", e.cv_pct, 0.0, 100.0);
   RequireRange("operating-point.p1_kpa", e.p1_kpa, 0.0, 2e4);
   RequireRange("operating-point.p2_kpa", e.p2_kpa, 0.0, 2e4);
-  RequireRange("operating-point.t1_degc", e.t1_degc, 0.0, 300.0);
+  RequireRange("operating-point.t1_degc", e.t1_degc, kColdestMediumC,
+               kHottestMediumC);
   RequireRange("operating-point.amplitude_pct", e.amplitude_pct, 0.0, 50.0);
   RequirePositive("operating-point.period_s", e.period_s);
   RequireDisturbance("operating-point.cv_noise_pct", e.cv_noise_pct);
@@ -148,6 +149,22 @@ void ValidateOne(const LevelLoopExcitation& e) {
   RequireRange("level-loop.bypass_opening", e.bypass_opening, 0.0, 1.0);
 }
 
+void ValidateOne(const InventoryLoopExcitation& e) {
+  RequireRange("inventory-loop.initial_cv_pct", e.initial_cv_pct, 1.0, 99.0);
+  RequireDisturbance("inventory-loop.demand_noise_pct", e.demand_noise_pct);
+  RequireDisturbance("inventory-loop.level_noise_pct", e.level_noise_pct);
+  RequireRange("inventory-loop.p1_kpa", e.p1_kpa, 0.0, 2e4);
+  RequireDisturbance("inventory-loop.p1_noise_kpa", e.p1_noise_kpa);
+  RequireRange("inventory-loop.p2_kpa", e.p2_kpa, 0.0, 2e4);
+  RequireDisturbance("inventory-loop.p2_noise_kpa", e.p2_noise_kpa);
+  RequireRange("inventory-loop.t1_degc", e.t1_degc, kColdestMediumC,
+               kHottestMediumC);
+  RequireRange("inventory-loop.holding_time_s", e.holding_time_s, 1.0, 1e6);
+  RequireRange("inventory-loop.proportional_gain", e.proportional_gain, 0.0,
+               100.0);
+  RequireRange("inventory-loop.integral_time_s", e.integral_time_s, 1.0, 1e6);
+}
+
 void ValidateOne(const RecordedExcitation& e) {
   if (e.rows.empty()) {
     throw ConfigError("csv excitation: it has no rows, expected at least 1");
@@ -157,13 +174,14 @@ void ValidateOne(const RecordedExcitation& e) {
     RequireRange(row + "CV [%]", e.rows[i].cv_pct, -10.0, 110.0);
     RequireRange(row + "P1 [kPa]", e.rows[i].p1_kpa, 0.0, 2e4);
     RequireRange(row + "P2 [kPa]", e.rows[i].p2_kpa, 0.0, 2e4);
-    RequireRange(row + "T1 [degC]", e.rows[i].t1_degc, 0.0, 300.0);
+    RequireRange(row + "T1 [degC]", e.rows[i].t1_degc, kColdestMediumC,
+                 kHottestMediumC);
   }
 }
 
 // In the order of the alternatives of ExcitationConfig, whose index() selects.
 constexpr std::string_view kNames[] = {"operating-point", "sine", "level-loop",
-                                       "csv"};
+                                       "inventory-loop", "csv"};
 
 }  // namespace
 
@@ -182,13 +200,15 @@ ExcitationConfig DefaultExcitation(std::string_view name) {
        {ExcitationConfig(OperatingPointExcitation{}),
         ExcitationConfig(SineExcitation{}),
         ExcitationConfig(LevelLoopExcitation{}),
+        ExcitationConfig(InventoryLoopExcitation{}),
         ExcitationConfig(RecordedExcitation{})}) {
     if (ExcitationName(config) == name) {
       return config;
     }
   }
   throw ConfigError("unknown excitation '" + std::string(name) +
-                    "': expected operating-point, sine, level-loop or csv");
+                    "': expected operating-point, sine, level-loop, "
+                    "inventory-loop or csv");
 }
 
 void Validate(const ExcitationConfig& config) {
@@ -208,6 +228,9 @@ std::unique_ptr<Excitation> MakeExcitation(const ExcitationConfig& config,
   }
   if (const auto* e = std::get_if<LevelLoopExcitation>(&config)) {
     return std::make_unique<LevelLoop>(*e, period_s, seed);
+  }
+  if (const auto* e = std::get_if<InventoryLoopExcitation>(&config)) {
+    return std::make_unique<InventoryLoop>(*e, period_s, seed);
   }
   return std::make_unique<Recorded>(std::get<RecordedExcitation>(config),
                                     period_s);

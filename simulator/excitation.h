@@ -13,6 +13,10 @@
 
 namespace fdi::simulator {
 
+/// Temperatures of the medium that a simulation accepts [degC].
+inline constexpr double kColdestMediumC = -100.0;
+inline constexpr double kHottestMediumC = 650.0;
+
 /// External inputs of the valve at one instant, in SI units.
 struct ProcessInputs {
   double command{0.0};  ///< CV as a fraction of closing, 0..1.
@@ -79,15 +83,33 @@ struct LevelLoopExcitation {
   double bypass_opening{0.0};  ///< V3, bypass hand valve, in [0, 1].
 };
 
+/// A level or pressure that the flow through the valve fills and a demand
+/// empties, kept by a PI controller through CV: a loop for valves of any size,
+/// medium and trim, see level_loop.h.
+struct InventoryLoopExcitation {
+  double initial_cv_pct{60.0};  ///< The flow there is the mean demand.
+  Disturbance demand_noise_pct{5.0, 0.984};  ///< Of the mean.
+  Disturbance level_noise_pct{1.05, 0.35};   ///< Of its transmitter.
+  double p1_kpa{1000.0};
+  Disturbance p1_noise_kpa{8.0, 0.85};
+  double p2_kpa{700.0};
+  Disturbance p2_noise_kpa{5.0, 0.85};
+  double t1_degc{190.0};
+  double holding_time_s{650.0};   ///< Span over mean demand.
+  double proportional_gain{5.0};  ///< % of CV per % of level.
+  double integral_time_s{120.0};
+};
+
 /// A recorded excitation, one row per sample.
 struct RecordedExcitation {
   std::vector<InputRow> rows{};
 };
 
-using ExcitationConfig = std::variant<OperatingPointExcitation, SineExcitation,
-                                      LevelLoopExcitation, RecordedExcitation>;
+using ExcitationConfig =
+    std::variant<OperatingPointExcitation, SineExcitation, LevelLoopExcitation,
+                 InventoryLoopExcitation, RecordedExcitation>;
 
-/// "operating-point", "sine", "level-loop" or "csv".
+/// "operating-point", "sine", "level-loop", "inventory-loop" or "csv".
 std::string_view ExcitationName(const ExcitationConfig& config);
 
 /// The default excitation `name` (csv: without rows).

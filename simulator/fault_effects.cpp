@@ -95,4 +95,8 @@ bool LeavesRod(int fault) {
   return effects == none;
 }
 
+bool Exists(int fault, const ValveParameters& valve) {
+  return !FaultFactsOf(fault).of_liquids || !valve.medium.is_gas();
+}
+
 }  // namespace fdi::simulator

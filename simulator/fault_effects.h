@@ -1,5 +1,7 @@
 #pragma once
 
+#include "simulator/valve_parameters.h"
+
 namespace fdi::simulator {
 
 /// Everything that a fault can change in the valve: the interface between fault
@@ -49,5 +51,9 @@ void ApplyFault(int fault, double strength, FaultEffects& effects);
 /// X is that of the healthy valve as long as nobody reacts to the readings.
 /// @throws std::invalid_argument if `fault` is not in the catalogue.
 bool LeavesRod(int fault);
+
+/// False for a fault that a valve with this medium cannot have: a gas does not
+/// evaporate.
+bool Exists(int fault, const ValveParameters& valve);
 
 }  // namespace fdi::simulator

@@ -1,9 +1,8 @@
 #include "simulator/fault_schedule.h"
 
-#include <array>
-#include <charconv>
 #include <cmath>
 
+#include "base/csv_cells.h"
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "simulator/require_range.h"
@@ -84,14 +83,6 @@ void ReadOption(std::string_view text, std::string_view option,
   }
 }
 
-// The shortest text that round-trips to `value`.
-std::string Shortest(double value) {
-  std::array<char, 32> buffer{};
-  const auto [end, error] =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
-  return {buffer.data(), end};
-}
-
 }  // namespace
 
 FaultSchedule ParseFaultSchedule(std::string_view text) {
@@ -119,19 +110,19 @@ FaultSchedule ParseFaultSchedule(std::string_view text) {
 std::string ToText(const FaultSchedule& schedule) {
   std::string text = FaultName(schedule.fault);
   if (schedule.flatline) {
-    text += ":flatline@" + Shortest(schedule.start_s);
+    text += ":flatline@" + NumberText(schedule.start_s);
   } else if (schedule.development_s > 0.0) {
-    text += ":incipient@" + Shortest(schedule.start_s) + '+' +
-            Shortest(schedule.development_s) +
-            ":from=" + Shortest(schedule.initial_strength);
+    text += ":incipient@" + NumberText(schedule.start_s) + '+' +
+            NumberText(schedule.development_s) +
+            ":from=" + NumberText(schedule.initial_strength);
   } else {
-    text += ":abrupt@" + Shortest(schedule.start_s);
+    text += ":abrupt@" + NumberText(schedule.start_s);
   }
   if (!schedule.flatline) {
-    text += ":strength=" + Shortest(schedule.final_strength);
+    text += ":strength=" + NumberText(schedule.final_strength);
   }
   if (std::isfinite(schedule.end_s)) {
-    text += ":until=" + Shortest(schedule.end_s);
+    text += ":until=" + NumberText(schedule.end_s);
   }
   return text;
 }

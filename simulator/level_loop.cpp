@@ -27,7 +27,7 @@ constexpr double kFiringIntegralS = 300.0;
 constexpr double kHandValveKv = 250.0;  // V1 and V2, open [m3/h].
 
 // Tsat of water near 2.4 MPa: 221.8 degC there, 0.020 K per kPa.
-double SaturationTemperature(double pressure_pa) {
+double DrumTemperature(double pressure_pa) {
   return 221.8 + 0.020e-3 * (pressure_pa - 2.4e6);
 }
 
@@ -61,7 +61,8 @@ LevelLoop::LevelLoop(const LevelLoopExcitation& config, double period_s,
               kSteamTemperatureC,
               config.steam_demand_t_h * kKgPerSPerTPerH + kBlowDownKgS,
               kFiringW},
-      integral_pct_(config.initial_cv_pct) {}
+      controller_(config.proportional_gain, config.integral_time_s,
+                  config.initial_cv_pct) {}
 
 ProcessInputs LevelLoop::InitialInputs() const {
   const double flow = boiler_.feed_flow_kg_s * 3600.0 / FeedDensity();
@@ -97,7 +98,7 @@ void LevelLoop::AdvanceBoiler() {
          b.steam_flow_kg_s * (kSteamEnthalpy - kWaterEnthalpy)) /
         kDrumEnergy;
     const double superheat =
-        b.steam_temperature_c - SaturationTemperature(b.drum_pressure_pa);
+        b.steam_temperature_c - DrumTemperature(b.drum_pressure_pa);
     const double temperature_rate =
         (kSuperheaterShare * b.firing_w -
          b.steam_flow_kg_s * kSteamHeat * superheat) /
@@ -108,14 +109,10 @@ void LevelLoop::AdvanceBoiler() {
   }
 }
 
-// PI controller for CV [%], with anti-windup; more CV means less water.
-double LevelLoop::LevelController(double level_pct) {
-  const double error = level_pct - config_.level_set_point_pct;
-  integral_pct_ +=
-      config_.proportional_gain / config_.integral_time_s * error * period_s_;
-  integral_pct_ = std::clamp(integral_pct_, 0.0, 100.0);
-  return std::clamp(integral_pct_ + config_.proportional_gain * error, 0.0,
-                    100.0);
+double InventoryController::Next(double error, double period_s) {
+  cv_pct_ += gain_ / integral_time_s_ * error * period_s;
+  cv_pct_ = std::clamp(cv_pct_, 0.0, 100.0);
+  return std::clamp(cv_pct_ + gain_ * error, 0.0, 100.0);
 }
 
 ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {
@@ -127,7 +124,10 @@ ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {
       std::max(0.0, config_.steam_demand_t_h + steam_.Next()) * kKgPerSPerTPerH;
   pump_offset_pa_ = 1e3 * pump_.Next();
   const double reading = boiler_.level_pct + level_noise_.Next();
-  const double cv_pct = held_ ? integral_pct_ : LevelController(reading);
+  const double cv_pct =
+      held_
+          ? controller_.integral_pct()
+          : controller_.Next(reading - config_.level_set_point_pct, period_s_);
   // More flow leaves less driving pressure, so bisection finds the balance.
   double low = 0.0;
   double high = 1000.0;
@@ -142,6 +142,41 @@ ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {
   }
   return {cv_pct / 100.0, InletPressure(low), OutletPressure(low),
           kFeedTemperatureC};
+}
+
+InventoryLoop::InventoryLoop(const InventoryLoopExcitation& config,
+                             double period_s, std::uint64_t seed)
+    : config_(config),
+      period_s_(period_s),
+      demand_(config.demand_noise_pct, NormalSource(seed, 31)),
+      p1_(config.p1_noise_kpa, NormalSource(seed, 32)),
+      p2_(config.p2_noise_kpa, NormalSource(seed, 33)),
+      level_noise_(config.level_noise_pct, NormalSource(seed, 34)),
+      controller_(config.proportional_gain, config.integral_time_s,
+                  config.initial_cv_pct),
+      last_(InitialInputs()) {}
+
+ProcessInputs InventoryLoop::InitialInputs() const {
+  return {config_.initial_cv_pct / 100.0, 1e3 * config_.p1_kpa,
+          1e3 * config_.p2_kpa, config_.t1_degc};
+}
+
+ProcessInputs InventoryLoop::Next(const FlowOfPressures& flow) {
+  const double now = flow(last_.inlet_pressure_pa, last_.outlet_pressure_pa);
+  const double demand = 1.0 + 0.01 * demand_.Next();
+  if (mean_flow_ == 0.0) {
+    mean_flow_ = std::max(now, 1e-12);
+  } else if (!held_) {
+    level_pct_ += 100.0 * period_s_ / config_.holding_time_s *
+                  (now / mean_flow_ - demand);
+    level_pct_ = std::clamp(level_pct_, -50.0, 50.0);
+  }
+  const double reading = level_pct_ + level_noise_.Next();
+  const double cv_pct =
+      held_ ? controller_.integral_pct() : controller_.Next(reading, period_s_);
+  last_ = {cv_pct / 100.0, 1e3 * (config_.p1_kpa + p1_.Next()),
+           1e3 * (config_.p2_kpa + p2_.Next()), config_.t1_degc};
+  return last_;
 }
 
 }  // namespace fdi::simulator

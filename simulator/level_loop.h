@@ -17,6 +17,23 @@ struct BoilerState {
   double firing_w;
 };
 
+/// PI controller for CV [%] with anti-windup; more CV means less flow.
+class InventoryController {
+ public:
+  InventoryController(double gain, double integral_time_s, double initial_pct)
+      : gain_(gain), integral_time_s_(integral_time_s), cv_pct_(initial_pct) {}
+
+  /// @param error level above the set point [%].
+  double Next(double error, double period_s);
+  /// The command without the proportional action [%].
+  double integral_pct() const { return cv_pct_; }
+
+ private:
+  double gain_;
+  double integral_time_s_;
+  double cv_pct_;
+};
+
 /// Feedwater loop about the operating point of the Lublin boiler: the valve
 /// feeds a drum whose level a PI controller maintains through CV; steam demand
 /// is the disturbance.
@@ -46,7 +63,6 @@ class LevelLoop final : public Excitation {
 
  private:
   void AdvanceBoiler();
-  double LevelController(double level_pct);
   double InletPressure(double flow_m3_h) const;
   double OutletPressure(double flow_m3_h) const;
 
@@ -58,8 +74,38 @@ class LevelLoop final : public Excitation {
   BoilerState boiler_;
   double pump_offset_pa_{0.0};
   double firing_integral_w_{0.0};
-  double integral_pct_;
+  InventoryController controller_;
   bool started_{false};
+  bool held_{false};
+};
+
+/// A loop in which the valve fills what a demand empties:
+///
+///   dL/dt = 100 (F / F0 - D) / T        (L in %, F0 the flow at the start)
+///
+/// D is 1 and a first-order autoregressive disturbance, P1 and P2 wander about
+/// their means. F / F0 is all that it knows of the valve.
+class InventoryLoop final : public Excitation {
+ public:
+  InventoryLoop(const InventoryLoopExcitation& config, double period_s,
+                std::uint64_t seed);
+
+  bool is_open_loop() const override { return false; }
+  ProcessInputs InitialInputs() const override;
+  void Hold(bool held) override { held_ = held; }
+  ProcessInputs Next(const FlowOfPressures& flow) override;
+
+ private:
+  InventoryLoopExcitation config_;
+  double period_s_;
+  DisturbanceProcess demand_;
+  DisturbanceProcess p1_;
+  DisturbanceProcess p2_;
+  DisturbanceProcess level_noise_;
+  InventoryController controller_;
+  double level_pct_{0.0};  // Above the set point.
+  double mean_flow_{0.0};  // Of the first sample; 0 before.
+  ProcessInputs last_;
   bool held_{false};
 };
 

@@ -5,7 +5,6 @@
 
 #include "base/error.h"
 #include "simulator/control_valve.h"
-#include "simulator/valve_equations.h"
 #include "simulator/valve_simulation.h"
 
 namespace fdi::simulator {
@@ -52,14 +51,11 @@ std::vector<RecordAnswer> SimulateRecord(const ValveParameters& parameters,
 double FlowReading(const ValveParameters& parameters,
                    const FaultEffects& effects, const InputRow& input,
                    double x_pct) {
-  const InstrumentParameters& i = parameters.instruments;
-  double flow = FlowM3PerHour(parameters.trim, effects,
-                              {0.01 * input.cv_pct, 1e3 * input.p1_kpa,
-                               1e3 * input.p2_kpa, input.t1_degc},
-                              0.01 * x_pct, 0.0);
-  if (i.flow_unit == FlowUnit::kTPerHour) {
-    flow *= LiquidDensity(input.t1_degc) / 1000.0;
-  }
+  const Instrumentation& i = parameters.instruments;
+  const double flow = FlowOf(parameters, effects,
+                             {0.01 * input.cv_pct, 1e3 * input.p1_kpa,
+                              1e3 * input.p2_kpa, input.t1_degc},
+                             0.01 * x_pct, 0.0);
   return std::clamp(flow * effects.flow_reading_factor, i.flow.low,
                     i.flow.high);
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 namespace fdi::simulator {
 double WaterDensity(double temperature_c) {
@@ -24,14 +25,25 @@ double LiquidDensity(double temperature_c) {
   return WaterDensity(std::min(temperature_c, kHottestC));
 }
 
+double FlowInUnit(FlowUnit unit, double flow_m3_h, double density_kg_m3) {
+  return unit == FlowUnit::kTPerHour ? flow_m3_h * (density_kg_m3 / 1000.0)
+                                     : flow_m3_h;
+}
+
+double FlowFromUnit(FlowUnit unit, double flow, double density_kg_m3) {
+  return unit == FlowUnit::kTPerHour ? flow * (1.0 / (density_kg_m3 / 1000.0))
+                                     : flow;
+}
+
 void FlowConversion::Apply(Sample& sample) {
   if (sample.Has(Signal::kT1)) {
     temperature_c_ = sample[Signal::kT1];
   }
-  const double t_per_m3 = LiquidDensity(temperature_c_) / 1000.0;
   if (sample.flow_unit != to_) {
-    sample.values[Index(Signal::kF)] *=
-        to_ == FlowUnit::kTPerHour ? t_per_m3 : 1.0 / t_per_m3;
+    const double density = LiquidDensity(temperature_c_);
+    double& flow = sample.values[Index(Signal::kF)];
+    flow =
+        FlowInUnit(to_, FlowFromUnit(sample.flow_unit, flow, density), density);
     sample.flow_unit = to_;
   }
 }
@@ -55,13 +67,12 @@ double SignedRoot(double d, double epsilon) {
 }
 
 // Linear interpolation in a table, constant beyond its ends.
-template <std::size_t N>
-double Interpolate(const std::array<double, N>& x,
-                   const std::array<double, N>& y, double at) {
+double Interpolate(std::span<const double> x, std::span<const double> y,
+                   double at) {
   if (!(at > x.front())) {
     return y.front();
   }
-  for (std::size_t i = 1; i < N; ++i) {
+  for (std::size_t i = 1; i < x.size(); ++i) {
     if (at <= x[i]) {
       return y[i - 1] + (y[i] - y[i - 1]) * (at - x[i - 1]) / (x[i] - x[i - 1]);
     }
@@ -69,24 +80,75 @@ double Interpolate(const std::array<double, N>& x,
   return y.back();
 }
 
+// From the shut valve, whose f is `leakage`, linearly to the first point.
+double InTable(std::span<const double> h, std::span<const double> f,
+               double leakage, double at) {
+  return at < h.front() ? leakage + (f.front() - leakage) * at / h.front()
+                        : Interpolate(h, f, at);
+}
+
 constexpr std::array<double, 11> kTenths{0.0, 0.1, 0.2, 0.3, 0.4, 0.5,
                                          0.6, 0.7, 0.8, 0.9, 1.0};
 
 }  // namespace
 
-double Opening(const TrimParameters& trim, double closing) {
-  const double x = std::clamp(closing, 0.0, 1.0);
-  if (trim.characteristic == FlowCharacteristic::kLinear) {
-    return 1.0 - x;
-  }
-  constexpr double kSeat = 0.975;
-  if (x <= kSeat) {
-    return std::exp(-trim.exponent * x);
-  }
-  return std::exp(-trim.exponent * kSeat) * (1.0 - x) / (1.0 - kSeat);
+double SaturationTemperature(double pressure_pa) {
+  constexpr std::array kN{1167.0521452767,  -724213.16703206, -17.073846940092,
+                          12020.82470247,   -3232555.0322333, 14.91510861353,
+                          -4823.2657361591, 405113.40542057,  -0.23855557567849,
+                          650.17534844798};
+  const double beta =
+      std::pow(std::clamp(1e-6 * pressure_pa, 6e-4, 22.0), 0.25);
+  const double e = beta * beta + kN[2] * beta + kN[5];
+  const double f = kN[0] * beta * beta + kN[3] * beta + kN[6];
+  const double g = kN[1] * beta * beta + kN[4] * beta + kN[7];
+  const double d = 2.0 * g / (-f - std::sqrt(f * f - 4.0 * e * g));
+  const double sum = kN[9] + d;
+  return 0.5 * (sum - std::sqrt(sum * sum - 4.0 * (kN[8] + kN[9] * d))) -
+         273.15;
 }
 
-double RecoveryCoefficient(double closing) {
+double SteamDensity(double pressure_pa, double temperature_c) {
+  constexpr double kMaxPressureMpa = 12.0;  // The line ends there.
+  const double p = std::clamp(1e-6 * pressure_pa, 1e-3, kMaxPressureMpa);
+  const double t =
+      std::max(temperature_c, SaturationTemperature(1e6 * p)) + 273.15;
+  const double hot = 647.096 / t;
+  const double v =
+      0.461526e-3 * t / p - 1e-3 * (4.743 * std::pow(hot, 2.961) +
+                                    0.006238 * p * p * std::pow(hot, 13.364));
+  return 1.0 / v;
+}
+
+double Opening(const Trim& trim, double closing) {
+  // The quick-opening points of a maker's handbook.
+  constexpr std::array kOpenings{0.0458, 0.1076, 0.2023, 0.2892, 0.4219,
+                                 0.5332, 0.7034, 0.8441, 1.0};
+  constexpr std::array kQuick{0.166, 0.394, 0.723, 0.825, 0.881,
+                              0.909, 0.940, 0.968, 1.0};
+  const double x = std::clamp(closing, 0.0, 1.0);
+  switch (trim.characteristic) {
+    case FlowCharacteristic::kLinear:
+      return trim.leakage + (1.0 - trim.leakage) * (1.0 - x);
+    case FlowCharacteristic::kQuickOpening:
+      return InTable(kOpenings, kQuick, trim.leakage, 1.0 - x);
+    case FlowCharacteristic::kTable:
+      return InTable(trim.table_h, trim.table_f, trim.leakage, 1.0 - x);
+    case FlowCharacteristic::kExponential:
+      break;
+  }
+  if (x <= trim.shut_off) {
+    return std::exp(-trim.exponent * x);
+  }
+  return trim.leakage +
+         (std::exp(-trim.exponent * trim.shut_off) - trim.leakage) * (1.0 - x) /
+             (1.0 - trim.shut_off);
+}
+
+double RecoveryCoefficient(const Trim& trim, double closing) {
+  if (trim.liquid_recovery > 0.0) {
+    return trim.liquid_recovery * trim.liquid_recovery;
+  }
   constexpr std::array<double, 10> kKm{1.00,  0.95, 0.90, 0.85,  0.785,
                                        0.725, 0.67, 0.61, 0.555, 0.50};
   const double x = std::clamp(closing, 0.0, 1.0) * 10.0;
@@ -112,19 +174,67 @@ double CriticalPressureRatio(double inlet_pressure_pa) {
   return Interpolate(kPressure, kRatio, inlet_pressure_pa);
 }
 
-MediumState MediumAt(double inlet_pressure_pa, double outlet_pressure_pa,
-                     double temperature_c) {
-  const double vapour = VapourPressure(temperature_c);
-  return {std::max(inlet_pressure_pa, vapour), outlet_pressure_pa, vapour,
-          LiquidDensity(temperature_c)};
+double VapourPressure(const Medium& medium, double temperature_c) {
+  switch (medium.fluid) {
+    case Fluid::kWater:
+      return VapourPressure(temperature_c);
+    case Fluid::kLiquid:
+      return 1e3 * medium.vapour_pressure_kpa;
+    default:
+      return 0.0;
+  }
 }
 
-double EffectivePressureDrop(const MediumState& medium, double recovery) {
-  const double ratio = CriticalPressureRatio(medium.inlet_pressure_pa);
+MediumState MediumAt(const Medium& medium, double inlet_pressure_pa,
+                     double outlet_pressure_pa, double temperature_c) {
+  constexpr double kMolarGasConstant = 8314.0;  // J/(kmol K)
+  constexpr double kAirExponent = 1.40;         // gamma that x_T is stated for
+  constexpr double kSteamExponent = 1.30;       // 1.28..1.30 at 0.5..10 MPa
+  constexpr double kN6 = 3.16;  // of the standard, for kPa and kg/h
+  const double vapour = VapourPressure(medium, temperature_c);
+  constexpr double kVacuumPa = 1.0;  // a gas without pressure has no density
+  const double inlet = std::max({inlet_pressure_pa, vapour, kVacuumPa});
+  MediumState state{inlet, outlet_pressure_pa, vapour, 0.0, 0.0, 0.0, 1.0};
+  switch (medium.fluid) {
+    case Fluid::kWater:
+      state.density_kg_m3 = LiquidDensity(temperature_c);
+      state.critical_ratio = CriticalPressureRatio(inlet);
+      break;
+    case Fluid::kLiquid:
+      state.density_kg_m3 = medium.density_kg_m3;
+      state.critical_ratio =
+          0.96 - 0.28 * std::sqrt(medium.vapour_pressure_kpa /
+                                  medium.critical_pressure_kpa);
+      break;
+    case Fluid::kGas:
+      state.density_kg_m3 = inlet * medium.molar_mass_kg_kmol /
+                            (medium.compressibility * kMolarGasConstant *
+                             (temperature_c + 273.15));
+      state.gas_factor = medium.isentropic_exponent / kAirExponent;
+      break;
+    case Fluid::kSteam:
+      state.density_kg_m3 = SteamDensity(inlet, temperature_c);
+      state.gas_factor = kSteamExponent / kAirExponent;
+      state.rounding = kN6 * kN6 / 10.0;
+      break;
+  }
+  return state;
+}
+
+double EffectivePressureDrop(const MediumState& medium, double recovery,
+                             double choked_pressure_ratio) {
+  const double drop = medium.inlet_pressure_pa - medium.outlet_pressure_pa;
+  if (medium.gas_factor > 0.0) {
+    const double most = medium.gas_factor * choked_pressure_ratio;
+    const double x = std::clamp(drop / medium.inlet_pressure_pa, 0.0, most);
+    const double expansion = 1.0 - x / (3.0 * most);
+    return medium.rounding * expansion * expansion * x *
+           medium.inlet_pressure_pa;
+  }
   const double limit =
-      recovery * (medium.inlet_pressure_pa - ratio * medium.vapour_pressure_pa);
-  return std::min(medium.inlet_pressure_pa - medium.outlet_pressure_pa,
-                  std::max(0.0, limit));
+      recovery * (medium.inlet_pressure_pa -
+                  medium.critical_ratio * medium.vapour_pressure_pa);
+  return std::min(drop, std::max(0.0, limit));
 }
 
 double Flow(double kv_m3_h, double opening, double pressure_drop_pa,
@@ -132,6 +242,16 @@ double Flow(double kv_m3_h, double opening, double pressure_drop_pa,
   constexpr double kPaPerMpa = 1e6;
   return 100.0 * kv_m3_h * opening * SignedRoot(pressure_drop_pa, kRegularPa) /
          std::sqrt(kPaPerMpa * density_kg_m3);
+}
+
+double CapacityFor(double flow_m3_h, const Trim& trim,
+                   const MediumState& medium, double closing) {
+  constexpr double kMinDropPa = 1e4;
+  const double drop = EffectivePressureDrop(
+      medium, RecoveryCoefficient(trim, closing), trim.choked_pressure_ratio);
+  return drop < kMinDropPa
+             ? 0.0
+             : flow_m3_h / Flow(1.0, 1.0, drop, medium.density_kg_m3);
 }
 
 double FlowForce(double pressure_drop_pa, double plug_area_m2,

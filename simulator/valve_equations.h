@@ -35,36 +35,74 @@ class FlowConversion {
 /// benchmark's formula: exact at 200 degC, 6 % low at 100, 11 % high at 300.
 double VapourPressure(double temperature_c);
 
-/// f(X) of (12) in [0, 1]; 1 is open.
-double Opening(const TrimParameters& trim, double closing);
+/// Temperature of boiling water [degC] at 0.6 kPa to 22 MPa, the backward
+/// equation of region 4 of [IAPWS, 2007], "Revised Release on the IAPWS
+/// Industrial Formulation 1997".
+double SaturationTemperature(double pressure_pa);
 
-/// Recovery coefficient Km(X) of the benchmark's table, 1 (open)..0.4.
-double RecoveryCoefficient(double closing);
+/// Density of steam [kg/m3]; within 0.3 % of IAPWS IF97 at 0.05..10 MPa, from
+/// saturation to 600 degC. Below saturation, that of saturated steam.
+///
+///   v = 0.461526e-3 T/P - 1e-3 [4.743 (647.096/T)^2.961 +
+///       0.006238 P^2 (647.096/T)^13.364]      [m3/kg], P in MPa, T in K
+double SteamDensity(double pressure_pa, double temperature_c);
+
+/// f(X) of (12) in [0, 1]; 1 is open.
+double Opening(const Trim& trim, double closing);
+
+/// Km(X) of the trim: F_L^2, or the benchmark's table, 1 (open)..0.4.
+double RecoveryCoefficient(const Trim& trim, double closing);
 /// Km of the bypass path, 0.45 (open)..1.
 double BypassRecoveryCoefficient(double closing);
 /// Critical pressure ratio rc(P1) of the benchmark's table.
 double CriticalPressureRatio(double inlet_pressure_pa);
 
-/// Pressures of the medium at the trim.
+/// Vapour pressure of the medium [Pa]; 0 for gases.
+double VapourPressure(const Medium& medium, double temperature_c);
+
+/// The medium at the trim.
 struct MediumState {
   double inlet_pressure_pa;   ///< P1m = max(P1, Pv).
   double outlet_pressure_pa;  ///< P2.
   double vapour_pressure_pa;  ///< Pv at T1.
-  double density_kg_m3;       ///< rho at T1.
+  double density_kg_m3;       ///< rho at the inlet.
+  double critical_ratio;      ///< Water: rc(P1m); liquids: F_F.
+  double gas_factor;          ///< F_gamma = gamma / 1.40; 0 for liquids.
+  double rounding;            ///< Of the standard's constant, on the drop.
 };
-MediumState MediumAt(double inlet_pressure_pa, double outlet_pressure_pa,
-                     double temperature_c);
+MediumState MediumAt(const Medium& medium, double inlet_pressure_pa,
+                     double outlet_pressure_pa, double temperature_c);
 
-/// Pressure drop that drives the flow: P1m - P2, at most max(0, Km (P1m - rc
-/// Pv)) (choking).
-double EffectivePressureDrop(const MediumState& medium, double recovery);
+/// Pressure drop of water that would drive the same flow [Pa].
+///
+/// Liquids: P1m - P2, at most max(0, Km (P1m - F_F Pv)) (choking).
+///
+/// Gases: Y^2 x P1 with x = (P1 - P2)/P1, at most F_gamma x_T (choking), and
+/// Y = 1 - x / (3 F_gamma x_T); 0 for reversed flow.
+///
+/// [IEC 60534-2-1:2011]; for water with the benchmark's Km and rc.
+double EffectivePressureDrop(const MediumState& medium, double recovery,
+                             double choked_pressure_ratio);
 
-/// (12) F = 100 Kv f sqrt(dP / rho) [m3/h], Kv in m3/h, dP in MPa; negative
-/// for reversed flow. The root is regularised below 1 kPa.
+/// (12) F = 100 Kv f sqrt(dP / rho) [m3/h at the inlet], Kv in m3/h, dP in MPa;
+/// negative for reversed flow. The root is regularised below 1 kPa.
+///
+/// The constants of the standard are rounded, N1 and N9 within 0.1 % of these
+/// 100; steam has N6 = 3.16 (MediumState::rounding).
 double Flow(double kv_m3_h, double opening, double pressure_drop_pa,
             double density_kg_m3);
 
-/// Force of the flow on the plug, towards opening: (P1m - P2) A0 / Km, with the
+/// The inverse of the flow equation: Kv f(X) [m3/h] that passes a flow
+/// [m3/h at the inlet] through the trim at the position `closing`; 0 if less
+/// than 10 kPa drive it.
+double CapacityFor(double flow_m3_h, const Trim& trim,
+                   const MediumState& medium, double closing);
+
+/// Converts a flow at the inlet [m3/h] to `unit`, and back.
+double FlowInUnit(FlowUnit unit, double flow_m3_h, double density_kg_m3);
+double FlowFromUnit(FlowUnit unit, double flow, double density_kg_m3);
+
+/// Force of the flow on the plug, with the spring: (P1m - P2) A0 / Km, with the
 /// unlimited drop. The paper prints Km (Pus - Pds) A0; this is the benchmark's
 /// form.
 double FlowForce(double pressure_drop_pa, double plug_area_m2, double recovery);

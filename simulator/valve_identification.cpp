@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "simulator/control_valve.h"
 #include "simulator/require_range.h"
 #include "simulator/robust_least_squares.h"
 #include "simulator/valve_equations.h"
@@ -191,8 +192,9 @@ struct LineSums {
   }
 };
 
-// Flow over 100 sqrt(dP / rho), i.e. Kv f(X) [m3/h]; 0 if not usable.
-double EffectiveKv(const RecordRow& row, const InstrumentParameters& i) {
+// Kv f(X) of a row [m3/h]; 0 if not usable.
+double EffectiveKv(const RecordRow& row, const ValveParameters& valve) {
+  const Instrumentation& i = valve.instruments;
   if (!row.x_measured || !row.flow_measured) {
     return 0.0;
   }
@@ -201,17 +203,11 @@ double EffectiveKv(const RecordRow& row, const InstrumentParameters& i) {
   if (row.flow < i.flow.low + margin || row.flow > i.flow.high - margin) {
     return 0.0;
   }
-  const MediumState medium = MediumAt(
-      1e3 * row.input.p1_kpa, 1e3 * row.input.p2_kpa, row.input.t1_degc);
-  const double drop =
-      EffectivePressureDrop(medium, RecoveryCoefficient(0.01 * row.x_pct));
-  constexpr double kMinDropPa = 1e4;
-  if (drop < kMinDropPa) {
-    return 0.0;
-  }
-  const double to_m3 =
-      i.flow_unit == FlowUnit::kTPerHour ? 1000.0 / medium.density_kg_m3 : 1.0;
-  return row.flow * to_m3 / Flow(1.0, 1.0, drop, medium.density_kg_m3);
+  const MediumState medium =
+      MediumAt(valve.medium, 1e3 * row.input.p1_kpa, 1e3 * row.input.p2_kpa,
+               row.input.t1_degc);
+  return CapacityFor(FlowFromUnit(i.flow_unit, row.flow, medium.density_kg_m3),
+                     valve.trim, medium, 0.01 * row.x_pct);
 }
 
 // The unknowns of `nominal` with its air relay, best determined first: Kv and
@@ -230,7 +226,7 @@ std::vector<ValveUnknown> UnknownsOf(const ValveParameters& nominal,
   if (has_flow) {
     add(
         "trim.kv_m3_h", [](V& v) -> double& { return v.trim.kv_m3_h; }, 4.0,
-        0.1, 1e5);
+        1e-5, 1e6);
     if (nominal.trim.characteristic == FlowCharacteristic::kExponential) {
       add(
           "trim.exponent", [](V& v) -> double& { return v.trim.exponent; }, 2.0,
@@ -329,11 +325,56 @@ ValveParameters WithUnknowns(ValveParameters parameters,
   return parameters;
 }
 
+// Beyond it, the shut-off part of the trim begins.
+constexpr double kShuttingOff = 0.97;
+
 }  // namespace
 
-TrimParameters RegressTrim(const std::vector<HealthyRecord>& records,
-                           const ValveParameters& nominal) {
-  TrimParameters trim = nominal.trim;
+double SizeOf(const std::vector<HealthyRecord>& records,
+              const ValveParameters& valve) {
+  constexpr std::size_t kMinRows = 30;
+  std::vector<double> ratios;
+  for (const HealthyRecord& record : records) {
+    for (const RecordRow& row : record.rows) {
+      const InputRow& in = row.input;
+      const double expected = FlowOf(
+          valve, {},
+          {0.01 * in.cv_pct, 1e3 * in.p1_kpa, 1e3 * in.p2_kpa, in.t1_degc},
+          0.01 * row.x_pct, 0.0);
+      if (row.x_measured && row.flow_measured && row.flow > 0.0 &&
+          expected > 0.0 && row.x_pct < 100.0 * kShuttingOff) {
+        ratios.push_back(row.flow / expected);
+      }
+    }
+  }
+  if (ratios.size() < kMinRows) {
+    return 1.0;
+  }
+  const auto middle =
+      ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
+}
+
+ValveParameters Resized(ValveParameters valve, double size,
+                        double largest_flow) {
+  constexpr double kLeastUse = 0.1;  // Of a range.
+  constexpr double kUse = 0.8;
+  valve.trim.kv_m3_h *= size;
+  valve.trim.bypass_kv_m3_h *= size;
+  Transmitter& flow = valve.instruments.flow;
+  const double high = size * flow.high;
+  const bool fits = largest_flow <= high && largest_flow >= kLeastUse * high;
+  const double range = fits ? size : largest_flow / kUse / flow.high;
+  for (double* value : {&flow.low, &flow.high, &flow.noise_sd}) {
+    *value *= range;
+  }
+  return valve;
+}
+
+Trim RegressTrim(const std::vector<HealthyRecord>& records,
+                 const ValveParameters& nominal) {
+  Trim trim = nominal.trim;
   const bool exponential =
       trim.characteristic == FlowCharacteristic::kExponential;
   // Noise of F with the deviation sd is noise of ln F with sd / F, hence the
@@ -343,15 +384,14 @@ TrimParameters RegressTrim(const std::vector<HealthyRecord>& records,
   //   n = (mean(X) mean(y) - mean(X y)) / var(X),
   //   ln Kv = mean(y) + n mean(X).
   //
-  // For f = 1 - X, y = ln(Kv f) - ln(1 - X) and n = 0.
+  // For a characteristic without n, y = ln(Kv f) - ln f(X) and n = 0.
   LineSums sums;
   for (const HealthyRecord& record : records) {
     for (const RecordRow& row : record.rows) {
-      const double kv = EffectiveKv(row, nominal.instruments);
+      const double kv = EffectiveKv(row, nominal);
       const double x = 0.01 * row.x_pct;
-      // Beyond 0.975 the exponential falls linearly to 0 (Opening()).
-      if (kv > 0.0 && x < 0.97) {
-        const double shape = exponential ? 0.0 : std::log1p(-std::max(0.0, x));
+      if (kv > 0.0 && x < kShuttingOff) {
+        const double shape = exponential ? 0.0 : std::log(Opening(trim, x));
         sums.Add(row.flow * row.flow, x, std::log(kv) - shape);
       }
     }
@@ -619,7 +659,7 @@ RobustFit Identification::Fit(const Hypothesis& hypothesis,
   RobustFitOptions options;
   options.max_iterations = iterations;
   options.huber = kHuber;
-  const InstrumentParameters& i = nominal_.instruments;
+  const Instrumentation& i = nominal_.instruments;
   options.least_scale.resize(options_.has_flow ? 2 : 1);
   options.least_scale[0] = MinScale(i.position);
   if (options_.has_flow) {

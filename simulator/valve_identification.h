@@ -13,6 +13,17 @@ struct HealthyRecord {
   std::vector<RecordRow> rows;
 };
 
+/// How many times the flow of `valve` the records show, the median of the ratio
+/// at the measured X, P1, P2 and T1; 1 if less than 30 rows have a flow.
+double SizeOf(const std::vector<HealthyRecord>& records,
+              const ValveParameters& valve);
+
+/// `valve`, `size` times as large: Kv, bypass and flow transmitter. Where
+/// `largest_flow` is beyond the end of this transmitter or in the lowest tenth
+/// of its range, it becomes 80 % of it.
+ValveParameters Resized(ValveParameters valve, double size,
+                        double largest_flow);
+
 /// Kv and exponent directly from the rows, by (12) with the measured X:
 ///
 ///   ln(F / (100 sqrt(dP / rho))) = ln Kv - n X
@@ -21,8 +32,8 @@ struct HealthyRecord {
 /// the flow range, without pressure drop or with a filled-in X or F are
 /// omitted; the result is `nominal` if less than 30 remain, and keeps the
 /// nominal exponent if X hardly moves.
-TrimParameters RegressTrim(const std::vector<HealthyRecord>& records,
-                           const ValveParameters& nominal);
+Trim RegressTrim(const std::vector<HealthyRecord>& records,
+                 const ValveParameters& nominal);
 
 struct ValveFitOptions {
   bool has_flow{true};   ///< RecordRow::flow is measured.

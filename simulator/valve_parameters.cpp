@@ -2,8 +2,11 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "base/csv_cells.h"
 #include "base/error.h"
+#include "simulator/parameter_fields.h"
 #include "simulator/require_range.h"
 
 namespace fdi::simulator {
@@ -40,6 +43,30 @@ ValveParameters PaperOperatingPoint() {
   return valve;
 }
 
+// F_L and x_T of a contoured plug, flow to open.
+ValveParameters Globe(const char* name, Fluid fluid, double flow_high) {
+  ValveParameters valve;
+  valve.name = name;
+  valve.medium.fluid = fluid;
+  valve.trim.kv_m3_h = 40.0;
+  valve.trim.exponent = std::log(50.0);
+  valve.trim.bypass_kv_m3_h = 7.0;
+  valve.trim.liquid_recovery = 0.90;
+  valve.trim.choked_pressure_ratio = 0.72;
+  valve.instruments.flow = {0.0, flow_high, 0.00141 * flow_high};
+  valve.instruments.temperature = {0.0, 600.0, 0.846};
+  return valve;
+}
+
+std::vector<ValveParameters> ShippedSets() {
+  return {LublinActuator3(),
+          LublinActuator3Refit(),
+          PaperOperatingPoint(),
+          Globe("liquid-globe", Fluid::kWater, 100.0),
+          Globe("gas-globe", Fluid::kGas, 10.0),
+          Globe("steam-globe", Fluid::kSteam, 5.0)};
+}
+
 void Validate(const char* name, const Transmitter& transmitter) {
   const std::string field = std::string("instruments.") + name;
   constexpr double kHuge = 1e9;
@@ -69,6 +96,66 @@ void ValidateActuator(const ActuatorParameters& a) {
   RequireRange("actuator.coulomb_friction_n", a.coulomb_friction_n, 0.0, 1e5);
 }
 
+void ValidateTrim(const Trim& t) {
+  RequireRange("trim.kv_m3_h", t.kv_m3_h, 1e-5, 1e6);
+  RequireRange("trim.exponent", t.exponent, 0.1, 20.0);
+  RequireRange("trim.shut_off", t.shut_off, 0.5, 0.9999);
+  RequireRange("trim.leakage", t.leakage, 0.0, 0.1);
+  if (t.liquid_recovery != 0.0) {
+    RequireRange("trim.liquid_recovery", t.liquid_recovery, 0.1, 1.0);
+  }
+  RequireRange("trim.choked_pressure_ratio", t.choked_pressure_ratio, 0.05,
+               1.0);
+  RequireRange("trim.bypass_kv_m3_h", t.bypass_kv_m3_h, 0.0, 1e6);
+  const bool is_table = t.characteristic == FlowCharacteristic::kTable;
+  if (t.table_h.size() != t.table_f.size() ||
+      (is_table ? t.table_h.size() < 2 : !t.table_h.empty())) {
+    throw ConfigError(
+        "trim.table_h and trim.table_f have " +
+        std::to_string(t.table_h.size()) + " and " +
+        std::to_string(t.table_f.size()) +
+        " values: expected equally many, at least 2, of a trim whose "
+        "characteristic is \"table\", and none of others");
+  }
+  constexpr std::size_t kMostPoints = 50;
+  if (t.table_h.size() > kMostPoints) {
+    throw ConfigError("trim.table_h has " + std::to_string(t.table_h.size()) +
+                      " values: expected at most " +
+                      std::to_string(kMostPoints));
+  }
+  for (const auto& [name, table] :
+       {std::pair{"trim.table_h", &t.table_h}, {"trim.table_f", &t.table_f}}) {
+    double before = 0.0;
+    for (const double value : *table) {
+      if (!(value > before)) {
+        throw ConfigError(std::string(name) + " has " + NumberText(value) +
+                          " behind " + NumberText(before) +
+                          ": expected values above 0 that rise");
+      }
+      before = value;
+    }
+    if (is_table && before != 1.0) {
+      throw ConfigError(std::string(name) + " ends at " + NumberText(before) +
+                        ": expected 1, the valve fully open");
+    }
+  }
+  if (is_table && t.leakage >= t.table_f.front()) {
+    throw ConfigError("trim.leakage is " + NumberText(t.leakage) +
+                      ": expected less than trim.table_f at the first point");
+  }
+}
+
+void ValidateMedium(const Medium& m) {
+  RequireRange("medium.density_kg_m3", m.density_kg_m3, 100.0, 2e4);
+  RequireRange("medium.critical_pressure_kpa", m.critical_pressure_kpa, 100.0,
+               1e5);
+  RequireRange("medium.vapour_pressure_kpa", m.vapour_pressure_kpa, 0.0,
+               m.critical_pressure_kpa);
+  RequireRange("medium.molar_mass_kg_kmol", m.molar_mass_kg_kmol, 1.0, 500.0);
+  RequireRange("medium.compressibility", m.compressibility, 0.1, 3.0);
+  RequireRange("medium.isentropic_exponent", m.isentropic_exponent, 1.01, 2.0);
+}
+
 void ValidatePositioner(const PositionerParameters& p) {
   RequireRange("positioner.gain", p.gain, 0.1, 1e4);
   RequireRange("positioner.integral_time_s", p.integral_time_s, 1e-3,
@@ -88,29 +175,42 @@ void ValidatePositioner(const PositionerParameters& p) {
 }  // namespace
 
 std::vector<std::string> ParameterSetNames() {
-  return {"lublin-actuator-3", "lublin-actuator-3-refit",
-          "paper-operating-point"};
+  std::vector<std::string> names;
+  for (const ValveParameters& set : ShippedSets()) {
+    names.push_back(set.name);
+  }
+  return names;
+}
+
+std::string Describe(const ValveParameters& valve) {
+  const auto name = []<typename Enum>(Enum value) {
+    return std::string(kEnumNames<Enum>[static_cast<std::size_t>(value)]);
+  };
+  const Instrumentation& i = valve.instruments;
+  return name(valve.medium.fluid) + ", " + name(valve.trim.characteristic) +
+         ", Kv " + NumberText(valve.trim.kv_m3_h) + " m3/h, spring " +
+         name(valve.actuator.spring) + ", F " + NumberText(i.flow.low) + ".." +
+         NumberText(i.flow.high) + ' ' + std::string(FlowUnitName(i.flow_unit));
 }
 
 ValveParameters ParameterSet(std::string_view name) {
-  for (const ValveParameters& set :
-       {LublinActuator3(), LublinActuator3Refit(), PaperOperatingPoint()}) {
+  std::string names;
+  for (const ValveParameters& set : ShippedSets()) {
     if (set.name == name) {
       return set;
     }
+    names += (names.empty() ? "" : ", ") + set.name;
   }
   throw ConfigError("unknown parameter set '" + std::string(name) +
-                    "': expected lublin-actuator-3, lublin-actuator-3-refit "
-                    "or paper-operating-point");
+                    "': expected one of " + names);
 }
 
 void Validate(const ValveParameters& parameters) {
   ValidateActuator(parameters.actuator);
   ValidatePositioner(parameters.positioner);
-  RequireRange("trim.kv_m3_h", parameters.trim.kv_m3_h, 0.1, 1e5);
-  RequireRange("trim.exponent", parameters.trim.exponent, 0.1, 20.0);
-  RequireRange("trim.bypass_kv_m3_h", parameters.trim.bypass_kv_m3_h, 0.0, 1e5);
-  const InstrumentParameters& i = parameters.instruments;
+  ValidateTrim(parameters.trim);
+  ValidateMedium(parameters.medium);
+  const Instrumentation& i = parameters.instruments;
   Validate("command", i.command);
   Validate("pressure", i.pressure);
   Validate("temperature", i.temperature);

@@ -9,8 +9,37 @@
 
 namespace fdi::simulator {
 
-/// Spring-and-diaphragm actuator, equations (13)-(15). x = 0 is open,
-/// x = stroke is closed; pressure in the chamber closes.
+/// What flows through the valve.
+enum class Fluid {
+  kWater,   ///< Density, vapour pressure and choking of the benchmark.
+  kLiquid,  ///< IEC 60534-2-1 with the three numbers of Medium.
+  kGas,     ///< IEC 60534-2-1, density by the gas law.
+  kSteam    ///< IEC 60534-2-1, density by SteamDensity().
+};
+
+/// The medium. A field that the fluid does not need is ignored.
+struct Medium {
+  Fluid fluid{Fluid::kWater};
+  double density_kg_m3{1000.0};           ///< Of a liquid.
+  double vapour_pressure_kpa{0.0};        ///< Of a liquid, absolute.
+  double critical_pressure_kpa{22064.0};  ///< Of a liquid, absolute.
+  double molar_mass_kg_kmol{28.96};       ///< M of a gas.
+  double compressibility{1.0};            ///< Z of a gas at the inlet.
+  double isentropic_exponent{1.4};        ///< gamma of a gas.
+
+  bool is_gas() const { return fluid == Fluid::kGas || fluid == Fluid::kSteam; }
+
+  friend bool operator==(const Medium&, const Medium&) = default;
+};
+
+/// Where the spring takes the rod when the air fails.
+enum class SpringAction {
+  kToOpen,  ///< Air closes.
+  kToClose  ///< Air opens.
+};
+
+/// Spring-and-diaphragm actuator, equations (13)-(15). Pressure in the chamber
+/// moves the rod against the spring, from 0 to the stroke.
 struct ActuatorParameters {
   double moving_mass_kg{2.0};              ///< m.
   double damping_n_s_m{1500.0};            ///< b.
@@ -29,6 +58,7 @@ struct ActuatorParameters {
   double lowest_travel{-0.05};
   double highest_travel{1.25};
   double coulomb_friction_n{0.0};  ///< F_f of (13), 0 = none.
+  SpringAction spring{SpringAction::kToOpen};
 };
 
 /// Law of air flow between two pressures.
@@ -51,17 +81,27 @@ struct PositionerParameters {
   bool transducer_dead_zone{false};    ///< Electro-pneumatic table in series.
 };
 
+/// f as a function of the opening h = 1 - X, IEC 60534-2-4.
 enum class FlowCharacteristic {
-  kExponential,  ///< f = exp(-n X), linear to 0 beyond X = 0.975.
-  kLinear        ///< f = 1 - X.
+  kExponential,   ///< f = exp(-n X): equal percentage of rangeability exp(n).
+  kLinear,        ///< f = h.
+  kQuickOpening,  ///< Points of a maker's handbook.
+  kTable          ///< The points of Trim.
 };
 
 /// The trim, equation (12).
-struct TrimParameters {
-  double kv_m3_h{120.0};  ///< Fully open.
+struct Trim {
+  double kv_m3_h{120.0};  ///< Rated, fully open; reducers included.
   FlowCharacteristic characteristic{FlowCharacteristic::kExponential};
-  double exponent{5.0};          ///< n of the exponential characteristic.
-  double bypass_kv_m3_h{19.75};  ///< V3, fully open (fault f18).
+  double exponent{5.0};    ///< n of the exponential characteristic.
+  double shut_off{0.975};  ///< X from which an exponential falls linearly.
+  double leakage{0.0};     ///< f of the shut valve.
+  std::vector<double> table_h{};  ///< Openings of the table, rising to 1.
+  std::vector<double> table_f{};  ///< f at them, rising to 1.
+  /// F_L; 0 takes the benchmark's Km(X) for its square.
+  double liquid_recovery{0.0};
+  double choked_pressure_ratio{0.72};  ///< x_T, for gases.
+  double bypass_kv_m3_h{19.75};        ///< V3, fully open (fault f18).
 };
 
 /// A transmitter: reading = quantize(clamp(clamp(value) + noise)), both to
@@ -70,10 +110,12 @@ struct Transmitter {
   double low;
   double high;
   double noise_sd;  ///< Same unit as the range, >= 0.
+
+  friend bool operator==(const Transmitter&, const Transmitter&) = default;
 };
 
 /// Transmitters in the units of Sample (%, kPa, degC, flow unit of the set).
-struct InstrumentParameters {
+struct Instrumentation {
   FlowUnit flow_unit{FlowUnit::kTPerHour};
   Transmitter command{0.0, 100.0, 0.0};
   Transmitter pressure{0.0, 4000.0, 5.64};
@@ -91,8 +133,9 @@ struct ValveParameters {
   std::string name{"lublin-actuator-3"};
   ActuatorParameters actuator{};
   PositionerParameters positioner{};
-  TrimParameters trim{};
-  InstrumentParameters instruments{};
+  Trim trim{};
+  Instrumentation instruments{};
+  Medium medium{};
 };
 
 /// The shipped sets:
@@ -102,9 +145,14 @@ struct ValveParameters {
 /// - lublin-actuator-3-refit: the same, refitted to 40 minutes of the plant
 ///   record: (16) with a Cv each for filling and venting (without the dead
 ///   zone's table), filter time, Kv and exponent; otherwise as above.
+/// - liquid-globe, gas-globe, steam-globe: a globe valve of DN 50 with an equal
+///   percentage trim of rangeability 50 for water, air or steam; flow in t/h.
 /// - paper-operating-point: linear trim in m3/h that gives the flow, position
 ///   and noise floor of [Mendonca et al., 2009], tables 3 and 4.
 std::vector<std::string> ParameterSetNames();
+
+/// One line: medium, trim, Kv, spring, range of the flow.
+std::string Describe(const ValveParameters& valve);
 
 /// @throws ConfigError naming the accepted names.
 ValveParameters ParameterSet(std::string_view name);

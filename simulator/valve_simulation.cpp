@@ -12,7 +12,6 @@
 #include "simulator/control_valve.h"
 #include "simulator/random.h"
 #include "simulator/require_range.h"
-#include "simulator/valve_equations.h"
 
 namespace fdi::simulator {
 namespace {
@@ -128,14 +127,15 @@ class Profiled final : public Excitation {
 };
 
 void RequireValues(const std::string& name, const InputProfile& profile,
-                   const std::vector<double>& values, double most) {
+                   const std::vector<double>& values, double least,
+                   double most) {
   if (!values.empty() && values.size() != profile.t_s.size()) {
     throw ConfigError("input: " + name + " has " +
                       std::to_string(values.size()) + " values, t_s has " +
                       std::to_string(profile.t_s.size()));
   }
   for (const double value : values) {
-    RequireRange("input." + name, value, 0.0, most);
+    RequireRange("input." + name, value, least, most);
   }
 }
 
@@ -146,7 +146,7 @@ void Validate(const InputProfile& profile) {
     throw ConfigError("input: t_s has " + std::to_string(profile.t_s.size()) +
                       " values, expected at least 2");
   }
-  RequireValues("t_s", profile, profile.t_s, kForever);
+  RequireValues("t_s", profile, profile.t_s, 0.0, kForever);
   if (!std::ranges::is_sorted(profile.t_s) ||
       profile.t_s.front() == profile.t_s.back()) {
     throw ConfigError("input: t_s does not ascend");
@@ -157,10 +157,11 @@ void Validate(const InputProfile& profile) {
         "input: there are no values, expected one of cv_pct, p1_kpa, p2_kpa, "
         "t1_degc");
   }
-  RequireValues("cv_pct", profile, profile.cv_pct, 100.0);
-  RequireValues("p1_kpa", profile, profile.p1_kpa, 2e4);
-  RequireValues("p2_kpa", profile, profile.p2_kpa, 2e4);
-  RequireValues("t1_degc", profile, profile.t1_degc, 300.0);
+  RequireValues("cv_pct", profile, profile.cv_pct, 0.0, 100.0);
+  RequireValues("p1_kpa", profile, profile.p1_kpa, 0.0, 2e4);
+  RequireValues("p2_kpa", profile, profile.p2_kpa, 0.0, 2e4);
+  RequireValues("t1_degc", profile, profile.t1_degc, kColdestMediumC,
+                kHottestMediumC);
   RequireDisturbance("input.cv_noise_pct", profile.cv_noise_pct);
   RequireDisturbance("input.p1_noise_kpa", profile.p1_noise_kpa);
   RequireDisturbance("input.p2_noise_kpa", profile.p2_noise_kpa);
@@ -421,16 +422,13 @@ void ValveSimulation::Impl::HoldFlatlines(double time_s, Sample& sample) {
 // acts from the stamp on. Every Read() draws from the same stream of noise, so
 // their order is part of what a seed reproduces.
 Sample ValveSimulation::Impl::ReadAll(std::uint64_t k) {
-  const InstrumentParameters& i = config_.parameters.instruments;
+  const Instrumentation& i = config_.parameters.instruments;
   const FaultEffects effects = EffectsAt(config_.faults, TimeOf(k));
   ProcessInputs present = inputs_;
   present.inlet_pressure_pa = reached_.inlet_pressure_pa;
   present.outlet_pressure_pa = reached_.outlet_pressure_pa;
   const ProcessInputs seen = valve_.Effective(present);
-  double flow = valve_.FlowM3PerHour(present, excitation_->bypass_opening());
-  if (i.flow_unit == FlowUnit::kTPerHour) {
-    flow *= LiquidDensity(seen.temperature_c) / 1000.0;
-  }
+  const double flow = valve_.Flow(present, excitation_->bypass_opening());
   Sample sample;
   sample.stamp_ns =
       config_.start_ns + static_cast<std::int64_t>(k) * period_ns_;

@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
-#include "simulator/valve_equations.h"
+#include "simulator/control_valve.h"
 #include "trainer/campaign/run_input.h"
 
 namespace fdi::trainer::study {
@@ -64,40 +64,28 @@ SignalMask UnionOf(const FaultInjection& injection,
   return static_cast<SignalMask>(all);
 }
 
-// Flow through trim and bypass [m3/h], faults included.
-double FlowOf(const simulator::TrimParameters& trim, double closing,
-              const simulator::MediumState& medium,
-              const FaultEffects& effects) {
-  using simulator::EffectivePressureDrop;
-  using simulator::Flow;
-  const double bypass = std::clamp(effects.bypass_opening, 0.0, 1.0);
-  return Flow(trim.kv_m3_h,
-              simulator::Opening(trim, closing) + effects.opening_offset,
-              EffectivePressureDrop(medium,
-                                    simulator::RecoveryCoefficient(closing)),
-              medium.density_kg_m3) +
-         Flow(trim.bypass_kv_m3_h, bypass,
-              EffectivePressureDrop(
-                  medium, simulator::BypassRecoveryCoefficient(1.0 - bypass)),
-              medium.density_kg_m3);
-}
-
 // What the flow through the faulty trim is more than through the healthy one,
-// as the transmitter of `sample` would see it.
-double AddedFlow(const ValveParameters& valve, const Sample& sample,
+// as the transmitter of `sample` would see it. The external leak stays out:
+// ChangeReadings() takes it from the whole flow.
+double AddedFlow(ValveParameters valve, const Sample& sample,
                  const FaultEffects& effects) {
   const double t1_c =
       sample.Has(Signal::kT1) && std::isfinite(sample[Signal::kT1])
           ? sample[Signal::kT1]
           : kColdWaterC;
-  const simulator::MediumState medium = simulator::MediumAt(
-      1e3 * sample[Signal::kP1], 1e3 * sample[Signal::kP2], t1_c);
   const double closing = std::clamp(0.01 * sample[Signal::kX], 0.0, 1.0);
-  const double unit = sample.flow_unit == FlowUnit::kTPerHour
-                          ? 1e-3 * medium.density_kg_m3
-                          : 1.0;
-  const double healthy = unit * FlowOf(valve.trim, closing, medium, {});
-  const double faulty = unit * FlowOf(valve.trim, closing, medium, effects);
+  valve.instruments.flow_unit = sample.flow_unit;
+  FaultEffects added;
+  added.opening_offset = effects.opening_offset;
+  added.bypass_opening = effects.bypass_opening;
+  const auto flow = [&](const FaultEffects& with) {
+    return simulator::FlowOf(
+        valve, with,
+        {0.0, 1e3 * sample[Signal::kP1], 1e3 * sample[Signal::kP2], t1_c},
+        closing, 0.0);
+  };
+  const double healthy = flow({});
+  const double faulty = flow(added);
   const double gain = healthy > 0.0 ? std::clamp(sample[Signal::kF] / healthy,
                                                  1.0 / kMaxGain, kMaxGain)
                                     : 1.0;
@@ -193,7 +181,7 @@ LabelledSample FaultInjector::Step(const Sample& healthy, double time_s) {
 
 void FaultInjector::ChangeReadings(const FaultEffects& effects,
                                    Sample& sample) {
-  const simulator::InstrumentParameters& range = injection_.valve.instruments;
+  const simulator::Instrumentation& range = injection_.valve.instruments;
   if (effects.opening_offset != 0.0 || effects.bypass_opening != 0.0) {
     sample.Set(Signal::kF, sample[Signal::kF] +
                                AddedFlow(injection_.valve, sample, effects));

@@ -230,7 +230,8 @@ void AddScenarioOptions(CLI::App& verb, RunOptions& options) {
                   "paper-operating-point or FILE.toml")
       ->type_name("NAME");
   verb.add_option("--excitation", options.excitation,
-                  "operating-point (default), sine, level-loop or csv:FILE")
+                  "operating-point (default), sine, level-loop, "
+                  "inventory-loop or csv:FILE")
       ->type_name("NAME");
   verb.add_option("--set", options.settings,
                   "A scenario key, e.g. excitation.amplitude_pct=5, "

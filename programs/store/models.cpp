@@ -2,11 +2,14 @@
 // delete.
 #include "storage/models/models.h"
 
+#include <algorithm>
+
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "programs/store/verbs.h"
 #include "report/models/lineage_text.h"
 #include "report/text_table.h"
+#include "simulator/valve_parameters.h"
 
 namespace fdi::storage {
 namespace {
@@ -240,17 +243,35 @@ const std::vector<report::Column> kTypeColumns = {
     {"bytes", "bytes"},
     {"summary", "summary"}};
 
+// Stored types, then those that are built in.
+Json AllTypes(const Context& context) {
+  Json types =
+      Rows(ModelStore(DataOf(context).models()).ListTemplates(), TypeJson);
+  for (const std::string& name : simulator::ParameterSetNames()) {
+    types.push_back(
+        {{"name", name},
+         {"created_utc", nullptr},
+         {"bytes", 0},
+         {"summary", "built in: " + Describe(simulator::ParameterSet(name))}});
+  }
+  return types;
+}
+
 Report ListTypes(const NoOptions&, const Context& context) {
   Report report;
-  report.document["types"] =
-      Rows(ModelStore(DataOf(context).models()).ListTemplates(), TypeJson);
+  report.document["types"] = AllTypes(context);
   return report.Table("types", kTypeColumns);
 }
 
 Report ShowType(const std::string& name, const Context& context) {
+  const Json types = AllTypes(context);
+  const auto found = std::ranges::find_if(
+      types, [&](const Json& type) { return type["name"] == name; });
+  if (found == types.end()) {
+    throw NotFoundError("no valve type " + name);
+  }
   Report report;
-  report.document =
-      TypeJson(ModelStore(DataOf(context).models()).LoadTemplate(name));
+  report.document = *found;
   return report.Fields("", kTypeColumns);
 }
 

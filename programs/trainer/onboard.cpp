@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -20,6 +21,7 @@
 #include "report/signal_list.h"
 #include "report/stop_signals.h"
 #include "simulator/scenario/scenario_toml.h"
+#include "simulator/valve_parameters.h"
 #include "storage/database/data_directory.h"
 #include "storage/models/model_codec.h"
 #include "storage/models/models.h"
@@ -102,13 +104,13 @@ FoundType ParseType(const std::string& text, const std::string& name) {
   simulator::Scenario scenario;
   ApplyScenario(reader, {}, scenario);
   reader.Finish();
-  return {{name,
-           scenario.config.parameters,
-           scenario.config.continuous_inputs,
-           static_cast<int>(delay.value_or(0)),
-           {levels[0], levels[1], levels[2], levels[3]}},
-          true,
-          model_set.value_or("")};
+  ValveType type;
+  type.name = name;
+  type.parameters = scenario.config.parameters;
+  type.interpolated_command = scenario.config.continuous_inputs;
+  type.command_delay = static_cast<int>(delay.value_or(0));
+  type.levels = {levels[0], levels[1], levels[2], levels[3]};
+  return {std::move(type), true, model_set.value_or("")};
 }
 
 // The type called `name`: one stored in models.db, a shipped parameter set, or
@@ -124,6 +126,16 @@ FoundType FindType(const std::string& name, storage::ModelStore& store) {
   ValveType type;
   type.name = name;
   type.parameters = simulator::FindParameters(name);
+  // A file that leaves the flow transmitter to the record does not tell a size
+  // either.
+  type.of_any_size = std::ranges::any_of(
+      simulator::ParameterSetNames(), [&](const std::string& shipped) {
+        return type.parameters.instruments.flow ==
+               simulator::ParameterSet(shipped).instruments.flow;
+      });
+  if (type.parameters.medium.is_gas()) {
+    type.levels = {60.0, 1000.0, 700.0, 190.0};
+  }
   return {std::move(type), false};
 }
 
@@ -144,9 +156,8 @@ void SaveType(const ValveType& type, const std::string& model_set,
               storage::ModelStore& store) {
   const std::string text = TypeText(type, model_set);
   store.SaveTemplate(type.name, std::as_bytes(std::span(text)),
-                     type.parameters.name + ", Kv " +
-                         NumberText(type.parameters.trim.kv_m3_h) +
-                         " m3/h, command " +
+                     type.parameters.name + ": " + Describe(type.parameters) +
+                         ", command " +
                          (type.interpolated_command ? "interpolated" : "held"));
 }
 
@@ -202,6 +213,7 @@ Json OnboardingJson(const Onboarding& onboarding,
                     const std::optional<ModelSet>& of_type) {
   Json json = ModelsJson(onboarding.models);
   json["hours"] = onboarding.hours;
+  json["size"] = onboarding.size;
   json["fault_observers_of"] =
       onboarding.transferred ? Json(NameOf(*of_type)) : Json();
   json["parameters"] = Json::array();
@@ -287,6 +299,16 @@ report::Report ReportOf(const Onboarding& onboarding,
                      : "simulated, since " + NameOf(*of_type) +
                            ", the type's set, has other channels or was made "
                            "for other commands, pressures or temperatures"));
+  }
+  if (onboarding.size != 1.0) {
+    const simulator::Instrumentation& i =
+        onboarding.type.parameters.instruments;
+    report.Line("the valve has " + FormatNumber(onboarding.size, 3) +
+                " times the size of its type; the flow transmitter is taken to "
+                "end at " +
+                FormatNumber(i.flow.high, 1) + ' ' +
+                std::string(FlowUnitName(i.flow_unit)) +
+                ": --type FILE.toml states another end");
   }
   report.Line(AlarmRateText(models));
   if (onboarding.left_out_s > 0.0) {

@@ -1,18 +1,19 @@
 #include "simulator/scenario/scenario_toml.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/field_list.h"
 #include "base/time_text.h"
 #include "import/csv.h"
+#include "simulator/parameter_fields.h"
 
 // A scenario as TOML. The keys of a table are the member names of its struct,
 // listed once for reader and writer; the unit of a field is the suffix of its
@@ -24,48 +25,25 @@ using std::filesystem::path;
 
 constexpr double kForever = 1e10;
 
-// VisitFields(value, visit) calls visit(name, field) for each field; nested
-// structs have lists of their own.
-#define FDI_VISIT(FIELD) visit(#FIELD, value.FIELD);
-#define FDI_FIELDS(STRUCT, ...)                      \
-  template <typename Visitor>                        \
-  void VisitFields(STRUCT& value, Visitor&& visit) { \
-    FDI_FOR_EACH(FDI_VISIT, __VA_ARGS__)             \
-  }
-
-FDI_FIELDS(Disturbance, sd, correlation)
-FDI_FIELDS(OperatingPointExcitation, cv_pct, cv_noise_pct, p1_kpa, p1_noise_kpa,
-           p2_kpa, p2_noise_kpa, t1_degc, amplitude_pct, period_s)
-FDI_FIELDS(SineExcitation, phase_s)
-FDI_FIELDS(LevelLoopExcitation, level_set_point_pct, steam_demand_t_h,
-           steam_noise_t_h, level_noise_pct, pump_noise_kpa, initial_cv_pct,
-           proportional_gain, integral_time_s, inlet_opening, outlet_opening,
-           bypass_opening)
-FDI_FIELDS(InputProfile, t_s, cv_pct, p1_kpa, p2_kpa, t1_degc, cv_noise_pct,
-           p1_noise_kpa, p2_noise_kpa)
-FDI_FIELDS(ActuatorParameters, moving_mass_kg, damping_n_s_m, spring_rate_n_m,
-           spring_preload_m, diaphragm_area_m2, stroke_m, chamber_volume_m3,
-           air_temperature_k, ambient_pressure_pa, supply_pressure_gauge_pa,
-           plug_area_m2, play_fraction, coulomb_friction_n)
-FDI_FIELDS(PositionerParameters, gain, integral_time_s, derivative_time_s,
-           filter_time_s, sampling_period_s, filling_cv, venting_cv,
-           transducer_dead_zone)
-FDI_FIELDS(TrimParameters, kv_m3_h, characteristic, exponent, bypass_kv_m3_h)
-FDI_FIELDS(Transmitter, low, high, noise_sd)
-FDI_FIELDS(InstrumentParameters, flow_unit, command, pressure, temperature,
-           position, flow, positioner_noise_sd_pct, resolution_bits)
-FDI_FIELDS(ValveParameters, name, actuator, positioner, trim, instruments)
-FDI_FIELDS(ValveSimulationConfig, cold_start, continuous_inputs, noise,
-           resolution)
+FDI_VISITABLE(Disturbance, sd, correlation)
+FDI_VISITABLE(OperatingPointExcitation, cv_pct, cv_noise_pct, p1_kpa,
+              p1_noise_kpa, p2_kpa, p2_noise_kpa, t1_degc, amplitude_pct,
+              period_s)
+FDI_VISITABLE(SineExcitation, phase_s)
+FDI_VISITABLE(LevelLoopExcitation, level_set_point_pct, steam_demand_t_h,
+              steam_noise_t_h, level_noise_pct, pump_noise_kpa, initial_cv_pct,
+              proportional_gain, integral_time_s, inlet_opening, outlet_opening,
+              bypass_opening)
+FDI_VISITABLE(InventoryLoopExcitation, initial_cv_pct, demand_noise_pct,
+              level_noise_pct, p1_kpa, p1_noise_kpa, p2_kpa, p2_noise_kpa,
+              t1_degc, holding_time_s, proportional_gain, integral_time_s)
+FDI_VISITABLE(InputProfile, t_s, cv_pct, p1_kpa, p2_kpa, t1_degc, cv_noise_pct,
+              p1_noise_kpa, p2_noise_kpa)
+FDI_VISITABLE(ValveSimulationConfig, cold_start, continuous_inputs, noise,
+              resolution)
 // The rows of a recorded excitation come from a file.
 template <typename Visitor>
 void VisitFields(RecordedExcitation& /*value*/, Visitor&& /*visit*/) {}
-
-#undef FDI_FIELDS
-#undef FDI_VISIT
-
-constexpr const char* kCharacteristics[] = {"exponential", "linear"};
-static_assert(static_cast<int>(FlowCharacteristic::kLinear) == 1);
 
 path Resolve(const path& folder, const path& file) {
   return file.is_absolute() ? file : folder / file;
@@ -89,27 +67,27 @@ class FieldReader {
     field = table_.Boolean(key).value_or(field);
   }
   void operator()(const char* key, std::vector<double>& field) {
-    field = table_.Numbers(key);
+    if (table_.Has(key)) {
+      field = table_.Numbers(key);
+    }
   }
   void operator()(const char* key, std::string& field) {
     field = table_.Text(key).value_or(field);
   }
-  void operator()(const char* key, FlowUnit& field) {
+  template <typename Enum>
+  requires std::is_enum_v<Enum>
+  void operator()(const char* key, Enum& field) {
     if (const auto text = table_.Text(key)) {
-      const auto unit = ParseFlowUnit(*text);
-      if (!unit) {
-        table_.Refuse(key, "'" + *text + "': expected m3/h or t/h");
+      constexpr auto& kNames = kEnumNames<Enum>;
+      const auto found = std::ranges::find(kNames, *text);
+      if (found == kNames.end()) {
+        std::string names;
+        for (const std::string_view name : kNames) {
+          names += (names.empty() ? "" : ", ") + std::string(name);
+        }
+        table_.Refuse(key, "'" + *text + "': expected one of " + names);
       }
-      field = *unit;
-    }
-  }
-  void operator()(const char* key, FlowCharacteristic& field) {
-    if (const auto text = table_.Text(key)) {
-      const auto found = std::ranges::find(kCharacteristics, *text);
-      if (found == std::end(kCharacteristics)) {
-        table_.Refuse(key, "'" + *text + "': expected exponential or linear");
-      }
-      field = static_cast<FlowCharacteristic>(found - kCharacteristics);
+      field = static_cast<Enum>(found - kNames.begin());
     }
   }
   template <typename Struct>
@@ -123,15 +101,6 @@ class FieldReader {
  private:
   TomlReader& table_;
 };
-
-// The shortest text that round-trips to `value`.
-template <typename Number>
-std::string Shortest(Number value) {
-  std::array<char, 32> buffer{};
-  const auto [end, error] =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
-  return {buffer.data(), end};
-}
 
 // "[a, b, c]", made by `text_of` from `items`.
 template <typename Items, typename TextOf>
@@ -151,22 +120,23 @@ class FieldWriter {
   FieldWriter(std::string prefix, Lines& lines)
       : prefix_(std::move(prefix)), lines_(lines) {}
 
-  void operator()(const char* key, double field) { Add(key, Shortest(field)); }
-  void operator()(const char* key, int field) { Add(key, Shortest(field)); }
+  void operator()(const char* key, double field) {
+    Add(key, NumberText(field));
+  }
+  void operator()(const char* key, int field) { Add(key, NumberText(field)); }
   void operator()(const char* key, bool field) {
     Add(key, field ? "true" : "false");
   }
   void operator()(const char* key, std::vector<double>& field) {
-    Add(key, List(field, Shortest<double>));
+    Add(key, List(field, NumberText<double>));
   }
   void operator()(const char* key, std::string& field) {
     Add(key, QuoteToml(field));
   }
-  void operator()(const char* key, FlowUnit field) {
-    Add(key, QuoteToml(FlowUnitName(field)));
-  }
-  void operator()(const char* key, FlowCharacteristic field) {
-    Add(key, QuoteToml(kCharacteristics[static_cast<int>(field)]));
+  template <typename Enum>
+  requires std::is_enum_v<Enum>
+  void operator()(const char* key, Enum field) {
+    Add(key, QuoteToml(kEnumNames<Enum>[static_cast<std::size_t>(field)]));
   }
   template <typename Struct>
   requires(std::is_class_v<Struct> && !std::is_same_v<Struct, std::string> &&
@@ -199,22 +169,21 @@ void AppendDifferences(const std::string& prefix, Struct value, Struct defaults,
   }
 }
 
-// Runs `read`; a ConfigError from it is reported at the place of `key`.
-template <typename Read>
-void AtKey(const TomlReader& table, std::string_view key, Read&& read) {
-  try {
-    read();
-  } catch (const ConfigError& error) {
-    table.Refuse(key, error.what());
-  }
-}
-
 void ReadParameterTable(TomlReader& table, const path& folder,
                         ValveParameters& parameters) {
   if (const auto base = table.Text("base")) {
-    AtKey(table, "base", [&] { parameters = FindParameters(*base, folder); });
+    table.At("base", [&] { parameters = FindParameters(*base, folder); });
   }
   VisitFields(parameters, FieldReader(table));
+  // As data sheets state the exponential characteristic: f = R^-X.
+  constexpr const char* kRangeability = "rangeability";
+  if (auto trim = table.Table("trim"); trim && trim->Has(kRangeability)) {
+    if (trim->Has("exponent")) {
+      trim->Refuse(kRangeability,
+                   "give it or exponent, which is its logarithm");
+    }
+    parameters.trim.exponent = std::log(*trim->Number(kRangeability, 1.2, 1e8));
+  }
 }
 
 void ReadParameters(TomlReader& table, const path& folder,
@@ -224,9 +193,9 @@ void ReadParameters(TomlReader& table, const path& folder,
     TomlReader inner = *table.Table(kKey);
     ReadParameterTable(inner, folder, parameters);
   } else if (const auto name = table.Text(kKey)) {
-    AtKey(table, kKey, [&] { parameters = FindParameters(*name, folder); });
+    table.At(kKey, [&] { parameters = FindParameters(*name, folder); });
   }
-  AtKey(table, kKey, [&] { Validate(parameters); });
+  table.At(kKey, [&] { Validate(parameters); });
 }
 
 // Uses CV, P1, P2 and T1 of a CSV as excitation, with its period and length.
@@ -257,14 +226,14 @@ void ReadExcitation(TomlReader& table, const path& folder, Scenario& scenario) {
   if (table.IsTable(kKey)) {
     TomlReader inner = *table.Table(kKey);
     if (const auto name = inner.Text("name")) {
-      AtKey(inner, "name", [&] { ChooseExcitation(*name, folder, scenario); });
+      inner.At("name", [&] { ChooseExcitation(*name, folder, scenario); });
     }
     std::visit([&](auto& e) { VisitFields(e, FieldReader(inner)); },
                scenario.config.excitation);
   } else if (const auto name = table.Text(kKey)) {
-    AtKey(table, kKey, [&] { ChooseExcitation(*name, folder, scenario); });
+    table.At(kKey, [&] { ChooseExcitation(*name, folder, scenario); });
   }
-  AtKey(table, kKey, [&] { Validate(scenario.config.excitation); });
+  table.At(kKey, [&] { Validate(scenario.config.excitation); });
 }
 
 void ReadFaults(TomlReader& table, ValveSimulationConfig& config) {
@@ -275,8 +244,7 @@ void ReadFaults(TomlReader& table, ValveSimulationConfig& config) {
   }
   config.faults.clear();
   for (const std::string& text : texts) {
-    AtKey(table, kKey,
-          [&] { config.faults.push_back(ParseFaultSchedule(text)); });
+    table.At(kKey, [&] { config.faults.push_back(ParseFaultSchedule(text)); });
   }
 }
 
@@ -290,7 +258,7 @@ void ReadInputs(TomlReader& table, ValveSimulationConfig& config) {
   for (TomlReader& own : profiles) {
     InputProfile& profile = config.inputs.emplace_back();
     VisitFields(profile, FieldReader(own));
-    AtKey(own, "t_s", [&] { Validate(profile); });
+    own.At("t_s", [&] { Validate(profile); });
   }
 }
 
@@ -312,7 +280,7 @@ void ReadModes(TomlReader& table, ValveSimulationConfig& config) {
                              std::string(kValveModeNames));
     }
     stretch.mode = *mode;
-    AtKey(own, "from_s", [&] { Validate(stretch); });
+    own.At("from_s", [&] { Validate(stretch); });
   }
 }
 
@@ -380,8 +348,8 @@ std::string InputText(const InputProfile& input) {
 }
 
 std::string ModeText(const ModeStretch& stretch) {
-  return "{from_s = " + Shortest(stretch.from_s) +
-         ", until_s = " + Shortest(stretch.until_s) +
+  return "{from_s = " + NumberText(stretch.from_s) +
+         ", until_s = " + NumberText(stretch.until_s) +
          ", mode = " + QuoteToml(ValveModeName(stretch.mode)) + '}';
 }
 
@@ -434,7 +402,7 @@ void ApplyScenario(TomlReader& table, const path& folder, Scenario& scenario) {
   ReadFaults(table, config);
   ReadNumbers(table, config);
   if (const auto start = table.Text("start")) {
-    AtKey(table, "start", [&] { config.start_ns = ParseTime(*start, true); });
+    table.At("start", [&] { config.start_ns = ParseTime(*start, true); });
   }
   VisitFields(config, FieldReader(table));
 }
@@ -487,14 +455,14 @@ std::string ScenarioText(const Scenario& scenario) {
                      List(config.faults, [](const FaultSchedule& fault) {
                        return QuoteToml(ToText(fault));
                      }));
-  lines.emplace_back("seed", Shortest(config.seed));
-  lines.emplace_back("duration_s", Shortest(config.duration_s));
-  lines.emplace_back("period_s", Shortest(config.period_s));
+  lines.emplace_back("seed", NumberText(config.seed));
+  lines.emplace_back("duration_s", NumberText(config.duration_s));
+  lines.emplace_back("period_s", NumberText(config.period_s));
   if (config.start_ns != 0) {
     lines.emplace_back("start", QuoteToml(FormatTime(config.start_ns, true)));
   }
   VisitFields(config, FieldWriter("", lines));
-  lines.emplace_back("tolerance_scale", Shortest(config.tolerance_scale));
+  lines.emplace_back("tolerance_scale", NumberText(config.tolerance_scale));
   std::string text;
   for (const auto& [key, value] : lines) {
     text += key + " = " + value + '\n';

@@ -47,33 +47,23 @@ bool Has(const std::vector<Explanation>& faults, int fault) {
                      [&](const auto& e) { return e.fault == fault; });
 }
 
-// Faults that the data do not tell apart, or only by what a healthy record
-// leaves open. Of two faults the third is 0, which must not match an
-// explanation by no fault.
-struct Likeness {
-  std::array<int, 3> faults;
-  bool (*holds)(const SecondLook& look, const Explanation& e, double nothing);
-};
-constexpr Likeness kLikenesses[] = {
-    // Leak through the seat and open bypass have one shape. What tells them
-    // apart is that a leak is small.
-    {{6, 18, 0},
-     [](const SecondLook&, const Explanation& e, double nothing) {
-       return std::abs(e.strength) < 1.0 && e.distance <= nothing;
-     }},
-    // A little sedimentation takes as much of the flow as a leak can, a
-    // twentieth, and moves X by less than the simulation errs.
-    {{2, 5, 0},
-     [](const SecondLook&, const Explanation& e, double nothing) {
-       return e.distance <= kAlike * nothing;
-     }},
-    // A stop far open, a torn diaphragm and too little supply differ by gain
-    // and supply pressure. Where the best leaves no more than a healthy valve
-    // does, it needs no such excuse.
-    {{1, 10, 16},
-     [](const SecondLook& look, const Explanation& e, double nothing) {
-       return look.misfit > kGoodMisfit && e.distance <= kAlike * nothing;
-     }}};
+// Whether `e` is to stand beside a fault of the set that it looks like.
+bool IsAlike(Alike alike, const SecondLook& look, const Explanation& e,
+             double nothing) {
+  switch (alike) {
+    case Alike::kWithinItsSize:
+      return std::abs(e.strength) < 1.0 && e.distance <= nothing;
+    case Alike::kWhileWeak:
+      return e.distance <= kAlike * nothing;
+    case Alike::kUnfit:
+      // Where the best leaves no more than a healthy valve does, it needs no
+      // such excuse.
+      return look.misfit > kGoodMisfit && e.distance <= kAlike * nothing;
+    case Alike::kNever:
+      break;
+  }
+  return false;
+}
 
 void AddIndistinguishable(const SecondLook& look, double nothing,
                           std::vector<Explanation>& set) {
@@ -81,16 +71,16 @@ void AddIndistinguishable(const SecondLook& look, double nothing,
       !Has(set, look.perforation->fault)) {
     set.push_back(*look.perforation);
   }
-  for (const Likeness& likeness : kLikenesses) {
-    const auto& alike = likeness.faults;
-    if (std::none_of(alike.begin(), alike.end(),
-                     [&](int fault) { return Has(set, fault); })) {
-      continue;
-    }
+  for (const Alike alike :
+       {Alike::kWithinItsSize, Alike::kWhileWeak, Alike::kUnfit}) {
     for (const Explanation& e : look.ranked) {
-      if (e.fault != 0 && !Has(set, e.fault) &&
-          std::count(alike.begin(), alike.end(), e.fault) > 0 &&
-          likeness.holds(look, e, nothing)) {
+      if (e.fault == 0 || Has(set, e.fault)) {
+        continue;
+      }
+      const FaultFacts& facts = FaultFactsOf(e.fault);
+      if (facts.alike == alike && IsAlike(alike, look, e, nothing) &&
+          std::ranges::any_of(facts.look_alikes,
+                              [&](int other) { return Has(set, other); })) {
         set.push_back(e);
       }
     }
@@ -236,21 +226,25 @@ void EpisodeLooks::AddRow(const Sample& sample) {
   // The simulation needs all inputs. One that is not measured is taken as
   // usual; it has no share in the cost of a fault. A transmitter that fails may
   // read less than the simulation takes, or more.
-  const auto value = [&](Signal signal, double usual, double most) {
-    return sample.Has(signal) ? std::clamp(sample[signal], 0.0, most) : usual;
+  const auto value = [&](Signal signal, double usual, double least,
+                         double most) {
+    return sample.Has(signal) ? std::clamp(sample[signal], least, most) : usual;
   };
   constexpr double kMaxPressureKpa = 2e4;
+  const bool is_water = physics_.parameters.medium.fluid == Fluid::kWater;
   const SignalMask uncertain = sample.uncertain();
   // A command is needed as much as a position, to compare that with.
   const bool follows = sample.Has(Signal::kCv) && sample.Has(Signal::kX);
-  const RecordRow row{{sample[Signal::kCv],
-                       value(Signal::kP1, physics_.p1.mean, kMaxPressureKpa),
-                       value(Signal::kP2, physics_.p2.mean, kMaxPressureKpa),
-                       value(Signal::kT1, physics_.t1.mean, kMaxTemperatureC)},
-                      sample[Signal::kX],
-                      sample.Has(Signal::kF) ? sample[Signal::kF] : 0.0,
-                      follows && (uncertain & MaskOf(Signal::kX)) == 0,
-                      (uncertain & MaskOf(Signal::kF)) == 0};
+  const RecordRow row{
+      {sample[Signal::kCv],
+       value(Signal::kP1, physics_.p1.mean, 0.0, kMaxPressureKpa),
+       value(Signal::kP2, physics_.p2.mean, 0.0, kMaxPressureKpa),
+       value(Signal::kT1, physics_.t1.mean, is_water ? 0.0 : kColdestMediumC,
+             is_water ? kMaxTemperatureC : kHottestMediumC)},
+      sample[Signal::kX],
+      sample.Has(Signal::kF) ? sample[Signal::kF] : 0.0,
+      follows && (uncertain & MaskOf(Signal::kX)) == 0,
+      (uncertain & MaskOf(Signal::kF)) == 0};
   for (std::int64_t held = 1; !rows_.empty() && held < step; ++held) {
     rows_.push_back({rows_.back().stamp_ns + period_ns_, rows_.back().row});
     rows_.back().row.x_measured = rows_.back().row.flow_measured = false;

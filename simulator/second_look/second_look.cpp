@@ -53,12 +53,14 @@ struct Hypothesis {
   double strength{0.0};                      // and its |strength|.
 };
 
+// X is that of the healthy valve, and so is what drives the flow.
 bool ActsOnFlowAlone(int fault) {
-  return fault != 0 && LeavesRod(fault) && !TransmitterOf(fault);
+  return fault != 0 && (FaultFactsOf(fault).acts_on == ActsOn::kFlow ||
+                        FaultFactsOf(fault).acts_on == ActsOn::kFlowReading);
 }
 
 bool ActsOnInputs(int fault) {
-  return fault == 7 || fault == 17 || TransmitterOf(fault).has_value();
+  return fault != 0 && FaultFactsOf(fault).acts_on == ActsOn::kInputs;
 }
 
 // A channel's share of Q, and what of it the errors alone contribute.
@@ -162,22 +164,14 @@ InputRow Looker::InputAt(int row, int fault, double strength) const {
   InputRow input = window_.rows[static_cast<std::size_t>(row)].input;
   input.cv_pct = DelayedCommand(window_.rows, static_cast<std::size_t>(row),
                                 physics_.drive.command_delay);
-  if (strength == 0.0) {
-    return input;
-  }
-  switch (fault) {
-    case 7:
-    case kTemperatureTransmitterFault:
-      input.t1_degc = usual_.t1_degc;
-      break;
-    case kInletPressureTransmitterFault:
-      input.p1_kpa = usual_.p1_kpa;
-      break;
-    case kOutletPressureTransmitterFault:
-      input.p2_kpa = usual_.p2_kpa;
-      break;
-    default:
-      break;
+  const auto hidden =
+      strength == 0.0 || fault == 0 ? std::nullopt : FaultFactsOf(fault).hides;
+  if (hidden == Signal::kT1) {
+    input.t1_degc = usual_.t1_degc;
+  } else if (hidden == Signal::kP1) {
+    input.p1_kpa = usual_.p1_kpa;
+  } else if (hidden == Signal::kP2) {
+    input.p2_kpa = usual_.p2_kpa;
   }
   return input;
 }
@@ -203,9 +197,13 @@ Trajectory Looker::Simulate(int fault, double strength, Course course,
   config.resolution = false;
   // Half the time of 1, for an error of 0.02 % of X (record_fit.h).
   config.tolerance_scale = 10.0;
-  // The recorded pressures already have what f17 does to them. A transmitter
-  // fault does not reach the valve, which InputAt() has given the usual value.
-  if (fault != 0 && fault != 17 && !TransmitterOf(fault)) {
+  // The recorded inputs already have what a fault does to them, unless it hides
+  // one; a transmitter fault does not reach the valve, which InputAt() has
+  // given the usual value.
+  const bool acts =
+      fault != 0 && !TransmitterOf(fault) &&
+      (!ActsOnInputs(fault) || FaultFactsOf(fault).hides.has_value());
+  if (acts) {
     FaultSchedule schedule;
     schedule.fault = fault;
     schedule.start_s = course.start * config.period_s;
@@ -322,7 +320,7 @@ double Looker::Readings() const {
 // How unusual the inputs are, behind the detection, if the fault is there.
 double Looker::InputCost(int fault, double strength, Course course,
                          const Trajectory& answers) const {
-  const InstrumentParameters& i = physics_.parameters.instruments;
+  const Instrumentation& i = physics_.parameters.instruments;
   double cost = 0.0;
   const auto add = [&](Signal signal, double InputRow::*member,
                        const InputBand& band, const Transmitter& transmitter,
@@ -350,31 +348,38 @@ double Looker::InputCost(int fault, double strength, Course course,
     const double away = (mean - expected) / sd;
     cost += away * away;
   };
-  // Expected readings. f7 and f17 act as in fault_effects.cpp; a faulty
-  // transmitter is off by s times its span.
+  // Expected readings: the usual ones, with what the fault does to them.
+  const auto with_fault = [&](auto&& change) {
+    return [&, change](double usual, double s) {
+      if (!ActsOnInputs(fault)) {
+        return usual;
+      }
+      FaultEffects effects;
+      ApplyFault(fault, s, effects);
+      return change(usual, effects);
+    };
+  };
+  const double pressure_span = i.pressure.high - i.pressure.low;
   add(Signal::kP1, &InputRow::p1_kpa, physics_.p1, i.pressure,
-      [&](double usual, double s) {
-        return fault == 17 && s < 0.0 ? usual * (1.0 + s)
-               : fault == kInletPressureTransmitterFault
-                   ? usual + s * (i.pressure.high - i.pressure.low)
-                   : usual;
-      });
+      with_fault([&](double usual, const FaultEffects& e) {
+        return usual * e.inlet_factor + e.inlet_reading_step * pressure_span;
+      }));
   add(Signal::kP2, &InputRow::p2_kpa, physics_.p2, i.pressure,
-      [&](double usual, double s) {
-        return fault == 17 && s > 0.0 ? usual * (1.0 - s)
-               : fault == kOutletPressureTransmitterFault
-                   ? usual + s * (i.pressure.high - i.pressure.low)
-                   : usual;
-      });
+      with_fault([&](double usual, const FaultEffects& e) {
+        return usual * e.outlet_factor + e.outlet_reading_step * pressure_span;
+      }));
   add(Signal::kT1, &InputRow::t1_degc, physics_.t1, i.temperature,
-      [&](double usual, double s) {
-        return fault == 7 && s > 0.0
-                   ? std::min(usual + 200.0 + 100.0 * s, kMaxTemperatureC)
-               : fault == kTemperatureTransmitterFault
-                   ? usual + s * (i.temperature.high - i.temperature.low)
-                   : usual;
-      });
-  return fault == 19 ? cost + command_cost_ : cost;
+      with_fault([&](double usual, const FaultEffects& e) {
+        const double t1_degc =
+            e.temperature_rise_c > 0.0
+                ? std::min(usual + e.temperature_rise_c, kMaxTemperatureC)
+                : usual;
+        return t1_degc + e.temperature_reading_step *
+                             (i.temperature.high - i.temperature.low);
+      }));
+  return fault != 0 && FaultFactsOf(fault).acts_on == ActsOn::kFlowReading
+             ? cost + command_cost_
+             : cost;
 }
 
 // A flow transmitter that goes wrong moves no command, unless the loop reads
@@ -422,14 +427,16 @@ double Looker::CostOf(const Hypothesis& h, double strength,
 std::vector<Hypothesis> Looker::Hypotheses() const {
   std::vector<Hypothesis> hypotheses;
   for (int fault = 1; fault <= kLastFault; ++fault) {
-    const auto transmitter = TransmitterOf(fault);
-    constexpr int kPlay = 4;  // There is no less play than none.
-    if (fault == 8 || fault == 14 || (transmitter && !Measures(*transmitter)) ||
-        (ActsOnFlowAlone(fault) && !Measures(Signal::kF))) {
+    const FaultFacts& facts = FaultFactsOf(fault);
+    // X is always there.
+    const auto measured =
+        static_cast<SignalMask>(window_.signals | MaskOf(Signal::kX));
+    if (facts.weak || !IsVisibleIn(fault, measured) ||
+        !Exists(fault, physics_.parameters)) {
       continue;
     }
     for (const double sign : {1.0, -1.0}) {
-      if (sign > 0.0 || (FaultFactsOf(fault).is_signed && fault != kPlay)) {
+      if (sign > 0.0 || HasNegative(fault)) {
         hypotheses.push_back({fault, sign, {detection_, false}});
       }
     }
@@ -483,9 +490,9 @@ void Looker::TryCourse(Hypothesis& h, Course course) {
 Hypothesis Looker::PerforationLike(const Hypothesis& supply_drop,
                                    Course course) {
   constexpr int kRefinements = 3;
-  Hypothesis best{10, 1.0, course};
+  Hypothesis best{kDiaphragmPerforation, 1.0, course};
   for (const double supply : kSupplies) {
-    Hypothesis other{10, 1.0, course, supply};
+    Hypothesis other{kDiaphragmPerforation, 1.0, course, supply};
     // Where the force that is left is that of f16,
     //
     //   A (1 - s) r P = A (1 - s16) P,   s = 1 - (1 - s16) / r
@@ -588,7 +595,7 @@ ChannelFit Looker::FitWithoutFault() const {
   const bool has_flow = Measures(Signal::kF);
   // A constant shift of one reading by some per cent: drift.
   constexpr double kDrift = 0.02;
-  const InstrumentParameters& i = physics_.parameters.instruments;
+  const Instrumentation& i = physics_.parameters.instruments;
   // What a drift of one reading changes; the rest of the cost stays.
   const auto drifted = [&](bool flow, const Transmitter& transmitter,
                            const Scatter& scatter) {
@@ -629,10 +636,10 @@ std::vector<Hypothesis> Looker::FitHypotheses(const std::stop_token& stop) {
     for (const double strength : {0.1, 0.3, 0.6, 1.0}) {
       Try(h, strength);
     }
-    if (h.fault == 1) {
+    const Onset onset = FaultFactsOf(h.fault).onset;
+    if (onset == Onset::kStop) {
       Try(h, ObservedStop());
-    } else if (h.fault == 10 || h.fault == 16) {
-      // Nothing shows until the force lacks, and little more does beyond.
+    } else if (onset == Onset::kThreshold) {
       for (const double strength : {0.5, 0.7, 0.8, 0.9}) {
         Try(h, strength);
       }
@@ -704,10 +711,11 @@ SecondLook Looker::Run(const std::stop_token& stop) {
                    [](const Explanation& a, const Explanation& b) {
                      return a.distance < b.distance;
                    });
-  if (faulty && first.fault == 16) {
+  if (faulty && first.fault == kSupplyDrop) {
     Hypothesis torn = PerforationLike(first, first.course);
     // Hypotheses() always has f10, whatever is measured.
-    const auto f10 = std::ranges::find(hypotheses, 10, &Hypothesis::fault);
+    const auto f10 = std::ranges::find(hypotheses, kDiaphragmPerforation,
+                                       &Hypothesis::fault);
     if (f10->course != first.course) {
       Hypothesis other = PerforationLike(first, f10->course);
       torn = other.cost < torn.cost ? std::move(other) : std::move(torn);

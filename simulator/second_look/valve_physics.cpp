@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <type_traits>
 
 #include "base/error.h"
 #include "base/field_list.h"
+#include "simulator/parameter_fields.h"
 
 namespace fdi::simulator {
 namespace {
@@ -297,53 +299,44 @@ ValvePhysics DescribeValve(const ValveParameters& parameters,
   return physics;
 }
 
-// VisitFields(value, visit) calls visit(name, field) for each field, in the
-// order in which a model set stores the physics:
+// A model set stores the physics in the order of the field lists:
 //
 //   physics = { path value }        a double, of switches and enumerations, too
-//   path    = field { "." field }   for example "parameters.actuator.stroke_m"
+//   path    = field { "." field } [ "." index ]
+//             for example "parameters.actuator.stroke_m"
 //
-// PhysicsFrom() requires these paths in this order. A field that is added,
-// renamed or moved makes the stored sets unreadable; only the last ones, those
-// of `loop`, may be missing.
+// PhysicsFrom() requires these paths in this order. A field that is renamed or
+// moved makes the stored sets unreadable; those of kAddedLater may be missing.
 namespace {
 
-#define FDI_VISIT(FIELD) visit(#FIELD, value.FIELD);
-#define FDI_FIELDS(STRUCT, ...)                      \
-  template <typename Visitor>                        \
-  void VisitFields(STRUCT& value, Visitor&& visit) { \
-    FDI_FOR_EACH(FDI_VISIT, __VA_ARGS__)             \
-  }
+FDI_VISITABLE(RecordDrive, period_s, interpolated_command, command_delay)
+FDI_VISITABLE(Scatter, sd, correlation_time, slow_sd)
+FDI_VISITABLE(InputBand, mean, slope, sd)
+FDI_VISITABLE(LoopHabit, command_sd, reads_flow)
+FDI_VISITABLE(ValvePhysics, parameters, drive, x, flow, flow_mean, p1, p2, t1,
+              loop)
 
-FDI_FIELDS(ActuatorParameters, moving_mass_kg, damping_n_s_m, spring_rate_n_m,
-           spring_preload_m, diaphragm_area_m2, stroke_m, chamber_volume_m3,
-           air_temperature_k, ambient_pressure_pa, supply_pressure_gauge_pa,
-           plug_area_m2, play_fraction, lowest_travel, highest_travel,
-           coulomb_friction_n)
-FDI_FIELDS(PositionerParameters, gain, integral_time_s, derivative_time_s,
-           filter_time_s, sampling_period_s, relay, filling_cv, venting_cv,
-           orifice_coefficient, transducer_dead_zone)
-FDI_FIELDS(TrimParameters, kv_m3_h, characteristic, exponent, bypass_kv_m3_h)
-FDI_FIELDS(Transmitter, low, high, noise_sd)
-FDI_FIELDS(InstrumentParameters, flow_unit, command, pressure, temperature,
-           position, flow, positioner_noise_sd_pct, resolution_bits)
-FDI_FIELDS(ValveParameters, actuator, positioner, trim, instruments)
-FDI_FIELDS(RecordDrive, period_s, interpolated_command, command_delay)
-FDI_FIELDS(Scatter, sd, correlation_time, slow_sd)
-FDI_FIELDS(InputBand, mean, slope, sd)
-FDI_FIELDS(LoopHabit, command_sd, reads_flow)
-FDI_FIELDS(ValvePhysics, parameters, drive, x, flow, flow_mean, p1, p2, t1,
-           loop)
+// Sets that were stored before there were these are of the default: a water
+// valve whose spring opens it.
+constexpr std::string_view kAddedLater[] = {
+    "loop.",
+    "parameters.medium.",
+    "parameters.actuator.spring",
+    "parameters.trim.shut_off",
+    "parameters.trim.leakage",
+    "parameters.trim.liquid_recovery",
+    "parameters.trim.choked_pressure_ratio"};
 
-#undef FDI_FIELDS
-#undef FDI_VISIT
-
-// Calls use(path, field) for every field that is a number.
+// Calls use(path, field) for every field that is a number or a list of them.
 template <typename Use>
 struct Numbers {
   std::string prefix;
   Use& use;
 
+  void operator()(const char* /*name*/, std::string& /*field*/) {}
+  void operator()(const char* name, std::vector<double>& field) {
+    use(prefix + name, field);
+  }
   template <typename Field>
   void operator()(const char* name, Field& field) {
     if constexpr (std::is_class_v<Field>) {
@@ -354,12 +347,20 @@ struct Numbers {
   }
 };
 
+using List = std::vector<double>;
+
 }  // namespace
 
 std::vector<PhysicalValue> ToValues(const ValvePhysics& physics) {
   std::vector<PhysicalValue> values;
   auto use = [&](const std::string& name, auto& field) {
-    values.push_back({name, static_cast<double>(field)});
+    if constexpr (std::is_same_v<std::decay_t<decltype(field)>, List>) {
+      for (std::size_t i = 0; i < field.size(); ++i) {
+        values.push_back({name + '.' + std::to_string(i), field[i]});
+      }
+    } else {
+      values.push_back({name, static_cast<double>(field)});
+    }
   };
   ValvePhysics copy = physics;
   VisitFields(copy, Numbers<decltype(use)>{"", use});
@@ -369,16 +370,23 @@ std::vector<PhysicalValue> ToValues(const ValvePhysics& physics) {
 ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values) {
   ValvePhysics physics;
   std::size_t next = 0;
+  const auto is_next = [&](const std::string& name) {
+    return next < values.size() && values[next].name == name;
+  };
   auto use = [&](const std::string& name, auto& field) {
-    if (next == values.size() && name.starts_with("loop.")) {
-      return;
-    }
-    if (next >= values.size() || values[next].name != name) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(field)>, List>) {
+      while (is_next(name + '.' + std::to_string(field.size()))) {
+        field.push_back(values[next++].value);
+      }
+    } else if (is_next(name)) {
+      field = static_cast<std::remove_reference_t<decltype(field)>>(
+          values[next++].value);
+    } else if (std::ranges::none_of(kAddedLater, [&](std::string_view added) {
+                 return name.starts_with(added);
+               })) {
       throw DataError("the physics of the model set lacks " + name +
                       ": onboard the valve anew");
     }
-    field = static_cast<std::remove_reference_t<decltype(field)>>(
-        values[next++].value);
   };
   VisitFields(physics, Numbers<decltype(use)>{"", use});
   if (next < values.size()) {

@@ -69,8 +69,8 @@ TEST(ControlValveTest, ForcesBalanceAtRest) {
 
   const ValveState s = valve.state();
   const double spring = 60892.0 * (s.rod * 0.0381 + 0.009525);
-  const double flow =
-      (3555e3 - 2615e3) / RecoveryCoefficient(s.rod) * 1.9635e-3;
+  const double flow = (3555e3 - 2615e3) /
+                      RecoveryCoefficient(parameters.trim, s.rod) * 1.9635e-3;
   const double diaphragm = (s.chamber_pressure_pa - 101325.0) * 0.0290;
   EXPECT_NEAR(diaphragm + 2.0 * 9.81 - spring - flow, 0.0, 1.0);
   EXPECT_NEAR(valve.NetForce(), 0.0, 1.0);
@@ -106,7 +106,7 @@ TEST(ControlValveTest, FlowIsEquationTwelve) {
   ControlValve valve(Exact(), 1.0);
   valve.Settle(InputsAt(0.7167));
   const double x = valve.state().rod;
-  const double rho = MediumAt(3555e3, 2615e3, 100.7).density_kg_m3;
+  const double rho = MediumAt({}, 3555e3, 2615e3, 100.7).density_kg_m3;
   EXPECT_NEAR(valve.FlowM3PerHour(InputsAt(0.7167), 0.0),
               100.0 * 63.0 * (1.0 - x) * std::sqrt(0.940 / rho), 1e-9);
 }
@@ -288,7 +288,7 @@ TEST(ControlValveTest, BypassAddsItsOwnFlow) {
   const ProcessInputs inputs = InputsAt(0.7);
   valve.Settle(inputs);
   const double closed = valve.FlowM3PerHour(inputs, 0.0);
-  const double rho = MediumAt(3555e3, 2615e3, 100.7).density_kg_m3;
+  const double rho = MediumAt({}, 3555e3, 2615e3, 100.7).density_kg_m3;
   EXPECT_NEAR(valve.FlowM3PerHour(inputs, 0.4) - closed,
               100.0 * 19.75 * 0.4 * std::sqrt(0.940 / rho), 1e-9);
 }

@@ -99,7 +99,8 @@ TEST(ExcitationTest, MessagesNameFieldAndRange) {
 }
 
 TEST(ExcitationTest, NamesLeadToTheirExcitation) {
-  for (const char* name : {"operating-point", "sine", "level-loop", "csv"}) {
+  for (const char* name :
+       {"operating-point", "sine", "level-loop", "inventory-loop", "csv"}) {
     EXPECT_EQ(ExcitationName(DefaultExcitation(name)), name);
   }
 }

@@ -51,6 +51,27 @@ TEST(RobustLeastSquaresTest, ResistsOutliersAndKnowsWhatItCannotTell) {
   EXPECT_NEAR(sd[2], 0.5, 1e-6);
 }
 
+// F is that of a valve 3 times as large.
+TEST(ValveUnknownsTest, TheSizeIsThatOfTheRecord) {
+  const ValveParameters valve = ParameterSet("lublin-actuator-3");
+  HealthyRecord record;
+  for (int k = 0; k < 40; ++k) {
+    RecordRow row{{50.0, 3500.0, 2600.0, 43.0}, 50.0 + 0.5 * k, 0.0};
+    row.flow = 3.0 * FlowReading(valve, {}, row.input, row.x_pct);
+    record.rows.push_back(row);
+  }
+  EXPECT_NEAR(SizeOf({record}, valve), 3.0, 1e-12);
+  const ValveParameters large = Resized(valve, 3.0, 71.0);
+  EXPECT_DOUBLE_EQ(large.trim.kv_m3_h, 3.0 * valve.trim.kv_m3_h);
+  EXPECT_DOUBLE_EQ(large.trim.bypass_kv_m3_h, 3.0 * valve.trim.bypass_kv_m3_h);
+  EXPECT_DOUBLE_EQ(large.instruments.flow.high, 120.0);
+  // A record beyond the range, and one that hardly uses it, set the range.
+  EXPECT_DOUBLE_EQ(Resized(valve, 1.0, 48.0).instruments.flow.high, 60.0);
+  EXPECT_DOUBLE_EQ(Resized(valve, 1.0, 2.0).instruments.flow.high, 2.5);
+  record.rows.resize(20);
+  EXPECT_EQ(SizeOf({record}, valve), 1.0);
+}
+
 TEST(ValveUnknownsTest, TheTrimFollowsFromPositionAndFlowAlone) {
   ValveParameters truth = ParameterSet("lublin-actuator-3");
   truth.trim.kv_m3_h = 80.0;
@@ -59,15 +80,15 @@ TEST(ValveUnknownsTest, TheTrimFollowsFromPositionAndFlowAlone) {
   for (int k = 0; k < 40; ++k) {
     const InputRow input{0.0, 3500.0 + k, 2600.0, 100.7};
     const double x_pct = 55.0 + 0.5 * k;
-    const MediumState medium = MediumAt(1e3 * input.p1_kpa, 2.6e6, 100.7);
+    const MediumState medium = MediumAt({}, 1e3 * input.p1_kpa, 2.6e6, 100.7);
     const double flow =
         Flow(80.0, Opening(truth.trim, 0.01 * x_pct),
-             EffectivePressureDrop(medium, RecoveryCoefficient(0.01 * x_pct)),
+             EffectivePressureDrop(
+                 medium, RecoveryCoefficient(truth.trim, 0.01 * x_pct), 0.72),
              medium.density_kg_m3);
     record.rows.push_back({input, x_pct, 1e-3 * flow * LiquidDensity(100.7)});
   }
-  const TrimParameters trim =
-      RegressTrim({record}, ParameterSet("lublin-actuator-3"));
+  const Trim trim = RegressTrim({record}, ParameterSet("lublin-actuator-3"));
   EXPECT_NEAR(trim.kv_m3_h, 80.0, 0.01);
   EXPECT_NEAR(trim.exponent, 4.2, 1e-4);
   // What is filled in does not count, of X or of F.

@@ -225,6 +225,36 @@ TEST(ValvePhysicsTest, KnowsNothingOfTheLoopWhereItIsOfBefore) {
   EXPECT_TRUE(PhysicsFrom(values).loop.reads_flow);
 }
 
+TEST(ValvePhysicsTest, SetsOfBeforeThereWereMediaAreOfWater) {
+  std::vector<PhysicalValue> values = ToValues(Physics());
+  const std::size_t all = values.size();
+  std::erase_if(values, [](const PhysicalValue& value) {
+    return value.name.starts_with("parameters.medium.") ||
+           value.name == "parameters.actuator.spring" ||
+           value.name == "parameters.trim.shut_off" ||
+           value.name == "parameters.trim.leakage" ||
+           value.name == "parameters.trim.liquid_recovery" ||
+           value.name == "parameters.trim.choked_pressure_ratio";
+  });
+  ASSERT_EQ(values.size() + 12, all);
+  const ValveParameters valve = PhysicsFrom(values).parameters;
+  EXPECT_EQ(valve.medium, Medium{});
+  EXPECT_EQ(valve.trim.shut_off, 0.975);
+  EXPECT_EQ(valve.actuator.spring, SpringAction::kToOpen);
+}
+
+TEST(ValvePhysicsTest, TablesAndMediaAreReadBack) {
+  ValvePhysics physics = Physics();
+  physics.parameters.trim.characteristic = FlowCharacteristic::kTable;
+  physics.parameters.trim.table_h = {0.3, 0.6, 1.0};
+  physics.parameters.trim.table_f = {0.1, 0.4, 1.0};
+  physics.parameters.medium.fluid = Fluid::kSteam;
+  const ValveParameters again = PhysicsFrom(ToValues(physics)).parameters;
+  EXPECT_EQ(again.trim.table_h, physics.parameters.trim.table_h);
+  EXPECT_EQ(again.trim.table_f, physics.parameters.trim.table_f);
+  EXPECT_EQ(again.medium.fluid, Fluid::kSteam);
+}
+
 TEST(ValvePhysicsTest, FilledInReadingsDoNotCountInTheScatter) {
   std::vector<RecordRow> rows = Recording(1200, 1, {});
   for (std::size_t k = 0; k < rows.size(); k += k % 3 + 1) {

@@ -103,7 +103,7 @@ TEST(FaultSynthesizerTest, StretchesThatBeginAtTheSameSampleMayDifferInLength) {
 
 TEST(OnboardingFaultsTest, FaultsOfMissingTransmittersAreLeftOut) {
   const auto has = [](SignalMask signals, int fault) {
-    const std::vector<FaultCondition> faults = OnboardingFaults(signals);
+    const std::vector<FaultCondition> faults = OnboardingFaults(signals, {});
     return std::any_of(faults.begin(), faults.end(),
                        [&](const auto& f) { return f.fault == fault; });
   };
@@ -115,13 +115,23 @@ TEST(OnboardingFaultsTest, FaultsOfMissingTransmittersAreLeftOut) {
   EXPECT_FALSE(has(cv_and_x, 19));
   EXPECT_FALSE(has(cv_and_x, kInletPressureTransmitterFault));
   EXPECT_TRUE(has(cv_and_x, 13));
-  EXPECT_LT(OnboardingFaults(kBasicSignals).size(),
+  EXPECT_LT(OnboardingFaults(kBasicSignals, {}).size(),
             static_cast<std::size_t>(kMaxObservers));
 }
 
+TEST(OnboardingFaultsTest, WhatTheMediumExcludesIsLeftOut) {
+  simulator::ValveParameters gas;
+  gas.medium.fluid = simulator::Fluid::kGas;
+  for (const FaultCondition& condition : OnboardingFaults(kBasicSignals, gas)) {
+    EXPECT_NE(condition.fault, 7);
+  }
+  EXPECT_LT(OnboardingFaults(kBasicSignals, gas).size(),
+            OnboardingFaults(kBasicSignals, {}).size());
+}
+
 TEST(OnboardingFaultsTest, WhereThereIsNoRoomForAllTheWeakestAreLeftOut) {
-  const auto all = OnboardingFaults(kBasicSignals);
-  const auto most = OnboardingFaults(kBasicSignals, all.size() - 5);
+  const auto all = OnboardingFaults(kBasicSignals, {});
+  const auto most = OnboardingFaults(kBasicSignals, {}, all.size() - 5);
   EXPECT_EQ(most.size(), all.size() - 5);
   for (const FaultCondition& condition : all) {
     EXPECT_TRUE(std::abs(condition.strength) == 0.1 ||
@@ -135,7 +145,7 @@ std::string Refusal(const std::function<void(Sample&)>& change) {
     change(labelled.sample);
   }
   try {
-    CheckRecords({run});
+    CheckRecords({run}, {});
   } catch (const DataError& error) {
     return error.what();
   }

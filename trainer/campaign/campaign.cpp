@@ -1,10 +1,9 @@
 #include "trainer/campaign/campaign.h"
 
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <utility>
 
+#include "base/csv_cells.h"
 #include "base/error.h"
 #include "base/toml_reader.h"
 #include "simulator/scenario/scenario_toml.h"
@@ -16,15 +15,6 @@ namespace {
 
 using simulator::QuoteToml;
 using std::filesystem::path;
-
-// The text that reads back as the same bits: a campaign that is written and
-// read again trains the same models.
-template <typename Number>
-std::string Shortest(Number value) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), end.ptr};
-}
 
 // Sets each field that its table names. Range and type are checked by the
 // reader, which knows file and line.
@@ -48,16 +38,6 @@ class FieldReader {
   TomlReader& table_;
 };
 
-// Runs `read`; a ConfigError without a place is given that of `key`.
-template <typename Read>
-void AtKey(const TomlReader& table, std::string_view key, Read&& read) {
-  try {
-    read();
-  } catch (const ConfigError& error) {
-    table.Refuse(key, error.what());
-  }
-}
-
 // The schedules that `faults` and `strengths` of a [[run]] stand for; one
 // without a fault if there are none.
 std::vector<std::vector<simulator::FaultSchedule>> ReadVariants(
@@ -75,8 +55,9 @@ std::vector<std::vector<simulator::FaultSchedule>> ReadVariants(
   }
   std::vector<std::vector<simulator::FaultSchedule>> variants;
   const auto add = [&](const std::string& text) {
-    AtKey(table, "faults",
-          [&] { variants.push_back({simulator::ParseFaultSchedule(text)}); });
+    table.At("faults", [&] {
+      variants.push_back({simulator::ParseFaultSchedule(text)});
+    });
   };
   for (const std::string& fault : faults) {
     const bool named = fault.find(':') == std::string::npos;
@@ -85,7 +66,7 @@ std::vector<std::vector<simulator::FaultSchedule>> ReadVariants(
       add(base);
     }
     for (const double strength : strengths) {
-      add(base + ":strength=" + Shortest(strength));
+      add(base + ":strength=" + NumberText(strength));
     }
   }
   return variants;
@@ -101,7 +82,7 @@ class Reader {
 
   Campaign Read() {
     TrainingOptions& training = campaign_.training;
-    AtKey(root_, "preset", [&] {
+    root_.At("preset", [&] {
       training = PresetOptions(root_.Text("preset").value_or("paper"));
     });
     training.name = root_.Text("name").value_or("");
@@ -166,7 +147,7 @@ class Reader {
     run.horizon_s = table.Number("horizon_s", 0.0, 1e12).value_or(0.0);
     if (recorded) {
       const std::string selector = *table.Text("run");
-      AtKey(table, "run", [&] { storage::ParseRunSelector(selector); });
+      table.At("run", [&] { storage::ParseRunSelector(selector); });
       run.source = RecordedRun{selector};
       runs.push_back(std::move(run));
       return;
@@ -175,7 +156,7 @@ class Reader {
     if (import) {
       const std::string valve = table.Text("valve").value_or(common_.valve_id);
       const std::string pattern = *table.Text("import");
-      AtKey(table, "import", [&] {
+      table.At("import", [&] {
         for (const path& file : MatchingFiles(pattern, folder_)) {
           run.source = ImportedRun{file, valve};
           runs.push_back(run);
@@ -212,7 +193,7 @@ class Reader {
         simulator::Scenario one = scenario;
         one.config.faults = faults;
         one.config.seed += own_seed ? index : simulated_;
-        AtKey(table, "simulate", [&] { simulator::Validate(one.config); });
+        table.At("simulate", [&] { simulator::Validate(one.config); });
         run.source = SimulatedRun{std::move(one)};
         runs.push_back(run);
       }
@@ -233,7 +214,7 @@ class FieldWriter {
   explicit FieldWriter(std::string& text) : text_(text) {}
 
   void operator()(const char* key, const auto& field, auto, auto) {
-    Line(key, Shortest(field));
+    Line(key, NumberText(field));
   }
   void operator()(const char* key, bool field) {
     Line(key, field ? "true" : "false");
@@ -268,13 +249,13 @@ void WriteRun(const char* table, const CampaignRun& run, std::string& text) {
   text += std::string("\n[[") + table + "]]\n";
   FieldWriter writer(text);
   if (run.horizon_s > 0.0) {
-    writer.Line("horizon_s", Shortest(run.horizon_s));
+    writer.Line("horizon_s", NumberText(run.horizon_s));
   }
   if (std::isfinite(run.stretch.from_s)) {
-    writer.Line("from_s", Shortest(run.stretch.from_s));
+    writer.Line("from_s", NumberText(run.stretch.from_s));
   }
   if (std::isfinite(run.stretch.to_s)) {
-    writer.Line("to_s", Shortest(run.stretch.to_s));
+    writer.Line("to_s", NumberText(run.stretch.to_s));
   }
   std::visit([&](const auto& source) { WriteSource(table, source, text); },
              run.source);

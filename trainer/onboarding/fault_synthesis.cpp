@@ -32,25 +32,19 @@ void Add(int fault, const auto& strengths, bool both_ways,
 
 }  // namespace
 
-std::vector<FaultCondition> OnboardingFaults(SignalMask signals,
-                                             std::size_t most) {
-  const auto measured = [&](Signal signal) {
-    return (signals & MaskOf(signal)) != 0;
-  };
+std::vector<FaultCondition> OnboardingFaults(
+    SignalMask signals, const simulator::ValveParameters& valve,
+    std::size_t most) {
   std::vector<FaultCondition> faults;
   for (int fault = 1; fault <= kLastFault; ++fault) {
-    // f14 shows in no basic signal. f19 is a fault of the flow transmitter, but
-    // not one of those that TransmitterOf() knows.
-    if (fault == 14 || (fault == 19 && !measured(Signal::kF))) {
+    if (!IsVisibleIn(fault, signals) || !Exists(fault, valve)) {
       continue;
     }
-    if (const auto transmitter = TransmitterOf(fault)) {
-      if (measured(*transmitter)) {
-        Add(fault, kTransmitterStrengths, true, faults);
-      }
-    } else if (FaultFactsOf(fault).is_signed && fault != 4) {
+    if (TransmitterOf(fault)) {
+      Add(fault, kTransmitterStrengths, true, faults);
+    } else if (HasNegative(fault)) {
       Add(fault, kSignedStrengths, true, faults);
-    } else {  // f4 too: there is no less play than none.
+    } else {
       Add(fault, kStrengths, false, faults);
     }
   }
@@ -170,7 +164,7 @@ std::vector<Sample> FaultSynthesizer::BehindRod(
     const FaultCondition& fault, std::vector<Sample> samples) const {
   simulator::FaultEffects effects;
   simulator::ApplyFault(fault.fault, fault.strength, effects);
-  const simulator::InstrumentParameters& i = type_.parameters.instruments;
+  const simulator::Instrumentation& i = type_.parameters.instruments;
   for (Sample& sample : samples) {
     // The fault of a transmitter of T1, P1 or P2 leaves the flow as it is.
     if (!TransmitterOf(fault.fault)) {
@@ -201,8 +195,7 @@ std::vector<Sample> FaultSynthesizer::operator()(const FaultCondition& fault,
                                        ? BehindRod(fault, without)
                                        : Simulate(fault, healthy.samples);
   std::vector<Sample> samples = healthy.samples;
-  const simulator::InstrumentParameters& instruments =
-      type_.parameters.instruments;
+  const simulator::Instrumentation& instruments = type_.parameters.instruments;
   for (std::size_t k = 0; k < samples.size(); ++k) {
     Sample& sample = samples[k];
     const auto add = [&](Signal signal, const Transmitter& transmitter) {
@@ -228,7 +221,16 @@ std::vector<Sample> SimulateHealthy(const ValveType& type, double duration_s,
                                     std::uint64_t seed) {
   simulator::ValveSimulationConfig config;
   config.parameters = type.parameters;
-  config.excitation = simulator::LevelLoopExcitation{};
+  if (type.parameters.medium.fluid == simulator::Fluid::kWater) {
+    config.excitation = simulator::LevelLoopExcitation{};
+  } else {
+    simulator::InventoryLoopExcitation loop;
+    loop.initial_cv_pct = type.levels.cv_pct;
+    loop.p1_kpa = type.levels.p1_kpa;
+    loop.p2_kpa = type.levels.p2_kpa;
+    loop.t1_degc = type.levels.t1_degc;
+    config.excitation = loop;
+  }
   config.duration_s = duration_s;
   config.seed = seed;
   return Run(config);

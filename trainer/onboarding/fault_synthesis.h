@@ -24,17 +24,19 @@ struct ValveType {
   bool interpolated_command{false};
   /// Samples from the stamp of a command to its action; see RecordDrive.
   int command_delay{0};
+  /// The type states a kind of valve, not its size: Kv and the range of the
+  /// flow transmitter are taken from the record where they differ much.
+  bool of_any_size{false};
   /// Stand for P1, P2 and T1 where a valve does not measure them.
   simulator::InputRow levels{71.67, 3555.0, 2615.0, 100.7};
 };
 
 /// Faults that onboarding prepares observers for, each at several strengths, by
-/// fault. Those of transmitters that are not among `signals` are left out, and
-/// f14, which the basic signals never show. Of more than `most` those of 0.1
-/// are left out, of the last faults first.
-std::vector<FaultCondition> OnboardingFaults(SignalMask signals,
-                                             std::size_t most = kMaxObservers -
-                                                                1);
+/// fault: those that are visible in `signals` and that `valve` can have. Of
+/// more than `most` those of 0.1 are left out, of the last faults first.
+std::vector<FaultCondition> OnboardingFaults(
+    SignalMask signals, const simulator::ValveParameters& valve,
+    std::size_t most = kMaxObservers - 1);
 
 /// The inputs of a simulation: what the sample has, else the level.
 simulator::InputRow InputsOf(const Sample& sample,
@@ -78,8 +80,9 @@ class FaultSynthesizer {
       healthy_;
 };
 
-/// A healthy valve of the type, simulated for `duration_s` in the feedwater
-/// loop with the noise of its transmitters; for valves without a record.
+/// A healthy valve of the type, simulated for `duration_s` in a closed loop
+/// (the feedwater loop if the medium is water) with the noise of its
+/// transmitters; for valves without a record.
 std::vector<Sample> SimulateHealthy(const ValveType& type, double duration_s,
                                     std::uint64_t seed);
 

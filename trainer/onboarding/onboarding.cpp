@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
@@ -12,6 +13,7 @@
 #include "trainer/evaluation.h"
 #include "trainer/onboarding/record_checks.h"
 #include "trainer/parallel_for.h"
+#include "trainer/statistics.h"
 
 namespace fdi::trainer {
 namespace {
@@ -320,15 +322,17 @@ void RequireHealthy(const std::vector<TrainingRun>& runs) {
 // The type with a flow transmitter in `unit`: its range is converted by the
 // density at the usual temperature.
 ValveType InUnit(ValveType type, FlowUnit unit) {
-  simulator::InstrumentParameters& instruments = type.parameters.instruments;
+  simulator::Instrumentation& instruments = type.parameters.instruments;
   if (instruments.flow_unit != unit) {
-    const double t_per_m3 =
-        simulator::LiquidDensity(type.levels.t1_degc) / 1000.0;
-    const double factor =
-        unit == FlowUnit::kTPerHour ? t_per_m3 : 1.0 / t_per_m3;
+    const double density =
+        simulator::MediumAt(type.parameters.medium, 1e3 * type.levels.p1_kpa,
+                            1e3 * type.levels.p2_kpa, type.levels.t1_degc)
+            .density_kg_m3;
     for (double* value : {&instruments.flow.low, &instruments.flow.high,
                           &instruments.flow.noise_sd}) {
-      *value *= factor;
+      *value = simulator::FlowInUnit(
+          unit, simulator::FlowFromUnit(instruments.flow_unit, *value, density),
+          density);
     }
     instruments.flow_unit = unit;
   }
@@ -363,6 +367,62 @@ simulator::ValveFit FitType(const std::vector<TrainingRun>& runs,
           : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   return simulator::FitValve(Records(runs, options.type.levels),
                              options.type.parameters, fit);
+}
+
+// Lowest and highest reading but for one in a thousand, which may be broken; 0
+// and 0 without any.
+std::pair<double, double> RangeOf(const std::vector<TrainingRun>& runs,
+                                  Signal signal) {
+  constexpr double kBroken = 1e-3;
+  std::vector<double> readings;
+  for (const TrainingRun& run : runs) {
+    for (const LabelledSample& labelled : run.samples) {
+      if (labelled.sample.Has(signal)) {
+        readings.push_back(labelled.sample[signal]);
+      }
+    }
+  }
+  if (readings.empty()) {
+    return {0.0, 0.0};
+  }
+  std::ranges::sort(readings);
+  return {SortedQuantile(readings, kBroken),
+          SortedQuantile(readings, 1.0 - kBroken)};
+}
+
+// Readings beyond the range of the type's transmitter would be held to it.
+void WidenRanges(const std::vector<TrainingRun>& runs,
+                 simulator::Instrumentation& instruments) {
+  constexpr double kUse = 0.8;
+  const auto widen = [&](Signal signal, simulator::Transmitter& transmitter) {
+    const auto [lowest, highest] = RangeOf(runs, signal);
+    if (highest > transmitter.high) {
+      transmitter.high = highest / kUse;
+    }
+    if (lowest < transmitter.low) {
+      transmitter.low = std::min(lowest, lowest / kUse);
+    }
+  };
+  widen(Signal::kP1, instruments.pressure);
+  widen(Signal::kP2, instruments.pressure);
+  widen(Signal::kT1, instruments.temperature);
+}
+
+// The type in the size of the valve. Where the flow is that of the type within
+// a factor of 2 and its transmitter reaches as far as the record, the type
+// stays as it is.
+void Resize(const std::vector<TrainingRun>& runs, Onboarding& onboarding) {
+  constexpr double kAlike = 2.0;
+  ValveType& type = onboarding.type;
+  const double size =
+      simulator::SizeOf(Records(runs, type.levels), type.parameters);
+  const double largest = RangeOf(runs, Signal::kF).second;
+  const bool alike = size < kAlike && size > 1.0 / kAlike &&
+                     largest <= type.parameters.instruments.flow.high;
+  if (!alike) {
+    onboarding.size = size;
+    type.parameters = simulator::Resized(type.parameters, size, largest);
+  }
 }
 
 // How the healthy valve is simulated, for the second look.
@@ -437,7 +497,8 @@ CoverageTable AssessSubset(const ValveType& type, const TrainingRun& full,
                            const Progress& progress) {
   const TrainingRun run = WithSignals(full, signals);
   const FaultSynthesizer synthesize(type);
-  const std::vector<FaultCondition> faults = OnboardingFaults(signals);
+  const std::vector<FaultCondition> faults =
+      OnboardingFaults(signals, type.parameters);
   const auto models = std::make_shared<const ModelSet>(
       TrainDifferenceSet({run}, faults, std::ref(synthesize),
                          type.parameters.instruments.flow.high,
@@ -479,8 +540,10 @@ double Hours(const std::vector<TrainingRun>& runs) {
 //                    which may have cut its longest stretch short
 //   RequireAlike     runs that differ in period, flow unit or signals
 //   CheckRecords     units and sense, before anything is fitted to them
-//   InUnit           the flow range of the type in the unit of the record,
-//                    before simulated and measured flows are compared
+//   InUnit, WidenRanges, Resize
+//                    the ranges of the type in the unit and of the size of the
+//                    record, before simulated and measured readings are
+//                    compared
 //   CheckFit         the physics, before faults are simulated by it
 //
 // The hours reported are those of the record as given.
@@ -493,7 +556,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   const SignalMask signals =
       runs.front().samples.front().sample.present & kBasicSignals;
   TrainingOptions training = TrainingOf(options, signals);
-  CheckRecords(runs);
+  CheckRecords(runs, options.type.parameters.medium);
   Onboarding result;
   result.unread = DropUnreadChannels(runs, training.channels);
   result.type = (signals & MaskOf(Signal::kF)) != 0
@@ -501,6 +564,11 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
                     : options.type;
   result.signals = signals;
   const double meter_end = result.type.parameters.instruments.flow.high;
+  WidenRanges(runs, result.type.parameters.instruments);
+  if (options.fit && result.type.of_any_size &&
+      (signals & MaskOf(Signal::kF)) != 0) {
+    Resize(runs, result);
+  }
   if (options.fit) {
     Part(progress, 0.0, kFitShare)(0.0, "fitting the physical parameters");
     OnboardingOptions fit = options;
@@ -514,7 +582,8 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
     CheckFit(runs, Compare(runs, result.type), {}, meter_end);
   }
   const FaultSynthesizer synthesize(result.type);
-  const std::vector<FaultCondition> faults = OnboardingFaults(signals);
+  const std::vector<FaultCondition> faults =
+      OnboardingFaults(signals, result.type.parameters);
   const Progress part = Part(progress, kFitShare, kTrainShare);
   result.transferred =
       options.of_type && IsTransferable(*options.of_type, runs, training);

@@ -98,7 +98,8 @@ struct ChannelFit {
 
 struct Onboarding {
   ModelSet models;
-  ValveType type;  ///< With the parameters that the faults were simulated by.
+  ValveType type;    ///< With the parameters that the faults were simulated by.
+  double size{1.0};  ///< Of the valve, relative to the type that was given.
   std::optional<simulator::ValveFit> fit;
   std::vector<ChannelFit> channels;
   std::vector<std::string> unread;  ///< Channels of DropUnreadChannels().

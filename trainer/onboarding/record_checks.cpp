@@ -71,19 +71,21 @@ void CheckShare(const Readings& r) {
   }
 }
 
-void CheckPressures(const Readings& p1, const Readings& p2,
-                    const Readings& t1) {
+void CheckPressures(const Readings& p1, const Readings& p2, const Readings& t1,
+                    const simulator::Medium& medium) {
   const double vapour =
-      t1.measured() ? 1e-3 * simulator::VapourPressure(t1.middle) : 0.0;
+      t1.measured() ? 1e-3 * simulator::VapourPressure(medium, t1.middle) : 0.0;
   if (p1.measured() &&
       p1.middle < std::max(kMinPressure, kBoilingShare * vapour)) {
     throw DataError(
         p1.Seen() +
-        (t1.measured() ? ", and " + t1.Seen() +
-                             ": water boils "
-                             "there below " +
-                             Text(vapour) + " kPa"
-                       : std::string()) +
+        (vapour > 0.0 ? ", and " + t1.Seen() +
+                            ": the liquid boils "
+                            "there below " +
+                            Text(vapour) +
+                            " kPa (for a gas or steam, --type names one of "
+                            "that medium)"
+                      : std::string()) +
         "; expected kPa absolute and degC. Map bar with scale = 100, MPa with "
         "scale = 1000, gauge pressure with offset = 101.3, K with offset = "
         "-273.15");
@@ -182,14 +184,15 @@ std::string BeyondMeter(const std::vector<TrainingRun>& runs, const Readings& f,
 
 }  // namespace
 
-void CheckRecords(const std::vector<TrainingRun>& runs) {
+void CheckRecords(const std::vector<TrainingRun>& runs,
+                  const simulator::Medium& medium) {
   const Readings cv = ReadingsOf(runs, Signal::kCv);
   const Readings x = ReadingsOf(runs, Signal::kX);
   CheckShare(cv);
   CheckShare(x);
   CheckKind(runs, cv, x);
   CheckPressures(ReadingsOf(runs, Signal::kP1), ReadingsOf(runs, Signal::kP2),
-                 ReadingsOf(runs, Signal::kT1));
+                 ReadingsOf(runs, Signal::kT1), medium);
   CheckSense(cv, x, ReadingsOf(runs, Signal::kF));
 }
 

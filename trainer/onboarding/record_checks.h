@@ -12,7 +12,8 @@ namespace fdi::trainer {
 /// one, P1 in bar, T1 in K, P1 below P2, X or F that move against the command;
 /// and records without X, with a copy of CV in X, or of an open/shut valve.
 /// @throws DataError with what was seen, what is expected and what to try.
-void CheckRecords(const std::vector<TrainingRun>& runs);
+void CheckRecords(const std::vector<TrainingRun>& runs,
+                  const simulator::Medium& medium);
 
 /// Refuses a simulation that follows the records worse than X = CV and F = its
 /// mean do, and fitted parameters that stand at the bound of their search:

@@ -240,6 +240,53 @@ TEST(ScenarioTomlTest, ACsvExcitationGivesPeriodAndDurationUnlessOverruled) {
   EXPECT_THAT(ScenarioText(whole), HasSubstr("\"csv:in.csv\""));
 }
 
+TEST(ScenarioTomlTest, ATypeIsFilledFromADataSheet) {
+  const ValveParameters valve = Read(R"(
+      [parameters]
+      base = "steam-globe"
+      [parameters.trim]
+      kv_m3_h = 63
+      rangeability = 30
+      choked_pressure_ratio = 0.68
+      [parameters.actuator]
+      spring = "to-close"
+      [parameters.instruments]
+      flow = { low = 0, high = 12 }
+  )")
+                                    .config.parameters;
+  EXPECT_EQ(valve.medium.fluid, Fluid::kSteam);
+  EXPECT_NEAR(valve.trim.exponent, 3.4012, 1e-4);
+  EXPECT_EQ(valve.trim.choked_pressure_ratio, 0.68);
+  EXPECT_EQ(valve.actuator.spring, SpringAction::kToClose);
+  EXPECT_EQ(valve.instruments.flow.high, 12.0);
+}
+
+TEST(ScenarioTomlTest, ATableOfTheTrimIsRestored) {
+  Scenario scenario;
+  Trim& trim = scenario.config.parameters.trim;
+  trim.characteristic = FlowCharacteristic::kTable;
+  trim.table_h = {0.5, 1.0};
+  trim.table_f = {0.2, 1.0};
+  scenario.config.parameters.name = "mine";
+
+  const Trim restored = Read(ScenarioText(scenario)).config.parameters.trim;
+
+  EXPECT_EQ(restored.characteristic, FlowCharacteristic::kTable);
+  EXPECT_EQ(restored.table_h, trim.table_h);
+  EXPECT_EQ(restored.table_f, trim.table_f);
+}
+
+TEST(ScenarioTomlTest, ATypeWithAWrongKeyOrValueIsRefused) {
+  EXPECT_THAT(RefusalOf("parameters.medium.fluid = 'syrup'"),
+              AllOf(HasSubstr("'syrup'"), HasSubstr("water, liquid, gas")));
+  EXPECT_THAT(RefusalOf("parameters.medium.desity_kg_m3 = 900"),
+              AllOf(HasSubstr("desity_kg_m3"), HasSubstr("density_kg_m3")));
+  EXPECT_THAT(RefusalOf("parameters.trim = {rangeability = 50, exponent = 4}"),
+              HasSubstr("rangeability"));
+  EXPECT_THAT(RefusalOf("parameters.trim.characteristic = 'table'"),
+              HasSubstr("table_h"));
+}
+
 TEST(ScenarioTomlTest, AParameterFileLiesBesideItsScenario) {
   const storage::TemporaryDirectory folder;
   std::ofstream(folder.path() / "valve.toml")
