@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <vector>
 
 #include "diagnosis/fault_catalogue.h"
 
@@ -47,9 +49,19 @@ double RodBand::Beyond(double x) const {
   return x - std::clamp(x, std::min(quick_, slow_), std::max(quick_, slow_));
 }
 
+double FlowShapeAt(const FloorLimits& floor, double x) {
+  const std::vector<double>& f = floor.flow_shape;
+  if (f.empty()) {
+    return std::exp(-0.01 * floor.flow_exponent * x);
+  }
+  const double at =
+      std::clamp(0.01 * x, 0.0, 1.0) * static_cast<double>(f.size() - 1);
+  const auto i = std::min(static_cast<std::size_t>(at), f.size() - 2);
+  return std::lerp(f[i], f[i + 1], at - static_cast<double>(i));
+}
+
 double FlowAt(const FloorLimits& floor, double x, double dp) {
-  return floor.flow_gain * std::exp(-0.01 * floor.flow_exponent * x) *
-         std::sqrt(std::max(dp, 0.0));
+  return floor.flow_gain * FlowShapeAt(floor, x) * std::sqrt(std::max(dp, 0.0));
 }
 
 Floor::Floor(const ModelSet& models)

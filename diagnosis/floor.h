@@ -38,6 +38,8 @@ class RodBand {
   bool resting_{true};
 };
 
+/// f(X) of the floor.
+double FlowShapeAt(const FloorLimits& floor, double x);
 /// F(X, P1 − P2) of the floor; `dp` may be negative.
 double FlowAt(const FloorLimits& floor, double x, double dp);
 

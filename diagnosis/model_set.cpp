@@ -135,6 +135,14 @@ void ValidateFloor(const ModelSet& models, const FloorLimits& floor) {
             floor.flow_factor >= 1.0 && floor.flow_margin > 0.0 &&
             floor.flow_gain >= 0.0 && floor.flow_high >= 0.0,
         models, "limits of the floor must be positive");
+  Check(
+      floor.flow_shape.empty() ||
+          (floor.flow_shape.size() == FloorLimits::kShapePoints &&
+           std::ranges::all_of(floor.flow_shape,
+                               [](double f) { return f >= 0.0 && f <= 1.0; })),
+      models,
+      "the trim of the floor must be " +
+          std::to_string(FloorLimits::kShapePoints) + " values in 0..1");
   Check(floor.deviation_samples >= 1 && floor.flow_samples >= 1, models,
         "the floor takes at least one sample");
 }

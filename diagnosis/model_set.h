@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -137,6 +138,7 @@ struct PhysicalValue {
 /// simple models; the margins are far beyond their errors on the healthy
 /// record.
 struct FloorLimits {
+  static constexpr std::size_t kShapePoints = 21;
   /// In one sample the rod moves by this share of its distance to the command,
   /// limited to `rate` [%]: the quickest and the slowest response compatible
   /// with the record.
@@ -153,10 +155,12 @@ struct FloorLimits {
   int deviation_samples{5};  ///< after this many consecutive samples.
   double stuck_travel{5.0};  ///< Travel [%] after which a repeated X is stuck.
 
-  /// F = gain exp(−exponent X/100) √(P1 − P2) [flow unit, kPa]; without both
-  /// pressures, dp_level is used. 0: no flow was measured.
+  /// F = gain f(X) √(P1 − P2) [flow unit, kPa]; without both pressures,
+  /// dp_level is used. 0: no flow was measured.
   double flow_gain{0.0};
-  double flow_exponent{4.0};
+  double flow_exponent{4.0};  ///< f = exp(−exponent X/100),
+  /// or, unless empty, that of the trim at X = 0, 5, ..., 100 %.
+  std::vector<double> flow_shape{};
   double dp_level{0.0};     ///< Mean P1 − P2 of the record, or 1 [kPa].
   double flow_high{0.0};    ///< The largest flow of the record [flow unit].
   double flow_factor{1.5};  ///< Flow limit: this factor times F(X),

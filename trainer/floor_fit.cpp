@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/floor.h"
@@ -187,12 +188,13 @@ void FitLevels(const std::vector<Stretch>& stretches, FloorLimits& floor) {
 // Noise of constant deviation σ in F is σ/F in ln F, hence the weights F².
 // Flows near the largest may be those of a saturated transmitter and are left
 // out. Where X hardly moves, the slope is noise, and the exponent stays at its
-// default.
+// default. With the f of a trim, y is ln(F/(f √dP)) and n is 0.
 //
 // The factor solves the test F > c F(X − L/2, dP) + m F_high of Floor for the
 // largest c that the record reached for flow_samples in a row.
 void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
   FitLevels(stretches, floor);
+  const bool shaped = !floor.flow_shape.empty();
   double w = 0.0;
   double wx = 0.0;
   double wy = 0.0;
@@ -202,13 +204,16 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
     for (const Sample& sample : stretch.samples) {
       const double flow = sample[Signal::kF];
       const double dp = DpOf(sample, floor);
+      const double shape =
+          shaped ? FlowShapeAt(floor, sample[Signal::kX]) : 1.0;
       if (flow <= floor.flow_margin * floor.flow_high ||
-          flow >= kMaxFlowShare * floor.flow_high || dp <= 0.0) {
+          flow >= kMaxFlowShare * floor.flow_high || dp <= 0.0 ||
+          shape <= 0.0) {
         continue;
       }
       const double weight = flow * flow;
       const double x = 0.01 * sample[Signal::kX];
-      const double y = std::log(flow / std::sqrt(dp));
+      const double y = std::log(flow / std::sqrt(dp)) - std::log(shape);
       w += weight;
       wx += weight * x;
       wy += weight * y;
@@ -220,7 +225,9 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
     return;
   }
   const double variance = wxx / w - wx / w * (wx / w);
-  if (variance > 1e-4 * kMinTravel * kMinTravel) {
+  if (shaped) {
+    floor.flow_exponent = 0.0;
+  } else if (variance > 1e-4 * kMinTravel * kMinTravel) {
     floor.flow_exponent =
         std::clamp(-(wxy / w - wx / w * (wy / w)) / variance, 1.0, 8.0);
   }
@@ -242,7 +249,8 @@ void FitFlow(const std::vector<Stretch>& stretches, FloorLimits& floor) {
 
 }  // namespace
 
-std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s) {
+std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s,
+                                    std::vector<double> flow_shape) {
   const std::vector<Stretch> stretches = WholeStretches(normal);
   const Sample& first = stretches.front().samples.front();
   if (!first.Has(Signal::kCv) || !first.Has(Signal::kX)) {
@@ -259,6 +267,7 @@ std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s) {
   FitRod(stretches, floor);
   FitDeviation(stretches, floor);
   if (first.Has(Signal::kF)) {
+    floor.flow_shape = std::move(flow_shape);
     FitFlow(stretches, floor);
   }
   return floor;

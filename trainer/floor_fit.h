@@ -12,8 +12,10 @@ namespace fdi::trainer {
 /// explain X nearly as well as the best one, the law of the flow, and margins
 /// of twice what they err by on these very data, within fixed bounds.
 ///
+/// @param flow_shape that of FloorLimits; the gain alone is fitted then.
 /// @return Nothing without CV and X.
-std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s);
+std::optional<FloorLimits> FitFloor(const Condition& normal, double period_s,
+                                    std::vector<double> flow_shape = {});
 
 /// Widens what the rod may deviate by, and may travel while X repeats, to twice
 /// what further normal operation shows, within the same bounds; never narrows.

@@ -194,7 +194,8 @@ ModelSet DescribeModelSet(const std::vector<TrainingRun>& runs,
   models.flow_unit = runs.front().flow_unit;
   models.validity = TrainedRegion(conditions);
   models.stuck = FitStuckLimits(conditions.front());
-  models.floor = FitFloor(conditions.front(), models.sample_period_s);
+  models.floor =
+      FitFloor(conditions.front(), models.sample_period_s, options.flow_shape);
   models.decision = options.decision;
   for (const ChannelPlan& plan : options.channels) {
     models.channels.push_back({plan.name, plan.output, -1.0, 1.0});

@@ -29,6 +29,8 @@ struct TrainingOptions {
   int threads{0};                      ///< 0: all of the machine.
   std::string software;                ///< Stored with the set.
   std::int64_t created_ns{0};          ///< Stored with the set.
+  /// FloorLimits::flow_shape of a valve whose trim is known.
+  std::vector<double> flow_shape{};
 };
 
 /// The options of a named preset. `paper`: two channels, X and F, each from the

@@ -47,6 +47,16 @@ TEST(FloorTest, ASetHasAllItsFindingsOnce) {
   EXPECT_NO_THROW(Validate(models));
 }
 
+TEST(FloorTest, TheTrimOfASetHasAllItsPoints) {
+  ModelSet models = FlooredPlant();
+  models.floor->flow_shape.assign(FloorLimits::kShapePoints, 0.5);
+  EXPECT_NO_THROW(Validate(models));
+  models.floor->flow_shape.back() = 1.5;
+  EXPECT_THROW(Validate(models), DataError);
+  models.floor->flow_shape.pop_back();
+  EXPECT_THROW(Validate(models), DataError);
+}
+
 struct Valve {
   double cv{50.0};
   double x{50.0};

@@ -152,6 +152,19 @@ TEST(ModelCodecTest, FloorIsPartOfTheNewerFormatAlone) {
   EXPECT_EQ(renumbered.content_hash, ContentHash(models));  // As it was stored.
 }
 
+// Likewise sets of before a floor took the trim of its type.
+TEST(ModelCodecTest, FlowShapeIsPartOfTheNewerFormatAlone) {
+  ModelSet models = RandomModelSet("valve");
+  FloorLimits& floor = models.floor.emplace();
+  floor.flow_shape.assign(FloorLimits::kShapePoints, 0.25);
+  AddFindings(models);
+  const auto bytes = EncodeModelSet(models);
+  EXPECT_EQ(std::to_integer<int>(bytes[4]), 3 + 2 + 32);
+  const ModelSet back = DecodeModelSet(bytes, "test");
+  EXPECT_EQ(back.floor, models.floor);
+  EXPECT_EQ(EncodeModelSet(back), bytes);
+}
+
 // Likewise sets of before a drift was followed.
 TEST(ModelCodecTest, DriftIsPartOfTheNewerFormatAlone) {
   ModelSet models = RandomModelSet("valve");
@@ -231,7 +244,7 @@ TEST(ModelCodecTest, RefusalsNameThePlaceAndTheReason) {
   auto older = bytes;
   older[4] = std::byte{2};
   EXPECT_THAT(Refusal(WithValidChecksum(older)),
-              HasSubstr("format version 2, this program reads 3 to 34"));
+              HasSubstr("format version 2, this program reads 3 to 66"));
   EXPECT_THAT(Refusal({}), HasSubstr("is not a model set"));
   // The length of the name stands first in the payload, after 16 bytes.
   auto huge = bytes;

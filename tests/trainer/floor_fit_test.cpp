@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -53,6 +54,27 @@ TEST(FloorFitTest, FindsTheAnswersOfTheRodAndTheLawOfTheFlow) {
   EXPECT_NEAR(floor->flow_exponent, 3.0, 0.1);
   EXPECT_NEAR(FlowAt(*floor, 60.0, 900.0), 60.0 * std::exp(-1.8), 0.2);
   EXPECT_EQ(floor->flow_factor, 1.5);
+}
+
+// F = 60 (1 - X) at 900 kPa: a linear trim, which no exponential follows.
+TEST(FloorFitTest, TakesTheTrimThatItIsGiven) {
+  Condition normal = Healthy(3.0);
+  for (Sample& sample : normal.training.front().samples) {
+    const double x = 0.01 * sample[Signal::kX];
+    sample.Set(Signal::kF, sample[Signal::kF] * std::exp(3.0 * x) * (1.0 - x));
+  }
+  std::vector<double> shape;
+  for (int i = 0; i <= 20; ++i) {
+    shape.push_back(1.0 - 0.05 * i);
+  }
+  const auto floor = FitFloor(normal, 1.0, shape);
+  EXPECT_EQ(floor->flow_shape, shape);
+  EXPECT_EQ(floor->flow_exponent, 0.0);
+  for (const double x : {0.0, 12.0, 50.0, 97.0}) {
+    EXPECT_NEAR(FlowAt(*floor, x, 900.0), 60.0 - 0.6 * x, 0.2);
+  }
+  EXPECT_EQ(FlowAt(*floor, 105.0, 900.0), 0.0);
+  EXPECT_GT(std::abs(FlowAt(*FitFloor(normal, 1.0), 97.0, 900.0) - 1.8), 1.0);
 }
 
 TEST(FloorFitTest, TimesAreSecondsWhateverThePeriod) {

@@ -425,6 +425,18 @@ void Resize(const std::vector<TrainingRun>& runs, Onboarding& onboarding) {
   }
 }
 
+// f of the trim for the floor, which fits an exponential one by itself.
+std::vector<double> FlowShape(const simulator::Trim& trim) {
+  std::vector<double> shape;
+  if (trim.characteristic != simulator::FlowCharacteristic::kExponential) {
+    constexpr int kLast = FloorLimits::kShapePoints - 1;
+    for (int i = 0; i <= kLast; ++i) {
+      shape.push_back(simulator::Opening(trim, static_cast<double>(i) / kLast));
+    }
+  }
+  return shape;
+}
+
 // How the healthy valve is simulated, for the second look.
 std::vector<PhysicalValue> Physics(const ValveType& type,
                                    const std::vector<TrainingRun>& runs) {
@@ -581,6 +593,7 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
   } else {
     CheckFit(runs, Compare(runs, result.type), {}, meter_end);
   }
+  training.flow_shape = FlowShape(result.type.parameters.trim);
   const FaultSynthesizer synthesize(result.type);
   const std::vector<FaultCondition> faults =
       OnboardingFaults(signals, result.type.parameters);
