@@ -112,7 +112,8 @@ void Pipeline::Tell(Call call) {
 }
 
 void Pipeline::Start(const std::vector<OpenEpisode>& open,
-                     std::vector<Accumulator> accumulators) {
+                     std::vector<Accumulator> accumulators,
+                     const std::vector<EndedEpisode>& ended) {
   // All reservations come before the first sample, so that unknown ids cannot
   // take the slots of known valves.
   for (const std::string& id : resolver_->AssignedValves()) {
@@ -126,6 +127,9 @@ void Pipeline::Start(const std::vector<OpenEpisode>& open,
     accumulators_[accumulator.valve_id] = std::move(accumulator);
   }
   last_poll_ = last_checkpoint_ = std::chrono::steady_clock::now();
+  for (const EndedEpisode& episode : ended) {
+    Recovered(episode.valve_id).Recover(episode);
+  }
   Recover(open);
   started_ = true;
   journal_.Start();
@@ -134,22 +138,31 @@ void Pipeline::Start(const std::vector<OpenEpisode>& open,
   }
 }
 
+EpisodeTracker& Pipeline::Recovered(const std::string& valve_id) {
+  const auto [found, fresh] =
+      recovered_.try_emplace(valve_id, valve_id, options_.trace);
+  if (fresh) {
+    found->second.StandBy(standby_, journal_);
+  }
+  return found->second;
+}
+
 // A valve has at most one open episode; the older of two is closed.
 void Pipeline::Recover(const std::vector<OpenEpisode>& episodes) {
   for (const OpenEpisode& episode : episodes) {
-    const auto [known, fresh] = recovered_.emplace(episode.valve_id, episode);
-    if (fresh) {
-      continue;
+    EpisodeTracker& tracker = Recovered(episode.valve_id);
+    OpenEpisode newer = episode;
+    if (const OpenEpisode* known = tracker.recovering()) {
+      OpenEpisode older = *known;
+      if (older.detection_stamp_ns > newer.detection_stamp_ns) {
+        std::swap(older, newer);
+      }
+      tracker.Recover(older);
+      tracker.AbandonRecovery(EndReason::kUnknown, journal_);
     }
-    OpenEpisode older = episode;
-    if (older.detection_stamp_ns > known->second.detection_stamp_ns) {
-      std::swap(older, known->second);
-    }
-    EpisodeTracker tracker(older.valve_id, options_.trace);
-    tracker.Recover(older);
-    tracker.AbandonRecovery(EndReason::kUnknown, journal_);
+    tracker.Recover(newer);
   }
-  if (!recovered_.empty()) {
+  if (!episodes.empty()) {
     recovery_deadline_ = last_poll_ + options_.recovery_window;
   }
 }
@@ -299,9 +312,9 @@ Pipeline::Valve& Pipeline::AddValve(std::string_view valve_id) {
                          options_.severities),
             reserved_.erase(id) > 0});
   valve->monitor.HoldIsolation(resolver_->IsolationHeld(id));
-  if (const auto open = recovered_.find(id); open != recovered_.end()) {
-    valve->monitor.Recover(open->second);
-    recovered_.erase(open);
+  valve->monitor.StandBy(standby_, journal_);
+  if (auto known = recovered_.extract(id)) {
+    valve->monitor.Recover(std::move(known.mapped()));
   }
   if (auto saved = accumulators_.extract(id)) {
     valve->monitor.Resume(std::move(saved.mapped()));
@@ -387,42 +400,45 @@ void Pipeline::Adopt(FaultEvent event) {
   std::optional<EngineParts> parts;
   Resolve(event.valve_id, parts);
   // The faults of an event are bits of its model set. With another set here
-  // they would mean other faults.
-  if (!parts || parts->plan->models().content_hash != event.model_hash) {
+  // they would mean other faults, but an end is an end.
+  if (parts && parts->plan->models().content_hash == event.model_hash) {
+    event.models = parts->plan->shared_models();
+  } else if (event.transition.kind != TransitionKind::kClosed) {
     log_.Line(LogLevel::kInfo,
               "event_not_adopted valve=" + LogValue(event.valve_id) +
                   " model_set=" + LogValue(event.model_set) + "@" +
                   std::to_string(event.model_version));
     return;
   }
-  event.models = parts->plan->shared_models();
   // Severities are not on the bus.
   event.transition.severity = SeverityOf(event, *options_.severities);
   journal_.OnEvent(event);
   if (const auto found = by_id_.find(event.valve_id); found != by_id_.end()) {
-    found->second->monitor.Adopt(event);
+    found->second->monitor.Adopt(event, journal_);
     return;
   }
   // Nothing of this valve was received here yet. Its episode is treated like
   // one that the last session left open: its first samples continue it, or the
   // recovery window closes it.
-  const auto open = recovered_.find(event.valve_id);
-  if (open != recovered_.end() && open->second.episode_id != event.episode_id) {
-    return;
+  EpisodeTracker& tracker = Recovered(event.valve_id);
+  tracker.Adopt(event, journal_);
+  if (tracker.recovering() != nullptr) {
+    recovery_deadline_ = last_poll_ + options_.recovery_window;
+    Reserve(event.valve_id);
   }
-  if (event.transition.kind == TransitionKind::kClosed) {
-    recovered_.erase(event.valve_id);
-    return;
-  }
-  recovered_.insert_or_assign(event.valve_id, OpenEpisodeOf(event));
-  recovery_deadline_ = last_poll_ + options_.recovery_window;
-  Reserve(event.valve_id);
 }
 
-bool Pipeline::IsSettling(const std::string& valve_id) const {
-  const auto found = by_id_.find(valve_id);
-  return found == by_id_.end() ||
-         found->second->monitor.verdict().quality == Quality::kSettling;
+void Pipeline::StandBy(bool standby) {
+  if (std::exchange(standby_, standby) == standby) {
+    return;
+  }
+  for (const std::unique_ptr<Valve>& valve : valves_) {
+    valve->monitor.StandBy(standby, journal_);
+  }
+  for (auto& [id, tracker] : recovered_) {
+    tracker.StandBy(standby, journal_);
+  }
+  recovery_deadline_ = last_poll_ + options_.recovery_window;
 }
 
 void Pipeline::Count(const Valve& valve, const Sample& sample,
@@ -567,9 +583,7 @@ void Pipeline::ExpireRecovery() {
   for (const std::unique_ptr<Valve>& valve : valves_) {
     valve->monitor.ExpireRecovery(now_ns, journal_);
   }
-  for (const auto& [id, episode] : std::exchange(recovered_, {})) {
-    EpisodeTracker tracker(id, options_.trace);
-    tracker.Recover(episode);
+  for (auto& [id, tracker] : recovered_) {
     tracker.ExpireRecovery(now_ns, journal_);
   }
 }
@@ -636,7 +650,10 @@ void Pipeline::AdoptNextResolver() {
   }
   // A slot stays reserved for what is assigned now or was left open.
   std::erase_if(reserved_, [this](const std::string& id) {
-    return !recovered_.contains(id) && !accumulators_.contains(id);
+    const auto known = recovered_.find(id);
+    return (known == recovered_.end() ||
+            known->second.recovering() == nullptr) &&
+           !accumulators_.contains(id);
   });
   for (const std::string& id : resolver_->AssignedValves()) {
     Reserve(id);

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "diagnosis/followed_drift.h"
+#include "diagnosis/records/ended_episode.h"
 #include "monitor/counters.h"
 #include "monitor/heartbeat.h"
 #include "monitor/journal.h"
@@ -99,8 +100,11 @@ class Pipeline {
 
   /// @param open episodes that the last session left open.
   /// @param accumulators of the valves, from the last checkpoint.
+  /// @param ended the last one of each valve: what the other monitor of a pair
+  ///   repeats of it or earlier ones is over.
   void Start(const std::vector<OpenEpisode>& open,
-             std::vector<Accumulator> accumulators = {});
+             std::vector<Accumulator> accumulators = {},
+             const std::vector<EndedEpisode>& ended = {});
 
   /// Reports that `event`, of an earlier session, was published. Before
   /// Start().
@@ -110,11 +114,11 @@ class Pipeline {
   void OnSample(std::string_view valve_id, const Sample& sample,
                 std::uint64_t writer,
                 TimePoint received = std::chrono::steady_clock::now());
-  /// Another monitor of the same valves raised an event that this one did not:
-  /// records it and, if its episode is open, continues that here.
+  /// Whether the other monitor of a pair has the word; see EpisodeTracker.
+  void StandBy(bool standby);
+  /// The other monitor of a pair published `event`: records it and, if its
+  /// episode is open, continues that here.
   void Adopt(FaultEvent event);
-  /// True while nothing of this valve is judged, at first or after a restart.
-  bool IsSettling(const std::string& valve_id) const;
   /// The writer ended the stream of the valve.
   void OnStreamEnded(std::string_view valve_id, std::uint64_t writer);
 
@@ -180,6 +184,7 @@ class Pipeline {
              const ValveOutcome& outcome);
   void Publish(const Valve& valve, const ValveOutcome& outcome);
   void Recover(const std::vector<OpenEpisode>& episodes);
+  EpisodeTracker& Recovered(const std::string& valve_id);
   void AdoptNextResolver();
   void UpdateDrift(Valve& valve);
   void ReportDriftAtBound(Valve& valve, std::size_t channel,
@@ -211,7 +216,9 @@ class Pipeline {
   std::vector<Valve*> idle_;  // Silent unknown valves, as of the last Poll().
   std::vector<FollowedDrift> drift_;         // Of the valve at hand in Poll().
   std::unordered_set<std::size_t> refused_;  // Hashes of ids.
-  std::unordered_map<std::string, OpenEpisode> recovered_;
+  // What is known of the episodes of valves without a slot.
+  std::unordered_map<std::string, EpisodeTracker> recovered_;
+  bool standby_{false};
   std::unordered_map<std::string, Accumulator> accumulators_;
   std::optional<TimePoint> recovery_deadline_;  // Empty: none is left.
 

@@ -51,6 +51,22 @@ void ValveMonitor::NameEpisodes() {
                    : nullptr;
 }
 
+// The name by the word of the leader is one more input of the name.
+void ValveMonitor::StandBy(bool standby, EpisodeOutlet& outlet) {
+  const std::optional<FaultSet> announced = tracker_.StandBy(standby, outlet);
+  if (announced && names_) {
+    names_->SetAnnounced(*announced);
+  }
+}
+
+void ValveMonitor::Adopt(const FaultEvent& event, EpisodeOutlet& outlet) {
+  if (tracker_.Adopt(event, outlet) && names_ &&
+      event.model_hash == models_->content_hash) {
+    const OpenEpisode episode = OpenEpisodeOf(event);
+    names_->Inherit(&episode);
+  }
+}
+
 bool ValveMonitor::RestartsEngine(const Sample& sample) const {
   const std::int64_t moved = sample.stamp_ns - stamp_ns_;
   const std::int64_t longest =
@@ -103,13 +119,16 @@ ValveOutcome ValveMonitor::Step(const Sample& sample, std::uint64_t writer,
     return {unassigned_, nullptr, swapped, isolation_held_, 0, period_s()};
   }
   RestoreOnce(sample.source_id);
+  if (tracker_.Outlasts()) {
+    Close(EndReason::kUnknown, outlet);
+  }
   const bool was_open = engine_->episode_open();
   const Verdict& engine = engine_->Step(sample);
   tracker_.Advance(sample, engine, *models_, outlet);
   // An episode that this sample opens has the old name only if it resumes that
   // episode.
   if (!was_open) {
-    names_->Inherit(tracker_.recovering());
+    names_->Inherit(tracker_.Resumable(sample.source_id, *models_));
   }
   const Verdict& verdict = names_->Step(sample, engine, isolation_held_);
   // From the next sample on; the verdict on this one stands.
@@ -282,7 +301,7 @@ void ValveMonitor::CheckTimeout(TimePoint now,
 // For a valve that sends, the time of its samples decides instead:
 // EpisodeTracker::TryRecovery().
 void ValveMonitor::ExpireRecovery(std::int64_t now_ns, EpisodeOutlet& outlet) {
-  if (!seen_ || stale_ || !engine_) {
+  if (!seen_ || stale_ || ended_ || !engine_) {
     tracker_.ExpireRecovery(now_ns, outlet);
   }
 }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/followed_drift.h"
@@ -35,9 +36,12 @@ class ValveMonitor {
 
   /// Call before the first Step().
   void Recover(const OpenEpisode& episode) { tracker_.Recover(episode); }
+  /// The same. @param tracker knows earlier episodes of the valve.
+  void Recover(EpisodeTracker tracker) { tracker_ = std::move(tracker); }
 
-  /// See EpisodeTracker::Adopt().
-  void Adopt(const FaultEvent& event) { tracker_.Adopt(event); }
+  /// See EpisodeTracker.
+  void StandBy(bool standby, EpisodeOutlet& outlet);
+  void Adopt(const FaultEvent& event, EpisodeOutlet& outlet);
 
   /// The accumulators from the last checkpoint of an earlier session; used if
   /// the first sample comes from the same source. Before the first Step().

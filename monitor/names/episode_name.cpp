@@ -37,6 +37,13 @@ void EpisodeName::Inherit(const OpenEpisode* episode) {
   }
 }
 
+void EpisodeName::SetAnnounced(FaultSet faults) {
+  if (open_) {
+    told_ = faults;
+    named_ = faults != 0;
+  }
+}
+
 const Verdict& EpisodeName::Step(const Inputs& inputs) {
   // Usually there is no episode, and the verdict of 2.5 kB is not copied.
   if (!open_ && inputs.engine.transition_count == 0) {
@@ -72,7 +79,7 @@ const Verdict& EpisodeName::Step(const Inputs& inputs) {
     const Choice choice = Choose(inputs);
     now_.unknown = choice.unknown;
     now_.source = choice.source;
-    if (choice.faults != now_.faults) {
+    if (choice.faults != now_.faults || choice.faults != told_) {
       Rename(choice, inputs);
     }
   }
@@ -137,7 +144,7 @@ bool EpisodeName::InheritedStands(const Inputs& inputs) const {
 }
 
 void EpisodeName::Rename(const Choice& choice, const Inputs& inputs) {
-  now_.faults = choice.faults;
+  now_.faults = told_ = choice.faults;
   now_.layer = choice.layer;
   Estimates(inputs);
   now_.severity =
@@ -285,6 +292,7 @@ void EpisodeName::Reset() {
   inherited_.reset();
   open_ = false;
   named_ = false;
+  told_ = 0;
   now_ = {};
   now_.severity = announced_ = SeverityAt(BandsOf(0), 0.0);
 }

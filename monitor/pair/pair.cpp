@@ -5,12 +5,17 @@
 // some seconds and publishes them at a takeover. So no vector is missing, and
 // none is sent twice unless both monitors led.
 //
-// Events. They are recorded before they come here (the outbox of the history
-// keeps them until they are marked as sent), and are the same on both sides:
-// ids are hashes of valve, source and stamp of detection. Events not heard from
-// the leader are published at the takeover. An event that the leader raised and
-// we did not, because we were away or settling, is adopted after a while: it is
-// recorded, and its episode continues here under the same id.
+// Events. What the leader publishes is the record. Two monitors may detect a
+// fault at different samples, and then its episode would have two ids; so the
+// standby records what it hears, and its trackers keep what they find
+// themselves until this monitor leads (see EpisodeTracker). Events are recorded
+// before they come here; the outbox of the history keeps them until they are
+// marked as sent. Those of ours that nobody heard, because we died or lost the
+// lease first, are published when we lead again, unless the leader said the
+// like meanwhile; at once if their episode gave way to another one.
+//
+// Events of a valve are kept, repeated and adopted in the order of stamps, and
+// known by (episode, transition, stamp), so that a repeat changes nothing.
 //
 // A leader that is killed may have reached us and nobody else. Its last
 // messages are therefore published once more, unless it said that it was
@@ -28,6 +33,7 @@
 #include "monitor/pair/pair.h"
 
 #include <algorithm>
+#include <iterator>
 #include <random>
 #include <set>
 #include <utility>
@@ -51,15 +57,42 @@ constexpr milliseconds kMaxDeliveryTime{200};
 constexpr std::size_t kMaxHeldVectors = 20'000;  // 46 MB
 constexpr std::size_t kMaxHeldEvents = 10'000;
 constexpr std::size_t kMaxCoveredValves = 200'000;
-// If no counterpart has arrived by then, the two monitors judged differently.
-constexpr milliseconds kAdoptAfter{2000};
 constexpr milliseconds kMaxEventAge{60'000};
+// For so long a late subscriber gets the events of ended episodes once more.
+constexpr std::chrono::hours kMaxRepeatAge{1};
+constexpr std::chrono::seconds kForgetPeriod{10};
+constexpr std::size_t kMaxPublishedValves = 10'000;
 constexpr std::size_t kEventsPerValve = 16;  // The writer's DDS history depth.
 
 bool Same(const FaultEvent& a, const FaultEvent& b) {
   return a.episode_id == b.episode_id &&
          OnTheBus(a.transition.kind) == OnTheBus(b.transition.kind) &&
          a.transition.stamp_ns == b.transition.stamp_ns;
+}
+
+bool Names(TransitionKind kind) {
+  return OnTheBus(kind) == TransitionKind::kReisolated ||
+         kind == TransitionKind::kIsolated;
+}
+
+// Whether `said` leaves nothing to say for `found`: it comes later in the same
+// episode, or is the same, though a sample earlier. An end is one until the
+// episode has ended.
+bool Covers(const FaultEvent& said, const FaultEvent& found) {
+  const Transition& a = said.transition;
+  const Transition& b = found.transition;
+  const bool like =
+      Names(a.kind) && Names(b.kind) ? a.faults == b.faults : a.kind == b.kind;
+  return said.episode_id == found.episode_id &&
+         (a.kind == TransitionKind::kClosed ||
+          (b.kind != TransitionKind::kClosed &&
+           (like || b.stamp_ns <= a.stamp_ns)));
+}
+
+// In the order in which the monitor of one source made them.
+bool Earlier(const FaultEvent& a, const FaultEvent& b) {
+  return std::pair(a.transition.stamp_ns, a.transition.kind) <
+         std::pair(b.transition.stamp_ns, b.transition.kind);
 }
 
 PairState OwnState(const PairOptions& options, const std::string& monitor) {
@@ -155,20 +188,63 @@ bool Pair::LastValuesDue() {
 
 // Called by the journal's publisher thread.
 bool Pair::Publish(const FaultEvent& event, bool persisted) {
-  const std::lock_guard lock(mutex_);
-  FaultEvent own = event;
-  own.persisted = persisted;
-  if (held_events_.empty() && Leads()) {
-    return !MarkPublishedLocked(own) || events_.Publish(event, persisted);
+  std::unique_lock sending(sending_);
+  {
+    const std::lock_guard lock(mutex_);
+    FaultEvent own = event;
+    own.persisted = persisted;
+    if (held_events_.empty() && Leads()) {
+      AnnounceLocked(std::move(own), false);
+    } else {
+      HoldLocked(std::move(own));
+    }
   }
-  HoldLocked(std::move(own));
-  return true;
+  return SendEvents(std::move(sending));
+}
+
+// A write may wait for a slow subscriber, which holds up neither the diagnosis
+// nor a reader of the status. Whoever finds the other thread writing leaves the
+// rest to it, or to the next Tick().
+// @returns whether the last one was sent.
+bool Pair::SendEvents(std::unique_lock<std::mutex> sending) {
+  bool sent = true;
+  while (sending.owns_lock()) {
+    Outgoing next;
+    {
+      const std::lock_guard lock(mutex_);
+      if (outgoing_.empty()) {
+        break;
+      }
+      next = std::move(outgoing_.front());
+      outgoing_.pop_front();
+    }
+    if (next.repeat) {
+      bus_.Repeat(next.event);
+    } else {
+      sent = events_.Publish(next.event, next.event.persisted);
+    }
+  }
+  return sent;
 }
 
 void Pair::HoldLocked(FaultEvent event) {
-  std::erase_if(unmatched_events_,
-                [&](const HeldEvent& held) { return Same(held.event, event); });
-  if (IsPublishedLocked(event)) {
+  const auto known = published_.find(event.valve_id);
+  if (known != published_.end() &&
+      std::ranges::any_of(known->second, [&](const HeldEvent& each) {
+        return Covers(each.event, event);
+      })) {
+    return;
+  }
+  // The leader does not tell of an episode of ours that gave way to its own.
+  if (event.transition.reason == EndReason::kSuperseded) {
+    std::erase_if(held_events_, [&](HeldEvent& held) {
+      const bool same = held.event.episode_id == event.episode_id;
+      if (same) {
+        AnnounceLocked(std::move(held.event), true);
+      }
+      return same;
+    });
+    AnnounceLocked(std::move(event), true);
     return;
   }
   if (held_events_.size() >= kMaxHeldEvents) {
@@ -177,24 +253,36 @@ void Pair::HoldLocked(FaultEvent event) {
   held_events_.push_back({Clock::now(), std::move(event)});
 }
 
-bool Pair::IsPublishedLocked(const FaultEvent& event) const {
-  const auto found = published_.find(event.valve_id);
-  return found != published_.end() &&
-         std::ranges::any_of(found->second, [&](const HeldEvent& each) {
-           return Same(each.event, event);
-         });
+// Unless the event is on the bus already.
+void Pair::AnnounceLocked(FaultEvent event, bool repeat) {
+  if (MarkPublishedLocked(event)) {
+    outgoing_.push_back({std::move(event), repeat});
+  }
 }
 
 // @returns false if the event is on the bus already.
 bool Pair::MarkPublishedLocked(const FaultEvent& event) {
-  if (IsPublishedLocked(event)) {
-    return false;
+  if (published_.size() >= kMaxPublishedValves) {
+    published_.clear();
   }
   std::deque<HeldEvent>& last = published_[event.valve_id];
-  if (last.size() >= kEventsPerValve) {
+  if (std::ranges::any_of(last, [&](const HeldEvent& each) {
+        return Same(each.event, event);
+      })) {
+    return false;
+  }
+  // The stamps of two sources are not compared.
+  auto place = last.end();
+  while (place != last.begin() &&
+         std::prev(place)->event.source_id == event.source_id &&
+         Earlier(event, std::prev(place)->event)) {
+    --place;
+  }
+  // A model set lasts no longer for it.
+  last.insert(place, {Clock::now(), event})->event.models = nullptr;
+  if (last.size() > kEventsPerValve) {
     last.pop_front();
   }
-  last.push_back({Clock::now(), event});
   return true;
 }
 
@@ -208,16 +296,17 @@ void Pair::OnVector(const idl::DecisionMessage& message) {
   }
 }
 
-void Pair::OnEvent(const FaultEvent& event, TimePoint now) {
-  const std::lock_guard lock(mutex_);
-  if (!MarkPublishedLocked(event)) {
-    return;
+void Pair::OnEvent(const FaultEvent& event, Pipeline& pipeline) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!MarkPublishedLocked(event)) {
+      return;
+    }
+    std::erase_if(held_events_, [&](const HeldEvent& held) {
+      return Covers(event, held.event);
+    });
   }
-  if (std::erase_if(held_events_, [&](const HeldEvent& held) {
-        return Same(held.event, event);
-      }) == 0) {
-    unmatched_events_.push_back({now, event});
-  }
+  pipeline.Adopt(event);
 }
 
 void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
@@ -244,9 +333,16 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
                       },
                       {}},
                      kNow);
+  // Of several writers, so in no order.
+  std::vector<FaultEvent> heard;
   peer_events_.Take(
-      {[&](const FaultEvent& event, const auto&) { OnEvent(event, now); }, {}},
+      {[&](const FaultEvent& event, const auto&) { heard.push_back(event); },
+       {}},
       kNow);
+  std::ranges::stable_sort(heard, Earlier);
+  for (const FaultEvent& event : heard) {
+    OnEvent(event, pipeline);
+  }
   // The lease counts from our last message, as the other monitors count, which
   // was sent before the last step.
   if (led_ && now >= lease_until_.load()) {
@@ -254,18 +350,22 @@ void Pair::Tick(std::uint64_t received, Pipeline& pipeline) {
   }
   election_.Step(received, static_cast<int>(pipeline.census().judged), now);
   DropCovered(now);
+  ForgetEnded(now);
   ApplyElection(now);
-  Adopt(now, pipeline);
+  pipeline.StandBy(!led_);
   if (led_ && events_lacked_ >= 0 && bus_.total_matched() > events_lacked_) {
     events_lacked_ = -1;
     RepeatEvents(TimePoint{});
   }
+  SendEvents(std::unique_lock(sending_, std::try_to_lock));
 }
 
-void Pair::StepDown() {
+void Pair::StepDown(Pipeline& pipeline) {
   const TimePoint now = Clock::now();
   election_.StepDown(now);
   ApplyElection(now);
+  SendEvents(std::unique_lock(sending_));
+  pipeline.StandBy(!led_);
   if (led_) {
     lease_until_ = TimePoint::max();  // Nobody else publishes the rest.
   }
@@ -334,10 +434,8 @@ void Pair::PublishHeld(TimePoint now) {
     PublishHeldVectors(now);
   }
   const std::lock_guard lock(mutex_);
-  for (const HeldEvent& held : std::exchange(held_events_, {})) {
-    if (MarkPublishedLocked(held.event)) {
-      events_.Publish(held.event, held.event.persisted);
-    }
+  for (HeldEvent& held : std::exchange(held_events_, {})) {
+    AnnounceLocked(std::move(held.event), false);
   }
 }
 
@@ -387,24 +485,19 @@ void Pair::DropCovered(TimePoint now) {
   });
 }
 
-// An event of a valve that is settling is adopted at once: this monitor will
-// not raise its own.
-void Pair::Adopt(TimePoint now, Pipeline& pipeline) {
-  std::vector<FaultEvent> due;
-  {
-    const std::lock_guard lock(mutex_);
-    std::erase_if(unmatched_events_, [&](HeldEvent& held) {
-      const bool is_due = now - held.since >= kAdoptAfter ||
-                          pipeline.IsSettling(held.event.valve_id);
-      if (is_due) {
-        due.push_back(std::move(held.event));
-      }
-      return is_due;
-    });
+// Nothing is repeated for ever: of a valve whose last episode ended long ago
+// subscribers need not hear.
+void Pair::ForgetEnded(TimePoint now) {
+  if (now - forgot_ < kForgetPeriod) {
+    return;
   }
-  for (FaultEvent& event : due) {
-    pipeline.Adopt(std::move(event));
-  }
+  forgot_ = now;
+  const std::lock_guard lock(mutex_);
+  std::erase_if(published_, [&](const auto& each) {
+    const HeldEvent& last = each.second.back();
+    return last.event.transition.kind == TransitionKind::kClosed &&
+           now - last.since > kMaxRepeatAge;
+  });
 }
 
 // Republishes the events heard at `since` or later.
@@ -413,7 +506,7 @@ void Pair::RepeatEvents(TimePoint since) {
   for (const auto& [valve_id, events] : published_) {
     for (const HeldEvent& held : events) {
       if (held.since >= since) {
-        bus_.Repeat(held.event);
+        outgoing_.push_back({held.event, true});
       }
     }
   }

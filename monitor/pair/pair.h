@@ -35,10 +35,10 @@ std::vector<std::string> PartitionsOf(const PairOptions& options);
 /// The partitions of the other monitors, as a pattern.
 std::vector<std::string> PartitionOfOthers(const PairOptions& options);
 
-/// One monitor of a redundant pair. Both diagnose and record everything and
-/// publish through this class; the standby holds its messages until it has
-/// heard the same from the leader, and publishes the unheard ones when it takes
-/// over.
+/// One monitor of a redundant pair. Both diagnose everything and publish
+/// through this class. The standby records the leader's events instead of its
+/// own (see EpisodeTracker), holds its vectors until it has heard the same from
+/// the leader, and publishes the unheard ones when it takes over.
 ///
 /// Tick() is called by the diagnosis thread and is the only sign of life that
 /// the other monitor gets.
@@ -67,7 +67,7 @@ class Pair : public DecisionSink, public EventSink {
   /// own. Called by the diagnosis thread, several times per patience interval.
   void Tick(std::uint64_t received, Pipeline& pipeline);
   /// Hands leadership over if another monitor is there; call before the end.
-  void StepDown();
+  void StepDown(Pipeline& pipeline);
 
   /// Thread safe.
   struct Status {
@@ -98,19 +98,24 @@ class Pair : public DecisionSink, public EventSink {
     TimePoint since;
     FaultEvent event;
   };
+  struct Outgoing {
+    FaultEvent event;
+    bool repeat{false};  // For the bus alone.
+  };
 
   bool Leads() const { return Clock::now() < lease_until_.load(); }
   bool IsCovered(const std::string& valve_id, const Verdict& verdict) const;
   void OnVector(const idl::DecisionMessage& message);
-  void OnEvent(const FaultEvent& event, TimePoint now);
+  void OnEvent(const FaultEvent& event, Pipeline& pipeline);
   void ApplyElection(TimePoint now);
   void PublishHeld(TimePoint now);
   void PublishHeldVectors(TimePoint now);
   void DropCovered(TimePoint now);
-  void Adopt(TimePoint now, Pipeline& pipeline);
+  void ForgetEnded(TimePoint now);
   void RepeatEvents(TimePoint since);
+  bool SendEvents(std::unique_lock<std::mutex> sending);
   void HoldLocked(FaultEvent event);
-  bool IsPublishedLocked(const FaultEvent& event) const;
+  void AnnounceLocked(FaultEvent event, bool repeat);
   bool MarkPublishedLocked(const FaultEvent& event);
 
   const PairOptions options_;
@@ -147,12 +152,16 @@ class Pair : public DecisionSink, public EventSink {
   int vectors_lacked_{-1};
   int events_lacked_{-1};
 
-  mutable std::mutex mutex_;  // Guards the members below.
+  TimePoint forgot_;
+
+  // Held while events are written; locked before mutex_.
+  std::mutex sending_;
+  mutable std::mutex mutex_;  // Guards the members below; never while writing.
   Status status_;
-  // The last events of each valve that are on the bus.
+  // The last events of each valve that are on the bus, by stamp.
   std::map<std::string, std::deque<HeldEvent>> published_;
   std::deque<HeldEvent> held_events_;  // Ours, not heard from the leader yet.
-  std::deque<HeldEvent> unmatched_events_;  // Heard, not raised by us yet.
+  std::deque<Outgoing> outgoing_;      // In the order of the bus.
 };
 
 }  // namespace fdi::monitor

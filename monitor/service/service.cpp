@@ -332,7 +332,9 @@ void Service::Start() {
   if (recorder_) {
     recorder_->Start();
   }
-  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators());
+  pipeline_.StandBy(pair_ != nullptr);
+  pipeline_.Start(history_.OpenEpisodes(), history_.Accumulators(),
+                  pair_ ? history_.LastEnds() : std::vector<EndedEpisode>{});
   diagnosis_.Start([this] { Diagnose(); });
   if (operators_) {
     operators_->Start();
@@ -427,7 +429,7 @@ void Service::Diagnose() {
   // Before the queue is drained: the standby takes over at once, without
   // waiting for its patience to pass.
   if (pair_) {
-    pair_->StepDown();
+    pair_->StepDown(pipeline_);
   }
   // Drains what has arrived already; publishers that continue to send do not
   // delay the shutdown beyond drain_until_.

@@ -320,6 +320,13 @@ auto ReadUndamaged(Statement& rows, const std::string& what, Read read,
   return records;
 }
 
+EndedEpisode ReadEnded(const Statement& row) {
+  EndedEpisode episode;
+  episode.episode_id = RequireEpisodeId(row, 0);
+  row.Read(1, episode.valve_id, episode.source_id, episode.ended_ns);
+  return episode;
+}
+
 }  // namespace
 
 HistoryWriter::HistoryWriter(const std::filesystem::path& path)
@@ -526,6 +533,12 @@ std::vector<OpenEpisode> HistoryWriter::OpenEpisodes(
     std::vector<std::string>* damaged) {
   Statement rows = database_.Prepare(sql::open_episodes);
   return ReadUndamaged(rows, "episode", ReadOpen, damaged);
+}
+
+std::vector<EndedEpisode> HistoryWriter::LastEnds(
+    std::vector<std::string>* damaged) {
+  Statement rows = database_.Prepare(sql::last_ends);
+  return ReadUndamaged(rows, "episode", ReadEnded, damaged);
 }
 
 }  // namespace fdi::storage

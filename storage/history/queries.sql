@@ -139,6 +139,10 @@ SELECT episode_id, valve_id, source_id, detected_ns,
   fault_bits, isolated_ns IS NOT NULL, layer, model_set, model_hash, faults,
   peak_factor, strength, priority
 FROM episode e WHERE ended_ns IS NULL ORDER BY detected_ns, valve_id
+-- The columns make an EndedEpisode; beside max() they are of the same row.
+-- name: last_ends
+SELECT episode_id, valve_id, source_id, max(ended_ns) FROM episode
+WHERE ended_ns IS NOT NULL GROUP BY valve_id
 
 -- ---- Events.
 -- Nothing is inserted if the event is there already, or its episode has ended.

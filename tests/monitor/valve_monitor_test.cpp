@@ -168,7 +168,7 @@ TEST_F(ValveMonitorTest, AnEpisodeOfAnotherMonitorGoesOnUnderItsId) {
        {TransitionKind::kDetected, TransitionKind::kIsolated}) {
     other.transition.kind = kind;
     other.transition.faults = kind == TransitionKind::kIsolated ? 0b10 : 0;
-    valve_.Adopt(other);
+    valve_.Adopt(other, notebook_);
   }
   Feed(505, 600, kF7Offset);
   EXPECT_THAT(notebook_.Kinds(), testing::IsEmpty());
@@ -182,9 +182,9 @@ TEST_F(ValveMonitorTest, AnEpisodeOfAnotherMonitorGoesOnUnderItsId) {
   other.episode_id = EpisodeId("V1", 1, PlantSample(700).stamp_ns);
   other.transition.kind = TransitionKind::kDetected;
   Feed(900, 905, kF7Offset);
-  valve_.Adopt(other);
+  valve_.Adopt(other, notebook_);
   other.transition.kind = TransitionKind::kClosed;
-  valve_.Adopt(other);
+  valve_.Adopt(other, notebook_);
   Feed(905, 1000, kF7Offset);
   EXPECT_EQ(notebook_.resumed.size(), 1U);
   EXPECT_NE(notebook_.events.back().episode_id, other.episode_id);

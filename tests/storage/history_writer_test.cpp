@@ -164,6 +164,17 @@ TEST_F(HistoryWriterTest, AClockThatIsSetBackHasSignsOfLife) {
             earlier - kSecond);
 }
 
+TEST_F(HistoryWriterTest, KnowsWhichEpisodeOfAValveEndedLast) {
+  HistoryWriter writer(path_);
+  EXPECT_TRUE(writer.LastEnds().empty());
+  RecordEpisode(writer, 0b010);
+  const auto ends = writer.LastEnds();
+  ASSERT_EQ(ends.size(), 1U);
+  EXPECT_EQ(ends[0].episode_id, Id());
+  EXPECT_EQ(std::to_string(ends[0].ended_ns),
+            Sql("SELECT ended_ns FROM episode"));
+}
+
 TEST_F(HistoryWriterTest, EpisodeOfADeadMonitorCanBeClosedOnce) {
   { HistoryWriter(path_).Record(Event(Kind::kDetected, 0, 0, 0.3), kDetected); }
   HistoryWriter writer(path_);

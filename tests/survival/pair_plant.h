@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <set>
@@ -53,6 +55,10 @@ class PairPlant {
         sends_([this](const std::stop_token& stop) { Send(stop); }) {}
 
   void SetFaulty(bool on) { offset_ = on ? kF7Offset : 0.0; }
+  /// Faults grow and go by so much with each sample, and begin with a different
+  /// sample at each valve. Monitors that run for a different time detect such
+  /// faults at different samples.
+  void SetGrowth(double per_sample) { growth_ = per_sample; }
 
   /// The newest words of the monitors that spoke within 200 ms and stay.
   std::map<std::string, PairState> Words() {
@@ -174,6 +180,23 @@ class PairPlant {
     const std::lock_guard lock(mutex_);
     counts_from_ = Clock::now();
   }
+  /// Every transition that came, in order, and whether it ever came as
+  /// persisted.
+  std::vector<FaultEvent> Events() {
+    const std::lock_guard lock(mutex_);
+    return heard_;
+  }
+  /// Episodes without an end.
+  std::size_t Open() {
+    const std::lock_guard lock(mutex_);
+    std::set<std::uint64_t> open = episodes_;
+    for (const auto& [episode, kind, stamp] : transitions_) {
+      if (kind == TransitionKind::kClosed) {
+        open.erase(episode);
+      }
+    }
+    return open.size();
+  }
   std::size_t Isolated() {
     const std::lock_guard lock(mutex_);
     return static_cast<std::size_t>(
@@ -189,6 +212,21 @@ class PairPlant {
     int heard{0};
   };
 
+  double Offset(int v, std::uint64_t k) {
+    if (v >= faulty_) {
+      return 0.0;
+    }
+    double& level = levels_[static_cast<std::size_t>(v)];
+    const double missing = offset_.load() - level;
+    const double growth = growth_.load();
+    // A valve that rests begins with a sample of its own.
+    if (std::isinf(growth) || std::abs(missing) < -kF7Offset ||
+        k % kStagger == static_cast<std::uint64_t>(v) % kStagger) {
+      level += std::clamp(missing, -growth, growth);
+    }
+    return level;
+  }
+
   void Send(const std::stop_token& stop) {
     Clock::time_point due = Clock::now();
     for (std::uint64_t k = 0; !stop.stop_requested(); ++k) {
@@ -198,8 +236,7 @@ class PairPlant {
           sent_[static_cast<std::size_t>(v)][k].sent = Clock::now();
         }
         samples_.Write(
-            {"V" + std::to_string(v),
-             PlantSample(k, v < faulty_ ? offset_.load() : 0.0, source_)});
+            {"V" + std::to_string(v), PlantSample(k, Offset(v, k), source_)});
       }
       due += period_;
       std::this_thread::sleep_until(due);
@@ -240,6 +277,15 @@ class PairPlant {
                                     event.transition.stamp_ns})
                            .second;
     totals_.repeats += fresh ? 0 : 1;
+    if (fresh) {
+      heard_.push_back(event);
+    } else if (event.persisted) {
+      std::ranges::find_if(heard_, [&event](const FaultEvent& each) {
+        return each.episode_id == event.episode_id &&
+               each.transition.kind == event.transition.kind &&
+               each.transition.stamp_ns == event.transition.stamp_ns;
+      })->persisted = true;
+    }
   }
 
   const int valves_;
@@ -248,11 +294,16 @@ class PairPlant {
   const std::uint64_t source_{
       static_cast<std::uint64_t>(Clock::now().time_since_epoch().count())};
   std::atomic<double> offset_{0.0};
+  static constexpr std::uint64_t kStagger = 5;
+  std::atomic<double> growth_{std::numeric_limits<double>::infinity()};
+  std::vector<double> levels_ =
+      std::vector<double>(static_cast<std::size_t>(valves_));  // By Send().
   std::mutex mutex_;  // Guards what follows.
   std::vector<std::map<std::uint64_t, Vector>> sent_{
       static_cast<std::size_t>(valves_)};  // By valve and seq.
   std::map<std::string, std::pair<PairState, Clock::time_point>> words_heard_;
   std::set<std::uint64_t> episodes_;
+  std::vector<FaultEvent> heard_;
   std::set<std::tuple<std::uint64_t, TransitionKind, std::int64_t>>
       transitions_;
   Totals totals_;
