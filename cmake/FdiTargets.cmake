@@ -111,6 +111,19 @@ function(fdi_program name)
   install(TARGETS ${name} RUNTIME)
 endfunction()
 
+# fdi_component(target FDI_COMPONENT SOURCES a.cpp ... LIBRARIES lib ...)
+# What the target has of a component if that option is ON; left_out.cpp, which
+# sees the option as 0 or 1, stands in for it.
+function(fdi_component target option)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBRARIES" ${ARGN})
+  set_property(SOURCE left_out.cpp APPEND PROPERTY
+               COMPILE_DEFINITIONS ${option}=$<BOOL:${${option}}>)
+  if(${option})
+    target_sources(${target} PRIVATE ${ARG_SOURCES})
+    target_link_libraries(${target} PRIVATE ${ARG_LIBRARIES})
+  endif()
+endfunction()
+
 # The headers of most tests, compiled once for all of them. With GCC alone: Clang
 # takes such a file only for a test that has the same definitions.
 function(fdi_test_precompiled_headers)

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "base/error.h"
+#include "storage/history/history.h"
 
 struct pg_conn;
 struct pg_result;
@@ -16,9 +16,9 @@ struct pg_result;
 namespace fdi::storage {
 
 /// PostgreSQL is away, refuses or fails; what() is one line with its reason.
-class PlantError : public DataError {
+class PlantError : public HistoryAwayError {
  public:
-  using DataError::DataError;
+  using HistoryAwayError::HistoryAwayError;
 };
 
 /// Rows that a statement returned; NULL is nothing. Columns count from 0.

@@ -156,6 +156,11 @@ std::string CommandLine(int argc, const char* const* argv) {
 
 }  // namespace
 
+std::string LeftOut(const std::string& name, const std::string& option) {
+  return name + " is not in this build: it takes one that was made with -D" +
+         option + "=ON";
+}
+
 Program::Program(std::string name, std::string description)
     : app_(
           std::make_unique<CLI::App>(std::move(description), std::move(name))) {
@@ -216,7 +221,12 @@ void Program::AllowCsv(CLI::App& verb, const std::string& description) {
 
 void Program::AddRemoved(const std::string& verb, const std::string& name,
                          const std::string& instead) {
-  removed_[{verb, name}] = instead;
+  removed_[{verb, name}] = name + " is gone: " + instead;
+}
+
+void Program::AddLeftOut(const std::string& verb, const std::string& name,
+                         const std::string& option) {
+  removed_[{verb, name}] = LeftOut(name, option);
 }
 
 std::optional<std::string> Program::RemovedWord() const {
@@ -226,13 +236,16 @@ std::optional<std::string> Program::RemovedWord() const {
     const std::string name = word.substr(0, word.find('='));
     if (const auto found = removed_.find({verb, name});
         found != removed_.end()) {
-      return name + " is gone: " + found->second;
+      return found->second;
     }
   }
   return std::nullopt;
 }
 
 void Program::AddExamples(std::vector<VerbExamples> examples) {
+  std::erase_if(examples, [this](const VerbExamples& of) {
+    return removed_.contains({"", of.verb.substr(0, of.verb.find(' '))});
+  });
   SetExamples(*app_, examples);
   std::ranges::move(examples, std::back_inserter(examples_));
 }

@@ -46,6 +46,10 @@ using PrintAction = std::function<int(const Context&)>;
 using ReportAction = std::function<Report(const Context&)>;
 using VerbAction = std::variant<ReportAction, PrintAction>;
 
+/// A sentence for `name`, which is of a component that this build was made
+/// without. @param option of CMake that brings it back.
+std::string LeftOut(const std::string& name, const std::string& option);
+
 /// A command-line program: global options, verbs, error reporting. Use:
 ///
 ///     int main(int argc, char** argv) {
@@ -95,9 +99,13 @@ class Program {
   /// instead. @param verb that had the option; "" for a verb of the program.
   void AddRemoved(const std::string& verb, const std::string& name,
                   const std::string& instead);
+  /// The same for a component that this build was made without; see LeftOut().
+  void AddLeftOut(const std::string& verb, const std::string& name,
+                  const std::string& option);
 
   /// Appends examples to the help of verbs, groups (both named by path,
-  /// "history list") and, for "", the program. Call after adding the verbs.
+  /// "history list") and, for "", the program; ignores those of a verb that is
+  /// left out. Call after adding the verbs.
   /// @throws std::logic_error for an unknown verb.
   void AddExamples(std::vector<VerbExamples> examples);
 
@@ -127,7 +135,7 @@ class Program {
   int RunVerb(int argc, const char* const* argv);
   int ExitCodeOf(const std::exception& error) const;
   int Print(const Report& report) const;
-  /// What to do instead of the first removed word among those left over.
+  /// Of the first word among those left over that was removed or left out.
   std::optional<std::string> RemovedWord() const;
   void PrintError(const std::string& message) const;
 

@@ -31,6 +31,6 @@ forbid '^((diagnosis|idl|simulator|trainer|monitor)/[^/]+$|(base|plant|storage)/
   'command line, logging and JSON belong to the programs'
 forbid '^(diagnosis|idl|import|simulator|storage|trainer|monitor|planner|plant|programs)/' 'toml\+\+' \
   'TOML belongs to base and to the options'
-forbid '^(base|diagnosis|idl|import|report|simulator|trainer|storage|planner|plant|programs)/' 'httplib\.h' \
-  'HTTP belongs to the monitor'
+forbid '^((base|diagnosis|idl|import|report|simulator|trainer|storage|plant|programs)/|planner/[^/]+$)' 'httplib\.h' \
+  'HTTP belongs to the monitor and to what planner/live adds to its page'
 exit "$failed"

@@ -7,7 +7,6 @@
 #include <httplib.h>
 
 #include "base/error.h"
-#include "plant/plant_database.h"
 #include "storage/history/history_reader.h"
 
 namespace fdi::console {
@@ -34,7 +33,7 @@ std::unique_ptr<storage::History> Api::History() const {
     return std::make_unique<storage::HistoryReader>(sources.history);
   }
   if (const auto away = alarms.away()) {
-    throw storage::PlantError(away->reason);
+    throw storage::HistoryAwayError(away->reason);
   }
   return sources.plant_history();
 }
@@ -58,7 +57,7 @@ void Guarded(httplib::Response& response, const std::function<void()>& send) {
     SendError(response, 400, error.what());
   } catch (const NotFoundError& error) {
     SendError(response, 404, error.what());
-  } catch (const storage::PlantError& error) {
+  } catch (const storage::HistoryAwayError& error) {
     SendError(response, 503, error.what());
   } catch (const storage::SqliteError& error) {
     SendError(response, error.IsBusy() ? 503 : 500, error.what());
@@ -73,7 +72,7 @@ void AddRoutes(httplib::Server& server, const Api& api,
     server.Get(route.path, [&api, route](const httplib::Request& request,
                                          httplib::Response& response) {
       Guarded(response, [&] {
-        if (route.json != nullptr) {
+        if (route.json) {
           SendJson(response, route.json(api, request));
           return;
         }

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -15,7 +14,6 @@
 #include "monitor/console/alarm_book.h"
 #include "monitor/console/live_board.h"
 #include "monitor/console/live_stream.h"
-#include "planner/work_list.h"
 #include "report/fault_texts.h"
 
 namespace httplib {
@@ -60,15 +58,6 @@ struct ConsoleSources {
   std::function<std::vector<MonitorLine>()> monitors{};
 };
 
-/// The last work list that was requested. Reading months of all valves takes a
-/// while, so it stays valid for a minute.
-struct WorkListCache {
-  std::mutex mutex;
-  std::string query;
-  std::int64_t read_ns{0};
-  std::vector<planner::WorkRow> rows;
-};
-
 /// What responses are made from; everything referenced outlives the server.
 struct Api {
   ConsoleSources sources;
@@ -76,13 +65,13 @@ struct Api {
   LiveStream& stream;
   AlarmBook& alarms;
   StoredModels& models;
-  WorkListCache& work_list;
   const report::FaultTexts& texts;
   Admission& access;
   std::string instance;  ///< Differs after a restart.
   std::stop_token stopping{};
 
-  /// @throws storage::PlantError immediately while the plant history is away.
+  /// @throws storage::HistoryAwayError immediately while that of a plant is
+  ///   away.
   std::unique_ptr<storage::History> History() const;
   /// Explain(), with the fault names of the catalogue.
   Json Words(const ModelFacts* facts, const TracePoint* point) const;
@@ -98,16 +87,14 @@ struct File {
 /// A GET handler for paths that match a regular expression: JSON or a file.
 struct Route {
   const char* path;
-  Json (*json)(const Api&, const httplib::Request&);
-  File (*file)(const Api&, const httplib::Request&){nullptr};
+  std::function<Json(const Api&, const httplib::Request&)> json;
+  std::function<File(const Api&, const httplib::Request&)> file{};
 };
 
 /// /api/v1/status, faults, valves, valves/ID/trend.
-std::span<const Route> LiveRoutes();
+std::vector<Route> LiveRoutes();
 /// /api/v1/alarms, history, statistics, shelf, episodes/ID with .csv .svg .png.
-std::span<const Route> HistoryRoutes();
-/// /api/v1/worklist, worklist.csv, valves/ID/health.
-std::span<const Route> PlannerRoutes();
+std::vector<Route> HistoryRoutes();
 
 /// Exceptions become {"error"} with 400 for ConfigError and
 /// std::invalid_argument, 404 for NotFoundError, 503 for a history that is busy

@@ -90,6 +90,7 @@ Console::Console(const ConsoleOptions& options,
                  const report::GlobalOptions& global, LogSink log)
     : server_(std::make_unique<monitor::HttpServer>(ServerOptions(options))),
       files_(FindConsoleFiles(options.files)),
+      more_routes_(options.routes),
       log_(std::move(log)),
       access_(options.admission, log_),
       texts_(report::LoadFaultTexts(global)) {}
@@ -107,15 +108,15 @@ void Console::Start(ConsoleSources sources) {
         return std::make_unique<storage::HistoryReader>(path);
       },
       texts_);
-  api_ = std::make_unique<Api>(
-      Api{std::move(sources), board_, stream_, *alarms_, *models_, work_list_,
-          texts_, access_, NewInstance(), stopping_.get_token()});
+  api_ = std::make_unique<Api>(Api{std::move(sources), board_, stream_,
+                                   *alarms_, *models_, texts_, access_,
+                                   NewInstance(), stopping_.get_token()});
   SetDefaultResponses();
   RenewTls();
   httplib::Server& routes = server_->routes();
   // Cookies ignore the port, and a host may run two consoles.
   access_.AddTo(routes, "fdi_" + std::to_string(server_->address().port));
-  for (const auto group : {LiveRoutes(), HistoryRoutes(), PlannerRoutes()}) {
+  for (const auto& group : {LiveRoutes(), HistoryRoutes(), more_routes_}) {
     AddRoutes(routes, *api_, group);
   }
   AddStreamRoute(routes, *api_);

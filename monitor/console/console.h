@@ -23,6 +23,7 @@ struct ConsoleOptions {
   std::vector<std::string> names;  ///< See monitor::HostAllowed().
   AdmissionOptions admission;
   std::optional<monitor::TlsFiles> tls;
+  std::vector<Route> routes{};  ///< Beside its own: of optional components.
 };
 
 /// The folder with index.html. @throws ConfigError naming `asked`, or DataError
@@ -80,12 +81,12 @@ class Console {
 
   std::unique_ptr<monitor::HttpServer> server_;
   std::filesystem::path files_;
+  std::vector<Route> more_routes_;
   LogSink log_;
   Admission access_;
   report::FaultTexts texts_;
   LiveBoard board_;
   LiveStream stream_;
-  WorkListCache work_list_;
   std::stop_source stopping_;
   std::unique_ptr<StoredModels> models_;
   std::unique_ptr<AlarmBook> alarms_;

@@ -377,20 +377,17 @@ File EpisodePicture(const Api& api, const httplib::Request& request) {
                            {.stop = api.stopping})};
 }
 
-constexpr Route kHistoryRoutes[] = {
-    {"/api/v1/alarms", Alarms},
-    {"/api/v1/history", History},
-    {"/api/v1/statistics", Statistics},
-    {"/api/v1/shelf", Shelves},
-    {"/api/v1/episodes/([0-9a-fA-F]{1,16}|last)", Episode},
-    {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.csv", nullptr, EpisodeCsv},
-    {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.(svg|png)", nullptr,
-     EpisodePicture}};
-
 }  // namespace
 
-std::span<const Route> HistoryRoutes() {
-  return kHistoryRoutes;
+std::vector<Route> HistoryRoutes() {
+  return {{"/api/v1/alarms", Alarms},
+          {"/api/v1/history", History},
+          {"/api/v1/statistics", Statistics},
+          {"/api/v1/shelf", Shelves},
+          {"/api/v1/episodes/([0-9a-fA-F]{1,16}|last)", Episode},
+          {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.csv", nullptr, EpisodeCsv},
+          {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.(svg|png)", nullptr,
+           EpisodePicture}};
 }
 
 }  // namespace fdi::console

@@ -129,11 +129,6 @@ Json Faults(const Api& api, const httplib::Request& /*request*/) {
   return report::FaultTextsJson(api.texts);
 }
 
-constexpr Route kLiveRoutes[] = {{"/api/v1/status", Status},
-                                 {"/api/v1/faults", Faults},
-                                 {"/api/v1/valves", Valves},
-                                 {"/api/v1/valves/(.+)/trend", Trend}};
-
 void Stream(const Api& api, const httplib::Request& request,
             httplib::Response& response) {
   const std::string valve = Parameter(request, "valve").value_or("");
@@ -181,8 +176,11 @@ void Stream(const Api& api, const httplib::Request& request,
 
 }  // namespace
 
-std::span<const Route> LiveRoutes() {
-  return kLiveRoutes;
+std::vector<Route> LiveRoutes() {
+  return {{"/api/v1/status", Status},
+          {"/api/v1/faults", Faults},
+          {"/api/v1/valves", Valves},
+          {"/api/v1/valves/(.+)/trend", Trend}};
 }
 
 void AddStreamRoute(httplib::Server& server, const Api& api) {

@@ -5,8 +5,8 @@
 // consumers are ready; until then samples queue at the subscriber.
 //
 // Stop: HTTP stops accepting requests, the diagnosis drains the subscriber,
-// recorder and journal store and publish the results, common causes are looked
-// for in the last events, the hook gets a second for its deliveries, the
+// recorder and journal store and publish the results, the follower of the
+// history reads the last events, the hook gets a second for its deliveries, the
 // session is closed in the history, and the last status is published. Each step
 // is attempted even if an earlier one failed.
 #include "monitor/service/service.h"
@@ -25,7 +25,6 @@
 #include "monitor/bus/dds_options.h"
 #include "monitor/guard.h"
 #include "monitor/health_book.h"
-#include "monitor/service/cause_groups.h"
 #include "monitor/service/shadow.h"
 #include "report/fault_texts.h"
 #include "storage/history/history_reader.h"
@@ -85,15 +84,6 @@ std::vector<Heartbeat::Member> Members(const Pipeline& pipeline,
   return members;
 }
 
-std::vector<storage::CauseGroup> CauseGroupsOf(
-    const ServiceOptions& options, const storage::DataDirectory& data) {
-  const std::filesystem::path usual = data.path / "groups.toml";
-  if (options.groups.empty() && !std::filesystem::exists(usual)) {
-    return {};
-  }
-  return ReadCauseGroups(options.groups.empty() ? usual : options.groups);
-}
-
 std::filesystem::path LockOf(const storage::DataDirectory& data) {
   std::filesystem::path path = data.history();
   return path += ".lock";
@@ -148,7 +138,6 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                    : nullptr),
       data_(Prepared(context.options.data_dir)),
       lock_(LockOf(data_), "recording faults"),
-      cause_groups_(CauseGroupsOf(options, data_)),
       hook_(
           options.on_event.empty()
               ? nullptr
@@ -247,9 +236,9 @@ void Service::ListAfterCommit() {
       console_->OnCommitted(event, stored);
     });
   }
-  if (!cause_groups_.empty()) {
-    after_commit_.Add("common_causes",
-                      [this](const FaultEvent&, bool) { causes_->Wake(); });
+  if (options_.follower) {
+    after_commit_.Add("follower",
+                      [this](const FaultEvent&, bool) { follower_->Wake(); });
   }
   if (pair_) {
     after_commit_.AddGate(*pair_);
@@ -311,16 +300,19 @@ void Service::Start() {
   if (hook_) {
     hook_->Start();
   }
-  if (!cause_groups_.empty()) {
-    context_.log(LogLevel::kInfo,
-                 "cause_groups groups=" + std::to_string(cause_groups_.size()));
-    causes_ = std::make_unique<planner::CauseWatch>(
-        data_.history(), cause_groups_,
-        [this](const storage::CauseChange& change) { OnCause(change); },
-        [this](const std::function<void()>& step) {
-          Guarded(counters_, log_, "common_causes", step);
-        });
-    causes_->Start();
+  if (options_.follower) {
+    follower_ = options_.follower(
+        {data_.history(), context_.log,
+         [this](std::string_view part, const std::function<void()>& step) {
+           Guarded(counters_, log_, part, step);
+         },
+         [this](const report::Json& json) {
+           // Both of a pair find it; the leader notifies.
+           if (hook_ && (!pair_ || pair_->status().leads)) {
+             hook_->Notify(json);
+           }
+         }});
+    follower_->Start();
   }
   ResendEvents();
   if (console_) {
@@ -351,20 +343,6 @@ void Service::ResendEvents() {
       pipeline_.MarkPublished(event);
       counters_.Add(Counter::kEventsResent);
     }
-  }
-}
-
-void Service::OnCause(const storage::CauseChange& change) {
-  context_.log(
-      LogLevel::kWarning,
-      EventLine("common_cause",
-                {{"kind", std::string(CauseChangeName(change.kind))},
-                 {"cause", change.cause.cause_id},
-                 {"group", change.cause.group},
-                 {"episodes", std::to_string(change.cause.members.size())}}));
-  // Both of a pair find the cause; the leader notifies.
-  if (hook_ && (!pair_ || pair_->status().leads)) {
-    hook_->Notify(CauseJson(change));
   }
 }
 
@@ -662,8 +640,8 @@ void Service::Stop() {
     operators_->Stop();
   }
   errors.Try([this] { StopDiagnosis(); });
-  if (causes_) {
-    errors.Try([this] { causes_->Stop(); });
+  if (follower_) {
+    errors.Try([this] { follower_->Stop(); });
   }
   if (hook_) {
     errors.Try([this] { hook_->Stop(kHookPatience); });

@@ -22,12 +22,12 @@
 #include "monitor/pipeline.h"
 #include "monitor/recorder.h"
 #include "monitor/service/event_hook.h"
+#include "monitor/service/history_follower.h"
 #include "monitor/service/history_store.h"
 #include "monitor/service/model_assignment.h"
 #include "monitor/service/run_store.h"
 #include "monitor/service/status.h"
 #include "monitor/shadow.h"
-#include "planner/cause_watch.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
 #include "storage/database/data_directory.h"
@@ -56,8 +56,7 @@ struct ServiceOptions {
   /// Serve metrics and probes over HTTP.
   std::optional<HttpAddress> http;
   std::vector<std::string> http_names;  ///< See HostAllowed().
-  /// Groups of valves with common causes; empty: DATA/groups.toml if it exists.
-  std::filesystem::path groups;
+  MakeFollower follower;                ///< Of the history; see there.
   /// Notify a program or a web server of events; empty: disabled.
   std::string on_event;
   int on_event_per_minute{60};
@@ -93,7 +92,6 @@ class Service {
   void AnnounceModels(const ModelSet& models);
 
   void Start();
-  void OnCause(const storage::CauseChange& change);
   void ResendEvents();
   void ServeConsole();
   void ServeProbes();
@@ -124,7 +122,6 @@ class Service {
   std::unique_ptr<console::Console> console_;  // Null: no console.
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
-  std::vector<storage::CauseGroup> cause_groups_;
   std::unique_ptr<EventHook> hook_;  // Null: no event hook.
   idl::Participant participant_;
   idl::Participant intake_participant_;  // See idl::Overflow.
@@ -145,9 +142,9 @@ class Service {
   std::unique_ptr<Pair> pair_;               // Null: not in a pair.
   std::unique_ptr<OperatorSync> operators_;  // Set together with pair_.
   ShareWatch shares_;
-  std::unique_ptr<ShadowBank> shadow_;           // Null: no candidate.
-  std::unique_ptr<Recorder> recorder_;           // Set together with runs_.
-  std::unique_ptr<planner::CauseWatch> causes_;  // Null: no groups.
+  std::unique_ptr<ShadowBank> shadow_;         // Null: no candidate.
+  std::unique_ptr<Recorder> recorder_;         // Set together with runs_.
+  std::unique_ptr<HistoryFollower> follower_;  // Null: nothing follows.
   Pipeline pipeline_;
   Pulse service_pulse_;  // Beaten by the thread of Run().
   Heartbeat heartbeat_;

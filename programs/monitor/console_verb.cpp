@@ -8,10 +8,11 @@
 
 #include "base/time_text.h"
 #include "monitor/console/console.h"
-#include "monitor/service/plant_feed.h"
 #include "monitor/throttled_log.h"
+#include "plant/live/plant_feed.h"
 #include "plant/plant_reader.h"
 #include "programs/monitor/bus_view.h"
+#include "programs/monitor/planner.h"
 #include "programs/monitor/verbs.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
@@ -37,6 +38,7 @@ console::MonitorFacts FactsOf(const std::vector<console::MonitorLine>& lines) {
 
 int RunConsole(PlantConsoleOptions options, const report::Context& context) {
   options.console.address = ParseHttpAddress(options.listen, "--listen");
+  options.console.routes = PlannerRoutes();
   const LogSink log = LimitLog(context.log);
   const report::StopSignals signals;
   const std::int64_t started_ns = NowNs();

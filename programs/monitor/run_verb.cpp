@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -11,6 +12,7 @@
 #include "base/error.h"
 #include "monitor/service/service.h"
 #include "monitor/throttled_log.h"
+#include "programs/monitor/planner.h"
 #include "programs/monitor/verbs.h"
 #include "report/program.h"
 #include "report/stop_signals.h"
@@ -29,6 +31,7 @@ struct RunArguments {
   std::string console_users;
   TlsFiles console_tls;
   PairOptions pair;
+  std::filesystem::path groups;
   ServiceOptions service;
 };
 
@@ -92,6 +95,7 @@ void TakeConsole(const RunArguments& arguments, ServiceOptions& options) {
       options.console.emplace(arguments.console_options);
   console.address = ParseHttpAddress(arguments.console, "--console");
   console.names = options.http_names;
+  console.routes = PlannerRoutes();
   if (writable) {
     console.admission.token_file = arguments.console_token;
   }
@@ -152,12 +156,6 @@ void AddConsoleOptions(CLI::App& run, RunArguments& arguments) {
 }
 
 void AddOnEventOptions(CLI::App& run, ServiceOptions& service) {
-  run.add_option("--groups", service.groups,
-                 "Groups of valves, [[group]] name, valves, faults, "
-                 "min_valves, within_s: faults that many have at once get one "
-                 "common cause (default: DATA/groups.toml)")
-      ->check(CLI::ExistingFile)
-      ->type_name("FILE.toml");
   run.add_option("--on-event", service.on_event,
                  "Notify of every fault event: a command that reads it as JSON "
                  "from its standard input, or http://HOST[:PORT][/PATH] that "
@@ -218,6 +216,7 @@ int Run(const RunArguments& arguments, const report::Context& context) {
   if (!options.http_names.empty() && !options.http && !options.console) {
     throw ConfigError("--allow-host needs --http or --console");
   }
+  options.follower = FollowCauses(arguments.groups, context);
   // Before the service, so that a signal during its start requests an orderly
   // stop.
   report::StopSignals signals(report::StopSignals::HangUp::kReload);
@@ -279,6 +278,7 @@ void AddRunVerb(report::Program& program) {
                  "samples")
       ->check(CLI::Range(0.0, 1800.0))
       ->capture_default_str();
+  AddGroupsOption(program, run, arguments->groups);
   AddOnEventOptions(run, service);
   AddPairOptions(run, arguments->pair);
   run.add_option("--http", arguments->http,

@@ -15,7 +15,8 @@ void AddConsoleUserVerb(report::Program& program);
 /// `watch`: prints or counts what monitors publish.
 void AddWatchVerb(report::Program& program);
 
-/// `console`: the live page of all monitors.
+/// `console`: the live page of all monitors; in a build without plant/,
+/// left_out.cpp.
 void AddConsoleVerb(report::Program& program);
 
 /// `top`: a live table of what they publish.

@@ -3,7 +3,6 @@
 
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
-#include "plant/plant_reader.h"
 #include "programs/store/verbs.h"
 #include "storage/models/models.h"
 
@@ -47,7 +46,7 @@ void PlantOptions::AddTo(CLI::App& verb) {
 std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
                                      const Context& context) {
   if (plant.asked()) {
-    return std::make_unique<PlantReader>(plant.url, plant.monitor);
+    return OpenPlant(plant);
   }
   return std::make_unique<HistoryReader>(DataOf(context).history());
 }

@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   fdi::storage::AddValvesVerbs(program);
   fdi::storage::AddTypesVerbs(program);
   fdi::storage::AddHistoryVerbs(program);
+  fdi::storage::AddFaultsVerb(program);
   fdi::storage::AddPlannerVerbs(program);
   fdi::storage::AddMaintenanceVerbs(program);
   fdi::storage::AddKeysVerbs(program);

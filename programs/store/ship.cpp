@@ -1,4 +1,5 @@
-// fdi-store ship: copies the history to the plant history in PostgreSQL.
+// fdi-store ship: copies the history to the plant history in PostgreSQL. And
+// --from of the verbs that read a history: opens that one.
 #include <algorithm>
 #include <chrono>
 #include <set>
@@ -8,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/log.h"
+#include "plant/plant_reader.h"
 #include "plant/shipper.h"
 #include "programs/store/verbs.h"
 
@@ -182,6 +184,10 @@ Report Ship(const ShipOptions& given, const Context& context) {
 }
 
 }  // namespace
+
+std::unique_ptr<History> OpenPlant(const PlantOptions& plant) {
+  return std::make_unique<PlantReader>(plant.url, plant.monitor);
+}
 
 void AddShipVerb(report::Program& program) {
   auto [verb, options] = AddVerb(

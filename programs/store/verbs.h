@@ -42,9 +42,11 @@ void AddHistoryVerbs(report::Program& program);  ///< list, show, export, plot
 // Added to the group `history`, which must exist.
 void AddHistoryFigures(report::Program& program, CLI::App& group);
 void AddAlarmVerbs(report::Program& program, CLI::App& group);
-void AddPlannerVerbs(report::Program& program);  ///< faults, health, worklist
+void AddFaultsVerb(report::Program& program);
 void AddMaintenanceVerbs(report::Program& program);
 void AddKeysVerbs(report::Program& program);
+// Of optional components; in a build without them, left_out.cpp defines these.
+void AddPlannerVerbs(report::Program& program);  ///< health, worklist
 void AddShipVerb(report::Program& program);
 void AddAuditVerb(report::Program& program);
 
@@ -114,6 +116,8 @@ struct HistoryOptions {
   }
 };
 
+/// The plant's history; of an optional component, too.
+std::unique_ptr<History> OpenPlant(const PlantOptions& plant);
 /// The history of --data, or the plant's.
 std::unique_ptr<History> OpenHistory(const PlantOptions& plant,
                                      const Context& context);

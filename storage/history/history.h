@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.h"
 #include "diagnosis/records/episode_look.h"
 #include "diagnosis/records/service_records.h"
 #include "diagnosis/records/strength_point.h"
@@ -17,8 +18,15 @@
 
 namespace fdi::storage {
 
-/// Read access to the history of one monitor (HistoryReader), or of a plant
-/// (PlantReader), whose rows also have host and monitor. One thread at a time.
+/// A history on another host is out of reach, refuses or fails; what() is one
+/// line with its reason.
+class HistoryAwayError : public DataError {
+ public:
+  using DataError::DataError;
+};
+
+/// Read access to the history of one monitor (HistoryReader), or of a plant,
+/// whose rows also have host and monitor. One thread at a time.
 class History {
  public:
   virtual ~History() = default;

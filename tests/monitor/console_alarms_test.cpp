@@ -2,7 +2,6 @@
 
 #include "monitor/console/alarm_book.h"
 #include "monitor/console/model_facts.h"
-#include "plant/plant_database.h"
 #include "report/shared_files.h"
 #include "storage/history/history_editor.h"
 #include "storage/history/history_reader.h"
@@ -74,13 +73,13 @@ TEST_F(AlarmBookTest, TellsSinceWhenTheHistoryIsAway) {
   AlarmBook book(
       [&]() -> std::unique_ptr<storage::History> {
         if (away) {
-          throw storage::PlantError("PostgreSQL: Connection refused");
+          throw storage::HistoryAwayError("PostgreSQL: Connection refused");
         }
         return std::make_unique<storage::HistoryReader>(path_);
       },
       texts_);
-  EXPECT_THROW(book.Refresh(kDetected), storage::PlantError);
-  EXPECT_THROW(book.Refresh(kDetected + kSecond), storage::PlantError);
+  EXPECT_THROW(book.Refresh(kDetected), storage::HistoryAwayError);
+  EXPECT_THROW(book.Refresh(kDetected + kSecond), storage::HistoryAwayError);
   ASSERT_TRUE(book.away());
   EXPECT_EQ(book.away()->since_ns, kDetected);
   EXPECT_EQ(book.away()->reason, "PostgreSQL: Connection refused");

@@ -91,6 +91,9 @@ Outcome RunProgram(std::vector<const char*> arguments,
   CLI::App& store = program.AddGroup("store", "Doors");
   program.AddVerb(store, "open", "Opens", [](const Context&) { return 1; });
   program.MapError<BusError>(kExitTransport);
+  program.AddLeftOut("", "paint", "FDI_PAINT");
+  program.AddLeftOut("greet", "--card", "FDI_PAINT");
+  program.AddExamples({{"paint wall", {{"A wall", "prog paint wall"}}}});
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();
   outcome.code =
@@ -122,6 +125,18 @@ TEST(ProgramTest, NumbersAreNumbers) {
   }
   EXPECT_EQ(RunProgram({"greet", "--size", "0.75"}).size, 0.75);
   EXPECT_EQ(RunProgram({"greet", "--who", "nan"}).who, "nan");
+}
+
+TEST(ProgramTest, WhatIsLeftOutNamesTheOptionThatBringsItBack) {
+  for (const std::vector<const char*>& arguments :
+       {std::vector<const char*>{"paint", "wall"}, {"greet", "--card=red"}}) {
+    const Outcome outcome = RunProgram(arguments);
+
+    EXPECT_EQ(outcome.code, kExitUsage);
+    EXPECT_THAT(outcome.err,
+                HasSubstr(" is not in this build: it takes one that was made "
+                          "with -DFDI_PAINT=ON"));
+  }
 }
 
 TEST(ProgramTest, ErrorOfAValueSaysWhatIsAccepted) {

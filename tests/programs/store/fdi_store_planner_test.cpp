@@ -1,7 +1,6 @@
 // What a planner asks fdi-store.
 #include <gmock/gmock.h>
 
-#include "diagnosis/fault_catalogue.h"
 #include "tests/programs/store/store_program_fixture.h"
 
 namespace fdi::storage {
@@ -60,17 +59,6 @@ TEST_F(FdiStorePlannerTest, WorkListAndCausesOfAnEmptyHistoryAreEmpty) {
   EXPECT_TRUE(StoreJson("history causes")["causes"].empty());
   EXPECT_EQ(Store("worklist").out, "Nothing to do.\n");
   EXPECT_EQ(Store("worklist --discipline plumber").code, 2);
-}
-
-TEST_F(FdiStorePlannerTest, CatalogueIsListedAndOverridden) {
-  EXPECT_EQ(StoreJson("faults")["faults"].size(),
-            kFaultsAndFindings.size() + 1);  // And unknown.
-  Write("faults.toml", "[f9]\nname = 'West header leaks'\n");
-  EXPECT_EQ(StoreJson("faults f9")["faults"][0]["name"], "West header leaks");
-  Write("faults.toml", "[f9]\nnane = 'x'\n");
-  const Outcome outcome = Store("faults");
-  EXPECT_EQ(outcome.code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("did you mean 'name'"));
 }
 
 }  // namespace

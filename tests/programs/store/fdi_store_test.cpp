@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include "diagnosis/fault_catalogue.h"
 #include "storage/models/models.h"
 #include "storage/runs/runs.h"
 #include "tests/programs/store/store_program_fixture.h"
@@ -408,6 +409,17 @@ TEST_F(FdiStoreTest, WhatTakesOutputTakesMinusO) {
   EXPECT_EQ(Store("models export pump -o pump.fdm").code, 0);
   EXPECT_EQ(Store("models import pump.fdm").code, 0);
   EXPECT_EQ(Store("history export -o history.csv").code, 0);
+}
+
+TEST_F(FdiStoreTest, CatalogueIsListedAndOverridden) {
+  EXPECT_EQ(StoreJson("faults")["faults"].size(),
+            kFaultsAndFindings.size() + 1);  // And unknown.
+  Write("faults.toml", "[f9]\nname = 'West header leaks'\n");
+  EXPECT_EQ(StoreJson("faults f9")["faults"][0]["name"], "West header leaks");
+  Write("faults.toml", "[f9]\nnane = 'x'\n");
+  const Outcome outcome = Store("faults");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("did you mean 'name'"));
 }
 
 }  // namespace

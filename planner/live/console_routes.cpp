@@ -1,63 +1,71 @@
 // Routes for maintenance planners: the work list, and months of a valve.
+#include "planner/live/console_routes.h"
+
 #include <map>
+#include <memory>
+#include <mutex>
 #include <sstream>
+#include <string>
 
 #include <httplib.h>
 
 #include "base/time_units.h"
-#include "monitor/console/api.h"
+#include "planner/work_list.h"
 #include "storage/history/health.h"
 
-namespace fdi::console {
+namespace fdi::planner {
 namespace {
+
+using console::Api;
+using console::Json;
+using console::Parameter;
+using console::TimeParameter;
 
 constexpr std::int64_t kDays = 90;  // Unless since_ms says otherwise.
 constexpr std::int64_t kMaxRows = 1000;
 constexpr std::int64_t kCacheNs = 60'000'000'000;
 
-std::vector<planner::HealthLimit> LimitsOf(const httplib::Request& request) {
+// The last work list that was requested.
+struct WorkListCache {
+  std::mutex mutex;
+  std::string query;
+  std::int64_t read_ns{0};
+  std::vector<WorkRow> rows;
+};
+
+std::vector<HealthLimit> LimitsOf(const httplib::Request& request) {
   std::vector<std::string> texts;
   for (std::size_t i = 0; i < request.get_param_value_count("limit"); ++i) {
     texts.push_back(request.get_param_value("limit", i));
   }
-  return planner::ParseLimits(texts);
+  return ParseLimits(texts);
 }
 
-report::Report ReadReport(const Api& api, const httplib::Request& request) {
+report::Report ReadReport(WorkListCache& cache, const Api& api,
+                          const httplib::Request& request) {
   std::string query = "?";
   for (const auto& [name, value] : request.params) {
     query += name + "=" + value + "&";
   }
-  WorkListCache& cache = api.work_list;
   const std::int64_t now_ns = api.sources.utc_now_ns();
   const std::lock_guard lock(cache.mutex);
   if (query != cache.query || now_ns >= cache.read_ns + kCacheNs ||
       now_ns < cache.read_ns) {
-    planner::WorkQuery work;
+    WorkQuery work;
     work.options.now_ns = now_ns;
     work.valve_glob = Parameter(request, "valve").value_or("*");
     work.since_ns =
         TimeParameter(request, "since_ms", now_ns - kDays * kNsPerDay);
     work.top = static_cast<std::size_t>(
-        IntegerParameter(request, "top", 10, 1, kMaxRows));
+        console::IntegerParameter(request, "top", 10, 1, kMaxRows));
     work.discipline = Parameter(request, "discipline").value_or("");
     work.limits = LimitsOf(request);
     const auto history = api.History();
-    cache.rows = planner::ReadWorkList(*history, api.texts, work);
+    cache.rows = ReadWorkList(*history, api.texts, work);
     cache.query = query;
     cache.read_ns = now_ns;
   }
-  return planner::WorkListReport(cache.rows);
-}
-
-Json WorkList(const Api& api, const httplib::Request& request) {
-  return ReadReport(api, request).document;
-}
-
-File WorkListCsv(const Api& api, const httplib::Request& request) {
-  std::ostringstream csv;
-  ReadReport(api, request).PrintCsv(csv);
-  return {"text/csv; charset=utf-8", "worklist.csv", csv.str()};
+  return WorkListReport(cache.rows);
 }
 
 // One array per quantity, as charts need them; all have the same length.
@@ -80,10 +88,10 @@ Json ColumnsJson(const std::vector<HealthHour>& hours) {
       }
     }
   };
-  const Json rows = planner::HealthHoursJson(hours);
+  const Json rows = HealthHoursJson(hours);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     for (auto& [key, column] : columns.items()) {
-      column.push_back(key == "t_ms" ? Ms(hours[i].hour * kNsPerHour)
+      column.push_back(key == "t_ms" ? console::Ms(hours[i].hour * kNsPerHour)
                                      : rows[i][key]);
     }
     for (const Json& channel : rows[i]["channels"]) {
@@ -109,26 +117,34 @@ Json Health(const Api& api, const httplib::Request& request) {
   const std::int64_t now_ns = api.sources.utc_now_ns();
   const std::int64_t since_ns =
       TimeParameter(request, "since_ms", now_ns - kDays * kNsPerDay);
-  const bool hourly = IntegerParameter(request, "hourly", 0, 0, 1) == 1;
+  const bool hourly =
+      console::IntegerParameter(request, "hourly", 0, 0, 1) == 1;
   const auto limits = LimitsOf(request);
   const auto history = api.History();
   const std::vector<HealthHour> hours =
       history->Health({valve_id, since_ns, now_ns + kNsPerHour});
   Json json{{"valve", valve_id}, {"step", hourly ? "hour" : "day"}};
-  json.update(ColumnsJson(hourly ? hours : planner::DaysOf(hours)));
-  json["trends"] = planner::TrendsJson(planner::TrendsOf(hours, limits));
+  json.update(ColumnsJson(hourly ? hours : DaysOf(hours)));
+  json["trends"] = TrendsJson(TrendsOf(hours, limits));
   return json;
 }
 
-constexpr Route kPlannerRoutes[] = {
-    {"/api/v1/worklist", WorkList},
-    {"/api/v1/worklist.csv", nullptr, WorkListCsv},
-    {"/api/v1/valves/(.+)/health", Health}};
-
 }  // namespace
 
-std::span<const Route> PlannerRoutes() {
-  return kPlannerRoutes;
+std::vector<console::Route> ConsoleRoutes() {
+  const auto cache = std::make_shared<WorkListCache>();
+  return {{"/api/v1/worklist",
+           [cache](const Api& api, const httplib::Request& request) {
+             return ReadReport(*cache, api, request).document;
+           }},
+          {"/api/v1/worklist.csv", nullptr,
+           [cache](const Api& api, const httplib::Request& request) {
+             std::ostringstream csv;
+             ReadReport(*cache, api, request).PrintCsv(csv);
+             return console::File{"text/csv; charset=utf-8", "worklist.csv",
+                                  csv.str()};
+           }},
+          {"/api/v1/valves/(.+)/health", Health}};
 }
 
-}  // namespace fdi::console
+}  // namespace fdi::planner

@@ -1,4 +1,6 @@
 // The planner's part of the console over real HTTP.
+#include "planner/live/console_routes.h"
+
 #include <fstream>
 
 #include <gmock/gmock.h>
@@ -20,6 +22,7 @@ class PlannerRoutesTest : public storage::HistoryFixture {
     ConsoleOptions options;
     options.address.host = "127.0.0.1";
     options.files = directory_.path();
+    options.routes = planner::ConsoleRoutes();
     std::string listening;
     console_.emplace(options, report::GlobalOptions{},
                      [&listening](LogLevel, std::string_view line) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/worker.h"
+#include "monitor/service/history_follower.h"
 #include "storage/history/common_cause.h"
 #include "storage/history/history_database.h"
 
@@ -17,7 +18,7 @@ namespace fdi::planner {
 /// a connection and a thread, so that neither journal nor bus waits for it.
 ///
 /// Built idle. Thread safe except for Start() and Stop().
-class CauseWatch {
+class CauseWatch : public monitor::HistoryFollower {
  public:
   /// Runs a step and takes what it throws; the step is repeated later.
   using Guard = std::function<void(const std::function<void()>&)>;
@@ -28,15 +29,13 @@ class CauseWatch {
              std::vector<storage::CauseGroup> groups,
              std::function<void(const storage::CauseChange&)> on_change,
              Guard guard);
-  ~CauseWatch() { Stop(); }
+  ~CauseWatch() override { Stop(); }
   CauseWatch(const CauseWatch&) = delete;
   CauseWatch& operator=(const CauseWatch&) = delete;
 
-  void Start();
-  /// Further events are committed. Does not wait.
-  void Wake();
-  /// Reads what is committed, then ends the thread.
-  void Stop();
+  void Start() override;
+  void Wake() override;
+  void Stop() override;
 
  private:
   void Run();
@@ -54,5 +53,9 @@ class CauseWatch {
 
   Worker worker_;
 };
+
+/// Logs each change of a common cause of `groups`, and notifies of it; empty if
+/// there are no groups.
+monitor::MakeFollower CauseFollower(std::vector<storage::CauseGroup> groups);
 
 }  // namespace fdi::planner

@@ -1,4 +1,4 @@
-#include "monitor/service/cause_groups.h"
+#include "planner/live/cause_groups.h"
 
 #include <fstream>
 
@@ -7,12 +7,12 @@
 
 #include "base/error.h"
 #include "monitor/service/history_store.h"
-#include "planner/cause_watch.h"
+#include "planner/live/cause_watch.h"
 #include "tests/monitor/linear_models.h"
 #include "tests/monitor/test_support.h"
 #include "tests/storage/temporary_directory.h"
 
-namespace fdi::monitor {
+namespace fdi::planner {
 namespace {
 
 using testing::HasSubstr;
@@ -46,7 +46,7 @@ class CauseGroupsTest : public testing::Test {
   }
   // As much as the watch of a session reads until its end.
   void Watch() {
-    planner::CauseWatch watch(
+    CauseWatch watch(
         directory_.path() / "history.db",
         ReadCauseGroups(Write("[[group]]\nname = 'header'\n"
                               "valves = ['A-*']\nfaults = ['f7']\n"
@@ -83,8 +83,8 @@ class CauseGroupsTest : public testing::Test {
   }
 
   storage::TemporaryDirectory directory_;
-  std::shared_ptr<const ModelSet> models_{SharedLinearModels()};
-  std::optional<HistoryStore> store_;
+  std::shared_ptr<const ModelSet> models_{monitor::SharedLinearModels()};
+  std::optional<monitor::HistoryStore> store_;
   std::vector<storage::CauseChange> told_;
   std::vector<std::string> failures_;
 };
@@ -171,4 +171,4 @@ TEST_F(CauseGroupsTest, ACauseThatCannotBeStoredIsAFailureOfItsOwn) {
 }
 
 }  // namespace
-}  // namespace fdi::monitor
+}  // namespace fdi::planner

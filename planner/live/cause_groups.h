@@ -6,7 +6,7 @@
 #include "report/json_output.h"
 #include "storage/history/common_cause.h"
 
-namespace fdi::monitor {
+namespace fdi::planner {
 
 /// Reads the groups of valves that may share a cause:
 ///
@@ -25,4 +25,4 @@ std::vector<storage::CauseGroup> ReadCauseGroups(
 /// "valves", "members": [{"valve_id", "episode_id", "fault"}]}
 report::Json CauseJson(const storage::CauseChange& change);
 
-}  // namespace fdi::monitor
+}  // namespace fdi::planner

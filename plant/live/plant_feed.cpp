@@ -1,4 +1,4 @@
-#include "monitor/service/plant_feed.h"
+#include "plant/live/plant_feed.h"
 
 #include <algorithm>
 #include <utility>

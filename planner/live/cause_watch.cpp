@@ -1,7 +1,12 @@
-#include "planner/cause_watch.h"
+#include "planner/live/cause_watch.h"
 
 #include <chrono>
+#include <memory>
+#include <string>
 #include <utility>
+
+#include "base/log.h"
+#include "planner/live/cause_groups.h"
 
 namespace fdi::planner {
 namespace {
@@ -60,6 +65,33 @@ void CauseWatch::ReadAll() {
       on_change_(change);
     }
   } while (!book_.at_end());
+}
+
+monitor::MakeFollower CauseFollower(std::vector<storage::CauseGroup> groups) {
+  if (groups.empty()) {
+    return {};
+  }
+  return [groups = std::move(groups)](const monitor::FollowerContext& service)
+             -> std::unique_ptr<monitor::HistoryFollower> {
+    service.log(LogLevel::kInfo,
+                "cause_groups groups=" + std::to_string(groups.size()));
+    const auto tell = [service](const storage::CauseChange& change) {
+      service.log(
+          LogLevel::kWarning,
+          EventLine(
+              "common_cause",
+              {{"kind", std::string(CauseChangeName(change.kind))},
+               {"cause", change.cause.cause_id},
+               {"group", change.cause.group},
+               {"episodes", std::to_string(change.cause.members.size())}}));
+      service.notify(CauseJson(change));
+    };
+    return std::make_unique<CauseWatch>(
+        service.history, groups, tell,
+        [guard = service.guard](const std::function<void()>& step) {
+          guard("common_causes", step);
+        });
+  };
 }
 
 }  // namespace fdi::planner

@@ -1,4 +1,4 @@
-#include "monitor/service/cause_groups.h"
+#include "planner/live/cause_groups.h"
 
 #include <set>
 
@@ -7,7 +7,7 @@
 #include "base/toml_reader.h"
 #include "diagnosis/fault_catalogue.h"
 
-namespace fdi::monitor {
+namespace fdi::planner {
 namespace {
 
 constexpr double kMaxWindowS = 86'400.0;
@@ -81,4 +81,4 @@ report::Json CauseJson(const storage::CauseChange& change) {
       {"members", members}};
 }
 
-}  // namespace fdi::monitor
+}  // namespace fdi::planner

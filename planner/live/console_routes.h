@@ -1,0 +1,13 @@
+#pragma once
+
+#include <vector>
+
+#include "monitor/console/api.h"
+
+namespace fdi::planner {
+
+/// /api/v1/worklist, worklist.csv, valves/ID/health. Reading months of all
+/// valves takes a while, so the last work list stays valid for a minute.
+std::vector<console::Route> ConsoleRoutes();
+
+}  // namespace fdi::planner

@@ -1,0 +1,25 @@
+// What this program says where a build was made without an optional component.
+#include "base/error.h"
+#include "programs/store/verbs.h"
+
+namespace fdi::storage {
+
+#if !FDI_PLANNER
+void AddPlannerVerbs(report::Program& program) {
+  for (const char* verb : {"health", "worklist"}) {
+    program.AddLeftOut("", verb, "FDI_PLANNER");
+  }
+}
+#endif
+
+#if !FDI_PLANT
+void AddShipVerb(report::Program& program) {
+  program.AddLeftOut("", "ship", "FDI_PLANT");
+}
+
+std::unique_ptr<History> OpenPlant(const PlantOptions& /*plant*/) {
+  throw ConfigError(report::LeftOut("--from", "FDI_PLANT"));
+}
+#endif
+
+}  // namespace fdi::storage
