@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "storage/history/certainty.h"
 
 namespace fdi::console {
 namespace {
@@ -28,6 +29,7 @@ void AddTo(ValveAlarm& valve, const Alarm& alarm,
     valve.strength = e.isolated_ns ? std::optional(e.strength) : std::nullopt;
     valve.unconfirmed_ns = e.unconfirmed_ns;
     valve.fault = e.fault.value_or("");
+    valve.certainty = storage::CertaintyOf(e);
   }
 }
 

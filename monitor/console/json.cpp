@@ -6,6 +6,8 @@
 #include <string_view>
 
 #include "diagnosis/fault_catalogue.h"
+#include "storage/database/database.h"
+#include "storage/history/certainty.h"
 
 namespace fdi::console {
 namespace {
@@ -41,8 +43,8 @@ std::string_view QualityOf(const ValveState& valve) {
   return QualityName(valve.quality);
 }
 
-Json FaultsOf(const ValveState& valve) {
-  Json faults = Json::array();
+std::vector<std::string> FaultsOf(const ValveState& valve) {
+  std::vector<std::string> faults;
   for (std::size_t f = 0; valve.models && f < valve.models->faults.size();
        ++f) {
     if ((valve.isolated >> f & 1U) != 0) {
@@ -50,6 +52,18 @@ Json FaultsOf(const ValveState& valve) {
     }
   }
   return faults;
+}
+
+// That of its alarm; of a name that its alarm does not have yet, by itself.
+Json CertaintyJson(const ValveState& valve, const std::string& fault,
+                   const ValveAlarm& alarm) {
+  if (valve.state == State::kNormal && !alarm.unconfirmed_ns) {
+    return {};
+  }
+  return CertaintyName(
+      fault.empty() || fault == alarm.fault
+          ? alarm.certainty
+          : CertaintyOf(fault, Layer::kObservers, valve.factor));
 }
 
 Json RoundedList(const std::vector<double>& values, int decimals) {
@@ -127,6 +141,7 @@ Json TextOrNull(const std::optional<std::string>& text) {
 Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
               bool newest_only) {
   const bool named = valve.isolated != 0;
+  const std::vector<std::string> faults = FaultsOf(valve);
   Json missing = Json::array();
   for (std::size_t s = 0; s < kSignalCount; ++s) {
     if ((valve.missing & MaskOf(static_cast<Signal>(s))) != 0) {
@@ -141,7 +156,8 @@ Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
       {"quality", QualityOf(valve)},
       {"reasons", CoverageReasonsName(valve.reasons)},
       {"missing", std::move(missing)},
-      {"faults", FaultsOf(valve)},
+      {"faults", faults},
+      {"certainty", CertaintyJson(valve, storage::JoinNames(faults), alarm)},
       {"factor", named ? Rounded(valve.factor, kFactorDecimals) : Json()},
       {"strength",
        named ? Rounded(alarm.strength.value_or(valve.strength), kFactorDecimals)
@@ -288,6 +304,7 @@ Json AlarmJson(const storage::Alarm& alarm, const report::FaultTexts& texts) {
   Json json{{"episode", e.episode_id},
             {"valve", e.valve_id},
             {"fault", TextOrNull(e.fault)},
+            {"certainty", CertaintyName(storage::CertaintyOf(e))},
             {"layer", TextOrNull(e.layer)},
             {"state", StateOf(e)},
             {"isa", storage::AlarmStateName(alarm.state)},
@@ -346,6 +363,8 @@ storage::Alarm AlarmOf(const FaultEvent& event) {
     e.fault = faults;
     e.layer = LayerName(transition.layer);
     e.isolated_ns = transition.stamp_ns;
+  } else if (CertaintyOf(event) == Certainty::kNotKnown) {
+    e.unknown_kind = UnknownName(Unknown::kOutsideKnown);
   }
   if (transition.kind == TransitionKind::kCleared) {
     e.cleared_ns = transition.stamp_ns;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/records/certainty.h"
 #include "monitor/console/live_board.h"
 #include "report/fault_texts.h"
 #include "report/json_output.h"
@@ -37,6 +38,7 @@ struct ValveAlarm {
   std::optional<double> strength;  ///< Nothing: it has no name.
   std::optional<std::int64_t> unconfirmed_ns;
   std::string fault;  ///< Empty: it has no name.
+  Certainty certainty{Certainty::kNotYet};
 
   bool operator==(const ValveAlarm&) const = default;
 };

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/time_units.h"
-#include "diagnosis/fault_catalogue.h"
+#include "diagnosis/records/certainty.h"
 #include "monitor/trace.h"
 
 namespace fdi::console {
@@ -34,16 +34,6 @@ monitor::Trace EmptyTrace() {
 }
 
 }  // namespace
-
-std::string IsolatedFaults(const FaultEvent& event) {
-  std::string text;
-  for (const FaultCandidate& candidate : event.candidates) {
-    if (candidate.isolated) {
-      text.append(text.empty() ? "" : "|").append(FaultName(candidate.fault));
-    }
-  }
-  return text;
-}
 
 // What the board holds of one valve.
 //

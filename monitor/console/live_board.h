@@ -62,9 +62,6 @@ struct LiveTrend {
   std::vector<FollowedDrift> drift{};  ///< By channel; empty: not known.
 };
 
-/// The faults that `event` isolates, joined by |; empty if none.
-std::string IsolatedFaults(const FaultEvent& event);
-
 /// The last-value cache of the console: the state of each valve and its last
 /// 900 instants, packed. That is 91 kB a valve for six signals, two channels
 /// and five faults, 116 kB for nineteen: 232 MB for 2000 valves. After a change

@@ -83,7 +83,7 @@ std::string Fitting(const ModelFacts& models, const TracePoint& point,
   for (const std::size_t f : fitting) {
     text.append(text.empty() ? "" : ", ").append(name(models.faults[f]));
   }
-  return text.empty() ? "no observer fits" : "fits: " + text;
+  return text.empty() ? "no known fault fits" : "fits: " + text;
 }
 
 }  // namespace
@@ -174,7 +174,9 @@ std::string Explain(const ModelFacts& models, const TracePoint& point,
            (residual < 0.0 ? " below" : " above") +
            " what the normal model expects";
   }
-  return text + "; " + Fitting(models, point, name);
+  return point.state == State::kNormal
+             ? text
+             : text + "; " + Fitting(models, point, name);
 }
 
 }  // namespace fdi::console

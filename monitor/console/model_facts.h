@@ -74,7 +74,9 @@ using FaultNamer = std::function<std::string(std::string_view)>;
 ///
 /// The channel shown has the normal residual farthest beyond its threshold,
 /// relative to it; the faults listed have a factor of at least T/2, best first.
-/// If no channel is beyond its threshold, the text says so.
+/// If no channel is beyond its threshold, the text says so. While the valve is
+/// normal no fault is listed: observers of faults that change nothing then
+/// explain normal data, too.
 std::string Explain(const ModelFacts& models, const TracePoint& point,
                     const FaultNamer& name);
 

@@ -146,11 +146,11 @@ void TopBoard::Add(const FaultEvent& message, Clock::time_point /*now*/) {
   const Transition& transition = message.transition;
   if (transition.kind != TransitionKind::kClosed) {
     open_[message.valve_id] = {transition.detection_stamp_ns,
-                               message.episode_id};
+                               message.episode_id, CertaintyOf(message)};
     return;
   }
   const auto found = open_.find(message.valve_id);
-  if (found != open_.end() && found->second.second == message.episode_id) {
+  if (found != open_.end() && found->second.id == message.episode_id) {
     open_.erase(found);
   }
 }
@@ -199,11 +199,14 @@ Json TopBoard::RowOf(const LatestVector& latest, Clock::time_point now) const {
     }
     ++f;
   }
-  if (faults.empty() && verdict.state != State::kNormal) {
+  const auto open = open_.find(message.valve_id);
+  const bool abnormal = verdict.state != State::kNormal;
+  const bool since = open != open_.end() && abnormal;
+  Certainty certainty = CertaintyOf(faults, Layer::kObservers, largest);
+  if (since && faults.empty() && open->second.unnamed == Certainty::kNotKnown) {
+    certainty = Certainty::kNotKnown;
     faults = "unknown";
   }
-  const auto open = open_.find(message.valve_id);
-  const bool since = open != open_.end() && verdict.state != State::kNormal;
   return {{"valve_id", message.valve_id},
           {"state", console::ShownState(verdict.state, verdict.quality)},
           {"quality", QualityName(verdict.quality)},
@@ -211,15 +214,18 @@ Json TopBoard::RowOf(const LatestVector& latest, Clock::time_point now) const {
           {"fault", faults.empty() ? Json() : Json(faults)},
           {"name",
            faults.empty() ? Json() : Json(texts_.Words(faults, strength).name)},
+          {"certainty", abnormal ? Json(CertaintyName(certainty)) : Json()},
           {"factor", largest},
           {"strength", verdict.isolated == 0 ? Json() : Json(strength)},
           {"normal_factor", verdict.normal_factor},
           {"factors", LargestOf(factors)},
           {"residuals", names_.Residuals(message)},
           {"since_utc",
-           since ? Json(FormatTime(open->second.first, true)) : Json()},
+           since ? Json(FormatTime(open->second.detection_stamp_ns, true))
+                 : Json()},
           {"abnormal_s",
-           since ? Json((verdict.stamp_ns - open->second.first) / 1'000'000'000)
+           since ? Json((verdict.stamp_ns - open->second.detection_stamp_ns) /
+                        kNsPerSecond)
                  : Json()},
           {"stamp_utc", FormatTime(verdict.stamp_ns, true)},
           {"model_set", info == nullptr ? Json()
@@ -243,7 +249,7 @@ report::Report TopBoard::Valves(TopSort sort, const std::string& filter,
     const bool by_factor = sort == TopSort::kWorst || sort == TopSort::kFactor;
     rows.emplace_back(
         Order{sort == TopSort::kWorst ? Rank(row) : 0,
-              by_time ? -open_.at(valve_id).first : 0,
+              by_time ? -open_.at(valve_id).detection_stamp_ns : 0,
               by_factor ? -row["factor"].get<double>() : 0.0, valve_id},
         std::move(row));
   }
@@ -266,13 +272,10 @@ report::Report TopBoard::Valves(TopSort sort, const std::string& filter,
        {.heading = "state", .key = "state", .tone = ToneOf},
        {.heading = "quality", .text = quality, .tone = ToneOf},
        {.heading = "fault", .key = "fault", .tone = ToneOf},
+       {.heading = "how sure", .key = "certainty", .tone = ToneOf},
        {.heading = "which is", .key = "name", .spare = 2},
        {.heading = "strength [-]", .key = "strength", .spare = 5},
        {"since", "abnormal_s", Format::kDuration, 0, 3},
-       {.heading = "d_0 [-]", .key = "normal_factor", .spare = 4},
-       {.heading = "factors d [-]",
-        .spare = 1,
-        .text = [](const Json& row) { return NumbersText(row["factors"]); }},
        {.heading = "residuals",
         .spare = 6,
         .text = [](const Json& row) { return NumbersText(row["residuals"]); }},

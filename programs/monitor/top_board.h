@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "diagnosis/records/certainty.h"
 #include "programs/monitor/bus_view.h"
 #include "report/fault_texts.h"
 #include "report/report.h"
@@ -36,9 +37,12 @@ class TopBoard {
   void Remove(const std::string& valve_id);
 
   /// {"monitor", "valves": [{"valve_id", "state", "quality", "silent", "fault",
-  /// "name", "factor", "strength", "normal_factor", "factors", "residuals",
-  /// "since_utc", "abnormal_s", "stamp_utc", "model_set"}]}, and its table.
-  /// `state` is NOT_JUDGED where the quality rules out a verdict; `factor` is
+  /// "name", "certainty", "factor", "strength", "normal_factor", "factors",
+  /// "residuals", "since_utc", "abnormal_s", "stamp_utc", "model_set"}]}, and
+  /// its table, which has words instead of factors.
+  /// `state` is NOT_JUDGED where the quality rules out a verdict; `fault` and
+  /// `certainty` are null unless a fault is detected, `fault` also until it has
+  /// a name ("unknown" where no known one fits); `factor` is
   /// the largest of the isolated set, or of any fault; `strength` is null until
   /// a fault is isolated; `factors` are the three that fit best; `since_utc`
   /// and `abnormal_s` belong to the open episode.
@@ -63,8 +67,12 @@ class TopBoard {
   std::chrono::milliseconds silence_;
   ModelNames names_;
   std::map<std::string, LatestVector> decisions_;
-  /// First abnormal sample of the open episode, and its id.
-  std::map<std::string, std::pair<std::int64_t, std::uint64_t>> open_;
+  struct OpenEpisode {
+    std::int64_t detection_stamp_ns;  // First abnormal sample.
+    std::uint64_t id;
+    Certainty unnamed;  // Of its last event, where that has no name.
+  };
+  std::map<std::string, OpenEpisode> open_;
   std::map<std::string, std::pair<idl::MonitorStatusMessage, Clock::time_point>>
       monitors_;
 };

@@ -1,7 +1,10 @@
 #include "programs/monitor/watch_records.h"
 
+#include <algorithm>
+
 #include "base/time_text.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/records/certainty.h"
 #include "monitor/console/model_facts.h"
 #include "report/text_table.h"
 #include "storage/history/episode.h"
@@ -21,21 +24,18 @@ Json Utc(std::int64_t stamp_ns) {
   return FormatTime(stamp_ns, true);
 }
 
-// Why there is no name: the candidates, or that no known fault fits.
-std::string UnknownReason(const FaultEvent& message) {
-  if (message.transition.faults != 0) {
-    return "";
+// "likely f19 strength=0.52", "not yet, f3|f6 may be"
+std::string NameText(const FaultEvent& message, const std::string& faults) {
+  std::string text(CertaintyName(CertaintyOf(message)));
+  if (!faults.empty()) {
+    return text + " " + faults +
+           " strength=" + FormatNumber(message.transition.strength, 2);
   }
   std::string names;
   for (const FaultCandidate& candidate : message.candidates) {
     names += (names.empty() ? "" : "|") + FaultName(candidate.fault);
   }
-  if (!names.empty()) {
-    return " too_early=" + names;
-  }
-  return message.transition.kind == TransitionKind::kDetected
-             ? " too_early"
-             : " outside_known";
+  return names.empty() ? text : text + ", " + names + " may be";
 }
 
 }  // namespace
@@ -70,20 +70,22 @@ WatchRecord WatchRecords::RecordOf(const idl::DecisionMessage& message) const {
   for (const auto& [name, residual] : residuals.items()) {
     line += " r_" + name + "=" + FormatNumber(residual.get<double>(), 3);
   }
-  if (message.channel_count > 0) {
-    line += " normal=" + FormatNumber(v.normal_factor, 2);
-  }
   Json isolated = Json::array();
+  std::string faults;
+  double largest = 0.0;
   std::size_t bit = 0;
   for (const auto& [name, factor] : factors.items()) {
-    const bool member = (v.isolated >> bit++ & 1U) != 0;
-    if (member) {
+    if ((v.isolated >> bit++ & 1U) != 0) {
       isolated.push_back(name);
+      faults += (faults.empty() ? "" : "|") + name;
+      largest = std::max(largest, factor.get<double>());
     }
-    if (member || factor.get<double>() > 0.0) {
-      line += " " + name + "=" + FormatNumber(factor.get<double>(), 2) +
-              (member ? "*" : "");
-    }
+  }
+  Json certainty;
+  if (v.state != State::kNormal) {
+    certainty = CertaintyName(CertaintyOf(faults, Layer::kObservers, largest));
+    line += " " + certainty.get<std::string>() +
+            (faults.empty() ? "" : " " + faults);
   }
   return {{{"topic", "DecisionVector"},
            {"valve_id", message.valve_id},
@@ -98,7 +100,8 @@ WatchRecord WatchRecords::RecordOf(const idl::DecisionMessage& message) const {
            {"normal_factor", v.normal_factor},
            {"residuals", residuals},
            {"factors", factors},
-           {"isolated", std::move(isolated)}},
+           {"isolated", std::move(isolated)},
+           {"certainty", std::move(certainty)}},
           line};
 }
 
@@ -121,19 +124,14 @@ TransitionKind WatchRecords::KindOf(const FaultEvent& message) {
 
 void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
   const Transition& t = message.transition;
-  std::string faults;
+  const std::string faults = IsolatedFaults(message);
   Json candidates = Json::array();
   for (const FaultCandidate& candidate : message.candidates) {
-    const std::string name = FaultName(candidate.fault);
-    if (candidate.isolated) {
-      faults += (faults.empty() ? "" : "|") + name;
-    }
-    candidates.push_back({{"fault", name},
+    candidates.push_back({{"fault", FaultName(candidate.fault)},
                           {"factor", candidate.factor},
                           {"strength", candidate.strength},
                           {"isolated", candidate.isolated}});
   }
-  faults = faults.empty() ? "unknown" : faults;
   const std::string kind(TransitionName(KindOf(message)));
   const std::string reason(EndReasonName(t.reason));
   sink_({{{"topic", "FaultEvent"},
@@ -142,18 +140,17 @@ void WatchRecords::Add(const FaultEvent& message, Clock::time_point /*now*/) {
           {"transition", kind},
           {"stamp_utc", Utc(t.stamp_ns)},
           {"detected_utc", Utc(t.detection_stamp_ns)},
-          {"fault", faults},
+          {"fault", faults.empty() ? "unknown" : faults},
+          {"certainty", CertaintyName(CertaintyOf(message))},
           {"factor", t.factor},
-          {"strength", t.strength},
+          {"strength", faults.empty() ? Json() : Json(t.strength)},
           {"reason", reason},
           {"candidates", std::move(candidates)},
           {"model_set",
            message.model_set + "@" + std::to_string(message.model_version)},
           {"persisted", message.persisted}},
-         Start(t.stamp_ns, message.valve_id) + " EVENT " + kind + " " + faults +
-             UnknownReason(message) + " factor=" + FormatNumber(t.factor, 2) +
-             " strength=" + FormatNumber(t.strength, 2) +
-             " episode=" + Hex(message.episode_id) +
+         Start(t.stamp_ns, message.valve_id) + " EVENT " + kind + " " +
+             NameText(message, faults) + " episode=" + Hex(message.episode_id) +
              (t.reason == EndReason::kNone ? "" : " reason=" + reason) +
              (message.persisted ? "" : " NOT_PERSISTED")});
 }

@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "diagnosis/fault_catalogue.h"
 #include "programs/store/verbs.h"
+#include "storage/history/certainty.h"
 #include "storage/models/models.h"
 
 namespace fdi::storage {
@@ -139,6 +140,7 @@ Json EpisodeJson(const Episode& episode) {
       {"isolated_utc", TextJson(episode.isolated_utc)},
       {"cleared_utc", TextJson(episode.cleared_utc)},
       {"fault", TextJson(episode.fault)},
+      {"certainty", CertaintyName(CertaintyOf(episode))},
       {"peak_factor", episode.peak_factor},
       {"model_set", episode.model_set},
       {"end_reason", TextJson(episode.end_reason)},

@@ -7,6 +7,7 @@
 #include "report/fault_texts.h"
 #include "report/plot/episode_figure.h"
 #include "report/text_table.h"
+#include "storage/history/certainty.h"
 #include "storage/history/history_reader.h"
 #include "storage/history/strength.h"
 
@@ -106,9 +107,9 @@ Report ListEpisodes(const HistoryOptions& options, const Context& context) {
       {"fault", "fault"},
       TextColumn(
           "which is", [of](const Json& row) { return of(row).fault_name; }, 2),
+      {"how sure", "certainty", Format::kPlain, 0, 3},
       {"severity", "severity", Format::kPlain, 0, 3},
       {"strength [-]", "strength", Format::kPlain, 3, 4},
-      {"peak [-]", "peak_factor", Format::kPlain, 3, 9},
       TextColumn(
           "isolated after",
           [of](const Json& row) { return of(row).isolated_after; }, 5,
@@ -171,14 +172,14 @@ void AddEvents(const std::vector<HistoryEntry>& events, const Context& context,
   report::TextTable table({{"event"},
                            {"at"},
                            {"faults"},
-                           {"factor [-]", Align::kRight},
                            {"strength [-]", Align::kRight},
                            {"note"}});
   for (const HistoryEntry& event : events) {
     const bool by_hand = !event.who.empty();
     table.AddRow({event.kind, TimeText(event.stamp_ns, context), event.faults,
-                  by_hand ? "" : report::FormatNumber(event.factor, 3),
-                  by_hand ? "" : report::FormatNumber(event.strength, 3),
+                  by_hand || event.faults.empty()
+                      ? ""
+                      : report::FormatNumber(event.strength, 3),
                   NoteText(event)});
   }
   AddTextTable(report, table);
@@ -315,13 +316,15 @@ void AddGrowth(const Episode& episode,
   }
 }
 
-// "f19: Flow transmitter wrong", "unknown (outside_known): ...".
+// "likely: Flow transmitter wrong (f19), by simulation of the valve"
 std::string FaultLine(const Episode& e, const std::string& name) {
-  const std::string why = e.unknown_kind ? " (" + *e.unknown_kind + ")" : "";
-  const std::string by =
-      ByPhysics(e.layer.value_or("")) ? std::string(", ") + kByPhysics : "";
-  return e.fault ? *e.fault + why + ": " + name + by
-                 : "- (not isolated yet)" + why;
+  const std::string certainty(CertaintyName(CertaintyOf(e)));
+  if (!e.fault || e.fault == "unknown") {
+    return certainty;
+  }
+  return certainty + ": " + name + " (" + *e.fault + ")" +
+         (ByPhysics(e.layer.value_or("")) ? std::string(", ") + kByPhysics
+                                          : "");
 }
 
 std::string AlarmLine(const Alarm& alarm, const Context& context) {
@@ -377,7 +380,6 @@ std::vector<Column> EpisodeFields(const Alarm& alarm, const Context& context) {
           TextField("cleared", when(e.cleared_ns)),
           TextField("ended", TimeText(e.ended_ns, context) + " " +
                                  e.end_reason.value_or("(open)")),
-          {"peak factor", "peak_factor", Format::kPlain, 3},
           TextField("strength", StrengthLine(e)),
           TextField("model set", e.model_set + " " + Hex(e.model_hash)),
           {"label", "label"},

@@ -89,6 +89,7 @@ class Monitor {
 
 function tile(id, state, faults = [], more = {}) {
   return {id, state, faults, quality: 'LIVE', reasons: '', missing: [],
+    certainty: faults.length > 0 ? 'likely' : null,
     factor: faults.length > 0 ? 0.9 : null, strength: null, d0: 1,
     drift_used: null, stamp_ms: kNowMs, since_ms: null, episode: null,
     model_set: 'm@1', shelved_until_ms: null, unacked: false, spark: [],
@@ -99,6 +100,7 @@ function alarm(episode, valve, fault, more = {}) {
   return {episode, valve, fault, layer: null, state: 'ISOLATED', isa: 'UNACK',
     shelved: null, detected_ms: kNowMs, isolated_ms: null, cleared_ms: null,
     ended_ms: null, end_reason: null, peak_factor: 0.9, strength: 0.5,
+    certainty: fault ? 'likely' : 'not yet',
     label: null, acked_by: null, acked_ms: null, model_set: 'm@1',
     severity: 'high', discipline: 'instrument', namur: 'failure', name: fault,
     check: '', ...more};
@@ -119,7 +121,7 @@ after(async () => {
 
 test('a new valve leaves the worst ones first', async () => {
   monitor.reset([tile('A', 'NORMAL'), tile('C', 'NORMAL'),
-    tile('Z', 'ISOLATED', ['f19'])]);
+    tile('Z', 'ISOLATED', ['f19'], {severity: 'high'})]);
   const page = await open(browser, address, '#/');
   await page.locator('.tile').first().waitFor();
 
@@ -144,7 +146,7 @@ test('what to check appears with the name of the fault', async () => {
   await monitor.push('alarm', alarm(episode, 'V', 'f19'));
   await monitor.push('tiles', {tiles: [tile('V', 'ISOLATED', ['f19'],
       {episode})]});
-  await state.getByText('fault isolated').waitFor();
+  await state.getByText('fault named').waitFor();
 
   assert.match(await page.locator('.checks').textContent(), /Compare it/);
   await page.context().close();
@@ -218,5 +220,65 @@ test('the figures of a year count all its episodes', async () => {
   const episodes = page.locator('.facts div', {hasText: /^Episodes/});
 
   assert.equal(await episodes.locator('dd').first().textContent(), '7');
+  await page.context().close();
+});
+
+/** A trend of `count` instants, each as `last` says. */
+function trend(last, {count = 30, faults = ['f19', 'f6']} = {}) {
+  const column = (value) => new Array(count).fill(value);
+  return {valve: 'V', model_set: 'm@1', flow_unit: 'm3/h', T: 0.7, faults,
+    channels: [{name: 'F', unit: 'm3/h', low: -2.5, high: 2.5}],
+    t_ms: column(0).map((_, i) => kNowMs - 1000 * (count - i)),
+    f: column(10), residuals: [column(last.residual ?? 0)],
+    d0: column(last.d0), d: faults.map((_, f) => column(last.d[f])),
+    state: column(last.state), quality: column('LIVE'),
+    gaps: [], marks: [], drift: [], words: ''};
+}
+
+test('a healthy valve shows no fault, and no number for one', async () => {
+  monitor.reset([tile('V', 'NORMAL')]);
+  monitor.answers['valves/V/trend'] =
+    trend({state: 'NORMAL', d0: 0.97, d: [1, 0.99]});
+  const page = await open(browser, address, '#/valve/V');
+  const now = page.locator('.now-tables');
+  await now.getByText('not excluded').waitFor();
+
+  const text = await page.locator('.valve').innerText();
+  assert.doesNotMatch(text, /Flow transmitter|f6|1\.00|0\.9/);
+  assert.equal(await now.locator('tr.out').count(), 0);
+  await page.context().close();
+});
+
+test('words say how sure a name is; the number is a hint', async () => {
+  const episode = '0000000000000001';
+  const more = {episode, factor: 0.93, strength: 0.004};
+  monitor.reset([tile('V', 'ISOLATED', ['f19'], more),
+    tile('W', 'ISOLATED', ['f19', 'f6'], {certainty: 'one of'}),
+    tile('X', 'DETECTED', [], {certainty: 'not yet'}),
+    tile('Y', 'DETECTED', [], {certainty: 'not known'})],
+  [alarm(episode, 'V', 'f19', {peak_factor: 0.93, strength: 0.004})]);
+  monitor.answers['valves/V/trend'] =
+    trend({state: 'ISOLATED', d0: 0, d: [0.93, 0.5]});
+  const page = await open(browser, address, '#/');
+  const said = (id) => page.locator('.tile', {has:
+    page.locator('.tile-id', {hasText: id})});
+  await said('V').waitFor();
+
+  assert.equal(await said('V').locator('.tile-certainty').innerText(),
+      'likely');
+  assert.match(await said('W').innerText(), /one of 2/);
+  assert.match(await said('X').innerText(), /not yet known which/);
+  assert.match(await said('Y').innerText(), /unlike any known fault/i);
+
+  await page.goto(`${address}/#/valve/V`);
+  await page.locator('.now-tables').getByText('not excluded').waitFor();
+  const text = await page.locator('.valve').innerText();
+  assert.doesNotMatch(text, /0\.93|factor|0 %/);
+  assert.equal(await page.locator('.state-line').getByText('likely')
+      .getAttribute('title'), 'decision factor 0.93');
+  await page.goto(`${address}/#/alarms`);
+  const row = page.locator('tr[data-episode]');
+  await row.getByText('likely').waitFor();
+  assert.doesNotMatch(await row.innerText(), /0\.93|\b0 %/);
   await page.context().close();
 });

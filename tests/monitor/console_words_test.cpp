@@ -45,10 +45,17 @@ TEST(ConsoleWordsTest, NothingBeyondItsThresholdIsSaidSo) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   TracePoint point = Abnormal({kNone, 3.9}, {0.0, 0.0, 0.0});
   EXPECT_EQ(Explain(TwoChannels(), point, Describe),
-            "no reading beyond its threshold now; no observer fits");
+            "no reading beyond its threshold now; no known fault fits");
   point.state = State::kNormal;
   EXPECT_EQ(Explain(TwoChannels(), point, Describe),
             "as the normal model expects");
+}
+
+TEST(ConsoleWordsTest, WhileAValveIsNormalNoFaultFits) {
+  TracePoint point = Abnormal({0.0, 12.0}, {1.0, 1.0, 1.0});
+  point.state = State::kNormal;
+  EXPECT_EQ(Explain(TwoChannels(), point, Describe),
+            "flow 12 m3/h above what the normal model expects");
 }
 
 TEST(ConsoleWordsTest, TwoDigitsCount) {

@@ -113,6 +113,22 @@ TEST_F(TopTest, TheFactorIsThatOfTheIsolatedFaults) {
   EXPECT_EQ(row["model_set"], "demo@2");
 }
 
+TEST_F(TopTest, WordsAndNoNumbersSayHowSureANameIs) {
+  FaultEvent outside = Event("odd", TransitionKind::kReisolated, 5);
+  board_.Add(outside, now_);
+  board_.Add(Decision("odd", State::kDetected, 0, {0, 0, 0}), now_);
+  board_.Add(Decision("clear", State::kIsolated, 0b1, {0.95, 0, 0}), now_);
+
+  EXPECT_EQ(Row("ill")["certainty"], "one of");
+  EXPECT_EQ(Row("clear")["certainty"], "sure");
+  EXPECT_EQ(Row("seen")["certainty"], "not yet");
+  EXPECT_TRUE(Row("seen")["fault"].is_null());
+  EXPECT_EQ(Row("odd")["certainty"], "not known");
+  EXPECT_TRUE(Row("calm")["certainty"].is_null());
+  EXPECT_THAT(Table(), HasSubstr("one of"));
+  EXPECT_THAT(Table(), Not(HasSubstr("0.9")));
+}
+
 TEST_F(TopTest, AValveThatIsNotJudgedIsNotCalledNormal) {
   for (const Quality quality :
        {Quality::kBadInput, Quality::kUncovered, Quality::kUnassigned}) {

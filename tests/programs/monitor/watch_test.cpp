@@ -6,6 +6,7 @@
 namespace fdi::monitor {
 namespace {
 
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::Not;
 using Clock = WatchRecords::Clock;
@@ -49,16 +50,50 @@ TEST_F(WatchTest, VectorsWaitForTheNamesOfTheirFaults) {
   ASSERT_EQ(records_.size(), 3U);
   EXPECT_EQ(records_[0].object["topic"], "ModelSetInfo");
   EXPECT_THAT(records_[1].line, HasSubstr(" r_X=0.000"));
-  EXPECT_THAT(records_[1].line, HasSubstr(" f19=0.90"));
+  EXPECT_THAT(records_[1].line, Not(HasSubstr("f19")));
+  EXPECT_EQ(records_[1].object["factors"]["f19"], 0.9);
   EXPECT_EQ(records_[2].object["quality"], "UNASSIGNED");
 }
 
+TEST_F(WatchTest, AFaultIsNamedByWordsAndOnlyWhereThereIsOne) {
+  watch_.Add(Info(7), now_);
+  idl::DecisionMessage message = Decision(7, Quality::kLive);
+  message.verdict.state = State::kDetected;
+  watch_.Add(message, now_);
+  message.verdict.state = State::kIsolated;
+  message.verdict.isolated = 0b10;
+  watch_.Add(message, now_);
+
+  EXPECT_THAT(records_[1].line, EndsWith(" not yet"));
+  EXPECT_THAT(records_[2].line, EndsWith(" sure f19"));
+}
+
+TEST_F(WatchTest, AnEventSaysHowSureItsNameIs) {
+  FaultEvent event;
+  event.valve_id = "V1";
+  event.candidates = {{1, 0.5, 0.0, false}};
+  watch_.Add(event, now_);
+  event.transition.kind = TransitionKind::kIsolated;
+  event.transition.factor = 0.8;
+  event.transition.strength = 0.5;
+  event.candidates = {{19, 0.8, 0.5, true}};
+  watch_.Add(event, now_);
+
+  EXPECT_THAT(records_[0].line, HasSubstr("DETECTED not yet, f1 may be"));
+  EXPECT_TRUE(records_[0].object["strength"].is_null());
+  EXPECT_THAT(records_[1].line, HasSubstr("ISOLATED likely f19 strength=0.50"));
+  EXPECT_EQ(records_[1].object["certainty"], "likely");
+}
+
 TEST_F(WatchTest, WithoutNamesAPositionDoesNotLookLikeAFault) {
-  watch_.Add(Decision(7, Quality::kLive), now_);
+  idl::DecisionMessage message = Decision(7, Quality::kLive);
+  message.verdict.state = State::kIsolated;
+  message.verdict.isolated = 0b10;
+  watch_.Add(message, now_);
   watch_.Flush(now_ + WatchRecords::kPatience);
 
   ASSERT_EQ(records_.size(), 1U);
-  EXPECT_THAT(records_[0].line, HasSubstr(" #2=0.90"));
+  EXPECT_THAT(records_[0].line, HasSubstr(" #2"));
   EXPECT_THAT(records_[0].line, Not(HasSubstr("d2")));
 }
 

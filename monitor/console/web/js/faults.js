@@ -1,7 +1,7 @@
 // Faults in the words of the catalogue, and how alarms are ranked.
 
-import {svg} from './dom.js';
-import {timeText} from './format.js';
+import {h, svg} from './dom.js';
+import {factorText, timeText} from './format.js';
 import {store} from './store.js';
 
 /** Members of "f19|f3". */
@@ -15,8 +15,8 @@ function nameOf(fault) {
 
 /** "flow sensor or erosion"; in words, too, where nothing is isolated. */
 export function faultName(fault) {
-  if (fault === 'unknown') return 'unknown: no model fits';
-  if (!fault) return 'not isolated yet';
+  if (fault === 'unknown') return 'unlike any known fault';
+  if (!fault) return 'fault, not yet known which';
   return members(fault).map(nameOf).join(' or ');
 }
 
@@ -26,6 +26,22 @@ export function faultTitle(fault) {
   return members(fault).length > 0 && name !== fault ?
     `${name} (${fault})` : name;
 }
+
+/** "likely", "one of 3"; empty for what needs no word. */
+export function certaintyText({certainty, faults, fault}) {
+  const count = members(fault ?? faults?.join('|')).length;
+  return certainty === 'one of' ? `one of ${count}` : certainty ?? '';
+}
+
+/** The same as an element that tells experts the number behind it. */
+export function certaintyNode(row, name = 'tag') {
+  const text = certaintyText(row);
+  const factor = row.factor ?? row.peak_factor;
+  return text === '' ? null : h('span', {class: name,
+    title: factor === null ? null : factorTitle(factor)}, text);
+}
+
+export const factorTitle = (d) => `decision factor ${factorText(d)}`;
 
 const kPriority = {critical: 1, high: 2, medium: 3, low: 4};
 
@@ -71,7 +87,7 @@ export const inAlarm = ({state}) => state !== 'NORMAL' && state !== 'NOT_JUDGED'
 
 const kStateWords = {
   NORMAL: 'normal', NOT_JUDGED: 'not judged', DETECTED: 'fault detected',
-  ISOLATED: 'fault isolated', REISOLATED: 'isolated anew', CLEARED: 'cleared',
+  ISOLATED: 'fault named', REISOLATED: 'named anew', CLEARED: 'cleared',
   CLOSED: 'closed',
 };
 export const stateWord = (state) => kStateWords[state] ?? state;
@@ -97,7 +113,7 @@ export function qualityText({quality, stamp_ms: stamp, reasons, missing,
 }
 
 const kMarkWords = {
-  REISOLATED: 'isolated anew', CHANGED: 'priority rose', ACK: 'acknowledged',
+  ISOLATED: 'named', REISOLATED: 'named anew', CHANGED: 'priority rose', ACK: 'acknowledged',
   LABEL: 'labelled',
 };
 export const markWord = (kind) =>

@@ -71,10 +71,10 @@ export function factorText(value) {
     '–' : value.toFixed(2);
 }
 
-/** "12 %" of what the model set was trained to. */
+/** "12 %" of what the model set was trained to; a dash where it is none. */
 export function percentText(value) {
-  return value === null || value === undefined || !Number.isFinite(value) ?
-    '–' : `${Math.round(100 * value)} %`;
+  return value === null || value === undefined || !Number.isFinite(value) ||
+    Math.abs(value) < 0.005 ? '–' : `${Math.round(100 * value)} %`;
 }
 
 /** Names with digits in the order a reader expects: FV-2 before FV-10. */

@@ -153,9 +153,11 @@ class Panel {
     const at = index ?? table.t.length - 1;
     for (const {line, value} of this.#entries) {
       const number = table[line.column]?.[at];
-      setText(value, number === null || number === undefined ? '–' :
-        this.panel.key === 'decision' ? number.toFixed(2) :
-          `${numberText(number)} ${line.unit}`.trim());
+      const missing = number === null || number === undefined;
+      setText(value, this.panel.key === 'decision' ?
+        (missing || index === null || index === undefined ? '' :
+          number.toFixed(2)) :
+        missing ? '–' : `${numberText(number)} ${line.unit}`.trim());
     }
   }
 

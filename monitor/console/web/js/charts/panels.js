@@ -64,13 +64,16 @@ function decisionPanel({faults, T}) {
     dash: kDashes[Math.floor(f / kFaultColors.length) % kDashes.length],
   }));
   return {
-    key: 'decision', title: 'Decision factors d and threshold T',
+    key: 'decision', title: 'How well each explains the data (dashed: enough)',
     height: 220, lines, range: [-0.03, 1.05], threshold: T, ribbon: true,
   };
 }
 
-/** Panels from top to bottom; lines without any value are left out. */
-export function panelsOf(data, table) {
+/**
+ * Panels from top to bottom; lines without any value are left out, and unless
+ * `everyFault` those of faults that never come near T.
+ */
+export function panelsOf(data, table, everyFault) {
   const {channels} = data.meta;
   const tall = channels.length <= kTallestResidualRows;
   const panels = [
@@ -81,11 +84,16 @@ export function panelsOf(data, table) {
   // The page of a plant has no readings.
   const read = data.size === 0 ||
       ['cv', 'x', 'f'].some((name) => data.has(name));
+  const {T} = data.meta;
   for (const panel of panels) {
-    panel.lines = panel.lines.filter(({column}) =>
-      table[column]?.some((value) => value !== null) ||
-      panel.key === 'decision' || read && (column === 'x' || column === 'f') ||
+    panel.lines = panel.lines.filter(({column, fault}) =>
+      (fault && !everyFault && T !== null ?
+        table[column]?.some((value) => value >= T / 2) :
+        table[column]?.some((value) => value !== null)) ||
+      column === 'd0' || read && (column === 'x' || column === 'f') ||
       panel.band);
   }
-  return panels.filter((panel) => panel.lines.length > 0);
+  // Nobody asks which fault it is while there is none.
+  return panels.filter(({key, lines}) => lines.length > 0 &&
+      (key !== 'decision' || everyFault || lines.some(({fault}) => fault)));
 }

@@ -11,6 +11,9 @@ import {panelsOf} from './panels.js';
 const kMinSpanMs = 5000;
 let count = 0;
 
+const linesOf = (panels) => panels.flatMap(({lines}) =>
+  lines.map(({column}) => column)).join();
+
 export class Timeline {
   element;
   #stack = new PanelStack();
@@ -24,6 +27,8 @@ export class Timeline {
   #setting = false;
   #syncKey = `trend${++count}`;
   #hidden = new Set(['process']);
+  #everyFault = false;
+  #shownLines = '';
   #data;
 
   /**
@@ -55,7 +60,8 @@ export class Timeline {
   /** Channels or faults are others: panels anew. */
   rebuild() {
     this.#readScene();
-    const all = panelsOf(this.#data, this.#scene.table);
+    const all = this.#panelsNow();
+    this.#shownLines = linesOf(all);
     this.hasProcess = all.some((panel) => panel.key === 'process');
     this.#stack.show(all.filter((panel) => !this.#hidden.has(panel.key)),
         this.#scene, this.#syncKey, {
@@ -71,6 +77,10 @@ export class Timeline {
   update() {
     if (this.panels.length === 0) return;
     this.#readScene();
+    if (linesOf(this.#panelsNow()) !== this.#shownLines) {
+      this.rebuild();
+      return;
+    }
     this.#summarise();
     this.panels.forEach((panel) => panel.update());
     this.#apply(this.#window ?? this.#following());
@@ -92,6 +102,10 @@ export class Timeline {
     this.#window = null;
     this.update();
     this.#makeButtons();
+  }
+
+  #panelsNow() {
+    return panelsOf(this.#data, this.#scene.table, this.#everyFault);
   }
 
   #readScene() {
@@ -230,6 +244,10 @@ export class Timeline {
         this.hasProcess ? tool('P1 P2 T1', () => this.#toggleProcess(),
             'Show pressures and temperature',
             !this.#hidden.has('process')) : null,
+        this.#data.meta.faults.length > 0 ? tool('All faults', () => {
+          this.#everyFault = !this.#everyFault;
+          this.rebuild();
+        }, 'Show the decision factors of all faults', this.#everyFault) : null,
         following || !this.live ? null :
           h('span', {class: 'paused'}, 'Paused: not following'));
     if (focused) {

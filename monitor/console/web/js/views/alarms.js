@@ -12,7 +12,7 @@ import {oncePerFrame, View} from './view.js';
 
 const kColumns = [
   columns.priority, columns.detected, columns.valve, columns.fault,
-  columns.group, columns.lasted, columns.factor, columns.strength,
+  columns.group, columns.lasted, columns.certainty, columns.strength,
   columns.discipline, columns.namur,
 ];
 

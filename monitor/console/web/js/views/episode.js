@@ -7,10 +7,10 @@ import {exportPng} from '../charts/export.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, errorNote, factList, h, replace, setText} from '../dom.js';
-import {faultTitle, groupName, layerText, markWord, members, namurText,
+import {certaintyNode, faultTitle, groupName, layerText, markWord, members, namurText,
   priorityNames, priorityOf, prioritySign, stateWord, unconfirmedText}
   from '../faults.js';
-import {durationText, factorText, percentText, zoneName} from '../format.js';
+import {durationText, percentText, zoneName} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {dataTable, labelText, lastedText, timeCell, valveLink}
@@ -34,14 +34,14 @@ function facts({episode: row, model_hash: hash}) {
     ['State', [`${stateWord(row.state)}; ${groupName(row).toLowerCase()}`,
       unconfirmedText(row)].filter(Boolean).join(', ')],
     ['Detected', timeCell(row.detected_ms)],
-    ['Isolated', row.isolated_ms === null ? '–' : h('span', {},
+    ['Named', row.isolated_ms === null ? '–' : h('span', {},
         timeCell(row.isolated_ms), `, ${durationText(
             row.isolated_ms - row.detected_ms)} after detection`)],
     ['Cleared', timeCell(row.cleared_ms)],
     ['Lasted', lastedText(row)],
     ['End', row.end_reason ? kEndWords[row.end_reason] ?? row.end_reason :
       'still open'],
-    ['Peak factor', factorText(row.peak_factor)],
+    ['How sure', certaintyNode(row, '')],
     ['Strength now', percentText(row.strength)],
     ['At its worst', percentText(row.worst_strength)],
     ['For', row.discipline ?? '–'],
@@ -59,7 +59,6 @@ function eventText(event) {
   const isolated = members(event.faults).length > 0;
   return [
     isolated ? faultTitle(event.faults) : null,
-    isolated ? `factor ${factorText(event.factor)}` : null,
     isolated ? `strength ${percentText(event.strength)}` : null,
     isolated ? layerText(event.layer) : null,
     event.value, event.reason && (kEndWords[event.reason] ?? event.reason),

@@ -24,13 +24,13 @@ const kStates = [
 ];
 const kColumns = [
   columns.priority, columns.detected, columns.valve, columns.fault,
-  columns.group, columns.lasted, columns.factor, columns.strength,
+  columns.group, columns.lasted, columns.certainty, columns.strength,
   columns.label,
 ];
 
 const kSaved = ['episode', 'valve', 'fault', 'name', 'state', 'isa',
-  'detected_ms', 'isolated_ms', 'cleared_ms', 'ended_ms', 'end_reason',
-  'peak_factor', 'strength', 'label', 'acked_by', 'model_set'];
+  'certainty', 'detected_ms', 'isolated_ms', 'cleared_ms', 'ended_ms',
+  'end_reason', 'peak_factor', 'strength', 'label', 'acked_by', 'model_set'];
 
 class History extends View {
   title = 'History';

@@ -1,9 +1,9 @@
 // Tables by declaration of their columns: {text, cell(row), class, header}.
 
 import {h} from '../dom.js';
-import {faultName, faultTitle, groupName, members, namurText, priorityOf,
+import {certaintyNode, faultName, faultTitle, groupName, members, namurText, priorityOf,
   priorityNames, prioritySign, unconfirmedText} from '../faults.js';
-import {durationText, factorText, percentText, timeText} from '../format.js';
+import {durationText, percentText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 
@@ -98,8 +98,8 @@ export const columns = {
   group: {text: 'State', class: 'remark', cell: (row) => [
     groupName(row), h('div', {class: 'number'}, personText(row))]},
   lasted: {text: 'Lasted', class: 'num', cell: lastedText},
-  factor: {text: 'Factor', class: 'num wide', cell: (row) =>
-    factorText(row.peak_factor)},
+  certainty: {text: 'How sure', class: 'wide', cell: (row) =>
+    certaintyNode(row, '')},
   strength: {text: 'Strength', class: 'num wide', cell: (row) =>
     percentText(row.strength)},
   discipline: {text: 'For', class: 'wider', cell: (row) =>

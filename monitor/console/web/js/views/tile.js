@@ -2,9 +2,10 @@
 
 import {drawSparkline} from '../charts/sparkline.js';
 import {h, setText} from '../dom.js';
-import {faultName, faultTitle, inAlarm, priorityNames, priorityOf,
-  prioritySign, qualityText, stateWord, unconfirmedText} from '../faults.js';
-import {clockText, factorText} from '../format.js';
+import {certaintyText, factorTitle, faultName, faultTitle, inAlarm,
+  priorityNames, priorityOf, prioritySign, qualityText, stateWord,
+  unconfirmedText} from '../faults.js';
+import {clockText} from '../format.js';
 import {link} from '../route.js';
 
 // A fault, or one that was there when the data ended.
@@ -20,10 +21,11 @@ export function rankOf(tile) {
 }
 
 function whatText(tile) {
-  if (tile.state === 'DETECTED' && tile.faults.length === 0) {
-    return 'Fault detected, not isolated yet';
+  if (inAlarm(tile)) {
+    const name = faultName(tile.certainty === 'not known' ? 'unknown' :
+      tile.faults.join('|'));
+    return name[0].toUpperCase() + name.slice(1);
   }
-  if (inAlarm(tile)) return faultName(tile.faults.join('|'));
   if (tile.unconfirmed_ms) {
     return `${faultName(tile.fault)}, ${unconfirmedText(tile)}`;
   }
@@ -38,12 +40,12 @@ export class Tile {
   #signBox = h('span', {class: 'sign-box'});
   #id = h('span', {class: 'tile-id'});
   #what = h('span', {class: 'tile-what'});
-  #factor = h('span', {class: 'tile-factor'});
+  #certainty = h('span', {class: 'tile-certainty'});
   #spoken = h('span', {class: 'sr-only'});  // What shape and colour say.
   #quality = h('span', {class: 'tile-quality'});
   #canvas = h('canvas', {'class': 'spark', 'aria-hidden': 'true'});
   #link = h('a', {}, h('span', {class: 'tile-head'}, this.#signBox, this.#id,
-      this.#spoken, this.#factor), this.#what, h('span', {class: 'tile-foot'},
+      this.#spoken, this.#certainty), this.#what, h('span', {class: 'tile-foot'},
       this.#canvas, this.#quality));
   element = h('li', {}, this.#link);
 
@@ -63,8 +65,9 @@ export class Tile {
         ` rank${rank}` + (tile.quality === 'LIVE' ? '' : ' not-live');
     this.#showSign(alarm ? priority : 0, tile.state === 'ISOLATED');
     setText(this.#what, what);
-    setText(this.#factor, alarm && tile.factor !== null ?
-      factorText(tile.factor) : '');
+    setText(this.#certainty, alarm ? certaintyText(tile) : '');
+    this.#certainty.title = alarm && tile.factor !== null ?
+      factorTitle(tile.factor) : '';
     setText(this.#quality, tile.shelved_until_ms === null ? quality :
       `shelved until ${clockText(tile.shelved_until_ms)}`);
     setText(this.#spoken, alarm ? `, ${priorityNames[priority]}, ` +

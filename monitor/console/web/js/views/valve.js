@@ -1,15 +1,14 @@
 // One valve: what the observers say now, in words and numbers, and the trend.
 
 import {getOptional, path} from '../api.js';
-import {barCell} from '../charts/bars.js';
 import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
 import {driftLines} from '../drift.js';
-import {faultName, faultTitle, inAlarm, priorityNames, priorityOf,
-  prioritySign, qualityText, stateWord, unconfirmedText} from '../faults.js';
-import {durationText, factorText, numberText, percentText, timeText}
-  from '../format.js';
+import {certaintyNode, factorTitle, faultName, faultTitle, inAlarm,
+  priorityNames, priorityOf, prioritySign, qualityText, stateWord,
+  unconfirmedText} from '../faults.js';
+import {durationText, numberText, percentText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {actionButtons} from '../actions.js';
@@ -36,11 +35,11 @@ function stateLine(tile) {
   return [
     h('span', {class: 'tag strong'},
         prioritySign(priority, tile.state === 'ISOLATED'),
-        `${stateWord(tile.state)}: ${faultTitle(tile.faults.join('|'))}`),
+        `${stateWord(tile.state)}: ` + faultTitle(tile.certainty ===
+          'not known' ? 'unknown' : tile.faults.join('|'))),
+    certaintyNode(tile),
     h('span', {class: 'tag'}, priorityNames[priority]),
-    tile.factor === null ? null :
-      h('span', {class: 'tag'}, `factor ${factorText(tile.factor)}`),
-    tile.strength === null || tile.strength === undefined ? null :
+    percentText(tile.strength) === '–' ? null :
       h('span', {class: 'tag'}, `strength ${percentText(tile.strength)}`),
     tile.since_ms === null ? null : h('span', {class: 'tag'},
         `for ${durationText(store.valveNowMs(tile.id) - tile.since_ms)}`),
@@ -63,28 +62,46 @@ const kResidualColumns = [
   {text: 'Unit', cell: (row) => unitText(row.unit)},
   {text: 'Judged', cell: judged},
 ];
-const kFactorColumns = [
-  {text: 'Condition', header: true, cell: ({fault}) =>
-    fault ? faultTitle(fault) : 'normal'},
-  {text: 'Factor', cell: ({d}) => barCell(d ?? 0, 1, factorText(d))},
+const kFitColumns = [
+  {text: 'Condition', header: true, cell: ({name}) => name},
+  {text: 'Explains the data', cell: ({fits, d}) =>
+    h('span', {title: d === null ? null : factorTitle(d)}, fits)},
 ];
 
-/** Residuals against their thresholds, factors of the faults: the numbers. */
+/**
+ * What explains the data, in words: [{name, fits, d, strong}]. While it is
+ * normal, no fault is listed: those that change nothing then explain it, too.
+ */
+export function explanations({faults, T}, state, d0, d) {
+  const normal = {name: 'normal', d: d0, fits: state === 'NOT_JUDGED' ?
+    'not judged' : d0 >= T || state === 'NORMAL' ? 'yes' : 'no'};
+  const ranked = faults.map((fault, f) => ({name: faultTitle(fault), d: d[f]}))
+      .filter((row) => row.d >= T / 2).sort((a, b) => b.d - a.d);
+  if (state === 'NOT_JUDGED') return [normal];
+  if (state === 'NORMAL') {
+    return [normal, ...(ranked.length === 0 ? [] : [{name: 'faults too small ' +
+      'to see', fits: 'not excluded', d: null, quiet: true}])];
+  }
+  return [normal, ...ranked.slice(0, 6).map((row) => ({...row,
+    fits: row.d >= T ? 'yes' : 'not excluded', strong: row.d >= T}))];
+}
+
+/** Residuals against their thresholds, and what explains them. */
 function nowTables(data) {
-  const {channels, faults, T} = data.meta;
+  const {channels, faults} = data.meta;
   const last = (name) => data.columns[name].at(-1);
   const residuals =
     channels.map((channel, c) => ({...channel, residual: last(`r${c}`)}));
-  const ranked = faults.map((fault, f) => ({fault, d: last(`d${f + 1}`)}))
-      .filter(({d}) => d !== null && d !== undefined)
-      .sort((a, b) => b.d - a.d).slice(0, 6);
-  const out = (is) => ({class: is ? 'out' : ''});
   return [
     dataTable('Residuals now', kResidualColumns, residuals, {attributesOf:
-      (row) => out(['above', 'below'].includes(judged(row)))}),
-    dataTable(`What explains the data now (T = ${T})`, kFactorColumns,
-        [{fault: null, d: last('d0')}, ...ranked],
-        {attributesOf: ({fault, d}) => out(fault && d >= T)}),
+      (row) => ({class:
+        ['above', 'below'].includes(judged(row)) ? 'out' : ''})}),
+    dataTable('What explains the data now', kFitColumns,
+        explanations(data.meta, last('state') === 'NORMAL' &&
+            last('quality') !== 'LIVE' ? 'NOT_JUDGED' : last('state'), last('d0'),
+            faults.map((_, f) => last(`d${f + 1}`))),
+        {attributesOf: ({strong, quiet}) =>
+          ({class: strong ? 'out' : quiet ? 'quiet' : ''})}),
   ];
 }
 

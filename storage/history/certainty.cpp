@@ -1,0 +1,15 @@
+#include "storage/history/certainty.h"
+
+namespace fdi::storage {
+
+Certainty CertaintyOf(const Episode& episode) {
+  const bool physics = episode.layer == LayerName(Layer::kPhysics);
+  const bool outside =
+      episode.unknown_kind == UnknownName(Unknown::kOutsideKnown);
+  return fdi::CertaintyOf(
+      episode.fault.value_or(""), physics ? Layer::kPhysics : Layer::kObservers,
+      episode.peak_factor,
+      outside ? Unknown::kOutsideKnown : Unknown::kTooEarly);
+}
+
+}  // namespace fdi::storage

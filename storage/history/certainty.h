@@ -1,0 +1,11 @@
+#pragma once
+
+#include "diagnosis/records/certainty.h"
+#include "storage/history/episode.h"
+
+namespace fdi::storage {
+
+/// How certain its name is; that of one that has ended, as it was.
+Certainty CertaintyOf(const Episode& episode);
+
+}  // namespace fdi::storage
