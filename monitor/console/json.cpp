@@ -54,6 +54,27 @@ std::vector<std::string> FaultsOf(const ValveState& valve) {
   return faults;
 }
 
+Json SignalsJson(SignalMask signals) {
+  Json names = Json::array();
+  for (std::size_t s = 0; s < kSignalCount; ++s) {
+    if ((signals & MaskOf(static_cast<Signal>(s))) != 0) {
+      names.push_back(SignalName(static_cast<Signal>(s)));
+    }
+  }
+  return names;
+}
+
+// Why the newest sample did not reach the observers.
+Json RefusedJson(const ValveState& valve) {
+  if (valve.intake == Intake::kAccepted) {
+    return {};
+  }
+  return {{"reason", IntakeName(valve.intake)},
+          {"signals", SignalsJson(valve.refused)},
+          {"flow_unit", valve.models ? FlowUnitName(valve.models->flow_unit)
+                                     : std::string_view()}};
+}
+
 // That of its alarm; of a name that its alarm does not have yet, by itself.
 Json CertaintyJson(const ValveState& valve, const std::string& fault,
                    const ValveAlarm& alarm) {
@@ -142,20 +163,18 @@ Json TileJson(const ValveState& valve, const ValveAlarm& alarm,
               bool newest_only) {
   const bool named = valve.isolated != 0;
   const std::vector<std::string> faults = FaultsOf(valve);
-  Json missing = Json::array();
-  for (std::size_t s = 0; s < kSignalCount; ++s) {
-    if ((valve.missing & MaskOf(static_cast<Signal>(s))) != 0) {
-      missing.push_back(SignalName(static_cast<Signal>(s)));
-    }
-  }
   Json tile = {
       {"id", valve.id},
-      {"state", ShownState(valve.state, valve.silence == monitor::Silence::kNone
-                                            ? valve.quality
-                                            : Quality::kStale)},
+      {"state",
+       ShownState(valve.state,
+                  valve.silence == monitor::Silence::kNone ? valve.quality
+                                                           : Quality::kStale,
+                  !valve.unjudged.empty())},
       {"quality", QualityOf(valve)},
       {"reasons", CoverageReasonsName(valve.reasons)},
-      {"missing", std::move(missing)},
+      {"missing", SignalsJson(valve.missing)},
+      {"unjudged", valve.unjudged},
+      {"refused", RefusedJson(valve)},
       {"faults", faults},
       {"certainty", CertaintyJson(valve, storage::JoinNames(faults), alarm)},
       {"factor", named ? Rounded(valve.factor, kFactorDecimals) : Json()},

@@ -29,6 +29,35 @@ void PushBounded(std::deque<T>& queue, T value, std::size_t limit) {
   }
 }
 
+bool IsReason(Intake intake, const Sample& sample, Signal signal) {
+  switch (intake) {
+    case Intake::kUnit:
+      return signal == Signal::kF;
+    case Intake::kBadQuality:
+      return sample.quality[Index(signal)] == SignalQuality::kBad;
+    case Intake::kNotFinite:
+      return !std::isfinite(sample[signal]);
+    case Intake::kRange:
+      return !PlausibleRange(signal).Contains(sample[signal]);
+    default:
+      return false;
+  }
+}
+
+// The signals of `required` because of which the sample was refused.
+SignalMask RefusedSignals(SignalMask required, const Sample& sample,
+                          Intake intake) {
+  SignalMask refused = 0;
+  for (std::size_t i = 0; i < kSignalCount; ++i) {
+    const auto signal = static_cast<Signal>(i);
+    if ((required & MaskOf(signal)) != 0 && sample.Has(signal) &&
+        IsReason(intake, sample, signal)) {
+      refused = static_cast<SignalMask>(refused | MaskOf(signal));
+    }
+  }
+  return refused;
+}
+
 monitor::Trace EmptyTrace() {
   return {kTrendInstants, kNsPerDay, /*keeps_isolated=*/false};
 }
@@ -64,6 +93,15 @@ struct LiveBoard::Slot {
     now.quality = verdict.quality;
     now.silence = monitor::Silence::kNone;
     now.reasons = verdict.uncovered;
+    now.intake = verdict.intake;
+    now.unjudged.clear();
+    for (std::size_t c = 0; now.models && now.quality == Quality::kLive &&
+                            c < now.models->channels.size();
+         ++c) {
+      if (std::isnan(verdict.residuals[c])) {
+        now.unjudged.push_back(now.models->channels[c].name);
+      }
+    }
     now.isolated = verdict.isolated;
     now.d0 = verdict.normal_factor;
     now.stamp_ns = verdict.stamp_ns;
@@ -226,6 +264,8 @@ void LiveBoard::OnVerdict(const std::string& valve_id, const Sample& sample,
     facts = models != nullptr ? Facts(*models) : nullptr;
   }
   slot.now.missing = outcome.missing;
+  slot.now.refused = RefusedSignals(facts ? facts->required : SignalMask{0},
+                                    sample, outcome.verdict.intake);
   ShowLocked(slot, sample, outcome.verdict, std::move(facts));
 }
 

@@ -31,6 +31,9 @@ struct ValveState {
   monitor::Silence silence{monitor::Silence::kNone};
   CoverageReasons reasons{0};
   SignalMask missing{0};  ///< That the model set needs and the sample lacks.
+  Intake intake{Intake::kAccepted};     ///< Of the newest sample.
+  SignalMask refused{0};                ///< Because of these signals.
+  std::vector<std::string> unjudged{};  ///< Channels that abstain now.
   FaultSet isolated{0};
   double factor{0.0};    ///< The largest of the isolated set [-].
   double strength{0.0};  ///< Estimated, of that fault; signed [-].

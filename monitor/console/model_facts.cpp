@@ -105,6 +105,7 @@ std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models) {
   facts->detection_samples = models.decision.detection_samples;
   facts->period_s = models.sample_period_s;
   facts->flow_unit = models.flow_unit;
+  facts->required = RequiredSignals(models);
   return facts;
 }
 
@@ -143,10 +144,17 @@ void StoredModels::Cache(std::shared_ptr<const ModelFacts> facts) {
   known_[name] = std::move(facts);
 }
 
-std::string_view ShownState(State state, Quality quality) {
-  return state == State::kNormal && quality != Quality::kLive
-             ? "NOT_JUDGED"
-             : StateName(state);
+std::string_view ShownState(State state, Quality quality, bool partly) {
+  if (state != State::kNormal) {
+    return StateName(state);
+  }
+  return quality != Quality::kLive ? "NOT_JUDGED"
+         : partly                  ? "PARTLY_JUDGED"
+                                   : StateName(state);
+}
+
+std::string_view ShownState(const Verdict& verdict) {
+  return ShownState(verdict.state, verdict.quality, verdict.confidence < 1.0);
 }
 
 std::string TwoDigits(double value) {

@@ -34,6 +34,7 @@ struct ModelFacts {
   int detection_samples{2};         ///< n_d
   double period_s{1.0};
   FlowUnit flow_unit{FlowUnit::kM3PerHour};
+  SignalMask required{0};  ///< Signals that the set needs.
 };
 
 std::shared_ptr<const ModelFacts> FactsOf(const ModelSet& models);
@@ -60,9 +61,11 @@ class StoredModels {
   std::map<std::string, std::shared_ptr<const ModelFacts>> known_;
 };
 
-/// "NORMAL", "DETECTED", "ISOLATED", or "NOT_JUDGED" where the engine reports
-/// NORMAL for a sample that it did not judge because of its quality.
-std::string_view ShownState(State state, Quality quality);
+/// "DETECTED", "ISOLATED", or where the engine reports NORMAL: "NOT_JUDGED" for
+/// a sample that it did not judge because of its quality, "PARTLY_JUDGED" where
+/// some channel abstained, and otherwise "NORMAL".
+std::string_view ShownState(State state, Quality quality, bool partly);
+std::string_view ShownState(const Verdict& verdict);
 
 /// Returns the plain name of a fault such as "f19".
 using FaultNamer = std::function<std::string(std::string_view)>;

@@ -40,21 +40,21 @@ bool Contains(const Json& row, const std::string& filter) {
 }
 
 bool Abnormal(const Json& row) {
-  return row["state"] != "NORMAL" && row["state"] != "NOT_JUDGED";
+  return row["state"] == "DETECTED" || row["state"] == "ISOLATED";
 }
 
-// Smaller is worse: isolated, detected, not diagnosed, normal.
+// Smaller is worse: isolated, detected, not or partly diagnosed, normal.
 int Rank(const Json& row) {
-  return row["state"] == "ISOLATED"     ? 0
-         : Abnormal(row)                ? 1
-         : row["silent"].get<bool>()    ? 2
-         : row["state"] == "NOT_JUDGED" ? 3
-                                        : 4;
+  return row["state"] == "ISOLATED"  ? 0
+         : Abnormal(row)             ? 1
+         : row["silent"].get<bool>() ? 2
+         : row["state"] != "NORMAL"  ? 3
+                                     : 4;
 }
 
 Tone ToneOf(const Json& row) {
   return Abnormal(row)                                           ? Tone::kAlarm
-         : row["silent"].get<bool>() || row["quality"] != "LIVE" ? Tone::kQuiet
+         : row["silent"].get<bool>() || row["state"] != "NORMAL" ? Tone::kQuiet
                                                                  : Tone::kPlain;
 }
 
@@ -208,7 +208,7 @@ Json TopBoard::RowOf(const LatestVector& latest, Clock::time_point now) const {
     faults = "unknown";
   }
   return {{"valve_id", message.valve_id},
-          {"state", console::ShownState(verdict.state, verdict.quality)},
+          {"state", console::ShownState(verdict)},
           {"quality", QualityName(verdict.quality)},
           {"silent", now - latest.at > silence_},
           {"fault", faults.empty() ? Json() : Json(faults)},

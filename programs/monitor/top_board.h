@@ -40,7 +40,7 @@ class TopBoard {
   /// "name", "certainty", "factor", "strength", "normal_factor", "factors",
   /// "residuals", "since_utc", "abnormal_s", "stamp_utc", "model_set"}]}, and
   /// its table, which has words instead of factors.
-  /// `state` is NOT_JUDGED where the quality rules out a verdict; `fault` and
+  /// `state` is console::ShownState(); `fault` and
   /// `certainty` are null unless a fault is detected, `fault` also until it has
   /// a name ("unknown" where no known one fits); `factor` is
   /// the largest of the isolated set, or of any fault; `strength` is null until

@@ -62,7 +62,7 @@ void WatchRecords::Flush(Clock::time_point now) {
 
 WatchRecord WatchRecords::RecordOf(const idl::DecisionMessage& message) const {
   const Verdict& v = message.verdict;
-  const std::string state(console::ShownState(v.state, v.quality));
+  const std::string state(console::ShownState(v));
   const Json residuals = names_.Residuals(message);
   const Json factors = names_.Factors(message);
   std::string line = Start(v.stamp_ns, message.valve_id) + " " +

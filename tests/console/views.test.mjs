@@ -282,3 +282,28 @@ test('words say how sure a name is; the number is a hint', async () => {
   assert.doesNotMatch(await row.innerText(), /0\.93|\b0 %/);
   await page.context().close();
 });
+
+test('what is judged in part only is said, with the reason', async () => {
+  monitor.reset([tile('half', 'PARTLY_JUDGED', [],
+      {missing: ['P1'], unjudged: ['F']}),
+  tile('bar', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
+    refused: {reason: 'range', signals: ['P1'], flow_unit: 'm3/h'}}),
+  tile('mass', 'NOT_JUDGED', [], {quality: 'BAD_INPUT',
+    refused: {reason: 'unit', signals: ['F'], flow_unit: 'm3/h'}}),
+  tile('well', 'NORMAL')]);
+  const page = await open(browser, address, '#/');
+  const said = (id) => page.locator('.tile', {hasText: id}).innerText();
+  await page.locator('.tile', {hasText: 'half'}).waitFor();
+
+  assert.match(await said('half'), /Partly judged[^]*no P1; F not judged/);
+  assert.match(await said('bar'), /bad input: P1 implausible: in another unit/);
+  assert.match(await said('mass'), /flow in another unit than m³\/h/);
+  assert.deepEqual(await page.locator('.tile .tile-id').allTextContents(),
+      ['bar', 'half', 'mass', 'well']);
+  await page.getByRole('button', {name: /Not or partly judged 3/}).waitFor();
+
+  await page.goto(`${address}/#/valve/half`);
+  await page.locator('.state-line').getByText('no P1; F not judged').waitFor();
+  assert.doesNotMatch(await page.locator('.state-line').innerText(), /normal/);
+  await page.context().close();
+});

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -108,6 +109,34 @@ TEST_F(ConsoleRoutesTest, AValveThatIsNotJudgedIsNotCalledNormal) {
   EXPECT_EQ(tile["state"], "NOT_JUDGED");
   EXPECT_EQ(tile["quality"], "BAD_INPUT");
   EXPECT_EQ(tile["missing"], Json::array({"F"}));
+}
+
+TEST_F(ConsoleRoutesTest, WhatIsPartlyJudgedIsNotCalledNormal) {
+  Start();
+  const auto models = monitor::SharedLinearModels();
+  Verdict verdict;
+  verdict.quality = Quality::kLive;
+  const auto show = [&](const Sample& sample) {
+    console_->live().OnVerdict("V1", sample,
+                               {verdict, models.get(), false, false});
+    return Get("/api/v1/valves")["valves"][0];
+  };
+  EXPECT_EQ(show(monitor::PlantSample(0))["state"], "NORMAL");
+
+  verdict.residuals[0] = std::numeric_limits<double>::quiet_NaN();
+  const Json partly = show(monitor::PlantSample(1));
+
+  EXPECT_EQ(partly["state"], "PARTLY_JUDGED");
+  EXPECT_EQ(partly["unjudged"], Json::array({"X"}));
+  EXPECT_TRUE(partly["refused"].is_null());
+
+  verdict.quality = Quality::kBadInput;
+  verdict.intake = Intake::kRange;
+  const Json refused = show(monitor::PlantSample(2, 1e6));
+
+  EXPECT_EQ(refused["state"], "NOT_JUDGED");
+  EXPECT_EQ(refused["refused"]["reason"], "range");
+  EXPECT_EQ(refused["refused"]["signals"], Json::array({"X"}));
 }
 
 TEST_F(ConsoleRoutesTest, WhatCannotBeIsRefusedWithTheRange) {

@@ -33,6 +33,7 @@ idl::DecisionMessage Decision(const std::string& valve, State state,
   message.channel_count = 1;
   message.fault_count = static_cast<int>(factors.size());
   message.verdict.quality = Quality::kLive;
+  message.verdict.confidence = 1.0;
   message.verdict.state = state;
   message.verdict.isolated = isolated;
   message.verdict.stamp_ns = 100 * kSecond;
@@ -139,6 +140,10 @@ TEST_F(TopTest, AValveThatIsNotJudgedIsNotCalledNormal) {
     EXPECT_EQ(Row("calm")["state"], "NOT_JUDGED");
     EXPECT_EQ(Row("calm")["quality"], QualityName(quality));
   }
+  idl::DecisionMessage half = Decision("calm", State::kNormal, 0, {});
+  half.verdict.confidence = 0.5;
+  board_.Add(half, now_);
+  EXPECT_EQ(Row("calm")["state"], "PARTLY_JUDGED");
   idl::DecisionMessage open = Decision("ill", State::kIsolated, 0b1, {1, 0, 0});
   open.verdict.quality = Quality::kBadInput;
   board_.Add(open, now_);

@@ -1,7 +1,7 @@
 // Faults in the words of the catalogue, and how alarms are ranked.
 
 import {h, svg} from './dom.js';
-import {factorText, timeText} from './format.js';
+import {factorText, timeText, unitText} from './format.js';
 import {store} from './store.js';
 
 /** Members of "f19|f3". */
@@ -83,10 +83,12 @@ export const unconfirmedText = ({unconfirmed_ms: since}) =>
 export const namurText = (name) => name ? plain(name) : '–';
 
 /** Whether a fault is detected; a valve that is not judged is in none. */
-export const inAlarm = ({state}) => state !== 'NORMAL' && state !== 'NOT_JUDGED';
+export const inAlarm = ({state}) =>
+  state === 'DETECTED' || state === 'ISOLATED';
 
 const kStateWords = {
-  NORMAL: 'normal', NOT_JUDGED: 'not judged', DETECTED: 'fault detected',
+  NORMAL: 'normal', NOT_JUDGED: 'not judged',
+  PARTLY_JUDGED: 'partly judged', DETECTED: 'fault detected',
   ISOLATED: 'fault named', REISOLATED: 'named anew', CLEARED: 'cleared',
   CLOSED: 'closed',
 };
@@ -100,16 +102,47 @@ const kQualityWords = {
   MODEL_UNSUITED: 'model unsuited', UNASSIGNED: 'no model set',
   ENDED: 'stream ended', MONITOR_SILENT: 'monitor silent',
 };
-/** Why a valve is not judged; empty if it is. */
-export function qualityText({quality, stamp_ms: stamp, reasons, missing,
-  monitor, monitor_silent_since_ms: silent}) {
-  if (quality === 'LIVE') return '';
+const kReasonWords = {
+  mode: 'mode is not AUTO', cv: 'command beyond what was trained',
+  cv_step: 'command stepped as never in training',
+  parked: 'parked at an end of travel', dp: 'pressure drop outside normal',
+  t1: 'T1 outside normal', p1: 'P1 outside normal', p2: 'P2 outside normal',
+  waiting: 'not for long enough yet',
+};
+const kRefusalWords = {
+  bad_quality: 'marked bad at the source', not_finite: 'no number',
+  range: 'implausible: in another unit?',
+};
+
+function refusalText({reason, signals, flow_unit: unit}) {
+  if (reason === 'unit') {
+    return `flow in another unit than ${unitText(unit)}`;
+  }
+  if (reason === 'period') return 'samples at another interval than trained';
+  return kRefusalWords[reason] ?
+    `${signals.join(', ')} ${kRefusalWords[reason]}` : '';
+}
+
+// "no P1; F not judged"
+function lackText({quality, missing, unjudged, refused}) {
+  return [
+    missing?.length ? `no ${missing.join(', ')}` : '',
+    unjudged?.length ? `${unjudged.join(', ')} not judged` : '',
+    refused && quality !== 'LIVE' ? refusalText(refused) : '',
+  ].filter(Boolean).join('; ');
+}
+
+/** Why a valve is not judged, or only in part; empty if it is. */
+export function qualityText(tile) {
+  const {quality, stamp_ms: stamp, reasons, monitor,
+    monitor_silent_since_ms: silent} = tile;
+  if (quality === 'LIVE') return lackText(tile);
   if (silent) return `monitor ${monitor} silent since ${timeText(silent)}`;
+  const why = quality === 'BAD_INPUT' ? lackText(tile) : (reasons ?? '')
+      .split('|').map((r) => kReasonWords[r] ?? r).join(', ');
   return (kQualityWords[quality] ?? plain(quality)) +
       (quality === 'STALE' && stamp ? ` since ${timeText(stamp)}` : '') +
-      (quality === 'BAD_INPUT' && missing?.length ?
-        `: no ${missing.join(', ')}` : '') +
-      (reasons ? `: ${reasons.replaceAll('|', ', ')}` : '');
+      (why ? `: ${why}` : '');
 }
 
 const kMarkWords = {

@@ -66,6 +66,11 @@ export function numberText(value, digits = 3) {
   return value.toFixed(Math.min(decimals, digits)).replace('-', '−');
 }
 
+export function unitText(unit) {
+  return (unit ?? '').replace('m3', 'm³').replace('degC', '°C')
+      .replace('_', ' ').replace('m³ per h', 'm³/h');
+}
+
 export function factorText(value) {
   return value === null || value === undefined || !Number.isFinite(value) ?
     '–' : value.toFixed(2);

@@ -1,15 +1,11 @@
 // Which lines stand in which panel of a trend, and how they look.
 
 import {faultTitle} from '../faults.js';
+import {unitText} from '../format.js';
 
 const kDashes = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
 const kFaultColors = ['--s2', '--s3', '--s4', '--s5', '--s6'];
 const kTallestResidualRows = 3;
-
-export function unitText(unit) {
-  return (unit ?? '').replace('m3', 'm³').replace('degC', '°C')
-      .replace('_', ' ').replace('m³ per h', 'm³/h');
-}
 
 function signalPanel(data) {
   const flow = unitText(data.meta.flow_unit);

@@ -3,9 +3,8 @@
 
 import {getOptional, path} from '../api.js';
 import {PanelStack} from '../charts/panel.js';
-import {unitText} from '../charts/panels.js';
 import {h} from '../dom.js';
-import {numberText} from '../format.js';
+import {numberText, unitText} from '../format.js';
 import {dataTable} from './table.js';
 
 const kMinDays = 2;

@@ -19,7 +19,8 @@ const kFilters = [
   {key: 'all', text: 'All', test: () => true},
   {key: 'alarm', text: 'In alarm', test: inAlarm},
   {key: 'unack', text: 'Unacknowledged', test: (t) => t.unacked},
-  {key: 'silent', text: 'Not live', test: (t) => t.quality !== 'LIVE'},
+  {key: 'silent', text: 'Not or partly judged', test: (t) =>
+    t.quality !== 'LIVE' || t.state === 'PARTLY_JUDGED'},
 ];
 
 function matches(tile, words) {

@@ -17,7 +17,7 @@ export function rankOf(tile) {
   if (isAlarm(tile)) {
     return [shelved ? 2 : tile.unacked ? 0 : 1, priorityOf(tile)];
   }
-  return [tile.unacked ? 3 : tile.quality === 'LIVE' ? 5 : 4, 0];
+  return [tile.unacked ? 3 : tile.state === 'NORMAL' ? 5 : 4, 0];
 }
 
 function whatText(tile) {
@@ -30,7 +30,8 @@ function whatText(tile) {
     return `${faultName(tile.fault)}, ${unconfirmedText(tile)}`;
   }
   if (tile.unacked) return 'Returned, unacknowledged';
-  return tile.state === 'NOT_JUDGED' ? 'Not judged' : '';
+  return {NOT_JUDGED: 'Not judged', PARTLY_JUDGED: 'Partly judged'}[
+      tile.state] ?? '';
 }
 
 export class Tile {
@@ -62,7 +63,8 @@ export class Tile {
     const what = whatText(tile);
     const quality = qualityText(tile) || (tile.monitor ?? '');
     this.element.className = 'tile' + (alarm ? ` alarm p${priority}` : '') +
-        ` rank${rank}` + (tile.quality === 'LIVE' ? '' : ' not-live');
+        ` rank${rank}` + (['NOT_JUDGED', 'PARTLY_JUDGED'].includes(tile.state) ||
+        tile.quality !== 'LIVE' ? ' not-live' : '');
     this.#showSign(alarm ? priority : 0, tile.state === 'ISOLATED');
     setText(this.#what, what);
     setText(this.#certainty, alarm ? certaintyText(tile) : '');

@@ -8,11 +8,11 @@ import {driftLines} from '../drift.js';
 import {certaintyNode, factorTitle, faultName, faultTitle, inAlarm,
   priorityNames, priorityOf, prioritySign, qualityText, stateWord,
   unconfirmedText} from '../faults.js';
-import {durationText, numberText, percentText, timeText} from '../format.js';
+import {durationText, numberText, percentText, timeText, unitText}
+  from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {actionButtons} from '../actions.js';
-import {unitText} from '../charts/panels.js';
 import {exportPng} from '../charts/export.js';
 import {HealthSection} from './health.js';
 import {dataTable} from './table.js';
