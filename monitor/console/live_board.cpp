@@ -77,6 +77,7 @@ struct LiveBoard::Slot {
 
   mutable std::mutex mutex;  // Guards all that follows.
   ValveState now;
+  bool expected{false};
   std::uint64_t pushed{0};  // Instants so far.
   std::deque<console::Mark> marks;
   std::deque<DataGap> gaps;
@@ -114,6 +115,20 @@ struct LiveBoard::Slot {
         now.strength = verdict.strengths[f];
       }
     }
+  }
+
+  // Of the valve nothing is known but when it was heard last.
+  void ShowAbsent() {
+    models = nullptr;
+    ValveState absent;
+    absent.id = now.id;
+    absent.stamp_ns = now.stamp_ns;
+    absent.silence = monitor::Silence::kStale;
+    absent.version = now.version + 1;
+    now = std::move(absent);
+    ShowDrift({});
+    ClearTrend();
+    spark_count = 0;
   }
 
   void ShowDrift(std::span<const FollowedDrift> channels) {
@@ -238,7 +253,7 @@ void LiveBoard::RecordGap(Slot& slot, const Sample& sample) {
   const std::int64_t from_ns = slot.now.stamp_ns;
   const std::int64_t limit_ns =
       static_cast<std::int64_t>(kGapPeriods * period_s * 1e9);
-  if (from_ns == 0 || period_s <= 0.0 ||
+  if (slot.pushed == 0 || period_s <= 0.0 ||
       sample.stamp_ns - from_ns <= limit_ns) {
     return;
   }
@@ -331,7 +346,33 @@ void LiveBoard::ShowMonitorSilence(const std::string& valve_id,
 
 void LiveBoard::OnRemoved(const std::string& valve_id, Checkpoint& /*last*/) {
   const std::unique_lock lock(slots_mutex_);
-  slots_.erase(valve_id);
+  const auto found = slots_.find(valve_id);
+  if (found == slots_.end()) {
+    return;
+  }
+  const std::shared_ptr<Slot> slot = found->second;  // Outlives its lock.
+  const std::lock_guard slot_lock(slot->mutex);
+  if (slot->expected) {
+    slot->ShowAbsent();
+  } else {
+    slots_.erase(found);
+  }
+}
+
+void LiveBoard::Expect(const std::string& valve_id, std::int64_t last_ns) {
+  const std::unique_lock lock(slots_mutex_);
+  std::shared_ptr<Slot>& slot = slots_[valve_id];
+  const bool is_new = slot == nullptr;
+  if (is_new) {
+    slot = std::make_shared<Slot>();
+    slot->now.id = valve_id;
+    slot->now.stamp_ns = last_ns;
+  }
+  const std::lock_guard slot_lock(slot->mutex);
+  slot->expected = true;
+  if (is_new) {
+    slot->ShowAbsent();
+  }
 }
 
 void LiveBoard::AddMark(const FaultEvent& event) {

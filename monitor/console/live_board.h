@@ -89,6 +89,11 @@ class LiveBoard : public monitor::ValveListener {
                std::span<const FollowedDrift> drift) override;
   void OnRemoved(const std::string& valve_id, Checkpoint& last) override;
 
+  /// A valve that ought to be there: it is listed as silent until it sends, and
+  /// also after it was evicted. @param last_ns when it was heard last; 0: not
+  /// known. Any thread.
+  void Expect(const std::string& valve_id, std::int64_t last_ns);
+
   /// As OnVerdict(), of a verdict that came over the bus without the readings.
   void ShowRemote(const std::string& valve_id, const Verdict& verdict,
                   std::shared_ptr<const ModelFacts> models,

@@ -21,7 +21,9 @@
 
 #include "base/printable.h"
 #include "base/time_text.h"
+#include "base/time_units.h"
 #include "diagnosis/records/partitions.h"
+#include "diagnosis/records/valve_glob.h"
 #include "monitor/bus/dds_options.h"
 #include "monitor/guard.h"
 #include "monitor/health_book.h"
@@ -356,7 +358,31 @@ void Service::ServeConsole() {
   console_->Start({data_.history(), data_.models(), context_.software,
                    started_ns_, facts, NowNs});
 }
+// Those of the last month of which anything is known.
+void Service::ExpectSeenValves() {
+  constexpr std::int64_t kMonthNs = 30 * kNsPerDay;
+  const std::vector<Accumulator> seen = history_.Accumulators();
+  std::int64_t newest_ns = 0;
+  for (const Accumulator& valve : seen) {
+    newest_ns = std::max(newest_ns, valve.stamp_ns);
+  }
+  for (const Accumulator& valve : seen) {
+    if (valve.stamp_ns >= newest_ns - kMonthNs) {
+      console_->live().Expect(valve.valve_id, valve.stamp_ns);
+    }
+  }
+}
 
+void Service::ExpectAssignedValves() {
+  for (const std::string& valve_id : assignment_->AssignedValves()) {
+    if (GlobMatches(options_.valves, valve_id)) {
+      console_->live().Expect(valve_id, 0);
+    }
+  }
+}
+
+ExpectSeenValves();
+ExpectAssignedValves();
 void Service::ServeProbes() {
   const auto readiness = [this] {
     return Readiness{model_sets_,
@@ -549,19 +575,17 @@ StatusFacts Service::Facts() const {
   idl::DatagramCounts datagrams = participant_.datagrams();
   std::ranges::transform(datagrams, intake_participant_.datagrams(),
                          datagrams.begin(), std::plus<>());
-  return {counters_,
-          pipeline_.census(),
-          samples_.status(),
-          datagrams,
-          intake_participant_.refused_participants(),
-          decisions_.status(),
-          pipeline_.journal_backlog(),
-          recorder_ ? recorder_->waiting() : 0,
-          pipeline_.history_degraded(),
-          RecordingDegraded(),
-          heartbeat_.StalledSince(Clock::now() - kStallLimit),
-          pair_ ? std::optional(pair_->status()) : std::nullopt,
-          shares_.contested()};
+  return {
+    counters_, pipeline_.census(), samples_.status(), if (console_) {
+      ExpectAssignedValves();
+    }
+    datagrams, intake_participant_.refused_participants(), decisions_.status(),
+        pipeline_.journal_backlog(), recorder_ ? recorder_->waiting() : 0,
+        pipeline_.history_degraded(), RecordingDegraded(),
+        heartbeat_.StalledSince(Clock::now() - kStallLimit),
+        pair_ ? std::optional(pair_->status()) : std::nullopt,
+        shares_.contested()
+  };
 }
 
 std::string Service::Metrics() const {

@@ -94,6 +94,8 @@ class Service {
   void Start();
   void ResendEvents();
   void ServeConsole();
+  void ExpectSeenValves();
+  void ExpectAssignedValves();
   void ServeProbes();
   void Diagnose();
 

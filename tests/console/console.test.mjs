@@ -167,6 +167,22 @@ test('what was done to alarms is there after the restart', async () => {
   await page.context().close();
 });
 
+test('a valve that is silent when the monitor starts is listed', async () => {
+  const page = await open(browser, address, '#/');
+  const once = page.locator('.tile', {hasText: 'ONCE'});
+  await plant.simulate('--valve', 'ONCE', '--duration', '60', '--speed', '20')
+      .ended;
+  await once.waitFor();
+
+  monitor.kill('SIGTERM');
+  await monitor.ended;
+  ({monitor} = await plant.startMonitor(new URL(address).port));
+  await page.reload();
+
+  await once.filter({hasText: /no data since \d/}).waitFor();
+  await page.context().close();
+});
+
 test('every view passes axe, light and dark, and asks no other host',
     async () => {
       const page = await open(browser, address, '#/');

@@ -184,5 +184,36 @@ TEST_F(LiveBoardTest, ReadersAndTheDiagnosisShareIt) {
   EXPECT_EQ(board_.Trend("V1")->now.version, 2000U);
 }
 
+TEST_F(LiveBoardTest, AnExpectedValveIsListedBeforeItSendsAndAfterItIsGone) {
+  Checkpoint last;
+  const std::int64_t seen_ns = PlantSample(0).stamp_ns - 3'600'000'000'000;
+  board_.Expect("V1", seen_ns);
+  board_.Expect("V0", 0);
+
+  const std::vector<ValveState> before = board_.Valves();
+  ASSERT_EQ(before.size(), 2U);
+  EXPECT_EQ(before[1].silence, monitor::Silence::kStale);
+  EXPECT_EQ(before[1].stamp_ns, seen_ns);
+  EXPECT_TRUE(board_.Trend("V1").value().points.empty());
+
+  Show(0, 10);
+  Show(0, 10, 0.0, 1, "guest");
+  board_.Expect("V1", seen_ns);  // Again, after a reload.
+  EXPECT_EQ(board_.Trend("V1").value().now.silence, monitor::Silence::kNone);
+  EXPECT_TRUE(board_.Trend("V1").value().gaps.empty());
+
+  board_.OnRemoved("V1", last);
+  board_.OnRemoved("guest", last);
+
+  const std::vector<ValveState> after = board_.Valves();
+  ASSERT_EQ(after.size(), 2U);
+  EXPECT_EQ(after[1].id, "V1");
+  EXPECT_EQ(after[1].silence, monitor::Silence::kStale);
+  EXPECT_EQ(after[1].stamp_ns, PlantSample(9).stamp_ns);
+
+  Show(20, 30);
+  EXPECT_EQ(board_.Trend("V1").value().points.size(), 10U);
+}
+
 }  // namespace
 }  // namespace fdi::console
