@@ -370,8 +370,14 @@ std::vector<WorkRow> ReadWorkList(storage::History& history,
   }
   std::map<std::string, ValveWork> valves;
   const std::vector<Episode> episodes = EpisodesOf(history, query);
+  // What is shelved has been put aside by somebody who knows of it.
+  const auto shelves = history.Shelves(query.options.now_ns);
+  const auto shelved = [&shelves](const Episode& episode) {
+    return std::ranges::any_of(
+        shelves, [&](const auto& s) { return Covers(s, episode); });
+  };
   for (const Episode& episode : episodes) {
-    if (episode.label != "false") {
+    if (episode.label != "false" && !shelved(episode)) {
       ValveWork& work = valves[episode.valve_id];
       AddEpisode(episode, texts, work.faults);
       work.host = episode.host;

@@ -94,7 +94,8 @@ struct WorkQuery {
 };
 
 /// Ranks what the history knows of the plant; see RankWork(). Trends use the
-/// hours of health from since_ns on.
+/// hours of health from since_ns on. Episodes that are shelved now are left
+/// out.
 /// @throws ConfigError for an unknown discipline, naming the accepted ones.
 std::vector<WorkRow> ReadWorkList(storage::History& history,
                                   const report::FaultTexts& texts,

@@ -216,7 +216,8 @@ Json FaultTextsJson(const FaultTexts& texts) {
          {"check", text.check},
          {"discipline", std::string(DisciplineName(text.discipline))},
          {"namur", std::string(NamurName(text.namur))},
-         {"severity", bands}});
+         {"severity", bands},
+         {"label", IsFault(fault)}});
   }
   return {{"faults", rows}};
 }

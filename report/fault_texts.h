@@ -90,7 +90,8 @@ class FaultTexts {
 FaultTexts LoadFaultTexts(const GlobalOptions& options);
 
 /// {"faults": [{"fault", "name", "check", "discipline", "namur", "severity":
-/// [{"from", "level"}]}]}, unknown last.
+/// [{"from", "level"}], "label"}]}, unknown last. An episode can be labelled
+/// with a fault, and not with a finding, which does not tell the cause.
 Json FaultTextsJson(const FaultTexts& texts);
 
 }  // namespace fdi::report

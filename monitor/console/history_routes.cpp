@@ -16,6 +16,8 @@
 #include "report/plot/episode_figure.h"
 #include "report/plot/gnuplot.h"
 #include "report/report.h"
+#include "storage/history/common_cause.h"
+#include "storage/history/history_reader.h"
 #include "storage/history/strength.h"
 
 namespace fdi::console {
@@ -143,6 +145,31 @@ Json Shelves(const Api& api, const httplib::Request& /*request*/) {
     list.push_back(ShelfJson(shelf));
   }
   return {{"shelf", std::move(list)}};
+}
+
+// Those that are open; the history of a plant has none.
+Json Causes(const Api& api, const httplib::Request& /*request*/) {
+  Json list = Json::array();
+  if (api.sources.plant_history) {
+    return {{"causes", std::move(list)}};
+  }
+  storage::HistoryReader reader(api.sources.history);
+  storage::CauseFilter filter;
+  filter.open_only = true;
+  for (const auto& cause :
+       storage::ReadCommonCauses(reader.database(), filter)) {
+    Json members = Json::array();
+    for (const storage::CauseMember& member : cause.members) {
+      members.push_back({{"episode", member.episode_id},
+                         {"valve", member.valve_id},
+                         {"fault", TextOrNull(member.fault)}});
+    }
+    list.push_back({{"cause", cause.cause_id},
+                    {"group", cause.group},
+                    {"opened_ms", Ms(cause.opened_ns)},
+                    {"members", std::move(members)}});
+  }
+  return {{"causes", std::move(list)}};
 }
 
 // Operator actions have a value and who; transitions have what was decided.
@@ -384,6 +411,7 @@ std::vector<Route> HistoryRoutes() {
           {"/api/v1/history", History},
           {"/api/v1/statistics", Statistics},
           {"/api/v1/shelf", Shelves},
+          {"/api/v1/causes", Causes},
           {"/api/v1/episodes/([0-9a-fA-F]{1,16}|last)", Episode},
           {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.csv", nullptr, EpisodeCsv},
           {"/api/v1/episodes/([0-9a-f]{1,16}|last)\\.(svg|png)", nullptr,

@@ -7,6 +7,7 @@
 #include "base/log.h"
 #include "base/time_text.h"
 #include "diagnosis/fault_catalogue.h"
+#include "diagnosis/records/certainty.h"
 #include "storage/history/episode.h"
 #include "storage/history/history_database.h"
 
@@ -39,7 +40,8 @@ std::string FaultsOf(const FaultEvent& event) {
 }  // namespace
 
 report::Json EventJson(const FaultEvent& event, bool persisted,
-                       const report::FaultTexts& texts) {
+                       const report::FaultTexts& texts,
+                       const std::vector<storage::Shelf>& shelves) {
   const Transition& t = event.transition;
   const std::string fault = FaultsOf(event);
   // For an event without a fault the catalogue says "unlike any known fault",
@@ -48,24 +50,32 @@ report::Json EventJson(const FaultEvent& event, bool persisted,
   const report::FaultWords words =
       texts.Words(fault, t.strength, PriorityOf(t.severity));
   const bool closed = t.kind == TransitionKind::kClosed;
-  return {{"kind", std::string(TransitionName(t.kind))},
-          {"valve_id", event.valve_id},
-          {"episode_id", storage::EpisodeIdText(event.episode_id)},
-          {"stamp_utc", FormatTime(t.stamp_ns, true)},
-          {"fault", fault.empty() ? report::Json() : report::Json(fault)},
-          {"name", named ? report::Json(words.name) : report::Json()},
-          {"severity", std::string(SeverityName(words.severity))},
-          {"priority", PriorityOf(words.severity)},
-          {"discipline", words.discipline},
-          {"namur", std::string(NamurName(words.namur))},
-          {"check", named ? report::Json(words.check) : report::Json()},
-          {"factor", t.factor},
-          {"strength", t.strength},
-          {"reason", closed ? report::Json(std::string(EndReasonName(t.reason)))
-                            : report::Json()},
-          {"model_set",
-           event.model_set + "@" + std::to_string(event.model_version)},
-          {"persisted", persisted}};
+  storage::Episode episode;
+  episode.valve_id = event.valve_id;
+  episode.fault = fault.empty() ? std::nullopt : std::optional(fault);
+  const bool shelved = std::ranges::any_of(
+      shelves, [&episode](const auto& s) { return Covers(s, episode); });
+  return {
+      {"kind", std::string(TransitionName(t.kind))},
+      {"valve_id", event.valve_id},
+      {"episode_id", storage::EpisodeIdText(event.episode_id)},
+      {"stamp_utc", FormatTime(t.stamp_ns, true)},
+      {"fault", fault.empty() ? report::Json() : report::Json(fault)},
+      {"name", named ? report::Json(words.name) : report::Json()},
+      {"certainty", CertaintyName(CertaintyOf(event))},
+      {"severity", std::string(SeverityName(words.severity))},
+      {"priority", PriorityOf(words.severity)},
+      {"discipline", words.discipline},
+      {"namur", std::string(NamurName(words.namur))},
+      {"check", named ? report::Json(words.check) : report::Json()},
+      {"factor", t.factor},
+      {"strength", fault.empty() ? report::Json() : report::Json(t.strength)},
+      {"reason", closed ? report::Json(std::string(EndReasonName(t.reason)))
+                        : report::Json()},
+      {"model_set",
+       event.model_set + "@" + std::to_string(event.model_version)},
+      {"persisted", persisted},
+      {"shelved", shelved}};
 }
 
 EventHook::EventHook(std::unique_ptr<EventDelivery> delivery,

@@ -17,6 +17,7 @@
 #include "diagnosis/records/fault_event.h"
 #include "report/fault_texts.h"
 #include "report/json_output.h"
+#include "storage/history/alarm.h"
 
 namespace fdi::monitor {
 
@@ -60,13 +61,15 @@ struct EventHookOptions {
       std::chrono::steady_clock::now};
 };
 
-/// {"kind", "valve_id", "episode_id", "stamp_utc", "fault", "name", "severity",
-/// "priority",
-/// "discipline", "namur", "check", "factor", "strength", "reason", "model_set",
-/// "persisted"}; missing values are null. Without a fault, name and check are
-/// null too, until the event is known to lie outside all known faults.
+/// {"kind", "valve_id", "episode_id", "stamp_utc", "fault", "name",
+/// "certainty", "severity", "priority", "discipline", "namur", "check",
+/// "factor", "strength", "reason", "model_set", "persisted", "shelved"};
+/// missing values are null. Without a fault, strength, name and check are null
+/// too, the last two until the event is known to lie outside all known faults.
+/// @param shelves those in force; "shelved" says whether one covers the event.
 report::Json EventJson(const FaultEvent& event, bool persisted,
-                       const report::FaultTexts& texts);
+                       const report::FaultTexts& texts,
+                       const std::vector<storage::Shelf>& shelves = {});
 
 /// Notifies a program or a web server of every fault event that goes to the
 /// bus, each at most once and in order, from a thread of its own: neither the

@@ -123,6 +123,15 @@ std::string MonotonicMicroseconds() {
                             .count());
 }
 
+// None where they cannot be read: an alarm too many is better than none.
+std::vector<storage::Shelf> ShelvesInForce(const storage::DataDirectory& data) {
+  try {
+    return storage::HistoryReader(data.history()).Shelves(NowNs());
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
 }  // namespace
 
 // Members are initialised in the order in which they use each other. The
@@ -247,14 +256,14 @@ void Service::ListAfterCommit() {
   }
   after_commit_.Add(events_);
   if (hook_) {
-    after_commit_.Add("on_event",
-                      [this, texts = report::LoadFaultTexts(context_.options)](
-                          const FaultEvent& event, bool stored) {
-                        // Its session may have notified of it.
-                        if (!event.resent) {
-                          hook_->Notify(EventJson(event, stored, texts));
-                        }
-                      });
+    after_commit_.Add("on_event", [this, texts = report::LoadFaultTexts(
+                                             context_.options)](
+                                      const FaultEvent& event, bool stored) {
+      // Its session may have notified of it.
+      if (!event.resent) {
+        hook_->Notify(EventJson(event, stored, texts, ShelvesInForce(data_)));
+      }
+    });
   }
 }
 
@@ -348,16 +357,6 @@ void Service::ResendEvents() {
   }
 }
 
-void Service::ServeConsole() {
-  const auto facts = [this] {
-    const idl::MonitorStatusMessage status = StatusOf(Facts());
-    return console::MonitorFacts{
-        idl::HealthName(status.health), status.counters,
-        pipeline_.census().open_episodes, pair_ ? PairText(*pair_) : ""};
-  };
-  console_->Start({data_.history(), data_.models(), context_.software,
-                   started_ns_, facts, NowNs});
-}
 // Those of the last month of which anything is known.
 void Service::ExpectSeenValves() {
   constexpr std::int64_t kMonthNs = 30 * kNsPerDay;
@@ -381,8 +380,19 @@ void Service::ExpectAssignedValves() {
   }
 }
 
-ExpectSeenValves();
-ExpectAssignedValves();
+void Service::ServeConsole() {
+  ExpectSeenValves();
+  ExpectAssignedValves();
+  const auto facts = [this] {
+    const idl::MonitorStatusMessage status = StatusOf(Facts());
+    return console::MonitorFacts{
+        idl::HealthName(status.health), status.counters,
+        pipeline_.census().open_episodes, pair_ ? PairText(*pair_) : ""};
+  };
+  console_->Start({data_.history(), data_.models(), context_.software,
+                   started_ns_, facts, NowNs});
+}
+
 void Service::ServeProbes() {
   const auto readiness = [this] {
     return Readiness{model_sets_,
@@ -568,6 +578,9 @@ void Service::LoadModels() {
   assignment_ = next;
   model_sets_ = next->loaded();
   pipeline_.Reassign(std::move(next));
+  if (console_) {
+    ExpectAssignedValves();
+  }
   retry_reload_at_.reset();
 }
 
@@ -575,17 +588,19 @@ StatusFacts Service::Facts() const {
   idl::DatagramCounts datagrams = participant_.datagrams();
   std::ranges::transform(datagrams, intake_participant_.datagrams(),
                          datagrams.begin(), std::plus<>());
-  return {
-    counters_, pipeline_.census(), samples_.status(), if (console_) {
-      ExpectAssignedValves();
-    }
-    datagrams, intake_participant_.refused_participants(), decisions_.status(),
-        pipeline_.journal_backlog(), recorder_ ? recorder_->waiting() : 0,
-        pipeline_.history_degraded(), RecordingDegraded(),
-        heartbeat_.StalledSince(Clock::now() - kStallLimit),
-        pair_ ? std::optional(pair_->status()) : std::nullopt,
-        shares_.contested()
-  };
+  return {counters_,
+          pipeline_.census(),
+          samples_.status(),
+          datagrams,
+          intake_participant_.refused_participants(),
+          decisions_.status(),
+          pipeline_.journal_backlog(),
+          recorder_ ? recorder_->waiting() : 0,
+          pipeline_.history_degraded(),
+          RecordingDegraded(),
+          heartbeat_.StalledSince(Clock::now() - kStallLimit),
+          pair_ ? std::optional(pair_->status()) : std::nullopt,
+          shares_.contested()};
 }
 
 std::string Service::Metrics() const {

@@ -146,6 +146,11 @@ Report Shelve(const ShelveOptions& options, const Context& context) {
   const auto path = DataOf(context).history();
   HistoryReader reader(path);
   const OperatorNote note = options.note.Note();
+  if (options.duration.find_first_not_of("0123456789.") == std::string::npos) {
+    throw ConfigError("--for " + options.duration +
+                      ": expected a time with its unit, such as 30min, 8h or "
+                      "3d");
+  }
   const std::int64_t until_ns = note.now_ns + ParseDuration(options.duration);
   WarnIfUnknown(options.valve, reader, context);
   const Shelf shelf = HistoryEditor(path).Shelve(

@@ -42,7 +42,14 @@ class Monitor {
         software: '0', pair: null, plant: null, write: false, user: null,
         role: null, session: false, model_sets: []},
       faults: {faults: [{fault: 'f19', name: 'Flow transmitter wrong',
-        check: 'Compare it.', severity: [{from: 0, level: 'high'}]}]},
+        check: 'Compare it.', severity: [{from: 0, level: 'high'}],
+        label: true},
+      {fault: 'f6', name: 'Plug worn', check: 'Look.', severity: [],
+        label: true},
+      {fault: 'x_stuck', name: 'Position stuck, whatever the command and ' +
+        'the flow say, for longer than the loop can explain', check: '',
+      severity: [], label: false}]},
+      causes: {causes: []},
       valves: {valves}, alarms: {alarms}, worklist: {rows: []},
     };
   }
@@ -305,5 +312,56 @@ test('what is judged in part only is said, with the reason', async () => {
   await page.goto(`${address}/#/valve/half`);
   await page.locator('.state-line').getByText('no P1; F not judged').waitFor();
   assert.doesNotMatch(await page.locator('.state-line').innerText(), /normal/);
+  await page.context().close();
+});
+
+test('a label reaches alarm list, tile and valve page, at once', async () => {
+  const episode = '0000000000000001';
+  const row = alarm(episode, 'V', 'f19');
+  monitor.reset([tile('V', 'ISOLATED', ['f19'], {episode})], [row]);
+  monitor.answers['valves/V/trend'] =
+    trend({state: 'ISOLATED', d0: 0, d: [0.93, 0.5]});
+  const page = await open(browser, address, '#/');
+  await page.locator('.tile', {hasText: 'V'}).waitFor();
+
+  await monitor.push('alarm', {...row, label: 'f6'});
+  await page.locator('.tile', {hasText: 'labelled was Plug worn'}).waitFor();
+
+  await page.goto(`${address}/#/valve/V`);
+  monitor.answers.alarms = {alarms: [{...row, label: 'f6'}]};
+  await page.reload();
+  await page.locator('.state-line', {hasText: 'was Plug worn'}).waitFor();
+  await page.goto(`${address}/#/alarms`);
+  await page.locator('tr[data-episode]', {hasText: 'was Plug worn'}).waitFor();
+  await page.context().close();
+});
+
+test('the label dialog offers what is accepted, within its frame', async () => {
+  monitor.reset([], [alarm('0000000000000001', 'V', 'x_stuck')]);
+  Object.assign(monitor.answers.status, {write: true});
+  const page = await open(browser, address, '#/alarms',
+      {viewport: {width: 390, height: 800}});
+  await page.getByRole('button', {name: 'Label V'}).click();
+  const choice = page.getByLabel('What was it?');
+
+  assert.deepEqual(await choice.locator('option').evaluateAll((options) =>
+    options.map((option) => option.value)), ['true', 'false', 'f19', 'f6']);
+  const frame = await page.getByRole('dialog').boundingBox();
+  const box = await choice.boundingBox();
+  assert.ok(box.x >= frame.x && box.x + box.width <= frame.x + frame.width);
+  await page.context().close();
+});
+
+test('common causes stand above the alarms', async () => {
+  monitor.reset();
+  monitor.answers.causes = {causes: [{cause: '1', group: 'air header 2',
+    opened_ms: kNowMs, members: ['A', 'B', 'C'].map((valve) =>
+      ({episode: '0000000000000001', valve, fault: 'f19'}))}]};
+  const page = await open(browser, address, '#/alarms');
+
+  await page.getByText('Common cause in air header 2').waitFor();
+
+  assert.match(await page.locator('.cause').innerText(),
+      /since \S+: 3 valves, A, B, C/);
   await page.context().close();
 });

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/time_units.h"
+#include "diagnosis/fault_catalogue.h"
 #include "report/plot/gnuplot.h"
 #include "tests/monitor/console_http_fixture.h"
 #include "tests/storage/message_of.h"
@@ -137,6 +138,30 @@ TEST_F(ConsoleRoutesTest, WhatIsPartlyJudgedIsNotCalledNormal) {
   EXPECT_EQ(refused["state"], "NOT_JUDGED");
   EXPECT_EQ(refused["refused"]["reason"], "range");
   EXPECT_EQ(refused["refused"]["signals"], Json::array({"X"}));
+}
+
+TEST_F(ConsoleRoutesTest, OpenCommonCausesAndWhatALabelMayBe) {
+  RecordEpisode(writer_, 4);
+  storage::Transaction transaction(writer_.database());
+  writer_.database().Run(
+      "INSERT INTO common_cause VALUES ('00000000000000aa', 'air', 5000000, "
+      "NULL), ('00000000000000bb', 'air', 1000000, 2000000)");
+  writer_.database().Run(
+      "INSERT INTO common_cause_member SELECT '00000000000000aa', "
+      "episode_id, valve_id, 'f7', detected_ns FROM episode");
+  transaction.Commit();
+  Start();
+
+  const Json causes = Get("/api/v1/causes")["causes"];
+  ASSERT_EQ(causes.size(), 1U);
+  EXPECT_EQ(causes[0]["group"], "air");
+  EXPECT_EQ(causes[0]["opened_ms"], 5);
+  EXPECT_EQ(causes[0]["members"][0]["fault"], "f7");
+
+  for (const Json& fault : Get("/api/v1/faults")["faults"]) {
+    EXPECT_EQ(fault["label"],
+              ParseFault(fault["fault"].get<std::string>()).has_value());
+  }
 }
 
 TEST_F(ConsoleRoutesTest, WhatCannotBeIsRefusedWithTheRange) {

@@ -384,6 +384,22 @@ TEST(EventJsonTest, EventSpeaksTheLanguageOfTheCatalogue) {
   EXPECT_EQ(changed["priority"], 2);
 }
 
+TEST(EventJsonTest, AShelvedAlarmSaysSo) {
+  const report::FaultTexts texts(report::SharedFile("faults.toml"));
+  FaultEvent event;
+  event.valve_id = "V1";
+  event.models = SharedLinearModels();
+  event.transition.kind = TransitionKind::kIsolated;
+  event.transition.faults = 2;  // f7
+  storage::Shelf shelf;
+  shelf.valve_id = "V1";
+  shelf.fault = "f7";
+  EXPECT_EQ(EventJson(event, true, texts, {shelf})["shelved"], true);
+  shelf.fault = "f1";
+  EXPECT_EQ(EventJson(event, true, texts, {shelf})["shelved"], false);
+  EXPECT_EQ(EventJson(event, true, texts)["shelved"], false);
+}
+
 // Only once no known fault explains it any more.
 TEST(EventJsonTest, ADetectionIsNotYetUnlikeAnyKnownFault) {
   const report::FaultTexts texts(report::SharedFile("faults.toml"));

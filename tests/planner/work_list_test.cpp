@@ -186,6 +186,15 @@ TEST_F(ReadWorkTest, ATrendIsAReasonOfItsOwn) {
   EXPECT_NEAR(rows[0].work.service_hours, 60 * 24.0, 1e-6);
 }
 
+TEST_F(ReadWorkTest, WhatIsShelvedIsLeftOutUntilTheShelfEnds) {
+  storage::HistoryEditor(directory_.path() / "history.db")
+      .Shelve("V1", std::nullopt, query_.options.now_ns + kDay,
+              By("anna", query_.options.now_ns));
+  EXPECT_EQ(Read().size(), 2u);
+  query_.options.now_ns += 2 * kDay;
+  EXPECT_EQ(Read().size(), 3u);
+}
+
 TEST_F(ReadWorkTest, TopAndDisciplineNarrowIt) {
   query_.top = 1;
   EXPECT_EQ(Read().size(), 1u);

@@ -168,6 +168,8 @@ TEST_F(FdiStoreHistoryTest, AShelvedAlarmSaysSoUntilItIsTakenOff) {
   EXPECT_EQ(Store("history unshelve 1").code, 3);
   EXPECT_EQ(Store("history unshelve --valve LV-1").code, 5);
   EXPECT_EQ(Store("history shelve LV-1 --for 91d").code, 2);
+  EXPECT_THAT(Store("history shelve LV-1 --for 8").err,
+              HasSubstr("--for 8: expected a time with its unit"));
   EXPECT_THAT(Store("history shelve LV-11").err,
               HasSubstr("warning valve_unknown valve=LV-11 did_you_mean=LV-1"));
 }

@@ -117,8 +117,8 @@ export function label(row) {
     ['true', own.length > 0 ? `True: it was ${faultTitle(row.fault)}` :
       'True: there was a fault'],
     ['false', 'False alarm'],
-    ...[...store.faults.keys()].map((fault) =>
-      [fault, `It was ${faultTitle(fault)}`]),
+    ...[...store.faults.values()].filter((fault) => fault.label)
+        .map(({fault}) => [fault, `It was ${faultTitle(fault)}`]),
   ], row.label ?? 'true');
   return ask({
     title: 'Label', verb: 'Label', subject: describe([row]),

@@ -4,7 +4,9 @@
 import {acknowledge, actionButtons, canAct, label, shelve}
   from '../actions.js';
 import {button, h, replace, setText} from '../dom.js';
-import {compareAlarms, groupOf, groups} from '../faults.js';
+import {get} from '../api.js';
+import {compareAlarms, faultTitle, groupOf, groups} from '../faults.js';
+import {timeText} from '../format.js';
 import {link, rememberQuery} from '../route.js';
 import {store} from '../store.js';
 import {bodyRow, columns, dataTable, headRow} from './table.js';
@@ -13,8 +15,17 @@ import {oncePerFrame, View} from './view.js';
 const kColumns = [
   columns.priority, columns.detected, columns.valve, columns.fault,
   columns.group, columns.lasted, columns.certainty, columns.strength,
-  columns.discipline, columns.namur,
+  columns.label, columns.discipline, columns.namur,
 ];
+
+function causeLine({group, opened_ms: since, members}) {
+  return h('p', {class: 'cause'}, h('strong', {}, `Common cause in ${group}`),
+      `, since ${timeText(since)}: ${members.length} valves, `,
+      members.map(({valve, fault, episode}, i) => [i > 0 ? ', ' : '', h('a',
+          {href: link('episode', episode), title: faultTitle(fault)}, valve)]));
+}
+
+const kCausesPeriodMs = 5000;
 
 class Alarms extends View {
   title = 'Alarms';
@@ -24,6 +35,7 @@ class Alarms extends View {
   #body = h('tbody', {role: 'rowgroup'});
   #head = h('thead', {role: 'rowgroup'});
   #chips = new Map();
+  #causes = h('div', {role: 'status'});
   #nothing = h('p', {class: 'nothing', hidden: true});
   #bulk = button('', () => this.#acknowledgeSelected(),
       {class: 'primary', hidden: true});
@@ -34,7 +46,7 @@ class Alarms extends View {
     this.#group = query.get('group') ?? '';
     this.element = h('section', {class: 'live'},
         h('div', {class: 'controls'}, h('h1', {}, 'Alarms'), this.#makeChips(),
-            this.#bulk), this.#readOnly, this.#nothing,
+            this.#bulk), this.#readOnly, this.#causes, this.#nothing,
         dataTable('Alarms, worst first', kColumns, [],
             {layout: 'cards', head: this.#head, body: this.#body}));
     // A flood of alarms costs one table a frame.
@@ -42,6 +54,8 @@ class Alarms extends View {
     this.on(store, 'alarms', showSoon);
     this.on(store, 'status', showSoon);
     this.every(1000, () => this.#showLasted());
+    this.every(kCausesPeriodMs, () => this.#fetchCauses());
+    this.#fetchCauses();
     this.key('j', 'Next alarm', () => this.#move(1));
     this.key('k', 'Alarm before', () => this.#move(-1));
     this.key('a', 'Acknowledge the alarm', () => this.#act((row) =>
@@ -51,6 +65,15 @@ class Alarms extends View {
     this.key('l', 'Label the alarm', () => this.#act(label));
     this.key('x', 'Select the alarm', () => this.#toggle(this.#current));
     this.#show();
+  }
+
+  async #fetchCauses() {
+    try {
+      const {causes} = await get('/causes');
+      if (!this.gone) replace(this.#causes, causes.map(causeLine));
+    } catch {
+      // Asked again soon.
+    }
   }
 
   #makeChips() {

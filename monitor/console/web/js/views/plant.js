@@ -45,6 +45,12 @@ class Plant extends View {
   #words;
   #order;
   #search;
+  #group;  // Only valves of this beginning; empty: all.
+  #groupBox = h('select', {'aria-label': 'Group', 'onchange': () => {
+    this.#group = this.#groupBox.value;
+    this.#refilter();
+  }});
+  #shownGroups = '';
   #buttons = new Map();
   #monitor;  // Only its valves; empty: all.
   #monitors = h('div', {class: 'monitors'});
@@ -66,6 +72,7 @@ class Plant extends View {
     this.on(store, 'tiles', (ids) => this.#changed(ids));
     this.on(store, 'plant', () => this.#showMonitors());
     this.on(settings, 'change', () => this.#showDensity());
+    this.on(store, 'alarms', (change) => this.#redraw(change?.row.valve));
     this.on(window, 'scroll', this.#placeSoon);
     this.on(window, 'resize', this.#placeSoon);
     this.every(kReorderPeriodMs, () => this.#needsOrder && this.#reorder());
@@ -164,6 +171,14 @@ class Plant extends View {
   }
 
   // As much as the budget of one frame allows; the rest in the next ones.
+  // A label is of the alarm, not of the tile; null: of any of them.
+  #redraw(id) {
+    for (const each of id ? [id] : this.#inDocument) {
+      if (this.#inDocument.has(each)) this.#dirty.add(each);
+    }
+    this.#workSoon();
+  }
+
   #work() {
     const end = performance.now() + kFrameBudgetMs;
     for (const id of this.#dirty) {

@@ -7,6 +7,11 @@ import {certaintyText, factorTitle, faultName, faultTitle, inAlarm,
   unconfirmedText} from '../faults.js';
 import {clockText} from '../format.js';
 import {link} from '../route.js';
+import {store} from '../store.js';
+import {labelText} from './table.js';
+
+const kIdTail = 6;
+const kDeviation = 0.3;  // Of 1 - d_0.
 
 // A fault, or one that was there when the data ended.
 const isAlarm = (tile) => inAlarm(tile) || Boolean(tile.unconfirmed_ms);
@@ -61,7 +66,9 @@ export class Tile {
     const alarm = isAlarm(tile);
     const [rank, priority] = rankOf(tile);
     const what = whatText(tile);
-    const quality = qualityText(tile) || (tile.monitor ?? '');
+    const label = store.alarms.get(tile.episode)?.label;
+    const quality = [qualityText(tile), label && `labelled ${labelText(label)}`]
+        .filter(Boolean).join('; ') || (tile.monitor ?? '');
     this.element.className = 'tile' + (alarm ? ` alarm p${priority}` : '') +
         ` rank${rank}` + (['NOT_JUDGED', 'PARTLY_JUDGED'].includes(tile.state) ||
         tile.quality !== 'LIVE' ? ' not-live' : '');

@@ -15,7 +15,7 @@ import {store} from '../store.js';
 import {actionButtons} from '../actions.js';
 import {exportPng} from '../charts/export.js';
 import {HealthSection} from './health.js';
-import {dataTable} from './table.js';
+import {dataTable, labelText} from './table.js';
 import {View} from './view.js';
 
 const kTrendSeconds = 900;  // What the monitor keeps.
@@ -32,6 +32,7 @@ function stateLine(tile) {
           `${faultTitle(tile.fault)}: ${unconfirmedText(tile)}`) : null];
   }
   const priority = priorityOf(tile);
+  const label = store.alarms.get(tile.episode)?.label;
   return [
     h('span', {class: 'tag strong'},
         prioritySign(priority, tile.state === 'ISOLATED'),
@@ -44,6 +45,7 @@ function stateLine(tile) {
     tile.since_ms === null ? null : h('span', {class: 'tag'},
         `for ${durationText(store.valveNowMs(tile.id) - tile.since_ms)}`),
     quality,
+    label && h('span', {class: 'tag'}, `labelled ${labelText(label)}`),
     tile.episode ? h('a', {href: link('episode', tile.episode)},
         'Open the episode') : null,
   ];
@@ -69,6 +71,18 @@ const kFitColumns = [
 ];
 
 /**
+// What this valve is judged by, and what that cannot see.
+function scopeText({model_set: set, missing}) {
+  const models = set && store.modelSet(set);
+  if (!models) return '';
+  const unseen = [...store.faults.values()].filter(({fault, label}) =>
+    label && !models.faults.includes(fault)).map(({name}) => name);
+  return `Judged by model set ${set}` +
+      (missing?.length ? `, without ${missing.join(', ')}` : '') +
+      (unseen.length === 0 ? ', which knows every fault.' :
+        `. Cannot be told from others here: ${unseen.join('; ')}.`);
+}
+
  * What explains the data, in words: [{name, fits, d, strong}]. While it is
  * normal, no fault is listed: those that change nothing then explain it, too.
  */
