@@ -143,7 +143,11 @@ FaultSet FaultBank::Unrefuted(double margin) const {
   }
   FaultSet unrefuted = 0;
   for (const StrengthTracker& tracker : trackers_) {
-    if (best - tracker.evidence(trained_) - allowance_ < margin) {
+    const double evidence = tracker.evidence(trained_);
+    if (evidence == best && !tracker.accounts()) {
+      return 0;
+    }
+    if (best - evidence - allowance_ < margin) {
       unrefuted |= FaultSet{1} << tracker.path().fault_index;
     }
   }

@@ -51,7 +51,8 @@ class FaultBank {
   void ApplyEvidence(Verdict& verdict) const;
 
   /// The faults that the evidence does not refute: L_best − L_f − a < `margin`;
-  /// nothing while it does not refute normal operation.
+  /// nothing while it does not refute normal operation, or while the best one
+  /// does not account for what is seen.
   FaultSet Unrefuted(double margin) const;
 
  private:

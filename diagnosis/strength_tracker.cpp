@@ -12,6 +12,7 @@ constexpr int kSearchSamples = 40;  // initial samples with a grid search
 constexpr double kRateDeviation = 1.0 / 1500.0;
 // An effect on a channel counts from this share of the deviation on.
 constexpr double kMinEffect = 0.25;
+constexpr double kAccounted = 0.5;  // of the normal observer's residual
 
 double Lane(const std::vector<Quad>& quads, std::size_t slot) {
   return quads[slot / kLanes].lane[slot % kLanes];
@@ -39,6 +40,7 @@ void StrengthTracker::Restart() {
   strength_ = path_->lowest;
   rate_ = 0.0;
   refutable_ = false;
+  accounts_ = false;
   total_ = 0.0;
   evidence_.fill(0.0);
   factor_ = 0.0;
@@ -312,8 +314,10 @@ void StrengthTracker::ClampEstimate() {
 
 void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
   factor_ = 1.0;
+  accounts_ = false;
+  double furthest = 0.0;
   const PathPlace place = path_->PlaceOf(strength_);
-  for (std::size_t c = 0; c < channels_ && factor_ > 0.0; ++c) {
+  for (std::size_t c = 0; c < channels_; ++c) {
     if (!bank.active(static_cast<int>(c))) {
       continue;
     }
@@ -326,6 +330,12 @@ void StrengthTracker::UpdateFactor(const ObserverBank& bank) {
     // The trapezoid is that of residuals with deviation σ; these have √S.
     const double shrunk = p.residual * nearest.sd / std::sqrt(p.variance);
     factor_ = std::min(factor_, nearest.membership(shrunk));
+    // The first node is normal operation.
+    const double normal = std::abs(bank.residual(0, static_cast<int>(c)));
+    if (normal > furthest * path_->points[c].sd) {
+      furthest = normal / path_->points[c].sd;
+      accounts_ = std::abs(p.residual) < kAccounted * normal;
+    }
   }
 }
 

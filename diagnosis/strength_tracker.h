@@ -59,6 +59,11 @@ class StrengthTracker {
   /// does not hide both. A fault that is not yet refutable is not isolated.
   bool refutable() const { return refutable_; }
 
+  /// Whether the fault accounts for what is seen: where the normal observer is
+  /// furthest off, in deviations, the residual is less than half of its one.
+  /// Else the fault only tolerates it, as a rod that sticks does nearly all.
+  bool accounts() const { return accounts_; }
+
   /// Smallest membership over the active channels of the residual at the
   /// tracked strength.
   double factor() const { return factor_; }
@@ -111,6 +116,7 @@ class StrengthTracker {
   Parts evidence_{};
   double factor_{0.0};
   bool refutable_{false};
+  bool accounts_{false};
   std::vector<double> cells_;  // evidence by cell and channel
 };
 

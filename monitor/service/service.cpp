@@ -381,8 +381,6 @@ void Service::ExpectAssignedValves() {
 }
 
 void Service::ServeConsole() {
-  ExpectSeenValves();
-  ExpectAssignedValves();
   const auto facts = [this] {
     const idl::MonitorStatusMessage status = StatusOf(Facts());
     return console::MonitorFacts{
@@ -391,6 +389,8 @@ void Service::ServeConsole() {
   };
   console_->Start({data_.history(), data_.models(), context_.software,
                    started_ns_, facts, NowNs});
+  ExpectSeenValves();
+  ExpectAssignedValves();
 }
 
 void Service::ServeProbes() {

@@ -136,6 +136,12 @@ importer::ColumnMap LoopMap(const std::string& text,
                       role.option + " COLUMN");
     }
   }
+  const auto mode = std::ranges::find_if(header, [](const std::string& column) {
+    return IsNamed(column, importer::kModeColumn);
+  });
+  if (map.mode_column.empty() && mode != header.end()) {
+    map.mode_column = *mode;
+  }
   // PV keeps its own unit: nothing here depends on it.
   map.flow_unit = FlowUnit::kM3PerHour;
   return map;
@@ -670,7 +676,7 @@ void AddAuditVerb(report::Program& program) {
   verb.add_option("--sp", options.sp, "Column of the set point [as PV]");
   verb.add_option("--x", options.x, "Column of the position [%]");
   verb.add_option("--mode", options.mode,
-                  "Column of the mode (mode, or auto with 1 and 0)");
+                  "Column of the mode (MODE, or auto with 1 and 0)");
   verb.add_flag("--ignore-x", options.ignore_x,
                 "Judge PV although the position is there");
   verb.add_option("--service", options.service,

@@ -212,7 +212,8 @@ void AddLook(const std::optional<EpisodeLook>& look, const Context& context,
   for (const LookFault& f : look->faults) {
     table.AddRow(
         {FaultName(f.fault), number(f.strength),
-         number(f.lowest) + ".." + number(f.highest),
+         f.lowest < f.highest ? number(f.lowest) + ".." + number(f.highest)
+                              : "not known",
          TimeText(f.begins_ns, context) + (f.growing ? ", growing" : "")});
   }
   if (look->faults.empty()) {
@@ -221,14 +222,17 @@ void AddLook(const std::optional<EpisodeLook>& look, const Context& context,
   AddTextTable(report, table);
 }
 
-// "0.42 (0.38 to 0.46)", "9.6 days (7.2 to 14.5)"
+// "0.42 (0.38 to 0.46)", "9.6 days (7.2 to 14.5)"; an interval without width
+// is not known.
 std::string IntervalText(double value, double lowest, double highest,
                          int decimals, const std::string& unit = "") {
   const auto number = [decimals](double x) {
     return report::FormatNumber(x, decimals);
   };
-  return number(value) + unit + " (" + number(lowest) + " to " +
-         number(highest) + ")";
+  return number(value) + unit +
+         (lowest < highest
+              ? " (" + number(lowest) + " to " + number(highest) + ")"
+              : "");
 }
 
 // In a unit of which there is one at least.
@@ -318,7 +322,7 @@ void AddGrowth(const Episode& episode,
 
 // "likely: Flow transmitter wrong (f19), by simulation of the valve"
 std::string FaultLine(const Episode& e, const std::string& name) {
-  const std::string certainty(CertaintyName(CertaintyOf(e)));
+  std::string certainty(CertaintyName(CertaintyOf(e)));
   if (!e.fault || e.fault == "unknown") {
     return certainty;
   }

@@ -67,8 +67,9 @@ class FieldReader {
     field = table_.Boolean(key).value_or(field);
   }
   void operator()(const char* key, std::vector<double>& field) {
+    auto numbers = table_.Numbers(key);
     if (table_.Has(key)) {
-      field = table_.Numbers(key);
+      field = std::move(numbers);
     }
   }
   void operator()(const char* key, std::string& field) {

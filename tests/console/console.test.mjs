@@ -170,9 +170,11 @@ test('what was done to alarms is there after the restart', async () => {
 test('a valve that is silent when the monitor starts is listed', async () => {
   const page = await open(browser, address, '#/');
   const once = page.locator('.tile', {hasText: 'ONCE'});
-  await plant.simulate('--valve', 'ONCE', '--duration', '60', '--speed', '20')
-      .ended;
+  // Its publisher dies, so that the stream does not end: it falls silent.
+  const publisher = plant.simulate('--valve', 'ONCE', '--duration', '3000',
+      '--speed', '20');
   await once.waitFor();
+  publisher.kill('SIGKILL');
 
   monitor.kill('SIGTERM');
   await monitor.ended;

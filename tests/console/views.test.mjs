@@ -7,7 +7,7 @@ import {readFile} from 'node:fs/promises';
 import {createServer} from 'node:http';
 import {after, before, test} from 'node:test';
 
-import {launch, open} from './browser.mjs';
+import {accessibilityFaults, launch, open} from './browser.mjs';
 import {until} from './programs.mjs';
 
 const kWeb = new URL('../../monitor/console/web/', import.meta.url);
@@ -365,3 +365,129 @@ test('common causes stand above the alarms', async () => {
       /since \S+: 3 valves, A, B, C/);
   await page.context().close();
 });
+
+test('a tile says since when and how strong, and cuts no id to sameness',
+    async () => {
+      const long = 'PLANT-NORTH-UNIT-0042-LINE-7-FV-10';
+      monitor.reset([tile(`${long}1`, 'ISOLATED', ['f19'],
+          {since_ms: kNowMs - 60000, strength: 0.52, spark: [0, 0.9, 1]}),
+      tile(`${long}2`, 'NORMAL', [], {spark: [0, 0.1, 0]})]);
+      const page = await open(browser, address, '#/');
+      const first = page.locator('.tile', {hasText: `${long}1`});
+      await first.waitFor();
+
+      assert.match(await first.locator('.tile-how').innerText(),
+          /^strong, since \d\d:\d\d:\d\d$/);
+      const ends = await page.locator('.tile-id > :last-child').evaluateAll(
+          (nodes) => nodes.map((node) => [node.textContent,
+            node.getBoundingClientRect().right <=
+              node.closest('.tile').getBoundingClientRect().right]));
+      assert.deepEqual(ends, [['FV-101', true], ['FV-102', true]]);
+      assert.equal(await first.locator('.tile-id').getAttribute('title'),
+          `${long}1`);
+      assert.equal(await page.locator('.spark:not([hidden])').count(), 1);
+      await page.context().close();
+    });
+
+test('groups have counts and select their valves', async () => {
+  monitor.reset([tile('U1-FV-1', 'NORMAL'), tile('U1-FV-2', 'ISOLATED',
+      ['f19']), tile('U2-LV-1A', 'NORMAL')]);
+  const page = await open(browser, address, '#/');
+  const group = page.getByLabel('Group');
+  await group.waitFor();
+
+  assert.deepEqual(await group.locator('option').allTextContents(),
+      ['All groups (2)', 'U1-FV (2, 1 in alarm)', 'U2-LV (1)']);
+  await group.selectOption('U2-LV');
+  await until(async () => await page.locator('.tile').count() === 1, 'one');
+  assert.match(page.url(), /group=U2-LV/);
+  await page.context().close();
+});
+
+test('a narrow screen keeps what to check', async () => {
+  monitor.reset([], [alarm('0000000000000001', 'V', 'f19',
+      {check: 'Compare it.'})]);
+  monitor.answers.worklist = {rows: [{rank: 1, valve_id: 'V', why: 'w',
+    fault: 'f19', name: 'n', discipline: 'air', check: 'Look here.',
+    episode_id: '0000000000000001'}]};
+  const page = await open(browser, address, '#/alarms',
+      {viewport: {width: 390, height: 800}});
+  await page.getByText('Check: Compare it.').waitFor();
+  await page.goto(`${address}/#/worklist`);
+  await page.getByText('Look here.').waitFor();
+
+  for (const view of ['alarms', 'worklist', '']) {
+    await page.goto(`${address}/#/${view}`);
+    await page.locator('main h1').waitFor();
+    assert.ok(await page.evaluate(() =>
+      document.documentElement.scrollWidth <= innerWidth), view);
+  }
+  await page.context().close();
+});
+
+test('a valve page says what judges it and what that cannot see', async () => {
+  monitor.reset([tile('V', 'NORMAL', [], {missing: ['P1']})]);
+  monitor.answers.status.model_sets = [{model_set: 'm@1', faults: ['f19']}];
+  monitor.answers['valves/V/trend'] =
+    trend({state: 'NORMAL', d0: 0.97, d: [1, 0.99]});
+  const page = await open(browser, address, '#/valve/V');
+
+  await page.getByText('Judged by model set m@1, without P1. Faults ' +
+    'that it cannot name: Plug worn.').waitFor();
+  await page.context().close();
+});
+
+test('an interval without width is never shown', async () => {
+  const row = alarm('0000000000000001', 'V', 'f19',
+      {lowest: 0.5, highest: 0.5, worst_strength: 0.5});
+  monitor.reset([], [row]);
+  monitor.answers[`episodes/${row.episode}`] = {episode: row, events: [],
+    trace: null, model_hash: 'x', look: {misfit: 1, faults: [{fault: 'f19',
+      strength: 0.5, lowest: 0.5, highest: 0.5, begins_ms: kNowMs,
+      growing: false}]}, growth: [{fault: 'f19', strength: 0.5, lowest: 0.5,
+      highest: 0.5, rate: null, full_in_ms: null, at_ms: kNowMs}]};
+  const page = await open(browser, address, `#/episode/${row.episode}`);
+  await page.locator('.growth').waitFor();
+
+  assert.doesNotMatch(await page.locator('.episode').innerText(),
+      /50 % to 50 %/);
+  await page.context().close();
+});
+
+test('every kind of tile can be read, at any size, light and dark',
+    async () => {
+      const episode = '0000000000000001';
+      const named = {episode, since_ms: kNowMs, strength: 0.5, unacked: true,
+        severity: 'critical'};
+      monitor.reset([tile('FV-1', 'ISOLATED', ['f19', 'f6'],
+          {...named, certainty: 'one of', spark: [0, 1]}),
+      tile('FV-2', 'DETECTED', [], {certainty: 'not yet', since_ms: kNowMs}),
+      tile('FV-3', 'PARTLY_JUDGED', [], {missing: ['P1'], unjudged: ['F']}),
+      tile('FV-4', 'NOT_JUDGED', [], {quality: 'STALE', stamp_ms: 1}),
+      tile('LV-5', 'NORMAL')],
+      [alarm(episode, 'FV-1', 'f19|f6', {label: 'f6', check: 'Look.'})]);
+      monitor.answers['valves/FV-1/trend'] =
+        trend({state: 'NORMAL', d0: 1, d: [1, 1]});
+      for (const [width, height] of [[1400, 900], [390, 800]]) {
+        const page = await open(browser, address, '#/',
+            {viewport: {width, height}});
+        for (const hash of ['#/', '#/alarms', '#/valve/FV-1']) {
+          await page.goto(`${address}/${hash}`);
+          await page.locator('main :is(.tile, tbody tr, .panel)').first()
+              .waitFor();
+          for (const colorScheme of ['light', 'dark']) {
+            await page.emulateMedia({colorScheme});
+            assert.deepEqual(await accessibilityFaults(page), [],
+                `${hash} ${width} ${colorScheme}`);
+          }
+          const cut = await page.locator('.tile-how, .tile-what, .tag')
+              .evaluateAll((nodes) => nodes.filter((node) =>
+                node.scrollHeight > node.clientHeight + 3)
+                  .map((node) => node.textContent));
+          assert.deepEqual(cut, [], `${hash} ${width}`);
+          assert.ok(await page.evaluate(() =>
+            document.documentElement.scrollWidth <= innerWidth), hash);
+        }
+        await page.context().close();
+      }
+    });

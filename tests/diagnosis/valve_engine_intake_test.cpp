@@ -52,7 +52,7 @@ TEST(ValveEngineIntakeTest, BadValuesNeverReachAnObserver) {
     Intake intake;
   } cases[] = {{std::nan(""), Intake::kNotFinite},
                {std::numeric_limits<double>::infinity(), Intake::kNotFinite},
-               {-100.0, Intake::kRange}};
+               {-1000.0, Intake::kRange}};
   for (const auto& bad : cases) {
     ValveEngine engine(SharedPlant());
     StepRange(engine, 0, 50);

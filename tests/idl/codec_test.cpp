@@ -150,8 +150,13 @@ TEST(CodecTest, FaultEventsArriveWhole) {
   sent.source_id = 1;
   sent.seq = 2;
   sent.episode_id = 3;
-  sent.transition = {TransitionKind::kClosed, 4, 5, 0b11, kThird, -0.5,
-                     EndReason::kUnknown};
+  sent.transition = {.kind = TransitionKind::kClosed,
+                     .stamp_ns = 4,
+                     .detection_stamp_ns = 5,
+                     .faults = 0b11,
+                     .factor = kThird,
+                     .strength = -0.5,
+                     .reason = EndReason::kUnknown};
   sent.candidates = {{19, 0.9, -0.5, true}, {3, 0.4, 0.1, false}};
   sent.model_set = "set";
   sent.model_version = 6;

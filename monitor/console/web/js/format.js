@@ -82,9 +82,28 @@ export function percentText(value) {
     Math.abs(value) < 0.005 ? '–' : `${Math.round(100 * value)} %`;
 }
 
+/** How strong a fault is, in words; empty where it is none. */
+export function strengthText(value) {
+  if (percentText(value) === '–') return '';
+  const size = Math.abs(value);
+  return size < 0.2 ? 'slight' : size < 0.5 ? 'moderate' :
+    size < 0.8 ? 'strong' : 'severe';
+}
+
+/** "12 % (10 % to 14 %)"; an interval without width is not known. */
+export function intervalText({value, lowest, highest}, text, unit = '') {
+  const known = lowest !== null && lowest !== undefined && lowest < highest;
+  return text(value) + unit +
+      (known ? ` (${text(lowest)} to ${text(highest)})` : '');
+}
+
 /** Names with digits in the order a reader expects: FV-2 before FV-10. */
 const collator = new Intl.Collator('en', {numeric: true});
 export const compareNames = (a, b) => collator.compare(a, b);
+
+/** What an id has in common with its neighbours: "U1-FV" of "U1-FV-102B". */
+export const groupOfId = (id) =>
+  id.replace(/[-_./ ]*\d+[^-_./ \d]*$/, '') || id;
 
 /** A datetime-local value and back, in the zone that was chosen. */
 export function toInput(ms) {

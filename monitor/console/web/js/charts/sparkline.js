@@ -31,4 +31,7 @@ export function drawSparkline(canvas, values, color) {
     x += step;
   }
   context.stroke();
+  context.font = '9px system-ui, sans-serif';
+  context.fillStyle = color;
+  context.fillText('deviation', 0, 8);
 }

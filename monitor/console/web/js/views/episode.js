@@ -10,7 +10,7 @@ import {button, errorNote, factList, h, replace, setText} from '../dom.js';
 import {certaintyNode, faultTitle, groupName, layerText, markWord, members, namurText,
   priorityNames, priorityOf, prioritySign, stateWord, unconfirmedText}
   from '../faults.js';
-import {durationText, percentText, zoneName} from '../format.js';
+import {durationText, intervalText, percentText, zoneName} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {dataTable, labelText, lastedText, timeCell, valveLink}
@@ -42,7 +42,7 @@ function facts({episode: row, model_hash: hash}) {
     ['End', row.end_reason ? kEndWords[row.end_reason] ?? row.end_reason :
       'still open'],
     ['How sure', certaintyNode(row, '')],
-    ['Strength now', percentText(row.strength)],
+    ['Strength now', intervalText({...row, value: row.strength}, percentText)],
     ['At its worst', percentText(row.worst_strength)],
     ['For', row.discipline ?? '–'],
     ['NE 107', namurText(row.namur)],
@@ -77,8 +77,8 @@ const kEventColumns = [
 const kLookColumns = [
   {text: 'Fault', header: true, cell: ({fault}) => faultTitle(fault)},
   {text: 'Strength', cell: ({strength}) => percentText(strength)},
-  {text: '95 % interval', cell: ({lowest, highest}) =>
-    `${percentText(lowest)} to ${percentText(highest)}`},
+  {text: '95 % interval', cell: ({lowest, highest}) => lowest < highest ?
+    `${percentText(lowest)} to ${percentText(highest)}` : 'not known'},
   {text: 'Begins', cell: ({begins_ms: begins, growing}) =>
     h('span', {}, timeCell(begins), growing ? ', growing' : '')},
 ];
@@ -96,9 +96,6 @@ function lookParts({faults, misfit}) {
 
 const kDay = 86_400_000;
 const kUnits = [[kDay, 'days'], [3_600_000, 'hours'], [60_000, 'minutes']];
-
-const intervalText = ({value, lowest, highest}, text, unit = '') =>
-  `${text(value)}${unit} (${text(lowest)} to ${text(highest)})`;
 
 function fullText(full) {
   const [unit, name] = kUnits.find(([ms]) => full.value >= ms) ?? kUnits[2];

@@ -3,7 +3,7 @@
 
 import {button, cssColor, h, replace, select, setText} from '../dom.js';
 import {faultTitle, inAlarm} from '../faults.js';
-import {compareNames} from '../format.js';
+import {compareNames, groupOfId} from '../format.js';
 import {rememberQuery} from '../route.js';
 import {settings} from '../settings.js';
 import {store} from '../store.js';
@@ -65,14 +65,15 @@ class Plant extends View {
     this.#filter = query.get('show') ?? 'all';
     this.#order = query.get('order') ?? 'worst';
     this.#monitor = query.get('monitor') ?? '';
+    this.#group = query.get('group') ?? '';
     this.#setWords(query.get('q') ?? '');
     this.element = h('section', {'class': 'plant', 'aria-label': 'Plant'},
         this.#controls(query.get('q') ?? ''), this.#monitors, this.#nothing,
         this.#grid);
     this.on(store, 'tiles', (ids) => this.#changed(ids));
     this.on(store, 'plant', () => this.#showMonitors());
-    this.on(settings, 'change', () => this.#showDensity());
     this.on(store, 'alarms', (change) => this.#redraw(change?.row.valve));
+    this.on(settings, 'change', () => this.#showDensity());
     this.on(window, 'scroll', this.#placeSoon);
     this.on(window, 'resize', this.#placeSoon);
     this.every(kReorderPeriodMs, () => this.#needsOrder && this.#reorder());
@@ -141,7 +142,7 @@ class Plant extends View {
           'onchange': () => settings.set('density', density.value)});
     return h('div', {class: 'controls'}, h('h1', {}, 'Plant'), this.#search,
         h('div', {'class': 'chips', 'role': 'group', 'aria-label': 'Filter'},
-            filters), order, density);
+            filters), this.#groupBox, order, density);
   }
 
   #setWords(text) {
@@ -170,7 +171,6 @@ class Plant extends View {
     this.#workSoon();
   }
 
-  // As much as the budget of one frame allows; the rest in the next ones.
   // A label is of the alarm, not of the tile; null: of any of them.
   #redraw(id) {
     for (const each of id ? [id] : this.#inDocument) {
@@ -179,6 +179,7 @@ class Plant extends View {
     this.#workSoon();
   }
 
+  // As much as the budget of one frame allows; the rest in the next ones.
   #work() {
     const end = performance.now() + kFrameBudgetMs;
     for (const id of this.#dirty) {
@@ -194,6 +195,7 @@ class Plant extends View {
   #shows(tile) {
     const filter = kFilters.find((f) => f.key === this.#filter) ?? kFilters[0];
     return (this.#monitor === '' || tile.monitor === this.#monitor) &&
+        (this.#group === '' || groupOfId(tile.id) === this.#group) &&
         filter.test(tile) && matches(tile, this.#words);
   }
 
@@ -204,7 +206,7 @@ class Plant extends View {
       q: this.#search.value,
       show: this.#filter === 'all' ? '' : this.#filter,
       order: this.#order === 'worst' ? '' : this.#order,
-      monitor: this.#monitor,
+      monitor: this.#monitor, group: this.#group,
     });
   }
 
@@ -215,9 +217,33 @@ class Plant extends View {
       setText(count, String(tiles.filter(test).length));
       chip.setAttribute('aria-pressed', String(this.#filter === key));
     }
+    this.#showGroups(tiles);
     this.#nothing.hidden = this.#shown.length > 0;
     setText(this.#nothing, tiles.length === 0 ?
       'No valve has been heard of yet.' : 'No valve fits the search.');
+  }
+
+  // "FV (12, 2 in alarm)"; without a choice of several, nothing.
+  #showGroups(tiles) {
+    const groups = new Map();
+    for (const tile of tiles) {
+      const name = groupOfId(tile.id);
+      const counts = groups.get(name) ?? {all: 0, alarms: 0};
+      groups.set(name, counts);
+      ++counts.all;
+      if (inAlarm(tile)) ++counts.alarms;
+    }
+    const options = [['', `All groups (${groups.size})`],
+      ...[...groups].sort(([a], [b]) => compareNames(a, b))
+          .map(([name, {all, alarms}]) => [name, `${name} (${all}` +
+            (alarms > 0 ? `, ${alarms} in alarm)` : ')')])];
+    const key = JSON.stringify(options);
+    if (key === this.#shownGroups) return;
+    this.#shownGroups = key;
+    this.#groupBox.hidden = groups.size < 2 && this.#group === '';
+    replace(this.#groupBox, options.map(([value, text]) =>
+      h('option', {value}, text)));
+    this.#groupBox.value = this.#group;
   }
 
   #reorder() {

@@ -3,7 +3,7 @@
 import {h} from '../dom.js';
 import {certaintyNode, faultName, faultTitle, groupName, members, namurText, priorityOf,
   priorityNames, prioritySign, unconfirmedText} from '../faults.js';
-import {durationText, percentText, timeText} from '../format.js';
+import {durationText, percentText, strengthText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 
@@ -57,6 +57,10 @@ function faultCell(row) {
     h('span', {class: 'number'}, ` ${numbers}`) : null);
 }
 
+/** What to check, where there is no room for a column of it. */
+const narrowCheck = ({check}) => check ?
+  h('div', {class: 'narrow'}, `Check: ${check}`) : null;
+
 /** How long it lasted, or lasts. */
 export function lastedText(row) {
   return durationText(
@@ -94,14 +98,15 @@ export const columns = {
   detected: {text: 'Detected', cell: (row) => timeCell(row.detected_ms)},
   valve: {text: 'Valve', header: true, cell: (row) =>
     valveCell(row.valve, row)},
-  fault: {text: 'Fault', class: 'fault', cell: faultCell},
+  fault: {text: 'Fault', class: 'fault', cell: (row) =>
+    [faultCell(row), narrowCheck(row)]},
   group: {text: 'State', class: 'remark', cell: (row) => [
     groupName(row), h('div', {class: 'number'}, personText(row))]},
   lasted: {text: 'Lasted', class: 'num', cell: lastedText},
-  certainty: {text: 'How sure', class: 'wide', cell: (row) =>
+  certainty: {text: 'How sure', cell: (row) =>
     certaintyNode(row, '')},
-  strength: {text: 'Strength', class: 'num wide', cell: (row) =>
-    percentText(row.strength)},
+  strength: {text: 'Strength', cell: (row) =>
+    h('span', {title: percentText(row.strength)}, strengthText(row.strength))},
   discipline: {text: 'For', class: 'wider', cell: (row) =>
     row.discipline ?? '–'},
   namur: {text: 'NE 107', class: 'wider', cell: (row) => namurText(row.namur)},

@@ -5,7 +5,7 @@ import {h, setText} from '../dom.js';
 import {certaintyText, factorTitle, faultName, faultTitle, inAlarm,
   priorityNames, priorityOf, prioritySign, qualityText, stateWord,
   unconfirmedText} from '../faults.js';
-import {clockText} from '../format.js';
+import {clockText, percentText, strengthText, timeText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {labelText} from './table.js';
@@ -39,6 +39,12 @@ function whatText(tile) {
       tile.state] ?? '';
 }
 
+// "strong, since 12:03"
+function howText({strength, since_ms: since}) {
+  return [strengthText(strength), since && `since ${timeText(since)}`]
+      .filter(Boolean).join(', ');
+}
+
 export class Tile {
   #position = 0;
   #count = 0;
@@ -47,18 +53,23 @@ export class Tile {
   #id = h('span', {class: 'tile-id'});
   #what = h('span', {class: 'tile-what'});
   #certainty = h('span', {class: 'tile-certainty'});
+  #how = h('span', {class: 'tile-how'});
   #spoken = h('span', {class: 'sr-only'});  // What shape and colour say.
   #quality = h('span', {class: 'tile-quality'});
-  #canvas = h('canvas', {'class': 'spark', 'aria-hidden': 'true'});
+  #canvas = h('canvas', {'class': 'spark', 'aria-hidden': 'true',
+    'title': 'Deviation from normal in the last minute'});
   #link = h('a', {}, h('span', {class: 'tile-head'}, this.#signBox, this.#id,
-      this.#spoken, this.#certainty), this.#what, h('span', {class: 'tile-foot'},
-      this.#canvas, this.#quality));
+      this.#spoken, this.#certainty), this.#what, this.#how,
+  h('span', {class: 'tile-foot'}, this.#canvas, this.#quality));
   element = h('li', {}, this.#link);
 
   constructor(id, color) {
     this.color = color;
     this.id = id;
-    setText(this.#id, id);
+    // Cut in the middle: ids of a plant differ at their ends.
+    this.#id.append(h('span', {class: 'id-head'}, id.slice(0, -kIdTail)),
+        h('span', {}, id.slice(-kIdTail)));
+    this.#id.title = id;
     this.#link.href = link('valve', id);
   }
 
@@ -75,6 +86,9 @@ export class Tile {
     this.#showSign(alarm ? priority : 0, tile.state === 'ISOLATED');
     setText(this.#what, what);
     setText(this.#certainty, alarm ? certaintyText(tile) : '');
+    setText(this.#how, alarm ? howText(tile) : '');
+    this.#how.title = alarm && strengthText(tile.strength) ?
+      `strength ${percentText(tile.strength)}` : '';
     this.#certainty.title = alarm && tile.factor !== null ?
       factorTitle(tile.factor) : '';
     setText(this.#quality, tile.shelved_until_ms === null ? quality :
@@ -84,7 +98,10 @@ export class Tile {
       what ? '' : ', normal');
     this.#what.title = alarm ?
       faultTitle(inAlarm(tile) ? tile.faults.join('|') : tile.fault) : '';
-    drawSparkline(this.#canvas, tile.spark ?? [], this.color);
+    // A calm valve draws no line: a line is a deviation, and says so.
+    const spark = tile.spark ?? [];
+    this.#canvas.hidden = !spark.some((v) => v > kDeviation);
+    if (!this.#canvas.hidden) drawSparkline(this.#canvas, spark, this.color);
   }
 
   /** Which of how many it is, for who cannot see the room around. */

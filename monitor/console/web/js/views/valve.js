@@ -8,8 +8,8 @@ import {driftLines} from '../drift.js';
 import {certaintyNode, factorTitle, faultName, faultTitle, inAlarm,
   priorityNames, priorityOf, prioritySign, qualityText, stateWord,
   unconfirmedText} from '../faults.js';
-import {durationText, numberText, percentText, timeText, unitText}
-  from '../format.js';
+import {durationText, numberText, percentText, strengthText, timeText,
+  unitText} from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {actionButtons} from '../actions.js';
@@ -41,11 +41,12 @@ function stateLine(tile) {
     certaintyNode(tile),
     h('span', {class: 'tag'}, priorityNames[priority]),
     percentText(tile.strength) === '–' ? null :
-      h('span', {class: 'tag'}, `strength ${percentText(tile.strength)}`),
+      h('span', {class: 'tag', title: percentText(tile.strength)},
+          strengthText(tile.strength)),
     tile.since_ms === null ? null : h('span', {class: 'tag'},
         `for ${durationText(store.valveNowMs(tile.id) - tile.since_ms)}`),
-    quality,
     label && h('span', {class: 'tag'}, `labelled ${labelText(label)}`),
+    quality,
     tile.episode ? h('a', {href: link('episode', tile.episode)},
         'Open the episode') : null,
   ];
@@ -70,7 +71,6 @@ const kFitColumns = [
     h('span', {title: d === null ? null : factorTitle(d)}, fits)},
 ];
 
-/**
 // What this valve is judged by, and what that cannot see.
 function scopeText({model_set: set, missing}) {
   const models = set && store.modelSet(set);
@@ -80,9 +80,10 @@ function scopeText({model_set: set, missing}) {
   return `Judged by model set ${set}` +
       (missing?.length ? `, without ${missing.join(', ')}` : '') +
       (unseen.length === 0 ? ', which knows every fault.' :
-        `. Cannot be told from others here: ${unseen.join('; ')}.`);
+        `. Faults that it cannot name: ${unseen.join('; ')}.`);
 }
 
+/**
  * What explains the data, in words: [{name, fits, d, strong}]. While it is
  * normal, no fault is listed: those that change nothing then explain it, too.
  */
@@ -125,6 +126,7 @@ class ValvePage extends View {
   #words = h('p', {class: 'words'});
   #drift = h('p', {class: 'note'});
   #now = h('div', {class: 'now-tables'});
+  #scope = h('p', {class: 'hint scope'});
   #actions = h('div', {class: 'actions'});
   #note = h('p', {class: 'note', role: 'status'});
   #checks = h('p', {class: 'checks'});
@@ -150,7 +152,7 @@ class ValvePage extends View {
         h('div', {class: 'controls'}, h('h1', {}, id), this.#state,
             this.#actions),
         h('div', {class: 'live'}, this.#words, this.#checks, this.#drift,
-            this.#now),
+            this.#now, this.#scope),
         this.#note,
         h('div', {class: 'row-end'}, button('Save as PNG', () =>
           exportPng(this.#timeline, id)), h('a', {href: link('history', '', {valve: id})},
@@ -297,6 +299,7 @@ class ValvePage extends View {
   #showState() {
     const tile = store.tiles.get(this.id);
     replace(this.#state, stateLine(tile));
+    setText(this.#scope, tile ? scopeText(tile) : '');
     const row = tile?.episode ? store.alarms.get(tile.episode) : null;
     const key = JSON.stringify([row, tile?.faults, store.status?.write]);
     if (key === this.#shownState) return;

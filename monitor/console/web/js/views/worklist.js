@@ -17,7 +17,7 @@ const kColumns = [
     row.episode_id ? h('a', {href: link('episode', row.episode_id)},
         faultTitle(row.fault)) : faultTitle(row.fault)},
   {text: 'For', cell: (row) => row.discipline ?? '–'},
-  {text: 'What to check', class: 'remark wide', cell: (row) =>
+  {text: 'What to check', class: 'remark', cell: (row) =>
     row.check ?? '–'},
 ];
 
@@ -41,7 +41,7 @@ class Worklist extends View {
       replace(this.#list, rows.length === 0 ?
         h('p', {class: 'nothing'}, 'Nothing to do: no valve stands out.') :
         dataTable('Work list, most urgent first', kColumns, rows,
-            {layout: 'worklist'}));
+            {layout: 'cards'}));
     } catch (error) {
       replace(this.#list, errorNote(error));
     }
