@@ -167,10 +167,12 @@ ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
 -- name: acknowledge
 UPDATE episode SET acked_by = ?, acked_ns = ?
 WHERE episode_id = ? AND acked_by IS NULL
+-- Not one from before the priority rose. The other monitor may have recorded the
+-- rise some seconds earlier.
 -- name: adopt_ack
 UPDATE episode SET acked_by = ?1, acked_ns = ?2
 WHERE episode_id = ?3 AND (acked_ns IS NULL OR acked_ns > ?2)
-  AND (raised_ns IS NULL OR raised_ns < ?2)
+  AND (raised_ns IS NULL OR raised_ns - 5000000000 < ?2)
 -- name: adopt_label
 UPDATE episode SET label = ?1
 WHERE episode_id = ?2 AND NOT EXISTS (

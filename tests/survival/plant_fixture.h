@@ -213,7 +213,10 @@ class PlantFixture : public HistoryFixture {
         PlantRowsOf("SELECT episode_id, valve_id, " + utc("detected_utc") +
                     ", " + utc("isolated_utc") + ", " + utc("cleared_utc") +
                     ", fault, peak_factor, model_set, end_reason, "
-                    "label, acked_by FROM fdi.fault_history WHERE "
+                    "label, acked_by, strength, worst_strength, severity, "
+                    "priority, " +
+                    utc("unconfirmed_utc") +
+                    " FROM fdi.fault_history WHERE "
                     "monitor = '" +
                     monitor + "' ORDER BY episode_id"));
   }

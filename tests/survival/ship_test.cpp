@@ -234,7 +234,7 @@ TEST_F(ShipTest, ChangesAreLoggedForPlantsAlone) {
   ASSERT_EQ(Ship("a").code, 0);
   EXPECT_EQ(LoggedChanges("a"), 0) << "copied, not logged";
   RecordEpisode(writer, 0b10, "LV-2");
-  EXPECT_EQ(LoggedChanges("a"), 4) << "one for each event";
+  EXPECT_EQ(LoggedChanges("a"), 5) << "one for each event, two for a name";
 
   // A second plant gets a copy of all, the first one what changed since.
   const std::string first = database_;
@@ -243,7 +243,7 @@ TEST_F(ShipTest, ChangesAreLoggedForPlantsAlone) {
   Init();
   ASSERT_EQ(Ship("a").code, 0);
   ExpectEqual("a");
-  EXPECT_EQ(LoggedChanges("a"), 4) << "the first one does not have them";
+  EXPECT_EQ(LoggedChanges("a"), 5) << "the first one does not have them";
   database_ = first;
   ASSERT_EQ(Ship("a").code, 0);
   ExpectEqual("a");
