@@ -158,7 +158,8 @@ TEST_F(ConsoleRoutesTest, OpenCommonCausesAndWhatALabelMayBe) {
   EXPECT_EQ(causes[0]["opened_ms"], 5);
   EXPECT_EQ(causes[0]["members"][0]["fault"], "f7");
 
-  for (const Json& fault : Get("/api/v1/faults")["faults"]) {
+  const Json known = Get("/api/v1/faults");
+  for (const Json& fault : known["faults"]) {
     EXPECT_EQ(fault["label"],
               ParseFault(fault["fault"].get<std::string>()).has_value());
   }
