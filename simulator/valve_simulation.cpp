@@ -411,7 +411,7 @@ void ValveSimulation::Impl::HoldFlatlines(double time_s, Sample& sample) {
   for (std::size_t i = 0; i < config_.faults.size(); ++i) {
     const FaultSchedule& fault = config_.faults[i];
     if (fault.flatline && StrengthAt(fault, time_s) != 0.0) {
-      double& reading = sample.values[Index(*TransmitterOf(fault.fault))];
+      double& reading = sample.values[fdi::Index(*TransmitterOf(fault.fault))];
       held_[i] = held_[i].value_or(reading);
       reading = *held_[i];
     }

@@ -583,6 +583,23 @@ Column BandColumn() {
   return column;
 }
 
+Column VerdictColumn() {
+  Column column{"verdict", "verdict"};
+  column.text = [](const Json& row) {
+    const std::string name = row["verdict"];
+    return row["certainty"].is_null()
+               ? name
+               : name + ", " + row["certainty"].get<std::string>();
+  };
+  column.tone = [](const Json& row) {
+    const std::string name = row["verdict"];
+    return name == "undetermined"       ? Tone::kQuiet
+           : row["certainty"] == "sure" ? Tone::kAlarm
+                                        : Tone::kWarning;
+  };
+  return column;
+}
+
 Report AuditLoops(const AuditOptions& options, const Context& context) {
   if (options.files.empty() && options.runs.empty() && options.valve.empty()) {
     throw ConfigError("audit: nothing to read; try FILE, --runs or --valve");
@@ -613,24 +630,11 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
   report.document["common_periods"] = CommonPeriods(judged);
   report.document["skipped"] = skipped;
   report.document["files"] = Json::array();
-  Column verdict{"verdict", "verdict"};
-  verdict.text = [](const Json& row) {
-    const std::string name = row["verdict"];
-    return row["certainty"].is_null()
-               ? name
-               : name + ", " + row["certainty"].get<std::string>();
-  };
-  verdict.tone = [](const Json& row) {
-    const std::string name = row["verdict"];
-    return name == "undetermined"       ? Tone::kQuiet
-           : row["certainty"] == "sure" ? Tone::kAlarm
-                                        : Tone::kWarning;
-  };
   report
       .Table("windows",
              {{"loop", "loop"},
               {"from [s]", "from_s", Format::kPlain, 0, 4},
-              verdict,
+              VerdictColumn(),
               BandColumn(),
               {"G [-]", "explained", Format::kPlain, 2, 2},
               {"LLR [-]", "prediction_gain", Format::kPlain, 1, 2},
