@@ -348,8 +348,8 @@ FaultSet Episode::WithGroups(FaultSet set, const Verdict& verdict) const {
 // Wald's sequential test: before t_k, the one fault that is left once the
 // likelihood ratio to every other one and to normal operation is more than
 // m/α, with m faults, so that a wrong name has at most the probability α where
-// the models are right. What they err in the first moments of a fault, its next
-// samples have to bear out.
+// the models are right. They err most in the first moments of a fault, so it
+// has to hold for more than n_d samples.
 FaultSet Episode::Proven(const Verdict& verdict) {
   const DecisionParameters& decision = models_->decision;
   if (decision.early_error <= 0.0 || isolation_.full()) {
@@ -382,16 +382,15 @@ void Episode::Isolate(Verdict& verdict) {
   FaultSet supported = isolation_.Supported();
   if (isolation_held_ || verdict.normal_factor >= threshold) {
     contender_run_ = 0;
-    return;
-  }
-  const FaultSet proven = Proven(verdict);
-  if (supported == 0 && (proven & ~verdict.isolated) != 0) {
-    supported = WithGroups(proven, verdict);
-    early_ = true;
-    Name(supported, verdict);
+    proven_run_ = 0;
     return;
   }
   if (supported == 0) {
+    if (const FaultSet proven = Proven(verdict);
+        (proven & ~verdict.isolated) != 0) {
+      early_ = true;
+      Name(WithGroups(proven, verdict), verdict);
+    }
     return;
   }
   supported = WithGroups(supported, verdict);

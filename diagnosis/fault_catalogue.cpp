@@ -115,8 +115,8 @@ std::optional<Signal> TransmitterOf(int fault) {
 }
 
 bool HasNegative(int fault) {
-  constexpr int kFriction = 4;
-  return FaultFactsOf(fault).is_signed && fault != kFriction;
+  const FaultFacts& facts = FaultFactsOf(fault);
+  return facts.is_signed && !facts.negative_hidden;
 }
 
 bool IsVisibleIn(int fault, SignalMask signals) {

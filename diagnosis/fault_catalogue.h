@@ -51,8 +51,11 @@ struct FaultFacts {
   Onset onset{Onset::kGradual};
   /// Weaker than a simulation of X and F errs.
   bool weak{false};
-  /// Needs a medium that can evaporate.
-  bool of_liquids{false};
+  /// A negative strength has no effect that can be seen: a valve has little
+  /// play to lose.
+  bool negative_hidden{false};
+  /// Needs water: of no other medium is it known when it evaporates.
+  bool of_water{false};
   /// The signal whose reading is not what acts on the valve.
   std::optional<Signal> hides{};
   Alike alike{Alike::kNever};
@@ -75,7 +78,8 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
     {.name = "f3", .description = "plug or seat erosion", .paper_name = "F2"},
     {.name = "f4",
      .description = "increased friction of valve or bushing",
-     .is_signed = true},
+     .is_signed = true,
+     .negative_hidden = true},
     {.name = "f5",
      .description = "external leakage",
      .acts_on = ActsOn::kFlow,
@@ -93,7 +97,7 @@ inline constexpr FaultFacts kFaultCatalogue[] = {
      .description = "medium evaporation or critical flow",
      .paper_name = "F4",
      .acts_on = ActsOn::kInputs,
-     .of_liquids = true,
+     .of_water = true,
      .hides = Signal::kT1},
     {.name = "f8", .description = "twisted piston rod", .weak = true},
     {.name = "f9", .description = "housing or terminals leak air"},
@@ -235,8 +239,7 @@ std::optional<int> ParseFinding(std::string_view name);
 /// The signal of the faulty transmitter, for transmitter faults.
 std::optional<Signal> TransmitterOf(int fault);
 
-/// A negative strength of `fault` has an effect of its own: less play than a
-/// valve has cannot be seen.
+/// A negative strength of `fault` exists and can be seen.
 bool HasNegative(int fault);
 
 /// `fault` can be seen in one of `signals`.

@@ -84,6 +84,12 @@ enum class TransitionKind : std::uint8_t {
   kChanged,  ///< The priority rose. On the bus: kReisolated, the same faults.
 };
 
+/// Gives an episode a name.
+constexpr bool IsIsolation(TransitionKind kind) {
+  return kind == TransitionKind::kIsolated ||
+         kind == TransitionKind::kReisolated;
+}
+
 enum class EndReason : std::uint8_t {
   kNone,
   kCleared,

@@ -30,14 +30,10 @@ constexpr const char* kSniff =
     "; try: fdi-store runs sniff FILE --map-output tags.toml, then --map "
     "tags.toml";
 
-/// Whether `words`, in lower case and between bars, contain `cell` in any case.
-bool IsModeWord(std::string_view cell, std::string_view words) {
-  std::string lower(cell);
-  std::ranges::transform(lower, lower.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return lower.find('|') == std::string::npos &&
-         words.find('|' + lower + '|') != std::string_view::npos;
+bool IsOneOf(std::string_view cell,
+             std::initializer_list<std::string_view> words) {
+  return std::ranges::any_of(
+      words, [cell](std::string_view word) { return SameName(cell, word); });
 }
 
 /// The names that `signal` may have in a header: "F_m3_h or F_t_h".
@@ -626,7 +622,7 @@ bool CsvReader::AddByContract(std::size_t column, std::string_view name) {
           : SameName(name, options_.map.mode_column);
   if (is_mode) {
     if (mode_column_) {
-      Refuse("column " + Quoted(name) + " is there twice");
+      Refuse("column " + Quoted(name) + ": the mode is there twice");
     }
     mode_column_ = column;
     return true;
@@ -678,6 +674,7 @@ void CsvReader::CheckHeader() const {
                                         ? kTimeColumn
                                         : std::string_view(map.time_column));
   require(clock_column_ || map.clock_column.empty(), map.clock_column);
+  require(mode_column_ || map.mode_column.empty(), map.mode_column);
   for (const ColumnMapping& m : map.columns) {
     require((header_.signals & MaskOf(m.signal)) != 0, m.column);
   }
@@ -743,21 +740,24 @@ ValveMode CsvReader::Mode() const {
     return *mode;
   }
   // In cascade the controller acts, too; what tracks or is local does not.
-  if (IsModeWord(cell, "|aut|a|cas|cascade|rcas|c|")) {
+  if (IsOneOf(cell, {"aut", "a", "cas", "cascade", "rcas", "c"})) {
     return ValveMode::kAuto;
   }
-  if (IsModeWord(cell, "|man|m|iman|imanual|lo|rout|track|trk|local|")) {
+  if (IsOneOf(cell, {"man", "m", "iman", "imanual", "lo", "rout", "track",
+                     "trk", "local"})) {
     return ValveMode::kManual;
   }
-  if (IsModeWord(cell, "|oos|o/s|off|")) {
+  if (IsOneOf(cell, {"oos", "o/s", "off"})) {
     return ValveMode::kOutOfService;
   }
   // Numbers of modes differ between systems, except in a column of this name.
   const std::string& name = names_[*mode_column_];
-  if (SameName(name, kAutoColumn) && IsModeWord(cell, "|1|1.0|true|yes|on|")) {
+  if (SameName(name, kAutoColumn) &&
+      IsOneOf(cell, {"1", "1.0", "true", "yes", "on"})) {
     return ValveMode::kAuto;
   }
-  if (SameName(name, kAutoColumn) && IsModeWord(cell, "|0|0.0|false|no|")) {
+  if (SameName(name, kAutoColumn) &&
+      IsOneOf(cell, {"0", "0.0", "false", "no"})) {
     return ValveMode::kManual;
   }
   Refuse("column " + Quoted(name) + ": " + Quoted(cell) + " is none of " +

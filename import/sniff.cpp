@@ -580,12 +580,12 @@ void SignalGuess::GuessName(SniffedColumn& column, const std::string& part) {
     return;
   }
   if (IsGasUnit(unit)) {
-    Say(column, "a flow of gas, and the physics is for water");
+    Say(column, "a flow of gas at standard conditions, which is not converted");
     found_.findings.push_back(
         column.name +
-        " is a flow of gas at standard conditions, and the physics is for "
-        "water: F is left out. CV and X still show what the rod does, as "
-        "--signals CV,X");
+        " is a flow of gas at standard conditions, which is not converted: F "
+        "is left out. Export t/h for a type of that gas; CV and X still show "
+        "what the rod does, as --signals CV,X");
     return;
   }
   const NameGuess guess = RoleOf(UnitIn(part).rest, column.about);

@@ -115,10 +115,10 @@ void ReadUnit(TomlReader& table, Signal signal, ColumnMap& map,
   if (!unit) {
     table.Refuse("unit",
                  (IsGasUnit(name) ? "'" + name +
-                                        "' is a flow of gas, "
-                                        "and the physics is for water: "
-                                        "leave [signal.F] out, CV and X "
-                                        "still show what the rod does"
+                                        "' is a flow of gas at standard "
+                                        "conditions, which is not converted: "
+                                        "export t/h, or leave [signal.F] out; "
+                                        "CV and X still show what the rod does"
                                   : "unknown unit '" + name + "'") +
                      "; accepted are" + UnitNames(signal));
   }

@@ -51,7 +51,7 @@ std::optional<FaultSet> EpisodeTracker::StandBy(bool standby,
   } else if (standby && open_ && !IsOver(open_->episode)) {
     open_->teller = Teller::kLeader;
     recovered_ = open_->episode;
-    said_ = true;
+    by_leader_ = true;
   }
   if (standby) {
     return {};
@@ -92,7 +92,7 @@ bool EpisodeTracker::Adopt(const FaultEvent& event, EpisodeOutlet& outlet) {
     }
     return false;
   }
-  said_ = said_ || known;
+  by_leader_ = by_leader_ || known;
   // Later words say more than a detection.
   if (IsOver(event) || (here && !standby_) ||
       (known && said.kind == TransitionKind::kDetected)) {
@@ -114,7 +114,7 @@ bool EpisodeTracker::Adopt(const FaultEvent& event, EpisodeOutlet& outlet) {
               episode.detection_stamp_ns, outlet);
   }
   recovered_ = episode;
-  said_ = true;
+  by_leader_ = true;
   if (!open_) {
     untold_.clear();
   }
@@ -122,8 +122,7 @@ bool EpisodeTracker::Adopt(const FaultEvent& event, EpisodeOutlet& outlet) {
     return false;
   }
   Follow(episode, outlet);
-  return said.kind == TransitionKind::kIsolated ||
-         said.kind == TransitionKind::kReisolated;
+  return IsIsolation(said.kind);
 }
 
 // A repeat of what was before the last end. The stamps of two sources are not
@@ -364,7 +363,7 @@ bool EpisodeTracker::Begin(const Transition& transition, const Verdict& verdict,
     }
     if (standby_) {
       open_->teller = Teller::kLeader;
-      said_ = true;
+      by_leader_ = true;
     } else {
       recovered_.reset();
     }

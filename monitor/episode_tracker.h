@@ -151,7 +151,7 @@ class EpisodeTracker {
   bool IsOver(const FaultEvent& event) const;
   // The history knows it.
   bool IsRecorded() const { return open_ && open_->teller != Teller::kNobody; }
-  bool WaitsForLeader() const { return standby_ && said_; }
+  bool WaitsForLeader() const { return standby_ && by_leader_; }
   void Take(const Transition& transition, const Verdict& verdict,
             const std::shared_ptr<const ModelSet>& models,
             EpisodeOutlet& outlet);
@@ -172,8 +172,8 @@ class EpisodeTracker {
   // Left by an earlier session, or open by the word of the leader; on a standby
   // also while it is open here.
   std::optional<OpenEpisode> recovered_;
-  bool said_{false};    // The latter.
-  EndedEpisode ended_;  // The last one, by whomever.
+  bool by_leader_{false};  // recovered_ is open by the word of the leader.
+  EndedEpisode ended_;     // The last one, by whomever.
   bool standby_{false};
   std::vector<FaultEvent> untold_;  // Of the last episode here.
   std::vector<FaultEvent> ends_;    // Of the leader's episodes.

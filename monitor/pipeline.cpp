@@ -34,6 +34,9 @@ constexpr std::array<LogId, kIntakeCount> kRejectionIds{
     LogId::kUnit,
     LogId::kPeriod};
 
+// Without a slot, of which something is remembered, unless more are open.
+constexpr std::size_t kMaxKnownValves = 10'000;
+
 // "F|T1"
 std::string SignalNames(SignalMask signals) {
   std::string names;
@@ -139,6 +142,12 @@ void Pipeline::Start(const std::vector<OpenEpisode>& open,
 }
 
 EpisodeTracker& Pipeline::Recovered(const std::string& valve_id) {
+  // What has ended is remembered against repeats of the other of a pair.
+  if (recovered_.size() >= kMaxKnownValves) {
+    std::erase_if(recovered_, [](const auto& known) {
+      return known.second.recovering() == nullptr;
+    });
+  }
   const auto [found, fresh] =
       recovered_.try_emplace(valve_id, valve_id, options_.trace);
   if (fresh) {

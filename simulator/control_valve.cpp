@@ -337,13 +337,6 @@ MediumState MediumFor(const ValveParameters& valve,
 
 }  // namespace
 
-double FlowM3PerHour(const ValveParameters& valve, const FaultEffects& effects,
-                     const ProcessInputs& effective, double rod,
-                     double bypass_opening) {
-  return FlowThrough(valve.trim, MediumFor(valve, effective), effects, rod,
-                     bypass_opening);
-}
-
 double FlowOf(const ValveParameters& valve, const FaultEffects& effects,
               const ProcessInputs& effective, double rod,
               double bypass_opening) {
@@ -648,10 +641,11 @@ double ControlValve::NetForce() const {
 double ControlValve::FlowM3PerHour(const ProcessInputs& inputs,
                                    double bypass_opening) const {
   const ValveDynamics& dynamics = impl_->dynamics_;
-  return simulator::FlowM3PerHour(
-      dynamics.parameters(), dynamics.effects(), dynamics.Effective(inputs),
-      dynamics.Closing(dynamics.Rod(impl_->x()[kActuatorState])),
-      bypass_opening);
+  const ValveParameters& valve = dynamics.parameters();
+  return FlowThrough(valve.trim, MediumFor(valve, dynamics.Effective(inputs)),
+                     dynamics.effects(),
+                     dynamics.Closing(dynamics.Rod(impl_->x()[kActuatorState])),
+                     bypass_opening);
 }
 
 double ControlValve::Flow(const ProcessInputs& inputs,

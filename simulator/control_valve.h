@@ -73,7 +73,8 @@ class ValveDynamics final : public OdeSystem {
 
   /// Backlash width / stroke.
   double PlayWidth() const;
-  /// Ends of the actuator's travel; those of the rod are 0 and its limit.
+  /// Ends of the actuator's travel; those of the rod
+  /// may be narrower.
   double LowStop() const { return parameters_.actuator.lowest_travel; }
   double HighStop() const { return parameters_.actuator.highest_travel; }
   /// Rod position behind the play for an actuator position z, along the
@@ -141,12 +142,8 @@ class ValveDynamics final : public OdeSystem {
   double vapour_pa_{0.0};
 };
 
-/// Flow through trim and bypass [m3/h at the inlet] with the rod at `rod`;
-/// `effective` has the fault effects applied.
-double FlowM3PerHour(const ValveParameters& valve, const FaultEffects& effects,
-                     const ProcessInputs& effective, double rod,
-                     double bypass_opening);
-/// The same in the flow unit of the valve's instruments.
+/// Flow through trim and bypass in the flow unit of the valve's instruments,
+/// with the rod at `rod`; `effective` has the fault effects applied.
 double FlowOf(const ValveParameters& valve, const FaultEffects& effects,
               const ProcessInputs& effective, double rod,
               double bypass_opening);
@@ -154,9 +151,9 @@ double FlowOf(const ValveParameters& valve, const FaultEffects& effects,
 /// Mechanical state. Fractions of the stroke; 0 open, 1 closed for rod and
 /// actuator.
 struct ValveState {
-  double rod;                  ///< Position y of rod and plug, behind the play.
-  double actuator;             ///< Position z of the actuator, before the play.
-  double velocity;             ///< dz/dt [1/s].
+  double rod;       ///< Position y of rod and plug, behind the play.
+  double actuator;  ///< Position z of the actuator, before the play.
+  double velocity;  ///< dz/dt [1/s], along the travel that the air causes.
   double chamber_pressure_pa;  ///< Absolute.
   double air_mass_kg;          ///< In the chamber.
   double feedback;  ///< Angle seen by the positioner, fraction of travel.
@@ -206,8 +203,9 @@ class ControlValve final {
 
   ValveState state() const;
 
-  /// Net force on the moving mass without friction and damping [N], towards
-  /// closing, equation (14), under the last inputs of Advance().
+  /// Net force on the moving mass without friction and damping [N], along
+  /// the travel that the air causes, equation (14), under the last inputs of
+  /// Advance().
   double NetForce() const;
 
   /// Flow through trim and bypass, with fault effects, in m3/h at the inlet and

@@ -96,7 +96,7 @@ bool LeavesRod(int fault) {
 }
 
 bool Exists(int fault, const ValveParameters& valve) {
-  return !FaultFactsOf(fault).of_liquids || !valve.medium.is_gas();
+  return !FaultFactsOf(fault).of_water || valve.medium.fluid == Fluid::kWater;
 }
 
 }  // namespace fdi::simulator

@@ -52,8 +52,8 @@ void ApplyFault(int fault, double strength, FaultEffects& effects);
 /// @throws std::invalid_argument if `fault` is not in the catalogue.
 bool LeavesRod(int fault);
 
-/// False for a fault that a valve with this medium cannot have: a gas does not
-/// evaporate.
+/// False for a fault that cannot be simulated with this medium: of water alone
+/// it is known when it evaporates.
 bool Exists(int fault, const ValveParameters& valve);
 
 }  // namespace fdi::simulator

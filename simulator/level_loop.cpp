@@ -110,9 +110,9 @@ void LevelLoop::AdvanceBoiler() {
 }
 
 double InventoryController::Next(double error, double period_s) {
-  cv_pct_ += gain_ / integral_time_s_ * error * period_s;
-  cv_pct_ = std::clamp(cv_pct_, 0.0, 100.0);
-  return std::clamp(cv_pct_ + gain_ * error, 0.0, 100.0);
+  integral_pct_ += gain_ / integral_time_s_ * error * period_s;
+  integral_pct_ = std::clamp(integral_pct_, 0.0, 100.0);
+  return std::clamp(integral_pct_ + gain_ * error, 0.0, 100.0);
 }
 
 ProcessInputs LevelLoop::Next(const FlowOfPressures& flow) {

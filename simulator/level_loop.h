@@ -21,17 +21,19 @@ struct BoilerState {
 class InventoryController {
  public:
   InventoryController(double gain, double integral_time_s, double initial_pct)
-      : gain_(gain), integral_time_s_(integral_time_s), cv_pct_(initial_pct) {}
+      : gain_(gain),
+        integral_time_s_(integral_time_s),
+        integral_pct_(initial_pct) {}
 
   /// @param error level above the set point [%].
   double Next(double error, double period_s);
   /// The command without the proportional action [%].
-  double integral_pct() const { return cv_pct_; }
+  double integral_pct() const { return integral_pct_; }
 
  private:
   double gain_;
   double integral_time_s_;
-  double cv_pct_;
+  double integral_pct_;
 };
 
 /// Feedwater loop about the operating point of the Lublin boiler: the valve

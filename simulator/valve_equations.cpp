@@ -137,12 +137,14 @@ double Opening(const Trim& trim, double closing) {
     case FlowCharacteristic::kExponential:
       break;
   }
+  const auto curve = [&trim](double at) {
+    return std::max(trim.leakage, std::exp(-trim.exponent * at));
+  };
   if (x <= trim.shut_off) {
-    return std::exp(-trim.exponent * x);
+    return curve(x);
   }
-  return trim.leakage +
-         (std::exp(-trim.exponent * trim.shut_off) - trim.leakage) * (1.0 - x) /
-             (1.0 - trim.shut_off);
+  return trim.leakage + (curve(trim.shut_off) - trim.leakage) * (1.0 - x) /
+                            (1.0 - trim.shut_off);
 }
 
 double RecoveryCoefficient(const Trim& trim, double closing) {

@@ -325,8 +325,10 @@ ValveParameters WithUnknowns(ValveParameters parameters,
   return parameters;
 }
 
-// Beyond it, the shut-off part of the trim begins.
-constexpr double kShuttingOff = 0.97;
+// Beyond it, the shut-off part of the trim may begin.
+double ShuttingOff(const Trim& trim) {
+  return std::min(0.97, trim.shut_off);
+}
 
 }  // namespace
 
@@ -342,7 +344,7 @@ double SizeOf(const std::vector<HealthyRecord>& records,
           {0.01 * in.cv_pct, 1e3 * in.p1_kpa, 1e3 * in.p2_kpa, in.t1_degc},
           0.01 * row.x_pct, 0.0);
       if (row.x_measured && row.flow_measured && row.flow > 0.0 &&
-          expected > 0.0 && row.x_pct < 100.0 * kShuttingOff) {
+          expected > 0.0 && row.x_pct < 100.0 * ShuttingOff(valve.trim)) {
         ratios.push_back(row.flow / expected);
       }
     }
@@ -390,7 +392,7 @@ Trim RegressTrim(const std::vector<HealthyRecord>& records,
     for (const RecordRow& row : record.rows) {
       const double kv = EffectiveKv(row, nominal);
       const double x = 0.01 * row.x_pct;
-      if (kv > 0.0 && x < kShuttingOff) {
+      if (kv > 0.0 && x < ShuttingOff(trim)) {
         const double shape = exponential ? 0.0 : std::log(Opening(trim, x));
         sums.Add(row.flow * row.flow, x, std::log(kv) - shape);
       }

@@ -164,8 +164,7 @@ Json Causes(const Api& api, const httplib::Request& /*request*/) {
                          {"valve", member.valve_id},
                          {"fault", TextOrNull(member.fault)}});
     }
-    list.push_back({{"cause", cause.cause_id},
-                    {"group", cause.group},
+    list.push_back({{"group", cause.group},
                     {"opened_ms", Ms(cause.opened_ns)},
                     {"members", std::move(members)}});
   }

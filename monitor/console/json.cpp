@@ -374,9 +374,7 @@ storage::Alarm AlarmOf(const FaultEvent& event) {
   e.detected_ns = transition.detection_stamp_ns;
   e.peak_factor = transition.factor;
   e.strength = transition.strength;
-  if (transition.severity) {
-    e.priority = PriorityOf(*transition.severity);
-  }
+  e.priority = PriorityOf(transition.severity);
   e.model_set = event.model_set + "@" + std::to_string(event.model_version);
   if (const std::string faults = IsolatedFaults(event); !faults.empty()) {
     e.fault = faults;

@@ -6,11 +6,6 @@
 namespace fdi::monitor {
 namespace {
 
-bool NamesFaults(const Transition& transition) {
-  return transition.kind == TransitionKind::kIsolated ||
-         transition.kind == TransitionKind::kReisolated;
-}
-
 FaultSet SetOf(const std::vector<NamedFault>& faults) {
   FaultSet set = 0;
   for (const NamedFault& fault : faults) {
@@ -56,7 +51,7 @@ const Verdict& EpisodeName::Step(const Inputs& inputs) {
   // In order: from a new source, one sample ends an episode and opens another.
   for (Transition transition : inputs.engine.Transitions()) {
     // Those that name faults are left out: Announce() has those of the name.
-    if (NamesFaults(transition)) {
+    if (IsIsolation(transition.kind)) {
       continue;
     }
     detection_ns_ = transition.detection_stamp_ns;

@@ -70,11 +70,6 @@ bool Same(const FaultEvent& a, const FaultEvent& b) {
          a.transition.stamp_ns == b.transition.stamp_ns;
 }
 
-bool Names(TransitionKind kind) {
-  return OnTheBus(kind) == TransitionKind::kReisolated ||
-         kind == TransitionKind::kIsolated;
-}
-
 // Whether `said` leaves nothing to say for `found`: it comes later in the same
 // episode, or is the same, though a sample earlier. An end is one until the
 // episode has ended.
@@ -82,7 +77,9 @@ bool Covers(const FaultEvent& said, const FaultEvent& found) {
   const Transition& a = said.transition;
   const Transition& b = found.transition;
   const bool like =
-      Names(a.kind) && Names(b.kind) ? a.faults == b.faults : a.kind == b.kind;
+      IsIsolation(OnTheBus(a.kind)) && IsIsolation(OnTheBus(b.kind))
+          ? a.faults == b.faults
+          : a.kind == b.kind;
   return said.episode_id == found.episode_id &&
          (a.kind == TransitionKind::kClosed ||
           (b.kind != TransitionKind::kClosed &&
@@ -519,10 +516,12 @@ Pair::Status Pair::status() const {
 
 bool Pair::AllEventsCovered() const {
   const TimePoint now = Clock::now();
-  const std::lock_guard lock(mutex_);
-  return std::ranges::all_of(held_events_, [&](const HeldEvent& held) {
-    return now - held.since > kMaxEventAge;
-  });
+  // What was taken from outgoing_ is on the bus once sending_ is free.
+  const std::scoped_lock lock(sending_, mutex_);
+  return outgoing_.empty() &&
+         std::ranges::all_of(held_events_, [&](const HeldEvent& held) {
+           return now - held.since > kMaxEventAge;
+         });
 }
 
 }  // namespace fdi::monitor

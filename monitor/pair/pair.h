@@ -155,7 +155,7 @@ class Pair : public DecisionSink, public EventSink {
   TimePoint forgot_;
 
   // Held while events are written; locked before mutex_.
-  std::mutex sending_;
+  mutable std::mutex sending_;
   mutable std::mutex mutex_;  // Guards the members below; never while writing.
   Status status_;
   // The last events of each valve that are on the bus, by stamp.

@@ -76,19 +76,19 @@ void HistoryStore::ReportDamage(const std::vector<std::string>& damaged) {
 }
 
 void HistoryStore::CommitBatch(const std::function<void()>& batch) {
-  InPlace([&] { writer_.CommitBatch(batch); });
+  OnCurrentFile([&] { writer_.CommitBatch(batch); });
 }
 
 void HistoryStore::CommitCheckpoint(const Checkpoint& checkpoint) {
-  InPlace([&] { writer_.CommitCheckpoint(checkpoint); });
+  OnCurrentFile([&] { writer_.CommitCheckpoint(checkpoint); });
 }
 
 void HistoryStore::Commit() {
-  InPlace([&] { writer_.Commit(utc_now_ns_()); });
+  OnCurrentFile([&] { writer_.Commit(utc_now_ns_()); });
 }
 
 // Runs `call` on the file that has the name of ours.
-void HistoryStore::InPlace(const std::function<void()>& call) {
+void HistoryStore::OnCurrentFile(const std::function<void()>& call) {
   moved_ = writer_.Refresh() || moved_;
   if (!moved_) {
     TellApart(call);

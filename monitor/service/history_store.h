@@ -67,7 +67,7 @@ class HistoryStore : public HistorySink {
   void EndSession() { writer_.EndSession(utc_now_ns_(), true); }
 
  private:
-  void InPlace(const std::function<void()>& call);
+  void OnCurrentFile(const std::function<void()>& call);
   void ReportDamage(const std::vector<std::string>& damaged);
   void SkipIfNotFound(const char* operation, const std::function<void()>& call);
 

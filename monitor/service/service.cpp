@@ -86,13 +86,6 @@ std::vector<Heartbeat::Member> Members(const Pipeline& pipeline,
   return members;
 }
 
-std::filesystem::path LockOf(const storage::DataDirectory& data) {
-  std::filesystem::path path = data.history();
-  return path += ".lock";
-}
-
-constexpr std::int64_t kMaxCountedAlarms = 100'000;
-
 // The reader never frees the slot of a valve while its publisher is alive, so
 // it needs more slots than the pipeline, which does free them.
 int IntakeValves(int max_valves) {
@@ -123,15 +116,6 @@ std::string MonotonicMicroseconds() {
                             .count());
 }
 
-// None where they cannot be read: an alarm too many is better than none.
-std::vector<storage::Shelf> ShelvesInForce(const storage::DataDirectory& data) {
-  try {
-    return storage::HistoryReader(data.history()).Shelves(NowNs());
-  } catch (const std::exception&) {
-    return {};
-  }
-}
-
 }  // namespace
 
 // Members are initialised in the order in which they use each other. The
@@ -148,7 +132,7 @@ Service::Service(const ServiceOptions& options, const report::Context& context)
                          *options.console, context.options, context.log)
                    : nullptr),
       data_(Prepared(context.options.data_dir)),
-      lock_(LockOf(data_), "recording faults"),
+      lock_(data_.lock(), "recording faults"),
       hook_(
           options.on_event.empty()
               ? nullptr
@@ -256,22 +240,36 @@ void Service::ListAfterCommit() {
   }
   after_commit_.Add(events_);
   if (hook_) {
-    after_commit_.Add("on_event", [this, texts = report::LoadFaultTexts(
-                                             context_.options)](
-                                      const FaultEvent& event, bool stored) {
-      // Its session may have notified of it.
-      if (!event.resent) {
-        hook_->Notify(EventJson(event, stored, texts, ShelvesInForce(data_)));
-      }
-    });
+    after_commit_.Add(
+        "on_event", [this, texts = report::LoadFaultTexts(context_.options)](
+                        const FaultEvent& event, bool stored) {
+          // Its session may have notified of it.
+          if (!event.resent) {
+            hook_->Notify(EventJson(event, stored, texts, ShelvesInForce()));
+          }
+        });
+  }
+}
+
+// None where they cannot be read: an alarm too many is better than none.
+std::vector<storage::Shelf> Service::ShelvesInForce() {
+  try {
+    if (!shelf_reader_) {
+      shelf_reader_ = std::make_unique<storage::HistoryReader>(data_.history());
+    }
+    shelf_reader_->database().Refresh();
+    return shelf_reader_->Shelves(NowNs());
+  } catch (const std::exception&) {
+    shelf_reader_.reset();
+    return {};
   }
 }
 
 PipelineOptions Service::WithDelivery(PipelineOptions options) {
-  // A standby publishes nothing itself: its events are delivered once it has
-  // heard them from the leader.
   options.severities = std::make_shared<const SeverityCatalogue>(
       report::LoadFaultTexts(context_.options).Severities());
+  // A standby publishes nothing itself: its events are delivered once it has
+  // heard them from the leader.
   options.journal.acknowledged = [this](milliseconds patience) {
     return (!pair_ || pair_->AllEventsCovered()) &&
            events_.WaitForAcknowledged(patience);
@@ -366,7 +364,8 @@ void Service::ExpectSeenValves() {
     newest_ns = std::max(newest_ns, valve.stamp_ns);
   }
   for (const Accumulator& valve : seen) {
-    if (valve.stamp_ns >= newest_ns - kMonthNs) {
+    if (valve.stamp_ns >= newest_ns - kMonthNs &&
+        GlobMatches(options_.valves, valve.valve_id)) {
       console_->live().Expect(valve.valve_id, valve.stamp_ns);
     }
   }
@@ -616,9 +615,7 @@ std::string Service::Metrics() const {
     facts.admissions = console_->admissions();
   }
   try {
-    storage::HistoryReader history(data_.history());
-    facts.alarms =
-        storage::CountAlarms(history.AlarmList(NowNs(), kMaxCountedAlarms));
+    facts.alarms = storage::HistoryReader(data_.history()).CountAlarms(NowNs());
   } catch (const std::exception&) {
     // Without the history nobody can tell; fdi_persistence_degraded says so.
   }

@@ -32,6 +32,7 @@
 #include "report/stop_signals.h"
 #include "storage/database/data_directory.h"
 #include "storage/database/locks.h"
+#include "storage/history/history_reader.h"
 
 namespace fdi::monitor {
 
@@ -89,6 +90,7 @@ class Service {
   PipelineOptions WithDelivery(PipelineOptions options);
   void AttachListeners();
   void ListAfterCommit();
+  std::vector<storage::Shelf> ShelvesInForce();
   void AnnounceModels(const ModelSet& models);
 
   void Start();
@@ -125,6 +127,8 @@ class Service {
   storage::DataDirectory data_;
   storage::ExclusiveLock lock_;
   std::unique_ptr<EventHook> hook_;  // Null: no event hook.
+  // Of the step "on_event", one event at a time; null: not open.
+  std::unique_ptr<storage::HistoryReader> shelf_reader_;
   idl::Participant participant_;
   idl::Participant intake_participant_;  // See idl::Overflow.
   idl::Publisher<idl::ModelSetInfoMessage> models_topic_;

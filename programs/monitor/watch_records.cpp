@@ -24,7 +24,7 @@ Json Utc(std::int64_t stamp_ns) {
   return FormatTime(stamp_ns, true);
 }
 
-// "likely f19 strength=0.52", "not yet, f3|f6 may be"
+// "likely f19 strength=0.52", "not yet, may be f3|f6"
 std::string NameText(const FaultEvent& message, const std::string& faults) {
   std::string text(CertaintyName(CertaintyOf(message)));
   if (!faults.empty()) {
@@ -35,7 +35,7 @@ std::string NameText(const FaultEvent& message, const std::string& faults) {
   for (const FaultCandidate& candidate : message.candidates) {
     names += (names.empty() ? "" : "|") + FaultName(candidate.fault);
   }
-  return names.empty() ? text : text + ", " + names + " may be";
+  return names.empty() ? text : text + ", may be " + names;
 }
 
 }  // namespace

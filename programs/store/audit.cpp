@@ -78,23 +78,24 @@ bool IsNamed(std::string_view column, std::string_view name) {
              column[column.size() - name.size() - 1]) != std::string_view::npos;
 }
 
-// The column of a role: as the user says, else the only one with a usual name.
-std::optional<std::string> ColumnOf(const Role& role,
-                                    const AuditOptions& options,
+// The column as the user `asked`, else the only one with a usual name.
+std::optional<std::string> ColumnOf(std::span<const char* const> names,
+                                    const char* option,
+                                    const std::string& asked,
                                     const std::vector<std::string>& header,
                                     const std::string& source) {
-  if (const std::string& asked = options.*(role.column); !asked.empty()) {
+  if (!asked.empty()) {
     return asked;
   }
-  for (const char* name : role.names) {
+  for (const char* name : names) {
     std::vector<std::string> found;
     std::ranges::copy_if(
         header, std::back_inserter(found),
         [name](const std::string& column) { return IsNamed(column, name); });
     if (found.size() > 1) {
       throw DataError(source + ": columns " + Quoted(Listed(found)) +
-                      " may each be it; try " + role.option +
-                      " with one of them");
+                      " all look like " + option +
+                      "; name one of them with it");
     }
     if (found.size() == 1) {
       return found.front();
@@ -112,8 +113,7 @@ struct LoopRecord {
   std::vector<SampleSeries> stretches;
 };
 
-// A readable set of columns becomes a map, so that the project's one reader
-// reads loops, too.
+// A map of the loop's columns, so that the importer reads loops, too.
 importer::ColumnMap LoopMap(const std::string& text,
                             const AuditOptions& options,
                             const std::string& source) {
@@ -128,7 +128,8 @@ importer::ColumnMap LoopMap(const std::string& text,
     if (role.signal == Signal::kX && options.ignore_x) {
       continue;
     }
-    if (const auto column = ColumnOf(role, options, header, source)) {
+    if (const auto column = ColumnOf(role.names, role.option,
+                                     options.*(role.column), header, source)) {
       map.columns.push_back({*column, role.signal});
     } else if (role.signal == Signal::kCv || role.signal == Signal::kF) {
       throw DataError(source + ": no column for " + (role.option + 2) +
@@ -136,12 +137,9 @@ importer::ColumnMap LoopMap(const std::string& text,
                       role.option + " COLUMN");
     }
   }
-  const auto mode = std::ranges::find_if(header, [](const std::string& column) {
-    return IsNamed(column, importer::kModeColumn);
-  });
-  if (map.mode_column.empty() && mode != header.end()) {
-    map.mode_column = *mode;
-  }
+  static constexpr const char* kMode[] = {"MODE"};
+  map.mode_column =
+      ColumnOf(kMode, "--mode", options.mode, header, source).value_or("");
   // PV keeps its own unit: nothing here depends on it.
   map.flow_unit = FlowUnit::kM3PerHour;
   return map;
@@ -345,8 +343,11 @@ std::string HintOf(const Judged& one, bool has_sp) {
            ", which is not % of its span: band and range are in its own unit";
   }
   if (e.distinct_answer == 1) {
-    return "always " + report::FormatNumber(one.window.pv.front(), 2) +
-           "; try --pv if that is another signal";
+    const bool of_x = !one.window.x.empty();
+    const auto& answer = of_x ? one.window.x : one.window.pv;
+    return std::string(of_x ? "X" : "PV") + " is always " +
+           report::FormatNumber(answer.front(), 2) + "; try " +
+           (of_x ? "--x" : "--pv") + " if the right column is another";
   }
   if (one.window.sp.empty() && one.window.x.empty() && has_sp) {
     return "SP is not there throughout and taken as constant; try --sp COLUMN";
@@ -546,8 +547,25 @@ void DrawAll(const std::vector<Judged>& judged, const std::string& path,
   }
 }
 
-void ReadRuns(const AuditOptions& options, const Context& context,
-              std::vector<LoopRecord>& records) {
+// Files and runs, one after the other. One that cannot be read does not keep
+// the others from being judged.
+void JudgeAll(const AuditOptions& options, const Context& context,
+              std::vector<Judged>& judged, Json& skipped) {
+  const auto judge = [&](const std::string& source, const auto& read) {
+    const auto skip = [&](const std::exception& error) {
+      skipped.push_back({{"source", source}, {"reason", error.what()}});
+    };
+    try {
+      JudgeRecord(read(), options, judged, skipped);
+    } catch (const DataError& error) {
+      skip(error);
+    } catch (const NotFoundError& error) {
+      skip(error);
+    }
+  };
+  for (const std::string& file : options.files) {
+    judge(file, [&] { return ReadLoop(file, options, context); });
+  }
   if (options.runs.empty() && options.valve.empty()) {
     return;
   }
@@ -559,13 +577,13 @@ void ReadRuns(const AuditOptions& options, const Context& context,
     for (const RunInfo& info : store.List(filter)) {
       ids.push_back(info.id);
     }
-    if (ids.empty()) {
+    if (ids.size() == options.runs.size()) {
       throw NotFoundError("no run of a valve " + Quoted(options.valve) +
                           "; fdi-store runs list shows what there is");
     }
   }
   for (const std::string& id : ids) {
-    records.push_back(ReadRun(id, store));
+    judge("run " + id, [&] { return ReadRun(id, store); });
   }
 }
 
@@ -579,6 +597,17 @@ Column BandColumn() {
     return report::FormatNumber(row["band_pct"].get<double>(), 2) + " (" +
            report::FormatNumber(row["band_low_pct"].get<double>(), 2) + ".." +
            report::FormatNumber(row["band_high_pct"].get<double>(), 2) + ")";
+  };
+  return column;
+}
+
+Column ReasonColumn() {
+  Column column{"reason", "reason", Format::kPlain, 2, 1};
+  column.text = [](const Json& row) {
+    const std::string reason = row["reason"];
+    return row["hint"].is_null()
+               ? reason
+               : reason + "; " + row["hint"].get<std::string>();
   };
   return column;
 }
@@ -609,21 +638,7 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
   }
   std::vector<Judged> judged;
   Json skipped = Json::array();
-  // One file that cannot be read does not keep the others from being judged.
-  for (const std::string& file : options.files) {
-    try {
-      JudgeRecord(ReadLoop(file, options, context), options, judged, skipped);
-    } catch (const DataError& error) {
-      skipped.push_back({{"source", file}, {"reason", error.what()}});
-    } catch (const NotFoundError& error) {
-      skipped.push_back({{"source", file}, {"reason", error.what()}});
-    }
-  }
-  std::vector<LoopRecord> records;
-  ReadRuns(options, context, records);
-  for (const LoopRecord& record : records) {
-    JudgeRecord(record, options, judged, skipped);
-  }
+  JudgeAll(options, context, judged, skipped);
   Rank(judged);
   Report report;
   report.document["windows"] = Rows(judged, JudgedJson);
@@ -640,7 +655,7 @@ Report AuditLoops(const AuditOptions& options, const Context& context) {
               {"LLR [-]", "prediction_gain", Format::kPlain, 1, 2},
               {"period [s]", "period_s", Format::kPlain, 0, 3},
               {"r [-]", "regularity", Format::kPlain, 1, 3},
-              {"reason", "reason", Format::kPlain, 2, 1}},
+              ReasonColumn()},
              "no window could be judged")
       .Csv("windows", {"loop", "source", "start_utc", "from_s", "samples",
                        "verdict", "certainty", "band_pct", "band_low_pct",
@@ -684,8 +699,8 @@ void AddAuditVerb(report::Program& program) {
   verb.add_flag("--ignore-x", options.ignore_x,
                 "Judge PV although the position is there");
   verb.add_option("--service", options.service,
-                  "F, P, T, A, or L for levels and what else integrates "
-                  "(default: letters of the tag)")
+                  "First letter of the tag: F, P, T or A, or L for levels and "
+                  "other integrating processes (default: from the name)")
       ->check(CLI::IsMember({"F", "P", "T", "A", "L"}, CLI::ignore_case));
   verb.add_option("--period", options.period_s,
                   "Sample period in s (0: the most usual step)")
@@ -693,8 +708,10 @@ void AddAuditVerb(report::Program& program) {
   verb.add_option("--window", options.window_s,
                   "Length of a window in s; at least 360 samples")
       ->check(CLI::PositiveNumber);
-  verb.add_option("--plot", options.plot,
-                  "Draw each window to FILE.png or FILE.svg");
+  verb.add_option(
+      "--plot", options.plot,
+      "Draw to FILE.png or FILE.svg; several windows to FILE-1.png, "
+      "FILE-2.png, ... by rank");
   options.table.AddTo(verb);
   program.AllowCsv(verb, "One line per window");
 }

@@ -90,8 +90,7 @@ Json Examine(const File& file) {
 // was deleted or replaced, and it cannot open this one.
 std::optional<std::string> MonitorElsewhere(const DataDirectory& data) {
   constexpr std::int64_t kSilenceNs = 60'000'000'000;
-  std::filesystem::path lock = data.history();
-  const auto holder = ExclusiveLock::HolderOf(lock += ".lock");
+  const auto holder = ExclusiveLock::HolderOf(data.lock());
   if (!holder) {
     return std::nullopt;
   }
@@ -108,7 +107,7 @@ std::optional<std::string> MonitorElsewhere(const DataDirectory& data) {
     return std::nullopt;
   }
   return "process " + *holder +
-         " records faults, and nothing of it is here since " +
+         " records faults, but has stored nothing here for " +
          std::to_string(kSilenceNs / 1'000'000'000) +
          " s: was the file deleted or replaced? Its log says why";
 }

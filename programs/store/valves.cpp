@@ -298,8 +298,7 @@ struct MoveOptions {
 };
 
 ExclusiveLock LockOf(const DataDirectory& data) {
-  std::filesystem::path path = data.history();
-  return {path += ".lock", "recording faults; stop it to move valves"};
+  return {data.lock(), "recording faults; stop it to move valves"};
 }
 
 // The valve of that id, or else those in models.db and history.db whose ids

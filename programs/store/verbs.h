@@ -42,13 +42,13 @@ void AddHistoryVerbs(report::Program& program);  ///< list, show, export, plot
 // Added to the group `history`, which must exist.
 void AddHistoryFigures(report::Program& program, CLI::App& group);
 void AddAlarmVerbs(report::Program& program, CLI::App& group);
+void AddAuditVerb(report::Program& program);
 void AddFaultsVerb(report::Program& program);
 void AddMaintenanceVerbs(report::Program& program);
 void AddKeysVerbs(report::Program& program);
 // Of optional components; in a build without them, left_out.cpp defines these.
 void AddPlannerVerbs(report::Program& program);  ///< health, worklist
 void AddShipVerb(report::Program& program);
-void AddAuditVerb(report::Program& program);
 
 /// Examples for --help and the manual pages.
 std::vector<report::VerbExamples> Examples();

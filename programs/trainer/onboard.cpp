@@ -134,7 +134,8 @@ FoundType FindType(const std::string& name, storage::ModelStore& store) {
                simulator::ParameterSet(shipped).instruments.flow;
       });
   if (type.parameters.medium.is_gas()) {
-    type.levels = {60.0, 1000.0, 700.0, 190.0};
+    const simulator::InventoryLoopExcitation loop;
+    type.levels = {loop.initial_cv_pct, loop.p1_kpa, loop.p2_kpa, loop.t1_degc};
   }
   return {std::move(type), false};
 }

@@ -25,7 +25,8 @@ struct Scenario {
 ///     parameters = "lublin-actuator-3"   # or a name of ParameterSetNames(),
 ///                                        # "FILE.toml", or a table
 ///     excitation = "level-loop"          # or operating-point, sine,
-///                                        # "csv:FILE", or a table
+///                                        # inventory-loop, "csv:FILE", or a
+///                                        # table
 ///     faults = ["f19:abrupt@50:strength=0.75"]   # kFaultForms
 ///     seed = 7
 ///     duration_s = 2000
@@ -76,7 +77,8 @@ void ApplyScenarioFile(const std::filesystem::path& path, Scenario& scenario);
 ValveParameters FindParameters(const std::string& name,
                                const std::filesystem::path& folder = {});
 
-/// Selects an excitation: operating-point, sine, level-loop or csv:FILE.
+/// Selects an excitation: operating-point, sine, level-loop, inventory-loop
+/// or csv:FILE.
 /// @throws ConfigError naming these; DataError.
 void ChooseExcitation(const std::string& name,
                       const std::filesystem::path& folder, Scenario& scenario);

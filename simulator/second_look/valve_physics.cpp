@@ -316,8 +316,8 @@ FDI_VISITABLE(LoopHabit, command_sd, reads_flow)
 FDI_VISITABLE(ValvePhysics, parameters, drive, x, flow, flow_mean, p1, p2, t1,
               loop)
 
-// Sets that were stored before there were these are of the default: a water
-// valve whose spring opens it.
+// Sets that were stored before there were these have the default: a water valve
+// whose spring opens it. A name with a dot at its end is that of all in it.
 constexpr std::string_view kAddedLater[] = {
     "loop.",
     "parameters.medium.",
@@ -382,7 +382,8 @@ ValvePhysics PhysicsFrom(const std::vector<PhysicalValue>& values) {
       field = static_cast<std::remove_reference_t<decltype(field)>>(
           values[next++].value);
     } else if (std::ranges::none_of(kAddedLater, [&](std::string_view added) {
-                 return name.starts_with(added);
+                 return added.ends_with('.') ? name.starts_with(added)
+                                             : name == added;
                })) {
       throw DataError("the physics of the model set lacks " + name +
                       ": onboard the valve anew");

@@ -12,6 +12,8 @@ struct DataDirectory {
   std::filesystem::path runs() const { return path / "runs.db"; }
   std::filesystem::path models() const { return path / "models.db"; }
   std::filesystem::path history() const { return path / "history.db"; }
+  /// Held by the monitor that records into history().
+  std::filesystem::path lock() const { return path / "history.db.lock"; }
 };
 
 /// Sizes of a database and of its write-ahead log [byte], 0 if the file is

@@ -222,7 +222,7 @@ class OpenFiles {
 
   /// Whether all are still the files of these names.
   bool InPlace() const { return HasDatabase() && HasWal() && HasGate(); }
-  bool HasDatabase() const { return IdOf("") == database_; }
+  bool HasDatabase() const { return database_ && IdOf("") == database_; }
   bool HasWal() const { return !wal_ || IdOf("-wal") == wal_; }
   /// Whether our WAL lies beside another database, or none.
   bool LeftWal() const { return wal_ && HasWal() && !HasDatabase(); }

@@ -167,26 +167,6 @@ std::vector<Alarm> AsAlarms(std::vector<Episode> episodes,
   return alarms;
 }
 
-AlarmCounts CountAlarms(const std::vector<Alarm>& alarms) {
-  AlarmCounts counts;
-  for (const Alarm& alarm : alarms) {
-    if (alarm.shelf) {
-      continue;
-    }
-    const Severity severity = SeverityOf(alarm.episode.priority.value_or(0))
-                                  .value_or(Severity::kMedium);
-    const auto i = static_cast<std::size_t>(severity);
-    const AlarmState state = alarm.state;
-    counts.active[i] +=
-        state == AlarmState::kUnacked || state == AlarmState::kAcked ? 1 : 0;
-    counts.unacked[i] +=
-        state == AlarmState::kUnacked || state == AlarmState::kReturnedUnacked
-            ? 1
-            : 0;
-  }
-  return counts;
-}
-
 std::vector<Shelf> ReadShelves(Database& database,
                                std::optional<std::int64_t> in_force_at_ns) {
   Statement rows = database.Prepare(SelectSql<Shelf>(

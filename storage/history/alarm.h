@@ -83,8 +83,6 @@ struct AlarmCounts {
   std::array<std::uint64_t, kSeverityCount> unacked{};  ///< Active or not.
 };
 
-AlarmCounts CountAlarms(const std::vector<Alarm>& alarms);
-
 /// Settings of ComputeAlarmStatistics().
 ///
 /// ANSI/ISA-18.2-2016 (clause on monitoring and assessment) and EEMUA 191 (3rd

@@ -276,6 +276,25 @@ std::vector<Alarm> HistoryReader::AlarmList(std::int64_t now_ns,
   return Alarms(ReadEpisodes(rows), now_ns);
 }
 
+AlarmCounts HistoryReader::CountAlarms(std::int64_t now_ns) {
+  const Snapshot snapshot(database_);
+  AlarmCounts counts;
+  for (const std::string_view part : {sql::count_active, sql::count_returned}) {
+    Statement rows = database_.Prepare(std::string(part) + " AND NOT " +
+                                       std::string(sql::is_shelved) +
+                                       " GROUP BY e.priority");
+    rows.Bind(std::nullopt, std::nullopt, std::nullopt, std::nullopt, now_ns);
+    while (rows.Step()) {
+      const Severity severity =
+          SeverityOf(rows.Int64(0)).value_or(Severity::kMedium);
+      const auto i = static_cast<std::size_t>(severity);
+      counts.active[i] += static_cast<std::uint64_t>(rows.Int64(1));
+      counts.unacked[i] += static_cast<std::uint64_t>(rows.Int64(2));
+    }
+  }
+  return counts;
+}
+
 AlarmStatistics HistoryReader::AlarmFigures(const EpisodeFilter& filter,
                                             std::int64_t now_ns) {
   return ComputeAlarmStatistics(ReadAlarmSpans(database_, filter),

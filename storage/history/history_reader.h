@@ -31,6 +31,7 @@ class HistoryReader : public History {
   std::vector<CoverageTime> Coverage(const EpisodeFilter& filter = {}) override;
   std::vector<Alarm> AlarmList(std::int64_t now_ns,
                                std::int64_t limit = 500) override;
+  AlarmCounts CountAlarms(std::int64_t now_ns);
   AlarmStatistics AlarmFigures(const EpisodeFilter& filter,
                                std::int64_t now_ns) override;
   std::vector<Shelf> Shelves(

@@ -35,11 +35,6 @@ double Finite(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-bool IsIsolation(TransitionKind kind) {
-  return kind == TransitionKind::kIsolated ||
-         kind == TransitionKind::kReisolated;
-}
-
 // Whether nothing says that the fault is gone: only the data ended.
 bool LeavesUnconfirmed(EndReason reason) {
   return reason == EndReason::kStreamEnded ||
@@ -169,7 +164,7 @@ bool StoreEvent(Database& database, const Entry& entry) {
     // Before the new priority replaces the one that was acknowledged.
     database.Cached(sql::raise_alarm)
         .Bind(entry.id, t.kind == TransitionKind::kChanged,
-              PriorityOf(t.severity), entry.recorded_ns)
+              PriorityOf(t.severity), entry.recorded_ns, t.stamp_ns)
         .Run();
     StoreStrengthNow(database, entry.id, {t.strength, t.lowest, t.highest},
                      t.severity);

@@ -27,13 +27,25 @@ e.episode_id IN (
     ORDER BY detected_ns DESC, valve_id DESC LIMIT ?1)
   UNION ALL
   SELECT episode_id FROM (
-    SELECT episode_id FROM episode e INDEXED BY episode_unacked
+    SELECT episode_id FROM episode INDEXED BY episode_returned
     WHERE acked_by IS NULL AND ended_ns IS NOT NULL AND unconfirmed_ns IS NULL
       AND (cleared_ns IS NOT NULL OR
            end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown'))
     ORDER BY detected_ns DESC, valve_id DESC LIMIT ?1)
   LIMIT ?1)
 ORDER BY e.detected_ns DESC, e.valve_id DESC
+-- Priority, how many are active and how many nobody has acknowledged, of each of
+-- the two parts of alarm_list.
+-- name: count_active
+SELECT e.priority, sum(e.unconfirmed_ns IS NOT NULL OR e.cleared_ns IS NULL),
+  sum(e.acked_by IS NULL)
+FROM episode e INDEXED BY episode_active
+WHERE (e.ended_ns IS NULL OR e.unconfirmed_ns IS NOT NULL)
+-- name: count_returned
+SELECT e.priority, 0, count(*) FROM episode e INDEXED BY episode_returned
+WHERE e.acked_by IS NULL AND e.ended_ns IS NOT NULL AND e.unconfirmed_ns IS NULL
+  AND (e.cleared_ns IS NOT NULL OR
+       e.end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown'))
 -- name: newest_of_fault
 SELECT f.episode_id
 FROM episode_fault f INDEXED BY episode_fault_by_fault
@@ -90,9 +102,11 @@ UPDATE episode SET strength = ?1, lowest = ?2, highest = ?3, priority = ?4,
     coalesce(worst_strength, ?1))
 WHERE episode_id = ?5
 -- A higher priority has to be acknowledged again. ?2: it did rise, if what it was
--- is not known.
+-- is not known. It rose with the sample of ?5, or at most 5 s before it was
+-- recorded at ?4: the other monitor of a pair may have recorded it sooner.
 -- name: raise_alarm
-UPDATE episode SET acked_by = NULL, acked_ns = NULL, raised_ns = ?4
+UPDATE episode SET acked_by = NULL, acked_ns = NULL,
+  raised_ns = max(min(?5, ?4), ?4 - 5000000000)
 WHERE episode_id = ?1 AND coalesce(priority > ?3, ?2)
 -- name: release_faults
 UPDATE episode_fault SET held = 0 WHERE episode_id = ?
@@ -167,12 +181,11 @@ ON CONFLICT (episode_id, kind, stamp_ns) DO NOTHING
 -- name: acknowledge
 UPDATE episode SET acked_by = ?, acked_ns = ?
 WHERE episode_id = ? AND acked_by IS NULL
--- Not one from before the priority rose. The other monitor may have recorded the
--- rise some seconds earlier.
+-- Not one from before the priority rose.
 -- name: adopt_ack
 UPDATE episode SET acked_by = ?1, acked_ns = ?2
 WHERE episode_id = ?3 AND (acked_ns IS NULL OR acked_ns > ?2)
-  AND (raised_ns IS NULL OR raised_ns - 5000000000 < ?2)
+  AND (raised_ns IS NULL OR raised_ns < ?2)
 -- name: adopt_label
 UPDATE episode SET label = ?1
 WHERE episode_id = ?2 AND NOT EXISTS (

@@ -325,7 +325,7 @@ test('a label reaches alarm list, tile and valve page, at once', async () => {
   await page.locator('.tile', {hasText: 'V'}).waitFor();
 
   await monitor.push('alarm', {...row, label: 'f6'});
-  await page.locator('.tile', {hasText: 'labelled was Plug worn'}).waitFor();
+  await page.locator('.tile', {hasText: 'label: was Plug worn'}).waitFor();
 
   await page.goto(`${address}/#/valve/V`);
   monitor.answers.alarms = {alarms: [{...row, label: 'f6'}]};

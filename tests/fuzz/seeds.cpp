@@ -57,7 +57,8 @@ void WriteConfigurations() {
   fdi::simulator::Scenario scenario;
   scenario.config.faults = {
       fdi::simulator::ParseFaultSchedule("f19:abrupt@50:strength=0.75")};
-  for (const std::string name : {"operating-point", "sine", "level-loop"}) {
+  for (const std::string name :
+       {"operating-point", "sine", "level-loop", "inventory-loop"}) {
     fdi::simulator::ChooseExcitation(name, {}, scenario);
     Write("toml", name, '\0' + fdi::simulator::ScenarioText(scenario));
   }

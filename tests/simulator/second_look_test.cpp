@@ -243,6 +243,19 @@ TEST(ValvePhysicsTest, SetsOfBeforeThereWereMediaAreOfWater) {
   EXPECT_EQ(valve.actuator.spring, SpringAction::kToOpen);
 }
 
+TEST(ValvePhysicsTest, AMissingValueThatWasAlwaysThereIsRefused) {
+  for (const char* name :
+       {"parameters.actuator.spring_rate_n_m", "parameters.trim.exponent"}) {
+    std::vector<PhysicalValue> values = ToValues(Physics());
+    ASSERT_EQ(std::erase_if(values,
+                            [name](const PhysicalValue& value) {
+                              return value.name == name;
+                            }),
+              1U);
+    EXPECT_THROW(PhysicsFrom(values), DataError) << name;
+  }
+}
+
 TEST(ValvePhysicsTest, TablesAndMediaAreReadBack) {
   ValvePhysics physics = Physics();
   physics.parameters.trim.characteristic = FlowCharacteristic::kTable;

@@ -266,8 +266,6 @@ TEST_F(DatabaseTest, AReaderCanCopyTheFile) {
   EXPECT_THROW(reader.BackupTo(directory_.path() / "copy.db"), DataError);
 }
 
-// Two processes that add to one row: without the gate and BEGIN IMMEDIATE an
-// update would be lost or refused.
 TEST_F(DatabaseTest, ADeletedFileTakesNoCommitAndIsMadeAnew) {
   Database database(file_, SchemaOf(1), Access::kWriter);
   Insert(database, 1);
@@ -379,6 +377,8 @@ TEST_F(DatabaseTest, WhatNobodyHasOpenIsReadWithoutWriting) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
+// Two processes that add to one row: without the gate and BEGIN IMMEDIATE an
+// update would be lost or refused.
 TEST_F(DatabaseTest, WritersOfTwoProcessesTakeTurns) {
   constexpr int kRounds = 100;
   {

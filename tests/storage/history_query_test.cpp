@@ -77,7 +77,7 @@ TEST_F(HistoryQueryTest, AlarmsAndTheirFiguresWalkIndexes) {
               HasSubstr("COVERING INDEX episode_statistics"));
   const std::string plan = PlanOf(AlarmListQuery());
   EXPECT_THAT(plan, HasSubstr("episode_active"));
-  EXPECT_THAT(plan, HasSubstr("episode_unacked"));
+  EXPECT_THAT(plan, HasSubstr("episode_returned"));
   EXPECT_THAT(plan, Not(HasSubstr("SCAN e\n")));
 }
 

@@ -328,8 +328,8 @@ TEST_F(GrowingAlarmTest, ItsStrengthIsThatOfNowAndItsWorstIsKept) {
   EXPECT_EQ(Shown().worst_strength, 0.2);
   EXPECT_EQ(Shown().acked_by, "anna");
   StrengthPoint other = Point(901, 0.9, Severity::kLow);
-  other.severity
-      .reset();  // Not of the fault that the name has its strength of.
+  // Not of the fault that the name has its strength of.
+  other.severity.reset();
   writer_.StoreStrength(other);
   EXPECT_EQ(Shown().strength, 0.1);
   EXPECT_EQ(Sql("SELECT strength || ' ' || worst_strength || ' ' || severity ||"
@@ -362,9 +362,18 @@ TEST_F(GrowingAlarmTest, AHigherPriorityHasToBeAcknowledgedAgain) {
   before.origin = "test";
   EXPECT_TRUE(editor_.Adopt(before));
   EXPECT_EQ(Shown().acked_by, std::nullopt);
+  const auto critical = [&] {
+    const AlarmCounts counts = HistoryReader(path_).CountAlarms(rose);
+    const auto i = static_cast<std::size_t>(Severity::kCritical);
+    return std::pair(counts.active[i], counts.unacked[i]);
+  };
+  EXPECT_EQ(critical(), std::pair(1UL, 1UL));
   before.stamp_ns += 1;
   EXPECT_TRUE(editor_.Adopt(before));
   EXPECT_EQ(Shown().acked_by, "jan");
+  EXPECT_EQ(critical(), std::pair(1UL, 0UL));
+  editor_.Shelve("LV-1", std::nullopt, rose + kSecond, By("jan", rose - 1));
+  EXPECT_EQ(critical(), std::pair(0UL, 0UL));
 }
 
 TEST_F(GrowingAlarmTest, AnotherNameHasToBeAcknowledgedAgainIfItIsWorse) {

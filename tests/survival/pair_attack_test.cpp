@@ -23,25 +23,12 @@ namespace fdi::monitor {
 namespace {
 
 using std::chrono::milliseconds;
-using Clock = std::chrono::steady_clock;
 
 constexpr int kAttackedValves = 20;
 
 int PairRounds(int otherwise) {
   const char* text = std::getenv("FDI_PAIR_ROUNDS");
   return text == nullptr ? otherwise : std::atoi(text);
-}
-
-bool Awaits(const std::function<bool()>& condition,
-            milliseconds patience = milliseconds(30'000)) {
-  const auto end = Clock::now() + patience;
-  while (!condition()) {
-    if (Clock::now() > end) {
-      return false;
-    }
-    std::this_thread::sleep_for(milliseconds(10));
-  }
-  return true;
 }
 
 using TransitionKey = std::tuple<std::uint64_t, std::string, std::int64_t>;
@@ -122,7 +109,7 @@ class PairAttackTest : public testing::Test {
   /// Waits until both speak and one leads. @returns which one leads.
   int Leader() {
     int leader = -1;
-    EXPECT_TRUE(Awaits([&] {
+    EXPECT_TRUE(Await([&] {
       const auto leaders = plant_.Leaders();
       for (int i = 0; i < 2; ++i) {
         leader = leaders == std::vector{std::to_string(monitors_[i]->pid())}
@@ -160,8 +147,8 @@ class PairAttackTest : public testing::Test {
   /// The valves recover, all episodes end, both monitors stop.
   void Finish() {
     plant_.SetFaulty(false);
-    EXPECT_TRUE(Awaits([this] { return plant_.Settled(); }));
-    Awaits([this] { return plant_.Open() == 0; }, milliseconds(10'000));
+    EXPECT_TRUE(Await([this] { return plant_.Settled(); }));
+    Await([this] { return plant_.Open() == 0; }, milliseconds(10'000));
     // The minute within which an episode may be resumed passes in 3 s.
     std::this_thread::sleep_for(milliseconds(4000));
     for (const auto& monitor : monitors_) {
@@ -297,7 +284,7 @@ TEST_F(PairAttackTest, AStandbyThatSettlesAsValvesFailFindsNoEpisodeOfItsOwn) {
   for (int round = 0; round < PairRounds(3); ++round) {
     plant_.SetFaulty(false);
     EXPECT_TRUE(
-        Awaits([this] { return plant_.Open() == 0 && plant_.Settled(); }));
+        Await([this] { return plant_.Open() == 0 && plant_.Settled(); }));
     const int standby = 1 - Leader();
     Kill(standby);
     EXPECT_TRUE(monitors_[standby]->AwaitLine("monitor_ready"));

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -24,6 +25,20 @@ inline void StorePairModels(const std::filesystem::path& data) {
   storage::ModelStore store(data / "models.db",
                             storage::Access::kOccasionalWriter);
   store.Save(LinearModels(), storage::Activation::kAlways);
+}
+
+/// @returns whether the condition came true before the patience ended.
+inline bool Await(
+    const std::function<bool()>& condition,
+    std::chrono::milliseconds patience = std::chrono::milliseconds(30'000)) {
+  const auto end = std::chrono::steady_clock::now() + patience;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) {
+      return false;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return true;
 }
 
 /// Valves of a pair of monitors and a subscriber of what these publish: whether

@@ -12,7 +12,6 @@
 // Usage: pair_rounds prepare DATA | pair_rounds run ADDRESS DOMAIN VALVES
 // FAULTY
 #include <cstdio>
-#include <functional>
 #include <iostream>
 #include <sstream>
 
@@ -20,19 +19,9 @@
 
 namespace {
 
+using fdi::monitor::Await;
 using fdi::monitor::PairPlant;
 using Clock = PairPlant::Clock;
-
-bool Await(const std::function<bool()>& condition, int seconds) {
-  const auto end = Clock::now() + std::chrono::seconds(seconds);
-  while (!condition()) {
-    if (Clock::now() > end) {
-      return false;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return true;
-}
 
 void Say(const std::string& line) {
   std::cout << line << std::endl;  // A script waits for it.
@@ -59,14 +48,16 @@ int Run(const fdi::idl::DdsOptions& dds, int valves, int faulty) {
     int seconds = 0;
     words >> command >> seconds;
     if (command == "ready") {
-      const bool settled = Await([&] { return plant.Settled(); }, seconds);
+      const bool settled =
+          Await([&] { return plant.Settled(); }, std::chrono::seconds(seconds));
       const auto leaders = plant.Leaders();
       Say(settled && leaders.size() == 1 ? leaders.front() : "0");
     } else if (command == "mark") {
       mark = Clock::now();
       Say("ok");
     } else if (command == "late") {
-      Await([&] { return plant.NextVectors(mark).missing == 0; }, 10);
+      Await([&] { return plant.NextVectors(mark).missing == 0; },
+            std::chrono::seconds(10));
       const PairPlant::Delay delay = plant.NextVectors(mark);
       Say(std::to_string(delay.median) + " " + std::to_string(delay.worst) +
           " " + std::to_string(delay.missing));
@@ -75,7 +66,7 @@ int Run(const fdi::idl::DdsOptions& dds, int valves, int faulty) {
       plant.SetFaulty(true);
       Await(
           [&] { return plant.Isolated() >= static_cast<std::size_t>(faulty); },
-          60);
+          std::chrono::seconds(60));
       Say(std::to_string(plant.Isolated()));
     } else if (command == "totals") {
       Say(Totals(plant.Count()));

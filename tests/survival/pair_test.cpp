@@ -1,7 +1,6 @@
 // A pair of monitors on loopback whose leader is killed, stopped and ended.
 #include <csignal>
 #include <fstream>
-#include <functional>
 #include <memory>
 
 #include <gtest/gtest.h>
@@ -22,18 +21,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kValves = 50;
 constexpr std::size_t kFaulty = 5;
-
-bool Await(const std::function<bool()>& condition,
-           milliseconds patience = milliseconds(30'000)) {
-  const auto end = Clock::now() + patience;
-  while (!condition()) {
-    if (Clock::now() > end) {
-      return false;
-    }
-    std::this_thread::sleep_for(milliseconds(10));
-  }
-  return true;
-}
 
 class PairTest : public testing::Test {
  protected:

@@ -575,12 +575,12 @@ Onboarding Onboard(const std::vector<TrainingRun>& all,
                     ? InUnit(options.type, runs.front().flow_unit)
                     : options.type;
   result.signals = signals;
-  const double meter_end = result.type.parameters.instruments.flow.high;
   WidenRanges(runs, result.type.parameters.instruments);
   if (options.fit && result.type.of_any_size &&
       (signals & MaskOf(Signal::kF)) != 0) {
     Resize(runs, result);
   }
+  const double meter_end = result.type.parameters.instruments.flow.high;
   if (options.fit) {
     Part(progress, 0.0, kFitShare)(0.0, "fitting the physical parameters");
     OnboardingOptions fit = options;

@@ -80,11 +80,9 @@ void CheckPressures(const Readings& p1, const Readings& p2, const Readings& t1,
     throw DataError(
         p1.Seen() +
         (vapour > 0.0 ? ", and " + t1.Seen() +
-                            ": the liquid boils "
-                            "there below " +
-                            Text(vapour) +
-                            " kPa (for a gas or steam, --type names one of "
-                            "that medium)"
+                            ": the liquid boils there below " + Text(vapour) +
+                            " kPa (for a gas or steam, give a --type of that "
+                            "medium)"
                       : std::string()) +
         "; expected kPa absolute and degC. Map bar with scale = 100, MPa with "
         "scale = 1000, gauge pressure with offset = 101.3, K with offset = "

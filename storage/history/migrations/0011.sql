@@ -19,8 +19,17 @@ WHERE end_reason IN ('stream_ended', 'stale_timeout', 'unknown')
     SELECT 1 FROM episode o
     WHERE o.valve_id = episode.valve_id AND o.detected_ns > episode.detected_ns);
 
+INSERT INTO change (item, key, part)
+SELECT 'episode', episode_id, 0 FROM episode
+WHERE (isolated_ns IS NOT NULL OR unconfirmed_ns IS NOT NULL)
+  AND EXISTS (SELECT 1 FROM ship_cursor);
+
 CREATE INDEX episode_active ON episode (detected_ns, valve_id)
   WHERE ended_ns IS NULL OR unconfirmed_ns IS NOT NULL;
+CREATE INDEX episode_returned ON episode (detected_ns, valve_id)
+  WHERE acked_by IS NULL AND ended_ns IS NOT NULL AND unconfirmed_ns IS NULL
+    AND (cleared_ns IS NOT NULL OR
+         end_reason NOT IN ('stream_ended', 'stale_timeout', 'unknown'));
 CREATE INDEX episode_unconfirmed ON episode (valve_id)
   WHERE unconfirmed_ns IS NOT NULL;
 

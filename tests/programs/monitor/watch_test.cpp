@@ -79,7 +79,7 @@ TEST_F(WatchTest, AnEventSaysHowSureItsNameIs) {
   event.candidates = {{19, 0.8, 0.5, true}};
   watch_.Add(event, now_);
 
-  EXPECT_THAT(records_[0].line, HasSubstr("DETECTED not yet, f1 may be"));
+  EXPECT_THAT(records_[0].line, HasSubstr("DETECTED not yet, may be f1"));
   EXPECT_TRUE(records_[0].object["strength"].is_null());
   EXPECT_THAT(records_[1].line, HasSubstr("ISOLATED likely f19 strength=0.50"));
   EXPECT_EQ(records_[1].object["certainty"], "likely");

@@ -218,7 +218,7 @@ TEST_F(FdiStoreHistoryTest, DoctorSaysWhatIsRecordedElsewhere) {
     const Outcome outcome = Store("doctor");
     EXPECT_EQ(outcome.code, 3);
     EXPECT_THAT(outcome.out, HasSubstr("history.db: process "));
-    EXPECT_THAT(outcome.out, HasSubstr("nothing of it is here"));
+    EXPECT_THAT(outcome.out, HasSubstr("has stored nothing here"));
 
     HistoryWriter writer(path_);
     writer.BeginSession(UtcNow(), "test", "");

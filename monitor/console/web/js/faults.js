@@ -29,7 +29,7 @@ export function faultTitle(fault) {
 
 /** "likely", "one of 3"; empty for what needs no word. */
 export function certaintyText({certainty, faults, fault}) {
-  const count = members(fault ?? faults?.join('|')).length;
+  const count = members(faults?.join('|') || fault).length;
   return certainty === 'one of' ? `one of ${count}` : certainty ?? '';
 }
 
@@ -86,6 +86,10 @@ export const namurText = (name) => name ? plain(name) : '–';
 export const inAlarm = ({state}) =>
   state === 'DETECTED' || state === 'ISOLATED';
 
+/** What a tile is named after: "f19|f3", "unknown", or empty. */
+export const faultOfTile = (tile) => !inAlarm(tile) ? tile.fault :
+  tile.certainty === 'not known' ? 'unknown' : tile.faults.join('|');
+
 const kStateWords = {
   NORMAL: 'normal', NOT_JUDGED: 'not judged',
   PARTLY_JUDGED: 'partly judged', DETECTED: 'fault detected',
@@ -107,7 +111,7 @@ const kReasonWords = {
   cv_step: 'command stepped as never in training',
   parked: 'parked at an end of travel', dp: 'pressure drop outside normal',
   t1: 'T1 outside normal', p1: 'P1 outside normal', p2: 'P2 outside normal',
-  waiting: 'not for long enough yet',
+  waiting: 'back inside, but not for long enough yet',
 };
 const kRefusalWords = {
   bad_quality: 'marked bad at the source', not_finite: 'no number',

@@ -76,10 +76,13 @@ export function factorText(value) {
     '–' : value.toFixed(2);
 }
 
+/** "12 %", and "0 %": the end of an interval. */
+export const wholePercent = (v) => `${Math.round(100 * v)} %`;
+
 /** "12 %" of what the model set was trained to; a dash where it is none. */
 export function percentText(value) {
   return value === null || value === undefined || !Number.isFinite(value) ||
-    Math.abs(value) < 0.005 ? '–' : `${Math.round(100 * value)} %`;
+    Math.abs(value) < 0.005 ? '–' : wholePercent(value);
 }
 
 /** How strong a fault is, in words; empty where it is none. */
@@ -91,10 +94,11 @@ export function strengthText(value) {
 }
 
 /** "12 % (10 % to 14 %)"; an interval without width is not known. */
-export function intervalText({value, lowest, highest}, text, unit = '') {
+export function intervalText({value, lowest, highest}, text, unit = '',
+    end = text) {
   const known = lowest !== null && lowest !== undefined && lowest < highest;
   return text(value) + unit +
-      (known ? ` (${text(lowest)} to ${text(highest)})` : '');
+      (known ? ` (${end(lowest)} to ${end(highest)})` : '');
 }
 
 /** Names with digits in the order a reader expects: FV-2 before FV-10. */

@@ -36,6 +36,7 @@ class Alarms extends View {
   #head = h('thead', {role: 'rowgroup'});
   #chips = new Map();
   #causes = h('div', {role: 'status'});
+  #shownCauses = '[]';  // What is made anew is read out anew.
   #nothing = h('p', {class: 'nothing', hidden: true});
   #bulk = button('', () => this.#acknowledgeSelected(),
       {class: 'primary', hidden: true});
@@ -70,7 +71,10 @@ class Alarms extends View {
   async #fetchCauses() {
     try {
       const {causes} = await get('/causes');
-      if (!this.gone) replace(this.#causes, causes.map(causeLine));
+      const key = JSON.stringify(causes);
+      if (this.gone || key === this.#shownCauses) return;
+      this.#shownCauses = key;
+      replace(this.#causes, causes.map(causeLine));
     } catch {
       // Asked again soon.
     }

@@ -10,7 +10,8 @@ import {button, errorNote, factList, h, replace, setText} from '../dom.js';
 import {certaintyNode, faultTitle, groupName, layerText, markWord, members, namurText,
   priorityNames, priorityOf, prioritySign, stateWord, unconfirmedText}
   from '../faults.js';
-import {durationText, intervalText, percentText, zoneName} from '../format.js';
+import {durationText, intervalText, percentText, wholePercent, zoneName}
+  from '../format.js';
 import {link} from '../route.js';
 import {store} from '../store.js';
 import {dataTable, labelText, lastedText, timeCell, valveLink}
@@ -20,7 +21,7 @@ import {View} from './view.js';
 const kEndWords = {
   cleared: 'normal again', stream_ended: 'the publisher ended its stream',
   stale_timeout: 'no samples for too long', model_changed: 'model set changed',
-  superseded: 'superseded', unknown: 'the monitor was down in it',
+  superseded: 'superseded', unknown: 'the monitor was down meanwhile',
 };
 
 function facts({episode: row, model_hash: hash}) {
@@ -42,7 +43,8 @@ function facts({episode: row, model_hash: hash}) {
     ['End', row.end_reason ? kEndWords[row.end_reason] ?? row.end_reason :
       'still open'],
     ['How sure', certaintyNode(row, '')],
-    ['Strength now', intervalText({...row, value: row.strength}, percentText)],
+    ['Strength', intervalText({...row, value: row.strength}, percentText, '',
+        wholePercent)],
     ['At its worst', percentText(row.worst_strength)],
     ['For', row.discipline ?? '–'],
     ['NE 107', namurText(row.namur)],
@@ -78,7 +80,7 @@ const kLookColumns = [
   {text: 'Fault', header: true, cell: ({fault}) => faultTitle(fault)},
   {text: 'Strength', cell: ({strength}) => percentText(strength)},
   {text: '95 % interval', cell: ({lowest, highest}) => lowest < highest ?
-    `${percentText(lowest)} to ${percentText(highest)}` : 'not known'},
+    `${wholePercent(lowest)} to ${wholePercent(highest)}` : 'not known'},
   {text: 'Begins', cell: ({begins_ms: begins, growing}) =>
     h('span', {}, timeCell(begins), growing ? ', growing' : '')},
 ];
@@ -116,7 +118,8 @@ function growthPart(growth) {
   const {fault, strength: value, lowest, highest, rate, full_in_ms: full} =
       growth;
   const said = [
-    `strength ${intervalText({value, lowest, highest}, percentText)}`,
+    `strength ${intervalText({value, lowest, highest}, percentText, '',
+        wholePercent)}`,
     rate ? rateText(rate) : null,
   ].filter(Boolean).join(', ');
   return h('p', {class: 'growth'}, h('strong', {}, faultTitle(fault)), ': ',

@@ -2,7 +2,7 @@
 // document, only what changed is touched, a few milliseconds of it a frame.
 
 import {button, cssColor, h, replace, select, setText} from '../dom.js';
-import {faultTitle, inAlarm} from '../faults.js';
+import {faultOfTile, faultTitle, inAlarm} from '../faults.js';
 import {compareNames, groupOfId} from '../format.js';
 import {rememberQuery} from '../route.js';
 import {settings} from '../settings.js';
@@ -25,7 +25,7 @@ const kFilters = [
 
 function matches(tile, words) {
   if (words.length === 0) return true;
-  const fault = inAlarm(tile) ? faultTitle(tile.faults.join('|')) : '';
+  const fault = inAlarm(tile) ? faultTitle(faultOfTile(tile)) : '';
   const text = [tile.id, fault, tile.quality, tile.model_set, tile.monitor]
       .join(' ').toLowerCase();
   return words.every((word) => text.includes(word));

@@ -2,8 +2,8 @@
 
 import {drawSparkline} from '../charts/sparkline.js';
 import {h, setText} from '../dom.js';
-import {certaintyText, factorTitle, faultName, faultTitle, inAlarm,
-  priorityNames, priorityOf, prioritySign, qualityText, stateWord,
+import {certaintyText, factorTitle, faultName, faultOfTile, faultTitle,
+  inAlarm, priorityNames, priorityOf, prioritySign, qualityText, stateWord,
   unconfirmedText} from '../faults.js';
 import {clockText, percentText, strengthText, timeText} from '../format.js';
 import {link} from '../route.js';
@@ -27,8 +27,7 @@ export function rankOf(tile) {
 
 function whatText(tile) {
   if (inAlarm(tile)) {
-    const name = faultName(tile.certainty === 'not known' ? 'unknown' :
-      tile.faults.join('|'));
+    const name = faultName(faultOfTile(tile));
     return name[0].toUpperCase() + name.slice(1);
   }
   if (tile.unconfirmed_ms) {
@@ -78,11 +77,11 @@ export class Tile {
     const [rank, priority] = rankOf(tile);
     const what = whatText(tile);
     const label = store.alarms.get(tile.episode)?.label;
-    const quality = [qualityText(tile), label && `labelled ${labelText(label)}`]
+    const quality = [qualityText(tile), label && `label: ${labelText(label)}`]
         .filter(Boolean).join('; ') || (tile.monitor ?? '');
     this.element.className = 'tile' + (alarm ? ` alarm p${priority}` : '') +
-        ` rank${rank}` + (['NOT_JUDGED', 'PARTLY_JUDGED'].includes(tile.state) ||
-        tile.quality !== 'LIVE' ? ' not-live' : '');
+        ` rank${rank}` + (tile.quality !== 'LIVE' ||
+        tile.state === 'PARTLY_JUDGED' ? ' not-live' : '');
     this.#showSign(alarm ? priority : 0, tile.state === 'ISOLATED');
     setText(this.#what, what);
     setText(this.#certainty, alarm ? certaintyText(tile) : '');
@@ -96,8 +95,7 @@ export class Tile {
     setText(this.#spoken, alarm ? `, ${priorityNames[priority]}, ` +
       stateWord(tile.state) + (tile.unacked ? ', unacknowledged' : '') :
       what ? '' : ', normal');
-    this.#what.title = alarm ?
-      faultTitle(inAlarm(tile) ? tile.faults.join('|') : tile.fault) : '';
+    this.#what.title = alarm ? faultTitle(faultOfTile(tile)) : '';
     // A calm valve draws no line: a line is a deviation, and says so.
     const spark = tile.spark ?? [];
     this.#canvas.hidden = !spark.some((v) => v > kDeviation);

@@ -5,7 +5,7 @@ import {Timeline} from '../charts/timeline.js';
 import {TrendData} from '../charts/trend_data.js';
 import {button, h, replace, setText} from '../dom.js';
 import {driftLines} from '../drift.js';
-import {certaintyNode, factorTitle, faultName, faultTitle, inAlarm,
+import {certaintyNode, factorTitle, faultName, faultOfTile, faultTitle, inAlarm,
   priorityNames, priorityOf, prioritySign, qualityText, stateWord,
   unconfirmedText} from '../faults.js';
 import {durationText, numberText, percentText, strengthText, timeText,
@@ -36,8 +36,7 @@ function stateLine(tile) {
   return [
     h('span', {class: 'tag strong'},
         prioritySign(priority, tile.state === 'ISOLATED'),
-        `${stateWord(tile.state)}: ` + faultTitle(tile.certainty ===
-          'not known' ? 'unknown' : tile.faults.join('|'))),
+        `${stateWord(tile.state)}: ${faultTitle(faultOfTile(tile))}`),
     certaintyNode(tile),
     h('span', {class: 'tag'}, priorityNames[priority]),
     percentText(tile.strength) === '–' ? null :
@@ -45,7 +44,7 @@ function stateLine(tile) {
           strengthText(tile.strength)),
     tile.since_ms === null ? null : h('span', {class: 'tag'},
         `for ${durationText(store.valveNowMs(tile.id) - tile.since_ms)}`),
-    label && h('span', {class: 'tag'}, `labelled ${labelText(label)}`),
+    label && h('span', {class: 'tag'}, `label: ${labelText(label)}`),
     quality,
     tile.episode ? h('a', {href: link('episode', tile.episode)},
         'Open the episode') : null,
@@ -87,7 +86,7 @@ function scopeText({model_set: set, missing}) {
  * What explains the data, in words: [{name, fits, d, strong}]. While it is
  * normal, no fault is listed: those that change nothing then explain it, too.
  */
-export function explanations({faults, T}, state, d0, d) {
+function explanations({faults, T}, state, d0, d) {
   const normal = {name: 'normal', d: d0, fits: state === 'NOT_JUDGED' ?
     'not judged' : d0 >= T || state === 'NORMAL' ? 'yes' : 'no'};
   const ranked = faults.map((fault, f) => ({name: faultTitle(fault), d: d[f]}))
