@@ -19,9 +19,13 @@ space() { echo "fdi-n$1-$tag"; }
 declare -a monitor shipper publisher
 watcher=
 
+kill_now() {
+  kill -9 "$1" 2>/dev/null || true
+  wait "$1" 2>/dev/null || true
+}
 finish() {
   for pid in "${monitor[@]:-}" "${shipper[@]:-}" "${publisher[@]:-}" "$watcher"; do
-    [ -z "$pid" ] || kill -9 "$pid" 2>/dev/null || true
+    [ -z "$pid" ] || kill_now "$pid"
   done
   [ ! -e "$out/cluster/postmaster.pid" ] ||
     postgres "$pg/pg_ctl" -D "$out/cluster" -m immediate stop >/dev/null || true
@@ -110,16 +114,12 @@ start_shipper() {  # MONITOR
     --every 1s >/dev/null 2>>"$out/shipper$1.log" &
   shipper[$1]=$!
 }
-kill_now() {
-  kill -9 "$1"
-  wait "$1" 2>/dev/null || true
-}
-
 ip netns exec "$hub" "$bin/fdi-monitor" --interface 10.79.0.3 \
-  watch --lossless --events >"$out/bus" 2>"$out/watch.log" &
+  watch --lossless --events --json >"$out/bus" 2>"$out/watch.log" &
 watcher=$!
 for i in 1 2; do
   start_monitor $i
+  until [ -e "$out/data$i/history.db" ]; do sleep 0.1; done
   start_shipper $i
 done
 # Each stream has two faults a minute, in turn, and a healthy minute at the end.
@@ -181,8 +181,7 @@ for i in 1 2; do
   monitor[$i]=
 done
 for i in 1 2; do
-  kill -TERM "${shipper[$i]}"
-  wait "${shipper[$i]}" || fail "shipper $i ended with $?"
+  kill_now "${shipper[$i]}"
   shipper[$i]=
   "$bin/fdi-store" ship --data "$out/data$i" --to "$url" --monitor "m$i" \
     >/dev/null || fail "the last rows of m$i were not shipped"
@@ -197,13 +196,13 @@ where="coalesce(end_reason, '') <> 'superseded'"
 for i in 1 2; do
   sqlite3 -readonly "$out/data$i/history.db" \
     "SELECT $columns FROM episode WHERE $where" | sort >"$out/history$i.txt"
-  psql "$url" -At -c "SELECT $columns FROM fdi.episode JOIN fdi.monitor
-    USING (monitor_id) WHERE monitor = 'm$i' AND $where" | sort >"$out/plant$i.txt"
+  psql "$url" -At -c "SELECT $columns FROM fdi.episode JOIN fdi.monitor m
+    USING (monitor_id) WHERE m.monitor = 'm$i' AND $where" | sort >"$out/plant$i.txt"
 done
 closed() { grep -c ' ' "$1" || true; }
 jq_id='s/.*"episode_id": *"\([^"]*\)".*/\1/p'
 sed -n "$jq_id" "$out/bus" | sort -u >"$out/heard.txt"
-"$bin/fdi-store" --data "$out/data1" history list --state all --json 2>/dev/null |
+"$bin/fdi-store" --data "$out/data1" history list --state any --json 2>/dev/null |
   sed -n "$jq_id" | sort -u >"$out/listed.txt"
 echo "mixed: $seconds s, seed $seed, strikes:" \
   "$(for kind in "${!strikes[@]}"; do echo -n "$kind ${strikes[$kind]} "; done)"
