@@ -307,7 +307,8 @@ void EpisodeTracker::TryRecovery(const Sample& sample, const ModelSet& models,
   if (recovered_->model_hash != models.content_hash) {
     CloseRecovered(EndReason::kModelChanged, sample.stamp_ns, outlet);
   } else if (recovered_->source_id != sample.source_id ||
-             sample.stamp_ns - first_stamp_ns_ > window_ns_) {
+             sample.stamp_ns - first_stamp_ns_ >
+                 (standby_ ? 2 : 1) * window_ns_) {  // The leader ends it first.
     CloseRecovered(EndReason::kUnknown, sample.stamp_ns, outlet);
   }
 }

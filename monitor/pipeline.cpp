@@ -172,7 +172,7 @@ void Pipeline::Recover(const std::vector<OpenEpisode>& episodes) {
     tracker.Recover(newer);
   }
   if (!episodes.empty()) {
-    recovery_deadline_ = last_poll_ + options_.recovery_window;
+    AwaitRecovery();
   }
 }
 
@@ -432,7 +432,7 @@ void Pipeline::Adopt(FaultEvent event) {
   EpisodeTracker& tracker = Recovered(event.valve_id);
   tracker.Adopt(event, journal_);
   if (tracker.recovering() != nullptr) {
-    recovery_deadline_ = last_poll_ + options_.recovery_window;
+    AwaitRecovery();
     Reserve(event.valve_id);
   }
 }
@@ -447,7 +447,7 @@ void Pipeline::StandBy(bool standby) {
   for (auto& [id, tracker] : recovered_) {
     tracker.StandBy(standby, journal_);
   }
-  recovery_deadline_ = last_poll_ + options_.recovery_window;
+  AwaitRecovery();
 }
 
 void Pipeline::Count(const Valve& valve, const Sample& sample,
@@ -585,6 +585,12 @@ void Pipeline::CheckSilentValves(TimePoint now) {
   }
   TakeCheckpoint(true);
   UpdateCensus();
+}
+
+// A standby waits for longer than its leader, whose ends are those of both.
+void Pipeline::AwaitRecovery() {
+  recovery_deadline_ =
+      last_poll_ + (standby_ ? 2 : 1) * options_.recovery_window;
 }
 
 void Pipeline::ExpireRecovery() {

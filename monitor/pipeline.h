@@ -190,6 +190,7 @@ class Pipeline {
   void ReportDriftAtBound(Valve& valve, std::size_t channel,
                           const FollowedDrift& drift);
   void CheckSilentValves(TimePoint now);
+  void AwaitRecovery();
   void ExpireRecovery();
   void UpdateCensus();
   void PublishLast();

@@ -328,6 +328,31 @@ TEST_F(PairEpisodeTest, AnEpisodeThatNobodyHeardOfGivesWayToTheLeaders) {
   EXPECT_EQ(standby_.said[0].transition.stamp_ns, PlantSample(100).stamp_ns);
 }
 
+// Both find it open when they start again, the standby some samples earlier.
+TEST_F(PairEpisodeTest, TheLeaderEndsWhatBothFoundOpenAndIsGone) {
+  const OpenEpisode open = OpenEpisodeOf(Said(Kind::kIsolated, 10, 15));
+  leader_.valve.Recover(open);
+  standby_.valve.Recover(open);
+  for (; k_ < 180; ++k_) {
+    standby_.Feed(k_, 0.0);
+    if (k_ >= 20) {
+      leader_.Feed(k_, 0.0);
+    }
+    standby_.Hear(leader_);
+  }
+  ASSERT_THAT(leader_.Kinds(), ElementsAre(Kind::kClosed));
+  EXPECT_EQ(leader_.said[0].transition.reason, EndReason::kUnknown);
+  EXPECT_THAT(standby_.Kinds(), IsEmpty());
+
+  // It was closed while this one was away: there is no word of it any more.
+  PairMember alone(true);
+  alone.valve.Recover(open);
+  for (std::uint64_t k = 0; k < 180; ++k) {
+    alone.Feed(k, 0.0);
+  }
+  EXPECT_THAT(alone.Kinds(), ElementsAre(Kind::kClosed));
+}
+
 // The leader has seen it end, and dies; here it has not ended for a minute.
 TEST_F(PairEpisodeTest, AFaultThatOutlastsTheLeadersEndIsDetectedAnew) {
   Run(0, 100, 1000, 120);
